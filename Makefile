@@ -1,0 +1,31 @@
+# Two commands do everything: `make report` (the comparison) and `make test`. Each makes .venv itself.
+PYTHON ?= python3
+BIN := .venv/bin
+OUT ?= out
+
+.PHONY: install report test check format clean
+
+install: .venv/.installed
+
+.venv/.installed: pyproject.toml constraints.txt
+	$(PYTHON) -m venv .venv
+	PIP_CONSTRAINT=constraints.txt $(BIN)/python -m pip install --quiet --editable ".[dev]"
+	touch $@
+
+report: install
+	$(BIN)/proofroll report --out $(OUT)
+
+test: install
+	$(BIN)/python -m pytest -n 2
+
+check: install
+	$(BIN)/ruff check .
+	$(BIN)/ruff format --check .
+	$(BIN)/mypy
+
+format: install
+	$(BIN)/ruff check --fix .
+	$(BIN)/ruff format .
+
+clean:
+	rm -rf $(OUT) dist build .pytest_cache .mypy_cache .ruff_cache .hypothesis

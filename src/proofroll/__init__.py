@@ -1,0 +1,24 @@
+"""Which multibody engine, formulation and time step can you trust for this scene?
+
+The public names, loaded when they are first used, so that importing proofroll stays light.
+"""
+
+from __future__ import annotations
+
+from importlib import import_module
+from typing import TYPE_CHECKING, Any
+
+if TYPE_CHECKING:
+    from proofroll.scene_file import load_scene
+    from proofroll.simulate import simulate
+
+__all__ = ["load_scene", "simulate"]
+__version__ = "0.1.0"
+
+_HOMES = {"load_scene": "proofroll.scene_file", "simulate": "proofroll.simulate"}
+
+
+def __getattr__(name: str) -> Any:
+    if name not in _HOMES:
+        raise AttributeError(f"module 'proofroll' has no attribute {name!r}")
+    return getattr(import_module(_HOMES[name]), name)

@@ -1,0 +1,105 @@
+"""Equivalence first: what the engine really built, held against the scene before anything is stepped."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+
+from proofroll.mechanics import initial_response, slip_velocity
+from proofroll.scene import Scene
+
+# Engines that compute in double precision reproduce the scene's numbers to this relative difference.
+EXACT = 1e-12
+
+
+@dataclass(frozen=True)
+class Line:
+    """One quantity of the certificate.
+
+    Attributes:
+        quantity: what is compared.
+        unit: its unit.
+        expected, found: from the scene, and read back from the engine.
+        difference: relative to the quantity's scale.
+        tolerance: largest difference that is accepted.
+        because: why the tolerance is not round-off; empty if it is.
+    """
+
+    quantity: str
+    unit: str
+    expected: tuple[float, ...]
+    found: tuple[float, ...]
+    difference: float
+    tolerance: float
+    because: str = ""
+
+    @property
+    def holds(self) -> bool:
+        """Whether the engine built what the scene says."""
+        return bool(self.difference <= self.tolerance)
+
+
+def certify(engine: Any, scene: Scene) -> list[Line]:
+    """Compares a freshly built engine with the scene. Quantities about which the engine is silent are left out."""
+    body = scene.rolling
+    built, sample = engine.built(), engine.sample()
+    acceleration, force = initial_response(body)
+    frame = body.surface.frame(body.u0)
+    speed = float(np.linalg.norm(body.v0)) or 1.0
+    weight = body.ball.mass * max(float(np.linalg.norm(body.gravity)), float(np.linalg.norm(acceleration)))
+    spin = max(float(np.linalg.norm(body.w0)), speed / body.ball.radius)
+    lines: list[Line] = []
+
+    def compare(quantity: str, unit: str, expected: Any, found: Any, scale: float) -> None:
+        if found is None:
+            return
+        want, got = np.atleast_1d(np.asarray(expected, float)), np.atleast_1d(np.asarray(found, float))
+        difference = float(np.max(np.abs(got - want))) / scale if got.shape == want.shape else float("inf")
+        soft = built.regularised.get(quantity)
+        lines.append(
+            Line(
+                quantity,
+                unit,
+                tuple(want.tolist()),
+                tuple(got.tolist()),
+                difference if np.isfinite(difference) else float("inf"),
+                soft.tolerance if soft else EXACT,
+                soft.because if soft else "",
+            )
+        )
+
+    compare("mass", "kg", body.ball.mass, built.mass, body.ball.mass)
+    compare("inertia", "kg m^2", np.full(3, body.ball.inertia), built.inertia, body.ball.inertia)
+    compare("gravity", "m/s^2", body.gravity, built.gravity, float(np.linalg.norm(body.gravity)) or 1.0)
+    compare("ball radius", "m", body.ball.radius, built.ball_radius, body.ball.radius)
+    f = body.contact.rolling_resistance
+    compare("rolling resistance", "m", f, built.rolling_resistance, f or body.ball.radius)
+    compare("position", "m", body.p0, sample.p_WB, body.ball.radius)
+    compare("gap", "m", 0.0, body.surface.gap(sample.p_WB), body.ball.radius)
+    compare("velocity", "m/s", body.v0, sample.v_WB, speed)
+    compare("spin", "rad/s", body.w0, sample.w_WB, spin)
+    slip = slip_velocity(body.ball.radius, body.surface.normal(sample.p_WB), sample.v_WB, sample.w_WB)
+    compare("slip", "m/s", np.zeros(3), slip, speed)
+    compare("acceleration", "m/s^2", acceleration, built.acceleration, float(np.linalg.norm(acceleration)) or 1.0)
+    if sample.force is not None:
+        for index, (name, sign) in enumerate((("N", -1.0), ("F2", 1.0), ("F3", 1.0))):
+            compare(name, "N", sign * force @ frame[:, index], sign * sample.force @ frame[:, index], weight)
+    return lines
+
+
+def first_difference(lines: list[Line]) -> str | None:
+    """One sentence about the first quantity that differs, or None if the certificate holds."""
+    for line in lines:
+        if not line.holds:
+            return (
+                f"the engine's model differs from the scene: {line.quantity} is {_shown(line.found)} instead of "
+                f"{_shown(line.expected)} {line.unit} (relative difference {line.difference:.2g}, "
+                f"allowed {line.tolerance:.2g})"
+            )
+    return None
+
+
+def _shown(values: tuple[float, ...]) -> str:
+    return ", ".join(f"{value:.6g}" for value in values)

@@ -1,0 +1,147 @@
+"""The protocol between proofroll and an engine. Implement it in under 60 lines; see CONTRIBUTING.md.
+
+An adapter contains no clock, no file and no plot: the runner owns the time grid, the stopwatch, the detection of
+NaN, timeouts and files. An adapter knows surfaces and contact laws, never a scene by name.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+from typing import Any, ClassVar, Protocol, Self
+
+from proofroll.errors import InputError
+from proofroll.scene import Capability, Scene
+from proofroll.surfaces import FloatArray
+
+
+@dataclass(frozen=True, slots=True)
+class Sample:
+    """State and reactions of one ball now, in the world frame W. None: the engine cannot say.
+
+    Attributes:
+        p_WB: centre [m], shape (3,).
+        v_WB: velocity of the centre [m/s], shape (3,).
+        w_WB: angular velocity [rad/s], shape (3,).
+        q_WB: orientation as a unit quaternion, scalar first, shape (4,); identity at time 0.
+        force: of the wall on the ball at the contact point, -N e1 + F2 e2 + F3 e3 [N], shape (3,).
+    """
+
+    p_WB: FloatArray
+    v_WB: FloatArray
+    w_WB: FloatArray
+    q_WB: FloatArray | None = None
+    force: FloatArray | None = None
+
+
+@dataclass(frozen=True)
+class Regularised:
+    """A quantity that the engine softens on purpose, so that it holds only within a tolerance.
+
+    Attributes:
+        tolerance: largest relative difference that the model explains.
+        because: why.
+    """
+
+    tolerance: float
+    because: str
+
+
+@dataclass(frozen=True)
+class Built:
+    """What the engine really built, read back from the engine (never from the scene). None: it cannot say.
+
+    Attributes:
+        mass: of the ball [kg].
+        inertia: central inertia of the ball, principal values [kg m²], shape (3,).
+        gravity: acceleration of gravity in the world [m/s²], shape (3,).
+        ball_radius: [m].
+        rolling_resistance: f [m]; 0 or None where nothing of the kind was built.
+        acceleration: of the ball's centre at time 0 [m/s²], shape (3,).
+        regularised: names of certificate quantities (``gap``, ``slip``, ``acceleration``, ``N``, ``F2``, ``F3``)
+            that the model softens, with tolerance and reason.
+    """
+
+    mass: float | None = None
+    inertia: FloatArray | None = None
+    gravity: FloatArray | None = None
+    ball_radius: float | None = None
+    rolling_resistance: float | None = None
+    acceleration: FloatArray | None = None
+    regularised: Mapping[str, Regularised] = field(default_factory=dict)
+
+
+class Settings(Protocol):
+    """A frozen dataclass with at least these fields; every field has a default."""
+
+    @property
+    def formulation(self) -> str:
+        """Which of the engine's models of the scene."""
+
+    @property
+    def preset(self) -> str:
+        """``default`` (the obvious model), ``matched`` (same physics, documented options) or ``tuned`` (best known)."""
+
+    @property
+    def resolution(self) -> str:
+        """Name of the field that trades speed for accuracy: ``dt`` [s] or ``rtol`` [-]."""
+
+    @property
+    def order(self) -> int | None:
+        """Declared order of convergence in ``dt``; None with an adaptive step."""
+
+
+class Engine(Protocol):
+    """A multibody engine behind proofroll's protocol.
+
+    Attributes:
+        name: equal to the name of the entry point.
+        provides: what it can represent honestly.
+        settings: frozen dataclass, see :class:`Settings`.
+        presets: formulation -> preset -> complete settings; each formulation has at least ``matched`` or ``default``.
+    """
+
+    name: ClassVar[str]
+    provides: ClassVar[frozenset[Capability]]
+    settings: ClassVar[type[Any]]
+    presets: ClassVar[Mapping[str, Mapping[str, Any]]]
+
+    @staticmethod
+    def version() -> str:
+        """Version of the engine, not of the adapter."""
+
+    @classmethod
+    def build(cls, scene: Scene, settings: Any) -> Self:
+        """The scene in the engine, at time 0. Untimed.
+
+        Raises:
+            Refused: the engine cannot represent the scene with these settings; the text says why.
+        """
+
+    def advance(self, t: float) -> None:
+        """Move the state to time ``t`` [s], not before the present one. The only timed call.
+
+        Raises:
+            Diverged: the engine gave up; the text says when and why.
+        """
+
+    def sample(self) -> Sample:
+        """State and reactions now. Untimed; changes nothing."""
+
+    def built(self) -> Built:
+        """What was built, read back from the engine. Called at time 0; changes nothing."""
+
+
+def whole_steps(start: float, end: float, dt: float) -> int:
+    """Number of steps of size ``dt`` [s] from ``start`` to ``end`` [s].
+
+    Raises:
+        InputError: the interval is not a whole number of steps.
+    """
+    exact = (end - start) / dt
+    steps = round(exact)
+    if abs(exact - steps) > 1e-6 * max(1.0, abs(steps)):
+        raise InputError(
+            "dt", dt, f"no whole number of steps reaches {end:g} s; choose a step that divides the interval"
+        )
+    return steps

@@ -1,0 +1,40 @@
+"""What can go wrong, each as one sentence that a person can act on."""
+
+from __future__ import annotations
+
+
+class ProofrollError(Exception):
+    """Base of everything proofroll raises on purpose; its text is one line for a person."""
+
+
+class InputError(ProofrollError):
+    """Something the user gave is wrong.
+
+    Attributes:
+        field: name of the offending field as the user writes it, e.g. ``radius``.
+        value: the value that was given.
+        advice: what is wrong and what to do instead.
+    """
+
+    def __init__(self, field: str, value: object, advice: str) -> None:
+        self.field = field
+        self.value = value
+        self.advice = advice
+        super().__init__(f"{field} = {_shown(value)}: {advice}")
+
+
+class Refused(ProofrollError):  # noqa: N818 -- a refusal is an honest answer, not an error
+    """The engine cannot represent this scene honestly; the text says why."""
+
+
+class Missing(ProofrollError):  # noqa: N818 -- likewise: the engine is not installed
+    """The engine cannot be loaded here; the text says why and how to get it."""
+
+
+class Diverged(ProofrollError):  # noqa: N818 -- a finding about the engine
+    """The engine gave up or produced a state that is not finite; the text says when."""
+
+
+def _shown(value: object) -> str:
+    text = repr(value) if isinstance(value, str) else str(value)
+    return text if len(text) <= 60 else text[:57] + "..."

@@ -1,0 +1,84 @@
+"""Runs one built engine over a time grid: the only loop over samples, and the place where NaN is noticed."""
+
+from __future__ import annotations
+
+import time
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from proofroll.engine import Sample
+from proofroll.errors import Diverged, InputError
+from proofroll.scene import Scene
+from proofroll.surfaces import FloatArray
+from proofroll.trajectory import from_samples
+
+if TYPE_CHECKING:
+    import xarray as xr
+
+
+def time_grid(until: float, every: float) -> FloatArray:
+    """Sample times 0, every, 2 every, … and ``until`` [s].
+
+    Raises:
+        InputError: ``until`` is negative, or ``every`` is not positive.
+    """
+    if not np.isfinite(until) or until < 0:
+        raise InputError("until", until, "give a finite time in s that is not negative")
+    if not np.isfinite(every) or every <= 0:
+        raise InputError("every", every, "give a positive, finite interval in s")
+    if until / every > 1e7:
+        raise InputError("every", every, f"that is more than ten million samples until {until:g} s; sample less often")
+    count = int(np.floor(until / every * (1 + 1e-12) + 1e-9))
+    times = np.arange(count + 1, dtype=np.float64) * every
+    if until - times[-1] > 1e-9 * max(every, until):
+        times = np.append(times, until)
+    else:
+        times[-1] = until
+    return np.asarray(times, dtype=np.float64)
+
+
+@dataclass(frozen=True)
+class Recording:
+    """What a run gave before it ended.
+
+    Attributes:
+        dataset: the trajectory up to the last finite sample.
+        failure: one sentence if it ended early, else None.
+        wall_seconds: spent inside ``advance`` [s].
+    """
+
+    dataset: xr.Dataset
+    failure: str | None
+    wall_seconds: float
+
+
+def record(engine: Any, scene: Scene, times: FloatArray) -> Recording:
+    """Advances a freshly built engine over ``times`` and samples it at each."""
+    samples = [_finite(engine.sample(), 0.0)]
+    failure: str | None = None
+    wall = 0.0
+    for t in times[1:]:
+        start = time.perf_counter()
+        try:
+            engine.advance(float(t))
+            wall += time.perf_counter() - start
+            samples.append(_finite(engine.sample(), float(t)))
+        except Diverged as error:
+            failure = str(error)
+            break
+    return Recording(from_samples(scene, times, samples), failure, wall)
+
+
+def _finite(sample: Sample, t: float) -> Sample:
+    for name in ("p_WB", "v_WB", "w_WB", "q_WB", "force"):
+        values = getattr(sample, name)
+        if values is None:
+            continue
+        shape = (4,) if name == "q_WB" else (3,)
+        if np.shape(values) != shape:
+            raise Diverged(f"the engine gave {name} with shape {np.shape(values)} instead of {shape} at {t:g} s")
+        if not np.all(np.isfinite(values)):
+            raise Diverged(f"{name} is not finite (NaN or overflow) at {t:g} s")
+    return sample

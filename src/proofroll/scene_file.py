@@ -1,0 +1,230 @@
+"""Reads ``models/<scene>/scene.toml`` into a :class:`~proofroll.scene.Scene`, with the user's parameters set."""
+
+from __future__ import annotations
+
+import math
+import operator
+import tomllib
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any, TypeVar
+
+from pydantic import ConfigDict, TypeAdapter, ValidationError
+
+from proofroll.errors import InputError, ProofrollError
+from proofroll.folders import data_folder
+from proofroll.scene import Ball, Contact, Gravity, InitialMotion, Scene
+from proofroll.surfaces import AnySurface
+
+
+@dataclass(frozen=True)
+class Parameter:
+    """A number that a user may set by name.
+
+    Attributes:
+        value: default, or the name of the parameter whose value is the default.
+        unit, symbol, meaning, source: for a person.
+        above, at_least, below, at_most: bounds, as numbers or names of other parameters.
+        nonzero: why the value must not be zero.
+        unbounded: whether inf is allowed.
+    """
+
+    value: float | str
+    unit: str
+    meaning: str
+    source: str
+    symbol: str = ""
+    above: float | str | None = None
+    at_least: float | str | None = None
+    below: float | str | None = None
+    at_most: float | str | None = None
+    nonzero: str | None = None
+    unbounded: bool = False
+
+
+@dataclass(frozen=True)
+class SceneFile:
+    """The contents of a ``scene.toml`` before parameters are set."""
+
+    title: str
+    source: str
+    parameters: dict[str, Parameter]
+    balls: list[dict[str, Any]]
+    surfaces: list[dict[str, Any]]
+    gravity: dict[str, Any]
+    contacts: list[dict[str, Any]]
+    initial: list[dict[str, Any]]
+
+
+@dataclass(frozen=True)
+class _Mechanics:
+    balls: tuple[Ball, ...]
+    surfaces: tuple[AnySurface, ...]
+    gravity: Gravity
+    contacts: tuple[Contact, ...]
+    initial: tuple[InitialMotion, ...]
+
+
+_T = TypeVar("_T")
+
+_STRICT = ConfigDict(extra="forbid")
+for _typed in (Parameter, SceneFile, _Mechanics, Ball, Contact, Gravity, InitialMotion, *AnySurface.__args__):
+    _typed.__pydantic_config__ = _STRICT  # how pydantic is told about stdlib dataclasses
+
+
+def scene_names() -> list[str]:
+    """Names of all scenes, sorted."""
+    return sorted(path.parent.name for path in data_folder("models").glob("*/scene.toml"))
+
+
+def read_scene_file(name: str) -> SceneFile:
+    """The scene's file, checked against the vocabulary.
+
+    Args:
+        name: a folder under ``models/``, or the path of a folder that holds a ``scene.toml``.
+
+    Raises:
+        InputError: there is no such scene, or its file is broken.
+    """
+    return _parse(scene_folder(name) / "scene.toml")
+
+
+def scene_folder(name: str) -> Path:
+    """Folder of the scene.
+
+    Raises:
+        InputError: there is no such scene.
+    """
+    for folder in (data_folder("models") / name, Path(name)):
+        if name and (folder / "scene.toml").is_file():
+            return folder
+    raise InputError("scene", name, f"there is no such scene; choose one of {', '.join(scene_names())}")
+
+
+def load_scene(name: str, /, **parameters: float) -> Scene:
+    """The scene with some of its parameters set, SI units.
+
+    Args:
+        name: a folder under ``models/``, e.g. ``sphere_in_cylinder``, or the path of such a folder.
+        **parameters: e.g. ``speed=3.3``; see ``proofroll scenes``.
+
+    Raises:
+        InputError: unknown scene or parameter, or a value that makes no sense.
+    """
+    folder = scene_folder(name)
+    file = _parse(folder / "scene.toml")
+    values = _values(file, parameters)
+    mechanics = _validated(
+        _Mechanics,
+        {
+            key: _substituted(getattr(file, key), values)
+            for key in ("balls", "surfaces", "gravity", "contacts", "initial")
+        },
+        str(folder / "scene.toml"),
+    )
+    return Scene(
+        name=folder.name,
+        title=file.title,
+        balls=mechanics.balls,
+        surfaces=mechanics.surfaces,
+        contacts=mechanics.contacts,
+        gravity=mechanics.gravity,
+        initial=mechanics.initial,
+        parameters=values,
+        folder=folder,
+    )
+
+
+def _parse(path: Path) -> SceneFile:
+    try:
+        content = tomllib.loads(path.read_text(encoding="utf-8"))
+    except (tomllib.TOMLDecodeError, UnicodeDecodeError) as error:
+        raise InputError(str(path), "TOML", f"the file is broken: {error}") from None
+    except OSError as error:
+        raise InputError(str(path), "TOML", f"the file cannot be read: {error.strerror}") from None
+    return _validated(SceneFile, content, str(path))
+
+
+def _validated(kind: type[_T], content: object, where: str) -> _T:
+    try:
+        return TypeAdapter(kind).validate_python(content)
+    except ValidationError as error:
+        raise first_problem(error, where) from None
+
+
+def first_problem(error: ValidationError, where: str) -> InputError:
+    """One line about the first thing that pydantic found wrong in ``where``."""
+    problem = error.errors()[0]
+    location = ".".join(str(part) for part in problem["loc"])
+    if problem["type"] in {"unexpected_keyword_argument", "extra_forbidden"}:
+        return InputError(f"{where}: {location}", problem["input"], "there is no such key here; remove it")
+    if problem["type"] in {"missing", "missing_argument"}:
+        return InputError(f"{where}: {location}", "nothing", "this key is required; add it")
+    return InputError(f"{where}: {location}", problem["input"], problem["msg"][0].lower() + problem["msg"][1:])
+
+
+def _values(file: SceneFile, given: Mapping[str, object]) -> dict[str, float]:
+    """Every parameter's number: given, or default, or that of the parameter it follows."""
+    known = ", ".join(file.parameters)
+    for name, value in given.items():
+        if name not in file.parameters:
+            raise InputError(name, value, f"there is no such parameter; choose from {known}")
+    values: dict[str, float] = {}
+    for name, parameter in file.parameters.items():
+        chosen = given.get(name, parameter.value)
+        if name not in given and isinstance(chosen, str):
+            chosen = values[chosen] if chosen in values else file.parameters[chosen].value
+        values[name] = _number(name, chosen, parameter)
+    # Numbers first, then other parameters: a parameter is never blamed for the bad value of another.
+    for kind in (float, str):
+        for name, parameter in file.parameters.items():
+            _check_bounds(name, parameter, values, kind)
+    return values
+
+
+def _number(name: str, value: object, parameter: Parameter) -> float:
+    if isinstance(value, bool) or not isinstance(value, (int, float, str)):
+        raise InputError(name, value, f"this is not a number; give one in {parameter.unit}")
+    try:
+        number = float(value)
+    except (ValueError, OverflowError):
+        raise InputError(name, value, f"this is not a number; give one in {parameter.unit}") from None
+    if math.isnan(number) or (math.isinf(number) and not (parameter.unbounded and number > 0)):
+        raise InputError(name, value, f"the value must be finite; give a number in {parameter.unit}")
+    if parameter.nonzero is not None and number == 0:
+        raise InputError(name, value, f"{parameter.nonzero}; give a value other than 0 {parameter.unit}")
+    return number
+
+
+_Bound = tuple[str, float | str | None, Callable[[float, float], bool]]
+
+
+def _check_bounds(name: str, parameter: Parameter, values: Mapping[str, float], kind: type) -> None:
+    value = values[name]
+    bounds: tuple[_Bound, ...] = (
+        ("above", parameter.above, operator.gt),
+        ("at least", parameter.at_least, operator.ge),
+        ("below", parameter.below, operator.lt),
+        ("at most", parameter.at_most, operator.le),
+    )
+    for words, bound, holds in bounds:
+        if not isinstance(bound, kind):
+            continue
+        limit = values[bound] if isinstance(bound, str) else float(bound)
+        if not holds(value, limit):
+            shown = f"{bound} = {limit:g}" if isinstance(bound, str) else f"{limit:g}"
+            raise InputError(name, value, f"{parameter.meaning} must be {words} {shown} {parameter.unit}")
+
+
+def _substituted(content: Any, values: Mapping[str, float]) -> Any:
+    if isinstance(content, dict):
+        return {key: _substituted(value, values) for key, value in content.items()}
+    if isinstance(content, list):
+        return [_substituted(value, values) for value in content]
+    if isinstance(content, str) and content.startswith("$"):
+        try:
+            return values[content[1:]]
+        except KeyError:
+            raise ProofrollError(f"scene.toml names the parameter {content}, which it does not define") from None
+    return content

@@ -1,0 +1,78 @@
+"""One scene in one engine, from Python, in this process."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, Any
+
+from proofroll.certificate import certify, first_difference
+from proofroll.errors import Refused
+from proofroll.recording import record, time_grid
+from proofroll.registry import load_engine, parse_engine, resolve_settings
+from proofroll.scene import Scene
+
+if TYPE_CHECKING:
+    import xarray as xr
+
+
+def build(scene: Scene, engine: str, **settings: Any) -> Any:
+    """The scene in the engine at time 0, after checking that the engine can represent it.
+
+    Args:
+        scene: from :func:`proofroll.load_scene`.
+        engine: ``name`` or ``name[key=value,…]``.
+        **settings: the engine's settings, put over those in brackets.
+
+    Raises:
+        InputError: unknown engine or setting.
+        Missing: the engine is not installed.
+        Refused: the engine cannot represent the scene.
+    """
+    spec = parse_engine(engine)
+    kind = load_engine(spec.name)
+    resolved = resolve_settings(kind, {**spec.options, **settings})
+    lacking = scene.requires - kind.provides
+    if lacking:
+        raise Refused("needs " + ", ".join(sorted(lacking)))
+    return kind.build(scene, resolved)
+
+
+def simulate(
+    scene: Scene,
+    engine: str = "truth",
+    *,
+    until: float = 2.0,
+    every: float = 0.01,
+    **settings: Any,
+) -> xr.Dataset:
+    """The trajectory of a scene in an engine, with units on every variable.
+
+    Args:
+        scene: from :func:`proofroll.load_scene`.
+        engine: ``truth``, ``name`` or ``name[key=value,…]``.
+        until: last time [s].
+        every: interval between samples [s].
+        **settings: e.g. ``formulation="chart", dt=1e-4``.
+
+    Returns:
+        Dataset with the attribute ``status`` (``done`` or ``diverged``) and ``message``, one sentence.
+
+    Raises:
+        InputError: a value that makes no sense.
+        Missing: the engine is not installed.
+        Refused: the engine cannot represent the scene, or built something else than the scene says.
+    """
+    times = time_grid(until, every)
+    if engine == "truth":
+        from proofroll.truth import truth
+
+        return truth(scene, times).assign_attrs(status="done", message="two independent routes agree")
+    built = build(scene, engine, **settings)
+    difference = first_difference(certify(built, scene))
+    if difference is not None:
+        raise Refused(difference)
+    recording = record(built, scene, times)
+    return recording.dataset.assign_attrs(
+        status="done" if recording.failure is None else "diverged",
+        message=recording.failure or f"reached {until:g} s",
+        wall_seconds=recording.wall_seconds,
+    )

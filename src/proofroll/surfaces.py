@@ -1,0 +1,261 @@
+"""Parametrised surfaces on which the centre of a ball moves: the only place that knows geometry.
+
+Each surface gives two independent descriptions of itself: a parametrisation (position, tangents, second
+derivatives; what constraint models need) and a signed distance with its derivatives (what contact models need).
+
+Local frame at a point, columns of :meth:`frame`:
+
+* ``e1`` unit normal, from the ball's centre towards the wall,
+* ``e2`` along the first coordinate, ``e3 = e1 × e2``.
+
+Array arguments may carry leading dimensions (``...``), e.g. time.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Literal, Protocol
+
+import numpy as np
+import numpy.typing as npt
+from scipy.spatial.transform import Rotation
+
+FloatArray = npt.NDArray[np.float64]
+
+
+@dataclass(frozen=True)
+class Generator:
+    """One of the two rigid motions that slide a homogeneous surface along itself.
+
+    Attributes:
+        kind: ``rotation`` about, or ``translation`` along, a line through the world origin.
+        axis: unit direction of that line in the world, shape (3,).
+    """
+
+    kind: Literal["rotation", "translation"]
+    axis: tuple[float, float, float]
+
+
+class Surface(Protocol):
+    """A surface that guides the centre of a ball. ``u`` are its two coordinates, shape (..., 2)."""
+
+    @property
+    def name(self) -> str:
+        """Name of the wall in the scene."""
+
+    @property
+    def coordinates(self) -> tuple[str, str]:
+        """Names of the two coordinates, e.g. ``("gamma", "z")``."""
+
+    @property
+    def units(self) -> tuple[str, str]:
+        """Units of the two coordinates, e.g. ``("rad", "m")``."""
+
+    @property
+    def periods(self) -> tuple[float | None, float | None]:
+        """Period of each coordinate after which the point repeats, or None."""
+
+    @property
+    def length_scales(self) -> tuple[float, float]:
+        """Metres travelled per unit of each coordinate, at most [m/unit]."""
+
+    @property
+    def generators(self) -> tuple[Generator, Generator] | None:
+        """Motions G1, G2 with p(u) = G1(u1) G2(u2) p(0) and frame(u) alike; None if not homogeneous."""
+
+    def offset(self, ball_radius: float) -> Surface:
+        """The surface on which the centre of a touching ball of this radius [m] moves."""
+
+    def position(self, u: npt.ArrayLike) -> FloatArray:
+        """p_WB: centre of the ball in the world [m], shape (..., 3)."""
+
+    def tangents(self, u: npt.ArrayLike) -> FloatArray:
+        """∂p/∂u [m/unit], shape (..., 3, 2)."""
+
+    def second(self, u: npt.ArrayLike) -> FloatArray:
+        """∂²p/∂u∂u [m/unit²], shape (..., 3, 2, 2)."""
+
+    def frame(self, u: npt.ArrayLike) -> FloatArray:
+        """Local frame with columns e1, e2, e3, shape (..., 3, 3)."""
+
+    def locate(self, p_WB: npt.ArrayLike) -> FloatArray:
+        """Coordinates u of the nearest point, shape (..., 2); a periodic coordinate is in (-period/2, period/2]."""
+
+    def gap(self, p_WB: npt.ArrayLike) -> FloatArray:
+        """Distance of the ball from the wall [m], shape (...); negative where it has sunk in."""
+
+    def normal(self, p_WB: npt.ArrayLike) -> FloatArray:
+        """e1 = -∇gap at any point near the surface, shape (..., 3)."""
+
+    def normal_gradient(self, p_WB: npt.ArrayLike) -> FloatArray:
+        """∂e1/∂p = -∇∇gap [1/m], shape (..., 3, 3)."""
+
+
+def _tilt(angle: float) -> FloatArray:
+    """Rotation by ``angle`` [rad] about the world's y axis, shape (3, 3)."""
+    return np.asarray(Rotation.from_euler("y", angle).as_matrix(), dtype=np.float64)
+
+
+def _axis(column: FloatArray) -> tuple[float, float, float]:
+    return (float(column[0]), float(column[1]), float(column[2]))
+
+
+@dataclass(frozen=True)
+class Cylinder:
+    """Inside of a circular cylinder; coordinates are the angle γ about its axis and the height z along it.
+
+    Attributes:
+        radius: radius [m]; of the wall in a scene, of the centre's path after :meth:`offset`.
+        tilt: rotation of the axis from the vertical about the world's y axis [rad].
+    """
+
+    name: str
+    radius: float
+    tilt: float = 0.0
+    kind: Literal["cylinder"] = "cylinder"
+
+    coordinates = ("gamma", "z")
+    units = ("rad", "m")
+    periods = (2 * np.pi, None)
+
+    @property
+    def length_scales(self) -> tuple[float, float]:
+        """See :class:`Surface`."""
+        return (self.radius, 1.0)
+
+    @property
+    def generators(self) -> tuple[Generator, Generator]:
+        """See :class:`Surface`."""
+        axis = _axis(_tilt(self.tilt)[:, 2])
+        return (Generator("rotation", axis), Generator("translation", axis))
+
+    def offset(self, ball_radius: float) -> Cylinder:
+        """See :class:`Surface`."""
+        return Cylinder(self.name, self.radius - ball_radius, self.tilt)
+
+    def position(self, u: npt.ArrayLike) -> FloatArray:
+        """See :class:`Surface`."""
+        gamma, z = np.moveaxis(np.asarray(u, dtype=np.float64), -1, 0)
+        c = self.radius
+        return np.stack([c * np.cos(gamma), c * np.sin(gamma), z], axis=-1) @ _tilt(self.tilt).T
+
+    def tangents(self, u: npt.ArrayLike) -> FloatArray:
+        """See :class:`Surface`."""
+        frame = self.frame(u)
+        return np.stack([self.radius * frame[..., 1], frame[..., 2]], axis=-1)
+
+    def second(self, u: npt.ArrayLike) -> FloatArray:
+        """See :class:`Surface`."""
+        frame = self.frame(u)
+        result = np.zeros((*frame.shape[:-2], 3, 2, 2))
+        result[..., 0, 0] = -self.radius * frame[..., 0]
+        return result
+
+    def frame(self, u: npt.ArrayLike) -> FloatArray:
+        """See :class:`Surface`."""
+        gamma = np.asarray(u, dtype=np.float64)[..., 0]
+        cos, sin, zero, one = np.cos(gamma), np.sin(gamma), np.zeros_like(gamma), np.ones_like(gamma)
+        columns = [
+            np.stack([cos, sin, zero], axis=-1),
+            np.stack([-sin, cos, zero], axis=-1),
+            np.stack([zero, zero, one], axis=-1),
+        ]
+        return np.asarray(_tilt(self.tilt) @ np.stack(columns, axis=-1), dtype=np.float64)
+
+    def _local(self, p_WB: npt.ArrayLike) -> FloatArray:
+        return np.asarray(np.asarray(p_WB, dtype=np.float64) @ _tilt(self.tilt), dtype=np.float64)
+
+    def locate(self, p_WB: npt.ArrayLike) -> FloatArray:
+        """See :class:`Surface`."""
+        p = self._local(p_WB)
+        return np.stack([np.arctan2(p[..., 1], p[..., 0]), p[..., 2]], axis=-1)
+
+    def gap(self, p_WB: npt.ArrayLike) -> FloatArray:
+        """See :class:`Surface`."""
+        p = self._local(p_WB)
+        return np.asarray(self.radius - np.hypot(p[..., 0], p[..., 1]), dtype=np.float64)
+
+    def normal(self, p_WB: npt.ArrayLike) -> FloatArray:
+        """See :class:`Surface`."""
+        p = self._local(p_WB)
+        radial = np.stack([p[..., 0], p[..., 1], np.zeros_like(p[..., 0])], axis=-1)
+        return np.asarray(radial / np.linalg.norm(radial, axis=-1, keepdims=True) @ _tilt(self.tilt).T)
+
+    def normal_gradient(self, p_WB: npt.ArrayLike) -> FloatArray:
+        """See :class:`Surface`."""
+        p = self._local(p_WB)
+        e1 = self.normal(p_WB)
+        axis = _tilt(self.tilt)[:, 2]
+        across = np.eye(3) - np.outer(axis, axis) - e1[..., :, None] * e1[..., None, :]
+        return np.asarray(across / np.hypot(p[..., 0], p[..., 1])[..., None, None])
+
+
+@dataclass(frozen=True)
+class Plane:
+    """Plane through the world's origin; coordinates are the distances down the slope and across it.
+
+    Attributes:
+        tilt: rotation from the horizontal about the world's y axis [rad]; positive descends along +x.
+        height: distance of the ball's centre above the wall's surface [m]; 0 for the wall itself.
+    """
+
+    name: str
+    tilt: float = 0.0
+    height: float = 0.0
+    kind: Literal["plane"] = "plane"
+
+    coordinates = ("down", "across")
+    units = ("m", "m")
+    periods = (None, None)
+    length_scales = (1.0, 1.0)
+
+    @property
+    def generators(self) -> tuple[Generator, Generator]:
+        """See :class:`Surface`."""
+        frame = self._axes()
+        return (Generator("translation", _axis(frame[:, 1])), Generator("translation", _axis(frame[:, 2])))
+
+    def _axes(self) -> FloatArray:
+        """Columns e1 (into the plane), e2 (down the slope), e3 = e1 × e2."""
+        rotation = _tilt(self.tilt)
+        return np.stack([-rotation[:, 2], rotation[:, 0], -rotation[:, 1]], axis=-1)
+
+    def offset(self, ball_radius: float) -> Plane:
+        """See :class:`Surface`."""
+        return Plane(self.name, self.tilt, self.height + ball_radius)
+
+    def position(self, u: npt.ArrayLike) -> FloatArray:
+        """See :class:`Surface`."""
+        axes = self._axes()
+        return np.asarray(np.asarray(u, dtype=np.float64) @ axes[:, 1:].T - self.height * axes[:, 0])
+
+    def tangents(self, u: npt.ArrayLike) -> FloatArray:
+        """See :class:`Surface`."""
+        return self.frame(u)[..., 1:]
+
+    def second(self, u: npt.ArrayLike) -> FloatArray:
+        """See :class:`Surface`."""
+        return np.zeros((*np.shape(u)[:-1], 3, 2, 2))
+
+    def frame(self, u: npt.ArrayLike) -> FloatArray:
+        """See :class:`Surface`."""
+        return np.broadcast_to(self._axes(), (*np.shape(u)[:-1], 3, 3)).copy()
+
+    def locate(self, p_WB: npt.ArrayLike) -> FloatArray:
+        """See :class:`Surface`."""
+        return np.asarray(np.asarray(p_WB, dtype=np.float64) @ self._axes()[:, 1:])
+
+    def gap(self, p_WB: npt.ArrayLike) -> FloatArray:
+        """See :class:`Surface`."""
+        return np.asarray(-np.asarray(p_WB, dtype=np.float64) @ self._axes()[:, 0] - self.height)
+
+    def normal(self, p_WB: npt.ArrayLike) -> FloatArray:
+        """See :class:`Surface`."""
+        return np.broadcast_to(self._axes()[:, 0], np.shape(p_WB)).copy()
+
+    def normal_gradient(self, p_WB: npt.ArrayLike) -> FloatArray:
+        """See :class:`Surface`."""
+        return np.zeros((*np.shape(p_WB), 3))
+
+
+AnySurface = Cylinder | Plane
