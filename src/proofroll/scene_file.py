@@ -209,9 +209,9 @@ def _check_bounds(name: str, parameter: Parameter, values: Mapping[str, float], 
         ("at most", parameter.at_most, operator.le),
     )
     for words, bound, holds in bounds:
-        if not isinstance(bound, kind):
+        if bound is None or not isinstance(bound, kind):
             continue
-        limit = values[bound] if isinstance(bound, str) else float(bound)
+        limit = values[bound] if isinstance(bound, str) else bound
         if not holds(value, limit):
             shown = f"{bound} = {limit:g}" if isinstance(bound, str) else f"{limit:g}"
             raise InputError(name, value, f"{parameter.meaning} must be {words} {shown} {parameter.unit}")
