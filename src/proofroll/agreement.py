@@ -87,7 +87,8 @@ def _converges(error: float, limit: Limit, limit_error: float, truth_error_bar: 
 
     Without the second condition a scattered ladder, whose error bar is as large as its error, would pass.
     """
-    return limit_error <= limit.error_bar + truth_error_bar and limit.error_bar < 0.5 * error
+    believable = limit.error_bar < 0.5 * error < float("inf")
+    return limit_error <= limit.error_bar + truth_error_bar and believable
 
 
 def _distance(values: FloatArray, true: FloatArray) -> float:

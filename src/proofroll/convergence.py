@@ -9,6 +9,9 @@ import numpy as np
 
 from proofroll.surfaces import FloatArray
 
+# An observed order this near to an integer is that integer.
+_NEAR = 0.25
+
 
 @dataclass(frozen=True)
 class Limit:
@@ -16,7 +19,8 @@ class Limit:
 
     Attributes:
         values: Richardson's extrapolation, shape (time,).
-        error_bar: its uncertainty, largest over time: twice what the last extrapolation changed.
+        error_bar: its uncertainty, largest over time: twice what the last extrapolation changed, or, where the order
+            is no integer, how far two extrapolations differ.
         order: observed order of convergence, NaN where the differences do not shrink.
     """
 
@@ -29,7 +33,7 @@ def richardson(curves: Sequence[FloatArray], ratio: float) -> Limit:
     """Extrapolates three curves computed with steps h ratio², h ratio and h (coarse first).
 
     The observed order p follows from the size of the two differences (Roache 1998, section 5.9); the extrapolation
-    removes the term h^p, then h^(p+1).
+    removes the term h^p, then h^(p+1) if p is an integer.
 
     Args:
         curves: three arrays of one shape.
@@ -43,13 +47,25 @@ def richardson(curves: Sequence[FloatArray], ratio: float) -> Limit:
     if not np.isfinite(order) or order < 0.25:
         # No convergence to speak of: the finest curve, as uncertain as the largest change seen.
         return Limit(fine, max(first, last), float("nan"))
-    # An integer order is a fact of the scheme; the observed one carries the noise of the coarsest curve.
-    power = max(1, round(order)) if abs(order - round(order)) < 0.25 else order
+    nearest = max(1, round(order))
+    twice = _two_terms(curves, ratio, nearest)
+    if abs(order - nearest) < _NEAR:
+        # An integer order is a fact of the scheme; the observed one carries the noise of the coarsest curve.
+        # Twice: the usual safety factor on an extrapolation from three grids (Roache 1998 argues for 1.25 to 3).
+        once = fine + (fine - middle) / (ratio**nearest - 1)
+        return Limit(twice, 2 * _size(twice - once), order)
+    # Either a method of a fractional order or an integer order mixed with the next: nobody knows which, and the two
+    # extrapolations differ by what that may matter.
+    values = fine + (fine - middle) / (ratio**order - 1)
+    return Limit(values, _size(values - twice), order)
+
+
+def _two_terms(curves: Sequence[FloatArray], ratio: float, power: int) -> FloatArray:
+    """The curves without their terms h^power and h^(power+1)."""
+    coarse, middle, fine = curves
     gain = ratio**power - 1
     before, after = middle + (middle - coarse) / gain, fine + (fine - middle) / gain
-    values = after + (after - before) / (ratio ** (power + 1) - 1)
-    # Twice: the usual safety factor on an extrapolation from three grids (Roache 1998 argues for 1.25 to 3).
-    return Limit(values, 2 * _size(values - after), order)
+    return np.asarray(after + (after - before) / (ratio ** (power + 1) - 1))
 
 
 def tightest(curves: Sequence[FloatArray]) -> Limit:

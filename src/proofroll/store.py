@@ -11,6 +11,7 @@ from pathlib import Path
 
 from proofroll.case import LASTING, Case, Result
 from proofroll.errors import ProofrollError
+from proofroll.files import replacing
 
 
 def write_text(path: Path, text: str) -> None:
@@ -19,14 +20,8 @@ def write_text(path: Path, text: str) -> None:
     Raises:
         ProofrollError: the place cannot be written.
     """
-    try:
-        path.parent.mkdir(parents=True, exist_ok=True)
-        handle, temporary = tempfile.mkstemp(dir=path.parent, prefix=f".{path.name}.")
-        with os.fdopen(handle, "w", encoding="utf-8") as file:
-            file.write(text)
-        Path(temporary).replace(path)
-    except OSError as error:
-        raise ProofrollError(f"{path} cannot be written ({error.strerror or error}); choose another place") from None
+    with replacing(path) as temporary:
+        temporary.write_text(text, encoding="utf-8")
 
 
 class Store:
@@ -55,21 +50,28 @@ class Store:
             result = dataclasses.replace(result, checksum=checksum)
         if result.status in LASTING:
             record = {"case": dataclasses.asdict(case), "result": dataclasses.asdict(result)}
-            write_text(self.folder / f"{case.key}.json", json.dumps(record, indent=1))
+            write_text(self.folder / f"{case.key}.json", json.dumps(record | {"seal": _seal(record)}, indent=1))
         return result
 
     def get(self, case: Case) -> Result | None:
         """The stored result, or None if there is none or it is not what was stored."""
         try:
             record = json.loads((self.folder / f"{case.key}.json").read_text(encoding="utf-8"))
+            if record.pop("seal") != _seal(record):
+                return None
             result = Result.from_dict(record["result"])
             if result.trajectory is not None:
                 content = self.trajectory(case).read_bytes()
                 if hashlib.sha256(content).hexdigest() != result.checksum:
                     return None
-        except (OSError, ValueError, KeyError, TypeError):
+        except (OSError, ValueError, KeyError, TypeError, AttributeError):
             return None  # absent, truncated or tampered with: the case is run again
         return result
+
+
+def _seal(record: object) -> str:
+    """Hash of a record, so that one whose numbers were changed is not believed."""
+    return hashlib.sha256(json.dumps(record, sort_keys=True).encode()).hexdigest()
 
 
 def move(source: Path, target: Path) -> None:
@@ -78,10 +80,5 @@ def move(source: Path, target: Path) -> None:
     Raises:
         ProofrollError: the place cannot be written.
     """
-    try:
-        handle, temporary = tempfile.mkstemp(dir=target.parent, prefix=f".{target.name}.")
-        with os.fdopen(handle, "wb") as file:
-            file.write(source.read_bytes())
-        Path(temporary).replace(target)
-    except OSError as error:
-        raise ProofrollError(f"{target} cannot be written ({error.strerror or error}); choose another place") from None
+    with replacing(target) as temporary:
+        temporary.write_bytes(source.read_bytes())

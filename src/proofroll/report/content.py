@@ -33,6 +33,7 @@ def outcome_content(outcome: Outcome) -> dict[str, Any]:
     about each single run.
     """
     comparison = outcome.comparison
+    numbers = {key: number for number, key in enumerate(by_row(outcome))}
     content = {
         "name": comparison.name,
         "title": comparison.title,
@@ -51,7 +52,7 @@ def outcome_content(outcome: Outcome) -> dict[str, Any]:
             for name, band in comparison.bands.items()
         },
         "rows": [_row(runs) for runs in by_row(outcome).values()],
-        "runs": [_run(run) for run in outcome.runs],
+        "runs": [{"row": numbers[id(run.row)], **_run(run)} for run in outcome.runs],
     }
     return dict(plain(content))
 
@@ -99,8 +100,9 @@ def _row(runs: list[Run]) -> dict[str, Any]:
         "expected": first.row.expect,
         "expected_for": first.row.expect_for,
         "because": first.row.because,
+        "tolerance": first.row.tolerance,
         "as_expected": not any(run.contradictions for run in runs),
-        "observables": {name: _worst([_judgement_of(run, name) for run in runs]) for name in names},
+        "observables": {name: _worst(runs, name) for name in names},
         "seconds_per_second": max(timings, default=None),
         "message": next((run.result.message for run in runs if run.result.status != Status.DONE), ""),
     }
@@ -110,13 +112,12 @@ def _judgement_of(run: Run, name: str) -> Judgement | None:
     return next((judgement for judgement in run.judgements if judgement.observable == name), None)
 
 
-def _worst(judgements: list[Judgement | None]) -> dict[str, Any]:
-    """The worst verdict, and the numbers of the judgement that is furthest beyond its tolerance."""
-    present = [judgement for judgement in judgements if judgement is not None]
-    worst = max(present, key=lambda judgement: judgement.error / judgement.tolerance)
+def _worst(runs: list[Run], name: str) -> dict[str, Any]:
+    """The judgement with the worst verdict, among equals the one furthest beyond its tolerance, and its point."""
     order = list(Verdict)
-    verdict = max((judgement.verdict for judgement in present), key=order.index)
-    return {**dataclasses.asdict(worst), "verdict": verdict}
+    judged = [(run, judgement) for run in runs if (judgement := _judgement_of(run, name)) is not None]
+    where, worst = max(judged, key=lambda pair: (order.index(pair[1].verdict), pair[1].error / pair[1].tolerance))
+    return {**dataclasses.asdict(worst), "point": point_name(where.parameters)}
 
 
 def _settings(run: Run) -> dict[str, Any]:

@@ -2,10 +2,12 @@
 
 from __future__ import annotations
 
+import dataclasses
 from pathlib import Path
 from typing import Any
 
 from proofroll.case import Case, Result
+from proofroll.events import events_of
 from proofroll.trajectory import read
 
 
@@ -32,6 +34,7 @@ def run_content(case: Case, result: Result, trajectory: Path) -> dict[str, Any]:
     curves = {name: variable for name, variable in dataset.data_vars.items() if variable.dims == ("time",)}
     content["final"] = {"time": float(dataset["time"][-1])} | {str(k): float(v[-1]) for k, v in curves.items()}
     content["units"] = {"time": "s"} | {str(name): variable.attrs["units"] for name, variable in curves.items()}
+    content["events"] = [dataclasses.asdict(event) for event in events_of(dataset)]
     bars = {str(k): float(v.attrs["error_bar"]) for k, v in curves.items() if "error_bar" in v.attrs}
     if bars:
         content["error_bars"] = bars
