@@ -161,8 +161,12 @@ def load_comparison(name: str) -> Comparison:
 
 def _comparison(path: Path, content: dict[str, Any]) -> Comparison:
     where = path.name
-    bands = {name: _band(f"{where}: tolerances.{name}", table) for name, table in content.pop("tolerances", {}).items()}
-    rows = [_prepared(f"{where}: rows.{index}", row) for index, row in enumerate(content.pop("rows", []))]
+    tolerances = _table(f"{where}: tolerances", content.pop("tolerances", {}))
+    bands = {name: _band(f"{where}: tolerances.{name}", table) for name, table in tolerances.items()}
+    given = content.pop("rows", None)
+    if not isinstance(given, list) or not given:
+        raise InputError(f"{where}: rows", given, "give at least one engine; write [[rows]] before each")
+    rows = [_prepared(f"{where}: rows.{index}", row) for index, row in enumerate(given)]
     try:
         comparison = TypeAdapter(Comparison).validate_python(
             {**content, "name": path.stem, "bands": bands, "rows": rows}
@@ -174,23 +178,32 @@ def _comparison(path: Path, content: dict[str, Any]) -> Comparison:
     return comparison
 
 
-def _band(where: str, table: dict[str, Any]) -> Band:
+def _table(where: str, value: object) -> dict[str, Any]:
+    if not isinstance(value, dict):
+        raise InputError(where, value, "this must be a table of names and values")
+    return dict(value)
+
+
+def _band(where: str, content: object) -> Band:
+    table = _table(where, content)
     because = table.pop("because", "")
     if not because:
         raise InputError(f"{where}.because", "nothing", "every tolerance needs its reason; add it")
     return Band(because, {name: Tolerance.parse(f"{where}.{name}", text) for name, text in table.items()})
 
 
-def _prepared(where: str, row: dict[str, Any]) -> dict[str, Any]:
+def _prepared(where: str, content: object) -> dict[str, Any]:
     """The row's table in the form that the typed check wants."""
-    row = dict(row)
+    row = _table(where, content)
     for key in ("limit", "bound"):
         if key in row:
-            row[key] = {name: Tolerance.parse(f"{where}.{key}.{name}", text) for name, text in row[key].items()}
+            bounds = _table(f"{where}.{key}", row[key])
+            row[key] = {name: Tolerance.parse(f"{where}.{key}.{name}", text) for name, text in bounds.items()}
     if isinstance(row.get("expect"), str):
         row["expect"] = [row["expect"]]
     if "expect_for" in row:
-        row["expect_for"] = {k: [v] if isinstance(v, str) else v for k, v in row["expect_for"].items()}
+        expected = _table(f"{where}.expect_for", row["expect_for"])
+        row["expect_for"] = {k: [v] if isinstance(v, str) else v for k, v in expected.items()}
     return row
 
 
@@ -198,8 +211,9 @@ def _check(where: str, row: Row, comparison: Comparison) -> None:
     """What types cannot say."""
     if row.tolerance not in comparison.bands:
         raise InputError(f"{where}.tolerance", row.tolerance, f"choose one of {', '.join(comparison.bands)}")
-    if len(row.ladder) != _LADDER_RUNGS or sorted(row.ladder, reverse=True) != row.ladder or 1.0 not in row.ladder:
-        raise InputError(f"{where}.ladder", row.ladder, "give three factors, largest first, one of them 1")
+    falling = all(0 < finer < coarser < math.inf for coarser, finer in itertools.pairwise(row.ladder))
+    if len(row.ladder) != _LADDER_RUNGS or not falling or 1.0 not in row.ladder:
+        raise InputError(f"{where}.ladder", row.ladder, "give three positive factors, largest first, one of them 1")
     if not math.isclose(row.ladder[0] / row.ladder[1], row.ladder[1] / row.ladder[2]):
         raise InputError(f"{where}.ladder", row.ladder, "neighbouring factors must have the same ratio")
     verdicts = {*row.expect, *itertools.chain.from_iterable(row.expect_for.values())}
@@ -208,9 +222,13 @@ def _check(where: str, row: Row, comparison: Comparison) -> None:
     for key in (*row.expect_for, *row.order, *row.limit, *row.bound):
         if key not in OBSERVABLES and key not in comparison.bands[row.tolerance].bounds:
             raise InputError(f"{where}: observable", key, "there is no such observable")
-    for key in row.only:
+    for key, values in row.only.items():
         if key not in comparison.vary:
             raise InputError(f"{where}.only", key, f"the comparison varies {', '.join(comparison.vary)}")
+        for value in values:
+            if value not in comparison.vary[key]:
+                known = ", ".join(f"{item:g}" for item in comparison.vary[key])
+                raise InputError(f"{where}.only.{key}", value, f"the comparison has only {known}")
 
 
 for _typed in (Comparison, Row):

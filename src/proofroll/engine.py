@@ -61,7 +61,7 @@ class Built:
         ball_radius: [m].
         rolling_resistance: f [m]; 0 or None where nothing of the kind was built.
         acceleration: of the ball's centre at time 0 [m/s²], shape (3,).
-        regularised: names of certificate quantities (``gap``, ``slip``, ``acceleration``, ``N``, ``F2``, ``F3``)
+        regularised: names of certificate quantities (``gap``, ``slip``, ``spin``, ``acceleration``, ``N``, ``F2``, …)
             that the model softens, with tolerance and reason.
     """
 
