@@ -68,8 +68,8 @@ class Row:
     Attributes:
         engine: ``name[key=value,…]``.
         tolerance: name of a band of tolerances.
-        expect: verdicts that are expected, for observables without an entry of their own.
-        expect_for: observable -> expected verdicts.
+        expect: expected verdicts on the row as a whole, which is the worst of its observables.
+        expect_for: observable -> expected verdicts on it alone.
         because: why something else than agreement is expected.
         ladder: factors on the step, coarse first; 1 is the run itself.
         only: parameter -> values for which this row is run (all if absent).
@@ -88,10 +88,6 @@ class Row:
     order: dict[str, tuple[float, float]] = field(default_factory=dict)
     limit: dict[str, Tolerance] = field(default_factory=dict)
     bound: dict[str, Tolerance] = field(default_factory=dict)
-
-    def expected(self, observable: str) -> list[Verdict]:
-        """Verdicts that do not contradict the claim."""
-        return self.expect_for.get(observable, self.expect)
 
 
 @dataclass(frozen=True)

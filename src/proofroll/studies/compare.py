@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable
+from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass, field
 from typing import TYPE_CHECKING
 
@@ -22,6 +22,12 @@ from proofroll.trajectory import read
 
 if TYPE_CHECKING:
     import xarray as xr
+
+
+def worst(judgements: Sequence[Judgement]) -> Verdict:
+    """The worst verdict of any observable; failed if there is none."""
+    order = list(Verdict)
+    return max((judgement.verdict for judgement in judgements), key=order.index, default=Verdict.FAILED)
 
 
 @dataclass(frozen=True)
@@ -49,10 +55,7 @@ class Run:
     @property
     def verdict(self) -> Verdict:
         """The worst verdict of any observable."""
-        if self.result.status != Status.DONE or not self.judgements:
-            return Verdict.FAILED
-        order = list(Verdict)
-        return max((judgement.verdict for judgement in self.judgements), key=order.index)
+        return worst(self.judgements) if self.result.status == Status.DONE else Verdict.FAILED
 
 
 @dataclass(frozen=True)
@@ -305,13 +308,17 @@ def _contradictions(comparison: Comparison, run: Planned, judgements: list[Judge
     """What the claim did not expect, as sentences."""
     where = f"{run.row.engine} at {point_name(run.parameters)}"
     found = []
+    overall = worst(judgements)
+    if overall not in run.row.expect:
+        # Which observables make it so; where it is better than expected, all of them do.
+        guilty = [judgement for judgement in judgements if judgement.verdict == overall]
+        said = "; ".join(_said(judgement) for judgement in guilty)
+        found.append(f"{where} {overall}, expected: {' or '.join(run.row.expect)} ({said})")
     for judgement in judgements:
-        name, expected = judgement.observable, run.row.expected(judgement.observable)
-        if judgement.verdict not in expected:
-            found.append(
-                f"{where}: {name} {judgement.verdict} (error {judgement.error:.3g} {judgement.unit}, tolerance "
-                f"{judgement.tolerance:.3g}), expected: {' or '.join(expected)}"
-            )
+        name = judgement.observable
+        expected = run.row.expect_for.get(name)
+        if expected is not None and judgement.verdict not in expected:
+            found.append(f"{where}: {_said(judgement)}, expected: {' or '.join(expected)}")
         if name in run.row.order and not _within(judgement.order, run.row.order[name]):
             low, high = run.row.order[name]
             found.append(f"{where}: order of {name} is {judgement.order}, expected {low:g} to {high:g}")
@@ -322,6 +329,11 @@ def _contradictions(comparison: Comparison, run: Planned, judgements: list[Judge
     missing = [name for name in run.row.expect_for if name not in {j.observable for j in judgements}]
     found += [f"{where}: {name} is not reported, though {comparison.name} expects a verdict on it" for name in missing]
     return found
+
+
+def _said(judgement: Judgement) -> str:
+    error, tolerance = f"{judgement.error:.3g} {judgement.unit}", f"{judgement.tolerance:.3g}"
+    return f"{judgement.observable} {judgement.verdict}, error {error} against {tolerance}"
 
 
 def _within(value: float | None, bounds: tuple[float, float]) -> bool:
