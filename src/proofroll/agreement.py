@@ -16,7 +16,7 @@ class Verdict(StrEnum):
 
     AGREES = "agrees"  # within tolerance at this step
     CONVERGES = "converges"  # not yet, but the limit of small steps is the truth
-    DIFFERS = "differs"  # the limit is something else: the model's form differs
+    DIFFERS = "differs"  # the limit is something else, or no limit shows: not this model at this step
     FAILED = "failed"  # there is no result
 
 

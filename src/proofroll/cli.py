@@ -297,12 +297,18 @@ def _complain(text: str) -> None:
     sys.stderr.write(f"proofroll: {' '.join(text.split())}\n")
 
 
+def _given(error: typer.TyperException) -> str:
+    """The offending value, which typer's messages about numbers leave out."""
+    problems: list[dict[str, Any]] = getattr(error.__cause__, "errors", list)()
+    return f" (given: {problems[0]['input']!r})" if problems else ""
+
+
 def main() -> None:
     """Entry point: every problem is one line on standard error and an exit code."""
     try:
         code = app(standalone_mode=False)
     except typer.TyperException as error:
-        _complain(error.format_message())
+        _complain(f"{error.format_message()}{_given(error)}")
         code = USAGE
     except InputError as error:
         _complain(str(error))

@@ -5,6 +5,7 @@ from __future__ import annotations
 import itertools
 import math
 import tomllib
+from collections.abc import Iterable
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
@@ -15,7 +16,7 @@ from proofroll.agreement import Verdict
 from proofroll.errors import InputError
 from proofroll.folders import data_folder
 from proofroll.metrics import OBSERVABLES
-from proofroll.scene_file import first_problem
+from proofroll.scene_file import first_problem, load_scene
 
 _LADDER_RUNGS = 3
 
@@ -169,6 +170,8 @@ def _comparison(path: Path, content: dict[str, Any]) -> Comparison:
         )
     except ValidationError as error:
         raise first_problem(error, where) from None
+    for name, band in comparison.bands.items():
+        _check_observables(f"{where}: tolerances.{name}", comparison, band.bounds)
     for index, row in enumerate(comparison.rows):
         _check(f"{where}: rows.{index}", row, comparison)
     return comparison
@@ -215,9 +218,7 @@ def _check(where: str, row: Row, comparison: Comparison) -> None:
     verdicts = {*row.expect, *itertools.chain.from_iterable(row.expect_for.values())}
     if verdicts - {Verdict.AGREES} and not row.because:
         raise InputError(f"{where}.because", "nothing", "an expectation other than agreement needs its reason; add it")
-    for key in (*row.expect_for, *row.order, *row.limit, *row.bound):
-        if key not in OBSERVABLES and key not in comparison.bands[row.tolerance].bounds:
-            raise InputError(f"{where}: observable", key, "there is no such observable")
+    _check_observables(where, comparison, [*row.expect_for, *row.order, *row.limit, *row.bound])
     for key, values in row.only.items():
         if key not in comparison.vary:
             raise InputError(f"{where}.only", key, f"the comparison varies {', '.join(comparison.vary)}")
@@ -225,6 +226,15 @@ def _check(where: str, row: Row, comparison: Comparison) -> None:
             if value not in comparison.vary[key]:
                 known = ", ".join(f"{item:g}" for item in comparison.vary[key])
                 raise InputError(f"{where}.only.{key}", value, f"the comparison has only {known}")
+
+
+def _check_observables(where: str, comparison: Comparison, names: Iterable[str]) -> None:
+    known = (*load_scene(comparison.scene).rolling.surface.coordinates, *OBSERVABLES)
+    for name in names:
+        if name not in known:
+            raise InputError(
+                f"{where}: observable", name, f"there is no such observable; choose from {', '.join(known)}"
+            )
 
 
 for _typed in (Comparison, Row):

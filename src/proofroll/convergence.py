@@ -12,6 +12,11 @@ from proofroll.surfaces import FloatArray
 # An observed order this near to an integer is that integer.
 _NEAR = 0.25
 
+# A ladder is asymptotic if its observed order is the scheme's to this much.
+_ASYMPTOTIC = 0.1
+# Differences that shrink more slowly than this say nothing about a limit.
+_NO_CONVERGENCE = 0.25
+
 
 @dataclass(frozen=True)
 class Limit:
@@ -29,43 +34,36 @@ class Limit:
     order: float
 
 
-def richardson(curves: Sequence[FloatArray], ratio: float) -> Limit:
+def richardson(curves: Sequence[FloatArray], ratio: float, declared: int | None = None) -> Limit:
     """Extrapolates three curves computed with steps h ratio², h ratio and h (coarse first).
 
-    The observed order p follows from the size of the two differences (Roache 1998, section 5.9); the extrapolation
-    removes the term h^p, then h^(p+1) if p is an integer.
+    The observed order p follows from the size of the two differences (Roache 1998, section 5.9). Where it is that of
+    the scheme the ladder is asymptotic: the extrapolation removes the term h^p, then h^(p+1), and is trusted to twice
+    its last change. Where it is not, the differences do not measure the error; the extrapolation with the declared
+    order is then trusted no further than the distance by which it moved the finest curve.
 
     Args:
         curves: three arrays of one shape.
         ratio: of neighbouring steps, above 1.
+        declared: order of the scheme; None: the nearest integer to the observed one.
     """
     coarse, middle, fine = curves
     first, last = _size(middle - coarse), _size(fine - middle)
     if last == 0:
         return Limit(fine, 0.0, float("nan"))
     order = float(np.log(first / last) / np.log(ratio)) if first > 0 else float("nan")
-    if not np.isfinite(order) or order < 0.25:
-        # No convergence to speak of: the finest curve, as uncertain as the largest change seen.
+    if not np.isfinite(order) or order < _NO_CONVERGENCE:
+        # The finest curve, as uncertain as the largest change seen.
         return Limit(fine, max(first, last), float("nan"))
-    nearest = max(1, round(order))
-    twice = _two_terms(curves, ratio, nearest)
-    if abs(order - nearest) < _NEAR:
-        # An integer order is a fact of the scheme; the observed one carries the noise of the coarsest curve.
-        # Twice: the usual safety factor on an extrapolation from three grids (Roache 1998 argues for 1.25 to 3).
-        once = fine + (fine - middle) / (ratio**nearest - 1)
-        return Limit(twice, 2 * _size(twice - once), order)
-    # Either a method of a fractional order or an integer order mixed with the next: nobody knows which, and the two
-    # extrapolations differ by what that may matter.
-    values = fine + (fine - middle) / (ratio**order - 1)
-    return Limit(values, _size(values - twice), order)
-
-
-def _two_terms(curves: Sequence[FloatArray], ratio: float, power: int) -> FloatArray:
-    """The curves without their terms h^power and h^(power+1)."""
-    coarse, middle, fine = curves
+    power = declared or max(1, round(order))
     gain = ratio**power - 1
     before, after = middle + (middle - coarse) / gain, fine + (fine - middle) / gain
-    return np.asarray(after + (after - before) / (ratio ** (power + 1) - 1))
+    values = after + (after - before) / (ratio ** (power + 1) - 1)
+    asymptotic = abs(order - power) < _ASYMPTOTIC
+    if asymptotic:
+        return Limit(values, 2 * _size(values - after), order)
+    # An order below the declared one leaves more of the error in place than the extrapolation removed.
+    return Limit(values, max(_size(values - fine), last / (ratio**order - 1)), order)
 
 
 def tightest(curves: Sequence[FloatArray]) -> Limit:

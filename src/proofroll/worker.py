@@ -57,7 +57,8 @@ def _answer(request: dict[str, Any]) -> dict[str, Any]:
     try:
         return action(**request)
     except InputError as error:
-        return {"error": "input", "field": error.field, "value": str(error.value), "advice": error.advice}
+        value = error.value if isinstance(error.value, (bool, int, float, str)) else str(error.value)
+        return {"error": "input", "field": error.field, "value": value, "advice": error.advice}
     except Missing as error:
         return {"error": "missing", "message": str(error)}
     except Exception as error:

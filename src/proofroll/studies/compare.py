@@ -301,7 +301,7 @@ def _limit(run: Planned, name: str, curves: list[dict[str, Observable] | None]) 
     assert isinstance(run.facts, EngineFacts)  # there are curves
     if run.facts.resolution != "dt":
         return tightest(values)
-    return richardson(values, run.row.ladder[0] / run.row.ladder[1])
+    return richardson(values, run.row.ladder[0] / run.row.ladder[1], run.facts.order)
 
 
 def _contradictions(comparison: Comparison, run: Planned, judgements: list[Judgement]) -> list[str]:

@@ -1,0 +1,16 @@
+"""The checks that an engine's author runs, in three lines of their own repository:
+
+    import pytest
+    from proofroll.conformance import checks
+
+    @pytest.mark.parametrize("check", checks(MyEngine))
+    def test_engine(check):
+        check()
+
+A check that fails says what is wrong and prints the command that runs it alone. pytest is not needed: each check is
+a plain callable that raises ``AssertionError``, or ``unittest.SkipTest`` where it has nothing to look at.
+"""  # noqa: D415 -- the code is part of the sentence
+
+from proofroll.conformance.checks import Check, checks, run_check
+
+__all__ = ["Check", "checks", "run_check"]

@@ -1,0 +1,103 @@
+"""Checks of what an engine builds and samples at time 0."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+
+from proofroll.certificate import certify, first_difference
+from proofroll.conformance.subject import Subject, bits, require, scenes
+from proofroll.engine import Sample
+from proofroll.errors import Refused
+from proofroll.scene import Capability, Scene
+
+
+def builds_or_refuses(subject: Subject) -> None:
+    """The engine builds the scene, or refuses it in one line that says why."""
+    if subject.scene.requires - subject.engine.provides:
+        return
+    try:
+        subject.engine.build(subject.scene, subject.settings)
+    except Refused as refusal:
+        text = str(refusal)
+        require(text.strip() and "\n" not in text, f"a refusal must be one line that says why, not {text!r}")
+    except Exception as error:
+        raise AssertionError(f"build raised {type(error).__name__} instead of Refused: {error}") from error
+
+
+def provides_what_it_says(engine: Any) -> None:
+    """For each capability that the engine provides some formulation builds a scene that needs it."""
+    for capability in sorted(engine.provides - {Capability.BOUNDED_FRICTION}):
+        refusals: list[str] = []
+        if not any(
+            _some_builds(engine, scene, refusals) for scene in scenes().values() if capability in scene.requires
+        ):
+            raise AssertionError(f"provides {capability}, but builds no scene that needs it: {'; '.join(refusals)}")
+
+
+def _some_builds(engine: Any, scene: Scene, refusals: list[str]) -> bool:
+    """Whether any preset builds the scene; the reasons of those that do not go to ``refusals``."""
+    lacking = scene.requires - engine.provides
+    if lacking:
+        refusals.append(f"{scene.name} needs {', '.join(sorted(lacking))}")
+        return False
+    for presets in engine.presets.values():
+        for settings in presets.values():
+            try:
+                engine.build(scene, settings)
+            except Refused as refusal:
+                refusals.append(f"{settings.formulation} on {scene.name}: {refusal}")
+            else:
+                return True
+    return False
+
+
+def certificate_holds(subject: Subject) -> None:
+    """What was built is what the scene says: mass, inertia, gravity, radius, start, first accelerations and forces."""
+    difference = first_difference(certify(subject.build(), subject.scene))
+    require(difference is None, str(difference))
+
+
+def samples_are_well_formed(subject: Subject) -> None:
+    """Samples hold finite arrays of doubles of the right shapes; the orientation starts as the identity."""
+    start = subject.build()
+    _well_formed(start.sample(), "at time 0")
+    orientation = start.sample().q_WB
+    if orientation is not None:
+        identity = float(np.max(np.abs(np.abs(orientation) - [1, 0, 0, 0])))
+        require(identity < 1e-12, f"q_WB at time 0 is {orientation} instead of 1, 0, 0, 0")
+    moved = subject.at(subject.span(1))
+    _well_formed(moved.sample(), "after a step")
+
+
+def _well_formed(sample: Sample, when: str) -> None:
+    require(isinstance(sample, Sample), f"sample() gave {type(sample).__name__} instead of Sample {when}")
+    for name, size in (("p_WB", 3), ("v_WB", 3), ("w_WB", 3), ("q_WB", 4), ("force", 3)):
+        value = getattr(sample, name)
+        if value is None and name in {"q_WB", "force"}:
+            continue
+        require(isinstance(value, np.ndarray), f"{name} is {type(value).__name__} instead of an array {when}")
+        require(value.shape == (size,), f"{name} has the shape {value.shape} instead of ({size},) {when}")
+        require(value.dtype == np.float64, f"{name} is of type {value.dtype} instead of float64 {when}")
+        require(np.all(np.isfinite(value)), f"{name} is {value} {when}")
+    if sample.q_WB is not None:
+        length = float(np.linalg.norm(sample.q_WB))
+        require(abs(length - 1) < 1e-6, f"q_WB has the length {length} instead of 1 {when}")
+
+
+def reading_back_changes_nothing(subject: Subject) -> None:
+    """``built()`` and ``sample()`` give the same twice and leave the state alone."""
+    engine = subject.build()
+    first = engine.sample()
+    before = bits(first)
+    engine.built()
+    engine.built()
+    require(bits(engine.sample()) == before, "sample() gives other numbers after built()")
+    t = subject.span(1)
+    engine.advance(t)
+    require(bits(first) == before, "a sample changed when the engine moved on; give copies of the engine's arrays")
+    require(
+        bits(engine.sample()) == bits(subject.at(t).sample()),
+        "a run whose engine was sampled at time 0 ends elsewhere than one that was not",
+    )

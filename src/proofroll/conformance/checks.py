@@ -1,0 +1,154 @@
+"""The list of checks for an engine, each a callable with a name and a command that runs it alone."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator, Mapping
+from dataclasses import dataclass
+from fnmatch import fnmatchcase
+from typing import Any
+from unittest import SkipTest
+
+from proofroll.conformance import building, declarations, motion
+from proofroll.conformance.subject import Subject, scenes
+
+# One per engine.
+_OF_ENGINES: tuple[Callable[[Any], None], ...] = (
+    declarations.name_is_the_entry_point,
+    declarations.version_is_told,
+    declarations.provides_capabilities,
+    declarations.settings_are_a_frozen_dataclass,
+    declarations.presets_are_complete,
+    declarations.resolution_and_order_are_told,
+    declarations.bad_settings_give_one_line,
+    building.provides_what_it_says,
+)
+# One per formulation, preset and scene.
+_OF_SCENES: tuple[Callable[[Subject], None], ...] = (
+    building.builds_or_refuses,
+    building.certificate_holds,
+)
+# One per formulation and preset, on the first scene that is not refused.
+_OF_PRESETS: tuple[Callable[[Subject], None], ...] = (
+    building.samples_are_well_formed,
+    building.reading_back_changes_nothing,
+    motion.advance_is_repeatable,
+    motion.advance_in_two_parts,
+    motion.sampling_changes_nothing,
+    motion.engines_do_not_disturb_each_other,
+    motion.velocities_are_the_rates,
+    motion.order_is_as_declared,
+    motion.tolerance_has_an_effect,
+)
+
+
+@dataclass(frozen=True)
+class Check:
+    """One check of one engine; call it.
+
+    Attributes:
+        engine: the engine's class.
+        name: e.g. ``certificate_holds[free-matched-plane]``.
+        known: why the check is known to fail; empty if it should pass. A known failure that passes is a failure.
+        run: the check itself.
+    """
+
+    engine: Any
+    name: str
+    known: str
+    run: Callable[[], None]
+
+    @property
+    def __name__(self) -> str:  # what pytest shows
+        return self.name
+
+    def __call__(self) -> None:
+        """Runs the check.
+
+        Raises:
+            AssertionError: it failed; the text says why and how to run it alone.
+            SkipTest: there is nothing to look at, or the failure is known.
+        """
+        try:
+            self.run()
+        except SkipTest:
+            raise
+        except Exception as error:
+            if self.known:
+                raise SkipTest(f"known: {self.known}") from error
+            what = str(error) if isinstance(error, AssertionError) else f"{type(error).__name__}: {error}"
+            raise AssertionError(f"{what}\n\nTo reproduce:\n{self.reproducer}") from error
+        if self.known:
+            raise AssertionError(f"{self.name} passes, though it is said to fail ({self.known}); take it off the list")
+
+    @property
+    def reproducer(self) -> str:
+        """A command for the shell that runs this check alone."""
+        module, name = self.engine.__module__, self.engine.__qualname__
+        imports = f"from {module} import {name}; from proofroll.conformance import run_check"
+        return f"python -c \"{imports}; run_check({name}, '{self.name}')\""
+
+
+def checks(engine: Any, known: Mapping[str, str] | None = None) -> list[Check]:
+    """All checks of an engine.
+
+    Args:
+        engine: the engine's class.
+        known: names of checks that are known to fail, ``*`` for any text as in ``order_is_as_declared[free-*]``, with
+            the reason. A name that fits no check, or whose check passes, is a failure.
+    """
+    patterns = dict(known or {})
+    found = [
+        Check(engine, name, next((why for pattern, why in patterns.items() if _fits(name, pattern)), ""), run)
+        for name, run in _runs(engine)
+    ]
+    for pattern in patterns:
+        if not any(_fits(check.name, pattern) for check in found):
+            raise ValueError(f"no check of {engine.__name__} fits {pattern!r}")
+    return found
+
+
+def _fits(name: str, pattern: str) -> bool:
+    return fnmatchcase(name, pattern.replace("[", "[[]"))
+
+
+def run_check(engine: Any, name: str) -> None:
+    """Runs the check of this name alone."""
+    for check in checks(engine):
+        if check.name == name:
+            check()
+            return
+    raise ValueError(f"{engine.__name__} has no check {name!r}")
+
+
+def _runs(engine: Any) -> Iterator[tuple[str, Callable[[], None]]]:
+    for check in _OF_ENGINES:
+        yield check.__name__, _bound(check, engine)
+    for formulation, presets in engine.presets.items():
+        for preset, settings in presets.items():
+            for name, scene in scenes().items():
+                for check_scene in _OF_SCENES:
+                    subject = Subject(engine, settings, scene)
+                    yield f"{check_scene.__name__}[{formulation}-{preset}-{name}]", _bound(check_scene, subject)
+            for check_preset in _OF_PRESETS:
+                yield f"{check_preset.__name__}[{formulation}-{preset}]", _first(check_preset, engine, settings)
+
+
+def _bound(check: Callable[[Any], None], what: Any) -> Callable[[], None]:
+    return lambda: check(what)
+
+
+def _first(check: Callable[[Subject], None], engine: Any, settings: Any) -> Callable[[], None]:
+    """The check on the most demanding scene that the engine builds with these settings."""
+
+    def run() -> None:
+        for scene in scenes().values():
+            subject = Subject(engine, settings, scene)
+            try:
+                subject.build()
+            except SkipTest:
+                continue
+            check(subject)
+            return
+        raise SkipTest("every scene is refused")
+
+    return run

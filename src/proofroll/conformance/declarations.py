@@ -1,0 +1,111 @@
+"""Checks of what an engine says of itself. Nothing is built."""
+
+from __future__ import annotations
+
+import dataclasses
+import json
+import math
+from importlib.metadata import entry_points
+from typing import Any
+
+from proofroll.conformance.subject import require
+from proofroll.errors import InputError
+from proofroll.registry import GROUP, resolve_settings
+from proofroll.scene import Capability
+
+
+def name_is_the_entry_point(engine: Any) -> None:
+    """An installed package announces the engine under its own name."""
+    points = [point for point in entry_points(group=GROUP) if point.name == engine.name]
+    require(points, f"no installed package has the entry point {GROUP}: {engine.name}; add it and install the package")
+    found = points[0].load()
+    require(found is engine, f"the entry point {engine.name} leads to {found!r} instead of {engine!r}")
+
+
+def version_is_told(engine: Any) -> None:
+    """The engine tells its version as text."""
+    version = engine.version()
+    require(isinstance(version, str) and version.strip(), f"version() gave {version!r} instead of text")
+
+
+def provides_capabilities(engine: Any) -> None:
+    """What the engine provides is a frozen set of capabilities with at least rolling in it."""
+    provides = engine.provides
+    require(isinstance(provides, frozenset), f"provides is a {type(provides).__name__}; make it a frozenset")
+    unknown = {item for item in provides if not isinstance(item, Capability)}
+    require(not unknown, f"provides holds {unknown}, which are not members of Capability")
+    require(Capability.ROLLING in provides, "every scene so far needs Capability.ROLLING, which is not provided")
+
+
+def settings_are_a_frozen_dataclass(engine: Any) -> None:
+    """The settings are a frozen dataclass in which every field has a default, formulation and preset among them."""
+    kind = engine.settings
+    require(dataclasses.is_dataclass(kind), "settings must be a dataclass")
+    require(kind.__dataclass_params__.frozen, "settings must be frozen: @dataclass(frozen=True)")
+    fields = {field.name: field for field in dataclasses.fields(kind)}
+    for name in ("formulation", "preset"):
+        require(name in fields, f"settings need the field {name}")
+    for name, field in fields.items():
+        missing = field.default is dataclasses.MISSING and field.default_factory is dataclasses.MISSING
+        require(not missing, f"the setting {name} needs a default")
+
+
+def presets_are_complete(engine: Any) -> None:
+    """Each formulation has a preset matched or default, and each preset says which it is and survives JSON."""
+    require(engine.presets, "presets are empty; give each formulation its settings")
+    for formulation, presets in engine.presets.items():
+        require({"matched", "default"} & set(presets), f"{formulation} needs a preset matched or default")
+        unknown = set(presets) - {"default", "matched", "tuned"}
+        require(not unknown, f"{formulation} has the preset {unknown}; only default, matched and tuned have a meaning")
+        for preset, settings in presets.items():
+            where = f"presets[{formulation!r}][{preset!r}]"
+            require(settings.formulation == formulation, f"{where}.formulation is {settings.formulation!r}")
+            require(settings.preset == preset, f"{where}.preset is {settings.preset!r}")
+            again = resolve_settings(engine, json.loads(json.dumps(dataclasses.asdict(settings))))
+            require(again == settings, f"{where} is {again} after it was written as JSON and read")
+
+
+def resolution_and_order_are_told(engine: Any) -> None:
+    """Each preset names the setting that trades speed for accuracy, and an order exactly if that is a step."""
+    for formulation, presets in engine.presets.items():
+        for preset, settings in presets.items():
+            where = f"presets[{formulation!r}][{preset!r}]"
+            require(
+                settings.resolution in {"dt", "rtol"}, f"{where}.resolution is {settings.resolution!r}, not dt or rtol"
+            )
+            value = getattr(settings, settings.resolution, None)
+            usable = isinstance(value, float) and math.isfinite(value) and value > 0
+            require(usable, f"{where}.{settings.resolution} is {value!r} instead of a positive number")
+            order = settings.order
+            if settings.resolution == "dt":
+                whole = isinstance(order, int) and not isinstance(order, bool) and order > 0
+                require(whole, f"{where}.order is {order!r}; a method with a fixed step has a whole order")
+            else:
+                require(order is None, f"{where}.order is {order!r}; with a tolerance there is none")
+
+
+def bad_settings_give_one_line(engine: Any) -> None:
+    """A setting that does not exist or makes no sense gives one line with its name and value, not a traceback."""
+    first = next(iter(engine.presets.values()))
+    resolution = next(iter(first.values())).resolution
+    bad: list[tuple[str, object]] = [("no_such_setting", 1), ("formulation", "no_such"), ("preset", "no_such")]
+    bad += [(resolution, value) for value in (0, -1.0, math.nan, math.inf, "text", None)]
+    for name, value in bad:
+        try:
+            found = resolve_settings(engine, {**_as_chosen(first), name: value})
+        except InputError as error:
+            text = str(error)
+            require("\n" not in text, f"the message about {name}={value!r} has more than one line: {text!r}")
+            require(name in text, f"the message about {name}={value!r} does not name the setting: {text!r}")
+        except Exception as error:
+            raise AssertionError(
+                f"{name}={value!r} gave {type(error).__name__} instead of InputError: {error}"
+            ) from error
+        else:
+            raise AssertionError(f"{name}={value!r} was accepted: {found}")
+
+
+def _as_chosen(presets: Any) -> dict[str, str]:
+    """Formulation and preset as a user would write them."""
+    preset = next(iter(presets))
+    return {"formulation": presets[preset].formulation, "preset": preset}

@@ -1,0 +1,157 @@
+"""Checks of how an engine moves: the runner may cut a run where it likes, and the step has the order it should."""
+
+from __future__ import annotations
+
+import math
+from itertools import pairwise
+from unittest import SkipTest
+
+import numpy as np
+from scipy.spatial.transform import Rotation
+
+from proofroll.conformance.subject import Subject, bits, require
+from proofroll.errors import Diverged
+from proofroll.scene_file import load_scene
+
+# Below this relative difference two states differ by little more than accumulated round-off.
+_ROUND_OFF = 1e-9
+# The next term of the error's expansion shifts the observed order by about (h/τ)/ln 2, with τ a time of the motion, and
+# half as much at half the step: two observations are as near to the order as they are to each other.
+_SETTLED = 0.1
+_ORDER_TOLERANCE = 0.2
+_ORDER_SPAN = 0.1
+_TRIES = 6
+# Long enough that a loose tolerance is not met by a single step of a method of high order.
+_TOLERANCE_SPAN = 0.5
+
+
+def advance_is_repeatable(subject: Subject) -> None:
+    """The same scene built twice moves the same, to the last bit."""
+    t = subject.span(1)
+    first, second = subject.at(t).sample(), subject.at(t).sample()
+    require(bits(first) == bits(second), f"two runs of one scene differ by {subject.distance(first, second):.2g}")
+
+
+def advance_in_two_parts(subject: Subject) -> None:
+    """Advancing to t by way of t/2 is advancing to t; advancing to the present time does nothing."""
+    t = subject.span(2)
+    engine = subject.at(t / 2)
+    engine.advance(t / 2)
+    engine.advance(t)
+    difference = subject.distance(engine.sample(), subject.at(t).sample())
+    require(
+        difference <= subject.closeness,
+        f"advance({t / 2:g}) and advance({t:g}) end {difference:.2g} away from advance({t:g}) alone (relative, allowed "
+        f"{subject.closeness:.2g})",
+    )
+
+
+def sampling_changes_nothing(subject: Subject) -> None:
+    """A run that is sampled on the way ends where one ends that is not, to the last bit."""
+    t = subject.span(4)
+    watched, alone = subject.build(), subject.build()
+    for part in range(1, 5):
+        watched.advance(t * part / 4)
+        once, twice = watched.sample(), watched.sample()
+        require(bits(once) == bits(twice), f"two samples at {t * part / 4:g} s differ")
+        alone.advance(t * part / 4)
+    difference = subject.distance(watched.sample(), alone.sample())
+    require(bits(watched.sample()) == bits(alone.sample()), f"sampling moved the end of the run by {difference:.2g}")
+
+
+def engines_do_not_disturb_each_other(subject: Subject) -> None:
+    """Two engines that are alive at once, with different scenes, each move as they do alone."""
+    t = subject.span(2)
+    parameters = dict(subject.scene.parameters)
+    other = Subject(
+        subject.engine,
+        subject.settings,
+        load_scene(
+            subject.scene.name, **(parameters | {"mass": 2 * parameters["mass"], "speed": -parameters["speed"]})
+        ),
+    )
+    alone = [bits(each.at(t).sample()) for each in (subject, other)]
+    together = [subject.build(), other.build()]
+    for engine in together:
+        engine.advance(t)
+    for name, engine, expected in zip(("first", "second"), together, alone, strict=True):
+        require(bits(engine.sample()) == expected, f"the {name} of two engines moves otherwise than it does alone")
+
+
+def velocities_are_the_rates(subject: Subject) -> None:
+    """v_WB is the rate of p_WB and w_WB, in the world, that of q_WB."""
+    start = subject.span(1)
+    h = subject.span(1, at_least=1e-4)
+    engine = subject.at(start)
+    before = engine.sample()
+    engine.advance(start + h)
+    after = engine.sample()
+    for name, rate, one, other in (
+        ("v_WB", (after.p_WB - before.p_WB) / h, before.v_WB, after.v_WB),
+        ("w_WB", _spin(before.q_WB, after.q_WB, h), before.w_WB, after.w_WB),
+    ):
+        if rate is None:
+            continue
+        mean = (one + other) / 2
+        # A semi-implicit step moves with the velocity at one of its ends; the trapezoidal rule is off by (ω h)²/12, and
+        # a soft contact may vibrate with its step.
+        allowed = float(np.linalg.norm(other - one)) / 2 + 1e-2 * float(np.linalg.norm(mean))
+        difference = float(np.linalg.norm(rate - mean))
+        require(difference <= allowed, f"{name} is {mean}, but the state changes at the rate {rate}")
+
+
+def _spin(before: object, after: object, h: float) -> np.ndarray | None:
+    """Angular velocity in the world between two orientations."""
+    if before is None or after is None:
+        return None
+    one, other = (Rotation.from_quat(np.asarray(q), scalar_first=True) for q in (before, after))
+    return np.asarray((other * one.inv()).as_rotvec() / h)
+
+
+def order_is_as_declared(subject: Subject) -> None:
+    """Halving the step divides the error by 2 to the declared order."""
+    if not subject.fixed_step:
+        raise SkipTest("the step is adaptive")
+    declared, rung, seen = subject.settings.order, subject, []
+    # The preset's step may be so small that only round-off is left, or so large that the order is not yet seen; which,
+    # is decided without a look at what was declared.
+    for _ in range(_TRIES):
+        first, second = _observed_orders(rung)
+        seen.append(f"{first:.2f}, {second:.2f} at dt = {rung.settings.dt:g}")
+        if math.isnan(second):
+            rung = rung.finer(2.0)
+        elif abs(first - second) > _SETTLED:
+            rung = rung.finer(0.5)
+        else:
+            require(
+                abs(second - declared) <= _ORDER_TOLERANCE,
+                f"the declared order is {declared}, the observed one {second:.2f} at dt = {rung.settings.dt:g}",
+            )
+            return
+    if all("nan" in text for text in seen):
+        raise SkipTest("every step is exact here, to round-off")
+    raise AssertionError(f"the declared order is {declared}, but none is observed: {'; '.join(seen)}")
+
+
+def _observed_orders(subject: Subject) -> tuple[float, float]:
+    """Orders from the steps 2h, h, h/2 and h, h/2, h/4; NaN where round-off hides them."""
+    ladder = [subject.finer(factor) for factor in (2.0, 1.0, 0.5, 0.25)]
+    t = ladder[0].span(1, _ORDER_SPAN)
+    try:
+        states = [each.scaled(each.at(t).sample()) for each in ladder]
+    except Diverged:
+        return math.inf, 0.0  # too coarse
+    changes = [float(np.max(np.abs(coarse - fine))) for coarse, fine in pairwise(states)]
+    if changes[-1] < _ROUND_OFF:
+        return math.nan, math.nan
+    return math.log2(changes[0] / changes[1]), math.log2(changes[1] / changes[2])
+
+
+def tolerance_has_an_effect(subject: Subject) -> None:
+    """Loosening the tolerance a hundredfold, and once more, moves the answer further and further from the tight one."""
+    if subject.fixed_step:
+        raise SkipTest("the step is fixed")
+    t = subject.span(1, _TOLERANCE_SPAN)
+    tight, *looser = (subject.finer(factor).at(t).sample() for factor in (1.0, 1e4, 1e8))
+    near, far = (subject.distance(tight, sample) for sample in looser)
+    require(near < far, f"a tolerance 1e8 times looser changes the answer by {far:.2g}, 1e4 times by {near:.2g}")

@@ -1,0 +1,114 @@
+"""What a check looks at: an engine with settings on a scene, and how two of its states compare."""
+
+from __future__ import annotations
+
+import dataclasses
+import math
+from dataclasses import dataclass
+from functools import cache
+from typing import Any
+from unittest import SkipTest
+
+import numpy as np
+
+from proofroll.engine import Sample
+from proofroll.errors import Refused
+from proofroll.scene import Scene
+from proofroll.scene_file import load_scene
+from proofroll.surfaces import FloatArray
+
+# Simulated time of a check of the motion [s]: the ball goes a sixth of a turn round the cylinder.
+_SPAN = 0.05
+
+
+@cache
+def scenes() -> dict[str, Scene]:
+    """Scenes in which nothing is zero or symmetric, the most demanding first."""
+    cylinder = {"speed": 3.3, "axial_speed": 0.7, "radial_spin": 12.0}
+    plane = {"tilt": 0.35, "speed": 0.8, "cross_speed": 0.5, "normal_spin": 12.0}
+    return {
+        "cylinder-resisting": load_scene("sphere_in_cylinder", **cylinder, rolling_resistance=5e-4),
+        "cylinder": load_scene("sphere_in_cylinder", **cylinder),
+        "plane-resisting": load_scene("inclined_plane", **plane, rolling_resistance=5e-4),
+        "plane": load_scene("inclined_plane", **plane),
+    }
+
+
+def require(condition: object, message: str) -> None:
+    """The check fails with this sentence unless the condition holds."""
+    if not condition:
+        raise AssertionError(message)
+
+
+@dataclass(frozen=True)
+class Subject:
+    """An engine with settings on a scene.
+
+    Attributes:
+        engine: the engine's class.
+        settings: complete settings.
+        scene: what is simulated.
+    """
+
+    engine: Any
+    settings: Any
+    scene: Scene
+
+    def build(self) -> Any:
+        """The engine at time 0; the check has nothing to look at if it refuses."""
+        lacking = self.scene.requires - self.engine.provides
+        if lacking:
+            raise SkipTest("does not provide " + ", ".join(sorted(lacking)))
+        try:
+            return self.engine.build(self.scene, self.settings)
+        except Refused as refusal:
+            raise SkipTest(f"refused: {refusal}") from None
+
+    def at(self, t: float) -> Any:
+        """The engine built and advanced to time ``t`` [s] at once."""
+        engine = self.build()
+        engine.advance(t)
+        return engine
+
+    def finer(self, factor: float) -> Subject:
+        """The same with the resolution (step or tolerance) times ``factor``."""
+        name = self.settings.resolution
+        value = getattr(self.settings, name) * factor
+        return dataclasses.replace(self, settings=dataclasses.replace(self.settings, **{name: value}))
+
+    @property
+    def fixed_step(self) -> bool:
+        """Whether the resolution is a step rather than a tolerance."""
+        return bool(self.settings.resolution == "dt")
+
+    def span(self, parts: int, at_least: float = _SPAN) -> float:
+        """A time [s] that a whole number of steps reaches, also when it is divided into equal parts."""
+        if not self.fixed_step:
+            return at_least
+        step = float(self.settings.dt)
+        return math.ceil(at_least / (parts * step)) * parts * step
+
+    @property
+    def closeness(self) -> float:
+        """How far two runs of one motion may be apart that were not made of the same steps (see :meth:`distance`).
+
+        With a fixed step the steps are the same; what an implicit one is solved to is hardly worse than 1e-8, while a
+        step lost or doubled shows as 1e-2. With a tolerance, some hundred steps each contribute about the tolerance.
+        """
+        return 1e-7 if self.fixed_step else max(1e-9, 1e3 * float(getattr(self.settings, self.settings.resolution)))
+
+    def distance(self, one: Sample, other: Sample) -> float:
+        """Largest difference of two states, relative to the size of each quantity in the scene."""
+        return float(np.max(np.abs(self.scaled(one) - self.scaled(other))))
+
+    def scaled(self, sample: Sample) -> FloatArray:
+        """Position, velocity and spin of a sample in units of the scene."""
+        body = self.scene.rolling
+        a, speed = body.ball.radius, float(np.linalg.norm(body.v0))
+        return np.concatenate([sample.p_WB / a, sample.v_WB / speed, sample.w_WB * a / speed])
+
+
+def bits(sample: Sample) -> bytes:
+    """All numbers of a sample, exactly."""
+    parts = (sample.p_WB, sample.v_WB, sample.w_WB, sample.q_WB, sample.force)
+    return b"".join(np.asarray(part, dtype=np.float64).tobytes() for part in parts if part is not None)

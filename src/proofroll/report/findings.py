@@ -1,0 +1,120 @@
+"""What the numbers of a comparison say, in sentences. Written from the data alone."""
+
+from __future__ import annotations
+
+from typing import Any
+
+from proofroll.metrics import OBSERVABLES
+from proofroll.report.labels import number, symbol, unit
+from proofroll.report.scores import Score, cheapest, recommendation, scores
+
+# The accuracy for which the first paragraph names a setting: a line in a figure.
+EVERYDAY = 1e-3
+
+
+def findings(content: dict[str, Any]) -> dict[str, Any]:
+    """The answer in one paragraph, three sentences, and what to use at each accuracy."""
+    found = scores(content)
+    return {
+        "answer": _answer(content, found),
+        "sentences": [_closest(found), _obvious(content, found), _surprises(content)],
+        "recommendation": recommendation(found),
+    }
+
+
+def _answer(content: dict[str, Any], found: list[Score]) -> str:
+    """What agrees, what does not, whether that was expected, and what to use for everyday accuracy."""
+    rows = content["rows"]
+    said = {
+        "agrees": ("agrees", "agree", "with the truth in every observable and every case"),
+        "converges": ("needs", "need", "a finer step"),
+        "differs": ("differs", "differ", "somewhere however small the step"),
+        "failed": ("gives", "give", "no result somewhere"),
+    }
+    parts = []
+    for verdict, (one, many, rest) in said.items():
+        count = sum(row["verdict"] == verdict for row in rows)
+        if count:
+            parts.append(f"{count} {one if count == 1 else many} {rest}")
+    unexpected = len(content["contradictions"])
+    expected = "All of this was expected." if content["as_expected"] else f"Not expected: {unexpected} findings."
+    text = f"Of {len(rows)} engine settings, {_joined(parts)}. {expected}"
+    best = cheapest(found, "worst", EVERYDAY)
+    if best:
+        cost = number(best["seconds_per_second"])
+        text += (
+            f" For motion and forces to {100 * EVERYDAY:g} %, the cheapest is {best['name']}: {cost} s of computing "
+        )
+        text += "per simulated second."
+    return text
+
+
+def _joined(parts: list[str]) -> str:
+    return parts[0] if len(parts) == 1 else ", ".join(parts[:-1]) + " and " + parts[-1]
+
+
+def _closest(found: list[Score]) -> str:
+    """What agrees best."""
+    complete = [(score.worst, score) for score in found if score.worst is not None]
+    if not complete:
+        return "No setting gave motion and forces in every case, so none can be called the closest to the truth."
+    best = min(complete, key=lambda pair: pair[0])[1]
+    cost = "" if best.seconds is None else f", for {number(best.seconds)} s of computing per simulated second"
+    return (
+        f"Closest to the truth is {best.name}: its motion stays within {number(best.motion)} of each coordinate's "
+        f"range and its forces within {number(best.forces)} of the largest normal force{cost}; the truth's "
+        "own error bar is in these numbers."
+    )
+
+
+def _obvious(content: dict[str, Any], found: list[Score]) -> str:
+    """What a user pays for the obvious model: the default preset against the best of the same engine."""
+    rows = content["rows"]
+    worst: tuple[float, Score, Score] | None = None
+    lost: list[str] = []
+    for score in found:
+        row = rows[score.index]
+        others = [
+            other
+            for other in found
+            if rows[other.index]["name"] == row["name"]
+            and rows[other.index]["preset"] != "default"
+            and other.motion is not None
+        ]
+        if row["preset"] != "default" or not others:
+            continue
+        best = min(others, key=lambda other: other.motion or 0.0)
+        if score.motion is None:
+            lost.append(score.name)
+        elif best.motion and (worst is None or score.motion / best.motion > worst[0]):
+            worst = (score.motion / best.motion, score, best)
+    failed = f" {_joined(lost)} did not even finish everywhere." if lost else ""
+    if worst is None:
+        return "What the obvious model costs cannot be said: no default setting stands beside another one." + failed
+    factor, score, best = worst
+    return (
+        f"The obvious model costs most with {score.name}: {_off(rows[score.index])}, which relative to the range is "
+        f"{number(factor, 1)} times the error of {best.name}.{failed}"
+    )
+
+
+def _off(row: dict[str, Any]) -> str:
+    """A row's largest error of a coordinate, in its unit."""
+    errors = {name: j for name, j in row["observables"].items() if name not in OBSERVABLES}
+    name, judgement = max(errors.items(), key=lambda item: item[1]["error"] / item[1]["scale"])
+    return f"its {symbol(name)} is off by {number(judgement['error'])} {unit(judgement['unit'])}".rstrip()
+
+
+def _surprises(content: dict[str, Any]) -> str:
+    """What contradicts the comparison's expectation."""
+    found = content["contradictions"]
+    if found:
+        more = f" (and {len(found) - 1} more, listed below)" if len(found) > 1 else ""
+        return f"Not expected: {found[0]}{more}."
+    known = [row for row in content["rows"] if row["verdict"] not in {"agrees"}]
+    if not known:
+        return "Nothing contradicts what the comparison expects, and nothing disagrees with the truth."
+    return (
+        f"Nothing contradicts what the comparison expects: where a setting does not agree ({len(known)} of "
+        f"{len(content['rows'])}), the comparison says why."
+    )

@@ -1,0 +1,76 @@
+"""How the report names and writes things: rows, symbols of quantities, numbers."""
+
+from __future__ import annotations
+
+import unicodedata
+from typing import Any
+
+SYMBOLS = {"agrees": "✓", "converges": "≈", "differs": "✗", "failed": "!"}
+MEANINGS = {
+    "agrees": "within tolerance at this step",
+    "converges": "not within tolerance yet, but the limit of small steps is the truth: right physics, step too coarse",
+    "differs": "the limit of small steps is something else: the model's form differs",
+    "failed": "there is no result; the row says why",
+}
+
+
+def number(value: float | None, digits: int = 2, none: str = "–") -> str:
+    """A number in few characters, e.g. ``3.4e-7``; ``none`` where there is none."""
+    if value is None:
+        return none
+    if 0 < abs(value) < 0.01:  # one form for all small numbers: 5.4e-4 below 3.0e-5 is read at a glance
+        mantissa, _, power = f"{value:.{digits - 1}e}".partition("e")
+        return f"{mantissa.rstrip('0').rstrip('.') if '.' in mantissa else mantissa}e{int(power)}"
+    mantissa, exponent, power = f"{value:.{digits}g}".partition("e")
+    return f"{mantissa}e{int(power)}" if exponent else mantissa
+
+
+def error(value: float | None, digits: int = 2) -> str:
+    """An error; JSON has no infinity, so None stands for one that is not finite."""
+    return number(value, digits, none="∞")
+
+
+def unit(text: str) -> str:
+    """A unit as it is shown: nothing for a number without one."""
+    return "" if text == "1" else text.replace("^2", "²").replace("^3", "³")
+
+
+def symbol(name: str) -> str:
+    """A quantity's name with the name of a Greek letter, and a number after it, as one reads them: γ, ω1."""
+    letters = name.rstrip("0123456789")
+    try:
+        return unicodedata.lookup(f"GREEK SMALL LETTER {letters.upper()}") + name[len(letters) :]
+    except KeyError:
+        return name.replace("_", " ")
+
+
+def step(row: dict[str, Any]) -> str:
+    """The setting that trades speed for accuracy, e.g. ``dt 1e-3``."""
+    value = row["resolution_value"]
+    if not row["resolution"]:
+        return ""
+    return f"{row['resolution']} {number(value) if isinstance(value, (int, float)) else value}"
+
+
+def setting(row: dict[str, Any]) -> str:
+    """Formulation and preset of a row, or what the comparison file calls it."""
+    return " ".join(str(part) for part in (row["formulation"], row["preset"]) if part) or str(row["engine"])
+
+
+def names(rows: list[dict[str, Any]]) -> list[str]:
+    """A short name for each row, unlike that of any other row: the comparison file's text where need be."""
+    short = []
+    for row in rows:
+        words = [row["name"], row["formulation"], row["preset"]]
+        short.append(" ".join([*(str(word) for word in words if word), *([f"({step(row)})"] if step(row) else [])]))
+    return [name if short.count(name) == 1 else str(row["engine"]) for name, row in zip(short, rows, strict=True)]
+
+
+def settings_text(settings: dict[str, Any]) -> str:
+    """Complete settings in one line."""
+    return ", ".join(f"{key}={value}" for key, value in settings.items())
+
+
+def values(found: list[float | None]) -> str:
+    """One number, or the components of a vector."""
+    return ", ".join(number(value, 8, none="not finite") for value in found)

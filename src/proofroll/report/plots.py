@@ -1,0 +1,148 @@
+"""The curves that the page draws: the truth, and what each engine adds to it, rounded and thinned."""
+
+from __future__ import annotations
+
+import math
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+import numpy.typing
+
+from proofroll.metrics import scales
+from proofroll.report.labels import symbol, unit
+from proofroll.scene_file import load_scene
+from proofroll.studies.compare import Outcome, Run, point_name
+from proofroll.surfaces import FloatArray
+from proofroll.trajectory import read
+
+if TYPE_CHECKING:
+    from pathlib import Path
+
+    import xarray as xr
+
+    from proofroll.store import Store
+
+Curves = dict[str, FloatArray]
+
+# Drawn besides the surface's coordinates. A reaction at time 0 belongs to the certificate, not to the curve.
+REACTIONS = ("N", "F2", "F3", "needed_friction")
+# More points than this are not seen in a figure 500 pixels wide.
+MOST_POINTS = 400
+# Digits of a curve, and of its difference from the truth: enough for a figure, and small in the file.
+CURVE_DIGITS, DIFFERENCE_DIGITS = 6, 3
+DASHES = ("solid", "dash", "dot", "dashdot", "longdash", "longdashdot")
+COLOURS = 8
+
+
+def point_curves(outcome: Outcome, store: Store) -> list[dict[str, Any]]:
+    """The curves of a comparison, one entry for each point of the parameters.
+
+    Each entry has ``point``, ``time`` [s] and ``observables``: name, unit, the truth's error bar and values, and for
+    each engine the number of its row and its *difference* from the truth.
+    """
+    entries = []
+    for name, case in outcome.truths.items():
+        path = store.trajectory(case)
+        if not path.is_file():
+            continue
+        truth = read(path)
+        body = load_scene(outcome.comparison.scene, **case.parameters).rolling
+        sizes = scales(body, truth)
+        drawn = [key for key in (*body.surface.coordinates, *REACTIONS) if key in truth]
+        engines = _engines(outcome, store, name, drawn)
+        entries.append(
+            {
+                "point": name,
+                "time": rounded(truth["time"].to_numpy(), CURVE_DIGITS),
+                "observables": [_observable(key, truth, engines, sizes.get(key, 1.0)) for key in drawn],
+            }
+        )
+    return entries
+
+
+def styles(rows: list[dict[str, Any]]) -> list[dict[str, Any]]:
+    """Colour by engine, dashes by formulation, width by preset, so that a row looks the same in every figure."""
+    engines = list(dict.fromkeys(row["name"] for row in rows))
+    formulations = {name: list(dict.fromkeys(r["formulation"] for r in rows if r["name"] == name)) for name in engines}
+    widths = {"default": 1.1, "tuned": 2.4}
+    return [
+        {
+            "colour": engines.index(row["name"]) % COLOURS,
+            "dash": DASHES[formulations[row["name"]].index(row["formulation"]) % len(DASHES)],
+            "width": widths.get(row["preset"], 1.7),
+            "opacity": 1 if row["verdict"] in {"agrees", "converges"} else 0.5,  # not to hide those that agree
+        }
+        for row in rows
+    ]
+
+
+def rounded(values: FloatArray, digits: int) -> list[float | None]:
+    """Numbers with so many significant digits; None where one is not finite."""
+    return [float(f"{value:.{digits - 1}e}") if math.isfinite(value) else None for value in values.tolist()]
+
+
+def kept(length: int, curves: list[FloatArray], most: int = MOST_POINTS) -> np.typing.NDArray[np.intp]:
+    """Indices of samples that are drawn: both ends, and every curve's lowest and highest sample of each stretch."""
+    if length <= most:
+        return np.arange(length)
+    stretches = np.array_split(np.arange(length), max(1, most // (2 * len(curves))))
+    chosen = {0, length - 1}
+    for stretch in stretches:
+        for curve in curves:
+            finite = stretch[np.isfinite(curve[stretch])]
+            if finite.size:
+                chosen |= {int(finite[np.argmin(curve[finite])]), int(finite[np.argmax(curve[finite])])}
+    return np.array(sorted(chosen))
+
+
+def _engines(outcome: Outcome, store: Store, point: str, drawn: list[str]) -> list[tuple[int, Curves]]:
+    """Row number and curves of every run at a point that has a trajectory."""
+    numbers: dict[int, int] = {}
+    found = []
+    for run in outcome.runs:
+        number = numbers.setdefault(id(run.row), len(numbers))
+        if point_name(run.parameters) == point and _has_trajectory(run, store):
+            assert run.case is not None  # it has a trajectory
+            found.append((number, _curves(store.trajectory(run.case), drawn)))
+    return found
+
+
+def _curves(path: Path, names: list[str]) -> Curves:
+    """Some variables of a trajectory: a tenth of the time that reading it whole takes."""
+    import h5netcdf
+
+    with h5netcdf.File(path) as file:
+        return {name: np.asarray(file[name][...]) for name in names if name in file.variables}
+
+
+def _has_trajectory(run: Run, store: Store) -> bool:
+    return run.case is not None and run.result.trajectory is not None and store.trajectory(run.case).is_file()
+
+
+def _observable(name: str, truth: xr.Dataset, engines: list[tuple[int, Curves]], scale: float) -> dict[str, Any]:
+    first = 1 if name in REACTIONS else 0
+    true = truth[name].to_numpy()
+    curves = []
+    for row, said in engines:
+        if name not in said:
+            continue
+        values = np.full(true.shape, np.nan)  # a run that ended early has fewer samples
+        ended = min(values.size, said[name].size)
+        values[first:ended] = said[name][first:ended]
+        with np.errstate(invalid="ignore", over="ignore"):
+            difference = values - true
+        at = kept(true.size, [values, np.abs(difference)])
+        curve: dict[str, Any] = {"row": row, "difference": rounded(difference[at], DIFFERENCE_DIGITS)}
+        if at.size < true.size:
+            curve["at"] = at.tolist()
+        curves.append(curve)
+    return {
+        "name": name,
+        "symbol": symbol(name),
+        "meaning": truth[name].attrs.get("long_name", name),
+        "unit": unit(truth[name].attrs["units"]),
+        "scale": float(f"{scale:.3g}"),
+        "error_bar": float(f"{truth[name].attrs.get('error_bar', 0.0):.3g}"),
+        "truth": rounded(true, CURVE_DIGITS),
+        "engines": curves,
+    }

@@ -1,0 +1,159 @@
+"""The report's tables as rows of cells, each with its verdict, its number and a link to its evidence."""
+
+from __future__ import annotations
+
+from typing import Any
+
+from proofroll.report.labels import SYMBOLS, error, names, number, setting, step, symbol, unit
+
+
+def anchor(comparison: int, row: int, point: int) -> str:
+    """Id of the evidence of one row at one point."""
+    return f"c{comparison}-r{row}-p{point}"
+
+
+def observables(content: dict[str, Any]) -> list[dict[str, str]]:
+    """The judged observables in the order of the first row that has them all."""
+    units: dict[str, str] = {}
+    for row in sorted(content["rows"], key=lambda row: -len(row["observables"])):
+        for name, judgement in row["observables"].items():
+            units.setdefault(name, judgement["unit"])
+    return [{"name": name, "symbol": symbol(name), "unit": unit(text)} for name, text in units.items()]
+
+
+def overview(content: dict[str, Any], comparison: int) -> dict[str, Any]:
+    """The verdict matrix: the worst of every row over all points."""
+    points = list(dict.fromkeys(run["point"] for run in content["runs"]))
+    lines = []
+    for index, row in enumerate(content["rows"]):
+        runs = [run for run in content["runs"] if run["row"] == index]
+        worst = next((run for run in runs if run["verdict"] == row["verdict"]), runs[0])
+        lines.append(
+            {
+                **_head(row),
+                "verdict": row["verdict"],
+                "verdict_text": _verdict_text(row),
+                "href": anchor(comparison, index, points.index(worst["point"])),
+                "message": row["message"],
+                "as_expected": row["as_expected"],
+                "seconds": row["seconds_per_second"],
+                "judged": {
+                    name: _cell(judgement, anchor(comparison, index, points.index(judgement["point"])))
+                    for name, judgement in row["observables"].items()
+                },
+            }
+        )
+    return _matrix(content, lines)
+
+
+def at_point(content: dict[str, Any], comparison: int, point: int, name: str) -> dict[str, Any]:
+    """The verdict matrix of one point of the parameters."""
+    lines = []
+    for run in content["runs"]:
+        if run["point"] != name:
+            continue
+        href = anchor(comparison, run["row"], point)
+        lines.append(
+            {
+                **_head(run),
+                "verdict": run["verdict"],
+                "verdict_text": run["verdict"],
+                "href": href,
+                "message": run["message"] if run["status"] != "done" else "",
+                "as_expected": not run["contradictions"],
+                "seconds": run["seconds_per_second"],
+                "judged": {judgement["observable"]: _cell(judgement, href) for judgement in run["judgements"]},
+            }
+        )
+    return _matrix(content, lines)
+
+
+def expectations(content: dict[str, Any]) -> list[dict[str, Any]]:
+    """What is expected, settings with the same expectation together."""
+    groups: dict[tuple[str, str, str], list[str]] = {}
+    for name, row in zip(names(content["rows"]), content["rows"], strict=True):
+        text = " or ".join(row["expected"])
+        for observable, verdicts in row["expected_for"].items():
+            text += f"; {symbol(observable)}: {' or '.join(verdicts)}"
+        groups.setdefault((row["tolerance"], text, row["because"]), []).append(name)
+    return [
+        {"names": found, "tolerance": tolerance, "expected": text, "because": because}
+        for (tolerance, text, because), found in groups.items()
+    ]
+
+
+def reasons(certificate: list[dict[str, Any]]) -> dict[str, list[str]]:
+    """Why some quantities of a certificate may differ by more than round-off: reason -> quantities."""
+    found: dict[str, list[str]] = {}
+    for line in certificate:
+        if line["because"]:
+            found.setdefault(line["because"], []).append(line["quantity"])
+    return found
+
+
+def bounds(content: dict[str, Any], band: dict[str, Any]) -> list[str]:
+    """The tolerances of a band, with symbols and units."""
+    units = {column["name"]: column["unit"] for column in observables(content)}
+    found = []
+    for name, bound in band["bounds"].items():
+        try:
+            text = f"{number(float(bound))} {units.get(name, '')}"
+        except ValueError:
+            text = bound  # relative, and says so
+        found.append(f"{symbol(name)} {text}".strip())
+    return found
+
+
+def belief(content: dict[str, Any]) -> list[dict[str, Any]]:
+    """Why to believe it: for each row its certificates and its force audit, the worst over all points."""
+    lines = []
+    for index, name in enumerate(names(content["rows"])):
+        runs = [run for run in content["runs"] if run["row"] == index]
+        certificate = [line for run in runs for line in run["certificate"]]
+        exact = [line["difference"] for line in certificate if not line["because"] and line["difference"] is not None]
+        soft = list(dict.fromkeys(line["quantity"] for line in certificate if line["because"]))
+        audit = content["rows"][index]["observables"].get("force_audit")
+        lines.append(
+            {
+                "name": name,
+                "held": sum(bool(line["holds"]) for line in certificate),
+                "total": len(certificate),
+                "difference": max(exact, default=None),
+                "soft": soft,
+                "audit": audit,
+            }
+        )
+    return lines
+
+
+def _head(row: dict[str, Any]) -> dict[str, Any]:
+    return {"engine": row["engine"], "name": row["name"], "setting": setting(row), "step": step(row)}
+
+
+def _verdict_text(row: dict[str, Any]) -> str:
+    """The verdict; with a count where only some of the points have it."""
+    count, total = row["verdicts"].get(row["verdict"], 0), sum(row["verdicts"].values())
+    return str(row["verdict"]) if count == total else f"{row['verdict']} {count}/{total}"
+
+
+def _cell(judgement: dict[str, Any], href: str) -> dict[str, Any]:
+    where = f" at {judgement['point']}" if judgement.get("point") else ""
+    text = unit(judgement["unit"])
+    return {
+        "verdict": judgement["verdict"],
+        "symbol": SYMBOLS[judgement["verdict"]],
+        "text": error(judgement["error"]),
+        "href": href,
+        "title": f"{symbol(judgement['observable'])} {judgement['verdict']}: error {error(judgement['error'])} ± "
+        f"{number(judgement['truth_error_bar'], 1)} {text}, tolerance {number(judgement['tolerance'])}{where}",
+    }
+
+
+def _matrix(content: dict[str, Any], lines: list[dict[str, Any]]) -> dict[str, Any]:
+    """Lines grouped by engine, cells in the order of the columns; None where an engine does not say."""
+    columns = observables(content)
+    groups: dict[str, list[dict[str, Any]]] = {}
+    for line in lines:
+        cells = [line["judged"].get(column["name"]) for column in columns]
+        groups.setdefault(line["name"], []).append({**line, "symbol": SYMBOLS[line["verdict"]], "cells": cells})
+    return {"columns": columns, "groups": groups}

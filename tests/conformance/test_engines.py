@@ -1,0 +1,38 @@
+"""Every installed engine, ours and others', conforms to the protocol."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from typing import Any
+
+import pytest
+
+from proofroll.conformance import Check, checks
+from proofroll.errors import Missing
+from proofroll.registry import engine_names, load_engine
+
+# Engine -> pattern of checks -> why they are known to fail.
+KNOWN: Mapping[str, Mapping[str, str]] = {
+    "mujoco": {
+        "order_is_as_declared[facets-*]": "each edge between two facets is a kick, at another moment for every step",
+    },
+}
+
+
+def all_checks() -> list[Any]:
+    """The checks of all engines; one that is skipped for each engine that is not installed."""
+    found: list[Any] = []
+    for name in engine_names():
+        try:
+            engine = load_engine(name)
+        except Missing as reason:
+            found.append(pytest.param(None, id=name, marks=pytest.mark.skip(reason=str(reason))))
+            continue
+        found += [pytest.param(check, id=f"{name}-{check.name}") for check in checks(engine, KNOWN.get(name))]
+    return found
+
+
+@pytest.mark.parametrize("check", all_checks())
+def test_engine(check: Check) -> None:
+    """The engine keeps a promise of the protocol."""
+    check()

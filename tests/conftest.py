@@ -1,0 +1,93 @@
+"""Fixtures that several kinds of tests share."""
+
+from __future__ import annotations
+
+import os
+from collections.abc import Callable, Mapping
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+from hypothesis import HealthCheck, settings
+
+from proofroll.case import Case, EngineFacts
+from proofroll.scene import Scene
+from proofroll.scene_file import load_scene
+
+PLUGINS = Path(__file__).parent / "plugins"
+
+# The same examples on every machine: a red test stays red when it is run again.
+settings.register_profile(
+    "repeatable",
+    derandomize=True,
+    deadline=None,
+    max_examples=5,
+    suppress_health_check=[HealthCheck.too_slow, HealthCheck.function_scoped_fixture],
+)
+settings.load_profile("repeatable")
+
+# Nothing about this motion is zero or symmetric, so a lost sign or a swapped axis shows.
+GENERAL = {"speed": 3.3, "axial_speed": 0.7, "radial_spin": 12.0}
+RESISTING = {"rolling_resistance": 5e-4}
+
+
+@pytest.fixture(
+    params=[
+        ("sphere_in_cylinder", GENERAL),
+        ("sphere_in_cylinder", GENERAL | RESISTING),
+        ("sphere_in_cylinder", {"speed": -4.0}),
+        ("inclined_plane", {"normal_spin": 3.0}),
+        ("inclined_plane", RESISTING),
+    ],
+    ids=["cylinder", "cylinder-resisting", "cylinder-backwards", "plane", "plane-resisting"],
+)
+def scene(request: pytest.FixtureRequest) -> Scene:
+    """Scenes with nothing special about their numbers."""
+    name, parameters = request.param
+    return load_scene(name, **parameters)
+
+
+@pytest.fixture
+def install_engines(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Callable[[Mapping[str, str]], None]:
+    """Announces engines of ``tests/plugins`` as an installed package would, to this process and to its workers."""
+
+    def install(engines: Mapping[str, str]) -> None:
+        site = tmp_path / "site"
+        info = site / "throwaway-1.0.dist-info"
+        info.mkdir(parents=True)
+        (info / "METADATA").write_text("Metadata-Version: 2.1\nName: throwaway\nVersion: 1.0\n")
+        lines = [f"{name} = {target}" for name, target in engines.items()]
+        (info / "entry_points.txt").write_text("\n".join(["[proofroll.engines]", *lines, ""]))
+        places = [str(site), str(PLUGINS), *filter(None, [os.environ.get("PYTHONPATH")])]
+        monkeypatch.setenv("PYTHONPATH", os.pathsep.join(places))
+        monkeypatch.syspath_prepend(str(site))
+
+    return install
+
+
+@pytest.fixture
+def make_case() -> Callable[..., Case]:
+    """A case of the sphere in the cylinder, short, in an engine of ``tests/plugins``."""
+
+    def make(engine: str, **changes: Any) -> Case:
+        parameters = changes.pop("parameters", {})
+        facts = EngineFacts(engine, "1", "code", changes.pop("settings", {}), "dt", None)
+        values: dict[str, Any] = {
+            "scene": "sphere_in_cylinder",
+            "parameters": parameters,
+            "scene_digest": load_scene("sphere_in_cylinder", **parameters).digest,
+            "engine": facts,
+            "until": 0.1,
+            "every": 0.05,
+            "time_limit": 60.0,
+        }
+        return Case(**(values | changes))
+
+    return make
+
+
+@pytest.fixture
+def times() -> np.ndarray:
+    """A time grid of two seconds, as the comparisons use it."""
+    return np.linspace(0.0, 2.0, 101)

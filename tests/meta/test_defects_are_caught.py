@@ -1,0 +1,137 @@
+"""An engine that is broken on purpose never passes: the certificate stops it, or its verdict contradicts the claim."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator, Mapping
+from pathlib import Path
+
+import pytest
+
+from proofroll.agreement import Verdict
+from proofroll.case import Status
+from proofroll.comparison_file import load_comparison
+from proofroll.runner import Runner
+from proofroll.store import Store
+from proofroll.studies.compare import Outcome, Run, compare
+
+# Defect that shows in what was built -> the quantity that the certificate must name.
+OPEN = {
+    "open_inertia": "inertia",
+    "open_gravity": "gravity",
+    "open_radius": "ball radius",
+    "open_mass": "mass",
+    "open_resistance": "rolling resistance",
+    "open_friction": "F2",
+}
+# Defect that hides until the ball moves -> observables that must differ, and some that must not.
+HIDDEN = {
+    "hidden_inertia": ({"z", "F3"}, set[str]()),
+    "hidden_gravity": ({"z", "F3"}, {"gap", "slip"}),
+    "hidden_radius": ({"z", "gap"}, set[str]()),
+    "hidden_mass": ({"N", "F3", "energy_balance"}, {"gamma", "z", "gap", "slip"}),
+    "hidden_resistance": ({"gamma", "F2", "energy_balance"}, {"gap", "slip"}),
+    "hidden_friction": ({"F2", "F3", "force_audit"}, {"gamma", "z", "N", "energy_balance"}),
+    "hidden_clock": ({"gamma", "z"}, {"gap", "slip"}),
+}
+SOUND = "hidden_none"
+
+HEAD = """
+title = "Defects"
+question = "Are they caught?"
+scene = "sphere_in_cylinder"
+until = 0.3
+every = 0.01
+vary = { rolling_resistance = [5e-4] }
+
+[tolerances.tight]
+because = "ten times what is left of the sound engine at its tolerance, and splines through the samples"
+gamma = "1e-9 rad"
+z = "1e-9 m"
+N = "0.01 %"
+F2 = "1e-6 N"
+F3 = "1e-6 N"
+energy_balance = "1e-7 J"
+force_audit = "1e-3 N"
+gap = "1e-9 m"
+slip = "1e-9 m/s"
+"""
+
+
+@pytest.fixture(scope="module")
+def outcome(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Outcome]:
+    """All defects in one comparison, each claimed to agree."""
+    with pytest.MonkeyPatch.context() as patch:
+        folder = tmp_path_factory.mktemp("defects")
+        _install(folder, patch)
+        rows = "".join(
+            f'\n[[rows]]\nengine = "broken[formulation={name}]"\ntolerance = "tight"\n'
+            for name in (*OPEN, *HIDDEN, SOUND)
+        )
+        (folder / "defects.toml").write_text(HEAD + rows)
+        yield compare(load_comparison(str(folder / "defects.toml")), Runner(Store(folder / "cases"), jobs=2))
+
+
+def _install(folder: Path, patch: pytest.MonkeyPatch) -> None:
+    info = folder / "site" / "throwaway-1.0.dist-info"
+    info.mkdir(parents=True)
+    (info / "METADATA").write_text("Metadata-Version: 2.1\nName: throwaway\nVersion: 1.0\n")
+    (info / "entry_points.txt").write_text("[proofroll.engines]\nbroken = broken:Broken\n")
+    plugins = Path(__file__).parents[1] / "plugins"
+    patch.setenv("PYTHONPATH", f"{folder / 'site'}:{plugins}")
+
+
+def run_of(outcome: Outcome, defect: str) -> Run:
+    """The row of one defect."""
+    return next(run for run in outcome.runs if run.row.engine == f"broken[formulation={defect}]")
+
+
+def test_the_sound_engine_agrees(outcome: Outcome) -> None:
+    """Without a defect the same engine agrees in every observable, so that what is caught is the defect."""
+    run = run_of(outcome, SOUND)
+    assert run.verdict is Verdict.AGREES, [j for j in run.judgements if j.verdict is not Verdict.AGREES]
+    assert len(run.judgements) == 9
+    assert not run.contradictions
+
+
+@pytest.mark.parametrize(("defect", "quantity"), OPEN.items())
+def test_the_certificate_stops_what_was_built_wrongly(outcome: Outcome, defect: str, quantity: str) -> None:
+    """An engine that built something else is refused before it is compared, and the row names the quantity."""
+    run = run_of(outcome, defect)
+    assert run.result.status is Status.REFUSED
+    assert f"differs from the scene: {quantity} is" in run.result.message
+    assert run.verdict is Verdict.FAILED
+    assert any(quantity in sentence for sentence in run.contradictions)
+
+
+@pytest.mark.parametrize(("defect", "expected"), HIDDEN.items())
+def test_the_verdict_stops_what_moves_wrongly(
+    outcome: Outcome, defect: str, expected: tuple[set[str], set[str]]
+) -> None:
+    """An engine that lies about what it built differs from the truth where its defect acts, and nowhere else."""
+    differing, agreeing = expected
+    run = run_of(outcome, defect)
+    assert run.result.status is Status.DONE
+    verdicts = {judgement.observable: judgement.verdict for judgement in run.judgements}
+    assert {name for name in differing if verdicts[name] is not Verdict.DIFFERS} == set()
+    assert {name for name in agreeing if verdicts[name] is not Verdict.AGREES} == set()
+    assert run.verdict is Verdict.DIFFERS
+    for name in differing:
+        assert any(f"{name} differs" in sentence for sentence in run.contradictions)
+
+
+def test_contradictions_belong_to_the_defects(outcome: Outcome) -> None:
+    """The comparison as a whole contradicts its claim, through every defect."""
+    named = {name for name in (*OPEN, *HIDDEN) if any(f"={name}]" in text for text in outcome.contradictions)}
+    assert named == {*OPEN, *HIDDEN}
+    assert not any(SOUND in text for text in outcome.contradictions)
+
+
+def test_conformance_sees_open_defects(install_engines: Callable[[Mapping[str, str]], None]) -> None:
+    """The author of such an engine would have been told by its own checks."""
+    install_engines({"broken": "broken:Broken"})
+    from broken import Broken
+
+    from proofroll.conformance import run_check
+
+    with pytest.raises(AssertionError, match="inertia"):
+        run_check(Broken, "certificate_holds[open_inertia-matched-cylinder]")

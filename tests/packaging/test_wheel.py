@@ -1,0 +1,130 @@
+"""The built wheel works on its own: without the repository, from any folder."""
+
+from __future__ import annotations
+
+import json
+import os
+import subprocess
+import sys
+import zipfile
+from pathlib import Path
+
+import pytest
+
+REPOSITORY = Path(__file__).parents[2]
+
+pytest.importorskip("hatchling", reason="the wheel is built with what is installed; pip install hatchling")
+pytest.importorskip("build", reason="the wheel is built with what is installed; pip install build")
+
+
+@pytest.fixture(scope="module")
+def wheel(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """The wheel, built from the repository."""
+    folder = tmp_path_factory.mktemp("dist")
+    command = [sys.executable, "-m", "build", "--wheel", "--no-isolation", "--outdir", str(folder), str(REPOSITORY)]
+    subprocess.run(command, check=True, capture_output=True)
+    (found,) = folder.glob("*.whl")
+    return found
+
+
+@pytest.fixture(scope="module")
+def installed(wheel: Path, tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """A folder with the wheel in it and nothing else; a wheel is a zip archive of exactly that."""
+    folder = tmp_path_factory.mktemp("installed")
+    with zipfile.ZipFile(wheel) as archive:
+        archive.extractall(folder)
+    return folder
+
+
+def python(installed: Path, folder: Path, *arguments: str) -> subprocess.CompletedProcess[str]:
+    """Python with the installed wheel before everything else, in a folder of its own."""
+    environment = {key: value for key, value in os.environ.items() if not key.startswith("PYTHON")}
+    return subprocess.run(
+        [sys.executable, *arguments],
+        cwd=folder,
+        env=environment | {"PYTHONPATH": str(installed)},
+        capture_output=True,
+        text=True,
+        check=False,
+    )
+
+
+def test_contents(wheel: Path) -> None:
+    """The wheel holds the package, its models, comparisons and license, and no tests."""
+    with zipfile.ZipFile(wheel) as archive:
+        names = archive.namelist()
+    for name in (
+        "proofroll/__init__.py",
+        "proofroll/models/sphere_in_cylinder/scene.toml",
+        "proofroll/models/inclined_plane/scene.toml",
+        "proofroll/conformance/checks.py",
+    ):
+        assert name in names
+    models = {path.relative_to(REPOSITORY).as_posix() for path in (REPOSITORY / "models").rglob("*") if path.is_file()}
+    claims = {path.relative_to(REPOSITORY).as_posix() for path in (REPOSITORY / "comparisons").glob("*.toml")}
+    assert claims
+    assert {f"proofroll/{name}" for name in models | claims} <= set(names)
+    pages = {path.relative_to(REPOSITORY / "src").as_posix() for path in (REPOSITORY / "src").rglob("*.j2")}
+    assert pages <= set(names)
+    assert any(name.endswith("LICENSE") for name in names)
+    assert not any(name.startswith(("tests/", "proofroll/tests/")) for name in names)
+    assert not any("__pycache__" in name for name in names)
+
+
+def test_it_is_the_wheel_that_is_used(installed: Path, tmp_path: Path) -> None:
+    """The package and its data come from the wheel, not from the repository."""
+    code = "import proofroll, proofroll.folders as f; print(proofroll.__file__); print(f.data_folder('models'))"
+    done = python(installed, tmp_path, "-c", code)
+    assert done.returncode == 0, done.stderr
+    assert all(line.startswith(str(installed)) for line in done.stdout.splitlines())
+
+
+def test_scenes(installed: Path, tmp_path: Path) -> None:
+    """The command line finds the scenes without the repository."""
+    done = python(installed, tmp_path, "-m", "proofroll.cli", "scenes", "--json")
+    assert done.returncode == 0, done.stderr
+    assert {scene["name"] for scene in json.loads(done.stdout)} >= {"sphere_in_cylinder", "inclined_plane"}
+
+
+@pytest.mark.parametrize("engine", ["truth", "projection"])
+def test_run(installed: Path, tmp_path: Path, engine: str) -> None:
+    """A run from another folder works, in a worker process of the same wheel."""
+    arguments = [
+        "run",
+        "inclined_plane",
+        "--engine",
+        engine,
+        "--until",
+        "0.2",
+        "--every",
+        "0.1",
+        "--out",
+        "run.nc",
+        "--json",
+    ]
+    done = python(installed, tmp_path, "-m", "proofroll.cli", *arguments)
+    assert done.returncode == 0, done.stderr
+    assert json.loads(done.stdout)["status"] == "done"
+    assert (tmp_path / "run.nc").is_file()
+
+
+def test_comparisons_are_found_by_name(installed: Path, tmp_path: Path) -> None:
+    """The claims in the wheel can be read by name."""
+    code = "from proofroll.comparison_file import *; print([load_comparison(n).name for n in comparison_names()])"
+    done = python(installed, tmp_path, "-c", code)
+    assert done.returncode == 0, done.stderr
+    assert "[]" not in done.stdout
+
+
+def test_entry_points(installed: Path) -> None:
+    """The wheel announces the command and our engines."""
+    (metadata,) = installed.glob("proofroll-*.dist-info/entry_points.txt")
+    text = metadata.read_text()
+    for name in ("proofroll = ", "projection = ", "exudyn = ", "pinocchio = ", "mujoco = "):
+        assert name in text
+
+
+def test_types_are_announced(wheel: Path) -> None:
+    """The package says that it is typed."""
+    with zipfile.ZipFile(wheel) as archive:
+        assert "proofroll/py.typed" in archive.namelist()

@@ -1,0 +1,123 @@
+"""One engine with a choice of defects, each the projection method on a scene that is not quite the one asked for.
+
+``open_*`` defects show in what the engine says it built; ``hidden_*`` defects do not: there the engine repeats the
+scene's own numbers, starts as it should, and moves wrongly.
+"""
+
+from __future__ import annotations
+
+import dataclasses
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass
+from typing import ClassVar, Self
+
+from proofroll.engine import Built, Sample
+from proofroll.engines.projection import Projection
+from proofroll.scene import Capability, Gravity, Scene
+from proofroll.surfaces import FloatArray
+
+
+def _ball(**factors: float) -> Callable[[Scene], Scene]:
+    def change(scene: Scene) -> Scene:
+        ball = scene.balls[0]
+        values = {name: getattr(ball, name) * factor for name, factor in factors.items()}
+        return dataclasses.replace(scene, balls=(dataclasses.replace(ball, **values),))
+
+    return change
+
+
+def _gravity(scene: Scene) -> Scene:
+    return dataclasses.replace(scene, gravity=Gravity(scene.gravity.magnitude * 1.001, scene.gravity.direction))
+
+
+def _resistance(scene: Scene) -> Scene:
+    contact = dataclasses.replace(scene.contacts[0], rolling_resistance=0.0)
+    return dataclasses.replace(scene, contacts=(contact,))
+
+
+def _same(scene: Scene) -> Scene:
+    return scene
+
+
+# What is built instead of the scene.
+BUILT: Mapping[str, Callable[[Scene], Scene]] = {
+    "inertia": _ball(inertia_ratio=2.0),
+    "gravity": _gravity,
+    "radius": _ball(radius=1.001, inertia_ratio=1.001**-2),  # of the same inertia
+    "mass": _ball(mass=1.001),
+    "resistance": _resistance,
+    "friction": _same,  # the reported friction has the wrong sign
+    "clock": _same,  # time goes 0.1 % too slowly
+    "none": _same,
+}
+
+
+@dataclass(frozen=True)
+class BrokenSettings:
+    """The formulation is the defect."""
+
+    formulation: str = "open_none"
+    preset: str = "matched"
+    rtol: float = 1e-12
+
+    @property
+    def resolution(self) -> str:
+        """See :class:`proofroll.engine.Settings`."""
+        return "rtol"
+
+    @property
+    def order(self) -> int | None:
+        """See :class:`proofroll.engine.Settings`."""
+        return None
+
+
+class Broken:
+    """The projection method with a defect."""
+
+    name: ClassVar[str] = "broken"
+    provides: ClassVar[frozenset[Capability]] = Projection.provides
+    settings: ClassVar[type[BrokenSettings]] = BrokenSettings
+    presets: ClassVar[Mapping[str, Mapping[str, BrokenSettings]]] = {
+        name: {"matched": BrokenSettings(name)}
+        for name in [f"{kind}_{defect}" for kind in ("open", "hidden") for defect in BUILT]
+    }
+
+    @staticmethod
+    def version() -> str:
+        """See :class:`proofroll.engine.Engine`."""
+        return "1"
+
+    @classmethod
+    def build(cls, scene: Scene, settings: BrokenSettings) -> Self:
+        """See :class:`proofroll.engine.Engine`."""
+        return cls(scene, settings)
+
+    def __init__(self, scene: Scene, settings: BrokenSettings) -> None:
+        kind, self.defect = settings.formulation.split("_")
+        self.hidden = kind == "hidden"
+        inner = Projection.settings(formulation="rotating_frame", rtol=settings.rtol)
+        self.wrong = Projection.build(BUILT[self.defect](scene), inner)
+        self.right = Projection.build(scene, inner)
+        self.t = 0.0
+
+    def advance(self, t: float) -> None:
+        """See :class:`proofroll.engine.Engine`."""
+        self.t = t
+        self.wrong.advance(t * 0.999 if self.defect == "clock" else t)
+
+    def sample(self) -> Sample:
+        """See :class:`proofroll.engine.Engine`."""
+        if self.hidden and self.t == 0:
+            return self.right.sample()
+        found = self.wrong.sample()
+        if self.defect != "friction" or found.force is None:
+            return found
+        return dataclasses.replace(found, force=self._reversed(found.p_WB, found.force))
+
+    def _reversed(self, p_WB: FloatArray, force: FloatArray) -> FloatArray:
+        e1 = p_WB * [1, 1, 0] / 0.2
+        return 2 * (force @ e1) * e1 - force
+
+    def built(self) -> Built:
+        """See :class:`proofroll.engine.Engine`."""
+        return (self.right if self.hidden else self.wrong).built()

@@ -1,0 +1,195 @@
+"""Engines that do to their process what an engine must never do; installed by tests under throwaway names."""
+
+from __future__ import annotations
+
+import os
+import signal
+import sys
+import time
+from collections.abc import Mapping
+from dataclasses import dataclass
+from typing import Any, ClassVar, Self
+
+import numpy as np
+
+from proofroll.engine import Built, Sample
+from proofroll.errors import Diverged, Refused
+from proofroll.mechanics import initial_response
+from proofroll.scene import Capability, Scene
+from proofroll.truth.closed_form import closed_form
+
+
+@dataclass(frozen=True)
+class HostileSettings:
+    """The least that an engine's settings may be."""
+
+    formulation: str = "only"
+    preset: str = "matched"
+    dt: float = 1e-2
+
+    @property
+    def resolution(self) -> str:
+        """See :class:`proofroll.engine.Settings`."""
+        return "dt"
+
+    @property
+    def order(self) -> int | None:
+        """The closed form has no order."""
+        return None
+
+
+class Oracle:
+    """Well behaved: answers with the closed form, and says so to standard output and standard error."""
+
+    name: ClassVar[str] = "oracle"
+    provides: ClassVar[frozenset[Capability]] = frozenset({Capability.ROLLING, Capability.CURVED_SURFACE})
+    settings: ClassVar[type[HostileSettings]] = HostileSettings
+    presets: ClassVar[Mapping[str, Mapping[str, HostileSettings]]] = {"only": {"matched": HostileSettings()}}
+
+    @staticmethod
+    def version() -> str:
+        """See :class:`proofroll.engine.Engine`."""
+        return "1"
+
+    @classmethod
+    def build(cls, scene: Scene, settings: HostileSettings) -> Self:  # noqa: ARG003 -- the protocol's signature
+        """See :class:`proofroll.engine.Engine`."""
+        return cls(scene)
+
+    def __init__(self, scene: Scene) -> None:
+        self.body = scene.rolling
+        self.t = 0.0
+
+    def advance(self, t: float) -> None:
+        """See :class:`proofroll.engine.Engine`."""
+        self.t = t
+
+    def sample(self) -> Sample:
+        """See :class:`proofroll.engine.Engine`."""
+        motion = closed_form(self.body, np.array([self.t]))
+        assert motion is not None  # the engine does not provide rolling resistance
+        return Sample(motion.p_WB[0], motion.v_WB[0], motion.w_WB[0], force=motion.force[0])
+
+    def built(self) -> Built:
+        """See :class:`proofroll.engine.Engine`."""
+        return Built(mass=self.body.ball.mass, acceleration=initial_response(self.body)[0])
+
+
+class Garbage(Oracle):
+    """Prints what looks like answers, on every stream, and closes standard output."""
+
+    name = "garbage"
+
+    def advance(self, t: float) -> None:
+        """See :class:`proofroll.engine.Engine`."""
+        sys.stdout.write('{"status": "done"}\n\x00 not UTF-8: ')
+        os.write(1, b"\xff\xfe\n" * 10000)
+        os.write(2, b"warning: nothing is well\n")
+        super().advance(t)
+
+
+class Exits(Oracle):
+    """Ends its process, as some libraries do on a licence error."""
+
+    name = "exits"
+
+    def advance(self, t: float) -> None:
+        """See :class:`proofroll.engine.Engine`."""
+        sys.stderr.write(f"fatal: no licence at {t}\n")
+        sys.stderr.flush()
+        os._exit(7)
+
+
+class Moody(Oracle):
+    """Ends its process if the ball is at 5 m/s."""
+
+    name = "moody"
+
+    def advance(self, t: float) -> None:
+        """See :class:`proofroll.engine.Engine`."""
+        if self.body.v0[1] == 5:
+            os._exit(1)
+        super().advance(t)
+
+
+class Segfaults(Oracle):
+    """Dies by a signal."""
+
+    name = "segfaults"
+
+    def advance(self, t: float) -> None:  # noqa: ARG002 -- the protocol's signature
+        """See :class:`proofroll.engine.Engine`."""
+        os.kill(os.getpid(), signal.SIGSEGV)
+
+
+class Hangs(Oracle):
+    """Never comes back, and does not listen to a polite signal."""
+
+    name = "hangs"
+
+    def advance(self, t: float) -> None:  # noqa: ARG002 -- the protocol's signature
+        """See :class:`proofroll.engine.Engine`."""
+        signal.signal(signal.SIGTERM, signal.SIG_IGN)
+        time.sleep(600)
+
+
+class Raises(Oracle):
+    """Raises something over two lines."""
+
+    name = "raises"
+
+    def advance(self, t: float) -> None:
+        """See :class:`proofroll.engine.Engine`."""
+        raise RuntimeError(f"matrix is singular\nat t = {t}")
+
+
+class SaysExit(Oracle):
+    """Calls ``sys.exit`` in the middle of a run."""
+
+    name = "says_exit"
+
+    def advance(self, t: float) -> None:  # noqa: ARG002 -- the protocol's signature
+        """See :class:`proofroll.engine.Engine`."""
+        sys.exit("goodbye")
+
+
+class NotANumber(Oracle):
+    """Its velocity is NaN from 0.1 s on."""
+
+    name = "not_a_number"
+
+    def sample(self) -> Sample:
+        """See :class:`proofroll.engine.Engine`."""
+        right = super().sample()
+        v = right.v_WB * (np.nan if self.t >= 0.1 else 1.0)
+        return Sample(right.p_WB, v, right.w_WB, force=right.force)
+
+
+class GivesUp(Oracle):
+    """Says that it diverged."""
+
+    name = "gives_up"
+
+    def advance(self, t: float) -> None:
+        """See :class:`proofroll.engine.Engine`."""
+        if t > 0.06:
+            raise Diverged(f"the step size fell to nothing at {t:g} s")
+        super().advance(t)
+
+
+class Refuses(Oracle):
+    """Refuses every scene, with its reason."""
+
+    name = "refuses"
+
+    @classmethod
+    def build(cls, scene: Scene, settings: Any) -> Self:  # noqa: ARG003 -- the protocol's signature
+        """See :class:`proofroll.engine.Engine`."""
+        raise Refused("no wheel, no ball")
+
+
+# Entry points of all of them; "absent" needs a module that nobody has.
+ENTRY_POINTS = {
+    kind.name: f"hostile:{kind.__name__}"
+    for kind in (Oracle, Garbage, Exits, Moody, Segfaults, Hangs, Raises, SaysExit, NotANumber, GivesUp, Refuses)
+} | {"absent": "no_such_module_anywhere:Engine", "misspelt": "hostile:NoSuchClass"}

@@ -1,0 +1,267 @@
+"""Engines that each break one promise of the protocol; ``FAILS`` says which check must notice."""
+
+from __future__ import annotations
+
+import dataclasses
+from collections.abc import Mapping
+from dataclasses import dataclass
+from typing import Any, ClassVar, Self
+
+import numpy as np
+from tiny import Tiny, TinySettings
+
+from proofroll.engine import Sample
+from proofroll.errors import Refused
+from proofroll.scene import Capability, Scene
+
+
+class Unannounced(Tiny):
+    """No package has an entry point of this name."""
+
+    name = "unannounced"
+
+
+class Versionless(Tiny):
+    """The version is a number."""
+
+    @staticmethod
+    def version() -> Any:
+        """Not text."""
+        return 2
+
+
+class ProvidesText(Tiny):
+    """Says what it provides in its own words."""
+
+    provides: ClassVar[Any] = frozenset({"rolling", Capability.ROLLING})
+
+
+@dataclass
+class MutableSettings:
+    """Not frozen."""
+
+    formulation: str = "midpoint"
+    preset: str = "matched"
+    dt: float = 1e-3
+    resolution: ClassVar[str] = "dt"
+    order: ClassVar[int] = 2
+
+
+class Mutable(Tiny):
+    """Its settings can be changed after the fact."""
+
+    settings = MutableSettings
+    presets: ClassVar[Mapping[str, Mapping[str, Any]]] = {"midpoint": {"matched": MutableSettings()}}
+
+
+class MixedUp(Tiny):
+    """Its preset calls itself something else."""
+
+    presets: ClassVar[Mapping[str, Mapping[str, Any]]] = {"midpoint": {"default": TinySettings()}}
+
+
+@dataclass(frozen=True)
+class OrderlessSettings(TinySettings):
+    """A step, but no order."""
+
+    @property
+    def order(self) -> int | None:
+        """Not told."""
+        return None
+
+
+class Orderless(Tiny):
+    """Does not say its order."""
+
+    settings = OrderlessSettings
+    presets: ClassVar[Mapping[str, Mapping[str, Any]]] = {"midpoint": {"matched": OrderlessSettings()}}
+
+
+@dataclass(frozen=True)
+class LaxSettings(TinySettings):
+    """Takes any step."""
+
+    dt: float = 1e-3
+
+
+class Lax(Tiny):
+    """Accepts a negative step."""
+
+    settings = LaxSettings
+    presets: ClassVar[Mapping[str, Mapping[str, Any]]] = {"midpoint": {"matched": LaxSettings()}}
+
+
+class Boastful(Tiny):
+    """Says that it provides rolling resistance, and refuses every scene with it."""
+
+    @classmethod
+    def build(cls, scene: Scene, settings: Any) -> Self:
+        """Refuses what it said it provides."""
+        if Capability.ROLLING_RESISTANCE in scene.requires:
+            raise Refused("no resistance, after all")
+        return super().build(scene, settings)
+
+
+class Silent(Tiny):
+    """Refuses without a word."""
+
+    @classmethod
+    def build(cls, scene: Scene, settings: Any) -> Self:
+        """No reason given."""
+        if Capability.CURVED_SURFACE not in scene.requires:
+            raise Refused("")
+        return super().build(scene, settings)
+
+
+class Heavy(Tiny):
+    """Builds a ball of twice the inertia."""
+
+    def __init__(self, scene: Scene, settings: Any) -> None:
+        ball = scene.balls[0]
+        heavy = dataclasses.replace(ball, inertia_ratio=2 * ball.inertia_ratio)
+        super().__init__(dataclasses.replace(scene, balls=(heavy,)), settings)
+
+
+class Row(Tiny):
+    """Gives its position as a row of a matrix."""
+
+    def sample(self) -> Sample:
+        """The wrong shape."""
+        right = super().sample()
+        return Sample(right.p_WB[None], right.v_WB, right.w_WB)
+
+
+class Views(Tiny):
+    """Gives the array that it goes on working with."""
+
+    def __init__(self, scene: Scene, settings: Any) -> None:
+        super().__init__(scene, settings)
+        self.p = np.zeros(3)
+
+    def sample(self) -> Sample:
+        """Overwrites what it gave before."""
+        right = super().sample()
+        self.p[:] = right.p_WB
+        return Sample(self.p, right.v_WB, right.w_WB, force=right.force)
+
+    def advance(self, t: float) -> None:
+        """Moves what it gave before."""
+        super().advance(t)
+        self.sample()
+
+
+class Moody(Tiny):
+    """Moves a little differently each time it is built."""
+
+    count = 0
+
+    def __init__(self, scene: Scene, settings: Any) -> None:
+        super().__init__(scene, settings)
+        Moody.count += 1
+        self.x = self.x * (1 + 1e-15 * Moody.count)
+
+
+class Forgetful(Tiny):
+    """Leaves out a step whenever it is stopped."""
+
+    def advance(self, t: float) -> None:
+        """Starts late."""
+        if t > self.t:
+            self.t += self.dt
+        super().advance(t)
+
+
+class Restless(Tiny):
+    """Moves when it is looked at."""
+
+    def sample(self) -> Sample:
+        """Not innocent."""
+        right = super().sample()
+        if self.t > 0:
+            self.x = self.x * (1 + 1e-15)
+        return right
+
+
+class Shared(Tiny):
+    """Keeps its state where every other one keeps it too."""
+
+    state: ClassVar[dict[str, Any]] = {}
+
+    @property
+    def x(self) -> Any:
+        """The state of whoever moved last."""
+        return Shared.state["x"]
+
+    @x.setter
+    def x(self, value: Any) -> None:
+        Shared.state["x"] = value
+
+
+class Millimetres(Tiny):
+    """Gives its velocity in mm/s, but only after the start."""
+
+    def sample(self) -> Sample:
+        """The wrong unit."""
+        right = super().sample()
+        return dataclasses.replace(right, v_WB=right.v_WB * (1000 if self.t else 1))
+
+
+class BodyFrame(Tiny):
+    """Gives an orientation that does not turn as its angular velocity says."""
+
+    def sample(self) -> Sample:
+        """Stands still."""
+        return dataclasses.replace(super().sample(), q_WB=np.array([1.0, 0, 0, 0]))
+
+
+class FirstOrder(Tiny):
+    """Declares the second order and has the first."""
+
+    def advance(self, t: float) -> None:
+        """Euler."""
+        for _ in range(round((t - self.t) / self.dt)):
+            self.x = self.x + self.dt * self.rates(self.x)
+        self.t = t
+
+
+@dataclass(frozen=True)
+class AdaptiveSettings:
+    """A tolerance that nobody looks at."""
+
+    formulation: str = "midpoint"
+    preset: str = "matched"
+    rtol: float = 1e-10
+    resolution: ClassVar[str] = "rtol"
+    order: ClassVar[None] = None
+    dt: ClassVar[float] = 1e-3
+
+
+class Deaf(Tiny):
+    """Its tolerance does nothing."""
+
+    settings = AdaptiveSettings
+    presets: ClassVar[Mapping[str, Mapping[str, Any]]] = {"midpoint": {"matched": AdaptiveSettings()}}
+
+
+FAILS: Mapping[type[Tiny], str] = {
+    Unannounced: "name_is_the_entry_point",
+    Versionless: "version_is_told",
+    ProvidesText: "provides_capabilities",
+    Mutable: "settings_are_a_frozen_dataclass",
+    MixedUp: "presets_are_complete",
+    Orderless: "resolution_and_order_are_told",
+    Lax: "bad_settings_give_one_line",
+    Boastful: "provides_what_it_says",
+    Silent: "builds_or_refuses",
+    Heavy: "certificate_holds",
+    Row: "samples_are_well_formed",
+    Views: "reading_back_changes_nothing",
+    Moody: "advance_is_repeatable",
+    Forgetful: "advance_in_two_parts",
+    Restless: "sampling_changes_nothing",
+    Shared: "engines_do_not_disturb_each_other",
+    Millimetres: "velocities_are_the_rates",
+    BodyFrame: "velocities_are_the_rates",
+    FirstOrder: "order_is_as_declared",
+    Deaf: "tolerance_has_an_effect",
+}

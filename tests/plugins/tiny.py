@@ -1,0 +1,84 @@
+"""The smallest engine that keeps every promise of the protocol: the midpoint rule on the reduced equations."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from typing import Annotated, Any, ClassVar, Literal, Self
+
+import numpy as np
+from annotated_types import Gt
+
+from proofroll.engine import Built, Sample, whole_steps
+from proofroll.mechanics import initial_response
+from proofroll.scene import Capability, Scene
+from proofroll.surfaces import FloatArray
+from proofroll.truth.rolling import reduced_rates
+
+
+@dataclass(frozen=True)
+class TinySettings:
+    """A step and nothing else."""
+
+    formulation: Literal["midpoint"] = "midpoint"
+    preset: Literal["matched"] = "matched"
+    dt: Annotated[float, Gt(0)] = 1e-3
+
+    @property
+    def resolution(self) -> str:
+        """See :class:`proofroll.engine.Settings`."""
+        return "dt"
+
+    @property
+    def order(self) -> int | None:
+        """See :class:`proofroll.engine.Settings`."""
+        return 2
+
+
+class Tiny:
+    """The midpoint rule, of second order, on (u, u̇, ω1)."""
+
+    name: ClassVar[str] = "tiny"
+    provides: ClassVar[frozenset[Capability]] = frozenset(
+        {Capability.ROLLING, Capability.CURVED_SURFACE, Capability.ROLLING_RESISTANCE}
+    )
+    settings: ClassVar[type[Any]] = TinySettings
+    presets: ClassVar[Mapping[str, Mapping[str, Any]]] = {"midpoint": {"matched": TinySettings()}}
+
+    @staticmethod
+    def version() -> str:
+        """See :class:`proofroll.engine.Engine`."""
+        return "1.0"
+
+    @classmethod
+    def build(cls, scene: Scene, settings: Any) -> Self:
+        """See :class:`proofroll.engine.Engine`."""
+        return cls(scene, settings)
+
+    def __init__(self, scene: Scene, settings: Any) -> None:
+        self.body, self.dt, self.t = scene.rolling, settings.dt, 0.0
+        self.x = np.array([*self.body.u0, *self.body.udot0, scene.initial[0].spin])
+
+    def rates(self, x: FloatArray) -> FloatArray:
+        """ẋ."""
+        return reduced_rates(self.body, x)[0]
+
+    def advance(self, t: float) -> None:
+        """See :class:`proofroll.engine.Engine`."""
+        for _ in range(whole_steps(self.t, t, self.dt)):
+            self.x = self.x + self.dt * self.rates(self.x + self.dt / 2 * self.rates(self.x))
+        self.t = t
+
+    def sample(self) -> Sample:
+        """See :class:`proofroll.engine.Engine`."""
+        _, v, force = reduced_rates(self.body, self.x)
+        e1 = self.body.surface.frame(self.x[:2])[:, 0]
+        w = self.x[4] * e1 - np.cross(e1, v) / self.body.ball.radius
+        return Sample(self.body.surface.position(self.x[:2]), v, w, force=force)
+
+    def built(self) -> Built:
+        """See :class:`proofroll.engine.Engine`."""
+        ball = self.body.ball
+        return Built(
+            ball.mass, np.full(3, ball.inertia), self.body.gravity, ball.radius, None, initial_response(self.body)[0]
+        )

@@ -1,0 +1,154 @@
+"""An invented comparison and its report, for the tests of the report."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from html.parser import HTMLParser
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import plotly.offline
+import pytest
+
+from proofroll.agreement import Verdict, judge
+from proofroll.case import Case, EngineFacts, Result, Status
+from proofroll.comparison_file import Band, Comparison, Row, Tolerance
+from proofroll.metrics import observables, scales
+from proofroll.report.html import write_report
+from proofroll.scene_file import load_scene
+from proofroll.store import Store
+from proofroll.studies.compare import Outcome, Run, point_name
+from proofroll.trajectory import write
+from proofroll.truth import truth
+
+UNTIL, EVERY = 1.0, 0.02
+
+
+@pytest.fixture(scope="session")
+def made(tmp_path_factory: pytest.TempPathFactory) -> tuple[Outcome, Store]:
+    """An invented comparison: a good row, a rough one, one that is silent about forces, and one that is missing."""
+    store = Store(tmp_path_factory.mktemp("report") / "cases")
+    rows = [
+        Row("alpha[formulation=fine]", "tight"),
+        Row("alpha[formulation=fine,preset=default]", "tight", expect=[Verdict.DIFFERS], because="it is coarse"),
+        Row("beta", "tight"),
+        Row("gamma", "tight"),
+    ]
+    bounds = dict.fromkeys(("gamma", "z", "N", "F2", "F3", "needed_friction", "gap"), Tolerance(1e-6, True))
+    comparison = Comparison(
+        name="invented",
+        title="An invented comparison",
+        question="Does the report say everything?",
+        scene="sphere_in_cylinder",
+        until=UNTIL,
+        every=EVERY,
+        vary={"speed": [3.0, 4.0]},
+        bands={"tight": Band("a reason for it", bounds)},
+        rows=rows,
+    )
+    times = np.linspace(0.0, UNTIL, round(UNTIL / EVERY) + 1)
+    runs, truths = [], {}
+    for speed in (3.0, 4.0):
+        point = {"speed": speed}
+        scene = load_scene("sphere_in_cylinder", **point)
+        true = truth(scene, times)
+
+        def case(name: str, digest: str = scene.digest, point: dict[str, float] = point, **settings: Any) -> Case:
+            facts = EngineFacts(name, "1.0", "code", settings, "dt" if settings else None, 2)
+            return Case("sphere_in_cylinder", point, digest, facts, UNTIL, EVERY)
+
+        truths[point_name(point)] = case("truth")
+        write(true, store.trajectory(truths[point_name(point)]))
+        sizes = scales(scene.rolling, true)
+        expected = observables(scene.rolling, true)
+        plans = [("matched", 1e-9, 0.2), ("default", 1e-3, 0.01), (None, 1e-7, 0.5)]
+        for row, (preset, off, seconds) in zip(rows, plans, strict=False):
+            settings = {"formulation": "fine" if preset else "only", "preset": preset, "dt": 1e-3}
+            run_case = case(row.engine.partition("[")[0], **settings)
+            dataset = true.copy(deep=True)
+            for name in ("gamma", "z", "N", "F2", "F3"):
+                dataset[name] = dataset[name] + off * sizes[name] * np.sin(9 * times)
+            if preset is None:
+                dataset = dataset.drop_vars(["N", "F2", "F3", "needed_friction"])
+            write(dataset, store.trajectory(run_case))
+            judgements = [
+                judge(
+                    name,
+                    curve.unit,
+                    curve.values,
+                    expected[name].values,
+                    truth_error_bar=1e-12,
+                    tolerance=bounds[name].absolute(sizes[name]),
+                    scale=sizes[name],
+                    limit=None,
+                )
+                for name, curve in observables(scene.rolling, dataset).items()
+                if name in bounds
+            ]
+            line = {
+                "quantity": "mass", "unit": "kg", "expected": (0.5,), "found": (0.5,), "difference": 1e-17,
+                "tolerance": 1e-12, "because": "", "holds": True,
+            }  # fmt: skip
+            result = Result(
+                Status.DONE,
+                "done",
+                seconds_per_second=seconds,
+                timings=[seconds],
+                certificate=[line],
+                versions={row.engine: "1.0"},
+                trajectory=store.trajectory(run_case).name,
+            )
+            runs.append(Run(row, point, run_case.engine, result, judgements, [], run_case))
+        missing = Result(Status.MISSING, "gamma is not installed here", versions={})
+        runs.append(Run(rows[3], point, None, missing, [], ["gamma at this point missing"]))
+    return Outcome(comparison, runs, truths), store
+
+
+@pytest.fixture(scope="session")
+def written(made: tuple[Outcome, Store], tmp_path_factory: pytest.TempPathFactory) -> tuple[dict[str, Any], Path]:
+    """The content and the folder of a written report."""
+    out = tmp_path_factory.mktemp("out")
+    return write_report([made[0]], made[1], out, "proofroll report invented"), out
+
+
+class Elements(HTMLParser):
+    """All start tags with their attributes, and the visible text."""
+
+    def __init__(self, html: str) -> None:
+        super().__init__(convert_charrefs=True)
+        self.tags: list[tuple[str, dict[str, str]]] = []
+        self.scripts: list[str] = []
+        self.text = ""
+        self._inside = ""
+        self.feed(html)
+
+    def handle_starttag(self, tag: str, attrs: list[tuple[str, str | None]]) -> None:
+        """Keeps the element."""
+        self.tags.append((tag, {name: value or "" for name, value in attrs}))
+        self._inside = tag
+        if tag == "script":
+            self.scripts.append("")
+
+    def handle_endtag(self, tag: str) -> None:  # noqa: ARG002 -- the signature is HTMLParser's
+        """Leaves the element."""
+        self._inside = ""
+
+    def handle_data(self, data: str) -> None:
+        """Keeps the text."""
+        if self._inside == "script":
+            self.scripts[-1] += data
+        elif self._inside != "style":
+            self.text += data
+
+
+@pytest.fixture(scope="session")
+def parse() -> Callable[[str], Elements]:
+    """Reads HTML as a browser does."""
+    return Elements
+
+
+@pytest.fixture(scope="session")
+def html(written: tuple[dict[str, Any], Path]) -> str:
+    """The written page without plotly, which is as its makers ship it."""
+    return (written[1] / "report.html").read_text(encoding="utf-8").replace(plotly.offline.get_plotlyjs(), "")

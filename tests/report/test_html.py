@@ -1,0 +1,254 @@
+"""The report stands alone, says everything, and lets nothing through that a scene, engine or message smuggles in."""
+
+from __future__ import annotations
+
+import copy
+import dataclasses
+import json
+import math
+from itertools import pairwise
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import plotly.offline
+import pytest
+
+import proofroll.report.html
+from proofroll.agreement import Verdict
+from proofroll.report.html import page, report_content, write_report
+from proofroll.report.labels import number, symbol
+from proofroll.report.plots import kept, point_curves
+from proofroll.report.scores import Score, recommendation
+from proofroll.store import Store
+from proofroll.studies.compare import Outcome
+
+POISON = "</script><script>alert('poison')</script><img src=x onerror=alert(1)>&%{y}\"'"
+COMMAND = "proofroll report invented"
+
+
+def test_page_needs_no_other_file_and_no_network(html: str, parse: Any) -> None:
+    """Nothing in the page names another place, and its policy forbids to load from one."""
+    assert "http:" not in html
+    assert "https:" not in html
+    assert "@import" not in html
+    assert "default-src 'none'" in html
+    for tag, attributes in parse(html).tags:
+        assert "src" not in attributes, tag
+        assert attributes.get("href", "#").startswith("#"), attributes
+        assert tag not in {"link", "iframe", "object", "base"}
+
+
+def test_plotly_is_there_once_and_cannot_end_its_element(written: tuple[dict[str, Any], Path]) -> None:
+    """The bundle is inlined as text; a closing tag in it would spill it over the page."""
+    bundle = plotly.offline.get_plotlyjs()
+    assert (written[1] / "report.html").read_text(encoding="utf-8").count(bundle) == 1
+    assert "</script" not in bundle.lower()
+    assert "<!--" not in bundle
+
+
+def test_json_file_is_the_content_and_has_no_nan(written: tuple[dict[str, Any], Path]) -> None:
+    """What is returned is what is written, in JSON that every reader accepts."""
+
+    def refuse(constant: str) -> None:
+        raise AssertionError(f"{constant} is not JSON")
+
+    content, out = written
+    assert json.loads((out / "report.json").read_text(encoding="utf-8"), parse_constant=refuse) == content
+    assert set(content) == {"comparisons", "environment", "date"}
+    assert content["environment"]["command"] == COMMAND
+    assert len(content["comparisons"][0]["truths"]) == 2
+
+
+def test_every_row_and_every_run_appears(written: tuple[dict[str, Any], Path], html: str, parse: Any) -> None:
+    """Every row of the file has its line and every run its evidence, the missing engine too."""
+    content = written[0]
+    elements = parse(html)
+    ids = [attributes["id"] for _, attributes in elements.tags if "id" in attributes]
+    assert len(ids) == len(set(ids))
+    for row in range(4):
+        for point in range(2):
+            assert f"c0-r{row}-p{point}" in ids
+    titles = {attributes.get("title") for tag, attributes in elements.tags if tag == "th"}
+    assert {row["engine"] for row in content["comparisons"][0]["rows"]} <= titles
+    assert "gamma is not installed here" in elements.text
+    assert "a reason for it" in elements.text
+    assert "it is coarse" in elements.text
+
+
+def test_every_link_within_the_page_leads_somewhere(html: str, parse: Any) -> None:
+    """Each cell of the matrix leads to evidence that exists."""
+    elements = parse(html)
+    ids = {attributes.get("id") for _, attributes in elements.tags}
+    links = [attributes["href"][1:] for tag, attributes in elements.tags if tag == "a"]
+    assert len(links) > 50
+    assert set(links) <= ids
+
+
+def test_headings_form_an_outline(html: str, parse: Any) -> None:
+    """One title, and no level is skipped on the way down."""
+    levels = [int(tag[1]) for tag, _ in parse(html).tags if tag in {"h1", "h2", "h3", "h4"}]
+    assert levels[0] == 1
+    assert levels.count(1) == 1
+    assert all(after <= before + 1 for before, after in pairwise(levels))
+
+
+def test_cells_can_be_read_without_colour(html: str) -> None:
+    """Each cell has a sign for the eye and a word for a screen reader."""
+    for verdict, sign in (("agrees", "✓"), ("differs", "✗")):
+        assert f'<span aria-hidden="true">{sign}</span><span class="vh">{verdict}</span>' in html
+
+
+def poisoned(value: Any) -> Any:
+    """The content with poison in every string that is not a word of our own, and in the names that others choose."""
+    free = {"versions", "settings", "parameters", "vary", "tolerances", "bounds", "expected_for"}
+    if isinstance(value, dict):
+        return {
+            key: {name + POISON: poisoned(item) for name, item in inner.items()}
+            if key in free and isinstance(inner, dict)
+            else poisoned(inner)
+            for key, inner in value.items()
+        }
+    if isinstance(value, list):
+        return [poisoned(item) for item in value]
+    if isinstance(value, str) and value not in {*Verdict, "proofroll"}:
+        return value + POISON
+    return value
+
+
+def test_nothing_that_others_write_becomes_markup(made: tuple[Outcome, Store], parse: Any) -> None:
+    """Poison in every string is shown as text: no element, no handler, no end of a script."""
+    content = report_content([made[0]], made[1], COMMAND)
+    curves = [point_curves(*made)]
+    clean = parse(page(content, curves))
+    bad = poisoned(content)
+    bad["environment"]["versions"]["proofroll"] = "1" + POISON
+    html = page(bad, poisoned(curves))
+    elements = parse(html)
+    assert elements.text.count("alert('poison')") > 100, "the strings are shown, as text"
+    assert "<script>alert" not in html
+    assert len(elements.scripts) == len(clean.scripts)
+    for tag, attributes in elements.tags:
+        assert tag != "img"
+        assert not any(name.startswith("on") for name in attributes), tag
+    data = next(text for text in elements.scripts if text.startswith("{"))
+    assert "alert('poison')" in json.loads(data)["rows"][0][0]["name"]
+
+
+def test_numbers_that_are_not_finite_do_not_break_the_page(made: tuple[Outcome, Store], tmp_path: Path) -> None:
+    """An infinite error is null in JSON and a sign on the page."""
+    outcome, store = made
+    first = outcome.runs[0]
+    lost = [dataclasses.replace(judgement, error=math.inf, order=math.nan) for judgement in first.judgements]
+    runs = [dataclasses.replace(first, judgements=lost), *outcome.runs[1:]]
+    content = write_report([dataclasses.replace(outcome, runs=runs)], store, tmp_path, COMMAND)
+    assert content["comparisons"][0]["runs"][0]["judgements"][0]["error"] is None
+    assert "∞" in (tmp_path / "report.html").read_text(encoding="utf-8").rpartition('<script type="text/plain"')[0]
+
+
+def test_the_largest_report_we_make_stays_small(made: tuple[Outcome, Store]) -> None:
+    """Six points, 24 rows and 201 samples: what the default study has."""
+    content = report_content([made[0]], made[1], COMMAND)
+    comparison = content["comparisons"][0]
+    rows, points = 24, 6
+    comparison["rows"] = [copy.deepcopy(comparison["rows"][0]) for _ in range(rows)]
+    good, known = comparison["runs"][0], comparison["truths"][0]
+    comparison["runs"] = [{**good, "row": row, "point": f"p{p}"} for p in range(points) for row in range(rows)]
+    comparison["truths"] = [{**known, "point": f"p{p}"} for p in range(points)]
+    for row in comparison["rows"]:
+        for judgement in row["observables"].values():
+            judgement["point"] = "p0"
+    for run in comparison["runs"]:
+        run["certificate"] = run["certificate"] * 14
+    curves = point_curves(*made)[0]
+    for observable in curves["observables"]:
+        observable["engines"] = [
+            {"row": row, "difference": [-1.23e-10] * 201, "name": row} for row in range(rows)
+        ]  # the longest form that a rounded number has
+    html = page(content, [[{**curves, "point": f"p{p}"} for p in range(points)]])
+    assert len(html.encode()) < 9e6
+
+
+def test_curves_are_the_difference_from_the_truth(made: tuple[Outcome, Store]) -> None:
+    """Rows keep their numbers, and what an engine does not say is not drawn."""
+    entry = point_curves(*made)[1]
+    z = next(observable for observable in entry["observables"] if observable["name"] == "z")
+    assert entry["point"] == "speed=4"
+    assert [engine["row"] for engine in z["engines"]] == [0, 1, 2]
+    assert max(abs(value) for value in z["engines"][1]["difference"]) == pytest.approx(1e-3 * z["scale"], rel=0.01)
+    normal = next(observable for observable in entry["observables"] if observable["name"] == "N")
+    assert [engine["row"] for engine in normal["engines"]] == [0, 1], "the third row is silent about forces"
+    assert normal["engines"][0]["difference"][0] is None, "a reaction at time 0 is the certificate's"
+
+
+def test_thinning_keeps_extrema_and_ends() -> None:
+    """A single sample that sticks out survives."""
+    curve = np.sin(np.linspace(0, 300, 20001))
+    curve[7777] = 5.0
+    at = kept(curve.size, [curve])
+    assert at.size <= 402
+    assert {0, 7777, curve.size - 1} <= set(at.tolist())
+
+
+def test_recommendation_is_the_cheapest_that_is_good_enough() -> None:
+    """Cheap but rough where that is enough, exact below, and nothing that was lost."""
+    rows = [Score(0, "exact", 1e-12, 1e-11, 2.0), Score(1, "fast", 3e-4, 0.02, 0.1), Score(2, "lost", None, None, 0.01)]
+    found = recommendation(rows)
+    assert found[0]["motion"]["name"] == "fast"
+    best = {entry["within"]: entry["motion_and_forces"] for entry in found}
+    assert best[0.1]["name"] == "fast"
+    assert best[0.01]["name"] == "exact"
+    assert found[-1]["down_to"] == pytest.approx(1e-12)
+    assert recommendation([rows[2]]) == []
+
+
+@pytest.mark.parametrize(
+    ("value", "shown"),
+    [
+        (None, "–"),
+        (0.0, "0"),
+        (5.39e-4, "5.4e-4"),
+        (1e-10, "1e-10"),
+        (0.25, "0.25"),
+        (-3e-12, "-3e-12"),
+        (4e12, "4e12"),
+    ],
+)
+def test_numbers_are_short(value: float | None, shown: str) -> None:
+    """Small numbers all have one form."""
+    assert number(value) == shown
+
+
+def test_quantities_have_their_symbols() -> None:
+    """Greek letters by their names, other names as words."""
+    assert [symbol(name) for name in ("gamma", "omega1", "z", "N", "needed_friction")] == [
+        "γ", "ω1", "z", "N", "needed friction",
+    ]  # fmt: skip
+
+
+def test_findings_are_written_from_the_data(written: tuple[dict[str, Any], Path]) -> None:
+    """The sentences name the right rows."""
+    found = written[0]["comparisons"][0]["findings"]
+    assert found["answer"].startswith("Of 4 engine settings, 2 agree with the truth")
+    assert found["sentences"][0].startswith("Closest to the truth is alpha fine matched")
+    assert "costs most with alpha fine default" in found["sentences"][1]
+    assert found["sentences"][2].startswith("Not expected: gamma at this point missing")
+
+
+def test_a_comparison_of_which_nothing_is_left_is_still_a_report(made: tuple[Outcome, Store], tmp_path: Path) -> None:
+    """Every engine missing: the page says so, and what cannot be said."""
+    outcome, store = made
+    lost = [run for run in outcome.runs if run.row.engine == "gamma"]
+    content = write_report([dataclasses.replace(outcome, runs=lost)], store, tmp_path, COMMAND)
+    found = content["comparisons"][0]["findings"]
+    assert found["answer"].startswith("Of 1 engine settings, 1 gives no result somewhere")
+    assert found["recommendation"] == []
+    assert "gamma is not installed here" in (tmp_path / "report.html").read_text(encoding="utf-8")
+
+
+def test_no_engine_and_no_scene_is_named_in_the_code_of_the_report() -> None:
+    """What is drawn and said comes from the data."""
+    folder = Path(proofroll.report.html.__file__).parent
+    text = "\n".join(file.read_text(encoding="utf-8") for file in folder.rglob("*.*") if file.suffix != ".pyc").lower()
+    for name in ("mujoco", "exudyn", "pinocchio", "sphere_in_cylinder", "inclined_plane", "cylinder"):
+        assert name not in text

@@ -1,0 +1,335 @@
+"""The command line as a user meets it: standard output, standard error and exit code."""
+
+from __future__ import annotations
+
+import json
+import os
+import subprocess
+import sys
+from collections.abc import Callable, Mapping
+from pathlib import Path
+from typing import Any
+
+import pytest
+from hostile import ENTRY_POINTS
+
+from proofroll import cli
+
+RUN = ["run", "sphere_in_cylinder", "--engine", "oracle", "--until", "0.1", "--every", "0.05"]
+KEYS = {
+    "scene", "engine", "settings", "status", "message", "until", "final", "events", "wall_seconds", "versions",
+}  # fmt: skip
+FINAL = {
+    "time", "gamma", "z", "gamma_rate", "z_rate", "omega1", "omega2", "omega3", "N", "F2", "F3", "slip2", "slip3",
+    "energy",
+}  # fmt: skip
+
+Proofroll = Callable[..., tuple[int, str, str]]
+
+
+@pytest.fixture
+def proofroll(
+    monkeypatch: pytest.MonkeyPatch,
+    capfd: pytest.CaptureFixture[str],
+    install_engines: Callable[[Mapping[str, str]], None],
+) -> Proofroll:
+    """Runs the command line in this process; exit code, standard output, standard error."""
+    install_engines(ENTRY_POINTS | {"broken": "broken:Broken"})
+    monkeypatch.setenv("COLUMNS", "100")
+
+    def run(*arguments: str) -> tuple[int, str, str]:
+        monkeypatch.setattr(sys, "argv", ["proofroll", *arguments])
+        capfd.readouterr()
+        with pytest.raises(SystemExit) as ended:
+            cli.main()
+        captured = capfd.readouterr()
+        code = ended.value.code
+        assert isinstance(code, int)
+        return code, captured.out, captured.err
+
+    return run
+
+
+def with_option(name: str, value: str) -> list[str]:
+    """The run above with one option replaced."""
+    arguments = list(RUN)
+    if name in arguments:
+        arguments[arguments.index(name) + 1] = value
+        return arguments
+    return [*arguments, name, value]
+
+
+def rk4(dt: str) -> list[str]:
+    """The run above in an engine with a fixed step."""
+    return with_option("--engine", f"projection[integrator=rk4,dt={dt}]")
+
+
+BAD = {
+    "unknown scene": ([*RUN[:1], "sphere_in_cone", *RUN[2:]], 2, ["scene = 'sphere_in_cone'", "inclined_plane"]),
+    "unknown engine": (with_option("--engine", "adams"), 2, ["engine = 'adams'", "projection", "truth"]),
+    "engine of another form": (with_option("--engine", "oracle[dt"), 2, ["engine = 'oracle[dt'", "name[key=value"]),
+    "unknown parameter": (with_option("--set", "wheels=4"), 2, ["wheels = '4'", "choose from radius"]),
+    "parameter of another form": (with_option("--set", "speed"), 2, ["--set = 'speed'", "parameter=value"]),
+    "parameter twice": ([*RUN, "--set", "speed=3", "--set", "speed=4"], 2, ["speed is given twice"]),
+    "unknown setting": (with_option("--engine", "oracle[step=1]"), 2, ["oracle: step = ", "choose from formulation"]),
+    "unknown formulation": (with_option("--engine", "broken[formulation=new]"), 2, ["= 'new'", "open_none"]),
+    "a setting for the truth": (with_option("--engine", "truth[dt=1]"), 2, ["truth", "no settings"]),
+    "ball as large as the cylinder": (with_option("--set", "radius=0.225"), 2, ["radius = 0.225", "cylinder_radius"]),
+    "negative mass": (with_option("--set", "mass=-1"), 2, ["mass = -1", "above 0"]),
+    "no mass": (with_option("--set", "mass=0"), 2, ["mass = 0", "above 0"]),
+    "NaN": (with_option("--set", "mass=nan"), 2, ["mass = 'nan'", "finite"]),
+    "infinity": (with_option("--set", "speed=inf"), 2, ["speed = 'inf'", "finite"]),
+    "text for a number": (with_option("--set", "speed=fast"), 2, ["speed = 'fast'", "not a number"]),
+    "no speed": (with_option("--set", "speed=0"), 2, ["speed = ", "nothing to roll on"]),
+    "dt of zero": (rk4("0"), 2, ["projection: dt = ", "greater than 0"]),
+    "negative dt": (rk4("-1"), 2, ["dt = ", "greater than 0"]),
+    "NaN for dt": (rk4("nan"), 2, ["dt = ", "nan"]),
+    "dt that fits no sample": (rk4("3e-2"), 2, ["dt = 0.03", "divides"]),
+    "negative end": (with_option("--until", "-1"), 2, ["until = -1", "not negative"]),
+    "text for the end": (with_option("--until", "long"), 2, ["--until", "long"]),
+    "NaN for the end": (with_option("--until", "nan"), 2, ["until = nan", "finite"]),
+    "no interval": (with_option("--every", "0"), 2, ["every = 0", "positive"]),
+    "no time limit": (with_option("--time-limit", "0"), 2, ["time_limit = 0", "positive"]),
+    "output in a file": (with_option("--out", "/dev/null/run.nc"), 2, ["/dev/null", "cannot be written"]),
+    "output is a folder": (with_option("--out", "/tmp"), 2, ["--out = '/tmp'", "folder"]),
+    "unknown option": ([*RUN, "--colour", "red"], 2, ["--colour"]),
+    "unknown command": (["simulate"], 2, ["simulate"]),
+    "no engine": (["run", "sphere_in_cylinder"], 2, ["--engine"]),
+    "no scene": (["run", "--engine", "truth"], 2, ["Missing argument", "scene"]),
+    "engine not installed": (with_option("--engine", "absent"), 3, ["absent is not installed here", "pip install"]),
+    "engine that cannot be loaded": (with_option("--engine", "misspelt"), 3, ["NoSuchClass"]),
+    "engine that crashes": (with_option("--engine", "exits"), 3, ["exits crashed", "exit code 7", "no licence"]),
+    "engine that raises": (with_option("--engine", "raises"), 3, ["raises crashed", "matrix is singular"]),
+    "engine that diverges": (with_option("--engine", "not_a_number"), 3, ["not_a_number diverged", "not finite"]),
+    "engine that refuses": (with_option("--engine", "refuses"), 3, ["refuses refused", "no wheel, no ball"]),
+    "capability that is lacking": (with_option("--set", "rolling_resistance=1e-4"), 3, ["needs rolling resistance"]),
+    "unknown comparison": (["compare", "no_such_claim"], 2, ["comparison = 'no_such_claim'"]),
+    "unknown comparison to report": (["report", "no_such_claim"], 2, ["comparison = 'no_such_claim'"]),
+    "no jobs": (["compare", "x", "--jobs", "0"], 2, ["--jobs"]),
+}  # fmt: skip
+
+
+@pytest.mark.parametrize(("arguments", "code", "words"), BAD.values(), ids=BAD.keys())
+def test_bad_input(proofroll: Proofroll, arguments: list[str], code: int, words: list[str]) -> None:
+    """Every bad input gives one line on standard error, nothing on standard output, and its exit code."""
+    found, out, err = proofroll(*arguments, *(["--json"] if "run" in arguments and code == 2 else []))
+    assert (found, err.count("\n")) == (code, 1), err
+    assert err.startswith("proofroll: ")
+    assert "Traceback" not in err
+    for word in words:
+        assert word in err
+    if code == 2:
+        assert out == ""
+
+
+def test_broken_toml(proofroll: Proofroll, tmp_path: Path) -> None:
+    """A scene or comparison that is no TOML gives one line with the file and the place in it."""
+    (tmp_path / "scene.toml").write_text("title = \n")
+    for arguments in (["run", str(tmp_path), "--engine", "truth"], ["compare", str(tmp_path / "scene.toml")]):
+        code, out, err = proofroll(*arguments)
+        assert (code, out, err.count("\n")) == (2, "", 1)
+        assert "broken" in err
+        assert "line 1" in err
+
+
+def test_an_engine_that_hangs(proofroll: Proofroll) -> None:
+    """A hang ends at the time limit, as a crash of the engine."""
+    code, out, err = proofroll(*with_option("--engine", "hangs"), "--time-limit", "6", "--json")
+    assert code == 3
+    assert err == "proofroll: hangs timeout: no result within 6 s; it was ended\n"
+    assert json.loads(out)["status"] == "timeout"
+
+
+def test_run_json(proofroll: Proofroll) -> None:
+    """``run --json`` prints one document with the promised keys, and nothing else anywhere."""
+    code, out, err = proofroll(*RUN, "--set", "speed=5", "--json")
+    assert (code, err) == (0, "")
+    found = json.loads(out)
+    assert set(found) >= KEYS
+    assert set(found["final"]) >= FINAL
+    assert found["engine"] == "oracle"
+    assert found["settings"] == {"formulation": "only", "preset": "matched", "dt": 0.01}
+    assert (found["status"], found["until"], found["events"]) == ("done", 0.1, [])
+    assert found["final"]["time"] == pytest.approx(0.1)
+    assert found["final"]["gamma"] == pytest.approx(2.5)
+    assert found["final"]["N"] == pytest.approx(0.517 * 25 / 0.2)
+    assert set(found["units"]) == set(found["final"])
+
+
+def test_run_of_the_truth(proofroll: Proofroll) -> None:
+    """The truth is an engine too, and gives its error bars."""
+    code, out, _ = proofroll(*with_option("--engine", "truth"), "--json")
+    found = json.loads(out)
+    assert code == 0
+    assert set(found) >= KEYS
+    assert set(found["final"]) >= FINAL
+    assert 0 < found["error_bars"]["z"] < 1e-11
+
+
+def test_run_for_a_person(proofroll: Proofroll) -> None:
+    """Without ``--json`` a run is a table with units, within 100 columns."""
+    code, out, err = proofroll(*RUN)
+    assert (code, err) == (0, "")
+    assert "gamma_rate" in out
+    assert "rad/s" in out
+    assert max(map(len, out.splitlines())) <= 100
+
+
+def test_garbage_does_not_reach_the_document(proofroll: Proofroll) -> None:
+    """What an engine prints is not mixed with what we print."""
+    code, out, err = proofroll(*with_option("--engine", "garbage"), "--json")
+    assert (code, err) == (0, "")
+    assert json.loads(out)["status"] == "done"
+
+
+def test_run_at_time_zero(proofroll: Proofroll) -> None:
+    """A run of no length is the initial state."""
+    code, out, _ = proofroll(*with_option("--until", "0"), "--json")
+    assert code == 0
+    assert json.loads(out)["final"]["gamma"] == 0
+
+
+def test_run_writes_netcdf(proofroll: Proofroll, tmp_path: Path) -> None:
+    """``--out`` writes the trajectory, in a folder that need not exist, over what was there."""
+    from proofroll.trajectory import read
+
+    target = tmp_path / "new" / "run.nc"
+    for _ in range(2):
+        code, _, err = proofroll(*RUN, "--out", str(target))
+        assert (code, err) == (0, "")
+    assert read(target).sizes["time"] == 3
+    assert [path.name for path in target.parent.iterdir()] == ["run.nc"]
+
+
+def test_scenes(proofroll: Proofroll) -> None:
+    """The scenes are listed with every parameter's default, unit and meaning."""
+    code, out, err = proofroll("scenes")
+    assert (code, err) == (0, "")
+    assert "sphere_in_cylinder" in out
+    assert "rolling_resistance" in out
+    code, out, _ = proofroll("scenes", "--json")
+    found = {scene["name"]: scene for scene in json.loads(out)}
+    assert found["sphere_in_cylinder"]["parameters"]["speed"]["value"] == 4.0
+    assert found["sphere_in_cylinder"]["parameters"]["speed"]["unit"] == "m/s"
+
+
+def test_engines(proofroll: Proofroll) -> None:
+    """The engines are listed with what they provide, and one that is missing with the reason."""
+    code, out, err = proofroll("engines", "--json")
+    assert (code, err) == (0, "")
+    found = {engine["name"]: engine for engine in json.loads(out)}
+    assert found["oracle"]["status"] == "installed"
+    assert found["oracle"]["provides"] == ["a curved surface", "rolling without slip"]
+    assert found["absent"]["status"] == "missing"
+    assert "no_such_module_anywhere" in found["absent"]["message"]
+    assert found["misspelt"]["status"] == "broken"
+    code, out, err = proofroll("engines")
+    assert (code, err) == (0, "")
+    assert "no_such_module_anywhere" in " ".join(out.split())
+
+
+COMPARISON = """
+title = "A claim"
+question = "Does it hold?"
+scene = "sphere_in_cylinder"
+until = 0.1
+every = 0.01
+vary = { speed = [4] }
+tolerances.tight = { because = "the engine is the closed form", z = "1e-9 m", gamma = "1e-9 rad" }
+
+[[rows]]
+engine = "ENGINE"
+tolerance = "tight"
+"""
+
+
+@pytest.mark.parametrize(
+    ("engine", "code", "as_expected"),
+    [
+        ("oracle", 0, True),
+        ("broken[formulation=hidden_gravity]", 1, False),
+        ("broken[formulation=open_gravity]", 1, False),
+        ("gives_up", 1, False),
+        ("exits", 3, None),
+        ("absent", 3, None),
+    ],
+)
+def test_compare(proofroll: Proofroll, tmp_path: Path, engine: str, code: int, as_expected: bool | None) -> None:
+    """A claim that holds ends with 0, one that a verdict contradicts with 1, an engine that is lost with 3."""
+    (tmp_path / "claim.toml").write_text(COMPARISON.replace("ENGINE", engine))
+    found, out, err = proofroll("compare", str(tmp_path / "claim.toml"), "--out", str(tmp_path / "out"), "--json")
+    assert found == code, err
+    document = json.loads(out)
+    assert document["name"] == "claim"
+    if as_expected is not None:
+        assert document["as_expected"] is as_expected
+        assert bool(document["contradictions"]) is not as_expected
+    assert "Traceback" not in err
+
+
+def test_compare_reuses_what_is_there(proofroll: Proofroll, tmp_path: Path) -> None:
+    """A second comparison into the same folder runs nothing, and says the same; ``--fresh`` runs it again."""
+    (tmp_path / "claim.toml").write_text(COMPARISON.replace("ENGINE", "oracle"))
+    arguments = ["compare", str(tmp_path / "claim.toml"), "--out", str(tmp_path / "out"), "--json"]
+    first = proofroll(*arguments)
+
+    def written() -> dict[str, int]:
+        return {path.name: path.stat().st_mtime_ns for path in (tmp_path / "out" / "cases").iterdir()}
+
+    before = written()
+    assert proofroll(*arguments) == first
+    assert written() == before
+    proofroll(*arguments, "--fresh")
+    assert all(written()[name] > time for name, time in before.items())
+
+
+def test_compare_restricted_to_an_engine(proofroll: Proofroll, tmp_path: Path) -> None:
+    """An engine that the comparison does not know is a usage error that names those it does."""
+    (tmp_path / "claim.toml").write_text(COMPARISON.replace("ENGINE", "oracle"))
+    code, out, err = proofroll("compare", str(tmp_path / "claim.toml"), "--engine", "mujoco", "--out", str(tmp_path))
+    assert (code, out, err.count("\n")) == (2, "", 1)
+    assert "claim compares oracle" in err
+
+
+def fresh(code: str) -> dict[str, Any]:
+    """Modules that are loaded after some code ran in a new interpreter, and its exit code."""
+    script = (
+        "import sys, json\ncode = 0\n"
+        f"try:\n    {code}\nexcept SystemExit as end:\n    code = end.code or 0\n"
+        "print('\\n@' + json.dumps({'code': code, 'modules': sorted(sys.modules)}))"
+    )
+    done = subprocess.run([sys.executable, "-c", script], capture_output=True, text=True, check=True, env=os.environ)
+    found: dict[str, Any] = json.loads(done.stdout.rpartition("\n@")[2])
+    return found
+
+
+@pytest.mark.parametrize("arguments", [["--help"], ["--version"], ["run", "--help"], ["compare", "--help"]])
+def test_help_is_light(arguments: list[str]) -> None:
+    """Help and version load no engine, no array library and no plots."""
+    found = fresh(f"sys.argv = ['proofroll', *{arguments}]; from proofroll.cli import main; main()")
+    heavy = {"xarray", "plotly", "numpy", "scipy", "mujoco", "pinocchio", "exudyn", "h5netcdf", "heyoka"}
+    assert found["code"] == 0
+    assert heavy & set(found["modules"]) == set()
+    assert not any(name.startswith("proofroll.engines.") for name in found["modules"])
+
+
+def test_help_and_version(proofroll: Proofroll) -> None:
+    """Help names every command; the version is that of the package; no command at all is wrong usage with help."""
+    code, out, _ = proofroll("--help")
+    assert code == 0
+    for command in ("scenes", "engines", "run", "compare", "report"):
+        assert command in out
+    assert proofroll("--version") == (0, "proofroll 0.1.0\n", "")
+    assert proofroll()[0] == 2
+
+
+def test_a_reader_that_stops_reading() -> None:
+    """Output into a pipe that is closed early, as by head, is no error."""
+    done = subprocess.run(
+        f"{sys.executable} -m proofroll.cli scenes --json | head -c 10",
+        shell=True,
+        capture_output=True,
+        text=True,
+        check=True,
+    )
+    assert done.stderr == ""

@@ -1,0 +1,160 @@
+from __future__ import annotations
+
+import dataclasses
+import json
+import os
+from collections.abc import Callable
+from pathlib import Path
+
+import pytest
+
+from proofroll.case import Case, Result, Status
+from proofroll.errors import ProofrollError
+from proofroll.store import Store, move, write_text
+
+MakeCase = Callable[..., Case]
+
+
+@pytest.fixture
+def stored(tmp_path: Path, make_case: MakeCase) -> tuple[Store, Case, Result]:
+    """A store with one finished case."""
+    store, case = Store(tmp_path / "cases"), make_case("oracle")
+    store.trajectory(case).write_bytes(b"a trajectory")
+    result = Result(Status.DONE, "reached 2 s", 0.5, 0.25, [0.5], [{"quantity": "mass"}], {"oracle": "1"}, "x.nc")
+    return store, case, store.put(case, result)
+
+
+def test_a_result_comes_back(stored: tuple[Store, Case, Result]) -> None:
+    """What was stored is found again, equal in every field."""
+    store, case, result = stored
+    assert store.get(case) == result
+    assert Store(store.folder).get(case) == result
+
+
+def test_absent(tmp_path: Path, make_case: MakeCase) -> None:
+    """An empty store has nothing."""
+    assert Store(tmp_path).get(make_case("oracle")) is None
+
+
+@pytest.mark.parametrize("suffix", [".json", ".nc"])
+@pytest.mark.parametrize("damage", ["absent", "empty", "truncated", "tampered"])
+def test_what_is_not_what_was_stored_counts_as_absent(
+    stored: tuple[Store, Case, Result], suffix: str, damage: str
+) -> None:
+    """A record or trajectory that is gone, cut off or changed is not reused."""
+    store, case, _ = stored
+    path = store.folder / f"{case.key}{suffix}"
+    content = path.read_bytes()
+    match damage:
+        case "absent":
+            path.unlink()
+        case "empty":
+            path.write_bytes(b"")
+        case "truncated":
+            path.write_bytes(content[:-5])
+        case "tampered":
+            path.write_bytes(content.replace(b"done", b"dome").replace(b"trajectory", b"trajectorY", 1))
+    assert store.get(case) is None
+
+
+@pytest.mark.parametrize("text", ["null", "[]", '"done"', "{}", '{"result": null}', '{"result": {"status": "done"}}'])
+def test_records_of_another_form_count_as_absent(stored: tuple[Store, Case, Result], text: str) -> None:
+    """A record that is JSON but not a record is not reused."""
+    store, case, _ = stored
+    (store.folder / f"{case.key}.json").write_text(text)
+    assert store.get(case) is None
+
+
+def test_a_number_changed_by_hand_is_not_believed(stored: tuple[Store, Case, Result]) -> None:
+    """The record's own numbers are guarded as the trajectory is."""
+    store, case, _ = stored
+    path = store.folder / f"{case.key}.json"
+    record = json.loads(path.read_text())
+    record["result"]["seconds_per_second"] = 1e-9
+    path.write_text(json.dumps(record))
+    assert store.get(case) is None
+
+
+@pytest.mark.parametrize("status", list(Status))
+def test_only_lasting_results_are_kept(tmp_path: Path, make_case: MakeCase, status: Status) -> None:
+    """A crash, a hang or a missing engine is tried again next time; an engine's own answer is kept."""
+    store, case = Store(tmp_path), make_case("oracle")
+    store.put(case, Result(status, "sentence"))
+    assert (store.get(case) is not None) == (status in {Status.DONE, Status.DIVERGED, Status.REFUSED})
+
+
+def test_key_follows_all_that_decides_the_result(make_case: MakeCase) -> None:
+    """Another engine, version, adapter, setting, scene or time grid is another case; another time limit is not."""
+    case = make_case("oracle")
+    others = [
+        make_case("other"),
+        make_case("oracle", settings={"dt": 1e-3}),
+        make_case("oracle", parameters={"speed": 5.0}),
+        make_case("oracle", until=0.2),
+        make_case("oracle", every=0.01),
+        make_case("oracle", timed=True),
+        dataclasses.replace(case, engine=dataclasses.replace(case.engine, version="2")),
+        dataclasses.replace(case, engine=dataclasses.replace(case.engine, code="other")),
+        dataclasses.replace(case, scene_digest="other"),
+    ]
+    assert len({case.key, *(other.key for other in others)}) == 1 + len(others)
+    assert make_case("oracle", time_limit=1.0).key == case.key
+
+
+def test_case_and_result_survive_json(make_case: MakeCase) -> None:
+    """A case and a result are the same after a trip through JSON."""
+    case = make_case("oracle", settings={"dt": 1e-3, "formulation": "free"}, parameters={"speed": 5.0})
+    assert Case.from_dict(json.loads(json.dumps(dataclasses.asdict(case)))) == case
+    result = Result(Status.DIVERGED, "at 1 s", timings=[1.0], trajectory="x.nc", checksum="abc")
+    assert Result.from_dict(json.loads(json.dumps(dataclasses.asdict(result)))) == result
+
+
+def test_text_is_written_whole_or_not_at_all(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """A failure before the last moment leaves the old text and no scraps."""
+    path = tmp_path / "record.json"
+    write_text(path, "old")
+
+    def refuse(self: Path, target: Path) -> None:  # noqa: ARG001 -- stands in for a method
+        raise OSError(28, "No space left on device")
+
+    monkeypatch.setattr(Path, "replace", refuse)
+    with pytest.raises(ProofrollError, match="No space left on device"):
+        write_text(path, "new")
+    assert path.read_text() == "old"
+    assert list(tmp_path.iterdir()) == [path]
+
+
+def test_move(tmp_path: Path) -> None:
+    """A moved file is at its new place, over whatever was there, or the reason is said."""
+    (tmp_path / "a").write_text("new")
+    (tmp_path / "b").write_text("old")
+    move(tmp_path / "a", tmp_path / "b")
+    assert (tmp_path / "b").read_text() == "new"
+    with pytest.raises(ProofrollError, match="cannot be written"):
+        move(tmp_path / "b", tmp_path / "b" / "c")
+
+
+def test_files_can_be_read_by_others(tmp_path: Path) -> None:
+    """A result has the permissions of an ordinary file, not those of a temporary one."""
+    write_text(tmp_path / "record.json", "text")
+    (tmp_path / "ordinary").write_text("text")
+    (tmp_path / "source").write_text("text")
+    move(tmp_path / "source", tmp_path / "moved")
+    modes = {(tmp_path / name).stat().st_mode for name in ("record.json", "moved", "ordinary")}
+    assert len(modes) == 1
+
+
+@pytest.mark.skipif(os.geteuid() == 0, reason="root may write anywhere")
+def test_a_folder_without_permission(tmp_path: Path) -> None:
+    """A folder that may not be written is refused before anything is run."""
+    tmp_path.chmod(0o500)
+    with pytest.raises(ProofrollError, match="choose another place with --out"):
+        Store(tmp_path / "cases")
+    tmp_path.chmod(0o700)
+
+
+def test_a_folder_that_is_a_file(tmp_path: Path) -> None:
+    """A file where the folder should be is refused before anything is run."""
+    (tmp_path / "cases").write_text("")
+    with pytest.raises(ProofrollError, match="choose another place with --out"):
+        Store(tmp_path / "cases")

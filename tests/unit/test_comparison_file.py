@@ -1,0 +1,178 @@
+from __future__ import annotations
+
+from collections.abc import Callable
+from pathlib import Path
+
+import pytest
+
+from proofroll.agreement import Verdict
+from proofroll.comparison_file import Comparison, Tolerance, comparison_names, load_comparison
+from proofroll.errors import InputError
+
+TEXT = """
+title = "A claim"
+question = "Does it hold?"
+scene = "sphere_in_cylinder"
+until = 1.0
+every = 0.01
+
+[vary]
+speed = [2, 4]
+rolling_resistance = [0.0, 5e-4]
+
+[tolerances.tight]
+because = "round-off"
+z = "1e-10 m"
+N = "0.1 %"
+
+[[rows]]
+engine = "projection"
+tolerance = "tight"
+
+[[rows]]
+engine = "mujoco[formulation=free]"
+tolerance = "tight"
+expect = "converges"
+expect_for = { N = ["agrees", "converges"], F2 = "differs" }
+because = "the contact is soft"
+ladder = [1, 0.5, 0.25]
+only = { speed = [4] }
+order = { z = [0.9, 1.1] }
+limit = { z = "3e-5 m" }
+bound = { F3 = "2 %" }
+"""
+
+
+@pytest.fixture
+def load(tmp_path: Path) -> Callable[..., Comparison]:
+    """Reads the comparison above with one text replaced."""
+
+    def read(old: str = "", new: str = "") -> Comparison:
+        assert old in TEXT
+        path = tmp_path / "claim.toml"
+        path.write_text(TEXT.replace(old, new, 1) if old else TEXT, encoding="utf-8")
+        return load_comparison(str(path))
+
+    return read
+
+
+def test_a_comparison(load: Callable[..., Comparison]) -> None:
+    """Everything that the file says is there, with defaults for what it does not say."""
+    comparison = load()
+    plain, free = comparison.rows
+    assert comparison.name == "claim"
+    assert comparison.time_limit == 120
+    assert plain.expect == [Verdict.AGREES]
+    assert plain.ladder == [4, 2, 1]
+    assert free.ladder == [1, 0.5, 0.25]
+    assert free.order == {"z": (0.9, 1.1)}
+    assert free.limit == {"z": Tolerance(3e-5, False)}
+    assert free.bound == {"F3": Tolerance(0.02, True)}
+    assert comparison.bands["tight"].because == "round-off"
+
+
+def test_expected_verdicts(load: Callable[..., Comparison]) -> None:
+    """One verdict may be written without a list, for the row and for an observable."""
+    free = load().rows[1]
+    assert free.expect == [Verdict.CONVERGES]
+    assert free.expect_for == {"N": [Verdict.AGREES, Verdict.CONVERGES], "F2": [Verdict.DIFFERS]}
+
+
+def test_variations(load: Callable[..., Comparison]) -> None:
+    """A row is run at every combination of the parameters that it is not restricted from."""
+    comparison = load()
+    assert comparison.variations(comparison.rows[0]) == [
+        {"speed": 2, "rolling_resistance": 0},
+        {"speed": 2, "rolling_resistance": 5e-4},
+        {"speed": 4, "rolling_resistance": 0},
+        {"speed": 4, "rolling_resistance": 5e-4},
+    ]
+    assert [point["speed"] for point in comparison.variations(comparison.rows[1])] == [4, 4]
+
+
+def test_tolerance() -> None:
+    """A tolerance is a number with a unit or a percentage of the scale."""
+    assert Tolerance.parse("x", "6e-5 m").absolute(10) == 6e-5
+    assert Tolerance.parse("x", "0.1 %").absolute(10) == pytest.approx(0.01)
+
+
+@pytest.mark.parametrize("text", ["6e-5", "m", "", "6e-5m", "0 m", "-1 m", "nan m", "inf m", "1 ", 6e-5, None])
+def test_tolerances_of_another_form(text: object) -> None:
+    """A tolerance without number or unit, or that is not positive, gives one line that shows the form."""
+    with pytest.raises(InputError, match=r"write a (positive )?number and a unit") as caught:
+        Tolerance.parse("claim: z", text)
+    assert caught.value.field == "claim: z"
+
+
+@pytest.mark.parametrize(
+    ("old", "new", "words"),
+    [
+        ("[vary]", "[vary", ["broken", "line"]),
+        ('title = "A claim"', "", ["title", "required"]),
+        ('scene = "sphere', 'scen = "sphere', ["scen"]),
+        ("until = 1.0", 'until = "long"', ["until", "'long'", "number"]),
+        ("until = 1.0", "until = 1.0\nwhile = 2", ["while", "no such key"]),
+        ('because = "round-off"', "", ["tolerances.tight.because", "every tolerance needs its reason"]),
+        ('z = "1e-10 m"', 'z = "1e-10"', ["tolerances.tight.z", "'1e-10'", "a unit"]),
+        ('tolerance = "tight"', 'tolerance = "loose"', ["rows.0.tolerance", "'loose'", "tight"]),
+        ('tolerance = "tight"', "", ["rows.0.tolerance", "required"]),
+        ('engine = "projection"', 'engines = "projection"', ["rows.0.engine"]),
+        ('expect = "converges"', 'expect = "maybe"', ["rows.1.expect", "maybe", "'converges'"]),
+        ('because = "the contact is soft"', "", ["rows.1.because", "needs its reason"]),
+        ("ladder = [1, 0.5, 0.25]", "ladder = [1, 0.5]", ["rows.1.ladder", "three positive factors"]),
+        ("ladder = [1, 0.5, 0.25]", "ladder = [0.25, 0.5, 1]", ["rows.1.ladder", "largest first"]),
+        ("ladder = [1, 0.5, 0.25]", "ladder = [8, 4, 2]", ["rows.1.ladder", "one of them 1"]),
+        ("ladder = [1, 0.5, 0.25]", "ladder = [1, 0.5, 0.1]", ["rows.1.ladder", "same ratio"]),
+        ("ladder = [1, 0.5, 0.25]", "ladder = [1, 1, 1]", ["rows.1.ladder"]),
+        ("ladder = [1, 0.5, 0.25]", "ladder = [1, 0.5, -0.25]", ["rows.1.ladder"]),
+        ("only = { speed = [4] }", "only = { sped = [4] }", ["rows.1.only", "'sped'", "varies speed"]),
+        ("only = { speed = [4] }", "only = { speed = [5] }", ["rows.1.only.speed = 5", "has only 2, 4"]),
+        ('N = "0.1 %"', 'n = "0.1 %"', ["tolerances.tight", "'n'", "no such observable; choose from gamma, z, N"]),
+        ('scene = "sphere_in_cylinder"', 'scene = "sphere"', ["scene = 'sphere'"]),
+        ('expect_for = { N', 'expect_for = { n', ["rows.1", "'n'", "no such observable"]),
+        ("order = { z", "order = { y", ["rows.1", "'y'", "no such observable"]),
+        ('limit = { z = "3e-5 m" }', 'limit = { z = "3e-5" }', ["rows.1.limit.z", "a unit"]),
+        ('limit = { z = "3e-5 m" }', "limit = 3e-5", ["rows.1.limit"]),
+        ('expect_for = { N = ["agrees", "converges"], F2 = "differs" }', "expect_for = 3", ["rows.1.expect_for"]),
+        ("[tolerances.tight]", "[tolerances]\nloose = 3\n[tolerances.tight]", ["tolerances.loose"]),
+    ],
+)  # fmt: skip
+def test_broken_comparisons(load: Callable[..., Comparison], old: str, new: str, words: list[str]) -> None:
+    """Each thing that is wrong in a comparison gives one line with the file, the key and what to do."""
+    with pytest.raises(InputError) as caught:
+        load(old, new)
+    text = str(caught.value)
+    assert "\n" not in text
+    assert "claim.toml" in text or "scene" in text
+    for word in words:
+        assert word in text
+
+
+def test_rows_that_are_no_list(tmp_path: Path) -> None:
+    """Rows written as one table are the user's error, not ours."""
+    (tmp_path / "claim.toml").write_text(TEXT.split("[[rows]]", maxsplit=1)[0] + '[rows]\nengine = "projection"\n')
+    with pytest.raises(InputError, match="rows"):
+        load_comparison(str(tmp_path / "claim.toml"))
+
+
+def test_a_comparison_without_rows(tmp_path: Path) -> None:
+    """A comparison that compares nothing is refused."""
+    (tmp_path / "claim.toml").write_text(TEXT.split("[[rows]]", maxsplit=1)[0])
+    with pytest.raises(InputError, match="rows"):
+        load_comparison(str(tmp_path / "claim.toml"))
+
+
+def test_an_unknown_comparison() -> None:
+    """An unknown comparison is answered with those that exist."""
+    with pytest.raises(InputError, match="there is no such comparison"):
+        load_comparison("no_such_claim")
+
+
+@pytest.mark.parametrize("name", comparison_names())
+def test_our_comparisons_can_be_read(name: str) -> None:
+    """Every comparison of the project is whole, and every reason in it is a sentence."""
+    comparison = load_comparison(name)
+    assert comparison.rows
+    assert all(comparison.variations(row) for row in comparison.rows)
+    for band in comparison.bands.values():
+        assert len(band.because.split()) > 3, band.because

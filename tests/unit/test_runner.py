@@ -1,0 +1,184 @@
+from __future__ import annotations
+
+import json
+import threading
+from collections.abc import Callable, Mapping
+from pathlib import Path
+
+import pytest
+from hostile import ENTRY_POINTS
+
+from proofroll.case import Case, EngineFacts, Result, Status
+from proofroll.errors import InputError, Missing
+from proofroll.runner import Runner, WorkerDied, describe, resolve, run_one
+from proofroll.store import Store
+from proofroll.trajectory import read
+
+MakeCase = Callable[..., Case]
+
+
+@pytest.fixture(autouse=True)
+def hostile_engines(install_engines: Callable[[Mapping[str, str]], None]) -> None:
+    """All engines of ``tests/plugins/hostile.py``."""
+    install_engines(ENTRY_POINTS)
+
+
+# What each hostile engine's row must say.
+OUTCOMES = {
+    "oracle": (Status.DONE, "reached 0.1 s"),
+    "garbage": (Status.DONE, "reached 0.1 s"),
+    "exits": (Status.CRASHED, "exit code 7: fatal: no licence at 0.05"),
+    "segfaults": (Status.CRASHED, "SIGSEGV"),
+    "hangs": (Status.TIMEOUT, "no result within 8 s"),
+    "raises": (Status.CRASHED, "RuntimeError: matrix is singular at t = 0.05"),
+    "says_exit": (Status.CRASHED, "goodbye"),
+    "not_a_number": (Status.DIVERGED, "v_WB is not finite"),
+    "gives_up": (Status.DIVERGED, "step size fell to nothing"),
+    "refuses": (Status.REFUSED, "no wheel, no ball"),
+    "absent": (Status.MISSING, "absent is not installed here"),
+    "misspelt": (Status.CRASHED, "NoSuchClass"),
+}
+
+
+def limit(engine: str) -> float:
+    """Only the engine that hangs is not waited for long."""
+    return 8.0 if engine == "hangs" else 60.0
+
+
+def test_each_engine_costs_its_own_case_alone(tmp_path: Path, make_case: MakeCase) -> None:
+    """A crash, a signal, a hang, an exception, NaN or garbage: each costs one case, which says so in a sentence."""
+    cases = {name: make_case(name, time_limit=limit(name)) for name in OUTCOMES}
+    results = Runner(Store(tmp_path), jobs=2).run(cases.values())
+    assert results.keys() == {case.key for case in cases.values()}
+    for name, (status, words) in OUTCOMES.items():
+        result = results[cases[name].key]
+        assert (result.status, words in result.message) == (status, True), (name, result)
+        assert "\n" not in result.message
+    for name in ("oracle", "garbage", "not_a_number", "gives_up"):
+        dataset = read(Runner(Store(tmp_path)).store.trajectory(cases[name]))
+        assert dataset.sizes["time"] == (3 if results[cases[name].key].status is Status.DONE else 2)
+
+
+def test_a_crash_costs_one_case_of_a_batch(tmp_path: Path, make_case: MakeCase) -> None:
+    """Cases that share a process with one that crashes are served by the next process."""
+    cases = [make_case("moody", parameters={"speed": speed}) for speed in (3.0, 5.0, 4.0)]
+    results = Runner(Store(tmp_path), jobs=1).run(cases)
+    assert [results[case.key].status for case in cases] == [Status.DONE, Status.CRASHED, Status.DONE]
+
+
+def test_stored_results_are_reused(tmp_path: Path, make_case: MakeCase) -> None:
+    """What is there is not run again; ``fresh`` runs it again; a crash is never reused."""
+    cases = [make_case("oracle"), make_case("refuses"), make_case("exits")]
+    first = Runner(Store(tmp_path), jobs=1)
+    before = first.run(cases)
+    assert first.reused == 0
+    again = Runner(Store(tmp_path), jobs=1)
+    after = again.run(cases)
+    assert again.reused == 2
+    assert after[cases[0].key] == before[cases[0].key]
+    fresh = Runner(Store(tmp_path), jobs=1, fresh=True)
+    fresh.run(cases[:1])
+    assert fresh.reused == 0
+
+
+def test_progress_is_told_of_every_case_once(tmp_path: Path, make_case: MakeCase) -> None:
+    """Equal cases are run once, and progress is reported in the caller's thread, stored results included."""
+    seen: list[tuple[str, Status, bool]] = []
+
+    def progress(case: Case, result: Result) -> None:
+        seen.append((case.engine.name, result.status, threading.current_thread() is threading.main_thread()))
+
+    store = Store(tmp_path)
+    Runner(store, jobs=1).run([make_case("oracle")])
+    Runner(store, jobs=2).run([make_case("oracle"), make_case("oracle"), make_case("refuses")], progress)
+    assert sorted(seen) == [("oracle", Status.DONE, True), ("refuses", Status.REFUSED, True)]
+
+
+def test_what_the_user_does_wrong_is_raised(tmp_path: Path, make_case: MakeCase) -> None:
+    """A setting that does not exist is the user's error, not a crash of the engine."""
+    with pytest.raises(InputError, match=r"oracle: speed = .*no such setting"):
+        Runner(Store(tmp_path), jobs=1).run([make_case("oracle", settings={"speed": 3})])
+
+
+def test_an_error_in_progress_ends_the_run(tmp_path: Path, make_case: MakeCase) -> None:
+    """An interruption reaches the caller although an engine hangs, and leaves no process behind."""
+
+    def interrupt(*_: object) -> None:
+        raise KeyboardInterrupt
+
+    runner = Runner(Store(tmp_path), jobs=2)
+    with pytest.raises(KeyboardInterrupt):
+        runner.run([make_case("hangs"), make_case("oracle")], interrupt)
+    assert not runner._workers
+
+
+def test_timed_runs(tmp_path: Path, make_case: MakeCase) -> None:
+    """Speed is measured in runs of their own, at least one, and given per simulated second."""
+    result = run_one(make_case("oracle", timed=True), tmp_path / "run.nc")
+    assert 1 <= len(result.timings) <= 5
+    assert result.seconds_per_second == pytest.approx(sorted(result.timings)[len(result.timings) // 2] / 0.1)
+    assert run_one(make_case("oracle"), tmp_path / "run.nc").seconds_per_second is None
+
+
+def test_manifest(tmp_path: Path, make_case: MakeCase) -> None:
+    """A trajectory says how it was made: engine, settings, parameters, versions, machine."""
+    case = make_case("oracle", settings={"dt": 5e-3}, parameters={"speed": 5.0})
+    result = run_one(case, tmp_path / "run.nc")
+    attributes = read(tmp_path / "run.nc").attrs
+    assert json.loads(attributes["settings"])["dt"] == 5e-3
+    assert json.loads(attributes["parameters"])["speed"] == 5.0
+    assert json.loads(attributes["versions"]) == result.versions
+    assert {"engine", "status", "message", "machine", "scene", "scene_digest"} <= set(attributes)
+    assert result.versions.keys() == {"oracle", "proofroll", "python"}
+    assert all(line["holds"] for line in result.certificate)
+
+
+def test_capabilities_are_checked_before_anything_is_built(tmp_path: Path, make_case: MakeCase) -> None:
+    """A scene that needs what the engine does not provide is refused by the words of what is lacking."""
+    case = make_case("oracle", parameters={"rolling_resistance": 1e-4, "mu_static": 0.3})
+    result = run_one(case, tmp_path / "run.nc")
+    assert result.status is Status.REFUSED
+    assert result.message == "needs bounded friction (slip), rolling resistance"
+
+
+def test_describe() -> None:
+    """An engine is described by itself, from a process of its own."""
+    found = describe("oracle")
+    assert found["version"] == "1"
+    assert found["provides"] == ["a curved surface", "rolling without slip"]
+    assert found["presets"] == {"only": {"matched": {"formulation": "only", "preset": "matched", "dt": 1e-2}}}
+    assert found["summary"].startswith("Well behaved")
+
+
+def test_describe_what_cannot_be_described() -> None:
+    """A missing, a broken and an unknown engine are told apart."""
+    with pytest.raises(Missing, match="absent"):
+        describe("absent")
+    with pytest.raises(WorkerDied, match="NoSuchClass"):
+        describe("misspelt")
+    with pytest.raises(InputError, match="no such engine"):
+        describe("unheard_of")
+
+
+def test_resolve_gives_each_answer_in_its_place() -> None:
+    """Settings of several engines come back in the order asked, each as facts or as its own error."""
+    found = resolve(
+        [("oracle", {"dt": "5e-3"}), ("absent", {}), ("oracle", {"dt": "x"}), ("truth", {}), ("truth", {"dt": 1})]
+    )
+    assert [type(item) for item in found] == [EngineFacts, Missing, InputError, EngineFacts, InputError]
+    assert isinstance(found[0], EngineFacts)
+    assert found[0].settings == {"formulation": "only", "preset": "matched", "dt": 5e-3}
+    assert found[0].resolution == "dt"
+
+
+def test_code_hash_follows_the_adapter(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """A change in the adapter's file changes the hash, so that no stored result outlives it."""
+    text = Path(__file__).parents[1].joinpath("plugins", "hostile.py").read_text(encoding="utf-8")
+    monkeypatch.setenv("PYTHONPATH", f"{tmp_path}:{tmp_path / 'site'}")
+    hashes = []
+    for content in (text, text + "\n# changed\n"):
+        (tmp_path / "hostile.py").write_text(content, encoding="utf-8")
+        facts = resolve([("oracle", {})])[0]
+        assert isinstance(facts, EngineFacts)
+        hashes.append(facts.code)
+    assert hashes[0] != hashes[1]
