@@ -1,0 +1,55 @@
+"""What happens to a ball on a wall: it begins to slip, sticks again, leaves the wall. Each with a bracket in time."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, Literal, get_args
+
+import numpy as np
+
+if TYPE_CHECKING:
+    import xarray as xr
+
+EventKind = Literal["slip", "stick", "liftoff"]
+
+
+@dataclass(frozen=True)
+class Event:
+    """One change of the contact.
+
+    Attributes:
+        kind: ``slip`` begins, the ball ``stick``s again, or ``liftoff`` (the normal force reached zero).
+        time: best value [s].
+        time_low, time_high: the event lies between these [s].
+    """
+
+    kind: EventKind
+    time: float
+    time_low: float
+    time_high: float
+
+
+def with_events(dataset: xr.Dataset, events: Sequence[Event]) -> xr.Dataset:
+    """The dataset with ``event_kind`` and ``event_time``, ``event_low``, ``event_high`` [s], each with dim ``event``."""
+    columns = {
+        "event_time": ("when it happened", [event.time for event in events]),
+        "event_low": ("not before", [event.time_low for event in events]),
+        "event_high": ("not after", [event.time_high for event in events]),
+    }
+    kinds = np.array([event.kind for event in events], dtype=f"<U{max(map(len, get_args(EventKind)))}")
+    result = dataset.assign(event_kind=("event", kinds, {"units": "1", "long_name": "what happened"}))
+    return result.assign(
+        {
+            name: ("event", np.array(values, dtype=np.float64), {"units": "s", "long_name": meaning})
+            for name, (meaning, values) in columns.items()
+        }
+    )
+
+
+def events_of(dataset: xr.Dataset) -> list[Event]:
+    """The events that :func:`with_events` stored; none if there are no such variables."""
+    if "event_kind" not in dataset:
+        return []
+    columns = (dataset[f"event_{name}"].to_numpy().tolist() for name in ("kind", "time", "low", "high"))
+    return [Event(*row) for row in zip(*columns, strict=True)]
