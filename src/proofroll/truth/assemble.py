@@ -14,6 +14,7 @@ from proofroll.truth.motion import Motion
 def world_motion(
     body: RollingBall,
     u: FloatArray,
+    *,
     velocity: FloatArray,
     spin: FloatArray,
     slip: FloatArray,
@@ -43,6 +44,18 @@ def world_motion(
     # slip = v + a ω × e1, so the tangential part of ω is e1 × (slip - v) / a
     w_WB = spin[:, None] * e1 + np.cross(e1, along(slip) - v_WB) / body.ball.radius
     return Motion(body.surface.position(u), v_WB, w_WB, along(friction) - press[:, None] * e1, route)
+
+
+def joined(
+    times: FloatArray, change: float, early: Callable[[FloatArray], Motion], late: Callable[[FloatArray], Motion]
+) -> Motion:
+    """Motion at rising times: by ``early`` before the time ``change`` [s] and by ``late`` from then on."""
+    first = int(np.searchsorted(times, change))
+    parts = early(times[:first]), late(times[first:])
+    p, v, w, force = (
+        np.concatenate([getattr(part, key) for part in parts]) for key in ("p_WB", "v_WB", "w_WB", "force")
+    )
+    return Motion(p, v, w, force, parts[1].route)
 
 
 def classic_step(rates: Callable[[FloatArray], FloatArray], state: FloatArray, span: float) -> FloatArray:

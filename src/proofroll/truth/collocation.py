@@ -30,7 +30,7 @@ def _tableau(stages: int) -> tuple[FloatArray, FloatArray, FloatArray]:
     polynomial[-2:] = 1.0, -1.0
     x = np.sort(np.real(legendre.legroots(polynomial)))
     x[-1] = 1.0
-    to_coefficients = np.linalg.inv(legendre.legvander(x, stages - 1))
+    to_coefficients = np.asarray(np.linalg.inv(legendre.legvander(x, stages - 1)), dtype=np.float64)
     integrals = np.stack([legendre.legval(x, legendre.legint(row, lbnd=-1)) for row in np.eye(stages)], axis=-1)
     return (x + 1) / 2, integrals @ to_coefficients / 2, to_coefficients
 
@@ -96,7 +96,8 @@ def take(system: System, time: float, state: FloatArray, length: float, guess: F
 
     Args:
         system: what is integrated.
-        time, state: where it starts.
+        time: where it starts [s].
+        state: there, shape (n,).
         length: of the step [s].
         guess: states at the nodes from which Newton's method starts, shape (s, n).
     """

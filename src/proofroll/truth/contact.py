@@ -6,18 +6,24 @@ by implicit collocation, so that neither the stiff start of a slip nor its end i
 
 from __future__ import annotations
 
+from typing import Any
+
 import numpy as np
+import numpy.typing as npt
 
 from proofroll.scene import RollingBall
 from proofroll.surfaces import FloatArray
 from proofroll.truth.collocation import System
 
+AnyArray = npt.NDArray[Any]  # real or complex
 _PLUS_MINUS = np.concatenate([np.eye(3), -np.eye(3)])
 # [e1]× from e1: e1 @ _CROSS has the rows of the matrix of e1 × x
-_CROSS = np.array([[[0, 0, 0], [0, 0, -1], [0, 1, 0]], [[0, 0, 1], [0, 0, 0], [-1, 0, 0]], [[0, -1, 0], [1, 0, 0], [0, 0, 0]]])
+_CROSS = np.array(
+    [[[0, 0, 0], [0, 0, -1], [0, 1, 0]], [[0, 0, 1], [0, 0, 0], [-1, 0, 0]], [[0, -1, 0], [1, 0, 0], [0, 0, 0]]]
+)
 
 
-def _times(matrix: FloatArray, x: FloatArray) -> FloatArray:
+def _times(matrix: AnyArray, x: AnyArray) -> AnyArray:
     return np.asarray((matrix @ x[..., None])[..., 0])
 
 
@@ -85,8 +91,8 @@ class Contact:
         return result
 
     def _solve(
-        self, e1: FloatArray, bend: FloatArray, w: FloatArray, u: FloatArray, sticking: bool
-    ) -> tuple[FloatArray, FloatArray]:
+        self, e1: FloatArray, bend: FloatArray, w: AnyArray, u: AnyArray, sticking: bool
+    ) -> tuple[AnyArray, AnyArray]:
         """ẏ and R; w and u may be complex."""
         body = self._body
         a, m, J, f = body.ball.radius, body.ball.mass, body.ball.inertia, body.contact.rolling_resistance

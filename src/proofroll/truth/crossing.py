@@ -22,7 +22,8 @@ def first_rise(function: Callable[[FloatArray], FloatArray], start: float, end: 
 
     Args:
         function: vectorised over times.
-        start, end: [s].
+        start: of the interval [s].
+        end: of the interval [s].
     """
     half, middle = (end - start) / 2, (end + start) / 2
     values = function(middle + half * _X)

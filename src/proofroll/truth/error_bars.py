@@ -25,4 +25,5 @@ def put_error_bars(result: xr.Dataset, check: xr.Dataset, floor: float) -> None:
         # Without contact |F|/N is 0/0 in both routes: nothing to compare there.
         known = np.isfinite(mine) | np.isfinite(other)
         difference = np.max(np.abs(mine - other)[known], initial=0.0)
-        values.attrs["error_bar"] = float(difference + floor * np.max(np.abs(mine[known]), initial=0.0))
+        size = 0.0 if values.dtype == bool else np.max(np.abs(mine[known]), initial=0.0)
+        values.attrs["error_bar"] = float(difference + floor * size)

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable
+from functools import partial
 
 import numpy as np
 
@@ -71,7 +72,7 @@ class Implicit:
                 halted = walk.state + left * self._contact.rates(walk.state[None, :], True)[0]
                 return walk.leg(self, True, walk.time + left, self.nudged(halted, np.zeros(3)), End.HALT)
             step, length = walk.step(min(length, _APPROACH * left))
-            rise = first_rise(lambda t, step=step: self._excess(step(t)), step.time, step.time + step.length)
+            rise = first_rise(partial(self._excess_along, step), step.time, step.time + step.length)
             if rise is not None:
                 return walk.leg(self, True, rise, walk.cut(rise), End.CONE)
         return walk.leg(self, True, until, walk.state, End.TIME)
@@ -91,9 +92,7 @@ class Implicit:
                 return walk.leg(self, False, walk.time + left, still, End.STILL)
             guess = None if started else self._first_guess(state)
             step, length = walk.step(min(length, _APPROACH * left), guess)
-            gone = first_rise(
-                lambda t, step=step: -self._contact.split(step(t), False)[1], step.time, step.time + step.length
-            )
+            gone = first_rise(partial(self._pull_along, step), step.time, step.time + step.length)
             if gone is not None:
                 return walk.leg(self, False, gone, walk.cut(gone), End.LIFTOFF)
         return walk.leg(self, False, until, walk.state, End.TIME)
@@ -111,6 +110,13 @@ class Implicit:
         friction, N = self._contact.split(y, sticking=True)
         needed, available = np.linalg.norm(friction, axis=-1), self._mu * N
         return np.asarray((needed - available) / np.maximum(needed + available, np.finfo(float).tiny))
+
+    def _excess_along(self, step: Step, times: FloatArray) -> FloatArray:
+        return self._excess(step(times))
+
+    def _pull_along(self, step: Step, times: FloatArray) -> FloatArray:
+        """-N [N]: rises through zero where the ball leaves the wall."""
+        return -self._contact.split(step(times), False)[1]
 
     def _until_still(self, state: FloatArray, sticking: bool) -> float:
         """Time until the centre (sticking) or the contact point (slipping) stands still at the present rate [s]."""

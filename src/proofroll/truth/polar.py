@@ -8,39 +8,22 @@ friction F. In polar form u = |u| (cos φ e2 + sin φ e3), F = -μk N (cos φ, s
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator
-from dataclasses import dataclass
+from collections.abc import Callable
 
 import numpy as np
-from scipy.integrate import DOP853
 
 from proofroll.errors import Diverged
 from proofroll.scene import RollingBall
 from proofroll.surfaces import FloatArray
-from proofroll.truth.assemble import classic_step, world_motion
-from proofroll.truth.crossing import first_rise
+from proofroll.truth.assemble import classic_step, joined, world_motion
+from proofroll.truth.explicit import Piece, Rates, at_clock, read, steps, stop
 from proofroll.truth.motion import Motion
 from proofroll.truth.rolling import reduced_rates
 from proofroll.truth.switching import End, Leg
 
-_RTOL = 100 * np.finfo(float).eps  # the tightest that scipy accepts
 _FLOOR = 1e-4  # |u| at which the rest of a slip is extrapolated, relative to where it began
 _APPROACH = 0.6  # part of the time left until the centre stands still that one step may take
 _STILL = 1e-9  # time left, relative to the pace of the motion, that is extrapolated
-
-Rates = Callable[[FloatArray], FloatArray]
-
-
-@dataclass(frozen=True)
-class _Piece:
-    """One step of the integrator: from, to [s], and the states between."""
-
-    start: float
-    end: float
-    first: FloatArray
-    last: FloatArray
-    between: Callable[[float], FloatArray]
-    atol: FloatArray
 
 
 class Polar:
@@ -94,17 +77,17 @@ class Polar:
 
     def stick(self, time: float, state: FloatArray, until: float) -> Leg[FloatArray]:
         """See :class:`Route`."""
-        pieces: list[_Piece] = []
+        pieces: list[Piece] = []
 
         def leg(end: float, last: FloatArray, why: End) -> Leg[FloatArray]:
             def motion(times: FloatArray) -> Motion:
-                return self._motion(_read(pieces, times, state), np.zeros(len(times)), None)
+                return self._motion(read(pieces, times, state), np.zeros(len(times)), None)
 
             return Leg(time, end, True, last, why, motion)
 
         resisted = self._body.contact.rolling_resistance > 0
         cap = (lambda y: _APPROACH * self._until_halt(y)) if resisted else None
-        for piece in _steps(self._rolling, time, state, until, self._atol[:5], cap):
+        for piece in steps(self._rolling, time, state, until, atol=self._atol[:5], cap=cap):
             pieces.append(piece)
             rise = self._rise(piece)
             if rise is not None:
@@ -120,33 +103,32 @@ class Polar:
         strength, change = self._pull(state)
         pace = min(strength / change if change > 0 else np.inf, until - time)
         handover = max(self._handover * strength * pace, np.finfo(float).tiny)
-        lead: list[_Piece] = []
+        lead: list[Piece] = []
         why, begun, small = self._creep(lead, time, state, until, handover)
 
         def creeping(times: FloatArray) -> Motion:
-            y = _read(lead, times, np.append(state, 0.0))
+            y = read(lead, times, np.append(state, 0.0))
             return self._motion(y[:, :5], y[:, 5], np.array([self._slaved(row)[1] for row in y]))
 
         if why is not None:
             return Leg(time, begun, False, small[:5], why, creeping)
         first = np.array([*small[:5], np.log(small[5]), self._slaved(small)[1], begun])
         floor = np.log(_FLOOR * handover)
-        pieces: list[_Piece] = []
+        pieces: list[Piece] = []
+
+        def slipping(times: FloatArray) -> Motion:
+            y = at_clock(pieces, times, first)
+            return self._motion(y[:, :5], np.exp(y[:, 5]), y[:, 6])
 
         def motion(times: FloatArray) -> Motion:
-            early = times < begun
-            y = _at_times(pieces, times[~early], first)
-            parts = [creeping(times[early]), self._motion(y[:, :5], np.exp(y[:, 5]), y[:, 6])]
-            order = np.argsort(np.concatenate([np.flatnonzero(early), np.flatnonzero(~early)]))
-            fields = ("p_WB", "v_WB", "w_WB", "force")
-            return Motion(*(np.concatenate([getattr(x, key) for x in parts])[order] for key in fields), self.name)
+            return joined(times, begun, creeping, slipping)
 
         def leg(y: FloatArray, end: End) -> Leg[FloatArray]:
             if end is End.TIME or y[7] >= until:
                 return Leg(time, until, False, y[:5], End.TIME, motion)
             return Leg(time, float(y[7]), False, y[:5], end, motion)
 
-        for piece in _steps(self._slipping, 0.0, first, np.inf, self._atol):
+        for piece in steps(self._slipping, 0.0, first, np.inf, atol=self._atol):
             pieces.append(piece)
             # Clock and ln|u| pass their limits but once, so the end of a step tells whether one was passed.
             stops: tuple[tuple[End, Callable[[FloatArray], float]], ...] = (
@@ -154,30 +136,30 @@ class Polar:
                 (End.TIME, lambda y: y[7] - until),
                 (End.STILL, lambda y: floor - y[5]),
             )
-            stops = tuple(stop for stop in stops if stop[1](piece.last) > 0)
-            found = [(when[0], when[1], end) for end, g in stops if (when := _stop(self._slipping, piece, g))]
+            stops = tuple(item for item in stops if item[1](piece.last) > 0)
+            found = [(when[0], when[1], end) for end, g in stops if (when := stop(self._slipping, piece, g))]
             if found:
                 _, y, end = min(found, key=lambda item: item[0])
                 return leg(self._stood_still(y) if end is End.STILL else y, end)
         raise Diverged(f"the truth (polar) ended without a reason at {time:g} s")
 
     def _creep(
-        self, pieces: list[_Piece], time: float, state: FloatArray, until: float, handover: float
+        self, pieces: list[Piece], time: float, state: FloatArray, until: float, handover: float
     ) -> tuple[End | None, float, FloatArray]:
         """The start of a slip, up to |u| = ``handover``; reason (None: handed over), time and (u, u̇, ω1, |u|)."""
         rates: Rates = lambda y: self._slaved(y)[0]  # noqa: E731 -- one line each for two closures
         last = np.append(state, 0.0)
-        for piece in _steps(rates, time, last, until, self._atol_slaved):
+        for piece in steps(rates, time, last, until, atol=self._atol_slaved):
             pieces.append(piece)
             last = piece.last
-            if last[5] >= handover and (grown := _stop(rates, piece, lambda y: y[5] - handover)):
+            if last[5] >= handover and (grown := stop(rates, piece, lambda y: y[5] - handover)):
                 return None, *grown
-            if last[5] <= 0 and (back := _stop(rates, piece, lambda y: -y[5])):
+            if last[5] <= 0 and (back := stop(rates, piece, lambda y: -y[5])):
                 return End.STILL, *back
         return End.TIME, until, last
 
     def _drive(self, y: FloatArray) -> tuple[FloatArray, float]:
-        """b along e2, e3 [m/s²], shape (2,), and N [N]."""
+        """Drive b along e2, e3 [m/s²], shape (2,), and N [N]."""
         return self._with_slip(y, 0.0, 0.0)[1:3]
 
     def _rolling(self, y: FloatArray) -> FloatArray:
@@ -238,14 +220,14 @@ class Polar:
         return np.asarray(y + rates / -rates[5])
 
     def _until_halt(self, y: FloatArray) -> float:
-        rates, v, force = reduced_rates(self._body, y[:5])
+        _, v, force = reduced_rates(self._body, y[:5])
         v_rate = force / self._body.ball.mass + self._body.gravity
         speed = float(np.linalg.norm(v))
         slowing = -float(v @ v_rate) / speed if speed > 0 else 0.0
         return speed / slowing if slowing > 0 else np.inf
 
-    def _rise(self, piece: _Piece) -> tuple[float, FloatArray] | None:
-        return _stop(self._rolling, piece, self.excess)
+    def _rise(self, piece: Piece) -> tuple[float, FloatArray] | None:
+        return stop(self._rolling, piece, self.excess)
 
     def _motion(self, y: FloatArray, size: FloatArray, phi: FloatArray | None) -> Motion:
         frame = self._body.surface.frame(y[:, :2])
@@ -257,75 +239,6 @@ class Polar:
             along = np.stack([np.cos(phi), np.sin(phi)], axis=-1).reshape(-1, 2)
             friction, u = -self._body.contact.mu_kinetic * N[:, None] * along, size[:, None] * along
         local = np.einsum("nij,ni->nj", frame[..., 1:], v)
-        return world_motion(self._body, y[:, :2], local, y[:, 4], u, friction, N, self.name)
-
-
-def _steps(
-    rates: Rates,
-    start: float,
-    state: FloatArray,
-    until: float,
-    atol: FloatArray,
-    cap: Callable[[FloatArray], float] | None = None,
-) -> Iterator[_Piece]:
-    """Steps of DOP853 from ``start`` to ``until``, each no longer than ``cap`` says of the state before it."""
-    if not until > start:
-        return
-    solver = DOP853(lambda _, y: rates(y), start, state, until, rtol=_RTOL, atol=atol)
-    while solver.status == "running":
-        if cap is not None:
-            solver.max_step = max(cap(solver.y), 1e-300)
-        first = solver.y
-        message = solver.step()
-        if message is not None:
-            raise Diverged(f"the truth (DOP853) could not be integrated past {solver.t:g}: {message}")
-        yield _Piece(solver.t_old, solver.t, first, solver.y, solver.dense_output(), atol)
-
-
-def _stop(rates: Rates, piece: _Piece, g: Callable[[FloatArray], float]) -> tuple[float, FloatArray] | None:
-    """Time and state where ``g`` first rises through zero in a step, the state integrated afresh up to there."""
-
-    def along(times: FloatArray) -> FloatArray:
-        return np.array([g(piece.between(t)) for t in times])
-
-    time = first_rise(along, piece.start, piece.end)
-    if time is None:
-        return None
-    for _ in range(3):
-        state = _integrated(rates, piece, time)
-        span = 1e-6 * (piece.end - piece.start)
-        slope = (g(state + span * rates(state)) - g(state - span * rates(state))) / (2 * span)
-        better = time - g(state) / slope if slope > 0 else time
-        if not abs(better - time) > 2 * np.spacing(time) or not piece.start <= better <= piece.end:
-            break
-        time = better
-    return time, _integrated(rates, piece, time)
-
-
-def _integrated(rates: Rates, piece: _Piece, time: float) -> FloatArray:
-    last = piece.first
-    for part in _steps(rates, piece.start, piece.first, time, piece.atol):
-        last = part.last
-    return last
-
-
-def _read(pieces: list[_Piece], where: FloatArray, first: FloatArray) -> FloatArray:
-    """States, shape (n, k), at values of the independent variable within the pieces."""
-    if not pieces or not len(where):
-        return np.broadcast_to(first, (len(where), len(first))).copy()
-    index = np.searchsorted([piece.start for piece in pieces], where, side="right") - 1
-    return np.array([pieces[i].between(x) for i, x in zip(index, where, strict=True)])
-
-
-def _at_times(pieces: list[_Piece], times: FloatArray, first: FloatArray) -> FloatArray:
-    """States of the slip, shape (n, 8), where its clock shows the times: Newton's method for τ."""
-    if not pieces:
-        return np.broadcast_to(first, (len(times), len(first))).copy()
-    ends = np.array([piece.end for piece in pieces])
-    tau = np.interp(times, [first[7], *(piece.last[7] for piece in pieces)], [0.0, *ends])
-    for _ in range(20):
-        y = _read(pieces, tau, first)
-        if not len(y) or np.all(np.abs(times - y[:, 7]) <= 4 * np.finfo(float).eps * times):
-            break
-        tau = np.clip(tau + (times - y[:, 7]) / np.exp(y[:, 5]), 0.0, ends[-1])
-    return _read(pieces, tau, first)
+        return world_motion(
+            self._body, y[:, :2], velocity=local, spin=y[:, 4], slip=u, friction=friction, press=N, route=self.name
+        )

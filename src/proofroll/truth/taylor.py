@@ -8,7 +8,7 @@ import numpy as np
 
 from proofroll.scene import RollingBall
 from proofroll.surfaces import Cylinder, FloatArray, Plane
-from proofroll.truth.assemble import classic_step, world_motion
+from proofroll.truth.assemble import classic_step, joined, world_motion
 from proofroll.truth.motion import Motion
 from proofroll.truth.switching import End, Leg
 from proofroll.truth.taylor_model import Model, model
@@ -133,11 +133,7 @@ class Taylor:
             return self._motion(states[:, :5], np.exp(states[:, 5]), states[:, 6])
 
         def motion(times: FloatArray) -> Motion:
-            early = times < creep.end
-            parts = [creeping(times[early]), slipping(times[~early])]
-            order = np.argsort(np.concatenate([np.flatnonzero(early), np.flatnonzero(~early)]))
-            fields = ("p_WB", "v_WB", "w_WB", "force")
-            return Motion(*(np.concatenate([getattr(x, key) for x in parts])[order] for key in fields), self.name)
+            return joined(times, creep.end, creeping, slipping)
 
         why = _SLIP_ENDS[slip.event] if slip.event is not None else End.TIME
         end, last = (float(slip.last[7]), slip.last[:5]) if why is not End.STILL else self._stood_still(slip.last)
@@ -167,9 +163,15 @@ class Taylor:
         else:
             along = np.stack([np.cos(phi), np.sin(phi)], axis=-1)
             friction, u = -self._body.contact.mu_kinetic * N[:, None] * along, size[:, None] * along
-        where = states[:, :2] / self._scales
         return world_motion(
-            self._body, where, states[:, 2:4], states[:, 4], u, ball.mass * friction, ball.mass * N, self.name
+            self._body,
+            states[:, :2] / self._scales,
+            velocity=states[:, 2:4],
+            spin=states[:, 4],
+            slip=u,
+            friction=ball.mass * friction,
+            press=ball.mass * N,
+            route=self.name,
         )
 
 
