@@ -6,6 +6,7 @@ from collections.abc import Callable, Iterable, Sequence
 from concurrent.futures import ProcessPoolExecutor
 from enum import IntEnum
 from functools import partial
+from multiprocessing import get_context
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -137,5 +138,6 @@ def _mapped(
     if workers == 1:
         yield from map(row, speeds)
         return
-    with ProcessPoolExecutor(workers) as pool:
+    # Not forked: a parent that shows progress has threads, and a fork copies their locks as they are.
+    with ProcessPoolExecutor(workers, mp_context=get_context("spawn")) as pool:
         yield from pool.map(row, speeds)

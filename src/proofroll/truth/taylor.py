@@ -6,6 +6,7 @@ from typing import Any
 
 import numpy as np
 
+from proofroll.errors import Diverged
 from proofroll.scene import RollingBall
 from proofroll.surfaces import Cylinder, FloatArray, Plane
 from proofroll.truth.assemble import classic_step, joined, world_motion
@@ -15,6 +16,8 @@ from proofroll.truth.taylor_model import Model, model
 
 # Stop conditions of the slip integrator in the order of its events.
 _SLIP_ENDS = (End.STILL, End.TIME, End.LIFTOFF)
+_LARGEST = 1e100  # friction that can still be squared
+_TIME_LIMIT = -(2**32) - 3  # heyoka's taylor_outcome.time_limit
 _FLOOR = 1e-4  # |u| at which the rest of a slip is extrapolated, relative to where it began
 
 
@@ -66,7 +69,8 @@ class Taylor:
         gravity = surface.frame(np.zeros(2)).T @ body.gravity
         self._A = (1 + body.ball.inertia_ratio) / body.ball.inertia_ratio
         self._pars = [1 / surface.radius if isinstance(surface, Cylinder) else 0.0, *gravity, body.ball.radius]
-        self._pars += [body.ball.inertia_ratio, contact.rolling_resistance, contact.mu_kinetic, contact.mu_static]
+        self._pars += [body.ball.inertia_ratio, contact.rolling_resistance]
+        self._pars += [min(mu, _LARGEST) for mu in (contact.mu_kinetic, contact.mu_static)]
         uniform = not curved or not np.any(gravity[:2])
         self._model: Model = model(resistance=contact.rolling_resistance > 0, uniform=uniform)
 
@@ -135,7 +139,7 @@ class Taylor:
         def motion(times: FloatArray) -> Motion:
             return joined(times, creep.end, creeping, slipping)
 
-        why = _SLIP_ENDS[slip.event] if slip.event is not None else End.TIME
+        why = _SLIP_ENDS[slip.event or 0]
         end, last = (float(slip.last[7]), slip.last[:5]) if why is not End.STILL else self._stood_still(slip.last)
         if end >= until:
             why, end = End.TIME, until
@@ -191,7 +195,9 @@ class _Run:
         self.end, self.last = time, state
         if until > time:
             code = self._again(dense=False)
-            self.event = -code - 1 if -(2**31) < code < 0 else None
+            self.event = -code - 1 if -(2**31) < code < 0 else None  # terminal events are numbered -1, -2, …
+            if (self.event is None and code != _TIME_LIMIT) or not np.all(np.isfinite(integrator.state)):
+                raise Diverged(f"the truth (Taylor series) could not be integrated past {integrator.time:g}")
             self.end, self.last = float(integrator.time), integrator.state.copy()
 
     def _again(self, dense: bool) -> int:
