@@ -152,7 +152,7 @@ class Taylor:
         mu = self._body.contact.mu_kinetic
         slowing = self._A * mu * N - b2 * cos - b3 * sin
         left = float(np.exp(last[5]) / slowing)
-        # v̇ = g_t + F = (b + κ A F ...) is reached from the sticking rates by exchanging the friction
+        # The rates of sticking with one friction exchanged for the other
         rates = self._rates(last[:5])
         rates[2] += -mu * N * cos + b2 / self._A
         rates[3] += -mu * N * sin + b3 / self._A
