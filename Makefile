@@ -3,7 +3,7 @@ PYTHON ?= python3
 BIN := .venv/bin
 OUT ?= out
 
-.PHONY: install report test check format clean
+.PHONY: install report test check format readme clean
 
 install: .venv/.installed
 
@@ -26,6 +26,10 @@ check: install
 format: install
 	$(BIN)/ruff check --fix .
 	$(BIN)/ruff format .
+
+# The picture and the table of README.md, from a real run.
+readme: install
+	$(BIN)/python docs/update_readme.py
 
 clean:
 	rm -rf $(OUT) dist build .pytest_cache .mypy_cache .ruff_cache .hypothesis

@@ -10,12 +10,12 @@ from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
     from proofroll.scene_file import load_scene
-    from proofroll.simulate import simulate
+    from proofroll.simulation import simulate
 
 __all__ = ["load_scene", "simulate"]
 __version__ = "0.1.0"
 
-_HOMES = {"load_scene": "proofroll.scene_file", "simulate": "proofroll.simulate"}
+_HOMES = {"load_scene": "proofroll.scene_file", "simulate": "proofroll.simulation"}
 
 
 def __getattr__(name: str) -> Any:

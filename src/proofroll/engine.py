@@ -6,11 +6,12 @@ NaN, timeouts and files. An adapter knows surfaces and contact laws, never a sce
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
-from typing import Any, ClassVar, Protocol, Self
+from typing import Any, ClassVar, Protocol, Self, runtime_checkable
 
 from proofroll.errors import InputError
+from proofroll.events import Event
 from proofroll.scene import Capability, Scene
 from proofroll.surfaces import FloatArray
 
@@ -25,6 +26,7 @@ class Sample:
         w_WB: angular velocity [rad/s], shape (3,).
         q_WB: orientation as a unit quaternion, scalar first, shape (4,); identity at time 0.
         force: of the wall on the ball at the contact point, -N e1 + F2 e2 + F3 e3 [N], shape (3,).
+        sticking: whether the contact holds by static friction; only where friction is bounded.
     """
 
     p_WB: FloatArray
@@ -32,6 +34,7 @@ class Sample:
     w_WB: FloatArray
     q_WB: FloatArray | None = None
     force: FloatArray | None = None
+    sticking: bool | None = None
 
 
 @dataclass(frozen=True)
@@ -58,7 +61,7 @@ class Built:
         ball_radius: [m].
         rolling_resistance: f [m]; 0 or None where nothing of the kind was built.
         acceleration: of the ball's centre at time 0 [m/s²], shape (3,).
-        regularised: names of certificate quantities (``gap``, ``slip``, ``acceleration``, ``N``, ``F2``, ``F3``)
+        regularised: names of certificate quantities (``gap``, ``slip``, ``spin``, ``acceleration``, ``N``, ``F2``, …)
             that the model softens, with tolerance and reason.
     """
 
@@ -130,6 +133,14 @@ class Engine(Protocol):
 
     def built(self) -> Built:
         """What was built, read back from the engine. Called at time 0; changes nothing."""
+
+
+@runtime_checkable
+class LocatesEvents(Protocol):
+    """What an engine has besides, if it locates stick-slip events more closely than its samples tell."""
+
+    def events(self) -> Sequence[Event]:
+        """The events so far, in order, each with its bracket (one step wide for a fixed step)."""
 
 
 def whole_steps(start: float, end: float, dt: float) -> int:

@@ -31,7 +31,7 @@ class Event:
 
 
 def with_events(dataset: xr.Dataset, events: Sequence[Event]) -> xr.Dataset:
-    """The dataset with ``event_kind`` and ``event_time``, ``event_low``, ``event_high`` [s] along ``event``."""
+    """The dataset with ``event_kind`` and ``event_time``, ``event_low``, ``event_high`` [s], each with dim ``event``."""
     columns = {
         "event_time": ("when it happened", [event.time for event in events]),
         "event_low": ("not before", [event.time_low for event in events]),
@@ -45,6 +45,15 @@ def with_events(dataset: xr.Dataset, events: Sequence[Event]) -> xr.Dataset:
             for name, (meaning, values) in columns.items()
         }
     )
+
+
+def between_samples(times: Sequence[float], sticking: Sequence[bool]) -> list[Event]:
+    """Events as the samples tell them: somewhere between two samples [s] of which one sticks and the other slips."""
+    return [
+        Event("stick" if after else "slip", 0.5 * (low + high), low, high)
+        for before, after, low, high in zip(sticking, sticking[1:], times, times[1:], strict=False)
+        if before != after
+    ]
 
 
 def events_of(dataset: xr.Dataset) -> list[Event]:

@@ -8,8 +8,9 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from proofroll.engine import Sample
+from proofroll.engine import LocatesEvents, Sample
 from proofroll.errors import Diverged, InputError
+from proofroll.events import between_samples, with_events
 from proofroll.scene import Scene
 from proofroll.surfaces import FloatArray
 from proofroll.trajectory import from_samples
@@ -68,7 +69,13 @@ def record(engine: Any, scene: Scene, times: FloatArray) -> Recording:
         except Diverged as error:
             failure = str(error)
             break
-    return Recording(from_samples(scene, times, samples), failure, wall)
+    dataset = from_samples(scene, times, samples)
+    if "sticking" in dataset:
+        located = isinstance(engine, LocatesEvents)
+        sticking = [bool(sample.sticking) for sample in samples]
+        events = engine.events() if located else between_samples(times.tolist(), sticking)
+        dataset = with_events(dataset, events)
+    return Recording(dataset, failure, wall)
 
 
 def _finite(sample: Sample, t: float) -> Sample:

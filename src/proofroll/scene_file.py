@@ -8,11 +8,11 @@ import tomllib
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any, TypeVar
+from typing import Annotated, Any, TypeVar
 
-from pydantic import ConfigDict, TypeAdapter, ValidationError
+from pydantic import ConfigDict, Field, TypeAdapter, ValidationError
 
-from proofroll.errors import InputError, ProofrollError
+from proofroll.errors import InputError
 from proofroll.folders import data_folder
 from proofroll.scene import Ball, Contact, Gravity, InitialMotion, Scene
 from proofroll.surfaces import AnySurface
@@ -60,7 +60,7 @@ class SceneFile:
 @dataclass(frozen=True)
 class _Mechanics:
     balls: tuple[Ball, ...]
-    surfaces: tuple[AnySurface, ...]
+    surfaces: tuple[Annotated[AnySurface, Field(discriminator="kind")], ...]
     gravity: Gravity
     contacts: tuple[Contact, ...]
     initial: tuple[InitialMotion, ...]
@@ -97,8 +97,11 @@ def scene_folder(name: str) -> Path:
         InputError: there is no such scene.
     """
     for folder in (data_folder("models") / name, Path(name)):
-        if name and (folder / "scene.toml").is_file():
-            return folder
+        try:
+            if name and (folder / "scene.toml").is_file():
+                return folder
+        except (OSError, ValueError):  # too long for a file system, or a zero byte
+            break
     raise InputError("scene", name, f"there is no such scene; choose one of {', '.join(scene_names())}")
 
 
@@ -115,14 +118,16 @@ def load_scene(name: str, /, **parameters: float) -> Scene:
     folder = scene_folder(name)
     file = _parse(folder / "scene.toml")
     values = _values(file, parameters)
+    where = str(folder / "scene.toml")
     mechanics = _validated(
         _Mechanics,
         {
-            key: _substituted(getattr(file, key), values)
+            key: _substituted(getattr(file, key), values, f"{where}: {key}")
             for key in ("balls", "surfaces", "gravity", "contacts", "initial")
         },
-        str(folder / "scene.toml"),
+        where,
     )
+    _check_names(mechanics, where)
     return Scene(
         name=folder.name,
         title=file.title,
@@ -143,7 +148,30 @@ def _parse(path: Path) -> SceneFile:
         raise InputError(str(path), "TOML", f"the file is broken: {error}") from None
     except OSError as error:
         raise InputError(str(path), "TOML", f"the file cannot be read: {error.strerror}") from None
-    return _validated(SceneFile, content, str(path))
+    file = _validated(SceneFile, content, str(path))
+    for name, parameter in file.parameters.items():
+        for key in ("value", "above", "at_least", "below", "at_most"):
+            other = getattr(parameter, key)
+            if isinstance(other, str) and (other == name or other not in file.parameters):
+                known = ", ".join(sorted(file.parameters.keys() - {name}))
+                advice = f"there is no such parameter to refer to; choose from {known}"
+                raise InputError(f"{path}: parameters.{name}.{key}", other, advice)
+    return file
+
+
+def _check_names(mechanics: _Mechanics, where: str) -> None:
+    """Contacts and initial motions name what there is.
+
+    Raises:
+        InputError: the first name that leads nowhere.
+    """
+    balls, surfaces = [ball.name for ball in mechanics.balls], [surface.name for surface in mechanics.surfaces]
+    for kind, items in (("contacts", mechanics.contacts), ("initial", mechanics.initial)):
+        for index, item in enumerate(items):
+            for key, known in (("body", balls), ("surface", surfaces)):
+                name = getattr(item, key, None)
+                if name is not None and name not in known:
+                    raise InputError(f"{where}: {kind}.{index}.{key}", name, f"choose one of {', '.join(known)}")
 
 
 def _validated(kind: type[_T], content: object, where: str) -> _T:
@@ -161,6 +189,13 @@ def first_problem(error: ValidationError, where: str) -> InputError:
         return InputError(f"{where}: {location}", problem["input"], "there is no such key here; remove it")
     if problem["type"] in {"missing", "missing_argument"}:
         return InputError(f"{where}: {location}", "nothing", "this key is required; add it")
+    if problem["type"] in {"union_tag_invalid", "union_tag_not_found"}:
+        key = problem["ctx"]["discriminator"].strip("'")
+        if problem["type"] == "union_tag_not_found":
+            return InputError(f"{where}: {location}.{key}", "nothing", "this key is required; add it")
+        return InputError(
+            f"{where}: {location}.{key}", problem["ctx"]["tag"], f"choose one of {problem['ctx']['expected_tags']}"
+        )
     return InputError(f"{where}: {location}", problem["input"], problem["msg"][0].lower() + problem["msg"][1:])
 
 
@@ -174,7 +209,7 @@ def _values(file: SceneFile, given: Mapping[str, object]) -> dict[str, float]:
     for name, parameter in file.parameters.items():
         chosen = given.get(name, parameter.value)
         if name not in given and isinstance(chosen, str):
-            chosen = values[chosen] if chosen in values else file.parameters[chosen].value
+            chosen = values[chosen] if chosen in values else given.get(chosen, file.parameters[chosen].value)
         values[name] = _number(name, chosen, parameter)
     # Numbers first, then other parameters: a parameter is never blamed for the bad value of another.
     for kind in (float, str):
@@ -217,14 +252,13 @@ def _check_bounds(name: str, parameter: Parameter, values: Mapping[str, float], 
             raise InputError(name, value, f"{parameter.meaning} must be {words} {shown} {parameter.unit}")
 
 
-def _substituted(content: Any, values: Mapping[str, float]) -> Any:
+def _substituted(content: Any, values: Mapping[str, float], where: str) -> Any:
     if isinstance(content, dict):
-        return {key: _substituted(value, values) for key, value in content.items()}
+        return {key: _substituted(value, values, f"{where}.{key}") for key, value in content.items()}
     if isinstance(content, list):
-        return [_substituted(value, values) for value in content]
+        return [_substituted(value, values, f"{where}.{index}") for index, value in enumerate(content)]
     if isinstance(content, str) and content.startswith("$"):
-        try:
-            return values[content[1:]]
-        except KeyError:
-            raise ProofrollError(f"scene.toml names the parameter {content}, which it does not define") from None
+        if content[1:] not in values:
+            raise InputError(where, content, f"there is no such parameter; choose from {', '.join(values)}")
+        return values[content[1:]]
     return content

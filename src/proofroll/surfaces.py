@@ -14,7 +14,7 @@ Array arguments may carry leading dimensions (``...``), e.g. time.
 from __future__ import annotations
 
 from dataclasses import dataclass
-from functools import cache
+from functools import lru_cache
 from typing import Literal, Protocol
 
 import numpy as np
@@ -92,11 +92,11 @@ class Surface(Protocol):
         """∂e1/∂p = -∇∇gap [1/m], shape (..., 3, 3)."""
 
 
-@cache
+@lru_cache
 def _tilt(angle: float) -> FloatArray:
-    """Rotation by ``angle`` [rad] about the world's y axis, shape (3, 3), read-only because it is shared."""
-    rotation = np.asarray(Rotation.from_euler("y", angle).as_matrix(), dtype=np.float64)
-    rotation.flags.writeable = False
+    """Rotation by ``angle`` [rad] about the world's y axis, read-only, shape (3, 3)."""
+    rotation = np.array(Rotation.from_euler("y", angle).as_matrix(), dtype=np.float64)
+    rotation.flags.writeable = False  # every caller shares it
     return rotation
 
 

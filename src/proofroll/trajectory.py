@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-import os
-import tempfile
 from collections.abc import Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING
@@ -11,7 +9,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from proofroll.engine import Sample
-from proofroll.errors import ProofrollError
+from proofroll.files import replacing
 from proofroll.mechanics import energy, slip_velocity
 from proofroll.scene import RollingBall, Scene
 from proofroll.surfaces import FloatArray, Surface
@@ -33,7 +31,7 @@ def from_samples(scene: Scene, times: FloatArray, samples: Sequence[Sample]) -> 
         return None if any(value is None for value in values) else np.asarray(values, dtype=np.float64)
 
     p, v, w = (np.array([getattr(s, key) for s in samples], dtype=np.float64) for key in ("p_WB", "v_WB", "w_WB"))
-    return trajectory(
+    dataset = trajectory(
         scene,
         np.asarray(times[: len(samples)], dtype=np.float64),
         p,
@@ -42,6 +40,10 @@ def from_samples(scene: Scene, times: FloatArray, samples: Sequence[Sample]) -> 
         force=stacked([s.force for s in samples]),
         q_WB=stacked([s.q_WB for s in samples]),
     )
+    if any(s.sticking is None for s in samples):
+        return dataset
+    sticking = np.array([s.sticking for s in samples], dtype=np.int8)  # netCDF has no boolean
+    return dataset.assign(sticking=("time", sticking, {"units": "1", "long_name": "1 sticks, 0 slips"}))
 
 
 def trajectory(
@@ -133,18 +135,8 @@ def write(dataset: xr.Dataset, path: Path) -> None:
     Raises:
         ProofrollError: the place cannot be written.
     """
-    try:
-        path.parent.mkdir(parents=True, exist_ok=True)
-        handle, temporary = tempfile.mkstemp(dir=path.parent, prefix=f".{path.name}.")
-        os.close(handle)
-        try:
-            dataset.to_netcdf(temporary, engine="h5netcdf")
-            Path(temporary).replace(path)
-        except BaseException:
-            Path(temporary).unlink(missing_ok=True)
-            raise
-    except OSError as error:
-        raise ProofrollError(f"{path} cannot be written ({error.strerror or error}); choose another place") from None
+    with replacing(path) as temporary:
+        dataset.to_netcdf(temporary, engine="h5netcdf")
 
 
 def read(path: Path) -> xr.Dataset:

@@ -5,7 +5,7 @@ from __future__ import annotations
 from typing import TYPE_CHECKING, Any
 
 from proofroll.certificate import certify, first_difference
-from proofroll.errors import Refused
+from proofroll.errors import InputError, Refused
 from proofroll.recording import record, time_grid
 from proofroll.registry import load_engine, parse_engine, resolve_settings
 from proofroll.scene import Scene
@@ -62,7 +62,11 @@ def simulate(
         Refused: the engine cannot represent the scene, or built something else than the scene says.
     """
     times = time_grid(until, every)
-    if engine == "truth":
+    spec = parse_engine(engine)
+    if spec.name == "truth":
+        options = {**spec.options, **settings}
+        if options:
+            raise InputError("truth", ", ".join(options), "the truth has no settings; leave them out")
         from proofroll.truth import truth
 
         return truth(scene, times).assign_attrs(status="done", message="two independent routes agree")

@@ -1,0 +1,57 @@
+"""A complete engine in under 60 lines: Newton-Euler with rolling rows, stepped by semi-implicit Euler."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from typing import Annotated, ClassVar, Literal
+
+from annotated_types import Gt
+
+from proofroll.engine import Built, Sample, whole_steps
+from proofroll.mechanics import newton_euler
+from proofroll.scene import Capability, RollingBall, Scene
+
+
+@dataclass(frozen=True)
+class Settings:
+    formulation: Literal["newton_euler"] = "newton_euler"
+    preset: Literal["default"] = "default"
+    dt: Annotated[float, Gt(0)] = 1e-4  # step [s]
+
+    resolution = "dt"
+    order = 1
+
+
+class SemiImplicit:
+    """Semi-implicit Euler on the unreduced equations."""
+
+    name: ClassVar[str] = "semi_implicit"
+    provides: ClassVar[frozenset[Capability]] = frozenset(Capability) - {Capability.BOUNDED_FRICTION}
+    settings: ClassVar[type[Settings]] = Settings
+    presets: ClassVar[Mapping[str, Mapping[str, Settings]]] = {"newton_euler": {"default": Settings()}}
+
+    @staticmethod
+    def version() -> str:
+        return "1.0"
+
+    @classmethod
+    def build(cls, scene: Scene, settings: Settings) -> SemiImplicit:
+        return cls(scene.rolling, settings.dt)
+
+    def __init__(self, body: RollingBall, dt: float) -> None:
+        self.body, self.dt, self.t = body, dt, 0.0
+        self.p, self.v, self.w = body.p0.copy(), body.v0.copy(), body.w0.copy()
+
+    def advance(self, t: float) -> None:
+        for _ in range(whole_steps(self.t, t, self.dt)):
+            acceleration, spin_rate, _ = newton_euler(self.body, self.p, self.v, self.w)
+            self.v, self.w = self.v + self.dt * acceleration, self.w + self.dt * spin_rate
+            self.p = self.p + self.dt * self.v
+        self.t = t
+
+    def sample(self) -> Sample:
+        return Sample(self.p, self.v, self.w, force=newton_euler(self.body, self.p, self.v, self.w)[2])
+
+    def built(self) -> Built:
+        return Built(acceleration=newton_euler(self.body, self.p, self.v, self.w)[0])

@@ -1,0 +1,84 @@
+"""Regenerates the verdict table and the picture of README.md from a real run: ``make readme``."""
+
+from __future__ import annotations
+
+import re
+import tempfile
+from pathlib import Path
+
+import matplotlib as mpl
+import matplotlib.pyplot as plt
+import numpy as np
+
+from proofroll.comparison_file import load_comparison
+from proofroll.report.content import outcome_content
+from proofroll.report.markdown import verdict_table
+from proofroll.runner import Runner
+from proofroll.store import Store
+from proofroll.studies.compare import Outcome, compare, point_name
+from proofroll.trajectory import read
+
+ROOT = Path(__file__).resolve().parents[1]
+POINT = {"speed": 4.0, "rolling_resistance": 0.0}
+SHOWN = (
+    "mujoco[formulation=facets,preset=default]",
+    "mujoco[formulation=free,preset=default]",
+    "mujoco[formulation=free,dt=1e-4]",
+    "mujoco[formulation=chart]",
+    "exudyn[formulation=carrier]",
+    "exudyn[formulation=generic]",
+    "pinocchio[formulation=composite]",
+    "projection[formulation=euler]",
+)
+COLOURS = mpl.colormaps["viridis"](np.linspace(0.92, 0.0, len(SHOWN)))
+
+
+def draw(outcome: Outcome, store: Store, path: Path) -> None:
+    """Height over time, and distance from the truth over time, for a selection of engines."""
+    truth = read(store.trajectory(outcome.truths[point_name(POINT)]))
+    runs = {run.row.engine: run for run in outcome.runs if run.parameters == POINT}
+    mpl.rcParams.update({"svg.hashsalt": "proofroll", "svg.fonttype": "none", "font.size": 9})
+    figure, (left, right) = plt.subplots(1, 2, figsize=(10, 3.8), constrained_layout=True)
+    for name, colour in zip(SHOWN, COLOURS, strict=True):
+        run = runs[name]
+        if run.case is None or run.result.trajectory is None:
+            continue
+        z = read(store.trajectory(run.case))["z"]
+        left.plot(z["time"], z, color=colour, lw=1)
+        error = np.abs(z - truth["z"])[1:]
+        right.semilogy(
+            error["time"], np.maximum(error, 1e-16), color=colour, lw=1, label=name.replace("formulation=", "")
+        )
+    left.plot(truth["time"], truth["z"], color="black", lw=2.2, ls=(0, (4, 2)), label="truth")
+    left.set(xlabel="time [s]", ylabel="height z [m]", ylim=(-0.35, 0.05), title="4 m/s, rolling without slip")
+    left.legend(frameon=False)
+    right.axhspan(1e-16, truth["z"].attrs["error_bar"], color="0.85", lw=0)
+    right.set(
+        xlabel="time [s]",
+        ylabel="|z - truth| [m]",
+        ylim=(1e-16, 10),
+        title="distance from the truth (grey: its error bar)",
+    )
+    right.legend(frameon=False, fontsize=7, loc="center left", bbox_to_anchor=(1.0, 0.5))
+    figure.savefig(path, metadata={"Date": None})
+
+
+def main() -> None:
+    """Runs the comparison and rewrites both."""
+    with tempfile.TemporaryDirectory() as folder:
+        runner = Runner(Store(Path(folder)))
+        outcome = compare(load_comparison("paper"), runner)
+        draw(outcome, runner.store, ROOT / "docs" / "picture.svg")
+    table = verdict_table(outcome_content(outcome))
+    readme = ROOT / "README.md"
+    text = re.sub(
+        r"(<!-- verdicts:begin -->\n).*?(<!-- verdicts:end -->)",
+        lambda match: match[1] + table + match[2],
+        readme.read_text(encoding="utf-8"),
+        flags=re.DOTALL,
+    )
+    readme.write_text(text, encoding="utf-8")
+
+
+if __name__ == "__main__":
+    main()

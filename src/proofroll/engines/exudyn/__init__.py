@@ -1,0 +1,57 @@
+"""Exudyn (https://github.com/jgerstmayr/EXUDYN), an engine for flexible and rigid multibody systems.
+
+It has no joint for a sphere on a curved wall. Three models of one are built here from what it has; see the modules
+:mod:`generic`, :mod:`carrier` and :mod:`rolling_disc`.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from importlib.metadata import version
+from typing import ClassVar, Self
+
+from proofroll.engine import Built, Sample
+from proofroll.engines.exudyn.carrier import Carrier
+from proofroll.engines.exudyn.generic import Generic
+from proofroll.engines.exudyn.rolling_disc import RollingDisc
+from proofroll.engines.exudyn.settings import PRESETS, ExudynSettings
+from proofroll.scene import Capability, Scene
+
+Model = Generic | Carrier | RollingDisc
+MODELS: Mapping[str, type[Model]] = {"generic": Generic, "carrier": Carrier, "rolling_disc": RollingDisc}
+
+
+class Exudyn:
+    """See :class:`proofroll.engine.Engine`."""
+
+    name: ClassVar[str] = "exudyn"
+    provides: ClassVar[frozenset[Capability]] = frozenset(
+        {Capability.ROLLING, Capability.CURVED_SURFACE, Capability.ROLLING_RESISTANCE}
+    )
+    settings: ClassVar[type[ExudynSettings]] = ExudynSettings
+    presets: ClassVar[Mapping[str, Mapping[str, ExudynSettings]]] = PRESETS
+
+    def __init__(self, model: Model) -> None:
+        self._model = model
+
+    @staticmethod
+    def version() -> str:
+        """Version of the installed package; the extension module names another one on some platforms."""
+        return version("exudyn")
+
+    @classmethod
+    def build(cls, scene: Scene, settings: ExudynSettings) -> Self:
+        """See :class:`proofroll.engine.Engine`."""
+        return cls(MODELS[settings.formulation](scene.rolling, settings))
+
+    def advance(self, t: float) -> None:
+        """See :class:`proofroll.engine.Engine`."""
+        self._model.integration.advance(t)
+
+    def sample(self) -> Sample:
+        """See :class:`proofroll.engine.Engine`."""
+        return self._model.sample()
+
+    def built(self) -> Built:
+        """See :class:`proofroll.engine.Engine`."""
+        return self._model.built()

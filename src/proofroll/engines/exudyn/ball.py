@@ -1,0 +1,141 @@
+"""What the two rigid-body formulations share: the ball, its weight and its rolling resistance."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+
+from proofroll.engine import Built, Sample
+from proofroll.engines.exudyn.local_frame import FrameAt, frame_at
+from proofroll.engines.exudyn.native import Output, items
+from proofroll.scene import RollingBall
+from proofroll.surfaces import FloatArray
+
+
+@dataclass(frozen=True)
+class RigidBall:
+    """Exudyn's numbers of the items of one ball.
+
+    Attributes:
+        node: rigid-body node with Euler parameters; with the rotation-vector Lie-group node the same time step leaves
+            one and a half times the error.
+        body, weight: the rigid body and its weight.
+        marker: at its centre.
+        resistance: load with the moment of the rolling resistance, None where there is none.
+    """
+
+    system: Any
+    node: Any
+    body: Any
+    weight: Any
+    marker: Any
+    resistance: Any
+
+    def sample(self, force: FloatArray) -> Sample:
+        """State from the node, with the force of the wall on the ball [N]."""
+        output = self.system.GetNodeOutput
+        q_WB = output(self.node, Output.CoordinatesTotal)[3:]
+        return Sample(
+            p_WB=output(self.node, Output.Position),
+            v_WB=output(self.node, Output.Velocity),
+            w_WB=output(self.node, Output.AngularVelocity),
+            q_WB=q_WB / np.linalg.norm(q_WB),
+            force=force,
+        )
+
+    def built(self, ball_radius: float | None) -> Built:
+        """Everything but the radius, which the joints hold."""
+        body = self.system.GetObject(self.body)
+        return Built(
+            mass=body["mass"],
+            inertia=np.array(body["inertia"][:3]),
+            gravity=np.array(self.system.GetLoad(self.weight)["loadVector"]),
+            ball_radius=ball_radius,
+            rolling_resistance=(
+                None if self.resistance is None else float(self.system.GetLoad(self.resistance)["loadVector"][0])
+            ),
+            acceleration=self.system.GetNodeOutput(self.node, Output.Acceleration),
+        )
+
+
+def add_body(system: Any, mass: float, inertia: float, p: FloatArray, v: FloatArray, w: FloatArray) -> tuple[Any, Any]:
+    """Node and rigid body, not turned at time 0: centre [m], velocity [m/s], angular velocity [rad/s]."""
+    node = system.AddNode(
+        items.NodeRigidBodyEP(
+            referenceCoordinates=[*p, 1.0, 0.0, 0.0, 0.0],
+            initialVelocities=[*v, 0.0, *(w / 2)],  # rates of the Euler parameters of a body that is not turned
+        )
+    )
+    body = system.AddObject(
+        items.ObjectRigidBody(mass=mass, inertia=[inertia, inertia, inertia, 0.0, 0.0, 0.0], nodeNumber=node)
+    )
+    return node, body
+
+
+def add_ball(system: Any, rolling: RollingBall) -> RigidBall:
+    """The ball with its weight and, where there is any, its rolling resistance."""
+    ball = rolling.ball
+    node, body = add_body(system, ball.mass, ball.inertia, rolling.p0, rolling.v0, rolling.w0)
+    marker = system.AddMarker(items.MarkerBodyRigid(bodyNumber=body))
+    weight = system.AddLoad(
+        items.LoadMassProportional(
+            markerNumber=system.AddMarker(items.MarkerBodyMass(bodyNumber=body)), loadVector=rolling.gravity
+        )
+    )
+    resistance = None
+    if rolling.contact.rolling_resistance:
+        resistance = system.AddLoad(
+            items.LoadTorqueVector(
+                markerNumber=marker,
+                # Not used as a moment: it hands f to the function, and can be read back.
+                loadVector=[rolling.contact.rolling_resistance, 0.0, 0.0],
+                loadVectorUserFunction=_resistance(rolling, node),
+            )
+        )
+    return RigidBall(system, node, body, weight, marker, resistance)
+
+
+def _resistance(rolling: RollingBall, node: Any) -> Any:
+    """Moment of the rolling resistance in the world [N m], as plain floats: it is called for every residual.
+
+    N follows from the state: along e1 the centre accelerates by -v·(∂e1/∂p)v, so that
+    N = m (v·(∂e1/∂p)v + e1·g). The last multiplier instead would lag by an iterate and make the moment ring with it.
+    """
+    frame: FrameAt = frame_at(rolling.surface, rolling.u0)
+    curvature = _curvature(rolling)
+    m = rolling.ball.mass
+    gx, gy, gz = rolling.gravity.tolist()
+    position, velocity = Output.Position, Output.Velocity
+
+    def moment(system: Any, t: float, load: Any) -> list[float]:  # noqa: ARG001 -- Exudyn's signature
+        x, y, z = system.GetNodeOutput(node, position).tolist()
+        vx, vy, vz = system.GetNodeOutput(node, velocity).tolist()
+        speed = (vx * vx + vy * vy + vz * vz) ** 0.5
+        if not speed:
+            return [0.0, 0.0, 0.0]
+        e = frame(x, y, z)
+        v2, v3 = vx * e[3] + vy * e[4] + vz * e[5], vx * e[6] + vy * e[7] + vz * e[8]
+        N = m * (curvature(x, y, z, v2, v3) + e[0] * gx + e[1] * gy + e[2] * gz)
+        factor = -load[0] * N / speed
+        return [factor * (vy * e[2] - vz * e[1]), factor * (vz * e[0] - vx * e[2]), factor * (vx * e[1] - vy * e[0])]
+
+    return moment
+
+
+def _curvature(rolling: RollingBall) -> Any:
+    """v·(∂e1/∂p)v [m/s²] as a function of place and of v along e2 and e3."""
+    surface = rolling.surface
+    if surface.generators is None:
+
+        def anywhere(x: float, y: float, z: float, v2: float, v3: float) -> float:
+            p = np.array([x, y, z])
+            v = surface.frame(surface.locate(p))[:, 1:] @ (v2, v3)
+            return float(v @ surface.normal_gradient(p) @ v)
+
+        return anywhere
+    frame = surface.frame(rolling.u0)
+    local = frame.T @ surface.normal_gradient(rolling.p0) @ frame
+    k22, k23, k33 = float(local[1, 1]), float(2 * local[1, 2]), float(local[2, 2])
+    return lambda x, y, z, v2, v3: k22 * v2 * v2 + k23 * v2 * v3 + k33 * v3 * v3  # noqa: ARG005 -- same everywhere

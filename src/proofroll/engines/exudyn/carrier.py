@@ -1,0 +1,125 @@
+"""A rigid ball held by a massless carrier that can only do what slides the wall along itself.
+
+The carrier's joint with the ground frees exactly the wall's two generators, and the ball turns about a point of the
+carrier. Rolling is two constraints between rates of relative coordinates. Everything is a built-in item of Exudyn;
+without rolling resistance no Python runs while it integrates. The carrier has no mass and no inertia at all.
+"""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+
+from proofroll.engine import Built, Sample
+from proofroll.engines.exudyn.ball import add_ball, add_body
+from proofroll.engines.exudyn.integration import Integration, consistent_start, new_system
+from proofroll.engines.exudyn.local_frame import LocalGeometry, local_geometry
+from proofroll.engines.exudyn.native import Output, exu, items
+from proofroll.engines.exudyn.settings import ExudynSettings
+from proofroll.errors import Refused
+from proofroll.scene import RollingBall
+from proofroll.surfaces import FloatArray, Generator
+
+
+class Carrier:
+    """Ball, carrier, two ``GenericJoint`` and two ``CoordinateConstraint`` at velocity level."""
+
+    def __init__(self, body: RollingBall, settings: ExudynSettings) -> None:
+        """Builds and initialises; raises Refused if the wall's generators do not fit one joint."""
+        local = local_geometry(body.surface, body.u0)
+        self.container, self.system = new_system()
+        add_marker, add_object = self.system.AddMarker, self.system.AddObject
+        self.ground = add_object(items.ObjectGround())
+        self.ball = add_ball(self.system, body)
+        rates = {kind: np.zeros(3) for kind in ("rotation", "translation")}
+        for generator, rate in zip(local.generators, body.udot0, strict=True):
+            rates[generator.kind] += rate * np.asarray(generator.axis)
+        self.node, self.carrier = add_body(self.system, 0.0, 0.0, np.zeros(3), rates["translation"], rates["rotation"])
+        axes, constrained = _joint_axes(local.generators)
+        ends, transform = (self.ground, self.carrier), exu.HT(rotation=axes)
+        guide = [add_marker(items.MarkerBodyRigid(bodyNumber=end, localHT=transform)) for end in ends]
+        add_object(items.GenericJoint(markerNumbers=guide, constrainedAxes=constrained))
+        # The carrier is not turned at time 0, so the ball's centre in it is its place in the world.
+        self.centre = body.p0
+        pivot = add_marker(items.MarkerBodyRigid(bodyNumber=self.carrier, localPosition=self.centre))
+        self.joint = add_object(
+            items.GenericJoint(markerNumbers=[pivot, self.ball.marker], constrainedAxes=[1, 1, 1, 0, 0, 0])
+        )
+        self.rolling = self._constrain(body, local)
+        self.system.Assemble()
+        start = consistent_start(self.system, settings, self._turning(body, rates["rotation"]))
+        self.integration = Integration(self.system, settings, start)
+
+    def _constrain(self, body: RollingBall, local: LocalGeometry) -> list[tuple[Any, float]]:
+        """Rolling along e2 and e3: K u̇ ± a (spin of the ball relative to the carrier) = 0; gives (item, K)."""
+        frame, a = body.surface.frame(body.u0), body.ball.radius
+        result = []
+        for along, about, sign in ((1, 2, 1.0), (2, 1, -1.0)):
+            row = local.tangents[along] + sign * a * local.turn[about]
+            (columns,) = np.nonzero(np.abs(row) > 1e-12)
+            if len(columns) != 1:
+                raise Refused("rolling along one direction needs both of the carrier's coordinates at once")
+            k = int(columns[0])
+            markers = [self._coordinate(local.generators[k]), self._spin(frame[:, about])]
+            # Exudyn's constraint is factor1 value1 - value0 = 0.
+            item = items.CoordinateConstraint(
+                markerNumbers=[self.system.AddMarker(marker) for marker in markers],
+                factor1=-sign * a / row[k],
+                velocityLevel=True,
+            )
+            result.append((self.system.AddObject(item), float(row[k])))
+        return result
+
+    def _turning(self, body: RollingBall, carrier: FloatArray) -> dict[Any, FloatArray]:
+        """-Ċ q̇ of the rolling constraints: the axis e of the relative spin turns with the carrier, ė = ω × e."""
+        frame = body.surface.frame(body.u0)
+        return {
+            item: np.array([-self.system.GetObject(item)["factor1"] * (body.w0 - carrier) @ np.cross(carrier, axis)])
+            for (item, _), axis in zip(self.rolling, (frame[:, 2], frame[:, 1]), strict=True)
+        }
+
+    def _coordinate(self, generator: Generator) -> Any:
+        kind = (
+            items.MarkerBodiesRelativeRotationCoordinate
+            if generator.kind == "rotation"
+            else items.MarkerBodiesRelativeTranslationCoordinate
+        )
+        return kind(bodyNumbers=[self.ground, self.carrier], axis0=generator.axis)
+
+    def _spin(self, axis: FloatArray) -> Any:
+        return items.MarkerBodiesRelativeRotationCoordinate(
+            bodyNumbers=[self.carrier, self.ball.body], axis0=axis, localPosition0=self.centre
+        )
+
+    def sample(self) -> Sample:
+        """See :class:`proofroll.engine.Engine`. The pivot transmits the whole force of the wall."""
+        turn = self.system.GetNodeOutput(self.node, Output.RotationMatrix).reshape(3, 3)
+        return self.ball.sample(-turn @ self.system.GetObjectOutput(self.joint, Output.ForceLocal))
+
+    def built(self) -> Built:
+        """See :class:`proofroll.engine.Engine`."""
+        item, rate = self.rolling[1]
+        return self.ball.built(abs(self.system.GetObject(item)["factor1"] * rate))
+
+
+def _joint_axes(generators: tuple[Generator, Generator]) -> tuple[FloatArray, list[int]]:
+    """Axes of one joint, as columns, and which of its three translations and three rotations are locked.
+
+    Raises:
+        Refused: the generators' axes are neither parallel nor orthogonal, or both are rotations.
+    """
+    if all(generator.kind == "rotation" for generator in generators):
+        raise Refused("one joint cannot guide the carrier about two axes")
+    first, second = (np.asarray(generator.axis) for generator in generators)
+    parallel = bool(abs(first @ second) > 1 - 1e-12)
+    if not parallel and abs(first @ second) > 1e-12:
+        raise Refused("one joint cannot guide the carrier along skew axes")
+    side = np.eye(3)[np.argmin(np.abs(first))] if parallel else second
+    side = side - (side @ first) * first
+    side = side / np.linalg.norm(side)
+    axes = np.stack([np.cross(side, first), side, first], axis=-1)
+    constrained = [1] * 6
+    for generator, axis in zip(generators, (2, 2 if parallel else 1), strict=True):
+        constrained[axis + (3 if generator.kind == "rotation" else 0)] = 0
+    return axes, constrained

@@ -1,0 +1,176 @@
+"""Minimal coordinates: distance from the surface, its two coordinates, and the spin in the local frame.
+
+Lagrange's equations of the translation and Euler's equation of an isotropic body in a frame that turns with the
+surface; the wall is one constraint on a coordinate and rolling two rows that are linear in the velocities with
+constant coefficients. What is tested is Exudyn's integration of a system with multipliers, not its bodies or joints.
+"""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+
+from proofroll.engine import Built, Sample
+from proofroll.engines.exudyn.integration import Integration, initial_matrices, new_system
+from proofroll.engines.exudyn.local_frame import LocalGeometry, local_geometry
+from proofroll.engines.exudyn.native import exu, items
+from proofroll.engines.exudyn.settings import ExudynSettings
+from proofroll.errors import Refused
+from proofroll.scene import RollingBall
+from proofroll.surfaces import FloatArray
+
+# q = (distance towards the wall, u1, u2, three quasi-coordinates whose rates are ω1, ω2, ω3)
+SIZE = 6
+
+
+class Generic:
+    """An ``ObjectGenericODE2`` with velocity-level constraints."""
+
+    def __init__(self, body: RollingBall, settings: ExudynSettings) -> None:
+        """Builds and initialises; raises Refused if the surface is not homogeneous."""
+        self.surface = body.surface
+        self.local = local_geometry(body.surface, body.u0)
+        self.container, self.system = new_system()
+        m, J = body.ball.mass, body.ball.inertia
+        frame = body.surface.frame(body.u0)
+        node = self.system.AddNode(
+            items.NodeGenericODE2(
+                referenceCoordinates=[0.0] * SIZE,
+                initialCoordinates=[0.0, *body.u0, 0.0, 0.0, 0.0],
+                initialCoordinates_t=[0.0, *body.udot0, *(frame.T @ body.w0)],
+                numberOfODE2Coordinates=SIZE,
+            )
+        )
+        mass = np.diag([m, 0.0, 0.0, J, J, J])
+        mass[1:3, 1:3] = m * self.local.tangents.T @ self.local.tangents
+        self.object = self.system.AddObject(
+            items.ObjectGenericODE2(
+                nodeNumbers=[node], massMatrix=mass, forceUserFunction=_force_function(body, self.local)
+            )
+        )
+        self.rolling = self._constrain(node, body.ball.radius)
+        self.system.Assemble()
+        self._gravity, self._resistance = self._probe(settings)
+        self.integration = Integration(self.system, settings)
+
+    def _probe(self, settings: ExudynSettings) -> tuple[FloatArray, float | None]:
+        """Gravity in the world [m/s²] and f [m], from the forces that Exudyn computes at rest and without spin."""
+        data, initial = self.system.systemData, exu.ConfigurationType.Initial
+        q, q_t = data.GetODE2Coordinates(initial), data.GetODE2Coordinates_t(initial)
+        # Without spin, the only moment is that of the rolling resistance, and the force along the distance is N.
+        moving = np.array([q_t[0], q_t[1], q_t[2], 0.0, 0.0, 0.0])
+        forces = {}
+        for name, rates in (("rest", np.zeros(SIZE)), ("moving", moving)):
+            data.SetODE2Coordinates_t(rates, initial)
+            mass, _, forces[name] = initial_matrices(self.system, settings)
+        data.SetODE2Coordinates_t(q_t, initial)
+        local = np.concatenate([forces["rest"][:1], np.linalg.solve(self.local.tangents[1:].T, forces["rest"][1:3])])
+        N, moment = abs(forces["moving"][0]), float(np.linalg.norm(forces["moving"][3:]))
+        known = bool(np.any(moving)) and N > 0
+        return self.surface.frame(q[1:3]) @ local / mass[0, 0], moment / N if known else None
+
+    def _constrain(self, node: Any, radius: float) -> Any:
+        """The wall first and then rolling, so that the multipliers are N, -F2, -F3."""
+        add_marker, add_object = self.system.AddMarker, self.system.AddObject
+        ground = self.system.AddNode(items.NodePointGround())
+        distance = [
+            add_marker(items.MarkerNodeCoordinate(nodeNumber=number, coordinate=0)) for number in (ground, node)
+        ]
+        all_of = [add_marker(items.MarkerNodeCoordinates(nodeNumber=number)) for number in (ground, node)]
+        add_object(items.CoordinateConstraint(markerNumbers=distance))
+        # v + a ω × e1 = 0 along e2 and e3
+        rows = np.zeros((2, SIZE))
+        rows[:, 1:3] = self.local.tangents[1:]
+        rows[0, 5], rows[1, 4] = radius, -radius
+        return add_object(
+            items.CoordinateVectorConstraint(markerNumbers=all_of, scalingMarker1=rows, velocityLevel=True)
+        )
+
+    def sample(self) -> Sample:
+        """See :class:`proofroll.engine.Engine`. The spin is a quasi-velocity, so there is no orientation to report."""
+        data = self.system.systemData
+        q, q_t, multipliers = data.GetODE2Coordinates(), data.GetODE2Coordinates_t(), data.GetAECoordinates()
+        frame = self.surface.frame(q[1:3])
+        velocity = self.local.tangents @ q_t[1:3] + np.array([q_t[0], 0.0, 0.0])
+        return Sample(
+            p_WB=self.surface.position(q[1:3]) + q[0] * frame[:, 0],
+            v_WB=frame @ velocity,
+            w_WB=frame @ q_t[3:],
+            force=-frame @ multipliers,
+        )
+
+    def built(self) -> Built:
+        """See :class:`proofroll.engine.Engine`. Gravity and f stem from the forces Exudyn computed."""
+        mass = self.system.GetObject(self.object)["massMatrix"].Convert2DenseMatrix()
+        data = self.system.systemData
+        q, q_t, q_tt = data.GetODE2Coordinates(), data.GetODE2Coordinates_t(), data.GetODE2Coordinates_tt()
+        tangents, frame = self.local.tangents, self.surface.frame(q[1:3])
+        acceleration = tangents @ q_tt[1:3] + np.einsum("ijk,j,k->i", self.local.second, q_t[1:3], q_t[1:3])
+        acceleration[0] += q_tt[0]
+        return Built(
+            mass=float(mass[0, 0]),
+            inertia=np.diag(mass)[3:],
+            gravity=self._gravity,
+            ball_radius=float(np.array(self.system.GetObject(self.rolling)["scalingMarker1"])[0, 5]),
+            rolling_resistance=self._resistance,
+            acceleration=frame @ acceleration,
+        )
+
+
+def _force_function(body: RollingBall, local: LocalGeometry) -> Any:
+    """Right-hand side of M q̈ + Cᵀλ = Q as plain floats: Exudyn calls it for every residual."""
+    m, J, f = body.ball.mass, body.ball.inertia, body.contact.rolling_resistance
+    tangents = local.tangents
+    # All inertial terms are quadratic in the velocities: Q_r = Σ c_rij q̇_i q̇_j. Terms with the distance itself as a
+    # factor are left out: the constraint keeps it at zero.
+    c = np.zeros((SIZE, SIZE, SIZE))
+    base = np.concatenate([np.eye(3)[:, :1], tangents], axis=1)  # ∂p/∂(distance, u1, u2)
+    c[:3, 1:3, 1:3] = -m * np.einsum("ir,ijk->rjk", base, local.second)
+    for k in range(2):
+        turn = local.turn[:, k]
+        c[:3, 0, 1 + k] -= 2 * m * base.T @ np.cross(turn, [1.0, 0.0, 0.0])
+        c[3:, 1 + k, 3:] -= J * np.cross(turn, np.eye(3)).T
+    quadratic = [(int(r), int(i), int(j), float(c[r, i, j])) for r, i, j in np.argwhere(np.abs(c) > 0)]
+    (t2u, t2v), (t3u, t3v) = tangents[1:].tolist()
+    weight = _weight(body, local, m * base)
+
+    def force(system: Any, t: float, item: int, q: list[float], rates: list[float]) -> list[float]:  # noqa: ARG001 -- Exudyn's signature
+        result: list[float] = weight(q)
+        for row, i, j, factor in quadratic:
+            result[row] += factor * rates[i] * rates[j]
+        if f:
+            v2, v3 = t2u * rates[1] + t2v * rates[2], t3u * rates[1] + t3v * rates[2]
+            speed = (v2 * v2 + v3 * v3) ** 0.5
+            if speed:
+                # Along the distance nothing accelerates, so its force is N; the moment is -f N (v/V) × e1.
+                factor = f * result[0] / speed
+                result[4] -= factor * v3
+                result[5] += factor * v2
+        return result
+
+    return force
+
+
+def _weight(body: RollingBall, local: LocalGeometry, scaled: FloatArray) -> Any:
+    """Generalised gravity as a function of q: constant, or turning once around with one of the coordinates."""
+    to_local = body.surface.frame(body.u0).T
+    rotations = [k for k, generator in enumerate(local.generators) if generator.kind == "rotation"]
+    axis = np.asarray(local.generators[rotations[0]].axis) if rotations else np.zeros(3)
+    along = axis * (axis @ body.gravity)
+    cosine, sine = body.gravity - along, np.cross(axis, body.gravity)
+    zero = [0.0, 0.0, 0.0]
+    if not rotations or not np.any(np.abs(sine) > 1e-14 * np.linalg.norm(body.gravity)):
+        constant = (scaled.T @ to_local @ body.gravity).tolist()
+        return lambda q: constant + zero  # noqa: ARG005 -- the place does not matter here
+    if len(rotations) > 1:
+        raise Refused("gravity along a wall with two rotations is not built")
+    steady, with_cosine, with_sine = (scaled.T @ to_local @ part for part in (along, cosine, sine))
+    column, start = 1 + rotations[0], float(body.u0[rotations[0]])
+
+    def weight(q: list[float]) -> list[float]:
+        angle = q[column] - start
+        force: list[float] = (steady + np.cos(angle) * with_cosine - np.sin(angle) * with_sine).tolist()
+        return force + zero
+
+    return weight

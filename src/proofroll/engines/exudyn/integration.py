@@ -1,0 +1,169 @@
+"""Exudyn's own implicit time integration, driven from sample to sample without losing its state."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from typing import Any
+
+import numpy as np
+
+from proofroll.engine import whole_steps
+from proofroll.engines.exudyn.native import exu
+from proofroll.engines.exudyn.settings import ExudynSettings
+from proofroll.errors import Diverged, Refused
+from proofroll.surfaces import FloatArray
+
+
+def new_system() -> tuple[Any, Any]:
+    """An empty container and system; what is global in Exudyn is set back to its defaults, and it is silent."""
+    exu.config.printToConsole = False
+    exu.special.solver.timeout = -1
+    container = exu.SystemContainer()
+    return container, container.AddSystem()
+
+
+def simulation_settings(settings: ExudynSettings) -> Any:
+    """The settings in Exudyn's own structure: no files, one thread, a step that never changes on its own."""
+    result = exu.SimulationSettings()
+    result.solution.file.write = False
+    result.solution.sensors.active = False
+    result.parallel.numberOfThreads = 1
+    time = result.timeIntegration
+    time.verboseMode = 0
+    # Otherwise a failing Newton iteration halves the step, down to 1e-8 s, and the run crawls for minutes.
+    time.adaptiveStep = False
+    time.newton.relativeTolerance = settings.newton_tolerance
+    time.newton.absoluteTolerance = settings.newton_tolerance / 100
+    time.newton.modifiedNewtonJacUpdatePerStep = settings.jacobian == "step"
+    alpha = time.generalizedAlpha
+    alpha.spectralRadius = settings.spectral_radius
+    alpha.useNewmark = alpha.useIndex2Constraints = settings.integrator == "trapezoidal_index2"
+    time.numberOfSteps = 1
+    time.endTime = settings.dt
+    return result
+
+
+class Integration:
+    """One run of Exudyn's implicit solver over an assembled system.
+
+    The solver is initialised once. ``SolveSteps`` goes from the start to the end that its iteration data name and keeps
+    coordinates, accelerations and multipliers, so moving start and end continues the run.
+    """
+
+    def __init__(
+        self, system: Any, settings: ExudynSettings, start: tuple[FloatArray, FloatArray] | None = None
+    ) -> None:
+        """Initialises the solver at time 0.
+
+        Args:
+            system: assembled.
+            settings: of the adapter.
+            start: accelerations of the coordinates and multipliers at time 0, where the engine cannot find them
+                itself; None: the engine solves for them.
+
+        Raises:
+            Refused: the engine does not accept the model.
+        """
+        self.t = 0.0
+        self.dt = settings.dt
+        self.system = system
+        self.options = simulation_settings(settings)
+        self.solver = exu.MainSolverImplicitSecondOrder()
+        if start is not None:
+            self.options.timeIntegration.generalizedAlpha.computeInitialAccelerations = False
+            system.systemData.SetODE2Coordinates_tt(start[0], exu.ConfigurationType.Initial)
+        try:
+            accepted = self.solver.InitializeSolver(system, self.options)
+        except exu.ExudynError as error:
+            raise Refused(f"Exudyn does not accept the model: {_sentence(error)}") from None
+        if not accepted:
+            raise Refused(f"Exudyn does not accept the model: {_sentence(self.solver.GetErrorString())}")
+        timer = self.solver.timer  # a copy; Exudyn's own stopwatches cost a fifth of the time of a small model
+        timer.useTimer = False
+        self.solver.timer = timer
+        if start is not None:
+            system.systemData.SetAECoordinates(start[1], exu.ConfigurationType.Current)
+
+    def advance(self, t: float) -> None:
+        """Moves the system to time ``t`` [s]; see :class:`proofroll.engine.Engine`."""
+        steps = whole_steps(self.t, t, self.dt)
+        if steps == 0:
+            return
+        iteration = self.solver.it
+        iteration.startTime = iteration.currentTime = self.t
+        iteration.endTime = t
+        iteration.numberOfSteps = steps
+        try:
+            done = self.solver.SolveSteps(self.system, self.options)
+        except Exception as error:  # an error in a user function comes out of the engine with its own type
+            raise Diverged(f"Exudyn stopped at {self.solver.it.currentTime:g} s: {_sentence(error)}") from None
+        reached = self.solver.it.currentTime
+        # It also reports success when it stopped early, e.g. because exudyn.special.solver.timeout was reached.
+        if not done or abs(reached - t) > 0.5 * self.dt:
+            raise Diverged(f"Exudyn stopped at {reached:g} s: {self._reason()}")
+        self.t = t
+
+    def _reason(self) -> str:
+        convergence, output = self.solver.conv, self.solver.output
+        if output.simulationTimeout:
+            return "its own timeout was reached"
+        if convergence.linearSolverFailed or convergence.massMatrixNotInvertible:
+            return "the system matrix is singular"
+        if convergence.newtonSolutionDiverged or not convergence.newtonConverged:
+            return "Newton's method did not converge; use a smaller dt"
+        return _sentence(self.solver.GetErrorString()) or "it gives no reason"
+
+
+def initial_matrices(system: Any, settings: ExudynSettings) -> tuple[FloatArray, FloatArray, FloatArray]:
+    """Mass matrix, the whole [0 Cᵀ; C D] of the constraints, and generalised forces, in the initial state.
+
+    D is not zero where a joint has a free axis, whose multiplier Exudyn keeps and sets to zero.
+
+    A second solver is asked, so that the one that integrates is not disturbed. Afterwards the system's present
+    accelerations and multipliers are those that Exudyn finds for the initial state.
+    """
+    options = simulation_settings(settings)
+    solver = exu.MainSolverImplicitSecondOrder()
+    solver.InitializeSolver(system, options)
+    coordinates, size = solver.GetODE2size(), solver.GetODE2size() + solver.GetAEsize()
+    solver.ComputeMassMatrix(system)
+    mass = np.array(solver.GetSystemMassMatrix())
+    solver.SetSystemJacobian(np.zeros((size, size)))  # it holds an inverse after the initialisation
+    solver.ComputeJacobianAE(system, 1.0, 1.0)
+    jacobian = np.array(solver.GetSystemJacobian())
+    solver.ComputeODE2RHS(system)
+    forces = np.array(solver.GetSystemResidual())[:coordinates]
+    return mass, jacobian, forces
+
+
+def consistent_start(
+    system: Any, settings: ExudynSettings, accelerations: Mapping[Any, FloatArray]
+) -> tuple[FloatArray, FloatArray]:
+    """Accelerations of the coordinates and multipliers at time 0.
+
+    Where a constraint at velocity level, C q̇ = 0, changes its direction, its derivative is C q̈ = -Ċ q̇. Exudyn
+    leaves the right side out for the constraints used here, and the trapezoidal rule would carry the wrong
+    multipliers along as an undamped oscillation. So its own mass matrix, constraint Jacobian, accelerations and
+    multipliers are taken, and corrected by what the right sides add.
+
+    Args:
+        system: assembled.
+        settings: of the adapter.
+        accelerations: constraint -> -Ċ q̇ of its rows.
+    """
+    mass, jacobian, _ = initial_matrices(system, settings)
+    data = system.systemData
+    start = np.concatenate([data.GetODE2Coordinates_tt(), data.GetAECoordinates()])
+    n = len(mass)
+    missing = np.zeros(len(start))
+    for item, expected in accelerations.items():
+        rows = np.array(data.GetObjectLTGAE(item))
+        missing[n + rows] = expected - jacobian[n + rows] @ start
+    jacobian[:n, :n] += mass
+    start += np.linalg.solve(jacobian, missing)
+    return start[:n], start[n:]
+
+
+def _sentence(text: object) -> str:
+    """What Exudyn says, on one line and without the stack of Python calls that it appends."""
+    return " ".join(str(text).partition("\n\nAt:")[0].split())

@@ -1,0 +1,75 @@
+"""The ball as a disc that always stands upright on the wall's tangent plane: Exudyn's joint for rolling discs.
+
+``ObjectJointRollingDisc`` constrains the velocity of the contact point of a disc on a plane. Re-aiming the plane's
+normal and the disc's axis before every Newton residual makes the disc's lowest point the ball's contact point.
+"""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+
+from proofroll.engine import Built, Sample
+from proofroll.engines.exudyn.ball import add_ball
+from proofroll.engines.exudyn.integration import Integration, consistent_start, new_system
+from proofroll.engines.exudyn.local_frame import frame_at
+from proofroll.engines.exudyn.native import Output, items
+from proofroll.engines.exudyn.settings import ExudynSettings
+from proofroll.scene import RollingBall
+from proofroll.surfaces import FloatArray
+
+
+class RollingDisc:
+    """A rigid ball and one re-aimed ``ObjectJointRollingDisc``; needs no generators of the surface."""
+
+    def __init__(self, body: RollingBall, settings: ExudynSettings) -> None:
+        """Builds and initialises."""
+        self.container, self.system = new_system()
+        ground = self.system.AddObject(items.ObjectGround())
+        self.ball = add_ball(self.system, body)
+        plane = self.system.AddMarker(items.MarkerBodyRigid(bodyNumber=ground))
+        frame = body.surface.frame(body.u0)
+        self.joint = self.system.AddObject(
+            items.ObjectJointRollingDisc(
+                markerNumbers=[plane, self.ball.marker],
+                discRadius=body.ball.radius,
+                discAxis=frame[:, 1],
+                planeNormal=-frame[:, 0],
+            )
+        )
+        self.system.SetPreNewtonResidualUserFunction(self._aiming(body))
+        self.system.Assemble()
+        # d/dt (v + a ω × e1) = v̇ + a ω̇ × e1 + a ω × ė1, in the directions of the joint's rows; ė1 is the re-aiming,
+        # of which Exudyn cannot know.
+        turning = body.ball.radius * np.cross(body.w0, body.surface.normal_gradient(body.p0) @ body.v0)
+        start = consistent_start(self.system, settings, {self.joint: -self._directions().T @ turning})
+        self.integration = Integration(self.system, settings, start)
+
+    def _aiming(self, body: RollingBall) -> Any:
+        """Turns the joint to the tangent plane below the present iterate; plain floats, it runs at every iterate."""
+        frame = frame_at(body.surface, body.u0)
+        node, joint = self.ball.node, self.joint
+        position, rotation = Output.Position, Output.RotationMatrix
+
+        def aim(system: Any, t: float, newton_iteration: int, discontinuous_iteration: int) -> None:  # noqa: ARG001 -- Exudyn's signature
+            e = frame(*system.GetNodeOutput(node, position).tolist())
+            r = system.GetNodeOutput(node, rotation).tolist()
+            x, y, z = e[3], e[4], e[5]
+            axis = [x * r[k] + y * r[k + 3] + z * r[k + 6] for k in (0, 1, 2)]  # e2 in the ball's frame
+            system.SetObjectParameter(joint, "planeNormal", [-e[0], -e[1], -e[2]])
+            system.SetObjectParameter(joint, "discAxis", axis)
+
+        return aim
+
+    def _directions(self) -> FloatArray:
+        """Lateral, longitudinal and normal direction of the joint in the world, as columns."""
+        return np.asarray(self.system.GetObjectOutput(self.joint, Output.RotationMatrix).reshape(3, 3))
+
+    def sample(self) -> Sample:
+        """See :class:`proofroll.engine.Engine`."""
+        return self.ball.sample(self._directions() @ self.system.GetObjectOutput(self.joint, Output.ForceLocal))
+
+    def built(self) -> Built:
+        """See :class:`proofroll.engine.Engine`."""
+        return self.ball.built(self.system.GetObject(self.joint)["discRadius"])

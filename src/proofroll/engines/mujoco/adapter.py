@@ -1,0 +1,164 @@
+"""The adapter: builds, steps and reads MuJoCo for any ball on any surface."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Mapping
+from contextlib import contextmanager
+from typing import Any, ClassVar, Protocol, Self
+
+import mujoco
+import numpy as np
+
+from proofroll.engine import Built, Sample, whole_steps
+from proofroll.engines.mujoco.chart import Chart
+from proofroll.engines.mujoco.contact import contact_force
+from proofroll.engines.mujoco.free import Facets, Free
+from proofroll.engines.mujoco.model import read_spec, write_physics
+from proofroll.engines.mujoco.settings import PRESETS, MujocoSettings, check, velocity_lag
+from proofroll.engines.mujoco.softness import softness
+from proofroll.engines.mujoco.start import EVALUATIONS, acceleration, start
+from proofroll.errors import Diverged
+from proofroll.scene import Capability, RollingBall, Scene
+
+
+class Formulation(Protocol):
+    """One way to present the wall to MuJoCo."""
+
+    def __init__(self, model: Any, body: RollingBall, settings: MujocoSettings) -> None: ...
+
+    @staticmethod
+    def write(spec: Any, body: RollingBall) -> None:
+        """Sets the numbers of the wall and of the joints."""
+
+    def run(self, data: Any, steps: int) -> None:
+        """Makes ``steps`` steps."""
+
+    def evaluate(self, data: Any) -> None:
+        """Computes forces and accelerations of the present state, as a step would."""
+
+
+_FORMULATIONS: Mapping[str, type[Formulation]] = {"free": Free, "chart": Chart, "facets": Facets}
+_FATAL = (
+    (mujoco.mjtWarning.mjWARN_BADQPOS, "positions are not finite or huge"),
+    (mujoco.mjtWarning.mjWARN_BADQVEL, "velocities are not finite or huge"),
+    (mujoco.mjtWarning.mjWARN_BADQACC, "accelerations are not finite or huge"),
+    (mujoco.mjtWarning.mjWARN_CONTACTFULL, "there are more contacts than MuJoCo holds"),
+    (mujoco.mjtWarning.mjWARN_CNSTRFULL, "there are more constraints than MuJoCo holds"),
+)
+
+
+class Mujoco:
+    """MuJoCo behind proofroll's protocol."""
+
+    name: ClassVar[str] = "mujoco"
+    provides: ClassVar[frozenset[Capability]] = frozenset(
+        {Capability.ROLLING, Capability.CURVED_SURFACE, Capability.ROLLING_RESISTANCE}
+    )
+    settings: ClassVar[type[Any]] = MujocoSettings
+    presets: ClassVar[Mapping[str, Mapping[str, Any]]] = PRESETS
+
+    def __init__(self, model: Any, body: RollingBall, settings: MujocoSettings) -> None:
+        self._model = model
+        self._body = body
+        self._settings = settings
+        self._formulation = _FORMULATIONS[settings.formulation](model, body, settings)
+        self._data = mujoco.MjData(model)
+        self._scratch = mujoco.MjData(model)
+        self._ball = model.body("ball").id
+        self._geom = model.geom("ball").id
+        self._steps = 0
+        with _silent():
+            start(model, self._data, body, settings, self._formulation)
+
+    @staticmethod
+    def version() -> str:
+        """Of MuJoCo."""
+        return str(mujoco.__version__)
+
+    @classmethod
+    def build(cls, scene: Scene, settings: MujocoSettings) -> Self:
+        """See :class:`proofroll.engine.Engine`."""
+        check(settings)
+        _forget_callbacks()
+        body = scene.rolling
+        spec = read_spec(scene, settings.formulation)
+        write_physics(spec, body, settings)
+        _FORMULATIONS[settings.formulation].write(spec, body)
+        return cls(spec.compile(), body, settings)
+
+    def advance(self, t: float) -> None:
+        """See :class:`proofroll.engine.Engine`."""
+        dt = self._settings.dt
+        # Counted, because the sum that MjData.time keeps drifts from the grid by round-off.
+        steps = whole_steps(self._steps * dt, t, dt)
+        if steps == 0:
+            return
+        with _silent():
+            self._formulation.run(self._data, steps)
+        self._steps += steps
+        warnings = self._data.warning
+        for kind, meaning in _FATAL:
+            if warnings[kind].number:
+                raise Diverged(f"MuJoCo gave up before {t:g} s: {meaning}")
+
+    def sample(self) -> Sample:
+        """See :class:`proofroll.engine.Engine`."""
+        data = self._evaluated()
+        force = contact_force(self._model, data, self._geom)
+        data.qvel += velocity_lag(self._settings) * data.qacc
+        mujoco.mj_comVel(self._model, data)
+        velocity = np.zeros(6)
+        mujoco.mj_objectVelocity(self._model, data, mujoco.mjtObj.mjOBJ_BODY, self._ball, velocity, 0)
+        return Sample(
+            p_WB=data.xpos[self._ball].copy(),
+            v_WB=velocity[3:],
+            w_WB=velocity[:3],
+            q_WB=data.xquat[self._ball].copy(),
+            force=force,
+        )
+
+    def built(self) -> Built:
+        """See :class:`proofroll.engine.Engine`."""
+        model, data = self._model, self._evaluated()
+        return Built(
+            mass=float(model.body_mass[self._ball]),
+            inertia=model.body_inertia[self._ball].copy(),
+            gravity=model.opt.gravity.copy(),
+            ball_radius=float(model.geom_size[self._geom, 0]),
+            rolling_resistance=self._lever(data),
+            acceleration=acceleration(model, data),
+            regularised=softness(self._body, self._settings),
+        )
+
+    def _lever(self, data: Any) -> float | None:
+        """Lever f [m] from the torque and the normal force that MuJoCo uses; None without a normal force."""
+        torque = float(np.linalg.norm(data.xfrc_applied[self._ball, 3:]))
+        N = -float(contact_force(self._model, data, self._geom) @ self._body.surface.normal(data.xpos[self._ball]))
+        if torque == 0:
+            return 0.0 if not self._body.contact.rolling_resistance else None
+        return torque / N
+
+    def _evaluated(self) -> Any:
+        """A copy of the present state with its own forces: after a step MjData holds those of the last stage."""
+        mujoco.mj_copyData(self._scratch, self._model, self._data)
+        with _silent():
+            for _ in range(EVALUATIONS if self._body.contact.rolling_resistance else 1):
+                self._formulation.evaluate(self._scratch)
+        return self._scratch
+
+
+def _forget_callbacks() -> None:
+    """Callbacks belong to the process: one that somebody else left would act in our models too."""
+    for name in ("act_bias", "act_dyn", "act_gain", "contactfilter", "control", "passive", "sensor"):
+        getattr(mujoco, f"set_mjcb_{name}")(None)
+
+
+@contextmanager
+def _silent() -> Iterator[None]:
+    """Keeps MuJoCo from printing, and from writing MUJOCO_LOG.TXT; warnings are read from MjData instead."""
+    before = mujoco.get_mju_user_warning()
+    mujoco.set_mju_user_warning(lambda _: None)
+    try:
+        yield
+    finally:
+        mujoco.set_mju_user_warning(before)

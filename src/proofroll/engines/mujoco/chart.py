@@ -1,0 +1,92 @@
+"""The ball on joints that follow the surface's coordinates, in real contact with a plane that follows it."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from contextlib import contextmanager
+from typing import Any
+
+import mujoco
+import numpy as np
+
+from proofroll.engines.mujoco.contact import apply_resistance, foreseen_normal_force
+from proofroll.engines.mujoco.model import pose, quaternion_of, tangent_plane
+from proofroll.engines.mujoco.settings import MujocoSettings
+from proofroll.errors import Refused
+from proofroll.scene import RollingBall
+
+
+class Chart:
+    """Joints ``u1``, ``u2`` (the surface's own motions), ``normal`` (the depth) and ``spin`` (a ball joint).
+
+    In these coordinates the contact's Jacobian is constant along the surface, so the term J̇v that MuJoCo leaves out
+    of contact rows vanishes. Contact, friction and the normal degree of freedom remain MuJoCo's own. The site
+    ``touch`` rides on ``u1`` and ``u2`` at the wall; the plane takes its pose, and stays a fixed body for MuJoCo.
+    """
+
+    def __init__(self, model: Any, body: RollingBall, settings: MujocoSettings) -> None:  # noqa: ARG002 -- the same call for every formulation
+        self._model = model
+        self._f = body.contact.rolling_resistance
+        self._ball = model.body("ball").id
+        self._wall = model.geom("wall").id
+        self._touch = model.site("touch").id
+        self._depth = int(model.joint("normal").dofadr[0])
+
+    @staticmethod
+    def write(spec: Any, body: RollingBall) -> None:
+        """Lays the joints along the surface's motions.
+
+        Raises:
+            Refused: the surface has no such motions, or the file's joints are of another kind.
+        """
+        surface = body.surface
+        if surface.generators is None:
+            raise Refused("chart needs a surface that two rigid motions slide along itself")
+        origin = np.zeros(2)
+        frame = surface.frame(origin)
+        centre = frame.T @ surface.position(origin)
+        pose(spec.body("chart"), np.zeros(3), quaternion_of(frame))
+        spec.body("carriage").pos = centre
+        for name, generator in zip(("u1", "u2"), surface.generators, strict=True):
+            joint = spec.joint(name)
+            hinge = generator.kind == "rotation"
+            if joint.type != (mujoco.mjtJoint.mjJNT_HINGE if hinge else mujoco.mjtJoint.mjJNT_SLIDE):
+                raise Refused(f"joint {name} of mujoco_chart.xml is not the {generator.kind} that the surface has")
+            joint.axis = frame.T @ np.asarray(generator.axis)
+            joint.pos = -centre if hinge else np.zeros(3)
+        spec.site("touch").pos = [body.ball.radius, 0.0, 0.0]
+        pose(spec.geom("wall"), *tangent_plane(body))
+
+    def run(self, data: Any, steps: int) -> None:
+        """Makes ``steps`` steps."""
+        with self._callbacks():
+            mujoco.mj_step(self._model, data, nstep=steps)
+
+    def evaluate(self, data: Any) -> None:
+        """Computes forces and accelerations of the present state, as a step would."""
+        with self._callbacks():
+            mujoco.mj_forward(self._model, data)
+
+    @contextmanager
+    def _callbacks(self) -> Iterator[None]:
+        """MuJoCo's callbacks belong to the process: they are ours only while we compute."""
+        mujoco.set_mjcb_contactfilter(self._pose_wall)
+        mujoco.set_mjcb_passive(self._resist if self._f else None)
+        try:
+            yield
+        finally:
+            mujoco.set_mjcb_contactfilter(None)
+            mujoco.set_mjcb_passive(None)
+
+    def _pose_wall(self, model: Any, data: Any, geom1: int, geom2: int) -> int:  # noqa: ARG002 -- MuJoCo's signature
+        """Called between kinematics and collision at each stage of RK4; 0 lets the pair collide."""
+        data.geom_xpos[self._wall] = data.site_xpos[self._touch]
+        data.geom_xmat[self._wall] = data.site_xmat[self._touch]
+        return 0
+
+    def _resist(self, model: Any, data: Any) -> None:  # noqa: ARG002 -- MuJoCo's signature
+        """Called between velocities and accelerations."""
+        N = foreseen_normal_force(data, -float(data.qfrc_constraint[self._depth]))
+        e1 = (-data.site_xmat[self._touch][2::3]).tolist()
+        v = data.cvel[self._ball, 3:].tolist()
+        apply_resistance(data.xfrc_applied[self._ball, 3:], self._f, N, e1, v)

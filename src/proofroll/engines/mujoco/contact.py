@@ -1,0 +1,75 @@
+"""Contact reactions as MuJoCo computed them, and the rolling resistance that MuJoCo cannot express."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from typing import Any
+
+import mujoco
+import numpy as np
+
+from proofroll.surfaces import FloatArray
+
+# Numbers of user data that foreseen_normal_force keeps.
+MEMORY = 4
+
+
+def contact_force(model: Any, data: Any, geom: int) -> FloatArray:
+    """Sum of the contact forces on a geom in the world [N], shape (3,); zero without contact."""
+    total = np.zeros(3)
+    wrench = np.zeros(6)
+    for index, contact in enumerate(data.contact[: data.ncon]):
+        mujoco.mj_contactForce(model, data, index, wrench)
+        # The frame's first axis points from geom[0] to geom[1], and the force is the one on geom[1].
+        sign = 1.0 if contact.geom[1] == geom else -1.0
+        total += sign * contact.frame.reshape(3, 3).T @ wrench[:3]
+    return total
+
+
+def foreseen_normal_force(data: Any, N: float) -> float:
+    """Normal force at ``data.time`` [N], extrapolated from MuJoCo's own of the two evaluations before.
+
+    The torque of the rolling resistance is needed before MuJoCo solves for the forces of the same instant; holding
+    the last value would be an error of first order. The memory lies in ``data.userdata``, so that it is copied with
+    the state: time of the evaluation before, time and force of the one before that, slope.
+
+    Args:
+        data: with MEMORY numbers of user data.
+        N: normal force of the evaluation before [N].
+    """
+    t = float(data.time)
+    last, before, N_before, slope = (float(number) for number in data.userdata)
+    if last > before:
+        slope = (N - N_before) / (last - before)
+    data.userdata[:] = (t, last, N, slope)
+    return max(N + slope * (t - last), 0.0)
+
+
+def apply_resistance(torque: Any, f: float, N: float, e1: Sequence[float], v: Sequence[float]) -> None:
+    """Writes the moment of the rolling resistance, -f N (v/V) × e1 [N m], into ``torque``.
+
+    MuJoCo's own rolling friction (condim 6) does not model it: there sliding and rolling share one cone.
+    Scalars, because this runs at each step and numpy's overhead on three numbers would outweigh MuJoCo's work.
+
+    Args:
+        torque: to write to, shape (3,).
+        f: coefficient of rolling resistance [m].
+        N: normal force of MuJoCo's own contact [N].
+        e1: unit normal from the ball to the wall.
+        v: velocity of the centre in the world [m/s].
+    """
+    speed = math.hypot(v[0], v[1], v[2])
+    if speed == 0:
+        torque[:] = 0.0
+        return
+    scale = -f * N / speed
+    c0, c1, c2 = cross(v, e1)
+    torque[0], torque[1], torque[2] = scale * c0, scale * c1, scale * c2
+
+
+def cross(x: Sequence[float], y: Sequence[float]) -> tuple[float, float, float]:
+    """Vector product of two triples (``numpy.cross`` takes ten times as long)."""
+    x0, x1, x2 = x
+    y0, y1, y2 = y
+    return (x1 * y2 - x2 * y1, x2 * y0 - x0 * y2, x0 * y1 - x1 * y0)

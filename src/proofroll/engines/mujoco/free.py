@@ -1,0 +1,155 @@
+"""A free ball: on a plane that is re-posed tangent to the wall before each step, or in a ring of boxes."""
+
+from __future__ import annotations
+
+import math
+from typing import Any
+
+import mujoco
+import numpy as np
+
+from proofroll.engines.mujoco.contact import apply_resistance, cross, foreseen_normal_force
+from proofroll.engines.mujoco.model import pose, quaternion_of, tangent_plane
+from proofroll.engines.mujoco.settings import MujocoSettings, normal_lead, own_share, velocity_lag
+from proofroll.errors import Refused
+from proofroll.scene import RollingBall
+from proofroll.surfaces import FloatArray
+
+
+class Free:
+    """The ball on a free joint; the wall a mocap body, which MuJoCo treats as fixed wherever it is put.
+
+    The plane stands for the wall only to first order: the contact rows lack J̇v (the turning of the normal).
+    """
+
+    def __init__(self, model: Any, body: RollingBall, settings: MujocoSettings) -> None:
+        self._model = model
+        self._surface = body.surface
+        self._radius = body.ball.radius
+        self._f = body.contact.rolling_resistance
+        self._ball = model.body("ball").id
+        self._wall = model.geom("wall").id
+        self._curvature = settings.curvature
+        self._half = velocity_lag(settings)
+        # MuJoCo's damping of a velocity that lags by half a step is part of -J̇v; this much is left to add.
+        self._share = 1 - own_share(settings)
+        self._lead = normal_lead(settings)
+
+    @staticmethod
+    def write(spec: Any, body: RollingBall) -> None:
+        """Puts the wall where the ball starts."""
+        spec.body("ball").pos = body.p0
+        pose(spec.body("wall"), *tangent_plane(body))
+
+    def run(self, data: Any, steps: int) -> None:
+        """Makes ``steps`` steps."""
+        for _ in range(steps):
+            motion = self._prepare(data)
+            if self._curvature:
+                mujoco.mj_step1(self._model, data)
+                self._add_curvature(data, *motion)
+                mujoco.mj_step2(self._model, data)
+            else:
+                mujoco.mj_step(self._model, data)
+
+    def evaluate(self, data: Any) -> None:
+        """Computes forces and accelerations of the present state, as a step would."""
+        motion = self._prepare(data)
+        if not self._curvature:
+            mujoco.mj_forward(self._model, data)
+            return
+        mujoco.mj_fwdPosition(self._model, data)
+        mujoco.mj_fwdVelocity(self._model, data)
+        self._add_curvature(data, *motion)
+        mujoco.mj_fwdActuation(self._model, data)
+        mujoco.mj_fwdAcceleration(self._model, data)
+        mujoco.mj_fwdConstraint(self._model, data)
+
+    def _prepare(self, data: Any) -> tuple[FloatArray, FloatArray]:
+        """Poses the plane, applies the rolling resistance and returns the present rates and their trend."""
+        p = data.qpos[:3]
+        e1 = self._surface.normal(p)
+        rates: FloatArray = data.qvel
+        normal = data.geom_xmat[self._wall, 2::3]  # still that of the step before, like qacc and qfrc_constraint
+        N = float(data.qfrc_constraint[:3] @ normal)
+        trend = data.qacc.copy()
+        if self._half:
+            # Along the planes only: velocity and acceleration of the step before have parts across the present one.
+            trend[:3] -= (trend[:3] @ normal) * normal
+            rates = rates + self._half * trend
+            rates[:3] -= (rates[:3] @ e1) * e1
+        data.mocap_pos[0] = p + (self._radius + self._surface.gap(p)) * e1
+        mujoco.mju_quatZ2Vec(data.mocap_quat[0], -e1)
+        if self._f:
+            foreseen = foreseen_normal_force(data, N)
+            apply_resistance(data.xfrc_applied[self._ball, 3:], self._f, foreseen, e1.tolist(), rates[:3].tolist())
+        return rates, trend
+
+    def _add_curvature(self, data: Any, rates: FloatArray, trend: FloatArray) -> None:
+        """Adds -J̇v to the contact's reference acceleration, less what MuJoCo's damping already gives.
+
+        Differentiating n·v = 0 (n = -e1) and t·(v + a ω × e1) = 0 leaves ė1·v and -a t·(ω × ė1) on the right.
+        """
+        if data.ncon == 0:
+            return
+        contact = data.contact[0]
+        gradient = self._surface.normal_gradient(data.qpos[:3])
+        e1_rate = gradient @ rates[:3]
+        w = data.xmat[self._ball].reshape(3, 3) @ rates[3:]
+        rows = contact.frame.reshape(3, 3) @ np.array(cross(w.tolist(), e1_rate.tolist())) * -self._radius
+        v = rates[:3] + self._lead * trend[:3]
+        rows[0] = v @ gradient @ v
+        data.efc_aref[contact.efc_address : contact.efc_address + 3] += self._share * rows
+
+
+class Facets:
+    """The ball on a free joint in a ring of boxes whose faces are tangent to the wall: the obvious concave wall."""
+
+    def __init__(self, model: Any, body: RollingBall, settings: MujocoSettings) -> None:  # noqa: ARG002 -- the same call for every formulation
+        self._model = model
+        self._surface = body.surface
+        self._f = body.contact.rolling_resistance
+        self._ball = model.body("ball").id
+
+    @staticmethod
+    def write(spec: Any, body: RollingBall) -> None:
+        """Turns the ring into the surface's axis and makes each face tangent to the wall.
+
+        The file turns the boxes about the ring's axis (``replicate``); MuJoCo applies that to the poses given here.
+
+        Raises:
+            Refused: the surface is not one that a rotation slides along itself, so a ring would not enclose it.
+        """
+        generators = body.surface.generators
+        if generators is None or generators[0].kind != "rotation":
+            raise Refused("facets needs a wall that closes on itself")
+        origin = np.zeros(2)
+        frame = body.surface.frame(origin)
+        face = frame.T @ body.wall.position(origin)
+        spec.body("ball").pos = body.p0
+        pose(spec.body("wall"), np.zeros(3), quaternion_of(frame))
+        boxes = spec.body("wall").geoms
+        for box in boxes:
+            thickness, _, height = box.size
+            box.pos = face + np.array([thickness, 0.0, 0.0])
+            box.size = [thickness, face[0] * math.tan(math.pi / len(boxes)), height]
+
+    def run(self, data: Any, steps: int) -> None:
+        """Makes ``steps`` steps."""
+        if not self._f:
+            mujoco.mj_step(self._model, data, nstep=steps)
+            return
+        for _ in range(steps):
+            self._resist(data)
+            mujoco.mj_step(self._model, data)
+
+    def evaluate(self, data: Any) -> None:
+        """Computes forces and accelerations of the present state, as a step would."""
+        if self._f:
+            self._resist(data)
+        mujoco.mj_forward(self._model, data)
+
+    def _resist(self, data: Any) -> None:
+        e1: FloatArray = self._surface.normal(data.qpos[:3])
+        N = -float(data.qfrc_constraint[:3] @ e1)
+        apply_resistance(data.xfrc_applied[self._ball, 3:], self._f, N, e1.tolist(), data.qvel[:3].tolist())

@@ -1,0 +1,87 @@
+"""A scene's MJCF file with every physical number set from the scene: structure from the file, numbers from here."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import mujoco
+import numpy as np
+
+from proofroll.engines.mujoco.contact import MEMORY
+from proofroll.engines.mujoco.settings import MujocoSettings
+from proofroll.errors import Refused
+from proofroll.scene import RollingBall, Scene
+from proofroll.surfaces import FloatArray
+
+_INTEGRATORS = {
+    "Euler": mujoco.mjtIntegrator.mjINT_EULER,
+    "RK4": mujoco.mjtIntegrator.mjINT_RK4,
+    "implicitfast": mujoco.mjtIntegrator.mjINT_IMPLICITFAST,
+}
+_CONES = {"pyramidal": mujoco.mjtCone.mjCONE_PYRAMIDAL, "elliptic": mujoco.mjtCone.mjCONE_ELLIPTIC}
+
+
+def read_spec(scene: Scene, formulation: str) -> Any:
+    """The scene's file for this formulation.
+
+    Raises:
+        Refused: the scene has none, or MuJoCo cannot read it.
+    """
+    path = scene.folder / f"mujoco_{formulation}.xml"
+    if not path.is_file():
+        raise Refused(f"the scene {scene.name} has no model {path.name}")
+    try:
+        return mujoco.MjSpec.from_file(str(path))
+    except ValueError as error:
+        raise Refused(f"MuJoCo cannot read {path.name}: {' '.join(str(error).split())}") from None
+
+
+def write_physics(spec: Any, body: RollingBall, settings: MujocoSettings) -> None:
+    """Sets what all formulations share: the ball, gravity, contact and solver."""
+    ball = spec.body("ball")
+    ball.explicitinertial = True
+    ball.mass = body.ball.mass
+    ball.inertia = np.full(3, body.ball.inertia)
+    ball.ipos = np.zeros(3)
+    spec.geom("ball").size = [body.ball.radius, 0.0, 0.0]
+    option = spec.option
+    option.gravity = body.gravity
+    option.timestep = settings.dt
+    option.integrator = _INTEGRATORS[settings.integrator]
+    option.cone = _CONES[settings.cone]
+    spec.nuserdata = MEMORY if body.contact.rolling_resistance else 0
+    # A blow-up must be seen: by default MuJoCo puts the model back to its initial state and goes on.
+    option.disableflags |= int(mujoco.mjtDisableBit.mjDSBL_AUTORESET)
+    for geom in spec.geoms:
+        geom.condim = 3
+        geom.friction = [settings.friction, 0.0, 0.0]
+        if settings.time_constant is not None:
+            geom.solref = [settings.time_constant * settings.dt, 1.0]
+        if settings.impedance is not None:
+            geom.solimp = [settings.impedance, settings.impedance, 0.001, 0.5, 2.0]
+
+
+def pose(element: Any, position: FloatArray, quaternion: FloatArray) -> None:
+    """Puts an element of a spec at ``position`` [m] with ``quaternion``.
+
+    An orientation that the file gives in another form (``zaxis``, ``xyaxes``, ``euler``) would silently win over the
+    quaternion when the spec is compiled, so it is taken away.
+    """
+    element.alt.type = mujoco.mjtOrientation.mjORIENTATION_QUAT
+    element.pos = position
+    element.quat = quaternion
+
+
+def tangent_plane(body: RollingBall) -> tuple[FloatArray, FloatArray]:
+    """Point [m] and quaternion of the plane that touches the ball at its start; its z axis points to the ball."""
+    e1 = body.surface.normal(body.p0)
+    quaternion = np.zeros(4)
+    mujoco.mju_quatZ2Vec(quaternion, -e1)
+    return body.p0 + body.ball.radius * e1, quaternion
+
+
+def quaternion_of(axes: FloatArray) -> FloatArray:
+    """MuJoCo's quaternion of a frame whose axes are the columns of ``axes``, shape (4,)."""
+    quaternion = np.zeros(4)
+    mujoco.mju_mat2Quat(quaternion, np.ascontiguousarray(axes).ravel())
+    return quaternion

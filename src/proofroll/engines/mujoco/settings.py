@@ -1,0 +1,175 @@
+"""What a user can choose about MuJoCo, and the three presets of each formulation."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from typing import Annotated, Literal
+
+from annotated_types import Ge, Gt, Le
+
+from proofroll.errors import InputError
+
+# What a MuJoCo model has whose author writes nothing: step, friction, solref [s], solimp (dmin, dmax).
+DEFAULT_STEP = 2e-3
+DEFAULT_FRICTION = 1.0
+DEFAULT_TIME_CONSTANT = 0.02
+DEFAULT_IMPEDANCE = (0.9, 0.95)
+# MuJoCo clips to these without a word: mjMAXIMP, and two steps (refsafe).
+LARGEST_IMPEDANCE = 0.9999
+SHORTEST_TIME_CONSTANT = 2.0
+# MuJoCo has no unbounded friction. With the elliptic cone any coefficient above the needed one gives the same motion
+# to all digits (1 to 10000 tried), so this one is out of reach and costs nothing. A pyramidal cone softens the
+# contact by the square of the coefficient: at 100 the ball flies through the wall without a warning.
+UNBOUNDED_FRICTION = 1e3
+LARGEST_PYRAMIDAL_FRICTION = 1.0
+
+
+@dataclass(frozen=True)
+class MujocoSettings:
+    """Formulation, time step and the options of contact that matter for rolling.
+
+    Attributes:
+        formulation: ``free``: a free ball and a plane that is re-posed tangent to the wall before each step;
+            ``chart``: the ball on joints that follow the surface's coordinates, with the same plane re-posed at each
+            evaluation of the forces; ``facets``: a free ball in a ring of boxes.
+        preset: where the other values come from.
+        dt: step [s].
+        integrator: MuJoCo's name of it.
+        cone: friction cone, exact (``elliptic``) or MuJoCo's default approximation (``pyramidal``).
+        time_constant: of the contact's return to zero depth (first number of ``solref``) in steps; None: MuJoCo's
+            default of 0.02 s at every step.
+        impedance: constant constraint impedance (``solimp``); 1 would be a rigid contact; None: MuJoCo's default,
+            0.9 to 0.95 growing with depth.
+        friction: coefficient that stands for unbounded friction [-]; with less than the scene needs, the ball slips.
+        start: ``touching``: at depth zero, where a soft contact is not loaded yet; ``settled``: at the depth at which
+            the contact already bends the path as the wall does.
+        curvature: whether the adapter adds to the contact's reference acceleration the term J̇v, which MuJoCo leaves
+            out (``free`` only).
+    """
+
+    formulation: Literal["free", "chart", "facets"] = "chart"
+    preset: Literal["default", "matched", "tuned"] = "matched"
+    dt: Annotated[float, Gt(0)] = 1e-3
+    integrator: Literal["Euler", "RK4", "implicitfast"] = "RK4"
+    cone: Literal["pyramidal", "elliptic"] = "elliptic"
+    time_constant: Annotated[float, Ge(SHORTEST_TIME_CONSTANT)] | None = SHORTEST_TIME_CONSTANT
+    impedance: Annotated[float, Gt(0), Le(LARGEST_IMPEDANCE)] | None = LARGEST_IMPEDANCE
+    friction: Annotated[float, Gt(0)] = UNBOUNDED_FRICTION
+    start: Literal["touching", "settled"] = "settled"
+    curvature: bool = False
+
+    @property
+    def resolution(self) -> str:
+        """See :class:`proofroll.engine.Settings`."""
+        return "dt"
+
+    @property
+    def order(self) -> int | None:
+        """Measured; with a time constant that does not shrink with the step the limit is not the rolling ball."""
+        second = self.time_constant is not None and (self.curvature or self.formulation == "chart")
+        return 2 if second else 1
+
+
+def velocity_lag(settings: MujocoSettings) -> float:
+    """How long before the positions the velocities hold [s].
+
+    An Euler step of MuJoCo moves the position with the new velocity: it is a leapfrog, of second order if velocities
+    are read as those of half a step before. Only a contact with J̇v is exact enough to profit from that reading.
+    """
+    return settings.dt / 2 if settings.curvature else 0.0
+
+
+def time_constant(settings: MujocoSettings) -> float:
+    """First number of the contact's ``solref`` [s]."""
+    return DEFAULT_TIME_CONSTANT if settings.time_constant is None else settings.time_constant * settings.dt
+
+
+def impedance(settings: MujocoSettings) -> tuple[float, float]:
+    """Impedance of the contact at depth zero and at large depth (dmin, dmax of ``solimp``)."""
+    return DEFAULT_IMPEDANCE if settings.impedance is None else (settings.impedance, settings.impedance)
+
+
+def own_share(settings: MujocoSettings) -> float:
+    """Part of J̇v that the contact's damping b J v supplies when v lags by half a step: b dt / 2.
+
+    MuJoCo has b = 2 / (dmax tc).
+    """
+    return velocity_lag(settings) * 2 / (impedance(settings)[1] * time_constant(settings))
+
+
+def normal_lead(settings: MujocoSettings) -> float:
+    """How long after the positions the bend of the path is needed [s].
+
+    To stay on the wall, a leapfrog step has to take e1·v from +h/2 V²/c at -h/2 to -h/2 V²/c at +h/2. The damping
+    gives ``own_share`` of that, for V at -h/2; the rest is to be added for V this much later than the positions.
+    Without the lead a ball that gets slower or faster along the wall loses contact in turns.
+    """
+    share = own_share(settings)
+    return velocity_lag(settings) * share / (1 - share)
+
+
+def check(settings: MujocoSettings) -> None:
+    """Rejects combinations that MuJoCo would silently ignore or misread.
+
+    Raises:
+        InputError: the first such combination.
+    """
+    if settings.cone == "pyramidal" and settings.friction > LARGEST_PYRAMIDAL_FRICTION:
+        advice = f"with cone=pyramidal more than {LARGEST_PYRAMIDAL_FRICTION:g} makes the wall soft; set cone=elliptic"
+        raise InputError("mujoco: friction", settings.friction, advice)
+    if not settings.curvature:
+        return
+    if settings.formulation != "free":
+        raise InputError("mujoco: curvature", True, f"{settings.formulation} does not use it; set formulation=free")
+    if settings.integrator != "Euler":
+        # mj_step1 and mj_step2, between which the term is added, always make an Euler step.
+        raise InputError("mujoco: integrator", settings.integrator, "curvature=true needs integrator=Euler")
+    if settings.cone != "elliptic":
+        # A pyramid's rows are sums of normal and friction; the term belongs to each of them alone.
+        raise InputError("mujoco: cone", settings.cone, "curvature=true needs cone=elliptic")
+
+
+def _obvious(formulation: Literal["free", "facets"]) -> MujocoSettings:
+    """A model whose author writes no option."""
+    return MujocoSettings(
+        formulation,
+        "default",
+        dt=DEFAULT_STEP,
+        integrator="Euler",
+        cone="pyramidal",
+        time_constant=None,
+        impedance=None,
+        friction=DEFAULT_FRICTION,
+        start="touching",
+    )
+
+
+PRESETS: Mapping[str, Mapping[str, MujocoSettings]] = {
+    "chart": {
+        # The coordinates and the integrator are the formulation; only the contact is left as MuJoCo has it.
+        "default": MujocoSettings(
+            "chart",
+            "default",
+            dt=DEFAULT_STEP,
+            cone="pyramidal",
+            time_constant=None,
+            impedance=None,
+            friction=DEFAULT_FRICTION,
+            start="touching",
+        ),
+        # In these coordinates J̇v vanishes, so documented options are also the best known ones: no ``tuned``.
+        "matched": MujocoSettings("chart", "matched"),
+    },
+    "free": {
+        "default": _obvious("free"),
+        # The hardest contact that the documentation allows. What is left is the missing J̇v: V²/c in the normal
+        # direction sinks the ball, a ω1 V/c lets it creep, both in proportion to the time constant and so to dt.
+        "matched": MujocoSettings("free", "matched", integrator="Euler"),
+        # J̇v is put where MuJoCo would have computed it: an edit of mjData.efc_aref that its manual does not describe.
+        "tuned": MujocoSettings("free", "tuned", integrator="Euler", curvature=True),
+    },
+    # Better options do not rescue it, since each edge between two boxes is a kick: 0.3 m off instead of 1.2 m in 2 s,
+    # whatever the step. It shows what the obvious wall costs.
+    "facets": {"default": _obvious("facets")},
+}

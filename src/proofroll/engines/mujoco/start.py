@@ -1,0 +1,113 @@
+"""The initial state, and how deep a soft contact has to be to carry the load."""
+
+from __future__ import annotations
+
+from typing import Any, Protocol
+
+import mujoco
+import numpy as np
+from scipy.optimize import brentq
+
+from proofroll.engines.mujoco.settings import MujocoSettings, own_share, velocity_lag
+from proofroll.errors import Refused
+from proofroll.scene import RollingBall
+from proofroll.surfaces import FloatArray
+
+# The resistance's torque uses the normal force of the evaluation before: at a standstill in time, repeats converge.
+EVALUATIONS = 3
+# A start "at depth zero" is this part of the radius inside: at zero, round-off would decide whether there is a contact.
+_TOUCHING = 1e-13
+
+
+class Evaluates(Protocol):
+    """What the start needs of a formulation."""
+
+    def evaluate(self, data: Any) -> None:
+        """Computes forces and accelerations of the present state."""
+
+
+def place(model: Any, data: Any, body: RollingBall, depth: float) -> None:
+    """The scene's initial motion with the ball ``depth`` [m] inside the wall, before any forces are known.
+
+    MuJoCo's contact point lies midway between the two surfaces, at a - depth/2 from the centre; the ball rolls
+    without slip there. The orientation is the identity.
+    """
+    ball = model.body("ball").id
+    e1 = body.surface.normal(body.p0)
+    data.qpos[:] = model.qpos0
+    data.qvel[:] = data.qacc[:] = 0.0
+    if model.joint("spin").type[0] == mujoco.mjtJoint.mjJNT_FREE:
+        data.qpos[:3] = body.p0 + depth * e1
+        data.qpos[3:7] = (1.0, 0.0, 0.0, 0.0)
+    else:
+        for name, value in zip(("u1", "u2", "normal"), (*body.u0, depth), strict=True):
+            data.joint(name).qpos[0] = value
+        mujoco.mj_kinematics(model, data)
+        mujoco.mju_negQuat(data.joint("spin").qpos, data.xquat[ball])
+    mujoco.mj_kinematics(model, data)
+    mujoco.mj_comPos(model, data)
+    about_normal = (body.w0 @ e1) * e1
+    w = about_normal + (body.w0 - about_normal) * body.ball.radius / (body.ball.radius - depth / 2)
+    jacobian = np.zeros((6, model.nv))
+    mujoco.mj_jacBody(model, data, jacobian[:3], jacobian[3:], ball)
+    data.qvel[:] = np.linalg.solve(jacobian, np.concatenate([body.v0, w]))
+
+
+def start(model: Any, data: Any, body: RollingBall, settings: MujocoSettings, formulation: Evaluates) -> None:
+    """The state at time 0 with its own forces.
+
+    Raises:
+        Refused: the contact is too soft for a settled start.
+    """
+    depth = _TOUCHING * body.ball.radius
+    if settings.start == "settled":
+        depth = _settled_depth(model, data, body, settings, formulation)
+    _evaluate_at(depth, model, data, body, settings, formulation)
+
+
+def _evaluate_at(
+    depth: float, model: Any, data: Any, body: RollingBall, settings: MujocoSettings, formulation: Evaluates
+) -> None:
+    place(model, data, body, depth)
+    now = data.qvel.copy()
+    lag, share = velocity_lag(settings), own_share(settings)
+    # Velocities that lag, and the resistance's torque from the evaluation before, each make it a fixed point.
+    rounds = 13 if lag else EVALUATIONS
+    for index in range(rounds):
+        before = data.qacc.copy()
+        data.qvel[:] = now - lag * before
+        formulation.evaluate(data)
+        if lag and index % 2:
+            # An error contracts by ``share`` along the contact's rows and vanishes elsewhere. Extrapolation removes
+            # the first and turns the second's sign, so it alternates with plain rounds and the last is plain.
+            data.qacc[:] = (data.qacc - share * before) / (1 - share)
+
+
+def acceleration(model: Any, data: Any) -> FloatArray:
+    """Of the ball's centre in the world after an evaluation [m/s²], shape (3,)."""
+    result = np.zeros(6)
+    mujoco.mj_rnePostConstraint(model, data)
+    mujoco.mj_objectAcceleration(model, data, mujoco.mjtObj.mjOBJ_BODY, model.body("ball").id, result, 0)
+    return np.asarray(result[3:] + model.opt.gravity)  # MuJoCo reports what an accelerometer would: without gravity
+
+
+def _settled_depth(model: Any, data: Any, body: RollingBall, settings: MujocoSettings, formulation: Evaluates) -> float:
+    """Depth [m] at which the contact bends the path exactly as the wall does: e1·p̈ = -ė1·v.
+
+    Only the shape of the wall and the initial velocity enter, no force of the scene's: N follows from MuJoCo.
+    """
+    e1 = body.surface.normal(body.p0)
+    wanted = -float(body.v0 @ body.surface.normal_gradient(body.p0) @ body.v0)
+
+    def excess(depth: float) -> float:
+        _evaluate_at(depth, model, data, body, settings, formulation)
+        return float(e1 @ acceleration(model, data)) - wanted
+
+    upper = 1e-12 * body.ball.radius
+    if excess(upper) <= 0:
+        return 0.0
+    while excess(upper) > 0:
+        upper *= 10
+        if upper > body.ball.radius:
+            raise Refused("the contact is so soft that the ball would sink into the wall; take a smaller dt")
+    return float(brentq(excess, upper / 10, upper, xtol=1e-14 * upper, rtol=1e-14))

@@ -1,0 +1,98 @@
+"""Formulation ``free_flyer``: a free ball, held on the surface and kept from slipping by three rows."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+import pinocchio as pin
+
+from proofroll.engines.pinocchio.rows import BallTerms, ball_terms, resistance, rolling_rows
+from proofroll.scene import RollingBall
+from proofroll.surfaces import FloatArray
+
+
+class FreeFlyer:
+    """Six freedoms; the rows come from the signed distance to the surface and its derivatives.
+
+    Velocities are those of the free-flyer joint, in the ball's own axes. The multipliers are the components of the
+    wall's force along e1, e2 and e3.
+    """
+
+    def __init__(self, body: RollingBall, orientation: bool) -> None:
+        """See :class:`~proofroll.engines.pinocchio.mechanism.Mechanism`."""
+        self._radius = body.ball.radius
+        self._f = body.contact.rolling_resistance
+        self._surface = body.surface
+        self._orientation = orientation
+        self.model = pin.Model()
+        self.model.gravity.linear = body.gravity
+        self.ball = self.model.addJoint(0, pin.JointModelFreeFlyer(), pin.SE3.Identity(), body.ball.name)
+        inertia = pin.Inertia(body.ball.mass, np.zeros(3), body.ball.inertia * np.eye(3))
+        self.model.appendBodyToJoint(self.ball, inertia, pin.SE3.Identity())
+        self._rest = np.zeros(self.model.nv)
+        self.q0 = np.concatenate([body.p0, [0.0, 0.0, 0.0, 1.0]])
+        self.v0 = np.concatenate([body.v0, body.w0])
+        speed = float(np.linalg.norm(body.v0)) or np.sqrt(np.linalg.norm(body.gravity) * self._radius)
+        self.q_scale = np.concatenate([np.full(3, self._radius), np.ones(4)])
+        self.v_scale = np.concatenate([np.full(3, speed), np.full(3, speed / self._radius)])
+
+    def _rows(self, data: Any, q: FloatArray, v: FloatArray) -> tuple[BallTerms, FloatArray, FloatArray, FloatArray]:
+        """Terms of the ball, local frame, rows and drift: first the surface, then the two of rolling."""
+        terms = ball_terms(self.model, data, self.ball, q, v)
+        p = q[:3]
+        frame = self._surface.frame(self._surface.locate(p))
+        e1_rate = self._surface.normal_gradient(p) @ terms.v
+        slip_rows, slip_drift = rolling_rows(terms, self._radius, frame, e1_rate)
+        rows, drift = np.empty((3, 6)), np.empty(3)
+        rows[0], rows[1:] = frame[:, 0] @ terms.jacobian[:3], slip_rows
+        drift[0], drift[1:] = frame[:, 0] @ terms.bias[:3] + e1_rate @ terms.v, slip_drift
+        return terms, frame, rows, drift
+
+    def _solve(self, data: Any, q: FloatArray, v: FloatArray) -> tuple[FloatArray, FloatArray, FloatArray]:
+        """Joint acceleration, multipliers (-N, F2, F3) [N], and the local frame."""
+        terms, frame, rows, drift = self._rows(data, q, v)
+        if not self._f:
+            acceleration = pin.forwardDynamics(self.model, data, self._rest, rows, drift)
+            return np.array(acceleration), np.array(data.lambda_c), frame
+        # Rolling resistance is proportional to N, an unknown here: it makes the columns differ from the rows, which
+        # forwardDynamics does not allow.
+        columns = rows.T.copy()
+        columns[:, 0] -= resistance(terms, self._f, frame[:, 0])
+        matrix = np.zeros((9, 9))
+        matrix[:6, :6] = data.M
+        matrix[:6, 6:] = -columns
+        matrix[6:, :6] = rows
+        solution = np.linalg.solve(matrix, np.concatenate([-data.nle, -drift]))
+        return solution[:6], solution[6:], frame
+
+    def respond(self, data: Any, q: FloatArray, v: FloatArray) -> tuple[FloatArray, FloatArray]:
+        """Joint acceleration, and -N, F2, F3 [N]; without orientation the acceleration is that of world components."""
+        acceleration, multipliers, _ = self._solve(data, q, v)
+        if not self._orientation:
+            # The joint accelerates in the ball's axes, which turn with ω; axes that are held fixed do not.
+            acceleration[:3] += pin.skew(v[3:]) @ v[:3]
+        return acceleration, multipliers
+
+    def reaction(self, data: Any, q: FloatArray, v: FloatArray) -> tuple[FloatArray, FloatArray]:
+        """Joint acceleration, and the wall's force from the multipliers."""
+        acceleration, multipliers, frame = self._solve(data, q, v)
+        return acceleration, frame @ multipliers
+
+    def project(self, data: Any, q: FloatArray, v: FloatArray) -> tuple[FloatArray, FloatArray]:
+        """Moves the centre onto the surface along its normal, then removes sinking and slip by an impulse."""
+        q = q.copy()
+        q[:3] += self._surface.gap(q[:3]) * self._surface.normal(q[:3])
+        rows = self._rows(data, q, v)[2]
+        return q, np.array(pin.impulseDynamics(self.model, data, v, rows))
+
+    def rolling_row(self, data: Any, q: FloatArray, v: FloatArray) -> FloatArray:
+        """Row of slip along e2, shape (nv,)."""
+        return np.asarray(self._rows(data, q, v)[2][1])
+
+    def resistance(self, data: Any, q: FloatArray, v: FloatArray) -> FloatArray | None:
+        """Rolling resistance on the joints per unit of normal force [m], shape (nv,); None if none was built."""
+        if not self._f:
+            return None
+        terms, frame = self._rows(data, q, v)[:2]
+        return resistance(terms, self._f, frame[:, 0])

@@ -1,0 +1,190 @@
+"""Time stepping on the configurations of Pinocchio."""
+
+from __future__ import annotations
+
+from typing import Any, Protocol
+
+import numpy as np
+import pinocchio as pin
+from scipy.integrate import DOP853
+
+from proofroll.engine import whole_steps
+from proofroll.engines.pinocchio.mechanism import Mechanism
+from proofroll.engines.pinocchio.settings import PinocchioSettings
+from proofroll.errors import Diverged
+from proofroll.surfaces import FloatArray
+
+
+class Integrator(Protocol):
+    """Moves the state of a mechanism.
+
+    Attributes:
+        q, v: joint configuration and velocity now.
+    """
+
+    q: FloatArray
+    v: FloatArray
+
+    def advance(self, start: float, end: float) -> None:
+        """From ``start`` to ``end`` [s].
+
+        Raises:
+            Diverged: no step is small enough, or the rows have become dependent.
+        """
+
+
+def integrator(mechanism: Mechanism, settings: PinocchioSettings) -> Integrator:
+    """The integrator that the settings ask for."""
+    if settings.integrator == "dop853":
+        return _Adaptive(mechanism, settings)
+    if settings.integrator == "semi_implicit_euler":
+        return _SemiImplicitEuler(mechanism, settings)
+    return _RungeKutta4(mechanism, settings)
+
+
+def _moving(mechanism: Mechanism, settings: PinocchioSettings) -> FloatArray:
+    """Factors on the joint velocity where it moves the configuration: 0 holds the ball's orientation, shape (nv,)."""
+    factors = np.ones(mechanism.model.nv)
+    if not settings.orientation:
+        # Isotropy: the inertia of the ball is the same in any axes fixed in it, so at each instant axes may be chosen
+        # that coincide with the carriage's (or the world's). In both formulations the spin is last.
+        factors[-3:] = 0.0
+    return factors
+
+
+class _FixedStep:
+    """Steps of ``dt``; subclasses say what one step is."""
+
+    def __init__(self, mechanism: Mechanism, settings: PinocchioSettings) -> None:
+        self._mechanism, self._settings = mechanism, settings
+        self._model, self._data = mechanism.model, mechanism.model.createData()
+        self._moving = _moving(mechanism, settings)
+        self._dt = float(settings.dt or 0.0)
+        self.q, self.v = mechanism.q0.copy(), mechanism.v0.copy()
+
+    def advance(self, start: float, end: float) -> None:
+        """See :class:`Integrator`."""
+        try:
+            for _ in range(whole_steps(start, end, self._dt)):
+                self._step(self._dt)
+                if self._settings.projection:
+                    self.q, self.v = self._mechanism.project(self._data, self.q, self.v)
+        except np.linalg.LinAlgError as error:
+            raise Diverged(f"the equations became singular between {start:g} s and {end:g} s ({error})") from None
+
+    def _acceleration(self, q: FloatArray, v: FloatArray) -> FloatArray:
+        return self._mechanism.respond(self._data, q, v)[0]
+
+    def _step(self, h: float) -> None:
+        raise NotImplementedError
+
+
+class _SemiImplicitEuler(_FixedStep):
+    """Velocity first, then the configuration with the new velocity."""
+
+    def _step(self, h: float) -> None:
+        self.v = self.v + h * self._acceleration(self.q, self.v)
+        self.q = pin.integrate(self._model, self.q, h * self._moving * self.v)
+
+
+class _RungeKutta4(_FixedStep):
+    """The classical scheme; displacements within a step are tangent vectors at its start.
+
+    As usually written, the displacement's rate is taken to be the joint velocity. That is so only where
+    configurations form a vector space: with rotations the rate is dexp⁻¹ times the velocity (Munthe-Kaas 1998), and
+    without it the orientation is of order 2. ``rk4_dexpinv`` has the term.
+    """
+
+    def _rate(self, displacement: FloatArray | None, v: FloatArray) -> FloatArray:
+        moving = self._moving * v
+        if displacement is None or self._settings.integrator == "rk4":
+            return moving
+        dexp = pin.dIntegrate(self._model, self.q, displacement, pin.ARG1)
+        return np.asarray(np.linalg.solve(dexp, moving))
+
+    def _step(self, h: float) -> None:
+        rates: list[FloatArray] = []
+        accelerations: list[FloatArray] = []
+        for reach in (0.0, 0.5 * h, 0.5 * h, h):
+            if not rates:
+                q, v, displacement = self.q, self.v, None
+            else:
+                displacement = reach * rates[-1]
+                q = pin.integrate(self._model, self.q, displacement)
+                v = self.v + reach * accelerations[-1]
+            rates.append(self._rate(displacement, v))
+            accelerations.append(self._acceleration(q, v))
+        q1, q2, q3, q4 = rates
+        v1, v2, v3, v4 = accelerations
+        self.q = pin.integrate(self._model, self.q, h / 6 * (q1 + 2 * (q2 + q3) + q4))
+        self.v = self.v + h / 6 * (v1 + 2 * (v2 + v3) + v4)
+
+
+# A step shorter than this part of the time in which the ball turns by a radian, this many times in a row, leads
+# nowhere: ordinary steps are a hundred times longer, and one jump of the forces is passed in a few dozen.
+_SHORT = 1e-4
+_PATIENCE = 500
+
+
+class _Adaptive:
+    """DOP853 on configuration and velocity together, the quaternion by its rate (pin.tangentMap)."""
+
+    def __init__(self, mechanism: Mechanism, settings: PinocchioSettings) -> None:
+        self._mechanism, self._settings = mechanism, settings
+        self._model, self._data = mechanism.model, mechanism.model.createData()
+        self._moving = _moving(mechanism, settings)
+        self._rtol = float(settings.rtol or 0.0)
+        # Components in the ball's turning axes pass through zero all the time: a hundredth of their natural size
+        # keeps the tolerance relative to most of their range.
+        self._atol = 1e-2 * self._rtol * np.concatenate([mechanism.q_scale, mechanism.v_scale])
+        self._turning_time = mechanism.q_scale[0] / mechanism.v_scale[0]
+        self._step: float | None = None
+        self.q, self.v = mechanism.q0.copy(), mechanism.v0.copy()
+
+    def _rates(self, _: float, y: FloatArray) -> FloatArray:
+        nq = self._model.nq
+        # The rates must not depend on the length to which the quaternion has drifted.
+        q, v = pin.normalize(self._model, y[:nq]), y[nq:]
+        rates = np.empty_like(y)
+        rates[:nq] = pin.tangentMap(self._model, q) @ (self._moving * v)
+        rates[nq:] = self._mechanism.respond(self._data, q, v)[0]
+        return rates
+
+    def advance(self, start: float, end: float) -> None:
+        """See :class:`Integrator`. The last step ends at ``end``: the dense output of DOP853 has a lower order."""
+        if end <= start:
+            return
+        first = None if self._step is None else min(self._step, end - start)
+        state = np.concatenate([self.q, self.v])
+        longest, short_steps = 0.0, 0
+        try:
+            solver = DOP853(self._rates, start, state, end, rtol=self._rtol, atol=self._atol, first_step=first)
+            while solver.status == "running":
+                message = solver.step()
+                if message is not None:
+                    raise Diverged(f"the motion could not be integrated past {solver.t:g} s: {message}")
+                longest = max(longest, solver.step_size)
+                short_steps = short_steps + 1 if self._is_short(solver) else 0
+                if short_steps > _PATIENCE:
+                    raise Diverged(
+                        f"the steps became too short at {solver.t:g} s: the forces jump there, as rolling resistance "
+                        "does when the ball comes to rest"
+                    )
+                if self._settings.projection:
+                    self._put_back(solver)
+        except np.linalg.LinAlgError as error:
+            raise Diverged(f"the equations became singular between {start:g} s and {end:g} s ({error})") from None
+        # The step that ends at ``end`` may be short; the next start must not inherit that.
+        self._step = max(longest, self._step or 0.0) if first == end - start else longest
+        nq = self._model.nq
+        self.q, self.v = pin.normalize(self._model, solver.y[:nq]), solver.y[nq:]
+
+    def _is_short(self, solver: Any) -> bool:
+        faster = max(1.0, float(np.max(np.abs(solver.y[self._model.nq :]) / self._mechanism.v_scale)))
+        return bool(solver.step_size * faster < _SHORT * self._turning_time)
+
+    def _put_back(self, solver: Any) -> None:
+        nq = self._model.nq
+        q, v = self._mechanism.project(self._data, pin.normalize(self._model, solver.y[:nq]), solver.y[nq:])
+        solver.y = np.concatenate([q, v])
+        solver.f = self._rates(solver.t, solver.y)  # the next step starts with the rates at its first point

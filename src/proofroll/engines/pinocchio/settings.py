@@ -1,0 +1,98 @@
+"""What a user can set, and the presets."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from typing import Annotated, Literal
+
+import numpy as np
+from annotated_types import Ge, Gt
+
+from proofroll.errors import InputError
+
+# scipy raises anything below 100 machine epsilons to it, with no more than a warning.
+TIGHTEST_RTOL = 100 * float(np.finfo(float).eps)
+
+_ORDERS = {"semi_implicit_euler": 1, "rk4": 2, "rk4_dexpinv": 4}
+
+
+@dataclass(frozen=True)
+class PinocchioSettings:
+    """Settings of the Pinocchio adapter.
+
+    Attributes:
+        formulation: ``composite`` (joints along the surface's generators, so the ball cannot leave it, and two rows
+            of rolling) or ``free_flyer`` (six freedoms, one row for the surface and two of rolling).
+        preset: where the other values come from.
+        integrator: ``semi_implicit_euler`` and ``rk4`` as they are usually written with ``pin.integrate``;
+            ``rk4_dexpinv`` the same with the missing term of rotations; ``dop853`` adaptive, order 8.
+        dt: step [s] of the first three; None with ``dop853``.
+        rtol: relative tolerance [-] of ``dop853``; None with the others.
+        orientation: integrate the orientation of the ball. Its inertia is the same about every axis, so the motion
+            does not depend on it, and without it the fast turning needs no small steps.
+        projection: put the state back on the constraints after each step.
+    """
+
+    formulation: Literal["composite", "free_flyer"] = "composite"
+    preset: Literal["default", "matched", "tuned"] = "matched"
+    integrator: Literal["semi_implicit_euler", "rk4", "rk4_dexpinv", "dop853"] = "dop853"
+    dt: Annotated[float, Gt(0)] | None = None
+    rtol: Annotated[float, Ge(TIGHTEST_RTOL)] | None = 1e-13
+    orientation: bool = True
+    projection: bool = True
+
+    def __post_init__(self) -> None:
+        """A fixed step has dt and no rtol, an adaptive one rtol and no dt.
+
+        Raises:
+            InputError: otherwise.
+        """
+        if self.integrator == "dop853":
+            if self.dt is not None:
+                advice = "dop853 chooses its steps; set rtol instead, or take the fixed steps of preset=default"
+                raise InputError("pinocchio: dt", self.dt, advice)
+            if self.rtol is None:
+                advice = "dop853 needs rtol, e.g. 1e-10; preset=matched has one"
+                raise InputError("pinocchio: integrator", self.integrator, advice)
+        else:
+            if self.rtol is not None:
+                advice = f"{self.integrator} has a fixed step; start from preset=default and set dt"
+                raise InputError("pinocchio: rtol", self.rtol, advice)
+            if self.dt is None:
+                advice = "a fixed step needs dt, e.g. 1e-3; preset=default has one"
+                raise InputError("pinocchio: integrator", self.integrator, advice)
+
+    @property
+    def resolution(self) -> str:
+        """See :class:`proofroll.engine.Settings`."""
+        return "rtol" if self.integrator == "dop853" else "dt"
+
+    @property
+    def order(self) -> int | None:
+        """See :class:`proofroll.engine.Settings`.
+
+        rk4 is of order 4 only where configurations form a vector space, that is without the orientation: see
+        :mod:`proofroll.engines.pinocchio.integrators`.
+        """
+        if self.integrator == "rk4" and not self.orientation:
+            return 4
+        return _ORDERS.get(self.integrator)
+
+
+def _presets(formulation: Literal["composite", "free_flyer"]) -> Mapping[str, PinocchioSettings]:
+    return {
+        # what one writes first: a classical scheme with pin.integrate, a fixed step, nothing against drift
+        "default": PinocchioSettings(formulation, "default", "rk4", 1e-3, None, projection=False),
+        # the same model, integrated so that only round-off is left
+        "matched": PinocchioSettings(formulation, "matched", rtol=3e-14),
+        # what differs in substance: the orientation, on which nothing depends, is not integrated, and with it goes
+        # the fast turning of the ball's own axes that dictates the step
+        "tuned": PinocchioSettings(formulation, "tuned", orientation=False),
+    }
+
+
+PRESETS: Mapping[str, Mapping[str, PinocchioSettings]] = {
+    "composite": _presets("composite"),
+    "free_flyer": _presets("free_flyer"),
+}

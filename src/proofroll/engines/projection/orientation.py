@@ -1,0 +1,147 @@
+"""How the ball's rotation is described: the paper's Euler angles, or no angles at all.
+
+The five velocities are s = [u̇1 u̇2 r1 r2 r3]; here r gives the angular velocity along the local axes,
+ω' = [ω1 ω2 ω3] = A r. A dot on A means its rate seen from the world.
+"""
+
+from __future__ import annotations
+
+import math
+from typing import ClassVar, Protocol
+
+import numpy as np
+from scipy.spatial.transform import Rotation
+
+from proofroll.errors import Diverged
+from proofroll.surfaces import FloatArray
+
+# The condition of M̄ grows like 1/sin²θ as θ nears 0 or π: here four digits are lost. With the tightest tolerance, a
+# ball that passes at this distance still has its reactions to 2e-11 N (weight 5 N); at 0.003 it is 2e-10 N (measured).
+_SMALLEST_SINE = 0.01
+# A fixed step that turns the ball by more than this is too coarse anywhere, not only near the singularity.
+_LARGEST_SINE = 0.5
+
+
+class Orientation(Protocol):
+    """Angles (none, or three) and the three velocities that describe the rotation.
+
+    Attributes:
+        size: number of angles; if there are any, their rates are the velocities r.
+    """
+
+    size: ClassVar[int]
+
+    def start(self, frame: FloatArray, w: FloatArray) -> tuple[FloatArray, FloatArray]:
+        """Angles [rad], shape (size,), and velocities r, shape (3,), of the angular velocity ω' [rad/s] at time 0."""
+
+    def kinematics(
+        self, angles: FloatArray, r: FloatArray, frame: FloatArray, turning: FloatArray
+    ) -> tuple[FloatArray, FloatArray]:
+        """A, shape (3, 3), and Ȧ r [rad/s²], shape (3,), where ``turning`` = FᵀḞ [1/s], shape (3, 3).
+
+        Raises:
+            ArithmeticError: the angles are not finite.
+        """
+
+    def check(self, t: float, angles: FloatArray, r: FloatArray, step: float) -> None:
+        """Raises Diverged if the description fails at time ``t`` [s]; ``step`` [s] is a fixed step's size, else 0."""
+
+    def quaternion(self, angles: FloatArray) -> FloatArray | None:
+        """Orientation in the world, scalar first, shape (4,), identity at time 0; None if it is not followed."""
+
+
+class EulerAngles:
+    """Euler angles z-x-z [φ θ ψ]: rotation, nutation, precession (Blajer 2006), about the axes of the world."""
+
+    size: ClassVar[int] = 3
+
+    def start(self, frame: FloatArray, w: FloatArray) -> tuple[FloatArray, FloatArray]:
+        """See :class:`Orientation`. θ = π/2 is as far from the singularity as can be."""
+        angles = np.array([0.0, math.pi / 2, 0.0])
+        A, _ = self.kinematics(angles, np.zeros(3), frame, np.zeros((3, 3)))
+        return angles, np.asarray(np.linalg.solve(A, w), dtype=np.float64)
+
+    def kinematics(
+        self,
+        angles: FloatArray,
+        r: FloatArray,
+        frame: FloatArray,
+        turning: FloatArray,  # noqa: ARG002 -- the angles are measured in the world, whatever the frame does
+    ) -> tuple[FloatArray, FloatArray]:
+        """See :class:`Orientation`. The columns of A are the axes about which φ, θ and ψ turn."""
+        _, theta, psi = angles.tolist()
+        phi_rate, theta_rate, psi_rate = r.tolist()
+        if not math.isfinite(theta + psi):
+            raise FloatingPointError("the Euler angles overflow inside a step")
+        sin, cos, sin_psi, cos_psi = math.sin(theta), math.cos(theta), math.sin(psi), math.cos(psi)
+        axes = np.array(
+            [
+                [sin * sin_psi, cos_psi, 0.0],
+                [-sin * cos_psi, sin_psi, 0.0],
+                [cos, 0.0, 1.0],
+            ]
+        )
+        # Rates of the axes times r: θ̇ tilts the axis of φ, and ψ̇ turns the axes of φ and θ about the vertical.
+        tilted, turned, node = phi_rate * theta_rate, phi_rate * psi_rate * sin, theta_rate * psi_rate
+        drift = np.array(
+            [
+                tilted * cos * sin_psi + turned * cos_psi - node * sin_psi,
+                -tilted * cos * cos_psi + turned * sin_psi + node * cos_psi,
+                -tilted * sin,
+            ]
+        )
+        return frame.T @ axes, frame.T @ drift
+
+    def check(self, t: float, angles: FloatArray, r: FloatArray, step: float) -> None:
+        """See :class:`Orientation`. Looks for the singularity at θ = 0 and π, where φ and ψ turn about one axis.
+
+        One fixed step turns the ball by |ω| step. If the axis of φ is nearer to the vertical than that, φ and ψ turn by
+        a radian or so in a step and the result is silently wrong (by as much as the weight in F3, measured).
+        """
+        theta = float(angles[1])
+        turn = math.sqrt(max(0.0, r @ r + 2.0 * r[0] * r[2] * math.cos(theta))) * step
+        if abs(math.sin(theta)) < max(_SMALLEST_SINE, min(turn, _LARGEST_SINE)):
+            raise Diverged(
+                f"θ reached {theta:.4g} rad at t = {t:.6g} s, near the Euler-angle singularity; "
+                "use formulation=rotating_frame"
+            )
+
+    def quaternion(self, angles: FloatArray) -> FloatArray:
+        """See :class:`Orientation`."""
+        phi, theta, psi = angles
+        now = Rotation.from_euler("ZXZ", [psi, theta, phi])
+        at_start = Rotation.from_euler("ZXZ", [0.0, math.pi / 2, 0.0])
+        return np.asarray(np.roll((now * at_start.inv()).as_quat(), 1), dtype=np.float64)
+
+
+class RotatingFrame:
+    """The angular velocity along the local axes itself, r = ω' (quasi-velocities): no angle, hence no singularity.
+
+    A ball's inertia does not depend on its orientation, so nothing in the equations asks for it.
+    """
+
+    size: ClassVar[int] = 0
+
+    def __init__(self) -> None:
+        self._identity = np.eye(3)
+
+    def start(self, frame: FloatArray, w: FloatArray) -> tuple[FloatArray, FloatArray]:  # noqa: ARG002 -- no angles
+        """See :class:`Orientation`."""
+        return np.empty(0), w
+
+    def kinematics(
+        self,
+        angles: FloatArray,  # noqa: ARG002 -- there are none
+        r: FloatArray,
+        frame: FloatArray,  # noqa: ARG002 -- everything is along its axes already
+        turning: FloatArray,
+    ) -> tuple[FloatArray, FloatArray]:
+        """See :class:`Orientation`. The axes turn with the frame: F ω' has the rate F (ω̇' + FᵀḞ ω')."""
+        return self._identity, turning @ r
+
+    def check(self, t: float, angles: FloatArray, r: FloatArray, step: float) -> None:
+        """See :class:`Orientation`. Nothing to fail."""
+
+    def quaternion(self, angles: FloatArray) -> FloatArray | None:  # noqa: ARG002 -- there are none
+        """See :class:`Orientation`. The orientation is not followed: nothing needs it."""
+        return None

@@ -1,0 +1,76 @@
+"""What a user can choose about the projection method."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from typing import Annotated, Literal
+
+from annotated_types import Gt
+
+from proofroll.engines.projection.integrators import INTEGRATORS, TIGHTEST
+from proofroll.errors import InputError
+
+_DT = 1e-3
+
+
+@dataclass(frozen=True)
+class ProjectionSettings:
+    """Settings of the projection method.
+
+    Attributes:
+        formulation: ``euler``, the paper's angles, with a singularity; or ``rotating_frame``, the angular velocity
+            along the local axes, without.
+        preset: where the other values come from.
+        integrator: ``rk4`` with the fixed step ``dt``, or ``dop853`` with the tolerance ``rtol``.
+        dt: step of rk4 [s].
+        rtol: relative tolerance of dop853 [-].
+        elimination: remove the violation of the rolling constraints after each step. In ``rotating_frame`` on a surface
+            of constant curvature nothing is left to remove: there the constraints are linear with constant
+            coefficients, and every Runge-Kutta method keeps those by itself.
+    """
+
+    formulation: Literal["euler", "rotating_frame"] = "euler"
+    preset: Literal["default", "matched"] = "matched"
+    integrator: Literal["rk4", "dop853"] = "dop853"
+    dt: Annotated[float, Gt(0)] = _DT
+    rtol: Annotated[float, Gt(0)] = TIGHTEST
+    elimination: bool = True
+
+    def __post_init__(self) -> None:
+        if self.rtol < TIGHTEST:
+            raise InputError("projection: rtol", self.rtol, f"double precision allows no less than {TIGHTEST:.3g}")
+        # A setting that would be ignored is an error: a user who writes dt=1e-4 believes that it does something.
+        if self.resolution == "rtol" and self.dt != _DT:
+            raise InputError(
+                "projection: dt", self.dt, f"{self.integrator} chooses its own steps; set rtol, or add integrator=rk4"
+            )
+        if self.resolution == "dt" and self.rtol != TIGHTEST:
+            raise InputError(
+                "projection: rtol", self.rtol, f"{self.integrator} has a fixed step; set dt, or add integrator=dop853"
+            )
+
+    @property
+    def resolution(self) -> Literal["dt", "rtol"]:
+        """The setting that trades speed for accuracy."""
+        return INTEGRATORS[self.integrator].resolution
+
+    @property
+    def order(self) -> int | None:
+        """Declared order of convergence in dt; None with an adaptive step."""
+        return INTEGRATORS[self.integrator].order
+
+
+# default: what a reader of the paper writes down, a classical fixed-step method with elimination of violations.
+# matched: the same equations with nothing left of the integrator but round-off.
+# There is no tuned: nothing is known to be better than matched.
+PRESETS: Mapping[str, Mapping[str, ProjectionSettings]] = {
+    "euler": {
+        "default": ProjectionSettings("euler", "default", "rk4"),
+        "matched": ProjectionSettings("euler", "matched", "dop853"),
+    },
+    "rotating_frame": {
+        "default": ProjectionSettings("rotating_frame", "default", "rk4"),
+        "matched": ProjectionSettings("rotating_frame", "matched", "dop853"),
+    },
+}

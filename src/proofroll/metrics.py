@@ -1,0 +1,119 @@
+"""Numbers that a trajectory is judged by: observables, their scales, the energy balance and the force audit.
+
+Everything here sees a trajectory and the scene's ball, never an engine.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import TYPE_CHECKING
+
+import numpy as np
+from scipy.interpolate import make_interp_spline
+
+from proofroll.scene import RollingBall
+from proofroll.surfaces import FloatArray
+
+if TYPE_CHECKING:
+    import xarray as xr
+
+# Observables besides the coordinates of the scene's surface.
+OBSERVABLES = ("N", "F2", "F3", "needed_friction", "energy_balance", "force_audit", "gap", "slip")
+
+# Degree of the splines through the samples. Sampled twenty times per oscillation of z, a derivative of degree 7 is
+# good to about 1e-6 of its size; what is left is measured on the truth and reported as the error bar.
+_DEGREE = 7
+# The ends of an interpolating spline's derivative are worse than its middle; the audit leaves them out.
+_ENDS = 5
+
+
+@dataclass(frozen=True)
+class Observable:
+    """A curve that can be held against the truth.
+
+    Attributes:
+        name: as in the comparison file.
+        unit: of its values.
+        values: over time, shape (time,); zero is perfect where the truth is zero by definition.
+    """
+
+    name: str
+    unit: str
+    values: FloatArray
+
+
+def observables(body: RollingBall, dataset: xr.Dataset) -> dict[str, Observable]:
+    """All curves that the trajectory allows, by name; what the engine cannot say is absent.
+
+    Coordinates of the surface, ``N``, ``F2``, ``F3`` [N] and ``needed_friction`` [-] as they are, without time 0,
+    where the certificate judges reactions; ``energy_balance`` [J], ``gap`` [m], ``slip`` [m/s] and ``force_audit``
+    [N], which are zero for a perfect run.
+    """
+    curves: dict[str, Observable] = {}
+
+    def put(name: str, unit: str, values: FloatArray) -> None:
+        curves[name] = Observable(name, unit, values)
+
+    for name, unit in zip(body.surface.coordinates, body.surface.units, strict=True):
+        put(name, unit, dataset[name].to_numpy())
+    if "N" in dataset:
+        for name in ("N", "F2", "F3", "needed_friction"):
+            put(name, dataset[name].attrs["units"], dataset[name].to_numpy()[1:])
+    put("gap", "m", dataset["gap"].to_numpy())
+    put("slip", "m/s", np.hypot(dataset["slip2"].to_numpy(), dataset["slip3"].to_numpy()))
+    if dataset.sizes["time"] > 2 * (_DEGREE + 1) + 2 * _ENDS:
+        if "N" in dataset or not body.contact.rolling_resistance:
+            put("energy_balance", "J", energy_balance(body, dataset))
+        if "N" in dataset:
+            put("force_audit", "N", force_audit(body, dataset))
+    return curves
+
+
+def scales(body: RollingBall, truth: xr.Dataset) -> dict[str, float]:
+    """Size of each observable in this case, to which a relative tolerance refers.
+
+    A coordinate's range; the largest normal force for every force; the largest needed friction; the initial kinetic
+    energy; the ball's radius for the gap; the initial speed for slip. Never zero.
+    """
+    normal = float(np.max(np.abs(truth["N"].to_numpy())))
+    speed = float(np.linalg.norm(body.v0))
+    kinetic = 0.5 * body.ball.mass * speed**2 + 0.5 * body.ball.inertia * float(body.w0 @ body.w0)
+    sizes = {name: float(np.ptp(truth[name].to_numpy())) for name in body.surface.coordinates}
+    sizes |= dict.fromkeys(("N", "F2", "F3", "force_audit"), normal)
+    sizes["needed_friction"] = float(np.nanmax(truth["needed_friction"].to_numpy()))
+    sizes |= {"energy_balance": kinetic, "gap": body.ball.radius, "slip": speed}
+    return {name: size if np.isfinite(size) and size > 0 else 1.0 for name, size in sizes.items()}
+
+
+def energy_balance(body: RollingBall, dataset: xr.Dataset) -> FloatArray:
+    """Energy now plus what rolling resistance took, minus the energy at the start [J], shape (time,).
+
+    The resistance takes N f V / a from the ball per second (the engine's own N and V are used).
+    """
+    balance = dataset["energy"].to_numpy() - float(dataset["energy"][0])
+    f = body.contact.rolling_resistance
+    if f:
+        speed = np.linalg.norm(dataset["v_WB"].to_numpy(), axis=-1)
+        power = dataset["N"].to_numpy() * f * speed / body.ball.radius
+        t = dataset["time"].to_numpy()
+        work = make_interp_spline(t, power, k=_DEGREE).antiderivative()
+        balance = balance + work(t) - work(t[0])
+    return np.asarray(balance)
+
+
+def force_audit(body: RollingBall, dataset: xr.Dataset) -> FloatArray:
+    """Reported minus recomputed contact force, largest of the components N, F2, F3 [N], shape (time - 10,).
+
+    Newton's law along e1, e2, e3 with the acceleration from the engine's own motion: the rates of the surface
+    coordinates are differentiated (they turn slowly, unlike the world components), the rest is geometry.
+    """
+    surface, t = body.surface, dataset["time"].to_numpy()
+    u = np.stack([dataset[name].to_numpy() for name in surface.coordinates], axis=-1)
+    rates = np.stack([dataset[f"{name}_rate"].to_numpy() for name in surface.coordinates], axis=-1)
+    second = make_interp_spline(t, rates, k=_DEGREE).derivative()(t)
+    acceleration = np.einsum("tij,tj->ti", surface.tangents(u), second)
+    acceleration += np.einsum("tijk,tj,tk->ti", surface.second(u), rates, rates)
+    force = body.ball.mass * (acceleration - body.gravity)
+    local = np.einsum("tij,ti->tj", surface.frame(u), force) * [-1.0, 1.0, 1.0]
+    reported = np.stack([dataset[name].to_numpy() for name in ("N", "F2", "F3")], axis=-1)
+    return np.asarray(np.max(np.abs(reported - local), axis=-1)[_ENDS:-_ENDS])

@@ -1,0 +1,153 @@
+"""The report: one HTML file that needs nothing else, and the same content as JSON beside it."""
+
+from __future__ import annotations
+
+import json
+import shlex
+from datetime import UTC, datetime
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+from proofroll.report import labels, tables
+from proofroll.report.content import environment, outcome_content, plain
+from proofroll.report.findings import findings
+from proofroll.report.plots import point_curves, styles
+from proofroll.store import Store, write_text
+from proofroll.studies.compare import Outcome
+from proofroll.trajectory import read
+
+if TYPE_CHECKING:
+    import jinja2
+
+
+def write_report(outcomes: list[Outcome], store: Store, out: Path, command: str) -> dict[str, Any]:
+    """Writes ``report.html`` and ``report.json``.
+
+    Args:
+        outcomes: what was compared.
+        store: where the trajectories are.
+        out: folder of the report.
+        command: that makes the report again.
+
+    Returns:
+        the content of both files as plain data: ``date``, ``comparisons`` and ``environment``.
+
+    Raises:
+        ProofrollError: the folder cannot be written.
+    """
+    content = report_content(outcomes, store, command)
+    curves = [point_curves(outcome, store) for outcome in outcomes]
+    write_text(out / "report.json", json.dumps(content, indent=1, allow_nan=False) + "\n")
+    write_text(out / "report.html", page(content, curves))
+    return content
+
+
+def report_content(outcomes: list[Outcome], store: Store, command: str) -> dict[str, Any]:
+    """All that the report says, as plain data."""
+    comparisons = []
+    for outcome in outcomes:
+        content = outcome_content(outcome)
+        comparisons.append({**content, "truths": _truths(outcome, store), "findings": findings(content)})
+    versions: dict[str, str] = {}
+    for outcome in outcomes:
+        for run in outcome.runs:
+            versions |= run.result.versions
+    content = {
+        "date": datetime.now(UTC).isoformat(timespec="seconds"),
+        "comparisons": comparisons,
+        "environment": environment(command, versions),
+    }
+    return dict(plain(content))
+
+
+def page(content: dict[str, Any], curves: list[list[dict[str, Any]]]) -> str:
+    """The HTML page.
+
+    Args:
+        content: from :func:`report_content`.
+        curves: from :func:`proofroll.report.plots.point_curves`, one list for each comparison.
+    """
+    import plotly.offline
+
+    drawn = {
+        "rows": [_drawn_rows(comparison) for comparison in content["comparisons"]],
+        "points": curves,
+    }
+    text = (
+        _templates()
+        .get_template("page.html")
+        .render(
+            content=content,
+            curves=curves,
+            styles=[styles(comparison["rows"]) for comparison in content["comparisons"]],
+            data=_script_json(drawn),
+            plotly=plotly.offline.get_plotlyjs(),
+        )
+    )
+    return text.encode("utf-8", "replace").decode("utf-8")  # a lone surrogate from an engine's message
+
+
+def _drawn_rows(comparison: dict[str, Any]) -> list[dict[str, Any]]:
+    rows = comparison["rows"]
+    return [{"name": name, **style} for name, style in zip(labels.names(rows), styles(rows), strict=True)]
+
+
+def _script_json(value: object) -> str:
+    """JSON for a script element: no character in it can end the element."""
+    text = json.dumps(value, allow_nan=False, separators=(",", ":"), ensure_ascii=True)
+    return text.replace("<", "\\u003c").replace(">", "\\u003e").replace("&", "\\u0026")
+
+
+def _templates() -> jinja2.Environment:
+    """The templates; everything that is put into them is escaped, save what they mark as ours."""
+    import jinja2
+
+    made = jinja2.Environment(
+        loader=jinja2.PackageLoader("proofroll.report"),
+        autoescape=True,
+        undefined=jinja2.StrictUndefined,
+        trim_blocks=True,
+        lstrip_blocks=True,
+    )
+    made.filters |= {
+        "number": labels.number,
+        "error": labels.error,
+        "symbol": labels.symbol,
+        "unit": labels.unit,
+        "values": labels.values,
+        "settings": labels.settings_text,
+    }
+    made.globals |= {
+        "tables": tables,
+        "names": labels.names,
+        "symbols": labels.SYMBOLS,
+        "meanings": labels.MEANINGS,
+        "again": _again,
+    }
+    return made
+
+
+def _again(comparison: dict[str, Any], run: dict[str, Any]) -> str:
+    """The command that makes one run again."""
+    words = ["proofroll", "run", comparison["scene"], "--engine", run["engine"]]
+    for name, value in run["parameters"].items():
+        words += ["--set", f"{name}={value:g}" if isinstance(value, float) else f"{name}={value}"]
+    return shlex.join([*words, "--until", f"{comparison['until']:g}", "--every", f"{comparison['every']:g}"])
+
+
+def _truths(outcome: Outcome, store: Store) -> list[dict[str, Any]]:
+    """For each point where the truth comes from and how well it is known."""
+    found = []
+    for name, case in outcome.truths.items():
+        path = store.trajectory(case)
+        entry: dict[str, Any] = {"point": name, "parameters": case.parameters, "trajectory": path.name}
+        if path.is_file():
+            dataset = read(path)
+            entry |= {key: dataset.attrs.get(key, "") for key in ("route", "second_route")}
+            entry["error_bars"] = {
+                str(key): {"value": float(curve.attrs["error_bar"]), "unit": curve.attrs["units"]}
+                for key, curve in dataset.data_vars.items()
+                if curve.dims == ("time",) and "error_bar" in curve.attrs
+            }
+        found.append(entry)
+    return found

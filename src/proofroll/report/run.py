@@ -1,0 +1,66 @@
+"""What ``proofroll run`` says."""
+
+from __future__ import annotations
+
+import dataclasses
+from pathlib import Path
+from typing import Any
+
+from proofroll.case import Case, Result
+from proofroll.events import events_of
+from proofroll.trajectory import read
+
+
+def run_content(case: Case, result: Result, trajectory: Path) -> dict[str, Any]:
+    """A run as plain data; ``final`` is the state at the last sample, empty if there is none."""
+    content: dict[str, Any] = {
+        "scene": case.scene,
+        "parameters": case.parameters,
+        "engine": case.engine.name,
+        "settings": case.engine.settings,
+        "status": result.status.value,
+        "message": result.message,
+        "until": case.until,
+        "final": {},
+        "units": {},
+        "events": [],
+        "wall_seconds": result.wall_seconds,
+        "versions": result.versions,
+        "certificate": result.certificate,
+    }
+    if result.trajectory is None:
+        return content
+    dataset = read(trajectory)
+    curves = {name: variable for name, variable in dataset.data_vars.items() if variable.dims == ("time",)}
+    content["final"] = {"time": float(dataset["time"][-1])} | {str(k): float(v[-1]) for k, v in curves.items()}
+    content["units"] = {"time": "s"} | {str(name): variable.attrs["units"] for name, variable in curves.items()}
+    content["events"] = [dataclasses.asdict(event) for event in events_of(dataset)]
+    bars = {str(k): float(v.attrs["error_bar"]) for k, v in curves.items() if "error_bar" in v.attrs}
+    if bars:
+        content["error_bars"] = bars
+    return content
+
+
+def run_lines(content: dict[str, Any]) -> list[Any]:
+    """A run for a person, as things that rich prints."""
+    from rich.table import Table
+    from rich.text import Text
+
+    settings = ", ".join(f"{key}={value}" for key, value in content["settings"].items())
+    lines: list[Any] = [Text(f"{content['scene']} in {content['engine']}" + (f" ({settings})" if settings else ""))]
+    lines.append(Text(f"{content['status']}: {content['message']}"))
+    if not content["final"]:
+        return lines
+    bars = content.get("error_bars", {})
+    table = Table(box=None, pad_edge=False)
+    table.add_column("at the end")
+    table.add_column("value", justify="right")
+    table.add_column("unit")
+    if bars:
+        table.add_column("error bar", justify="right")
+    for name, value in content["final"].items():
+        bar = [f"{bars[name]:.1e}" if name in bars else ""] if bars else []
+        table.add_row(name, f"{value:.12g}", content["units"][name], *bar)
+    lines.append(table)
+    lines.append(Text(f"{content['wall_seconds']:.3g} s of wall time"))
+    return lines

@@ -1,0 +1,91 @@
+"""The verdict table and other tables on the terminal, within 100 columns."""
+
+from __future__ import annotations
+
+from typing import Any
+
+from rich.console import Console
+from rich.table import Table
+from rich.text import Text
+
+from proofroll.metrics import OBSERVABLES
+
+WIDTH = 100
+SYMBOLS = {"agrees": "✓", "converges": "≈", "differs": "✗", "failed": "!"}
+_STYLES = {"agrees": "green", "converges": "yellow", "differs": "red", "failed": "bold red"}
+
+
+def console() -> Console:
+    """The console for data, on standard output; never wider than 100 columns."""
+    out = Console(highlight=False)
+    out.width = min(out.width, WIDTH) if out.is_terminal else WIDTH
+    return out
+
+
+def number(value: float | None, digits: int = 2) -> str:
+    """A number in few characters, a dash for none."""
+    return "–" if value is None else f"{value:.{digits}g}"
+
+
+def verdict_table(content: dict[str, Any]) -> Table:
+    """One line per engine with settings: the worst over all points of the parameters."""
+    names = columns(content)
+    table = Table(title=Text(content["title"]), title_justify="left", box=None, padding=(0, 1, 0, 0))
+    table.add_column("engine formulation setting", no_wrap=True)
+    table.add_column("step", no_wrap=True)
+    table.add_column("verdict", no_wrap=True)
+    for name, unit in names:
+        table.add_column(Text(f"{name} [{unit}]"), justify="right", no_wrap=True)
+    table.add_column("order", justify="right", no_wrap=True)
+    table.add_column("s/s", justify="right", no_wrap=True)
+    table.add_column("", no_wrap=True)
+    for row in content["rows"]:
+        verdict = row["verdict"]
+        observables = row["observables"]
+        shown = [observables[name] for name, _ in names if name in observables]
+        worst: dict[str, Any] = max(shown, key=lambda item: float(item["error"] or 0) / item["tolerance"], default={})
+        table.add_row(
+            Text(" ".join(filter(None, (row["name"], row["formulation"], row["preset"])))),
+            step(row),
+            Text(f"{SYMBOLS[verdict]} {verdict}", style=_STYLES[verdict]),
+            *(number(observables[name]["error"] if name in observables else None) for name, _ in names),
+            number(worst.get("order")),
+            number(row["seconds_per_second"]),
+            Text("") if row["as_expected"] else Text("!!", style="bold red"),
+        )
+    return table
+
+
+def step(row: dict[str, Any]) -> str:
+    """The resolution in few characters: ``1e-3 s``, or ``tol 2e-14``."""
+    if not row["resolution"]:
+        return ""
+    mantissa, _, exponent = f"{row['resolution_value']:.0e}".partition("e")
+    text = f"{mantissa}e{int(exponent)}"
+    return f"{text} s" if row["resolution"] == "dt" else f"tol {text}"
+
+
+def columns(content: dict[str, Any]) -> list[tuple[str, str]]:
+    """The observables that fit on the terminal: the coordinates of the surface and the normal force."""
+    units: dict[str, str] = {}
+    for row in content["rows"]:
+        for name, judgement in row["observables"].items():
+            units[name] = judgement["unit"]
+    coordinates = [name for name in units if name not in OBSERVABLES]
+    return [(name, units[name]) for name in (*coordinates, "N") if name in units]
+
+
+def closing_lines(content: dict[str, Any]) -> list[str]:
+    """What to look at first, in words."""
+    rows = content["rows"]
+    counts = {verdict: sum(row["verdict"] == verdict for row in rows) for verdict in SYMBOLS}
+    said = ", ".join(f"{count} {verdict}" for verdict, count in counts.items() if count)
+    lines = [f"{len(rows)} engine settings over {len(content['runs']) // max(1, len(rows))} cases each: {said}."]
+    if content["contradictions"]:
+        lines.append(
+            f"{len(content['contradictions'])} findings contradict what {content['name']} expects (!! above); first:"
+        )
+        lines += [f"  {sentence}" for sentence in content["contradictions"][:5]]
+    else:
+        lines.append("Every verdict is as the comparison file expects.")
+    return lines

@@ -1,0 +1,37 @@
+"""One run, as the command line asks for it."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+
+from proofroll.case import Case
+from proofroll.errors import InputError, ProofrollError
+from proofroll.registry import parse_engine
+from proofroll.runner import resolve
+from proofroll.scene_file import load_scene
+
+
+def single_case(
+    scene: str, parameters: Mapping[str, object], engine: str, *, until: float, every: float, time_limit: float
+) -> Case:
+    """The case of one run.
+
+    Raises:
+        InputError, Missing: something that was given does not exist or makes no sense.
+    """
+    if not time_limit > 0:
+        raise InputError("time_limit", time_limit, "give a positive time in s")
+    spec = parse_engine(engine)
+    loaded = load_scene(scene, **parameters)  # type: ignore[arg-type]  # text is checked and converted there
+    facts = resolve([(spec.name, spec.options)])[0]
+    if isinstance(facts, ProofrollError):
+        raise facts
+    return Case(
+        scene=scene,
+        parameters={name: loaded.parameters[name] for name in parameters},
+        scene_digest=loaded.digest,
+        engine=facts,
+        until=until,
+        every=every,
+        time_limit=time_limit,
+    )

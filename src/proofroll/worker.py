@@ -1,0 +1,214 @@
+"""The process in which engines run: one request a line on standard input, one answer a line on a private pipe.
+
+``python -m proofroll.worker FD`` serves requests until its input ends. What an engine prints cannot reach the
+answers, and what an engine breaks costs only this process.
+"""
+
+from __future__ import annotations
+
+import dataclasses
+import gc
+import hashlib
+import inspect
+import json
+import os
+import platform
+import statistics
+import sys
+import time
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any
+
+import proofroll
+from proofroll.case import Case, EngineFacts, Result, Status
+from proofroll.errors import Diverged, InputError, Missing, Refused
+
+# Everything whose change may change a result; reports and command line are not among it.
+_FOUNDATION = (
+    "case.py",
+    "certificate.py",
+    "engine.py",
+    "events.py",
+    "mechanics.py",
+    "recording.py",
+    "scene.py",
+    "scene_file.py",
+    "surfaces.py",
+    "trajectory.py",
+    "worker.py",
+)
+# A clean run shorter than this is repeated, up to five times, so that its median means something.
+_TIMED_SECONDS = 0.3
+_TIMED_RUNS = 5
+
+
+def main(answers: int) -> None:
+    """Serves requests; ``answers`` is the file descriptor for the answers."""
+    with os.fdopen(answers, "w", encoding="utf-8") as pipe:
+        for line in sys.stdin:
+            pipe.write(json.dumps(_answer(json.loads(line))) + "\n")
+            pipe.flush()
+
+
+def _answer(request: dict[str, Any]) -> dict[str, Any]:
+    actions: dict[str, Callable[..., dict[str, Any]]] = {"describe": describe, "resolve": resolve, "run": run}
+    action = actions[request.pop("do")]
+    try:
+        return action(**request)
+    except InputError as error:
+        return {"error": "input", "field": error.field, "value": str(error.value), "advice": error.advice}
+    except Missing as error:
+        return {"error": "missing", "message": str(error)}
+    except Exception as error:
+        return {"error": "crashed", "message": one_line(error)}
+
+
+def describe(engine: str) -> dict[str, Any]:
+    """What an engine is and provides."""
+    from proofroll.registry import load_engine
+
+    kind = load_engine(engine)
+    presets = {
+        formulation: {preset: dataclasses.asdict(settings) for preset, settings in by_preset.items()}
+        for formulation, by_preset in kind.presets.items()
+    }
+    return {
+        "name": engine,
+        "version": kind.version(),
+        "provides": sorted(kind.provides),
+        "presets": presets,
+        "summary": (inspect.getdoc(kind) or "").split("\n", 1)[0],
+    }
+
+
+def resolve(engine: str, options: dict[str, Any]) -> dict[str, Any]:
+    """Complete settings of an engine, and what else decides its results."""
+    if engine == "truth":
+        if options:
+            raise InputError("truth", ", ".join(options), "the truth has no settings; leave them out")
+        code = _digest([Path(proofroll.__file__).parent / "truth"])
+        return dataclasses.asdict(EngineFacts("truth", proofroll.__version__, code, {}))
+    from proofroll.registry import load_engine, resolve_settings
+
+    kind = load_engine(engine)
+    settings = resolve_settings(kind, options)
+    source = Path(inspect.getfile(kind))
+    package = source.parent.name == engine
+    facts = EngineFacts(
+        name=engine,
+        version=kind.version(),
+        code=_digest([source.parent if package else source]),
+        settings=dataclasses.asdict(settings),
+        resolution=settings.resolution,
+        order=settings.order,
+    )
+    return dataclasses.asdict(facts)
+
+
+def _digest(sources: list[Path]) -> str:
+    """Hash of the adapter's files and of the modules that every result rests on."""
+    root = Path(proofroll.__file__).parent
+    files = [root / name for name in _FOUNDATION if (root / name).is_file()]
+    for source in sources:
+        files += sorted(source.rglob("*.py")) if source.is_dir() else [source]
+    content = hashlib.sha256()
+    for file in files:
+        content.update(file.read_bytes())
+    return content.hexdigest()[:16]
+
+
+def run(case: dict[str, Any], out: str) -> dict[str, Any]:
+    """Runs a case and writes its trajectory to ``out``; everything the case says comes back as a result."""
+    try:
+        return dataclasses.asdict(_run(Case.from_dict(case), Path(out)))
+    finally:
+        gc.collect()  # the next case of this process starts clean
+
+
+def _run(case: Case, out: Path) -> Result:
+    from proofroll.certificate import certify, first_difference
+    from proofroll.recording import record, time_grid
+    from proofroll.registry import load_engine, resolve_settings
+    from proofroll.scene_file import load_scene
+    from proofroll.trajectory import write
+
+    versions = {case.engine.name: case.engine.version, "proofroll": proofroll.__version__}
+    versions["python"] = platform.python_version()
+    scene = load_scene(case.scene, **case.parameters)
+    times = time_grid(case.until, case.every)
+    if case.engine.name == "truth":
+        return _run_truth(scene, times, out, versions)
+    kind = load_engine(case.engine.name)
+    settings = resolve_settings(kind, case.engine.settings)
+    lacking = scene.requires - kind.provides
+    if lacking:
+        return Result(Status.REFUSED, "needs " + ", ".join(sorted(lacking)), versions=versions)
+    try:
+        engine = kind.build(scene, settings)
+        certificate = certify(engine, scene)
+        difference = first_difference(certificate)
+        lines = [{**dataclasses.asdict(line), "holds": line.holds} for line in certificate]
+        if difference is not None:
+            return Result(Status.REFUSED, difference, certificate=lines, versions=versions)
+        recording = record(engine, scene, times)
+        del engine
+    except Refused as error:
+        return Result(Status.REFUSED, str(error), versions=versions)
+    except Diverged as error:
+        return Result(Status.DIVERGED, str(error), versions=versions)
+    timings: list[float] = []
+    if recording.failure is None and case.timed and case.until > 0:
+        timings = _clean_runs(kind, scene, settings, case.until)
+    result = Result(
+        status=Status.DONE if recording.failure is None else Status.DIVERGED,
+        message=recording.failure or f"reached {case.until:g} s",
+        wall_seconds=recording.wall_seconds,
+        seconds_per_second=statistics.median(timings) / case.until if timings else None,
+        timings=timings,
+        certificate=lines,
+        versions=versions,
+        trajectory=out.name,
+    )
+    manifest = {"status": result.status.value, "message": result.message, "wall_seconds": result.wall_seconds}
+    manifest |= {"engine": case.engine.name, "settings": json.dumps(case.engine.settings, sort_keys=True)}
+    manifest |= {"parameters": json.dumps(dict(scene.parameters)), "versions": json.dumps(versions)}
+    manifest |= {"machine": f"{platform.machine()} {platform.system()}"}
+    write(recording.dataset.assign_attrs(manifest), out)
+    return result
+
+
+def _run_truth(scene: Any, times: Any, out: Path, versions: dict[str, str]) -> Result:
+    from proofroll.trajectory import write
+    from proofroll.truth import truth
+
+    start = time.perf_counter()
+    try:
+        dataset = truth(scene, times)
+    except Refused as error:
+        return Result(Status.REFUSED, str(error), versions=versions)
+    wall = time.perf_counter() - start
+    message = f"{dataset.attrs['route']}, checked by {dataset.attrs['second_route']}"
+    write(dataset.assign_attrs(status="done", message=message, engine="truth", wall_seconds=wall), out)
+    return Result(Status.DONE, message, wall_seconds=wall, versions=versions, trajectory=out.name)
+
+
+def _clean_runs(kind: Any, scene: Any, settings: Any, until: float) -> list[float]:
+    """Wall seconds of runs that only advance, each on an engine built for it."""
+    timings: list[float] = []
+    while len(timings) < _TIMED_RUNS and sum(timings) < _TIMED_SECONDS:
+        engine = kind.build(scene, settings)
+        start = time.perf_counter()
+        engine.advance(until)
+        timings.append(time.perf_counter() - start)
+    return timings
+
+
+def one_line(error: BaseException) -> str:
+    """Kind and text of an exception in one line."""
+    text = " ".join(str(error).split())
+    return f"{type(error).__name__}: {text}"[:400] if text else type(error).__name__
+
+
+if __name__ == "__main__":
+    main(int(sys.argv[1]))

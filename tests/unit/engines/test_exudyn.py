@@ -1,0 +1,281 @@
+from __future__ import annotations
+
+import dataclasses
+from typing import Any
+
+import numpy as np
+import pytest
+
+from proofroll import load_scene
+from proofroll.certificate import certify
+from proofroll.errors import Diverged, InputError, Refused
+from proofroll.registry import resolve_settings
+from proofroll.scene import Scene
+from proofroll.simulation import build, simulate
+from proofroll.surfaces import Cylinder
+
+pytest.importorskip("exudyn")
+
+FORMULATIONS = ("generic", "carrier", "rolling_disc")
+UNTIL = 0.5
+
+
+def cylinder(**parameters: float) -> Scene:
+    """The cylinder scene at V0 = 4 m/s."""
+    return load_scene("sphere_in_cylinder", **{"speed": 4, **parameters})
+
+
+def plane(**parameters: float) -> Scene:
+    """The plane scene, with a motion across the slope."""
+    return load_scene("inclined_plane", **{"tilt": 0.35, "cross_speed": 0.2, **parameters})
+
+
+def errors(scene: Scene, formulation: str, dt: float, **settings: Any) -> dict[str, float]:
+    """Largest difference from the truth over UNTIL seconds."""
+    run = simulate(scene, "exudyn", until=UNTIL, every=0.05, formulation=formulation, dt=dt, **settings)
+    truth = simulate(scene, "truth", until=UNTIL, every=0.05)
+    assert run.attrs["status"] == "done"
+    common = [name for name in ("gamma", "z", "down", "across", "N", "F2", "F3", "energy", "gap") if name in run]
+    return {name: float(np.abs(run[name].values - truth[name].values).max()) for name in common}
+
+
+# Twice what was measured at this step; the errors fall as dt², and energy follows the spin's. Weight is 5 N, N is 41 N.
+BOUNDS = {
+    "generic": {"z": 1e-5, "N": 1e-5, "F2": 1e-5, "F3": 8e-4, "energy": 1e-5, "gap": 1e-13},
+    "carrier": {"z": 1.1e-3, "N": 0.03, "F2": 0.02, "F3": 0.06, "energy": 7e-3, "gap": 5e-5},
+    "rolling_disc": {"z": 1e-3, "N": 0.05, "F2": 0.2, "F3": 0.05, "energy": 8e-3, "gap": 1e-5},
+}
+
+
+@pytest.mark.parametrize("formulation", FORMULATIONS)
+@pytest.mark.parametrize("f", [0.0, 5e-4])
+def test_path_and_reactions_are_near_the_truth(formulation: str, f: float) -> None:
+    """At dt = 1e-3 s every formulation gives path, reactions and energy within twice its measured error."""
+    found = errors(cylinder(rolling_resistance=f), formulation, 1e-3)
+    for name, bound in BOUNDS[formulation].items():
+        assert found[name] < bound, name
+
+
+@pytest.mark.parametrize("formulation", FORMULATIONS)
+def test_second_order(formulation: str) -> None:
+    """Halving the step divides the error of z by four, as the settings declare."""
+    scene = cylinder(rolling_resistance=5e-4)
+    coarse, fine = (errors(scene, formulation, dt)["z"] for dt in (1e-3, 5e-4))
+    assert np.log2(coarse / fine) == pytest.approx(2.0, abs=0.05)
+
+
+def test_generic_reaches_the_truth_with_small_steps() -> None:
+    """At dt = 1e-4 s minimal coordinates leave 2e-7 m, the trapezoidal rule's own error, over 2 s."""
+    scene = cylinder()
+    run = simulate(scene, "exudyn", until=2, every=0.1, formulation="generic", dt=1e-4)
+    truth = simulate(scene, "truth", until=2, every=0.1)
+    assert float(np.abs(run.z - truth.z).max()) < 2e-7
+
+
+SCENES = [
+    cylinder(),
+    cylinder(rolling_resistance=5e-4, axial_speed=0.3, radial_spin=5),
+    cylinder(speed=-4, radial_spin=-20),
+    plane(),
+    plane(rolling_resistance=5e-4, normal_spin=5),
+    plane(speed=0, cross_speed=0, rolling_resistance=5e-4),
+]
+
+
+@pytest.mark.parametrize("formulation", FORMULATIONS)
+@pytest.mark.parametrize("scene", SCENES, ids=range(len(SCENES)))
+def test_certificate_holds_to_round_off(formulation: str, scene: Scene) -> None:
+    """Every formulation builds what the scene says, with accelerations and reactions at time 0, on both scenes."""
+    lines = certify(build(scene, "exudyn", formulation=formulation), scene)
+    assert [line for line in lines if not line.holds] == []
+    assert {"mass", "inertia", "gravity", "ball radius", "acceleration", "N", "F2", "F3"} <= {x.quantity for x in lines}
+
+
+@pytest.mark.parametrize("formulation", FORMULATIONS)
+def test_plane(formulation: str) -> None:
+    """On the inclined plane, across its slope and with resistance, the ball stays within 5 mm after 1.3 m."""
+    found = errors(plane(rolling_resistance=5e-4), formulation, 1e-3)
+    # Euler parameters of a ball that spins faster and faster: (ω dt)² of the path.
+    assert max(found["down"], found["across"]) < (1e-7 if formulation == "generic" else 5e-4)
+
+
+def tilted(scene: Scene, angle: float) -> Scene:
+    """The same scene with the wall tilted [rad]."""
+    (wall,) = scene.surfaces
+    return dataclasses.replace(scene, surfaces=(dataclasses.replace(wall, tilt=angle),))
+
+
+@pytest.mark.parametrize("formulation", FORMULATIONS)
+def test_tilted_cylinder(formulation: str) -> None:
+    """With the cylinder tilted, where gravity turns around in the local frame, the energy stays and all agree."""
+    scene = tilted(cylinder(), 0.3)
+    assert all(line.holds for line in certify(build(scene, "exudyn", formulation=formulation), scene))
+    run, reference = (
+        simulate(scene, "exudyn", until=UNTIL, every=0.1, formulation=name, dt=5e-4)
+        for name in (formulation, "generic")
+    )
+    assert float(np.abs(run.energy - run.energy[0]).max()) < 2e-3
+    assert float(np.abs(run.p_WB - reference.p_WB).max()) < 1e-3
+
+
+class Foreign(Cylinder):
+    """A cylinder that does not tell how it slides along itself."""
+
+    @property
+    def generators(self) -> None:  # type: ignore[override]
+        """Unknown."""
+        return None
+
+
+def test_wall_without_generators() -> None:
+    """Only the rolling disc can do without generators, and gives the same numbers; the others refuse with a reason."""
+    scene = cylinder(rolling_resistance=5e-4)
+    foreign = dataclasses.replace(scene, surfaces=(Foreign("wall", 0.225),))
+    foreign.rolling.__dict__["surface"] = Foreign("wall", foreign.rolling.surface.radius)
+    for formulation in ("generic", "carrier"):
+        with pytest.raises(Refused, match="slide along itself"):
+            build(foreign, "exudyn", formulation=formulation)
+    ends = []
+    for each in (scene, foreign):
+        engine = build(each, "exudyn", formulation="rolling_disc", dt=1e-3)
+        engine.advance(0.05)
+        ends.append(engine.sample().p_WB)
+    np.testing.assert_allclose(ends[1], ends[0], atol=1e-10)
+
+
+@pytest.mark.parametrize("formulation", FORMULATIONS)
+def test_interrupted_run_is_the_same_run(formulation: str) -> None:
+    """Stopping for samples loses nothing: state and reactions equal those of one uninterrupted run."""
+    scene = cylinder(rolling_resistance=5e-4)
+    once, often = (build(scene, "exudyn", formulation=formulation, dt=1e-3) for _ in range(2))
+    once.advance(0.3)
+    for t in (0.001, 0.05, 0.05, 0.127, 0.3):
+        often.advance(t)
+        often.sample()
+        often.built()
+    # What differs is only how often Newton's Jacobian is set up, so the tolerance of Newton's method bounds it.
+    np.testing.assert_allclose(often.sample().p_WB, once.sample().p_WB, atol=1e-9)
+    np.testing.assert_allclose(often.sample().force, once.sample().force, atol=1e-6)
+
+
+@pytest.mark.parametrize("formulation", FORMULATIONS)
+def test_rebuild_and_sample_change_nothing(formulation: str) -> None:
+    """Two builds give the same bits, and sampling twice gives the same sample."""
+    scene = cylinder(rolling_resistance=5e-4)
+    one, two = (build(scene, "exudyn", formulation=formulation, dt=1e-3) for _ in range(2))
+    for engine in (one, two):
+        engine.advance(0.1)
+    for first, second in ((one.sample(), two.sample()), (one.sample(), one.sample())):
+        for name in ("p_WB", "v_WB", "w_WB", "force"):
+            np.testing.assert_array_equal(getattr(first, name), getattr(second, name))
+
+
+@pytest.mark.parametrize("formulation", ["carrier", "rolling_disc"])
+@pytest.mark.parametrize(("f", "loads"), [(0.0, 1), (5e-4, 2)])
+def test_no_resistance_no_load(formulation: str, f: float, loads: int) -> None:
+    """Without rolling resistance the model holds the ball's weight as its only load."""
+    engine = build(cylinder(rolling_resistance=f), "exudyn", formulation=formulation)
+    assert engine._model.system.systemData.NumberOfLoads() == loads
+
+
+def test_carrier_weighs_nothing() -> None:
+    """The carrier has no mass and no inertia, so nothing has to be made small."""
+    engine = build(cylinder(), "exudyn", formulation="carrier")
+    model = engine._model
+    carrier = model.system.GetObject(model.carrier)
+    assert carrier["mass"] == 0
+    assert not np.any(carrier["inertia"])
+
+
+@pytest.mark.parametrize("formulation", ["carrier", "rolling_disc"])
+def test_too_large_a_step_diverges(formulation: str) -> None:
+    """A ball that turns by 1.6 rad per step with the engine's default damping ends in one sentence, not in numbers."""
+    engine = build(cylinder(), "exudyn", formulation=formulation, preset="default", dt=0.01)
+    with pytest.raises(Diverged, match=r"Newton's method did not converge; use a smaller dt") as raised:
+        engine.advance(1.0)
+    assert "\n" not in str(raised.value)
+
+
+@pytest.mark.parametrize("formulation", FORMULATIONS)
+def test_default_preset_is_the_engines_default(formulation: str) -> None:
+    """The preset `default` leaves integrator, damping and Newton options as a new SimulationSettings has them."""
+    import exudyn
+
+    own = exudyn.SimulationSettings().timeIntegration
+    model = build(cylinder(), "exudyn", formulation=formulation, preset="default")._model
+    built = model.integration.options.timeIntegration
+    for group, names in (
+        ("newton", ("relativeTolerance", "absoluteTolerance", "useModifiedNewton", "modifiedNewtonJacUpdatePerStep")),
+        ("generalizedAlpha", ("spectralRadius", "useNewmark", "useIndex2Constraints")),
+    ):
+        for name in names:
+            assert getattr(getattr(built, group), name) == getattr(getattr(own, group), name), name
+
+
+@pytest.mark.parametrize(
+    ("options", "words"),
+    [
+        ({"dt": 0}, "dt"),
+        ({"dt": "fast"}, "dt"),
+        ({"formulation": "mesh"}, "choose one of generic, carrier, rolling_disc"),
+        ({"formulation": "generic", "preset": "tuned"}, "generic has default, matched"),
+        ({"spectral_radius": 1.5}, "spectral_radius"),
+        ({"integrator": "euler"}, "integrator"),
+        ({"newton_tolerance": 2}, "newton_tolerance"),
+        ({"step": 1e-3}, "no such setting"),
+    ],
+)
+def test_wrong_settings_give_one_clear_line(options: dict[str, Any], words: str) -> None:
+    """A wrong setting names itself and what to do, on one line."""
+    with pytest.raises(InputError, match=words) as raised:
+        build(cylinder(), "exudyn", **options)
+    assert "\n" not in str(raised.value)
+
+
+def test_step_that_does_not_divide_the_interval() -> None:
+    """A step that misses the sample time is refused instead of being rounded."""
+    with pytest.raises(InputError, match="divides the interval"):
+        build(cylinder(), "exudyn", dt=3e-3).advance(0.01)
+
+
+def test_every_preset_is_complete() -> None:
+    """Each preset carries its own formulation and name, and resolves to itself."""
+    from proofroll.engines.exudyn import Exudyn
+
+    for formulation, presets in Exudyn.presets.items():
+        for name, settings in presets.items():
+            assert resolve_settings(Exudyn, {"formulation": formulation, "preset": name}) == settings
+
+
+def test_timeout_of_the_engine_is_noticed() -> None:
+    """Exudyn reports success when its own timeout stops it; here it is a divergence with a sentence."""
+    import exudyn
+
+    engine = build(cylinder(), "exudyn", formulation="generic", dt=1e-4)
+    exudyn.special.solver.timeout = 1e-4
+    try:
+        with pytest.raises(Diverged, match="timeout"):
+            engine.advance(1.0)
+    finally:
+        exudyn.special.solver.timeout = -1
+
+
+def test_error_in_a_callback_is_a_sentence() -> None:
+    """An exception inside a function that Exudyn calls ends the run with one line that names it."""
+    engine = build(cylinder(), "exudyn", formulation="rolling_disc", dt=1e-3)
+
+    def broken(*_: Any) -> None:
+        raise ArithmeticError("no normal here")
+
+    engine._model.system.SetPreNewtonResidualUserFunction(broken)
+    with pytest.raises(Diverged, match="no normal here") as raised:
+        engine.advance(0.1)
+    assert "\n" not in str(raised.value)
+
+
+def test_silent(capfd: pytest.CaptureFixture[str]) -> None:
+    """Nothing is printed, not even by Exudyn's own code and not when it fails."""
+    for formulation in FORMULATIONS:
+        build(cylinder(), "exudyn", formulation=formulation, dt=1e-3).advance(0.01)
+    out, err = capfd.readouterr()
+    assert out + err == ""

@@ -1,0 +1,354 @@
+"""MuJoCo against the truth: accuracy, order, what was built, and what must not happen."""
+
+from __future__ import annotations
+
+import dataclasses
+import functools
+
+import mujoco
+import numpy as np
+import pytest
+
+from proofroll.certificate import certify, first_difference
+from proofroll.engine import Sample
+from proofroll.engines.mujoco import Mujoco
+from proofroll.engines.mujoco.settings import PRESETS
+from proofroll.errors import Diverged, InputError, Refused
+from proofroll.recording import record, time_grid
+from proofroll.scene import Scene
+from proofroll.scene_file import load_scene
+from proofroll.simulation import build, simulate
+from proofroll.surfaces import Cylinder
+
+CYLINDER, PLANE = "sphere_in_cylinder", "inclined_plane"
+MODELS = [(formulation, preset) for formulation, presets in PRESETS.items() for preset in presets]
+ON_BOTH = [(formulation, preset) for formulation, preset in MODELS if formulation != "facets"]
+
+
+@functools.cache
+def truth(scene: str, until: float, **parameters: float):
+    """The true trajectory, computed once for all tests."""
+    return simulate(load_scene(scene, **parameters), "truth", until=until, every=0.05)
+
+
+def error(scene: str, engine: str, variable: str, *, until: float = 1.0, signed: bool = False, **parameters: float):
+    """Largest difference from the truth, or the difference at each sample."""
+    run = simulate(load_scene(scene, **parameters), f"mujoco[{engine}]", until=until, every=0.05)
+    assert run.status == "done", run.message
+    difference = (run[variable] - truth(scene, until, **parameters)[variable]).to_numpy()
+    return difference if signed else float(np.max(np.abs(difference)))
+
+
+def numbers(sample: Sample) -> np.ndarray:
+    """Everything in a sample as one row."""
+    return np.concatenate([sample.p_WB, sample.v_WB, sample.w_WB, sample.q_WB, sample.force])
+
+
+# z's range is 0.12 m. Each bound is about 1.5 times what MuJoCo 4.0 gives, so that a change of the method is seen.
+@pytest.mark.parametrize(
+    ("engine", "f", "bound"),
+    [
+        ("formulation=chart,dt=1e-3", 0.0, 6e-5),
+        ("formulation=chart,dt=1e-3", 5e-4, 6e-5),
+        ("formulation=chart,dt=2.5e-4", 0.0, 2e-6),
+        ("formulation=chart,dt=2.5e-4", 5e-4, 2e-6),
+        ("formulation=free,preset=tuned,dt=1e-3", 0.0, 1.3e-4),
+        ("formulation=free,preset=tuned,dt=1e-3", 5e-4, 1.3e-4),
+        ("formulation=free,preset=tuned,dt=2.5e-4", 0.0, 7e-6),
+        ("formulation=free,dt=1e-3", 0.0, 3.5e-2),
+        ("formulation=chart,preset=default", 0.0, 5e-4),
+    ],
+)
+def test_height_is_as_accurate_as_the_formulation_allows(engine: str, f: float, bound: float) -> None:
+    """The height in the cylinder stays within the bound measured for the formulation and step."""
+    assert error(CYLINDER, engine, "z", until=2.0, rolling_resistance=f) < bound
+
+
+@pytest.mark.parametrize("engine", ["formulation=chart,dt=5e-4", "formulation=free,preset=tuned,dt=5e-4"])
+@pytest.mark.parametrize("f", [0.0, 5e-4])
+def test_reactions_are_the_truths(engine: str, f: float) -> None:
+    """N, F2 and F3 as MuJoCo computed them agree with the truth within 0.15 % of the normal force (41 N)."""
+    # F3 of the chart carries b = 1/dt times the slip that is left, an error of first order: 6 mN at this step.
+    for variable in ("N", "F2", "F3"):
+        assert error(CYLINDER, engine, variable, rolling_resistance=f) < 0.06
+    # The weight's share is 1.45 N: this bound sees a doubled inertia, which would change it by 0.8 N.
+    assert error(CYLINDER, engine, "F3", rolling_resistance=f) < 0.01
+
+
+@pytest.mark.parametrize(
+    ("parameters", "bound"),
+    [
+        ({"speed": 6.0, "rolling_resistance": 5e-4}, 3e-4),
+        ({"speed": -4.0, "rolling_resistance": 5e-4}, 2e-4),
+        ({"axial_speed": 0.3, "radial_spin": 5.0, "rolling_resistance": 5e-4}, 2e-4),
+    ],
+)
+@pytest.mark.parametrize("engine", ["formulation=chart", "formulation=free,preset=tuned"])
+def test_other_motions_in_the_cylinder(engine: str, parameters: dict[str, float], bound: float) -> None:
+    """Fast, backwards and spinning starts are as accurate as the plain one."""
+    assert error(CYLINDER, engine, "z", **parameters) < bound
+
+
+@pytest.mark.parametrize("f", [0.0, 5e-4])
+@pytest.mark.parametrize(("engine", "bound"), [("formulation=chart", 1e-6), ("formulation=free,preset=tuned", 1e-6)])
+def test_plane_through_the_same_code(engine: str, bound: float, f: float) -> None:
+    """On the tilted plane the ball is where the truth says to a micrometre, with and without rolling resistance."""
+    for variable in ("down", "across"):
+        assert error(PLANE, engine, variable, rolling_resistance=f) < bound
+
+
+@pytest.mark.parametrize(
+    ("engine", "coarse"),
+    [("formulation=chart", 1e-3), ("formulation=free,preset=tuned", 1e-3), ("formulation=free", 4e-4)],
+)
+def test_declared_order_is_the_measured_one(engine: str, coarse: float) -> None:
+    """Halving the step twice reduces the error of z at the declared order (a little faster for the chart)."""
+    options = dict(part.split("=") for part in engine.split(","))
+    declared = PRESETS[options["formulation"]][options.get("preset", "matched")].order
+    errors = [error(CYLINDER, f"{engine},dt={coarse / 2**k:g}", "z") for k in range(3)]
+    measured = np.log2(errors[0] / errors[2]) / 2
+    # The chart's RK4 error (h³…h⁴) still shows at 1e-3; below 1e-4 the impedance of 0.9999 is all that is left.
+    assert declared - 0.1 < measured < declared + (0.9 if declared == 2 else 0.1)
+
+
+def test_limit_of_small_steps_of_the_documented_model() -> None:
+    """The free ball with documented options is off by centimetres, but its limit of small steps is the truth."""
+    h4, h2, h1 = (error(CYLINDER, f"formulation=free,dt={dt:g}", "z", signed=True) for dt in (4e-4, 2e-4, 1e-4))
+    first_order_removed = (2 * h2 - h4, 2 * h1 - h2)
+    limit = (4 * first_order_removed[1] - first_order_removed[0]) / 3
+    assert np.max(np.abs(h1)) > 1e-3
+    assert np.max(np.abs(limit)) < 3e-5
+
+
+def test_default_contact_is_wrong_at_every_step() -> None:
+    """With MuJoCo's default contact the free ball is decimetres off, and a smaller step does not help."""
+    for dt in (2e-3, 5e-4):
+        assert 0.1 < error(CYLINDER, f"formulation=free,preset=default,dt={dt:g}", "z", until=2.0) < 0.4
+
+
+def test_facets_are_useless_and_say_so_by_their_numbers() -> None:
+    """The ring of boxes loses most of the energy: a row of the report, not a model."""
+    assert error(CYLINDER, "formulation=facets", "energy", until=2.0) > 1.0
+
+
+@pytest.mark.parametrize(("formulation", "preset"), MODELS)
+@pytest.mark.parametrize(
+    "parameters",
+    [
+        {},
+        {"rolling_resistance": 5e-4, "speed": 6.0},
+        {"rolling_resistance": 5e-4, "speed": -2.0, "axial_speed": 0.3, "radial_spin": 5.0},
+        {"radius": 0.05, "mass": 2.0, "gravity": 1.6},
+    ],
+)
+def test_certificate_holds_in_the_cylinder(formulation: str, preset: str, parameters: dict[str, float]) -> None:
+    """What MuJoCo built is what the scene says, within the tolerances that softness explains."""
+    scene = load_scene(CYLINDER, **parameters)
+    engine = build(scene, f"mujoco[formulation={formulation},preset={preset}]")
+    assert first_difference(certify(engine, scene)) is None
+
+
+@pytest.mark.parametrize(("formulation", "preset"), ON_BOTH)
+@pytest.mark.parametrize(
+    "parameters",
+    [
+        {},
+        {"tilt": 0.0, "rolling_resistance": 5e-4},
+        {"tilt": -1.2, "speed": 0.0, "cross_speed": 0.0, "normal_spin": 5.0},
+    ],
+)
+def test_certificate_holds_on_the_plane(formulation: str, preset: str, parameters: dict[str, float]) -> None:
+    """What MuJoCo built is what the scene says, within the tolerances that softness explains."""
+    scene = load_scene(PLANE, **parameters)
+    engine = build(scene, f"mujoco[formulation={formulation},preset={preset}]")
+    assert first_difference(certify(engine, scene)) is None
+
+
+@pytest.mark.parametrize("engine", ["formulation=chart", "formulation=free", "formulation=free,preset=tuned"])
+def test_certificate_sees_a_doubled_inertia(engine: str) -> None:
+    """The tolerances are tight enough that a ball of twice the inertia fails by inertia, acceleration and F3."""
+    scene = load_scene(CYLINDER)
+    heavy = dataclasses.replace(scene, balls=(dataclasses.replace(scene.balls[0], inertia_ratio=0.8),))
+    failed = {line.quantity for line in certify(build(heavy, f"mujoco[{engine}]"), scene) if not line.holds}
+    assert {"inertia", "acceleration", "F3"} <= failed
+
+
+@pytest.mark.parametrize("engine", ["formulation=chart", "formulation=free,preset=tuned"])
+def test_tilted_cylinder_through_the_same_code(engine: str) -> None:
+    """A cylinder whose axis leans is built and run by the same adapter from the same file."""
+    scene = load_scene(CYLINDER, rolling_resistance=5e-4)
+    leaning = dataclasses.replace(scene, surfaces=(Cylinder("wall", scene.surfaces[0].radius, tilt=0.3),))
+    assert isinstance(leaning, Scene)
+    built = build(leaning, f"mujoco[{engine}]")
+    assert first_difference(certify(built, leaning)) is None
+    true = simulate(leaning, "truth", until=0.5, every=0.05)
+    run = record(built, leaning, time_grid(0.5, 0.05)).dataset
+    assert float(np.max(np.abs(run.z - true.z))) < 1e-4
+
+
+def test_leaning_ring_of_boxes_stands_where_the_wall_is() -> None:
+    """Each box of the facets touches the wall from outside, whatever the wall's tilt."""
+    scene = load_scene(CYLINDER)
+    leaning = dataclasses.replace(scene, surfaces=(Cylinder("wall", scene.surfaces[0].radius, tilt=0.3),))
+    model = build(leaning, "mujoco[formulation=facets]")._model
+    data = mujoco.MjData(model)
+    mujoco.mj_kinematics(model, data)
+    boxes = [index for index in range(model.ngeom) if model.geom_type[index] == mujoco.mjtGeom.mjGEOM_BOX]
+    faces = np.array([data.geom_xpos[i] - model.geom_size[i, 0] * data.geom_xmat[i, 0::3] for i in boxes])
+    assert np.max(np.abs(leaning.rolling.wall.gap(faces))) < 1e-12
+    angles = np.sort(leaning.rolling.wall.locate(faces)[:, 0])
+    np.testing.assert_allclose(np.diff(angles), 2 * np.pi / len(boxes), rtol=1e-9)
+
+
+@pytest.mark.parametrize(
+    ("scene", "formulation", "preset"),
+    [
+        (CYLINDER, "chart", "matched"),
+        (CYLINDER, "free", "default"),
+        (CYLINDER, "facets", "default"),
+        (PLANE, "chart", "matched"),
+        (PLANE, "free", "default"),
+    ],
+)
+def test_numbers_in_the_files_are_the_scenes(scene: str, formulation: str, preset: str) -> None:
+    """The MJCF file, opened alone, is the model that the adapter builds from the scene's defaults."""
+    loaded = load_scene(scene)
+    alone = mujoco.MjModel.from_xml_path(str(loaded.folder / f"mujoco_{formulation}.xml"))
+    engine = build(loaded, f"mujoco[formulation={formulation},preset={preset}]")
+    ours = engine._model
+    compared = 0
+    for owner, other in ((alone, ours), (alone.opt, ours.opt)):
+        for name in dir(owner):
+            value = getattr(owner, name)
+            if not name.startswith("_") and isinstance(value, (int, float, np.ndarray)):
+                np.testing.assert_allclose(value, getattr(other, name), rtol=1e-9, atol=1e-11, err_msg=name)
+                compared += 1
+    assert compared > 200
+    # The adapter starts at the depth that carries the load, at most 1e-7 m, and with the spin that rolls there.
+    np.testing.assert_allclose(alone.key_qpos[0], engine._data.qpos, atol=1e-7)
+    np.testing.assert_allclose(alone.key_qvel[0], engine._data.qvel, rtol=1e-6, atol=1e-4)
+
+
+def test_model_contains_only_what_the_scene_requires() -> None:
+    """Without rolling resistance there is no torque, no callback for one and no memory; friction has no torsion."""
+    plain = build(load_scene(CYLINDER), "mujoco")
+    plain.advance(0.01)
+    assert not np.any(plain._data.xfrc_applied)
+    assert plain._model.nuserdata == 0
+    assert np.all(plain._model.geom_condim == 3)
+    assert np.all(plain._model.geom_friction[:, 1:] == 0)
+    assert plain._model.njnt == 4
+    resisted = build(load_scene(CYLINDER, rolling_resistance=5e-4), "mujoco")
+    assert np.any(resisted._data.xfrc_applied)
+
+
+@pytest.mark.parametrize(("formulation", "preset"), MODELS)
+def test_rebuilding_gives_the_same_numbers(formulation: str, preset: str) -> None:
+    """Two builds of the same scene give the same numbers to the last bit."""
+    scene = load_scene(CYLINDER, rolling_resistance=5e-4)
+    runs = []
+    for _ in range(2):
+        engine = build(scene, f"mujoco[formulation={formulation},preset={preset}]")
+        engine.advance(0.1)
+        runs.append(numbers(engine.sample()))
+    np.testing.assert_array_equal(*runs)
+
+
+@pytest.mark.parametrize(("formulation", "preset"), MODELS)
+def test_sampling_changes_nothing(formulation: str, preset: str) -> None:
+    """A run that is sampled often and a run that is not end in the same state."""
+    scene = load_scene(CYLINDER, rolling_resistance=5e-4)
+    often, once = (build(scene, f"mujoco[formulation={formulation},preset={preset}]") for _ in range(2))
+    for step in range(1, 11):
+        often.advance(0.01 * step)
+        often.sample()
+        often.built()
+    once.advance(0.1)
+    np.testing.assert_array_equal(numbers(often.sample()), numbers(once.sample()))
+
+
+@pytest.mark.parametrize("formulation", ["chart", "free"])
+def test_two_engines_in_one_process_do_not_disturb_each_other(formulation: str) -> None:
+    """Callbacks are global in MuJoCo; runs of two scenes in turns equal the runs alone, and no callback stays."""
+    specs = [load_scene(CYLINDER, rolling_resistance=5e-4), load_scene(PLANE)]
+    alone = []
+    for scene in specs:
+        engine = build(scene, f"mujoco[formulation={formulation}]")
+        engine.advance(0.1)
+        alone.append(numbers(engine.sample()))
+    mujoco.set_mjcb_control(lambda _, data: data.qfrc_applied.fill(1.0))
+    pair = [build(scene, f"mujoco[formulation={formulation}]") for scene in specs]
+    for step in range(1, 11):
+        for engine in pair:
+            engine.advance(0.01 * step)
+    for engine, expected in zip(pair, alone, strict=True):
+        np.testing.assert_array_equal(numbers(engine.sample()), expected)
+    assert mujoco.get_mjcb_contactfilter() is mujoco.get_mjcb_passive() is mujoco.get_mjcb_control() is None
+
+
+@pytest.mark.parametrize(
+    ("engine", "field"),
+    [
+        ("dt=0", "dt"),
+        ("dt=nan", "dt"),
+        ("time_constant=1", "time_constant"),
+        ("impedance=1", "impedance"),
+        ("preset=tuned", "preset"),
+        ("curvature=true", "curvature"),
+        ("formulation=free,curvature=true,integrator=RK4", "integrator"),
+        ("formulation=free,preset=tuned,cone=pyramidal,friction=1", "cone"),
+        ("formulation=free,cone=pyramidal", "friction"),
+    ],
+)
+def test_wrong_settings_give_one_clear_line(engine: str, field: str) -> None:
+    """Settings that MuJoCo would ignore or misread are refused by name before anything is built."""
+    with pytest.raises(InputError) as caught:
+        build(load_scene(CYLINDER), f"mujoco[{engine}]")
+    assert field in caught.value.field
+    assert "\n" not in str(caught.value)
+
+
+def test_step_that_misses_the_samples_is_named() -> None:
+    """A step that does not divide the interval between samples is an error about dt."""
+    with pytest.raises(InputError, match="dt"):
+        build(load_scene(CYLINDER), "mujoco[dt=3e-4]").advance(0.01)
+
+
+def test_scene_without_a_model_is_refused_with_the_reason() -> None:
+    """A plane has no ring of boxes; the refusal names the file that is not there."""
+    with pytest.raises(Refused, match=r"mujoco_facets\.xml"):
+        build(load_scene(PLANE), "mujoco[formulation=facets]")
+
+
+def test_file_of_another_surface_is_refused(tmp_path) -> None:
+    """A chart whose joints are not the surface's motions is refused, not run."""
+    plane = load_scene(PLANE)
+    (tmp_path / "mujoco_chart.xml").write_text((plane.folder / "mujoco_chart.xml").read_text())
+    with pytest.raises(Refused, match="u1"):
+        build(dataclasses.replace(load_scene(CYLINDER), folder=tmp_path), "mujoco")
+    (tmp_path / "mujoco_chart.xml").write_text("<mujoco><worldbody><bo")
+    with pytest.raises(Refused, match="cannot read"):
+        build(dataclasses.replace(plane, folder=tmp_path), "mujoco")
+
+
+def test_contact_too_soft_to_start_is_refused() -> None:
+    """Where the settled depth would exceed the ball's radius the engine refuses instead of starting inside out."""
+    with pytest.raises(Refused, match="soft"):
+        build(load_scene(CYLINDER, speed=60.0), "mujoco[formulation=free,dt=1e-2]")
+
+
+@pytest.mark.parametrize("value", [np.nan, 1e12])
+def test_blow_up_is_reported_and_not_reset(value: float, tmp_path, monkeypatch, capfd) -> None:
+    """MuJoCo would silently return to the initial state; the adapter says when and why, and nothing is printed."""
+    monkeypatch.chdir(tmp_path)
+    engine = build(load_scene(CYLINDER), "mujoco")
+    engine._data.qvel[:] = value
+    with pytest.raises(Diverged, match=r"before 0\.01 s"):
+        engine.advance(0.01)
+    assert capfd.readouterr() == ("", "")
+    assert not list(tmp_path.iterdir())
+
+
+def test_version_is_the_engines() -> None:
+    """The version reported is MuJoCo's."""
+    assert Mujoco.version() == mujoco.__version__

@@ -1,0 +1,220 @@
+"""The projections themselves, held against the explicit matrices of Blajer (2006) and against other surfaces."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+
+import numpy as np
+import pytest
+
+import proofroll
+from proofroll.engines.projection.geometry import General, Uniform, geometry_of, local_geometry
+from proofroll.engines.projection.method import ProjectedBall
+from proofroll.engines.projection.orientation import EulerAngles, RotatingFrame
+from proofroll.surfaces import Cylinder, Plane
+from proofroll.truth.rolling import reduced_rates
+
+BODY = proofroll.load_scene("sphere_in_cylinder", rolling_resistance=5e-4).rolling
+A, C, M, J = BODY.ball.radius, BODY.surface.radius, BODY.ball.mass, BODY.ball.inertia
+SEEDS = pytest.mark.parametrize("seed", range(5))
+
+
+def random_state(seed):
+    """Any q = [γ z φ θ ψ], not near the singularity, and any q̇, which need not roll."""
+    rng = np.random.default_rng(seed)
+    q = np.array([*rng.uniform(-9, 9, 3), rng.uniform(0.4, 2.7), rng.uniform(-9, 9)])
+    return np.concatenate([q, rng.uniform(-1, 1, 5) * [20, 1, 160, 160, 160]])
+
+
+def euler_ball(body=BODY):
+    """The equations in Euler angles."""
+    return ProjectedBall(body, geometry_of(body.surface), EulerAngles())
+
+
+def close(found, expected):
+    """Equal to the round-off of a few hundred operations on the largest entry."""
+    np.testing.assert_allclose(found, expected, rtol=0, atol=1e-12 * max(1.0, np.max(np.abs(expected))))
+
+
+@SEEDS
+def test_mass_matrix_is_the_papers(seed):
+    """M̄ = DᵀMD is the paper's diag(mc², m) ⊕ J [[1,0,cosθ],[0,1,0],[cosθ,0,1]]."""
+    x = random_state(seed)
+    cos = np.cos(x[3])
+    expected = np.zeros((5, 5))
+    expected[:2, :2] = np.diag([M * C**2, M])
+    expected[2:, 2:] = J * np.array([[1, 0, cos], [0, 1, 0], [cos, 0, 1]])
+    np.testing.assert_allclose(euler_ball().mass_matrix(euler_ball().kinematics(x)), expected, rtol=0, atol=1e-15)
+
+
+@SEEDS
+def test_bias_is_the_papers(seed):
+    """d̄ = DᵀMḊq̇ is the paper's J [0, 0, -θ̇ψ̇ sinθ, φ̇ψ̇ sinθ, -φ̇θ̇ sinθ]."""
+    x = random_state(seed)
+    sin, (phi, theta, psi) = np.sin(x[3]), x[7:]
+    close(
+        euler_ball().bias(euler_ball().kinematics(x)),
+        J * sin * np.array([0, 0, -theta * psi, phi * psi, -phi * theta]),
+    )
+
+
+@SEEDS
+def test_normal_force_is_the_papers(seed):
+    """The orthogonal projection gives N = m c γ̇², whether or not the ball rolls."""
+    x = random_state(seed)
+    close(euler_ball().response(euler_ball().kinematics(x)).N, M * C * x[5] ** 2)
+
+
+@SEEDS
+def test_slip_is_the_papers(seed):
+    """The non-holonomic rows are cγ̇ + aω3 and ż - aω2 with the paper's ω2 and ω3 in Euler angles."""
+    x = random_state(seed)
+    gamma, _, _, theta, psi, gamma_rate, z_rate, phi_rate, theta_rate, psi_rate = x
+    w2 = theta_rate * np.sin(psi - gamma) - phi_rate * np.sin(theta) * np.cos(psi - gamma)
+    w3 = psi_rate + phi_rate * np.cos(theta)
+    close(euler_ball().slip(x), [C * gamma_rate + A * w3, z_rate - A * w2])
+
+
+@SEEDS
+def test_resistance_is_the_papers(seed):
+    """M_C = (0, -N f ż/V, N f cγ̇/V) along the local axes."""
+    x = random_state(seed)
+    v2, v3, f = C * x[5], x[6], 5e-4
+    found = euler_ball().resistance(euler_ball().kinematics(x), 7.0)
+    close(found, 7.0 * f / np.hypot(v2, v3) * np.array([0, -v3, v2]))
+
+
+@SEEDS
+def test_explicit_constraint_satisfies_the_implicit_one(seed):
+    """C_h D = 0, with C_h from the signed distance and D from the parametrisation."""
+    x = random_state(seed)
+    kin = euler_ball().kinematics(x)
+    normal = BODY.surface.normal(BODY.surface.position(x[:2]))
+    np.testing.assert_allclose(normal @ kin.local.frame @ kin.D[:3], 0, atol=1e-15)
+
+
+@SEEDS
+def test_drift_of_the_rows_is_their_derivative(seed):
+    """Ċ_nh q̇ is what finite differences along the motion with constant q̇ give."""
+    x, ball = random_state(seed), euler_ball()
+    h = 1e-6  # differences of slips of some 10 m/s lose 1e-16 * 10 / 1e-6 and neglect 160² h² of the rate
+    ahead, behind = (ball.slip(np.concatenate([x[:5] + step * x[5:], x[5:]])) for step in (h, -h))
+    found = ball.slip_drift(ball.kinematics(x))
+    np.testing.assert_allclose(found, (ahead - behind) / (2 * h), rtol=1e-6, atol=1e-6 * np.max(np.abs(found)))
+
+
+@SEEDS
+def test_elimination_is_the_mass_orthogonal_projection(seed):
+    """What elimination removes is M̄-orthogonal to every admissible velocity, and nothing is left to remove."""
+    x, ball = random_state(seed), euler_ball()
+    kin = ball.kinematics(x)
+    result = ball.eliminated(x)
+    admissible = np.linalg.svd(ball.rows @ kin.D)[2][2:]
+    close(admissible @ ball.mass_matrix(kin) @ (result - x)[5:], np.zeros(3))
+    close(ball.slip(result), np.zeros(2))
+    np.testing.assert_array_equal(result[:5], x[:5])
+
+
+@SEEDS
+def test_rows_can_be_switched_off(seed):
+    """Without rows the ball slides without friction; with one row there is friction along that direction only."""
+    x, ball = random_state(seed), euler_ball(proofroll.load_scene("sphere_in_cylinder").rolling)
+    kin = ball.kinematics(x)
+    ball.rows = ball.rows[:0]
+    close((kin.D @ ball.response(kin).acceleration + kin.drift)[2:], [-9.81, 0, 0, 0])
+    ball = euler_ball()  # without resistance, nothing would ask for friction along e2
+    rows = ball.rows
+    for index in (0, 1):
+        ball.rows = rows[index : index + 1]
+        force = ball.contact_force(ball.response(ball.kinematics(x)))
+        assert force[2 - index] == 0
+        assert force[1 + index] != 0
+
+
+def test_without_resistance_no_moment_is_modelled(monkeypatch):
+    """With f = 0 the model does not contain the moment of rolling resistance at all."""
+    monkeypatch.delattr(ProjectedBall, "resistance")
+    x = random_state(0)
+    free = euler_ball(proofroll.load_scene("sphere_in_cylinder").rolling)
+    assert np.all(np.isfinite(free.rates(x)))
+    with pytest.raises(AttributeError):
+        euler_ball().rates(x)
+
+
+@dataclass(frozen=True)
+class Torus:
+    """Inside of a ring-shaped tube: curved both ways, by different amounts from point to point; not homogeneous."""
+
+    ring: float = 0.5
+    tube: float = 0.2
+    generators = None
+    length_scales = (0.7, 0.2)
+
+    def frame(self, u):
+        """Columns: out of the tube's middle, along the ring, around the tube."""
+        (ca, sa), (cb, sb) = ((np.cos(angle), np.sin(angle)) for angle in u)
+        return np.array([[cb * ca, -sa, -sb * ca], [cb * sa, ca, -sb * sa], [sb, 0, cb]])
+
+    def tangents(self, u):
+        """Along the frame's e2 and e3."""
+        return self.frame(u)[:, 1:] * [self.ring + self.tube * np.cos(u[1]), self.tube]
+
+    def second(self, u):
+        """Derivatives of the tangents."""
+        frame, (a, b) = self.frame(u), u
+        result = np.zeros((3, 2, 2))
+        result[:, 0, 0] = -(self.ring + self.tube * np.cos(b)) * np.array([np.cos(a), np.sin(a), 0])
+        result[:, 0, 1] = result[:, 1, 0] = -self.tube * np.sin(b) * frame[:, 1]
+        result[:, 1, 1] = -self.tube * frame[:, 0]
+        return result
+
+
+@pytest.mark.parametrize("u", [(0.3, 0.4), (-2.0, 2.5)])
+@pytest.mark.parametrize("surface", [Torus(), Cylinder("wall", 0.2, 0.3), Plane("wall", 0.4, 0.025)])
+def test_turning_of_the_frame_follows_from_its_definition(surface, u):
+    """Fᵀ ∂F/∂u, which is derived from tangents and second derivatives, is what differences of the frame give."""
+    u = np.asarray(u)
+    steps = 1e-6 * np.eye(2)
+    slopes = np.stack([(surface.frame(u + h) - surface.frame(u - h)) / 2e-6 for h in steps], axis=-1)
+    expected = np.einsum("ji,jkl->ikl", surface.frame(u), slopes)
+    np.testing.assert_allclose(local_geometry(surface, u).turning, expected, atol=1e-9)  # 1e-16 / 1e-6, with a margin
+
+
+@SEEDS
+@pytest.mark.parametrize("orientation", [EulerAngles, RotatingFrame])
+@pytest.mark.parametrize("surface", [Torus(), Cylinder("wall", 0.2, 0.3), Plane("wall", 0.4, 0.025)])
+def test_any_surface_any_orientation(surface, orientation, seed):
+    """On curved, tilted and flat surfaces both formulations give what the reduced equations give."""
+    rng = np.random.default_rng(seed)
+    u, udot, spin = rng.uniform(-2, 2, 2), rng.uniform(-5, 5, 2), rng.uniform(-50, 50)
+    body = replace(BODY, surface=surface)
+    rates, v, force = reduced_rates(body, np.array([*u, *udot, spin]))
+    frame = surface.frame(u)
+    w = spin * frame[:, 0] - np.cross(frame[:, 0], v) / A
+    describe = orientation()
+    angles, r = describe.start(frame, frame.T @ w)
+    ball = ProjectedBall(body, geometry_of(surface), describe)
+    kin = ball.kinematics(np.array([*u, *angles, *udot, *r]))
+    response = ball.response(kin)
+    np.testing.assert_allclose(response.acceleration[:2], rates[2:4], rtol=1e-11, atol=1e-10)
+    np.testing.assert_allclose(frame @ ball.contact_force(response), force, rtol=1e-11, atol=1e-11)
+
+
+@pytest.mark.parametrize("u", [(0.0, 0.0), (40.0, -3.0)])
+@pytest.mark.parametrize("surface", [Cylinder("wall", 0.2, 0.3), Plane("wall", 0.4, 0.025)])
+def test_uniform_geometry_is_the_general_one(surface, u):
+    """On a homogeneous surface the precomputed geometry equals the one evaluated on the spot."""
+    cheap = geometry_of(surface)
+    assert isinstance(cheap, Uniform)
+    for found, expected in zip(cheap.at(np.array(u)), General(surface).at(np.array(u)), strict=True):
+        close(found, expected)
+
+
+def test_other_surfaces_are_evaluated_at_each_point():
+    """A surface without generators, or with some that do not commute, is not taken for uniform."""
+    assert isinstance(geometry_of(Torus()), General)
+
+    class Sphere(Torus):
+        generators = tuple(replace(Cylinder("w", 1.0, tilt).generators[0]) for tilt in (0.0, 1.0))
+
+    assert isinstance(geometry_of(Sphere()), General)
