@@ -31,7 +31,7 @@ class Event:
 
 
 def with_events(dataset: xr.Dataset, events: Sequence[Event]) -> xr.Dataset:
-    """The dataset with ``event_kind`` and ``event_time``, ``event_low``, ``event_high`` [s], each with dim ``event``."""
+    """The dataset with ``event_kind`` and ``event_time``, ``event_low``, ``event_high`` [s] along ``event``."""
     columns = {
         "event_time": ("when it happened", [event.time for event in events]),
         "event_low": ("not before", [event.time_low for event in events]),

@@ -6,11 +6,12 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from proofroll.errors import Refused
+from proofroll.events import with_events
 from proofroll.scene import Capability, Scene
 from proofroll.surfaces import FloatArray
 from proofroll.trajectory import trajectory
 from proofroll.truth.closed_form import closed_form
+from proofroll.truth.error_bars import put_error_bars
 from proofroll.truth.motion import Motion
 from proofroll.truth.rolling import reduced, unreduced
 
@@ -28,19 +29,23 @@ def truth(scene: Scene, times: FloatArray) -> xr.Dataset:
     Newton-Euler system, derived and integrated independently. The error bar of a variable is the largest difference
     between the routes plus round-off.
 
+    With bounded friction the routes are those of :mod:`proofroll.truth.stick_slip`, and the dataset also holds
+    ``sticking`` and the events (:func:`proofroll.events.events_of`).
+
     Raises:
-        Refused: bounded friction, for which there is no truth yet.
+        Diverged: the routes disagree about the order of events.
+        Refused: the ball leaves the wall and lands on it again.
     """
     if Capability.BOUNDED_FRICTION in scene.requires:
-        raise Refused("the truth does not model bounded friction (slip) yet; leave mu_static unbounded")
+        from proofroll.truth.stick_slip import stick_slip
+
+        return with_events(*stick_slip(scene, times))
     body = scene.rolling
     times = np.asarray(times, dtype=np.float64)
     first = closed_form(body, times) or reduced(body, times)
     second = unreduced(body, times)
     result, check = _dataset(scene, times, first), _dataset(scene, times, second)
-    for name, values in result.data_vars.items():
-        difference = float(np.max(np.abs(values.to_numpy() - check[name].to_numpy())))
-        values.attrs["error_bar"] = difference + _ROUND_OFF * float(np.max(np.abs(values.to_numpy())))
+    put_error_bars(result, check, _ROUND_OFF)
     result.attrs["route"] = first.route
     result.attrs["second_route"] = second.route
     return result

@@ -1,0 +1,136 @@
+"""Implicit collocation at Radau points: order 2s - 1, stiffly accurate, never evaluated at the start of a step.
+
+The last property is why it is used here: at the start of a slip the direction of slip does not exist, and the step
+goes over that point without any special start. The step's error is read off the decay of the Legendre coefficients of
+the collocation polynomial, so the polynomial is as accurate between the ends of a step as at them.
+
+Source of the method: E. Hairer, G. Wanner, Solving Ordinary Differential Equations II, sections IV.5 and IV.8.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.polynomial import legendre
+from scipy.linalg import lu_factor, lu_solve
+
+from proofroll.surfaces import FloatArray
+
+_STAGES = 13
+_NEWTON = 14  # iterations after which a step is taken again with half its length
+_ROUND_OFF = 1e-15  # Newton corrections, relative to the scale, that are only noise
+
+
+def _tableau(stages: int) -> tuple[FloatArray, FloatArray, FloatArray]:
+    """Nodes in (0, 1], integration matrix, and the map from stage values to Legendre coefficients."""
+    # Right Radau points: zeros of P_{s-1} - P_s on [-1, 1]; the last is 1.
+    polynomial = np.zeros(stages + 1)
+    polynomial[-2:] = 1.0, -1.0
+    x = np.sort(np.real(legendre.legroots(polynomial)))
+    x[-1] = 1.0
+    to_coefficients = np.asarray(np.linalg.inv(legendre.legvander(x, stages - 1)), dtype=np.float64)
+    integrals = np.stack([legendre.legval(x, legendre.legint(row, lbnd=-1)) for row in np.eye(stages)], axis=-1)
+    return (x + 1) / 2, integrals @ to_coefficients / 2, to_coefficients
+
+
+_NODES, _MATRIX, _TO_LEGENDRE = _tableau(_STAGES)
+
+
+@dataclass(frozen=True)
+class System:
+    """An autonomous system ẏ = f(y) of n equations.
+
+    Attributes:
+        rates: f, shape (s, n) -> (s, n).
+        jacobian: ∂f/∂y, shape (s, n) -> (s, n, n).
+        scale: size of each variable, to which the tolerance is relative, shape (n,).
+    """
+
+    rates: Callable[[FloatArray], FloatArray]
+    jacobian: Callable[[FloatArray], FloatArray]
+    scale: FloatArray
+
+
+@dataclass(frozen=True)
+class Step:
+    """One accepted or rejected step.
+
+    Attributes:
+        time, length: start and length [s].
+        values: at the start and at the nodes, shape (s + 1, n).
+        error: estimate relative to the scale; inf where Newton's method failed.
+    """
+
+    time: float
+    length: float
+    values: FloatArray
+    error: float
+
+    @property
+    def last(self) -> FloatArray:
+        """State at the end of the step."""
+        return np.asarray(self.values[-1])
+
+    def __call__(self, times: FloatArray) -> FloatArray:
+        """States at times within the step, shape (m, n)."""
+        # Barycentric interpolation through the start and the nodes
+        away = ((np.asarray(times) - self.time) / self.length)[:, None] - _WITH_START
+        at_node = np.abs(away) < 1e-15
+        weights = np.where(np.any(at_node, axis=-1, keepdims=True), at_node, _WEIGHTS / np.where(at_node, 1.0, away))
+        return np.asarray(weights @ self.values / np.sum(weights, axis=-1, keepdims=True))
+
+
+_WITH_START = np.concatenate([[0.0], _NODES])
+_WEIGHTS = 1 / np.prod(_WITH_START[:, None] - _WITH_START + np.eye(_STAGES + 1), axis=-1)
+
+
+def nodes(length: float) -> FloatArray:
+    """Times of the stages after the start of a step of this length [s], shape (s,)."""
+    return length * _NODES
+
+
+def take(system: System, time: float, state: FloatArray, length: float, guess: FloatArray) -> Step:
+    """One step.
+
+    Args:
+        system: what is integrated.
+        time: where it starts [s].
+        state: there, shape (n,).
+        length: of the step [s].
+        guess: states at the nodes from which Newton's method starts, shape (s, n).
+    """
+    s, n = guess.shape
+    values = guess
+    before, factors = np.inf, None
+    for _ in range(_NEWTON):
+        rates = system.rates(values)
+        if factors is None:
+            jacobians = system.jacobian(values)
+            matrix = np.eye(s * n) - (length * np.einsum("ij,jkl->ikjl", _MATRIX, jacobians)).reshape(s * n, s * n)
+            if not np.all(np.isfinite(matrix)):
+                break
+            factors = lu_factor(matrix, check_finite=False)
+        residual = values - state - length * _MATRIX @ rates
+        if not np.all(np.isfinite(residual)):
+            break
+        correction = lu_solve(factors, -residual.ravel(), check_finite=False).reshape(s, n)
+        values = values + correction
+        change = float(np.max(np.abs(correction) / system.scale))
+        if change < _ROUND_OFF or (change < 1e-11 and change > 0.3 * before):  # converged, or as far as round-off lets
+            coefficients = length * _TO_LEGENDRE @ system.rates(values) / system.scale
+            # The last two: one of them may vanish by symmetry
+            return Step(time, length, np.vstack([state, values]), float(np.max(np.abs(coefficients[-2:]))))
+        if change > 0.02 * before or before == np.inf:
+            factors = None
+        before = change
+    return Step(time, length, np.vstack([state, guess]), np.inf)
+
+
+def next_length(step: Step, tolerance: float) -> float:
+    """Length of the next try: the error falls with the power s - 1 of the length."""
+    if not np.isfinite(step.error):
+        return 0.4 * step.length
+    growth = (tolerance / max(step.error, 1e-30)) ** (1 / (_STAGES - 1))
+    return step.length * float(np.clip(0.8 * growth, 0.2, 3.0))

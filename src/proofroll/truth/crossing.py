@@ -1,0 +1,47 @@
+"""Where a smooth function first rises through zero: also when it does so twice within one step."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+
+import numpy as np
+from numpy.polynomial import chebyshev
+
+from proofroll.surfaces import FloatArray
+
+_POINTS = 20
+_X = chebyshev.chebpts2(_POINTS)
+_TO_CHEBYSHEV = np.linalg.inv(chebyshev.chebvander(_X, _POINTS - 1))
+
+
+def first_rise(function: Callable[[FloatArray], FloatArray], start: float, end: float) -> float | None:
+    """First time in (start, end] at which the function passes from negative to positive, or None.
+
+    A polynomial through 20 Chebyshev points finds every root, also the pair under a crest that lies between the ends
+    of a step; two secant steps on the function itself then polish the first.
+
+    Args:
+        function: vectorised over times.
+        start: of the interval [s].
+        end: of the interval [s].
+    """
+    half, middle = (end - start) / 2, (end + start) / 2
+    values = function(middle + half * _X)
+    coefficients = _TO_CHEBYSHEV @ values
+    slope = chebyshev.chebder(coefficients)
+    bound = float(np.sum(np.abs(coefficients[1:])))
+    if coefficients[0] + bound < 0:
+        return None
+    if values[0] > 0:  # round-off at the start: on its way out already
+        return start if chebyshev.chebval(-1.0, slope) > 0 else None
+    roots = chebyshev.chebroots(np.trim_zeros(coefficients, "b")) if np.any(coefficients) else np.empty(0)
+    real = np.sort(np.real(roots[np.abs(np.imag(roots)) < 1e-9]))
+    rising = [x for x in real if -1 <= x <= 1 + 1e-12 and chebyshev.chebval(x, slope) > 0]
+    if not rising:
+        return None
+    x = rising[0]
+    for _ in range(2):
+        steepness = float(chebyshev.chebval(x, slope))
+        here = float(function(np.array([middle + half * x]))[0])
+        x = min(max(x - here / steepness, -1.0), 1.0) if abs(here) < abs(steepness) else x
+    return float(middle + half * x)

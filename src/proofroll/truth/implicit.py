@@ -1,0 +1,214 @@
+"""Stick and slip by implicit collocation in the world frame: the second route, for every surface."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from functools import partial
+
+import numpy as np
+
+from proofroll.errors import Diverged
+from proofroll.scene import RollingBall
+from proofroll.surfaces import FloatArray
+from proofroll.truth.assemble import classic_step
+from proofroll.truth.collocation import Step, System, next_length, nodes, take
+from proofroll.truth.contact import Contact
+from proofroll.truth.crossing import first_rise
+from proofroll.truth.motion import Motion
+from proofroll.truth.switching import End, Leg
+
+_TOLERANCE = 1e-13  # of a step, relative to the scale of each variable
+_APPROACH = 0.6  # part of the time left until something stands still that one step may take
+_STILL = 1e-9  # time left, relative to the pace of the motion, that is extrapolated
+
+
+class Implicit:
+    """Route in the state y = (p, ω, u) of :class:`Contact`.
+
+    Args:
+        body: the scene's ball.
+        first_step: longest first step of a slip, relative to the pace of the motion. That step goes from u = 0 on.
+    """
+
+    name = "world frame by signed distance, implicit collocation"
+
+    def __init__(self, body: RollingBall, first_step: float = 0.1) -> None:
+        self._body = body
+        self._contact = Contact(body)
+        self._first = first_step
+        self._pace = body.ball.radius / max(float(self._contact.scale[-1]), 1e-300)  # [s]
+        self._mu = body.contact.mu_static
+
+    def start(self) -> FloatArray:
+        """See :class:`Route`."""
+        return np.concatenate([self._body.p0, self._body.w0, np.zeros(3)])
+
+    def excess(self, state: FloatArray) -> float:
+        """See :class:`Route`."""
+        return float(self._excess(state[None, :])[0])
+
+    def ahead(self, state: FloatArray, span: float) -> FloatArray:
+        """See :class:`Route`."""
+        return classic_step(lambda y: self._contact.rates(y[None, :], True)[0], state, span)
+
+    def world(self, state: FloatArray) -> tuple[FloatArray, FloatArray, FloatArray]:
+        """See :class:`Route`."""
+        return state[:3], self._contact.velocity(state[None, :])[0], state[3:6]
+
+    def nudged(self, state: FloatArray, v_WB: FloatArray) -> FloatArray:
+        """See :class:`Route`."""
+        e1 = self._body.surface.normal(state[:3])
+        w = (state[3:6] @ e1) * e1 - np.cross(e1, v_WB) / self._body.ball.radius
+        return np.concatenate([state[:3], w, np.zeros(3)])
+
+    def stick(self, time: float, state: FloatArray, until: float) -> Leg[FloatArray]:
+        """See :class:`Route`."""
+        walk = _Walk(self._contact.system(sticking=True), time, state, until)
+        resisted = self._body.contact.rolling_resistance > 0
+        length = self._pace
+        while walk.time < until:
+            left = self._until_still(walk.state, True) if resisted else np.inf
+            if left < _STILL * self._pace:
+                halted = walk.state + left * self._contact.rates(walk.state[None, :], True)[0]
+                return walk.leg(self, True, walk.time + left, self.nudged(halted, np.zeros(3)), End.HALT)
+            step, length = walk.step(min(length, _APPROACH * left))
+            rise = first_rise(partial(self._excess_along, step), step.time, step.time + step.length)
+            if rise is not None:
+                return walk.leg(self, True, rise, walk.cut(rise), End.CONE)
+        return walk.leg(self, True, until, walk.state, End.TIME)
+
+    def slip(self, time: float, state: FloatArray, until: float) -> Leg[FloatArray]:
+        """See :class:`Route`."""
+        walk = _Walk(self._contact.system(sticking=False), time, state, until)
+        length = min(self._first * self._pace, until - time)
+        while walk.time < until:
+            started = bool(walk.steps)
+            left = self._until_still(walk.state, False) if started else np.inf
+            if left < _STILL * self._pace:
+                still = walk.state + left * self._contact.rates(walk.state[None, :], False)[0]
+                still[6:] = 0.0
+                if walk.time + left > until:
+                    break
+                return walk.leg(self, False, walk.time + left, still, End.STILL)
+            guess = None if started else self._first_guess(state)
+            step, length = walk.step(min(length, _APPROACH * left), guess)
+            gone = first_rise(partial(self._pull_along, step), step.time, step.time + step.length)
+            if gone is not None:
+                return walk.leg(self, False, gone, walk.cut(gone), End.LIFTOFF)
+        return walk.leg(self, False, until, walk.state, End.TIME)
+
+    def motion(self, y: FloatArray, sticking: bool) -> Motion:
+        """Motion in states, shape (n, 9)."""
+        return Motion(y[:, :3], self._contact.velocity(y), y[:, 3:6], self._contact.force(y, sticking), self.name)
+
+    def force_at_start(self, state: FloatArray) -> FloatArray:
+        """Force of the wall at the very start of a slip [N], shape (3,), where u = 0 but has a direction."""
+        tiny = np.concatenate([state[:6], 1e-100 * self._contact.slip_direction_at_rest(state)])
+        return np.asarray(self._contact.force(tiny[None, :], False)[0])
+
+    def _excess(self, y: FloatArray) -> FloatArray:
+        friction, N = self._contact.split(y, sticking=True)
+        needed, available = np.linalg.norm(friction, axis=-1), self._mu * N
+        return np.asarray((needed - available) / np.maximum(needed + available, np.finfo(float).tiny))
+
+    def _excess_along(self, step: Step, times: FloatArray) -> FloatArray:
+        return self._excess(step(times))
+
+    def _pull_along(self, step: Step, times: FloatArray) -> FloatArray:
+        """-N [N]: rises through zero where the ball leaves the wall."""
+        return -self._contact.split(step(times), False)[1]
+
+    def _until_still(self, state: FloatArray, sticking: bool) -> float:
+        """Time until the centre (sticking) or the contact point (slipping) stands still at the present rate [s]."""
+        rates = self._contact.rates(state[None, :], sticking)[0]
+        if sticking:
+            v, e1 = self._contact.velocity(state[None, :])[0], self._body.surface.normal(state[:3])
+            v_rate = -self._body.ball.radius * np.cross(rates[3:6], e1)
+        else:
+            v, v_rate = state[6:], rates[6:]
+        size = float(np.linalg.norm(v))
+        slowing = -float(v @ v_rate) / size if size > 0 else 0.0
+        return size / slowing if slowing > 0 else np.inf
+
+    def _first_guess(self, state: FloatArray) -> Callable[[float], FloatArray]:
+        """States at the nodes of a first step: u = (G t + α t²/2) d, the rest along its tangent."""
+        d = self._contact.slip_direction_at_rest(state)
+
+        def growth(y: FloatArray) -> tuple[float, FloatArray]:
+            along = self._contact.slip_direction_at_rest(y)
+            rates = self._contact.rates(np.concatenate([y[:6], 1e-100 * along])[None, :], False)[0]
+            return float(rates[6:] @ along), rates
+
+        G, rates = growth(state)
+        span = 1e-4 * self._pace
+        alpha = (growth(state + span * rates)[0] - G) / span
+
+        def guess(length: float) -> FloatArray:
+            t = nodes(length)[:, None]
+            y = state + t * rates
+            y[:, 6:] = np.maximum(G * t + 0.5 * alpha * t**2, 1e-100) * d
+            return y
+
+        return guess
+
+
+class _Walk:
+    """Steps of one leg, each controlled by its error."""
+
+    def __init__(self, system: System, time: float, state: FloatArray, until: float) -> None:
+        self._system, self._start, self._state, self._until = system, time, state, until
+        self.steps: list[Step] = []
+
+    @property
+    def time(self) -> float:
+        """Reached so far [s]; exactly ``until`` at the end."""
+        if not self.steps:
+            return self._start
+        end = self.steps[-1].time + self.steps[-1].length
+        return self._until if self._until - end <= 4 * np.spacing(self._until) else end
+
+    @property
+    def state(self) -> FloatArray:
+        """Reached so far, shape (9,)."""
+        return self.steps[-1].last if self.steps else self._state
+
+    def step(self, length: float, guess: Callable[[float], FloatArray] | None = None) -> tuple[Step, float]:
+        """One accepted step, at most of this length [s], and the length to try next."""
+        length = min(length, self._until - self.time)
+        while True:
+            if self.time + length == self.time:
+                raise Diverged(f"the truth (implicit collocation) could not be integrated past {self.time:g} s")
+            step = take(self._system, self.time, self.state, length, (guess or self._continued)(length))
+            wanted = next_length(step, _TOLERANCE)
+            if step.error <= _TOLERANCE:
+                self.steps.append(step)
+                return step, wanted
+            length = min(wanted, 0.8 * length)
+
+    def _continued(self, length: float) -> FloatArray:
+        """Tangent at the end of the last step: safer for Newton's method than the continued polynomial."""
+        rates = self._system.rates(self.state[None, :])[0]
+        return np.asarray(self.state + nodes(length)[:, None] * rates)
+
+    def cut(self, time: float) -> FloatArray:
+        """State at a time within the last step, shape (9,)."""
+        return np.asarray(self.steps[-1](np.array([time]))[0])
+
+    def leg(self, route: Implicit, sticking: bool, end: float, state: FloatArray, why: End) -> Leg[FloatArray]:
+        """The leg made of the steps so far."""
+        steps, first = self.steps, self._state
+        starts = np.array([step.time for step in steps])
+
+        def motion(times: FloatArray) -> Motion:
+            y = np.broadcast_to(first, (len(times), 9)).copy()
+            index = np.searchsorted(starts, times, side="right") - 1
+            for number in np.unique(index[index >= 0]):
+                here = index == number
+                y[here] = steps[number](np.minimum(times[here], starts[number] + steps[number].length))
+            result = route.motion(y, sticking)
+            if not sticking:
+                for row in np.flatnonzero(~np.any(y[:, 6:], axis=-1)):
+                    result.force[row] = route.force_at_start(y[row])
+            return result
+
+        return Leg(self._start, end, sticking, state, why, motion)

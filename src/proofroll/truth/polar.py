@@ -1,0 +1,244 @@
+"""Stick and slip on the surface's coordinates with size and direction of the slip: the first route on any surface.
+
+With A = (1 + κ)/(κ m) and the friction F* that sticking would need, the slip velocity u obeys u̇ = A (F - F*) for any
+friction F. In polar form u = |u| (cos φ e2 + sin φ e3), F = -μk N (cos φ, sin φ) and b = -A F*,
+
+    d|u|/dt = b · (cos φ, sin φ) - A μk N,      |u| (φ̇ + ė2 · e3) = b · (-sin φ, cos φ).
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+
+import numpy as np
+
+from proofroll.errors import Diverged
+from proofroll.scene import RollingBall
+from proofroll.surfaces import FloatArray
+from proofroll.truth.assemble import classic_step, joined, world_motion
+from proofroll.truth.explicit import Piece, Rates, at_clock, read, steps, stop
+from proofroll.truth.motion import Motion
+from proofroll.truth.rolling import reduced_rates
+from proofroll.truth.switching import End, Leg
+
+_FLOOR = 1e-4  # |u| at which the rest of a slip is extrapolated, relative to where it began
+_APPROACH = 0.6  # part of the time left until the centre stands still that one step may take
+_STILL = 1e-9  # time left, relative to the pace of the motion, that is extrapolated
+
+
+class Polar:
+    """Route in (u, u̇, ω1), joined while slipping by ln|u|, φ and the time t against τ with dt = |u| dτ.
+
+    Args:
+        body: the scene's ball.
+        handover: |u| relative to |b| T, up to which the direction is slaved to b; T = |b|/|ḃ|.
+    """
+
+    name = "surface coordinates with direction of slip, DOP853"
+
+    def __init__(self, body: RollingBall, handover: float = 1e-5) -> None:
+        self._body = body
+        self._handover = handover
+        ball = body.ball
+        self._A = (1 + ball.inertia_ratio) / (ball.inertia_ratio * ball.mass)
+        pace = np.sqrt(ball.radius * np.linalg.norm(body.gravity)) + np.linalg.norm(body.v0)
+        pace = max(float(pace), 1e-300)
+        self._pace = ball.radius / pace
+        # Absolute tolerances: round-off in the rates of u, u̇, ω1 (and |u| or ln|u|, φ, t) must not drive the step.
+        lengths = np.array(body.surface.length_scales)
+        scales = [*(ball.radius / lengths), *(pace / lengths), max(pace / ball.radius, np.linalg.norm(body.w0))]
+        self._atol = 1e-15 * np.array([*scales, 1.0, 1.0, self._pace])
+        self._atol_slaved = 1e-15 * np.array([*scales, pace])
+
+    def start(self) -> FloatArray:
+        """See :class:`Route`."""
+        body = self._body
+        return np.concatenate([body.u0, body.udot0, [body.w0 @ body.surface.normal(body.p0)]])
+
+    def excess(self, state: FloatArray) -> float:
+        """See :class:`Route`."""
+        b, N = self._drive(state)
+        needed, available = float(np.linalg.norm(b)) / self._A, self._body.contact.mu_static * N
+        return (needed - available) / max(needed + available, np.finfo(float).tiny)
+
+    def ahead(self, state: FloatArray, span: float) -> FloatArray:
+        """See :class:`Route`."""
+        return classic_step(self._rolling, state, span)
+
+    def world(self, state: FloatArray) -> tuple[FloatArray, FloatArray, FloatArray]:
+        """See :class:`Route`."""
+        motion = self._motion(state[None, :5], np.zeros(1), None)
+        return motion.p_WB[0], motion.v_WB[0], motion.w_WB[0]
+
+    def nudged(self, state: FloatArray, v_WB: FloatArray) -> FloatArray:
+        """See :class:`Route`."""
+        udot = np.linalg.pinv(self._body.surface.tangents(state[:2])) @ v_WB
+        return np.concatenate([state[:2], udot, state[4:]])
+
+    def stick(self, time: float, state: FloatArray, until: float) -> Leg[FloatArray]:
+        """See :class:`Route`."""
+        pieces: list[Piece] = []
+
+        def leg(end: float, last: FloatArray, why: End) -> Leg[FloatArray]:
+            def motion(times: FloatArray) -> Motion:
+                return self._motion(read(pieces, times, state), np.zeros(len(times)), None)
+
+            return Leg(time, end, True, last, why, motion)
+
+        resisted = self._body.contact.rolling_resistance > 0
+        cap = (lambda y: _APPROACH * self._until_halt(y)) if resisted else None
+        for piece in steps(self._rolling, time, state, until, atol=self._atol[:5], cap=cap):
+            pieces.append(piece)
+            rise = self._rise(piece)
+            if rise is not None:
+                return leg(*rise, End.CONE)
+            left = self._until_halt(piece.last) if resisted else np.inf
+            if left < _STILL * self._pace and piece.end < until:
+                halted = piece.last + left * self._rolling(piece.last)
+                return leg(piece.end + left, self.nudged(halted, np.zeros(3)), End.HALT)
+        return leg(until, pieces[-1].last if pieces else state, End.TIME)
+
+    def slip(self, time: float, state: FloatArray, until: float) -> Leg[FloatArray]:
+        """See :class:`Route`."""
+        strength, change = self._pull(state)
+        pace = min(strength / change if change > 0 else np.inf, until - time)
+        handover = max(self._handover * strength * pace, np.finfo(float).tiny)
+        lead: list[Piece] = []
+        why, begun, small = self._creep(lead, time, state, until, handover)
+
+        def creeping(times: FloatArray) -> Motion:
+            y = read(lead, times, np.append(state, 0.0))
+            return self._motion(y[:, :5], y[:, 5], np.array([self._slaved(row)[1] for row in y]))
+
+        if why is not None:
+            return Leg(time, begun, False, small[:5], why, creeping)
+        first = np.array([*small[:5], np.log(small[5]), self._slaved(small)[1], begun])
+        floor = np.log(_FLOOR * handover)
+        pieces: list[Piece] = []
+
+        def slipping(times: FloatArray) -> Motion:
+            y = at_clock(pieces, times, first)
+            return self._motion(y[:, :5], np.exp(y[:, 5]), y[:, 6])
+
+        def motion(times: FloatArray) -> Motion:
+            return joined(times, begun, creeping, slipping)
+
+        def leg(y: FloatArray, end: End) -> Leg[FloatArray]:
+            if end is End.TIME or y[7] >= until:
+                return Leg(time, until, False, y[:5], End.TIME, motion)
+            return Leg(time, float(y[7]), False, y[:5], end, motion)
+
+        for piece in steps(self._slipping, 0.0, first, np.inf, atol=self._atol):
+            pieces.append(piece)
+            # Clock and ln|u| pass their limits but once, so the end of a step tells whether one was passed.
+            stops: tuple[tuple[End, Callable[[FloatArray], float]], ...] = (
+                (End.LIFTOFF, lambda y: -self._drive(y)[1]),
+                (End.TIME, lambda y: y[7] - until),
+                (End.STILL, lambda y: floor - y[5]),
+            )
+            stops = tuple(item for item in stops if item[1](piece.last) > 0)
+            found = [(when[0], when[1], end) for end, g in stops if (when := stop(self._slipping, piece, g))]
+            if found:
+                _, y, end = min(found, key=lambda item: item[0])
+                return leg(self._stood_still(y) if end is End.STILL else y, end)
+        raise Diverged(f"the truth (polar) ended without a reason at {time:g} s")
+
+    def _creep(
+        self, pieces: list[Piece], time: float, state: FloatArray, until: float, handover: float
+    ) -> tuple[End | None, float, FloatArray]:
+        """The start of a slip, up to |u| = ``handover``; reason (None: handed over), time and (u, u̇, ω1, |u|)."""
+        rates: Rates = lambda y: self._slaved(y)[0]  # noqa: E731 -- one line each for two closures
+        last = np.append(state, 0.0)
+        for piece in steps(rates, time, last, until, atol=self._atol_slaved):
+            pieces.append(piece)
+            last = piece.last
+            if last[5] >= handover and (grown := stop(rates, piece, lambda y: y[5] - handover)):
+                return None, *grown
+            if last[5] <= 0 and (back := stop(rates, piece, lambda y: -y[5])):
+                return End.STILL, *back
+        return End.TIME, until, last
+
+    def _drive(self, y: FloatArray) -> tuple[FloatArray, float]:
+        """Drive b along e2, e3 [m/s²], shape (2,), and N [N]."""
+        return self._with_slip(y, 0.0, 0.0)[1:3]
+
+    def _rolling(self, y: FloatArray) -> FloatArray:
+        return reduced_rates(self._body, y)[0]
+
+    def _pull(self, y: FloatArray) -> tuple[float, float]:
+        """|b| and |ḃ| while sticking; ḃ by a central difference, for it only sets a scale."""
+        span, rates = 1e-4 * self._pace, self._rolling(y)
+        b_rate = (self._drive(y + span * rates)[0] - self._drive(y - span * rates)[0]) / (2 * span)
+        return float(np.linalg.norm(self._drive(y)[0])), float(np.linalg.norm(b_rate))
+
+    def _with_slip(self, y: FloatArray, size: float, phi: float) -> tuple[FloatArray, FloatArray, float, float]:
+        """Rates of (u, u̇, ω1) while slipping, b, N and ė2 · e3."""
+        body, surface = self._body, self._body.surface
+        a, m, kappa, f = body.ball.radius, body.ball.mass, body.ball.inertia_ratio, body.contact.rolling_resistance
+        frame, tangents, bending = surface.frame(y[:2]), surface.tangents(y[:2]), surface.second(y[:2]) @ y[2:4]
+        T = frame.T[1:] @ tangents  # tangents along e2, e3
+        inverse = np.array([[T[1, 1], -T[0, 1]], [-T[1, 0], T[0, 0]]]) / (T[0, 0] * T[1, 1] - T[0, 1] * T[1, 0])
+        v = T @ y[2:4]
+        e1_rate = -(frame[:, 0] @ bending) @ inverse  # along e2, e3
+        g1, g2, g3 = frame.T @ body.gravity
+        N = m * (float(e1_rate @ v) + g1)
+        spin, speed = a * y[4], float(np.hypot(v[0], v[1]))
+        ahead = f * N / (kappa * m * a * speed) * v if f and speed > 0 else np.zeros(2)
+        b = np.array([g2 - spin * e1_rate[1], g3 + spin * e1_rate[0]]) + ahead  # e1 × (x, y) = (-y, x)
+        grip = body.contact.mu_kinetic * N
+        c, s = np.cos(phi), np.sin(phi)
+        v_rate = np.array([g2 - grip / m * c, g3 - grip / m * s])
+        u_second = inverse @ (v_rate - frame.T[1:] @ (bending @ y[2:4]))
+        w2, w3 = (v[1] - size * s) / a, (size * c - v[0]) / a  # e1 × (u - v) / a
+        rates = np.array([y[2], y[3], *u_second, w2 * e1_rate[0] + w3 * e1_rate[1]])
+        return rates, b, N, float(frame[:, 2] @ bending[:, 0]) / float(np.hypot(T[0, 0], T[1, 0]))
+
+    def _slipping(self, y: FloatArray) -> FloatArray:
+        """d/dτ of (u, u̇, ω1, ln|u|, φ, t)."""
+        size, phi = float(np.exp(y[5])), y[6]
+        rates, b, N, turning = self._with_slip(y, size, phi)
+        grip = self._A * self._body.contact.mu_kinetic * N
+        c, s = np.cos(phi), np.sin(phi)
+        return np.array([*(size * rates), b[0] * c + b[1] * s - grip, b[1] * c - b[0] * s - size * turning, size])
+
+    def _slaved(self, y: FloatArray) -> tuple[FloatArray, float]:
+        """Rates of (u, u̇, ω1, |u|) and φ on the slow solution, where φ - φ_b = -|u| φ̇_b / (|b| + d|u|/dt)."""
+        b, N = self._drive(y)
+        grip = self._A * self._body.contact.mu_kinetic * N
+        phi, size, strength = float(np.arctan2(b[1], b[0])), float(y[5]), float(np.linalg.norm(b))
+        leading, _, _, turning = self._with_slip(y, size, phi)
+        span = 1e-4 * self._pace
+        change = (self._drive(y[:5] + span * leading)[0] - self._drive(y[:5] - span * leading)[0]) / (2 * span)
+        rotation = float(b[0] * change[1] - b[1] * change[0]) / strength**2 + turning
+        delta = -size * rotation / (2 * strength - grip)
+        rates = self._with_slip(y, size, phi + delta)[0]
+        return np.append(rates, strength * np.cos(delta) - grip), phi + delta
+
+    def _stood_still(self, y: FloatArray) -> FloatArray:
+        """The state at |u| = 0, linearly from a |u| so small that nothing else is seen."""
+        rates = self._slipping(y)
+        return np.asarray(y + rates / -rates[5])
+
+    def _until_halt(self, y: FloatArray) -> float:
+        _, v, force = reduced_rates(self._body, y[:5])
+        v_rate = force / self._body.ball.mass + self._body.gravity
+        speed = float(np.linalg.norm(v))
+        slowing = -float(v @ v_rate) / speed if speed > 0 else 0.0
+        return speed / slowing if slowing > 0 else np.inf
+
+    def _rise(self, piece: Piece) -> tuple[float, FloatArray] | None:
+        return stop(self._rolling, piece, self.excess)
+
+    def _motion(self, y: FloatArray, size: FloatArray, phi: FloatArray | None) -> Motion:
+        frame = self._body.surface.frame(y[:, :2])
+        v = np.einsum("nij,nj->ni", self._body.surface.tangents(y[:, :2]), y[:, 2:4])
+        drives = [self._drive(row) for row in y]
+        b, N = np.array([d[0] for d in drives]).reshape(-1, 2), np.array([d[1] for d in drives])
+        friction, u = -b / self._A, np.zeros((len(y), 2))
+        if phi is not None:
+            along = np.stack([np.cos(phi), np.sin(phi)], axis=-1).reshape(-1, 2)
+            friction, u = -self._body.contact.mu_kinetic * N[:, None] * along, size[:, None] * along
+        local = np.einsum("nij,ni->nj", frame[..., 1:], v)
+        return world_motion(
+            self._body, y[:, :2], velocity=local, spin=y[:, 4], slip=u, friction=friction, press=N, route=self.name
+        )

@@ -1,0 +1,219 @@
+"""The sequence of sticking and slipping, whatever integrates each leg of it.
+
+A leg is a stretch of time in one mode. A :class:`Route` integrates one leg at a time and says why it ended; here is
+decided what comes next. Nothing limits the number of legs: only the end of time ends the sequence.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+from enum import Enum, auto
+from typing import Generic, Protocol, TypeVar
+
+import numpy as np
+
+from proofroll.errors import Diverged, Refused
+from proofroll.events import EventKind
+from proofroll.scene import RollingBall
+from proofroll.surfaces import FloatArray
+from proofroll.truth.motion import Motion
+
+# Relative distance from the friction cone below which round-off decides on which side a state is.
+_ON_CONE = 1e-13
+
+State = TypeVar("State")
+
+
+class End(Enum):
+    """Why a leg ended."""
+
+    TIME = auto()  # the last time was reached
+    CONE = auto()  # sticking: the needed friction left the static cone
+    STILL = auto()  # slipping: the contact point stands still
+    HALT = auto()  # sticking with rolling resistance: the centre stands still
+    LIFTOFF = auto()  # slipping: the normal force reached zero
+
+
+@dataclass(frozen=True)
+class Leg(Generic[State]):
+    """One stretch of time in one mode.
+
+    Attributes:
+        start, end: [s].
+        sticking: the mode.
+        state: at the end; the slip velocity in it is zero unless ``why`` is TIME or LIFTOFF.
+        why: why it ended.
+        motion: times within the leg [s], shape (n,) -> motion at these times.
+    """
+
+    start: float
+    end: float
+    sticking: bool
+    state: State
+    why: End
+    motion: Callable[[FloatArray], Motion]
+
+
+class Route(Protocol[State]):
+    """One way of integrating the legs, in state variables of its own."""
+
+    @property
+    def name(self) -> str:
+        """How the legs are integrated, for a person."""
+
+    def start(self) -> State:
+        """State at time 0, rolling without slip."""
+
+    def excess(self, state: State) -> float:
+        """(needed - available) / (needed + available) with the friction needed to stick and μs N [-]."""
+
+    def ahead(self, state: State, span: float) -> State:
+        """The state after sticking for a short ``span`` [s], to third order at least."""
+
+    def stick(self, time: float, state: State, until: float) -> Leg[State]:
+        """Roll without slip from ``time`` to ``until`` at the latest [s]."""
+
+    def slip(self, time: float, state: State, until: float) -> Leg[State]:
+        """Slip, starting with the contact point at rest, from ``time`` to ``until`` at the latest [s]."""
+
+    def world(self, state: State) -> tuple[FloatArray, FloatArray, FloatArray]:
+        """p_WB [m], v_WB [m/s], w_WB [rad/s] of the state, each shape (3,)."""
+
+    def nudged(self, state: State, v_WB: FloatArray) -> State:
+        """The state rolling with the centre's velocity ``v_WB`` [m/s], shape (3,), in place of its own."""
+
+
+@dataclass(frozen=True)
+class Path(Generic[State]):
+    """The whole sequence.
+
+    Attributes:
+        legs: one after another from time 0.
+        events: kind and time [s] of each change.
+    """
+
+    legs: list[Leg[State]]
+    events: list[tuple[EventKind, float]]
+
+    def motion(self, times: FloatArray, route: str) -> tuple[Motion, np.ndarray[tuple[int], np.dtype[np.bool_]]]:
+        """Motion at ``times`` [s] and whether the ball sticks there; a time of an event belongs to the later leg."""
+        index = np.searchsorted([leg.start for leg in self.legs], times, side="right") - 1
+        columns = {key: np.empty((len(times), 3)) for key in ("p_WB", "v_WB", "w_WB", "force")}
+        for number in np.unique(index):
+            here = index == number
+            part = self.legs[number].motion(times[here])
+            for key, column in columns.items():
+                column[here] = getattr(part, key)
+        sticking = np.array([leg.sticking for leg in self.legs])[index]
+        return Motion(**columns, route=route), sticking
+
+
+def follow(body: RollingBall, route: Route[State], until: float) -> Path[State]:
+    """Everything from time 0 to ``until`` [s].
+
+    Raises:
+        Refused: the ball leaves the wall and comes back to it; impact is not modelled.
+        Diverged: a route makes no progress.
+    """
+    legs: list[Leg[State]] = []
+    events: list[tuple[EventKind, float]] = []
+    time, state = 0.0, route.start()
+    if _stands(body, route, state):
+        if _stays(body, route, state):
+            return Path([_rest(body, route, state, time, until)], events)
+        state = _set_off(body, route, state)
+    sticking = not _must_slip(body, route, state)
+    if not sticking:
+        events.append(("slip", time))
+    while True:
+        leg = (route.stick if sticking else route.slip)(time, state, until)
+        legs.append(leg)
+        if not leg.end > time and leg.why is not End.TIME and len(legs) > 1 and legs[-2].end == legs[-2].start:
+            raise Diverged(f"the truth makes no progress at {time:g} s, where sticking and slipping alternate at once")
+        time, state = leg.end, leg.state
+        if leg.why is End.TIME:
+            return Path(legs, events)
+        if leg.why is End.LIFTOFF:
+            events.append(("liftoff", time))
+            legs.append(_flight(body, route, state, time, until))
+            return Path(legs, events)
+        if leg.why is End.HALT:
+            if _stays(body, route, state):
+                legs.append(_rest(body, route, state, time, until))
+                return Path(legs, events)
+            state = _set_off(body, route, state)
+        # With |u| = 0 the ball sticks if it can; where the needed force is outside the cone it goes on slipping.
+        must_slip = leg.why is End.CONE or _must_slip(body, route, state)
+        if must_slip and sticking:
+            events.append(("slip", time))
+        elif not must_slip and not sticking:
+            events.append(("stick", time))
+        sticking = not must_slip
+
+
+def _must_slip(body: RollingBall, route: Route[State], state: State) -> bool:
+    """Whether the needed friction is outside the static cone, or on it and about to leave."""
+    excess = route.excess(state)
+    if abs(excess) > _ON_CONE:
+        return excess > 0
+    a, speed = body.ball.radius, float(np.linalg.norm(route.world(state)[1]))
+    pace = np.sqrt(a * np.linalg.norm(body.gravity)) + speed
+    return bool(pace > 0 and route.excess(route.ahead(state, 1e-3 * a / pace)) > _ON_CONE)
+
+
+def _stands(body: RollingBall, route: Route[State], state: State) -> bool:
+    return body.contact.rolling_resistance > 0 and not np.any(route.world(state)[1])
+
+
+def _pull(body: RollingBall, p_WB: FloatArray) -> tuple[FloatArray, float]:
+    """Tangential gravity [m/s²], shape (3,), and the normal force per mass of a ball at rest [m/s²]."""
+    e1 = body.surface.normal(p_WB)
+    press = float(e1 @ body.gravity)
+    return body.gravity - press * e1, press
+
+
+def _stays(body: RollingBall, route: Route[State], state: State) -> bool:
+    """Whether a ball whose centre stands still stays so: friction and rolling resistance can both hold it."""
+    pull, press = _pull(body, route.world(state)[0])
+    strength = float(np.linalg.norm(pull))
+    a, contact = body.ball.radius, body.contact
+    return strength * a <= contact.rolling_resistance * press and strength <= contact.mu_static * press
+
+
+def _set_off(body: RollingBall, route: Route[State], state: State) -> State:
+    """The state with a velocity down the slope too small to matter: it gives the resistance its direction."""
+    p_WB = route.world(state)[0]
+    pull, _ = _pull(body, p_WB)
+    return route.nudged(state, 1e-12 * np.sqrt(body.ball.radius / np.linalg.norm(pull)) * pull)
+
+
+def _rest(body: RollingBall, route: Route[State], state: State, time: float, until: float) -> Leg[State]:
+    p, _, w = route.world(state)
+    e1 = body.surface.normal(p)
+    force = -body.ball.mass * body.gravity
+
+    def motion(times: FloatArray) -> Motion:
+        p_WB, v_WB, w_WB, held = (np.broadcast_to(x, (len(times), 3)) for x in (p, np.zeros(3), (w @ e1) * e1, force))
+        return Motion(p_WB, v_WB, w_WB, held, "at rest")
+
+    return Leg(time, until, True, state, End.TIME, motion)
+
+
+def _flight(body: RollingBall, route: Route[State], state: State, time: float, until: float) -> Leg[State]:
+    """Free fall after the wall was left."""
+    p, v, w = route.world(state)
+
+    def motion(times: FloatArray) -> Motion:
+        t = (times - time)[:, None]
+        p_WB, v_WB = p + t * v + 0.5 * t**2 * body.gravity, v + t * body.gravity
+        away = body.surface.gap(p_WB)
+        if np.any(away < -1e-9 * body.ball.radius):
+            landed = float(times[np.argmax(away < -1e-9 * body.ball.radius)])
+            raise Refused(
+                f"the ball leaves the wall at {time:.6g} s and is back on it before {landed:.6g} s; "
+                "the truth does not model the impact, so end the run earlier"
+            )
+        return Motion(p_WB, v_WB, np.broadcast_to(w, p_WB.shape), np.zeros_like(p_WB), "free flight")
+
+    return Leg(time, until, False, state, End.TIME, motion)
