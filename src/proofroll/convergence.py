@@ -39,8 +39,8 @@ def richardson(curves: Sequence[FloatArray], ratio: float, declared: int | None 
 
     The observed order p follows from the size of the two differences (Roache 1998, section 5.9). Where it is that of
     the scheme the ladder is asymptotic: the extrapolation removes the term h^p, then h^(p+1), and is trusted to twice
-    its last change. Where it is not, the differences do not measure the error; the extrapolation with the declared
-    order is then trusted no further than the distance by which it moved the finest curve.
+    its last change. Where it is not, extrapolating would spread the error of the coarse curves; the finest curve then
+    stands for the limit, trusted to twice what the last refinement changed (more, where the order is below one).
 
     Args:
         curves: three arrays of one shape.
@@ -56,14 +56,12 @@ def richardson(curves: Sequence[FloatArray], ratio: float, declared: int | None 
         # The finest curve, as uncertain as the largest change seen.
         return Limit(fine, max(first, last), float("nan"))
     power = declared or max(1, round(order))
+    if abs(order - power) > _ASYMPTOTIC:
+        return Limit(fine, 2 * last * max(1.0, 1 / (ratio**order - 1)), order)
     gain = ratio**power - 1
     before, after = middle + (middle - coarse) / gain, fine + (fine - middle) / gain
     values = after + (after - before) / (ratio ** (power + 1) - 1)
-    asymptotic = abs(order - power) < _ASYMPTOTIC
-    if asymptotic:
-        return Limit(values, 2 * _size(values - after), order)
-    # An order below the declared one leaves more of the error in place than the extrapolation removed.
-    return Limit(values, max(_size(values - fine), last / (ratio**order - 1)), order)
+    return Limit(values, 2 * _size(values - after), order)
 
 
 def tightest(curves: Sequence[FloatArray]) -> Limit:
