@@ -41,8 +41,18 @@ def initial_response(body: RollingBall) -> tuple[FloatArray, FloatArray]:
 
     Newton-Euler with rolling without slip, solved for the nine unknowns p̈, ω̇, (N, F2, F3) together; the rows of
     the last three equations are the constraints differentiated, using the signed distance and its derivatives.
+    Where that needs more friction than there is, the ball begins to slip against it: N is the same, for friction
+    along the wall does not change it.
     """
-    return newton_euler(body, body.p0, body.v0, body.w0)[::2]
+    acceleration, _, force = newton_euler(body, body.p0, body.v0, body.w0)
+    e1 = body.surface.normal(body.p0)
+    normal = (force @ e1) * e1
+    friction, press = force - normal, float(np.linalg.norm(normal))
+    needed = float(np.linalg.norm(friction))
+    if needed <= body.contact.mu_static * press * (1 + 1e-12):
+        return acceleration, force
+    force = normal + friction * (body.contact.mu_kinetic * press / needed)
+    return force / body.ball.mass + body.gravity, force
 
 
 def newton_euler(

@@ -18,7 +18,7 @@ from proofroll.simulation import build, simulate
 
 pin = pytest.importorskip("pinocchio")
 
-FORMULATIONS = ("composite", "free_flyer")
+FORMULATIONS = ("composite", "free_flyer")  # those with rows; contact has tests of its own
 PRESETS = ("default", "matched", "tuned")
 RESISTANCE = 5e-4  # 0.02 a, the paper's value
 
@@ -148,7 +148,7 @@ def test_declared_order(formulation: str, integrator: str, orientation: bool, dt
     for step in (dt, dt / 2):
         run = simulate(scene, "pinocchio", until=until, every=until / 2, dt=step, **options)
         errors.append(float(np.abs(run.p_WB - true.p_WB).max()))
-    declared = build(scene, "pinocchio", dt=dt, **options)._motion._settings.order
+    declared = build(scene, "pinocchio", dt=dt, **options)._run.motion._settings.order
     assert np.log2(errors[0] / errors[1]) == pytest.approx(declared, abs=0.35)
 
 
@@ -165,7 +165,7 @@ def test_projection_takes_away_drift() -> None:
 
 def test_projection_is_mass_orthogonal() -> None:
     """What the projection takes from the velocities is an impulse of the rows: orthogonal to every rolling motion."""
-    mechanism = build(cylinder(), "pinocchio", formulation="free_flyer")._mechanism
+    mechanism = build(cylinder(), "pinocchio", formulation="free_flyer")._run.mechanism
     data = mechanism.model.createData()
     v = mechanism.v0 + np.array([1e-3, 2e-3, -1e-3, 0.3, 0.1, -0.2])
     q, corrected = mechanism.project(data, mechanism.q0, v)
@@ -177,7 +177,7 @@ def test_projection_is_mass_orthogonal() -> None:
 
 def test_joint_transmits_what_the_multipliers_say() -> None:
     """In composite the spherical joint's wrench has no couple, and its friction is that of the multipliers."""
-    mechanism = build(cylinder(axial_speed=0.3, radial_spin=5), "pinocchio")._mechanism
+    mechanism = build(cylinder(axial_speed=0.3, radial_spin=5), "pinocchio")._run.mechanism
     data = mechanism.model.createData()
     _, force = mechanism.reaction(data, mechanism.q0, mechanism.v0)
     wrench = data.oMi[mechanism.ball].act(data.f[mechanism.ball])
@@ -188,7 +188,7 @@ def test_model_is_only_what_the_scene_requires() -> None:
     """No torque without rolling resistance, no mass but the ball's, no freedom but those needed."""
     for formulation, freedoms in (("composite", 5), ("free_flyer", 6)):
         engine = build(cylinder(), "pinocchio", formulation=formulation)
-        mechanism = engine._mechanism
+        mechanism = engine._run.mechanism
         data = mechanism.model.createData()
         assert mechanism.resistance(data, mechanism.q0, mechanism.v0) is None
         assert engine.built().rolling_resistance == 0.0
@@ -286,7 +286,13 @@ def test_coming_to_rest_is_said() -> None:
         ("preset=default,dt=0", "dt", "greater than 0"),
         ("preset=default,dt=0.003", "dt", "whole number of steps"),
         ("formulation=rigid", "formulation", "composite, free_flyer"),
-        ("integrator=leapfrog", "integrator", "'rk4'"),
+        ("integrator=euler", "integrator", "'rk4'"),
+        ("integrator=leapfrog", "integrator", "only contact"),
+        ("formulation=contact,integrator=rk4", "integrator", "semi_implicit_euler and leapfrog"),
+        ("formulation=contact,projection=true", "projection", "leave it out"),
+        ("formulation=contact,orientation=false", "orientation", "leave it out"),
+        ("formulation=contact,solver=newton", "solver", "'admm'"),
+        ("formulation=contact,solver_tolerance=0", "solver_tolerance", "greater than 0"),
     ],
 )
 def test_wrong_settings_give_one_line(options: str, field: str, advice: str) -> None:
@@ -299,20 +305,14 @@ def test_wrong_settings_give_one_line(options: str, field: str, advice: str) -> 
 
 
 def test_presets_are_complete() -> None:
-    """Each formulation has the three presets, and each preset is filed under its own name."""
+    """Each formulation has its presets, and each preset is filed under its own name."""
     from proofroll.engines.pinocchio import Pinocchio
 
-    assert set(Pinocchio.presets) == set(FORMULATIONS)
+    assert set(Pinocchio.presets) == {*FORMULATIONS, "contact"}
     for formulation, presets in Pinocchio.presets.items():
-        assert set(presets) == set(PRESETS)
+        assert set(presets) == (set(PRESETS) if formulation in FORMULATIONS else {"default", "matched"})
         assert all((s.formulation, s.preset) == (formulation, name) for name, s in presets.items())
-        assert {s.resolution for s in presets.values()} == {"dt", "rtol"}
-
-
-def test_slip_is_refused() -> None:
-    """Bounded friction is not modelled and not silently ignored."""
-    with pytest.raises(Refused, match="slip"):
-        simulate(cylinder(mu_static=0.35), "pinocchio", until=0.01)
+        assert {s.resolution for s in presets.values()} == ({"dt", "rtol"} if formulation in FORMULATIONS else {"dt"})
 
 
 def test_surface_without_generators() -> None:
@@ -338,10 +338,10 @@ def test_surface_without_generators() -> None:
 
 
 def test_provides_names_what_is_modelled() -> None:
-    """The capabilities are those of rolling, not of slip."""
+    """The capabilities are those of rolling and of slip."""
     from proofroll.engines.pinocchio import Pinocchio
 
-    assert Pinocchio.provides == {Capability.ROLLING, Capability.CURVED_SURFACE, Capability.ROLLING_RESISTANCE}
+    assert Pinocchio.provides == set(Capability)
     assert Pinocchio.version() == pin.__version__
 
 

@@ -2,11 +2,13 @@
 
 from __future__ import annotations
 
+import math
 from typing import Any
 
 import numpy as np
 import pinocchio as pin
 
+from proofroll.engines.pinocchio.mechanism import Sliding
 from proofroll.engines.pinocchio.rows import BallTerms, ball_terms, resistance, rolling_rows
 from proofroll.errors import Refused
 from proofroll.scene import RollingBall
@@ -32,6 +34,7 @@ class Composite:
             raise Refused("composite joints need a surface that slides along itself; use formulation=free_flyer")
         self._radius = body.ball.radius
         self._f = body.contact.rolling_resistance
+        self._mu_kinetic = body.contact.mu_kinetic
         self._frame0 = body.surface.frame(np.zeros(2))
         self.model = pin.Model()
         self.model.gravity.linear = body.gravity
@@ -99,6 +102,39 @@ class Composite:
             return None
         terms, frame = self._rows(data, q, v)[:2]
         return resistance(terms, self._f, frame[:, 0])
+
+    def needed(self, data: Any, q: FloatArray, v: FloatArray) -> tuple[float, float]:
+        """See :class:`~proofroll.engines.pinocchio.mechanism.Mechanism`."""
+        friction = self.respond(data, q, v)[1]
+        e1 = data.oMi[self._carriage].rotation @ self._frame0[:, 0]
+        return math.hypot(*friction), self._normal_force(data, e1)  # forwardDynamics leaves the bias pass alone
+
+    def slide(self, data: Any, q: FloatArray, v: FloatArray, direction: FloatArray) -> Sliding:
+        """See :class:`~proofroll.engines.pinocchio.mechanism.Mechanism`; the friction is put to the joints."""
+        terms, frame, rows, drift = self._rows(data, q, v)
+        e1, along = frame[:, 0], frame[:, 1:]
+        # Friction along the wall cannot change N, no more than the joints can.
+        normal_force = self._normal_force(data, e1)
+        friction = -self._mu_kinetic * normal_force * (along.T @ direction)
+        torque = rows.T @ friction
+        if self._f:
+            torque += normal_force * resistance(terms, self._f, e1)
+        acceleration = np.array(pin.aba(self.model, data, q, v, torque))
+        slip_rate = along @ (rows @ acceleration + drift)
+        return Sliding(acceleration, normal_force, along @ (rows @ v), slip_rate, along @ friction, e1)
+
+    def sliding_reaction(
+        self, data: Any, q: FloatArray, v: FloatArray, direction: FloatArray
+    ) -> tuple[FloatArray, FloatArray]:
+        """See :class:`~proofroll.engines.pinocchio.mechanism.Mechanism`; N from the joint's wrench."""
+        sliding = self.slide(data, q, v, direction)
+        pin.rnea(self.model, data, q, v, sliding.acceleration)
+        force = sliding.friction - self._normal_force(data, sliding.e1) * sliding.e1
+        return sliding.acceleration, np.asarray(force)
+
+    def project_sliding(self, data: Any, q: FloatArray, v: FloatArray) -> tuple[FloatArray, FloatArray]:  # noqa: ARG002 -- the protocol's
+        """See :class:`~proofroll.engines.pinocchio.mechanism.Mechanism`: the joints hold the ball on the surface."""
+        return q, v
 
 
 def _joint(generator: Generator) -> Any:

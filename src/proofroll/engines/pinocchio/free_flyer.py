@@ -2,11 +2,13 @@
 
 from __future__ import annotations
 
+import math
 from typing import Any
 
 import numpy as np
 import pinocchio as pin
 
+from proofroll.engines.pinocchio.mechanism import Sliding
 from proofroll.engines.pinocchio.rows import BallTerms, ball_terms, resistance, rolling_rows
 from proofroll.scene import RollingBall
 from proofroll.surfaces import FloatArray
@@ -23,6 +25,7 @@ class FreeFlyer:
         """See :class:`~proofroll.engines.pinocchio.mechanism.Mechanism`."""
         self._radius = body.ball.radius
         self._f = body.contact.rolling_resistance
+        self._mu_kinetic = body.contact.mu_kinetic
         self._surface = body.surface
         self._orientation = orientation
         self.model = pin.Model()
@@ -96,3 +99,47 @@ class FreeFlyer:
             return None
         terms, frame = self._rows(data, q, v)[:2]
         return resistance(terms, self._f, frame[:, 0])
+
+    def needed(self, data: Any, q: FloatArray, v: FloatArray) -> tuple[float, float]:
+        """See :class:`~proofroll.engines.pinocchio.mechanism.Mechanism`."""
+        minus_N, F2, F3 = self._solve(data, q, v)[1]
+        return math.hypot(F2, F3), -float(minus_N)
+
+    def _slide(self, data: Any, q: FloatArray, v: FloatArray, direction: FloatArray) -> Sliding:
+        """One row, that of the surface; friction and rolling resistance are columns, for both follow N."""
+        terms, frame, rows, drift = self._rows(data, q, v)
+        e1, along = frame[:, 0], frame[:, 1:]
+        against = -self._mu_kinetic * (along.T @ direction)
+        column = rows[0] - against @ rows[1:]
+        if self._f:
+            column = column - resistance(terms, self._f, e1)
+        matrix = np.zeros((7, 7))
+        matrix[:6, :6] = data.M
+        matrix[:6, 6] = -column
+        matrix[6, :6] = rows[0]
+        solution = np.linalg.solve(matrix, np.concatenate([-data.nle, -drift[:1]]))
+        acceleration, normal_force = solution[:6], -float(solution[6])
+        slip_rate = along @ (rows[1:] @ acceleration + drift[1:])
+        friction = along @ (normal_force * against)
+        return Sliding(acceleration, normal_force, along @ (rows[1:] @ v), slip_rate, friction, e1)
+
+    def slide(self, data: Any, q: FloatArray, v: FloatArray, direction: FloatArray) -> Sliding:
+        """See :class:`~proofroll.engines.pinocchio.mechanism.Mechanism`."""
+        sliding = self._slide(data, q, v, direction)
+        if not self._orientation:  # as in respond
+            sliding.acceleration[:3] += pin.skew(v[3:]) @ v[:3]
+        return sliding
+
+    def sliding_reaction(
+        self, data: Any, q: FloatArray, v: FloatArray, direction: FloatArray
+    ) -> tuple[FloatArray, FloatArray]:
+        """See :class:`~proofroll.engines.pinocchio.mechanism.Mechanism`; N is the multiplier."""
+        sliding = self._slide(data, q, v, direction)
+        return sliding.acceleration, np.asarray(sliding.friction - sliding.normal_force * sliding.e1)
+
+    def project_sliding(self, data: Any, q: FloatArray, v: FloatArray) -> tuple[FloatArray, FloatArray]:
+        """See :class:`~proofroll.engines.pinocchio.mechanism.Mechanism`."""
+        q = q.copy()
+        q[:3] += self._surface.gap(q[:3]) * self._surface.normal(q[:3])
+        rows = self._rows(data, q, v)[2]
+        return q, np.array(pin.impulseDynamics(self.model, data, v, rows[:1]))

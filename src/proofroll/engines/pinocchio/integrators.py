@@ -36,10 +36,10 @@ class Integrator(Protocol):
 def integrator(mechanism: Mechanism, settings: PinocchioSettings) -> Integrator:
     """The integrator that the settings ask for."""
     if settings.integrator == "dop853":
-        return _Adaptive(mechanism, settings)
+        return Adaptive(mechanism, settings)
     if settings.integrator == "semi_implicit_euler":
-        return _SemiImplicitEuler(mechanism, settings)
-    return _RungeKutta4(mechanism, settings)
+        return SemiImplicitEuler(mechanism, settings)
+    return RungeKutta4(mechanism, settings)
 
 
 def _moving(mechanism: Mechanism, settings: PinocchioSettings) -> FloatArray:
@@ -52,7 +52,7 @@ def _moving(mechanism: Mechanism, settings: PinocchioSettings) -> FloatArray:
     return factors
 
 
-class _FixedStep:
+class FixedStep:
     """Steps of ``dt``; subclasses say what one step is."""
 
     def __init__(self, mechanism: Mechanism, settings: PinocchioSettings) -> None:
@@ -79,7 +79,7 @@ class _FixedStep:
         raise NotImplementedError
 
 
-class _SemiImplicitEuler(_FixedStep):
+class SemiImplicitEuler(FixedStep):
     """Velocity first, then the configuration with the new velocity."""
 
     def _step(self, h: float) -> None:
@@ -87,7 +87,7 @@ class _SemiImplicitEuler(_FixedStep):
         self.q = pin.integrate(self._model, self.q, h * self._moving * self.v)
 
 
-class _RungeKutta4(_FixedStep):
+class RungeKutta4(FixedStep):
     """The classical scheme; displacements within a step are tangent vectors at its start.
 
     As usually written, the displacement's rate is taken to be the joint velocity. That is so only where
@@ -123,10 +123,10 @@ class _RungeKutta4(_FixedStep):
 # A step shorter than this part of the time in which the ball turns by a radian, this many times in a row, leads
 # nowhere: ordinary steps are a hundred times longer, and one jump of the forces is passed in a few dozen.
 _SHORT = 1e-4
-_PATIENCE = 500
+PATIENCE = 500
 
 
-class _Adaptive:
+class Adaptive:
     """DOP853 on configuration and velocity together, the quaternion by its rate (pin.tangentMap)."""
 
     def __init__(self, mechanism: Mechanism, settings: PinocchioSettings) -> None:
@@ -165,7 +165,7 @@ class _Adaptive:
                     raise Diverged(f"the motion could not be integrated past {solver.t:g} s: {message}")
                 longest = max(longest, solver.step_size)
                 short_steps = short_steps + 1 if self._is_short(solver) else 0
-                if short_steps > _PATIENCE:
+                if short_steps > PATIENCE:
                     raise Diverged(
                         f"the steps became too short at {solver.t:g} s: the forces jump there, as rolling resistance "
                         "does when the ball comes to rest"

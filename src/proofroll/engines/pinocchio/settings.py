@@ -14,7 +14,8 @@ from proofroll.errors import InputError
 # scipy raises anything below 100 machine epsilons to it, with no more than a warning.
 TIGHTEST_RTOL = 100 * float(np.finfo(float).eps)
 
-_ORDERS = {"semi_implicit_euler": 1, "rk4": 2, "rk4_dexpinv": 4}
+_ORDERS = {"semi_implicit_euler": 1, "leapfrog": 2, "rk4": 2, "rk4_dexpinv": 4}
+_OF_CONTACT = ("semi_implicit_euler", "leapfrog")
 
 
 @dataclass(frozen=True)
@@ -23,31 +24,50 @@ class PinocchioSettings:
 
     Attributes:
         formulation: ``composite`` (joints along the surface's generators, so the ball cannot leave it, and two rows
-            of rolling) or ``free_flyer`` (six freedoms, one row for the surface and two of rolling).
+            of rolling), ``free_flyer`` (six freedoms, one row for the surface and two of rolling) or ``contact`` (a
+            free ball against a plane posed anew in each step, by Pinocchio's solver of contact with friction).
         preset: where the other values come from.
         integrator: ``semi_implicit_euler`` and ``rk4`` as they are usually written with ``pin.integrate``;
-            ``rk4_dexpinv`` the same with the missing term of rotations; ``dop853`` adaptive, order 8.
-        dt: step [s] of the first three; None with ``dop853``.
+            ``rk4_dexpinv`` the same with the missing term of rotations; ``dop853`` adaptive, order 8. ``contact`` has
+            ``semi_implicit_euler`` and ``leapfrog``, whose velocities are half a step ahead of the positions.
+        dt: step [s]; None with ``dop853``.
         rtol: relative tolerance [-] of ``dop853``; None with the others.
         orientation: integrate the orientation of the ball. Its inertia is the same about every axis, so the motion
             does not depend on it, and without it the fast turning needs no small steps.
-        projection: put the state back on the constraints after each step.
+        projection: put the state back on the constraints after each step; not in ``contact``, where the solver does.
+        solver: of ``contact``: projected Gauss-Seidel or alternating directions (ADMM).
+        solver_tolerance: of ``contact``: feasibility [m/s] and complementarity [J], both also relative [-].
     """
 
-    formulation: Literal["composite", "free_flyer"] = "composite"
+    formulation: Literal["composite", "free_flyer", "contact"] = "composite"
     preset: Literal["default", "matched", "tuned"] = "matched"
-    integrator: Literal["semi_implicit_euler", "rk4", "rk4_dexpinv", "dop853"] = "dop853"
+    integrator: Literal["semi_implicit_euler", "leapfrog", "rk4", "rk4_dexpinv", "dop853"] = "dop853"
     dt: Annotated[float, Gt(0)] | None = None
     rtol: Annotated[float, Ge(TIGHTEST_RTOL)] | None = 1e-13
     orientation: bool = True
     projection: bool = True
+    solver: Literal["pgs", "admm"] = "pgs"
+    solver_tolerance: Annotated[float, Gt(0)] = 1e-12
 
     def __post_init__(self) -> None:
         """A fixed step has dt and no rtol, an adaptive one rtol and no dt.
 
         Raises:
-            InputError: otherwise.
+            InputError: otherwise, or the formulation has no such option.
         """
+        if (self.formulation == "contact") != (self.integrator in _OF_CONTACT) and (
+            self.formulation == "contact" or self.integrator == "leapfrog"
+        ):
+            advice = (
+                f"contact has {' and '.join(_OF_CONTACT)}" if self.formulation == "contact" else "only contact has it"
+            )
+            raise InputError("pinocchio: integrator", self.integrator, advice)
+        if self.formulation == "contact" and self.projection:
+            raise InputError(
+                "pinocchio: projection", self.projection, "contact is put back by its solver; leave it out"
+            )
+        if self.formulation == "contact" and not self.orientation:
+            raise InputError("pinocchio: orientation", self.orientation, "contact always turns the ball; leave it out")
         if self.integrator == "dop853":
             if self.dt is not None:
                 advice = "dop853 chooses its steps; set rtol instead, or take the fixed steps of preset=default"
@@ -95,4 +115,12 @@ def _presets(formulation: Literal["composite", "free_flyer"]) -> Mapping[str, Pi
 PRESETS: Mapping[str, Mapping[str, PinocchioSettings]] = {
     "composite": _presets("composite"),
     "free_flyer": _presets("free_flyer"),
+    "contact": {
+        # what one writes first: the plane where the ball is when the step begins, the solver as it comes
+        "default": PinocchioSettings(
+            "contact", "default", "semi_implicit_euler", 1e-3, None, projection=False, solver_tolerance=1e-6
+        ),
+        # the same contact, with its turning during a step taken into account, and solved to round-off
+        "matched": PinocchioSettings("contact", "matched", "leapfrog", 1e-3, None, projection=False),
+    },
 }

@@ -1,0 +1,289 @@
+"""Formulation ``contact``: a free ball against the wall through Pinocchio's own solver of contact with friction.
+
+The wall is presented as a plane, posed anew in each step tangent to it at the contact; Pinocchio's PGS or ADMM solver
+finds the impulse of the step in its friction cone. The ball has a translation joint with a spherical joint in it: with
+a free-flyer joint the velocity of the centre has components in the ball's turning axes, and a step of semi-implicit
+Euler multiplies it by the square root of 1 + (ω dt)², so that a fast ball blows up at any useful step.
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+import pinocchio as pin
+
+from proofroll.engine import Built, Regularised, Sample, whole_steps
+from proofroll.engines.pinocchio.settings import PinocchioSettings
+from proofroll.errors import Diverged, Refused
+from proofroll.events import Event, EventKind
+from proofroll.scene import RollingBall
+from proofroll.surfaces import FloatArray
+
+# Pinocchio's cone needs a number where friction is unbounded. PGS takes any; the iterations of ADMM grow with it.
+_UNBOUNDED_FRICTION = {"pgs": 1e6, "admm": 1e2}
+# Pinocchio's limit of 1000 is met at tight tolerances where the normal force is small.
+_ADMM_ITERATIONS = 10_000
+# An impulse nearer to the cone than this is on it [-].
+_ON_CONE = 1e-9
+# A normal impulse smaller than this part of gravity's is round-off of the gap: the wall does not press.
+_FAINT = 1e-9
+# The moment of rolling resistance follows the normal force, and is found by repetition.
+_REPEATS, _SETTLED = 10, 1e-13
+
+
+@dataclass(frozen=True, slots=True)
+class Kick:
+    """What the contact does to the ball around the present time.
+
+    Attributes:
+        before, v: joint velocity before and after it, shape (6,).
+        span: duration [s].
+        force: of the wall on the ball in the world, mean over the span [N], shape (3,).
+        status: ``stick``, ``slip``, or ``liftoff`` where the wall does not press.
+    """
+
+    before: FloatArray
+    v: FloatArray
+    span: float
+    force: FloatArray
+    status: EventKind
+
+
+class ContactRun:
+    """Velocity-level time stepping; see :class:`proofroll.engine.Engine` for the methods.
+
+    With ``semi_implicit_euler`` the plane is that at the start of the step, and position and velocity belong to the
+    same time. With ``leapfrog`` the velocity runs half a step ahead of the position (the first kick is half as long),
+    and the rate at which the plane turns is given to the solver, so that at the middle of the step the ball is on the
+    wall and does not slip; that is of order 2.
+    """
+
+    def __init__(self, body: RollingBall, settings: PinocchioSettings) -> None:
+        """At time 0.
+
+        Raises:
+            Refused: Pinocchio's solver does not find the first impulse.
+        """
+        self._body, self._settings = body, settings
+        self._dt = float(settings.dt or 0.0)
+        self._leapfrog = settings.integrator == "leapfrog"
+        self.model = pin.Model()
+        self.model.gravity.linear = body.gravity
+        carriage = self.model.addJoint(0, pin.JointModelTranslation(), pin.SE3.Identity(), "centre")
+        self._ball = self.model.addJoint(carriage, pin.JointModelSpherical(), pin.SE3.Identity(), body.ball.name)
+        inertia = pin.Inertia(body.ball.mass, np.zeros(3), body.ball.inertia * np.eye(3))
+        self.model.appendBodyToJoint(self._ball, inertia, pin.SE3.Identity())
+        self._data, self._scratch = self.model.createData(), self.model.createData()
+        self._q = np.concatenate([body.p0, [0.0, 0.0, 0.0, 1.0]])
+        self._v = np.concatenate([body.v0, body.w0])
+        self._started = False
+
+        point = pin.PointContactConstraintModel(self.model, 0, pin.SE3.Identity(), self._ball, pin.SE3.Identity())
+        self._models, self._datas = pin.StdVec_ConstraintModel(), pin.StdVec_ConstraintData()
+        self._models.append(pin.ConstraintModel(point))
+        self._datas.append(self._models[0].createData())
+        self._point = self._models[0].extract()  # refers to the model in the vector
+        self._bounded = math.isfinite(body.contact.mu_static)
+        unbounded = _UNBOUNDED_FRICTION[settings.solver]
+        self._mu_static = body.contact.mu_static if self._bounded else unbounded
+        self._mu_kinetic = body.contact.mu_kinetic if self._bounded else unbounded
+        self._solver, self._options, self._result = _solver(settings)
+
+        self._status: EventKind = "stick"
+        self._pressed = False
+        self._normal_force = 0.0
+        self._events: list[Event] = []
+        self._time = 0.0
+        try:
+            kick = self._kick()
+        except Diverged as error:
+            raise Refused(str(error)) from None
+        if self._bounded and kick.status == "slip":
+            self._status = "slip"
+            self._events.append(Event("slip", 0.0, 0.0, 0.0))
+
+    def advance(self, start: float, end: float) -> None:
+        """From ``start`` to ``end`` [s].
+
+        Raises:
+            Diverged: Pinocchio's solver did not find the impulse.
+        """
+        for number in range(whole_steps(start, end, self._dt)):
+            self._time = start + number * self._dt
+            kick = self._kick()
+            if kick.status != self._status:
+                before = max(self._time - self._dt, 0.0)
+                self._events.append(Event(kick.status, 0.5 * (before + self._time), before, self._time))
+            self._status, self._started = kick.status, True
+            self._pressed = self._pressed or bool(kick.force.any())
+            self._v = kick.v
+            self._q = pin.integrate(self.model, self._q, self._dt * kick.v)
+        self._time = end
+
+    def _kick(self) -> Kick:
+        """The impulse around the present time. Changes nothing but scratch data."""
+        model, data, q, v = self.model, self._data, self._q, self._v
+        span = self._dt if self._started or not self._leapfrog else 0.5 * self._dt
+        pin.computeAllTerms(model, data, q, v)
+        velocity = pin.getVelocity(model, data, self._ball, pin.LOCAL_WORLD_ALIGNED)
+        p, turned = data.oMi[self._ball].translation, data.oMi[self._ball].rotation
+        axes = self._pose(p, turned)
+        self._point.calc(model, data, self._datas[0].extract())
+        jacobian = self._point.jacobian(model, data, self._datas[0].extract())
+        inverse = np.triu(pin.computeMinverse(model, data, q))
+        inverse += np.triu(inverse, 1).T
+        delassus = pin.DelassusOperatorDense(jacobian @ inverse @ jacobian.T)
+        shift = np.array([0.0, 0.0, float(self._body.surface.gap(p)) / self._dt])
+        if self._leapfrog:
+            shift += 0.5 * self._dt * (axes.T @ self._turning(p, velocity))
+
+        f, torque, normal_force = self._body.contact.rolling_resistance, np.zeros(6), self._normal_force
+        after, velocity_now = v, velocity.linear
+        for _ in range(_REPEATS):
+            if f:
+                torque = self._resistance(p, turned, velocity_now) * normal_force
+            free = v + span * pin.aba(model, data, q, v, torque)
+            impulse, status = self._solve(delassus, jacobian @ free + shift)
+            after = free + inverse @ (jacobian.T @ impulse)
+            found = float(impulse[2]) / span
+            if not f or abs(found - normal_force) <= _SETTLED * abs(found):
+                break
+            normal_force = found
+            # the resistance is that at the present time, which with leapfrog is the middle of the kick
+            velocity_now = 0.5 * (v + after)[:3] if self._leapfrog and self._started else velocity.linear
+        self._normal_force = found  # only where the next repetition starts
+        if status == "liftoff" and not self._pressed:
+            status = self._status  # a plane does not press before the ball has moved into it
+        return Kick(v, after, span, axes @ impulse / span, status)
+
+    def _pose(self, p: FloatArray, turned: FloatArray) -> FloatArray:
+        """Poses the plane, and returns its axes as columns, the last one from the wall into the ball."""
+        surface = self._body.surface
+        frame = surface.frame(surface.locate(p))
+        axes = frame[:, [1, 2, 0]] * (1.0, -1.0, -1.0)
+        arm = self._body.ball.radius * frame[:, 0]
+        self._point.joint1_placement = pin.SE3(axes, p + arm)
+        self._point.joint2_placement = pin.SE3(turned.T @ axes, turned.T @ arm)
+        return np.asarray(axes)
+
+    def _turning(self, p: FloatArray, velocity: Any) -> FloatArray:
+        """Rate of the velocity of the contact point that comes from the turning of the normal [m/s²], shape (3,)."""
+        surface, radius = self._body.surface, self._body.ball.radius
+        e1, e1_rate = surface.normal(p), surface.normal_gradient(p) @ velocity.linear
+        slip_rate = radius * (pin.skew(velocity.angular) @ e1_rate)
+        return np.asarray(slip_rate - (e1 @ slip_rate) * e1 + (e1_rate @ velocity.linear) * e1)
+
+    def _resistance(self, p: FloatArray, turned: FloatArray, v_WB: FloatArray) -> FloatArray:
+        """Rolling resistance on the joints per unit of normal force [m], shape (6,); zero where the ball rests."""
+        torque, speed = np.zeros(6), math.sqrt(v_WB @ v_WB)
+        if speed > 0:
+            e1 = self._body.surface.normal(p)
+            torque[3:] = turned.T @ (pin.skew(e1) @ v_WB) * (self._body.contact.rolling_resistance / speed)
+        return torque
+
+    def _solve(self, delassus: Any, free: FloatArray) -> tuple[FloatArray, EventKind]:
+        """The impulse [N s] for the velocity of the contact point that it would have without, each shape (3,)."""
+        mu = self._mu_static if self._status == "stick" else self._mu_kinetic
+        impulse = self._impulse(delassus, free, mu)
+        status = self._judged(impulse, mu)
+        if status == "slip" and not self._bounded:
+            raise Diverged(f"at {self._time:g} s more friction is needed than {mu:g} times the normal force")
+        if status == "slip" and mu != self._mu_kinetic:
+            impulse = self._impulse(delassus, free, self._mu_kinetic)
+        return impulse, status
+
+    def _judged(self, impulse: FloatArray, mu: float) -> EventKind:
+        weight = self._body.ball.mass * float(np.linalg.norm(self._body.gravity))
+        if impulse[2] <= _FAINT * weight * self._dt:
+            return "liftoff"
+        on_cone = math.hypot(impulse[0], impulse[1]) >= mu * float(impulse[2]) * (1 - _ON_CONE)
+        return "slip" if on_cone else "stick"
+
+    def _impulse(self, delassus: Any, free: FloatArray, mu: float) -> FloatArray:
+        self._point.setFriction(mu)
+        # No guess from the last step: the answer must not depend on what was looked at in between.
+        self._result.reset()
+        found = self._solver.solve(delassus, free, self._models, self._datas, self._options, self._result)
+        if not found:
+            raise Diverged(
+                f"Pinocchio's {self._settings.solver} solver did not reach solver_tolerance="
+                f"{self._settings.solver_tolerance:g} at {self._time:g} s"
+            )
+        return np.array(self._result.retrieveConstraintImpulses())
+
+    def _now(self, kick: Kick) -> FloatArray:
+        """Joint velocity at the present time, shape (6,)."""
+        if not (self._leapfrog and self._started):
+            return kick.before
+        return np.asarray(0.5 * (kick.before + kick.v))
+
+    def sample(self) -> Sample:
+        """See :class:`proofroll.engine.Engine`; the force is that of the step beginning or centred here."""
+        kept = self._normal_force
+        kick = self._kick()
+        self._normal_force = kept
+        pin.forwardKinematics(self.model, self._scratch, self._q, self._now(kick))
+        velocity = pin.getVelocity(self.model, self._scratch, self._ball, pin.LOCAL_WORLD_ALIGNED)
+        pose = self._scratch.oMi[self._ball]
+        return Sample(
+            p_WB=pose.translation.copy(),
+            v_WB=velocity.linear.copy(),
+            w_WB=velocity.angular.copy(),
+            q_WB=np.roll(pin.Quaternion(pose.rotation).coeffs(), 1),
+            force=kick.force,
+            sticking=kick.status == "stick" if self._bounded else None,
+        )
+
+    def built(self) -> Built:
+        """See :class:`proofroll.engine.Engine`: from the model, and from its contact and torques at the state now."""
+        kept = self._normal_force
+        kick = self._kick()
+        self._normal_force = kept
+        inertia = self.model.inertias[self._ball]
+        f: float | None = 0.0
+        if self._body.contact.rolling_resistance:
+            pose = self._data.oMi[self._ball]
+            torque = self._resistance(pose.translation, pose.rotation, kick.before[:3])
+            f = float(np.linalg.norm(torque)) or None
+        return Built(
+            mass=float(inertia.mass),
+            inertia=np.linalg.eigvalsh(inertia.inertia),
+            gravity=self.model.gravity.linear.copy(),
+            ball_radius=float(np.linalg.norm(self._point.joint2_placement.translation)),
+            rolling_resistance=f,
+            acceleration=(kick.v - kick.before)[:3] / kick.span,
+            regularised=self._softened(),
+        )
+
+    def _softened(self) -> dict[str, Regularised]:
+        if self._leapfrog:
+            because = "the impulse of a step is found to solver_tolerance, the gap to round-off"
+            # An error of velocity makes one of acceleration when divided by the step, one of position when divided
+            # again; the latter are compared with gravity, which no smaller scale of the certificate undercuts.
+            rounding = float(np.finfo(float).eps) * self._body.ball.radius / self._dt**2
+            gravity = float(np.linalg.norm(self._body.gravity)) or 1.0
+            tolerance = 10 * (self._settings.solver_tolerance / self._dt + rounding / gravity)
+        else:
+            because = "for the length of a step the wall is a plane, and at time 0 it does not yet bend the path"
+            tolerance = 1.0
+        return {name: Regularised(tolerance, because) for name in ("N", "F2", "F3", "acceleration")}
+
+    def events(self) -> tuple[Event, ...]:
+        """See :class:`proofroll.engine.LocatesEvents`; none with unbounded friction."""
+        return tuple(self._events) if self._bounded else ()
+
+
+def _solver(settings: PinocchioSettings) -> tuple[Any, Any, Any]:
+    """Solver, its options and its result for one contact."""
+    if settings.solver == "pgs":
+        solver, options, result = pin.PGSConstraintSolver(3), pin.PGSSolverSettings(), pin.PGSSolverResult()
+    else:
+        solver, options, result = pin.ADMMConstraintSolver(3), pin.ADMMSolverSettings(), pin.ADMMSolverResult()
+        options.max_iterations = _ADMM_ITERATIONS
+    for name in ("feasibility", "complementarity"):
+        for kind in ("absolute", "relative"):
+            setattr(options, f"{kind}_{name}_tol", settings.solver_tolerance)
+    return solver, options, result

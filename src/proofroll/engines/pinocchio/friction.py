@@ -1,0 +1,41 @@
+"""Which integrator a bounded friction needs."""
+
+from __future__ import annotations
+
+from typing import Any, Protocol, runtime_checkable
+
+from proofroll.engines.pinocchio.integrators import Integrator
+from proofroll.engines.pinocchio.mechanism import Mechanism
+from proofroll.engines.pinocchio.settings import PinocchioSettings
+from proofroll.engines.pinocchio.stick_slip import AdaptiveStickSlip
+from proofroll.engines.pinocchio.stick_slip_steps import StickSlipEuler, StickSlipRungeKutta4
+from proofroll.events import Event
+from proofroll.scene import Contact
+from proofroll.surfaces import FloatArray
+
+
+@runtime_checkable
+class StickSlip(Integrator, Protocol):
+    """An integrator that knows stick from slip.
+
+    Attributes:
+        events: so far.
+    """
+
+    events: list[Event]
+
+    @property
+    def sticking(self) -> bool:
+        """Whether the ball sticks now."""
+
+    def reaction(self, data: Any) -> tuple[FloatArray, FloatArray]:
+        """Joint acceleration, and force of the wall on the ball in the world [N], now."""
+
+
+def stick_slip(mechanism: Mechanism, settings: PinocchioSettings, contact: Contact) -> StickSlip:
+    """The integrator that the settings ask for."""
+    if settings.integrator == "dop853":
+        return AdaptiveStickSlip(mechanism, settings, contact)
+    if settings.integrator == "semi_implicit_euler":
+        return StickSlipEuler(mechanism, settings, contact)
+    return StickSlipRungeKutta4(mechanism, settings, contact)

@@ -1,0 +1,85 @@
+"""Formulations ``composite`` and ``free_flyer``: a mechanism with rows on top, and the integrator of its motion."""
+
+from __future__ import annotations
+
+import math
+from typing import Any
+
+import numpy as np
+import pinocchio as pin
+
+from proofroll.engine import Built, Sample
+from proofroll.engines.pinocchio.composite import Composite
+from proofroll.engines.pinocchio.free_flyer import FreeFlyer
+from proofroll.engines.pinocchio.friction import StickSlip, stick_slip
+from proofroll.engines.pinocchio.integrators import Integrator, integrator
+from proofroll.engines.pinocchio.mechanism import Mechanism
+from proofroll.engines.pinocchio.settings import PinocchioSettings
+from proofroll.events import Event
+from proofroll.scene import RollingBall
+from proofroll.surfaces import FloatArray
+
+
+class RowsRun:
+    """See :class:`proofroll.engine.Engine` for the methods."""
+
+    def __init__(self, body: RollingBall, settings: PinocchioSettings) -> None:
+        kind = Composite if settings.formulation == "composite" else FreeFlyer
+        self.mechanism: Mechanism = kind(body, settings.orientation)
+        self.motion: Integrator = (
+            stick_slip(self.mechanism, settings, body.contact)
+            if math.isfinite(body.contact.mu_static)
+            else integrator(self.mechanism, settings)
+        )
+        self._orientation = settings.orientation
+
+    def advance(self, start: float, end: float) -> None:
+        """From ``start`` to ``end`` [s]."""
+        self.motion.advance(start, end)
+
+    def sample(self) -> Sample:
+        """See :class:`proofroll.engine.Engine`; no orientation where it is not integrated."""
+        model, ball = self.mechanism.model, self.mechanism.ball
+        data = model.createData()
+        force = self._reaction(data)[1]
+        velocity = pin.getVelocity(model, data, ball, pin.LOCAL_WORLD_ALIGNED)
+        pose = data.oMi[ball]
+        return Sample(
+            p_WB=pose.translation.copy(),
+            v_WB=velocity.linear.copy(),
+            w_WB=velocity.angular.copy(),
+            q_WB=np.roll(pin.Quaternion(pose.rotation).coeffs(), 1) if self._orientation else None,
+            force=force,
+            sticking=self.motion.sticking if isinstance(self.motion, StickSlip) else None,
+        )
+
+    def events(self) -> tuple[Event, ...]:
+        """See :class:`proofroll.engine.LocatesEvents`; none with unbounded friction."""
+        return tuple(self.motion.events) if isinstance(self.motion, StickSlip) else ()
+
+    def built(self) -> Built:
+        """See :class:`proofroll.engine.Engine`: from the model, and from its rows and torques at the state now."""
+        mechanism, q, v = self.mechanism, self.motion.q, self.motion.v
+        model, data, ball = mechanism.model, mechanism.model.createData(), mechanism.ball
+        inertia = model.inertias[ball]
+        # In both formulations the spin is last, in orthonormal axes: the row of slip has the length a there, and
+        # rolling resistance the length f (at rest it has no direction, and nothing can be read).
+        radius = float(np.linalg.norm(mechanism.rolling_row(data, q, v)[-3:]))
+        torque = mechanism.resistance(data, q, v)
+        f = 0.0 if torque is None else float(np.linalg.norm(torque[-3:])) or None
+        acceleration = self._reaction(data)[0]
+        pin.forwardKinematics(model, data, q, v, acceleration)
+        return Built(
+            mass=float(inertia.mass),
+            inertia=np.linalg.eigvalsh(inertia.inertia),
+            gravity=model.gravity.linear.copy(),
+            ball_radius=radius,
+            rolling_resistance=f,
+            acceleration=pin.getClassicalAcceleration(model, data, ball, pin.LOCAL_WORLD_ALIGNED).linear.copy(),
+        )
+
+    def _reaction(self, data: Any) -> tuple[FloatArray, FloatArray]:
+        """Joint acceleration, and force of the wall on the ball in the world [N], now."""
+        if isinstance(self.motion, StickSlip):
+            return self.motion.reaction(data)
+        return self.mechanism.reaction(data, self.motion.q, self.motion.v)

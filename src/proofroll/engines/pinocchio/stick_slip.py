@@ -1,0 +1,308 @@
+"""Stick and slip with an adaptive step: three laws of motion in turn, and the times at which they change.
+
+Sticking, the rows of rolling hold. Sliding, friction mu_kinetic N acts against the slip velocity u. Between them lies
+the start of a slip, where the direction u/|u| is stiff like 1/|u| and at first does not exist: there, *creeping*,
+friction takes the direction on which the stiff one settles. With b the rate that u would have without friction, and G
+the rate that friction takes from |u|, that is the direction of b, lagging by |u| ω_b / (2|b| - G) while b turns at
+ω_b.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable
+from enum import Enum, auto
+from typing import Any
+
+import numpy as np
+import pinocchio as pin
+from scipy.integrate import DOP853
+
+from proofroll.engines.pinocchio.crossing import first_rise
+from proofroll.engines.pinocchio.integrators import PATIENCE, Adaptive
+from proofroll.engines.pinocchio.mechanism import Mechanism, Sliding
+from proofroll.engines.pinocchio.settings import PinocchioSettings
+from proofroll.errors import Diverged
+from proofroll.events import Event, EventKind
+from proofroll.scene import Contact
+from proofroll.surfaces import FloatArray
+
+# |u| at which creeping ends, relative to |b|/ω_b: what is left out of the direction goes with its square.
+_HANDOVER = 1e-4
+# |u| at which the rest of a slip is extrapolated, relative to where creeping ended.
+_FLOOR = 1e-6
+# Part of the time that is left until |u| = 0 which one step may take.
+_APPROACH = 0.7
+# Span over which the turning of b is measured, relative to the time in which the ball turns by a radian.
+_SPAN = 1e-4
+# A steady b counts as turning by a radian in so many of these times.
+_STEADY = 100.0
+
+# Friction relative to the normal force, and excess of it, that is round-off.
+_NOISE = 1e-13
+
+
+class Mode(Enum):
+    """The law that holds now."""
+
+    STICKING = auto()
+    CREEPING = auto()
+    SLIDING = auto()
+
+
+def unit(vector: FloatArray) -> FloatArray:
+    """The vector made a unit vector; zero stays zero."""
+    length = math.sqrt(vector @ vector)
+    return vector / length if length > 0 else vector
+
+
+def excess(mechanism: Mechanism, data: Any, q: FloatArray, v: FloatArray, contact: Contact) -> float:
+    """(needed - available) / (needed + available) friction while sticking [-]; slip begins where it is positive."""
+    needed, normal_force = mechanism.needed(data, q, v)
+    available = contact.mu_static * normal_force
+    # A friction of round-off is needed even where none is: it must not count as more than none (mu_static = 0).
+    noise = _NOISE * abs(normal_force)
+    return (needed - available - noise) / max(needed + abs(available) + noise, np.finfo(float).tiny)
+
+
+def held(sliding: Sliding, time: float) -> Sliding:
+    """The same, if the wall presses.
+
+    Raises:
+        Diverged: the normal force is gone.
+    """
+    if sliding.normal_force < 0:
+        raise Diverged(f"the ball leaves the wall at {time:.6g} s, which this formulation does not model")
+    return sliding
+
+
+class AdaptiveStickSlip(Adaptive):
+    """DOP853 from event to event.
+
+    Attributes:
+        events: so far.
+        sticking: whether the ball sticks now.
+    """
+
+    def __init__(self, mechanism: Mechanism, settings: PinocchioSettings, contact: Contact) -> None:
+        super().__init__(mechanism, settings)
+        self._contact = contact
+        self._span = _SPAN * self._turning_time
+        self._handover = 0.0
+        self._mode = Mode.STICKING
+        self.events: list[Event] = []
+        y = np.concatenate([self.q, self.v])
+        if self._excess(y) > 0:
+            self._record("slip", 0.0, 0.0)
+            self._creep(y)
+
+    @property
+    def sticking(self) -> bool:
+        """Whether the ball sticks now."""
+        return self._mode is Mode.STICKING
+
+    def reaction(self, data: Any) -> tuple[FloatArray, FloatArray]:
+        """Joint acceleration, and force of the wall on the ball in the world [N], now."""
+        if self.sticking:
+            return self._mechanism.reaction(data, self.q, self.v)
+        direction = self._direction(data, np.concatenate([self.q, self.v]))
+        return self._mechanism.sliding_reaction(data, self.q, self.v, direction)
+
+    def advance(self, start: float, end: float) -> None:
+        """See :class:`~proofroll.engines.pinocchio.integrators.Integrator`."""
+        try:
+            while start < end:
+                start = self._leg(start, end)
+        except np.linalg.LinAlgError as error:
+            raise Diverged(f"the equations became singular before {end:g} s ({error})") from None
+
+    # -- the laws ---------------------------------------------------------------------------------------------------
+
+    def _split(self, y: FloatArray) -> tuple[FloatArray, FloatArray]:
+        nq = self._model.nq
+        return pin.normalize(self._model, y[:nq]), y[nq:]
+
+    def _slide(self, data: Any, y: FloatArray, direction: FloatArray) -> Sliding:
+        return self._mechanism.slide(data, *self._split(y), direction)
+
+    def _excess(self, y: FloatArray) -> float:
+        return excess(self._mechanism, self._data, *self._split(y), self._contact)
+
+    def _turning(self, data: Any, y: FloatArray) -> tuple[Sliding, FloatArray]:
+        """The ball without friction, and the rate at which the direction of its slip_rate turns [1/s], shape (3,)."""
+        free = self._slide(data, y, np.zeros(3))
+        along = unit(free.slip_rate)
+        ahead = y + self._span * self._sliding_rates(data, y, along)[0]
+        return free, (unit(self._slide(data, ahead, np.zeros(3)).slip_rate) - along) / self._span
+
+    def _direction(self, data: Any, y: FloatArray) -> FloatArray:
+        """Direction against which friction acts, shape (3,)."""
+        if self._mode is Mode.SLIDING:
+            return unit(self._slide(data, y, np.zeros(3)).slip)
+        free, turning = self._turning(data, y)
+        along, strength = unit(free.slip_rate), math.sqrt(free.slip_rate @ free.slip_rate)
+        grip = strength - along @ self._slide(data, y, along).slip_rate
+        size = max(float(free.slip @ along), 0.0)
+        lag = size / (2 * strength - grip) if 2 * strength > grip else 0.0
+        tangential = turning - (turning @ free.e1) * free.e1
+        return unit(along - lag * tangential)
+
+    def _sliding_rates(self, data: Any, y: FloatArray, direction: FloatArray) -> tuple[FloatArray, Sliding]:
+        q, v = self._split(y)
+        sliding = self._mechanism.slide(data, q, v, direction)
+        return np.concatenate([pin.tangentMap(self._model, q) @ (self._moving * v), sliding.acceleration]), sliding
+
+    def _law(self, t: float, y: FloatArray) -> FloatArray:
+        if self._mode is Mode.STICKING:
+            return self._rates(t, y)
+        return self._sliding_rates(self._data, y, self._direction(self._data, y))[0]
+
+    def _speed(self, y: FloatArray, time: float) -> tuple[float, float]:
+        """|u| [m/s], in creeping with its sign, and its rate [m/s²]."""
+        direction = self._direction(self._data, y)
+        sliding = held(self._slide(self._data, y, direction), time)
+        return float(sliding.slip @ direction), float(sliding.slip_rate @ direction)
+
+    # -- from event to event ----------------------------------------------------------------------------------------
+
+    def _leg(self, start: float, end: float) -> float:
+        """Integrates in the present mode until the mode changes or ``end``; returns that time [s]."""
+        y = np.concatenate([self.q, self.v])
+        first = None if self._step is None else min(self._step, end - start)
+        solver = DOP853(self._law, start, y, end, rtol=self._rtol, atol=self._atol, first_step=first)
+        monitor = self._monitor(y, start)
+        longest, short_steps = 0.0, 0
+        while solver.status == "running":
+            if self._mode is Mode.SLIDING:
+                left = monitor[0] / -monitor[1] if monitor[1] < 0 else math.inf
+                if monitor[0] <= _FLOOR * self._handover and left < math.inf:
+                    stop = solver.t + left
+                    if stop > end:
+                        return self._keep(solver.y + (end - solver.t) * solver.f, end)
+                    return self._switch(stop, left, solver.y + left * solver.f)
+                solver.max_step = max(_APPROACH * left, 1e-300)
+            message = solver.step()
+            if message is not None:
+                raise Diverged(f"the motion could not be integrated past {solver.t:g} s: {message}")
+            before, monitor = monitor, self._monitor(solver.y, solver.t)
+            stop = self._stop(solver, before, monitor)
+            if stop is not None:
+                return self._switch(*stop)
+            longest = max(longest, solver.step_size)
+            short_steps = short_steps + 1 if self._is_short(solver) else 0
+            if short_steps > PATIENCE:
+                raise Diverged(
+                    f"the steps became too short at {solver.t:g} s: the forces jump there, as rolling resistance "
+                    "does when the ball comes to rest"
+                )
+            if self._settings.projection:
+                self._put_back(solver)
+        self._step = max(longest, self._step or 0.0) if first == end - start else longest
+        return self._keep(solver.y, end)
+
+    def _keep(self, y: FloatArray, time: float) -> float:
+        self.q, self.v = self._split(y)
+        return time
+
+    def _put_back(self, solver: Any) -> None:
+        if self._mode is Mode.STICKING:
+            super()._put_back(solver)
+            return
+        q, v = self._split(solver.y)
+        back = self._mechanism.project_sliding(self._data, q, v)
+        if back[1] is not v:
+            solver.y = np.concatenate(back)
+            solver.f = self._law(solver.t, solver.y)
+
+    def _monitor(self, y: FloatArray, time: float) -> tuple[float, float]:
+        """What may end the mode: the excess of needed friction when sticking, else |u| and its rate."""
+        return (self._excess(y), 0.0) if self._mode is Mode.STICKING else self._speed(y, time)
+
+    def _stop(
+        self, solver: Any, before: tuple[float, float], after: tuple[float, float]
+    ) -> tuple[float, float, FloatArray] | None:
+        """Time at which the mode ended within the last step [s], half the width of its bracket [s], and state."""
+        if self._mode is Mode.STICKING:
+            # The excess lies in [-1, 1] and its crests are many steps wide, so far below zero nothing is missed.
+            if max(before[0], after[0]) < -0.1 - abs(after[0] - before[0]):
+                return None
+            return self._located(solver, self._excess, before[0], after[0])
+        if self._mode is Mode.CREEPING:
+            if after[0] >= self._handover:
+                return self._located(
+                    solver, lambda y: self._speed(y, solver.t)[0] - self._handover, -self._handover, after[0]
+                )
+            if after[0] <= 0 and after[1] < 0:
+                return self._located(solver, lambda y: -self._speed(y, solver.t)[0], -before[0], -after[0])
+        return None
+
+    def _located(
+        self, solver: Any, g: Callable[[FloatArray], float], before: float, after: float
+    ) -> tuple[float, float, FloatArray] | None:
+        """Where ``g`` first rises through zero in the last step."""
+        dense = solver.dense_output()
+        low, high = float(solver.t_old), float(solver.t)
+        time = first_rise(lambda t: g(dense(t)), low, high, before, after)
+        if time is None:
+            return None
+        # The dense output is of lower order than the steps: Newton's method on states that were integrated there.
+        y, width = self._integrated(solver, time), 0.0
+        for _ in range(3):
+            rates = self._law(time, y)
+            slope = (g(y + self._span * rates) - g(y - self._span * rates)) / (2 * self._span)
+            better = time - g(y) / slope if slope > 0 else time
+            if not low <= better <= high or abs(better - time) > 0.1 * (high - low):
+                break  # a crest that only touches zero has no slope to go by
+            width = abs(better - time)
+            if width <= 2 * np.spacing(time):
+                break
+            time, y = better, self._integrated(solver, better)
+        return time, width, y
+
+    def _integrated(self, solver: Any, time: float) -> FloatArray:
+        """The state at ``time``, integrated from the start of the last step."""
+        if time <= solver.t_old:
+            return np.asarray(solver.y_old)
+        part = DOP853(
+            self._law,
+            solver.t_old,
+            solver.y_old,
+            time,
+            rtol=self._rtol,
+            atol=self._atol,
+            first_step=time - solver.t_old,
+        )
+        while part.status == "running":
+            part.step()
+        return np.asarray(part.y)
+
+    def _switch(self, time: float, width: float, y: FloatArray) -> float:
+        """Enters the mode that follows the state at which the last one ended."""
+        self._step = None
+        self.q, self.v = self._split(y)
+        was = self._mode
+        if was is Mode.CREEPING and self._speed(y, time)[0] > 0.5 * self._handover:
+            self._mode = Mode.SLIDING
+            return time
+        # The contact point is at rest up to round-off; the ball sticks if it can.
+        self.q, self.v = self._mechanism.project(self._data, self.q, self.v)
+        y = np.concatenate([self.q, self.v])
+        if was is Mode.STICKING:
+            self._record("slip", time, width)
+            self._creep(y)
+        elif self._excess(y) <= _NOISE:
+            self._mode = Mode.STICKING
+            self._record("stick", time, width)
+        else:
+            self._creep(y)
+        return time
+
+    def _creep(self, y: FloatArray) -> None:
+        self._mode = Mode.CREEPING
+        free, turning = self._turning(self._data, y)
+        rate = max(math.sqrt(turning @ turning), 1.0 / (_STEADY * self._turning_time))
+        self._handover = _HANDOVER * math.sqrt(free.slip_rate @ free.slip_rate) / rate
+
+    def _record(self, kind: EventKind, time: float, width: float) -> None:
+        width += 4 * float(np.spacing(time))
+        self.events.append(Event(kind, time, max(time - width, 0.0), time + width))

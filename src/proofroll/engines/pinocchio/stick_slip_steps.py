@@ -1,0 +1,109 @@
+"""Stick and slip with a fixed step: the law of motion changes between steps, and each event lies within one step."""
+
+from __future__ import annotations
+
+import math
+from typing import Any
+
+import numpy as np
+
+from proofroll.engine import whole_steps
+from proofroll.engines.pinocchio.integrators import FixedStep, RungeKutta4, SemiImplicitEuler
+from proofroll.engines.pinocchio.mechanism import Mechanism
+from proofroll.engines.pinocchio.settings import PinocchioSettings
+from proofroll.engines.pinocchio.stick_slip import excess, held, unit
+from proofroll.errors import Diverged
+from proofroll.events import Event
+from proofroll.scene import Contact
+from proofroll.surfaces import FloatArray
+
+
+class FixedStickSlip(FixedStep):
+    """Mixin for the schemes of :mod:`~proofroll.engines.pinocchio.integrators`.
+
+    Attributes:
+        events: so far; the time is interpolated, the bracket is the step.
+        sticking: whether the ball sticks now.
+    """
+
+    def __init__(self, mechanism: Mechanism, settings: PinocchioSettings, contact: Contact) -> None:
+        super().__init__(mechanism, settings)
+        self._contact = contact
+        self.events: list[Event] = []
+        self._excess = excess(mechanism, self._data, self.q, self.v, contact)
+        self.sticking = self._excess <= 0
+        if not self.sticking:
+            self.events.append(Event("slip", 0.0, 0.0, 0.0))
+
+    def reaction(self, data: Any) -> tuple[FloatArray, FloatArray]:
+        """Joint acceleration, and force of the wall on the ball in the world [N], now."""
+        if self.sticking:
+            return self._mechanism.reaction(data, self.q, self.v)
+        direction = self._direction(data, self.q, self.v)
+        return self._mechanism.sliding_reaction(data, self.q, self.v, direction)
+
+    def advance(self, start: float, end: float) -> None:
+        """See :class:`~proofroll.engines.pinocchio.integrators.Integrator`."""
+        try:
+            for number in range(whole_steps(start, end, self._dt)):
+                self._advance_one(start + number * self._dt)
+        except np.linalg.LinAlgError as error:
+            raise Diverged(f"the equations became singular between {start:g} s and {end:g} s ({error})") from None
+
+    def _advance_one(self, time: float) -> None:
+        if not self.sticking:
+            self._stick_if_it_can(time)
+        self._step(self._dt)
+        if self._settings.projection:
+            put_back = self._mechanism.project if self.sticking else self._mechanism.project_sliding
+            self.q, self.v = put_back(self._data, self.q, self.v)
+        if self.sticking:
+            before, self._excess = self._excess, excess(self._mechanism, self._data, self.q, self.v, self._contact)
+            if self._excess > 0:
+                part = min(max(before / (before - self._excess), 0.0), 1.0) if before < 0 else 0.0
+                self.events.append(Event("slip", time + part * self._dt, time, time + self._dt))
+                self.sticking = False
+
+    def _stick_if_it_can(self, time: float) -> None:
+        """Sticks if friction can bring the contact point to rest within the step and keep it so."""
+        free = held(self._mechanism.slide(self._data, self.q, self.v, np.zeros(3)), time)
+        along = unit(free.slip + self._dt * free.slip_rate)
+        # what friction takes from the slip velocity in a step if it acts along that velocity
+        taken = free.slip_rate - self._mechanism.slide(self._data, self.q, self.v, along).slip_rate
+        ahead = free.slip + self._dt * free.slip_rate
+        if math.sqrt(ahead @ ahead) > self._dt * math.sqrt(taken @ taken):
+            return
+        q, v = self._mechanism.project(self._data, self.q, self.v)
+        needed = excess(self._mechanism, self._data, q, v, self._contact)
+        if needed > 0:
+            return
+        slowing = math.sqrt((free.slip_rate - taken) @ (free.slip_rate - taken))
+        size = math.sqrt(free.slip @ free.slip)
+        part = min(size / (slowing * self._dt), 1.0) if slowing > 0 else 0.0
+        self.events.append(Event("stick", time + part * self._dt, time, time + self._dt))
+        self.q, self.v, self._excess, self.sticking = q, v, needed, True
+
+    def _direction(self, data: Any, q: FloatArray, v: FloatArray) -> FloatArray:
+        """Direction of friction's opposite, shape (3,).
+
+        Where a step is longer than the time in which the direction of slip settles, the direction after a step
+        without friction is taken, which is stable (Moreau 1988); else that of the slip velocity, which is exact.
+        """
+        free = self._mechanism.slide(data, q, v, np.zeros(3))
+        size, pull = math.sqrt(free.slip @ free.slip), math.sqrt(free.slip_rate @ free.slip_rate)
+        if size > self._dt * pull:
+            return unit(free.slip)
+        return unit(free.slip + self._dt * free.slip_rate)
+
+    def _acceleration(self, q: FloatArray, v: FloatArray) -> FloatArray:
+        if self.sticking:
+            return super()._acceleration(q, v)
+        return self._mechanism.slide(self._data, q, v, self._direction(self._data, q, v)).acceleration
+
+
+class StickSlipEuler(FixedStickSlip, SemiImplicitEuler):
+    """Stick and slip by semi-implicit Euler."""
+
+
+class StickSlipRungeKutta4(FixedStickSlip, RungeKutta4):
+    """Stick and slip by the classical scheme, of order 1 over an event."""

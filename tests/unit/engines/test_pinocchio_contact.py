@@ -1,0 +1,171 @@
+"""Pinocchio's own solver of contact with friction, run on the real engine."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+import xarray as xr
+
+from proofroll.certificate import certify
+from proofroll.errors import Diverged, Refused
+from proofroll.events import events_of
+from proofroll.scene_file import load_scene
+from proofroll.simulation import build, simulate
+
+pin = pytest.importorskip("pinocchio")
+
+RESISTANCE = 5e-4
+SOLVERS = ("pgs", "admm")
+
+
+def errors(engine: str, until: float = 0.5, **parameters: float) -> dict[str, float]:
+    """Largest difference from the truth with unbounded friction, after time 0."""
+    scene = load_scene("sphere_in_cylinder", **parameters)
+    true, run = (simulate(scene, name, until=until, every=0.1) for name in ("truth", engine))
+    assert run.status == "done", run.message
+    return {str(name): float(np.abs(run[name] - true[name])[1:].max()) for name in true.data_vars}
+
+
+@pytest.mark.parametrize("solver", SOLVERS)
+@pytest.mark.parametrize("resistance", [0.0, RESISTANCE])
+def test_accuracy(solver: str, resistance: float) -> None:
+    """With leapfrog, path, forces, energy and gap are right to a few times what was measured at 1 ms."""
+    found = errors(f"pinocchio[formulation=contact,solver={solver}]", rolling_resistance=resistance)
+    assert found["z"] < 5e-5
+    assert found["gamma"] < 1.5e-3
+    assert max(found["N"], found["F2"], found["F3"]) < 1e-2
+    assert found["energy"] < 2e-4
+    assert max(found["slip2"], found["slip3"]) < 1e-5
+    assert found["gap"] < 1e-7
+
+
+def test_plane_at_the_start_of_the_step() -> None:
+    """With the obvious scheme the ball sinks in by V² dt² / 2c and is a centimetre off: that is its order."""
+    found = errors("pinocchio[formulation=contact,preset=default]")
+    assert found["gap"] == pytest.approx(4.0**2 * 1e-6 / (2 * 0.2), rel=0.05)
+    assert 5e-3 < found["z"] < 2e-2
+
+
+@pytest.mark.parametrize(("preset", "order"), [("default", 1), ("matched", 2)])
+@pytest.mark.parametrize("resistance", [0.0, RESISTANCE])
+def test_declared_order(preset: str, order: int, resistance: float) -> None:
+    """The measured order in the step is the declared one."""
+    found = [
+        errors(f"pinocchio[formulation=contact,preset={preset},dt={dt}]", rolling_resistance=resistance)["z"]
+        for dt in (2e-3, 1e-3)
+    ]
+    assert np.log2(found[0] / found[1]) == pytest.approx(order, abs=0.25)
+    engine = build(load_scene("sphere_in_cylinder"), f"pinocchio[formulation=contact,preset={preset}]")
+    assert engine._run._settings.order == order
+
+
+@pytest.mark.parametrize("preset", ["default", "matched"])
+@pytest.mark.parametrize("solver", SOLVERS)
+@pytest.mark.parametrize(
+    ("scene", "parameters"),
+    [
+        ("sphere_in_cylinder", {}),
+        ("sphere_in_cylinder", {"speed": -4, "axial_speed": 0.3, "radial_spin": 5, "rolling_resistance": RESISTANCE}),
+        ("inclined_plane", {"tilt": 0.35, "cross_speed": 0.7, "rolling_resistance": RESISTANCE}),
+        ("sphere_in_cylinder", {"mu_static": 0.01, "rolling_resistance": RESISTANCE}),
+    ],
+)
+def test_certificate(scene: str, parameters: dict[str, float], solver: str, preset: str) -> None:
+    """Each solver builds what the scene says, on both surfaces, sticking and slipping."""
+    built = load_scene(scene, **parameters)
+    engine = build(built, f"pinocchio[formulation=contact,preset={preset},solver={solver}]")
+    lines = certify(engine, built)
+    assert [line.quantity for line in lines if not line.holds] == []
+    assert len(lines) == 14
+    softened = [line.quantity for line in lines if line.because]
+    assert softened == ["acceleration", "N", "F2", "F3"]
+    if preset == "matched":  # tight: a force that is wrong by a ten-millionth would be found
+        assert all(line.tolerance < 2e-8 for line in lines)
+
+
+@pytest.fixture(scope="module")
+def paper() -> dict[str, xr.Dataset]:
+    """The paper's ball with bounded friction, by both solvers."""
+    scene = load_scene("sphere_in_cylinder", mu_static=0.35, rolling_resistance=RESISTANCE)
+    return {s: simulate(scene, f"pinocchio[formulation=contact,solver={s}]", until=4, every=0.02) for s in SOLVERS}
+
+
+@pytest.mark.parametrize("solver", SOLVERS)
+def test_stick_slip_stick_fall(paper: dict[str, xr.Dataset], solver: str) -> None:
+    """The paper's ball slips, sticks, slips again and falls; times are right to a step, the end to a millimetre."""
+    events = events_of(paper[solver])
+    assert [event.kind for event in events] == ["slip", "stick", "slip"]
+    np.testing.assert_allclose([e.time for e in events], [1.720183, 2.008128, 2.449695], rtol=0, atol=1e-3)
+    assert all(event.time_high - event.time_low == pytest.approx(1e-3) for event in events)
+    assert float(paper[solver].z[-1]) == pytest.approx(-2.2976587, abs=1e-3)
+
+
+@pytest.mark.parametrize("solver", SOLVERS)
+def test_law_of_friction(paper: dict[str, xr.Dataset], solver: str) -> None:
+    """Slipping, friction is mu N against the slip velocity; sticking, it is inside the cone, and creep is small."""
+    result = paper[solver]
+    slips = (result.sticking == 0).values
+    slip, friction = (np.stack([result[f"{name}2"], result[f"{name}3"]], axis=-1) for name in ("slip", "F"))
+    size = np.linalg.norm(slip, axis=-1)
+    np.testing.assert_allclose(result.needed_friction[slips], 0.35, rtol=1e-8)
+    fast = slips & (size > 1e-2)
+    cosine = -np.sum(slip * friction, axis=-1)[fast] / size[fast] / np.linalg.norm(friction, axis=-1)[fast]
+    assert fast.sum() > 50
+    assert cosine.min() > 1 - 1e-3  # the force is that of the step's end, where slip turns while it is small
+    assert float(result.needed_friction[~slips].max()) < 0.35
+    assert size[~slips].max() < 1e-5
+
+
+def test_solvers_agree(paper: dict[str, xr.Dataset]) -> None:
+    """PGS and ADMM find the same impulses: their paths differ by what the tolerance leaves."""
+    np.testing.assert_allclose(paper["admm"].p_WB, paper["pgs"].p_WB, rtol=0, atol=1e-6)
+
+
+def test_smaller_kinetic_friction() -> None:
+    """With mu_kinetic below mu_static the ball slips at the one and is held back by the other."""
+    scene = load_scene("sphere_in_cylinder", mu_static=0.15, mu_kinetic=0.1)
+    result = simulate(scene, "pinocchio[formulation=contact]", until=0.4, every=0.01)
+    events = events_of(result)
+    assert [event.kind for event in events] == ["slip"]
+    assert events[0].time == pytest.approx(0.176667992, abs=1.5e-3)
+    slips = (result.sticking == 0).values
+    np.testing.assert_allclose(result.needed_friction[slips], 0.1, rtol=1e-8)
+
+
+def test_leaving_the_wall() -> None:
+    """On the inside of a leaning cylinder a slow ball lets go of the wall, and then nothing acts on it."""
+    import dataclasses
+
+    scene = load_scene("sphere_in_cylinder", mu_static=0.35, speed=2)
+    scene = dataclasses.replace(scene, surfaces=(dataclasses.replace(scene.surfaces[0], tilt=1.2),))
+    result = simulate(scene, "pinocchio[formulation=contact]", until=0.4, every=0.01)
+    kinds = [event.kind for event in events_of(result)]
+    assert "liftoff" in kinds
+    flying = (result.N == 0) & (result.gap > 1e-4)
+    assert int(flying.sum()) > 3
+
+
+def test_too_little_friction_for_unbounded() -> None:
+    """Where ADMM's number for unbounded friction is not enough, the engine refuses instead of slipping."""
+    scene = load_scene("sphere_in_cylinder", speed=0.1)
+    with pytest.raises(Refused, match=r"more friction|did not reach"):
+        build(scene, "pinocchio[formulation=contact,solver=admm]")
+    assert simulate(scene, "pinocchio[formulation=contact,solver=pgs]", until=0.1).status == "done"
+
+
+def test_solver_that_gives_up_is_said() -> None:
+    """A solver that does not converge ends the run with a sentence."""
+    engine = build(load_scene("sphere_in_cylinder"), "pinocchio[formulation=contact,solver=admm]")
+    engine._run._options.max_iterations = 3
+    with pytest.raises(Diverged, match="solver_tolerance"):
+        engine.advance(0.01)
+
+
+def test_model_is_only_what_the_scene_requires() -> None:
+    """One ball, one contact, no torque without rolling resistance."""
+    run = build(load_scene("sphere_in_cylinder"), "pinocchio[formulation=contact]")._run
+    assert run.model.nv == 6
+    assert len(run._models) == 1
+    assert run.built().rolling_resistance == 0.0
+    assert run.sample().sticking is None
+    assert run.events() == ()
