@@ -16,6 +16,7 @@ class Verdict(StrEnum):
 
     AGREES = "agrees"  # within tolerance at this step
     CONVERGES = "converges"  # not yet, but the limit of small steps is the truth
+    ILL_POSED = "ill-posed"  # here the answer hangs on less than the parameters are known to; nobody can be judged
     DIFFERS = "differs"  # the limit is something else, or no limit shows: not this model at this step
     FAILED = "failed"  # there is no result
 
@@ -58,8 +59,12 @@ def judge(
     tolerance: float,
     scale: float,
     limit: Limit | None,
+    ill_posed: bool = False,
 ) -> Judgement:
-    """Holds a curve and its limit of small steps against the true curve."""
+    """Holds a curve and its limit of small steps against the true curve.
+
+    Where the question is ill-posed, a curve that would differ is not judged.
+    """
     error = _distance(values, true)
     limit_error = None if limit is None else _distance(limit.values, true)
     if error <= tolerance:
@@ -67,7 +72,7 @@ def judge(
     elif limit is not None and limit_error is not None and _converges(error, limit, limit_error, truth_error_bar):
         verdict = Verdict.CONVERGES
     else:
-        verdict = Verdict.DIFFERS
+        verdict = Verdict.ILL_POSED if ill_posed else Verdict.DIFFERS
     return Judgement(
         observable=name,
         unit=unit,
@@ -92,5 +97,7 @@ def _converges(error: float, limit: Limit, limit_error: float, truth_error_bar: 
 
 
 def _distance(values: FloatArray, true: FloatArray) -> float:
-    distance = float(np.max(np.abs(values - true)))
+    if values.shape != true.shape:
+        return float("inf")  # one of the two has what the other has not
+    distance = float(np.max(np.abs(values - true), initial=0.0))
     return distance if np.isfinite(distance) else float("inf")

@@ -72,7 +72,7 @@ class Row:
         expect: expected verdicts on the row as a whole, which is the worst of its observables.
         expect_for: observable -> expected verdicts on it alone.
         because: why something else than agreement is expected.
-        ladder: factors on the step, coarse first; 1 is the run itself.
+        ladder: factors on the step, coarse first; 1 is the run itself. [1]: no ladder, so no limit of small steps.
         only: parameter -> values for which this row is run (all if absent).
         order: observable -> lowest and highest order that is expected.
         limit: observable -> largest expected distance of the limit of small steps from the truth.
@@ -92,6 +92,17 @@ class Row:
 
 
 @dataclass(frozen=True)
+class Edge:
+    """A value of a parameter at which the time of the first slip jumps, to be found between two others.
+
+    Attributes:
+        edge_between: the two values.
+    """
+
+    edge_between: tuple[float, float]
+
+
+@dataclass(frozen=True)
 class Comparison:
     """A claim about engines on a scene.
 
@@ -101,6 +112,7 @@ class Comparison:
         scene: name of the scene.
         until, every: last time and sampling interval [s].
         vary: parameter -> values; every combination is run.
+        points: further combinations, each with parameters of its own.
         bands: tolerances by name.
         rows: engines with settings.
         time_limit: wall seconds a case may take [s].
@@ -112,16 +124,24 @@ class Comparison:
     scene: str
     until: float
     every: float
-    vary: dict[str, list[float]]
-    bands: dict[str, Band]
-    rows: list[Row]
+    vary: dict[str, list[float]] = field(default_factory=dict)
+    points: list[dict[str, float | Edge]] = field(default_factory=list)
+    bands: dict[str, Band] = field(default_factory=dict)
+    rows: list[Row] = field(default_factory=list)
     time_limit: float = 120.0
 
+    def combinations(self) -> list[dict[str, float | Edge]]:
+        """Every combination of parameters."""
+        found: list[dict[str, float | Edge]] = [*self.points]
+        if self.vary:
+            for values in itertools.product(*self.vary.values()):
+                found.append(dict(zip(self.vary, values, strict=True)))
+        return found
+
     def variations(self, row: Row) -> list[dict[str, float]]:
-        """The combinations of parameters for which the row is run."""
-        combinations = itertools.product(*self.vary.values())
-        found = [dict(zip(self.vary, values, strict=True)) for values in combinations]
-        return [point for point in found if all(point[key] in allowed for key, allowed in row.only.items())]
+        """The combinations of parameters for which the row is run, once every edge has been found."""
+        numbers = [{k: v for k, v in point.items() if isinstance(v, float)} for point in self.combinations()]
+        return [point for point in numbers if all(point.get(key) in allowed for key, allowed in row.only.items())]
 
 
 def comparison_names() -> list[str]:
@@ -210,22 +230,32 @@ def _check(where: str, row: Row, comparison: Comparison) -> None:
     """What types cannot say."""
     if row.tolerance not in comparison.bands:
         raise InputError(f"{where}.tolerance", row.tolerance, f"choose one of {', '.join(comparison.bands)}")
-    falling = all(0 < finer < coarser < math.inf for coarser, finer in itertools.pairwise(row.ladder))
-    if len(row.ladder) != _LADDER_RUNGS or not falling or 1.0 not in row.ladder:
-        raise InputError(f"{where}.ladder", row.ladder, "give three positive factors, largest first, one of them 1")
-    if not math.isclose(row.ladder[0] / row.ladder[1], row.ladder[1] / row.ladder[2]):
-        raise InputError(f"{where}.ladder", row.ladder, "neighbouring factors must have the same ratio")
+    if row.ladder != [1.0]:
+        _check_ladder(where, row.ladder)
     verdicts = {*row.expect, *itertools.chain.from_iterable(row.expect_for.values())}
     if verdicts - {Verdict.AGREES} and not row.because:
         raise InputError(f"{where}.because", "nothing", "an expectation other than agreement needs its reason; add it")
     _check_observables(where, comparison, [*row.expect_for, *row.order, *row.limit, *row.bound])
+    given: dict[str, list[float]] = {}
+    for point in comparison.combinations():
+        for key, value in point.items():
+            if isinstance(value, float):
+                given.setdefault(key, []).append(value)
     for key, values in row.only.items():
-        if key not in comparison.vary:
-            raise InputError(f"{where}.only", key, f"the comparison varies {', '.join(comparison.vary)}")
+        if key not in given:
+            raise InputError(f"{where}.only", key, f"the comparison varies {', '.join(given)}")
         for value in values:
-            if value not in comparison.vary[key]:
-                known = ", ".join(f"{item:g}" for item in comparison.vary[key])
+            if value not in given[key]:
+                known = ", ".join(f"{item:g}" for item in dict.fromkeys(given[key]))
                 raise InputError(f"{where}.only.{key}", value, f"the comparison has only {known}")
+
+
+def _check_ladder(where: str, ladder: list[float]) -> None:
+    falling = all(0 < finer < coarser < math.inf for coarser, finer in itertools.pairwise(ladder))
+    if len(ladder) != _LADDER_RUNGS or not falling or 1.0 not in ladder:
+        raise InputError(f"{where}.ladder", ladder, "give three positive factors, largest first, one of them 1; or [1]")
+    if not math.isclose(ladder[0] / ladder[1], ladder[1] / ladder[2]):
+        raise InputError(f"{where}.ladder", ladder, "neighbouring factors must have the same ratio")
 
 
 def _check_observables(where: str, comparison: Comparison, names: Iterable[str]) -> None:

@@ -5,12 +5,14 @@ Everything here sees a trajectory and the scene's ball, never an engine.
 
 from __future__ import annotations
 
+import itertools
 from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
 import numpy as np
 from scipy.interpolate import make_interp_spline
 
+from proofroll.events import events_of
 from proofroll.scene import RollingBall
 from proofroll.surfaces import FloatArray
 
@@ -18,7 +20,19 @@ if TYPE_CHECKING:
     import xarray as xr
 
 # Observables besides the coordinates of the scene's surface.
-OBSERVABLES = ("N", "F2", "F3", "needed_friction", "energy_balance", "force_audit", "gap", "slip")
+OBSERVABLES = (
+    "N",
+    "F2",
+    "F3",
+    "needed_friction",
+    "energy_balance",
+    "force_audit",
+    "gap",
+    "slip",
+    "creep",
+    "first_slip",
+    "event_order",
+)
 
 # Degree of the splines through the samples. Sampled twenty times per oscillation of z, a derivative of degree 7 is
 # good to about 1e-6 of its size; what is left is measured on the truth and reported as the error bar.
@@ -47,7 +61,8 @@ def observables(body: RollingBall, dataset: xr.Dataset) -> dict[str, Observable]
 
     Coordinates of the surface, ``N``, ``F2``, ``F3`` [N] and ``needed_friction`` [-] as they are, without time 0,
     where the certificate judges reactions; ``energy_balance`` [J], ``gap`` [m], ``slip`` [m/s] and ``force_audit``
-    [N], which are zero for a perfect run.
+    [N], which are zero for a perfect run. With bounded friction ``slip`` is not zero; ``creep`` [m] is, the way
+    slipped while sticking, and ``first_slip`` [s] is one value, or none if the ball never slips.
     """
     curves: dict[str, Observable] = {}
 
@@ -66,7 +81,18 @@ def observables(body: RollingBall, dataset: xr.Dataset) -> dict[str, Observable]
             put("energy_balance", "J", energy_balance(body, dataset))
         if "N" in dataset:
             put("force_audit", "N", force_audit(body, dataset))
+    if "sticking" in dataset:
+        slips = [event.time for event in events_of(dataset) if event.kind == "slip"]
+        put("first_slip", "s", np.array(slips[:1]))
+        put("creep", "m", np.array([_creep(curves["slip"].values, dataset)]))
     return curves
+
+
+def _creep(slip: FloatArray, dataset: xr.Dataset) -> float:
+    """Way slipped while sticking [m]; an interval counts if the ball sticks at both of its ends."""
+    sticking, t = dataset["sticking"].to_numpy().astype(bool), dataset["time"].to_numpy()
+    both = sticking[1:] & sticking[:-1]
+    return float(np.sum(both * np.diff(t) * (slip[1:] + slip[:-1]) / 2))
 
 
 def scales(body: RollingBall, truth: xr.Dataset) -> dict[str, float]:
@@ -81,32 +107,49 @@ def scales(body: RollingBall, truth: xr.Dataset) -> dict[str, float]:
     sizes = {name: float(np.ptp(truth[name].to_numpy())) for name in body.surface.coordinates}
     sizes |= dict.fromkeys(("N", "F2", "F3", "force_audit"), normal)
     sizes["needed_friction"] = float(np.nanmax(truth["needed_friction"].to_numpy()))
-    sizes |= {"energy_balance": kinetic, "gap": body.ball.radius, "slip": speed}
+    sizes |= {"energy_balance": kinetic, "gap": body.ball.radius, "slip": speed, "creep": body.ball.radius}
     return {name: size if np.isfinite(size) and size > 0 else 1.0 for name, size in sizes.items()}
 
 
 def energy_balance(body: RollingBall, dataset: xr.Dataset) -> FloatArray:
-    """Energy now plus what rolling resistance took, minus the energy at the start [J], shape (time,).
+    """Energy now plus what resistance and friction took, minus the energy at the start [J], shape (time,).
 
-    The resistance takes N f V / a from the ball per second (the engine's own N and V are used).
+    Rolling resistance takes N f V / a from the ball per second, friction -F · u; N, F, V and u are the engine's own.
     """
     balance = dataset["energy"].to_numpy() - float(dataset["energy"][0])
-    f = body.contact.rolling_resistance
+    t, f = dataset["time"].to_numpy(), body.contact.rolling_resistance
+    bounded = "sticking" in dataset
+    power = np.zeros_like(t)
     if f:
         speed = np.linalg.norm(dataset["v_WB"].to_numpy(), axis=-1)
-        power = dataset["N"].to_numpy() * f * speed / body.ball.radius
-        t = dataset["time"].to_numpy()
-        work = make_interp_spline(t, power, k=_DEGREE).antiderivative()
+        power += dataset["N"].to_numpy() * f * speed / body.ball.radius
+    if bounded:
+        power -= sum(dataset[f"F{i}"].to_numpy() * dataset[f"slip{i}"].to_numpy() for i in (2, 3))
+    if np.any(power):
+        # The power of friction has kinks where slip begins and ends, at which a smooth spline would ring.
+        work = make_interp_spline(t, power, k=1 if bounded else _DEGREE).antiderivative()
         balance = balance + work(t) - work(t[0])
     return np.asarray(balance)
 
 
 def force_audit(body: RollingBall, dataset: xr.Dataset) -> FloatArray:
-    """Reported minus recomputed contact force, largest of the components N, F2, F3 [N], shape (time - 10,).
+    """Reported minus recomputed contact force, largest of the components N, F2, F3 [N], shape (samples,).
 
     Newton's law along e1, e2, e3 with the acceleration from the engine's own motion: the rates of the surface
-    coordinates are differentiated (they turn slowly, unlike the world components), the rest is geometry.
+    coordinates are differentiated (they turn slowly, unlike the world components), the rest is geometry. Forces jump
+    where slip begins or ends, so each stretch between events is taken by itself, without its first and last samples;
+    stretches of few samples are left out.
     """
+    t = dataset["time"].to_numpy()
+    inner = [event.time for event in events_of(dataset)]
+    cuts = [0, *np.searchsorted(t, inner).tolist(), len(t)]
+    stretches = [dataset.isel(time=slice(start, end)) for start, end in itertools.pairwise(cuts)]
+    audited = [_audited(body, stretch) for stretch in stretches if stretch.sizes["time"] > _DEGREE + 2 * _ENDS]
+    return np.concatenate(audited) if audited else np.zeros(0)
+
+
+def _audited(body: RollingBall, dataset: xr.Dataset) -> FloatArray:
+    """The audit of a stretch without events, shape (time - 10,)."""
     surface, t = body.surface, dataset["time"].to_numpy()
     u = np.stack([dataset[name].to_numpy() for name in surface.coordinates], axis=-1)
     rates = np.stack([dataset[f"{name}_rate"].to_numpy() for name in surface.coordinates], axis=-1)

@@ -188,8 +188,14 @@ def _run_truth(scene: Any, times: Any, out: Path, versions: dict[str, str]) -> R
         dataset = truth(scene, times)
     except Refused as error:
         return Result(Status.REFUSED, str(error), versions=versions)
+    except Diverged as error:
+        return Result(Status.DIVERGED, str(error), versions=versions)
     wall = time.perf_counter() - start
     message = f"{dataset.attrs['route']}, checked by {dataset.attrs['second_route']}"
+    if "sticking" in dataset:
+        from proofroll.truth.onset import onset
+
+        dataset.attrs["onset"] = json.dumps(dataclasses.asdict(onset(scene, float(times[-1]))))
     write(dataset.assign_attrs(status="done", message=message, engine="truth", wall_seconds=wall), out)
     return Result(Status.DONE, message, wall_seconds=wall, versions=versions, trajectory=out.name)
 

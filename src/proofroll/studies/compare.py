@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import itertools
+import json
 from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass, field
 from typing import TYPE_CHECKING
@@ -13,11 +15,14 @@ from proofroll.case import Case, EngineFacts, Result, Status
 from proofroll.comparison_file import Band, Comparison, Row
 from proofroll.convergence import Limit, richardson, tightest
 from proofroll.errors import InputError, Missing, ProofrollError
+from proofroll.events import events_of
 from proofroll.metrics import Observable, observables, scales
 from proofroll.registry import parse_engine
 from proofroll.runner import Runner, WorkerDied, resolve
 from proofroll.scene import Scene
 from proofroll.scene_file import load_scene
+from proofroll.studies.points import settled
+from proofroll.surfaces import FloatArray
 from proofroll.trajectory import read
 
 if TYPE_CHECKING:
@@ -86,13 +91,12 @@ def point_name(parameters: dict[str, float]) -> str:
 
 @dataclass(frozen=True)
 class Planned:
-    """A run with the cases of its ladder, coarse first; the run's own case is ``main``."""
+    """A run with the cases of its ladder by their factor on the step; the run's own case has the factor 1."""
 
     row: Row
     parameters: dict[str, float]
     facts: EngineFacts | ProofrollError
-    ladder: list[Case] = field(default_factory=list)
-    main: Case | None = None
+    ladder: dict[float, Case] = field(default_factory=dict)
 
 
 @dataclass(frozen=True)
@@ -106,7 +110,7 @@ class Plan:
     @property
     def cases(self) -> list[Case]:
         """Every case once or more; the runner runs equal ones once."""
-        return [*self.truths.values(), *(case for run in self.runs for case in run.ladder)]
+        return [*self.truths.values(), *(case for run in self.runs for case in run.ladder.values())]
 
 
 def plan(comparison: Comparison, engines: Iterable[str] = ()) -> Plan:
@@ -119,6 +123,7 @@ def plan(comparison: Comparison, engines: Iterable[str] = ()) -> Plan:
     Raises:
         InputError: an engine or setting that does not exist.
     """
+    comparison = settled(comparison)
     chosen = set(engines)
     rows = [row for row in comparison.rows if not chosen or parse_engine(row.engine).name in chosen]
     if not rows:
@@ -141,29 +146,29 @@ def plan(comparison: Comparison, engines: Iterable[str] = ()) -> Plan:
             if not isinstance(facts, EngineFacts):
                 runs.append(Planned(row, point, facts))
                 continue
-            main = _case(comparison, scene, point, facts, timed=True)
-            ladder = [main if f is facts else _case(comparison, scene, point, f) for f in ladder_facts]
-            runs.append(Planned(row, point, facts, ladder, main))
+            ladder = {
+                factor: _case(comparison, scene, point, rung, timed=factor == 1)
+                for factor, rung in ladder_facts.items()
+            }
+            runs.append(Planned(row, point, facts, ladder))
     return Plan(comparison, truths, runs)
 
 
-def _rungs(rows: list[Row], resolved: list[EngineFacts | ProofrollError]) -> list[list[EngineFacts]]:
-    """For every row the facts of its ladder: its own settings with the resolution scaled."""
+def _rungs(rows: list[Row], resolved: list[EngineFacts | ProofrollError]) -> list[dict[float, EngineFacts]]:
+    """For every row the facts of its ladder: its own settings with the resolution scaled, where that is allowed."""
     wanted: list[tuple[int, float, EngineFacts]] = []
     for index, (row, facts) in enumerate(zip(rows, resolved, strict=True)):
         if isinstance(facts, EngineFacts) and facts.resolution is not None:
-            wanted += [(index, factor, facts) for factor in row.ladder]
+            wanted += [(index, factor, facts) for factor in row.ladder if factor != 1]
     scaled = [
         (facts.name, {**facts.settings, facts.resolution: facts.settings[facts.resolution] * _scaled(facts, factor)})
         for _, factor, facts in wanted
         if facts.resolution is not None
     ]
-    ladders: list[list[EngineFacts]] = [[] for _ in rows]
-    for (index, factor, facts), found in zip(wanted, resolve(scaled), strict=True):
-        if factor == 1:
-            ladders[index].append(facts)
-        elif isinstance(found, EngineFacts):
-            ladders[index].append(found)
+    ladders = [{1.0: facts} if isinstance(facts, EngineFacts) else {} for facts in resolved]
+    for (index, factor, _), found in zip(wanted, resolve(scaled), strict=True):
+        if isinstance(found, EngineFacts):
+            ladders[index][factor] = found
     return ladders
 
 
@@ -196,21 +201,22 @@ def evaluate(planned: Plan, results: dict[str, Result], runner: Runner) -> Outco
         if isinstance(run.facts, ProofrollError):
             judged.append(_absent(run))
             continue
-        assert run.main is not None  # it goes with the facts
-        result = results[run.main.key]
+        main = run.ladder[1.0]
+        result = results[main.key]
         if result.trajectory is None or result.status != Status.DONE:
             judged.append(_failed(run, run.facts, result))
             continue
         name = point_name(run.parameters)
         if name not in references:
             references[name] = _reference(comparison, run.parameters, planned.truths[name], results, runner)
-        trajectories = [
-            read(runner.store.trajectory(case)) if results[case.key].status == Status.DONE else None
-            for case in run.ladder
-        ]
+        trajectories = {
+            factor: read(runner.store.trajectory(case))
+            for factor, case in run.ladder.items()
+            if results[case.key].status == Status.DONE
+        }
         judgements = _judgements(run, comparison.bands[run.row.tolerance], references[name], trajectories)
         contradictions = _contradictions(comparison, run, judgements)
-        judged.append(Run(run.row, run.parameters, run.facts, result, judgements, contradictions, run.main))
+        judged.append(Run(run.row, run.parameters, run.facts, result, judgements, contradictions, main))
     return Outcome(comparison, judged, planned.truths)
 
 
@@ -233,6 +239,27 @@ class _Reference:
     dataset: xr.Dataset
     curves: dict[str, Observable]
     sizes: dict[str, float]
+
+    @property
+    def ill_posed(self) -> bool:
+        """Whether the time of the first slip hangs on less than the parameters are known to."""
+        onset = json.loads(self.dataset.attrs.get("onset", "{}"))
+        return bool(onset.get("verdict") == "ill-posed")
+
+    def true(self, name: str, curve: Observable) -> tuple[FloatArray, float]:
+        """The true values of an observable, and their error bar."""
+        if name == "event_order":
+            return np.zeros(1), 0.0
+        values = self.curves[name].values
+        if name == "first_slip":
+            events = [event for event in events_of(self.dataset) if event.kind == "slip"]
+            return values, events[0].time_high - events[0].time_low if events else 0.0
+        if name == "slip" and "sticking" in self.dataset:
+            return values, float(np.hypot(*(self.dataset[f"slip{i}"].attrs["error_bar"] for i in (2, 3))))
+        if name not in self.dataset or name == "gap":
+            # Zero for a perfect run: what is left on the truth is what the measurement itself cannot resolve.
+            return np.zeros_like(curve.values), float(np.max(np.abs(values), initial=0.0))
+        return values, float(self.dataset[name].attrs["error_bar"])
 
 
 def _reference(
@@ -260,43 +287,52 @@ def _absent(run: Planned) -> Run:
 def _failed(run: Planned, facts: EngineFacts, result: Result) -> Run:
     expected = Verdict.FAILED in run.row.expect
     sentence = f"{run.row.engine} at {point_name(run.parameters)} {result.status}: {result.message}"
-    return Run(run.row, run.parameters, facts, result, [], [] if expected else [sentence], run.main)
+    return Run(run.row, run.parameters, facts, result, [], [] if expected else [sentence], run.ladder[1.0])
 
 
 def _judgements(
-    run: Planned, band: Band, reference: _Reference, trajectories: list[xr.Dataset | None]
+    run: Planned, band: Band, reference: _Reference, trajectories: dict[float, xr.Dataset]
 ) -> list[Judgement]:
     body = reference.scene.rolling
-    curves = [None if dataset is None else observables(body, dataset) for dataset in trajectories]
-    main = curves[run.row.ladder.index(1.0)] if len(curves) == len(run.row.ladder) else curves[-1]
-    assert main is not None  # the run itself is done
+    curves = {factor: observables(body, dataset) for factor, dataset in trajectories.items()}
+    main = curves[1.0]
+    if "sticking" in trajectories[1.0]:
+        main["event_order"] = _event_order(trajectories[1.0], reference.dataset)
     judgements = []
     for name, curve in main.items():
         tolerance = run.row.bound.get(name) or band.bounds.get(name)
         if tolerance is None:
             continue
-        true = reference.curves[name].values
-        zero_by_definition = name not in reference.dataset or name in {"gap"}
-        bar = float(np.max(np.abs(true))) if zero_by_definition else float(reference.dataset[name].attrs["error_bar"])
+        true, bar = reference.true(name, curve)
         judgements.append(
             judge(
                 name,
                 curve.unit,
                 curve.values,
-                np.zeros_like(true) if zero_by_definition else true,
+                true,
                 truth_error_bar=bar,
-                tolerance=tolerance.absolute(reference.sizes[name]),
-                scale=reference.sizes[name],
+                tolerance=tolerance.absolute(reference.sizes.get(name, 1.0)),
+                scale=reference.sizes.get(name, 1.0),
                 limit=_limit(run, name, curves),
+                ill_posed=reference.ill_posed,
             )
         )
     return judgements
 
 
-def _limit(run: Planned, name: str, curves: list[dict[str, Observable] | None]) -> Limit | None:
+def _event_order(dataset: xr.Dataset, truth: xr.Dataset) -> Observable:
+    """How many of the events are of another kind than the truth's, or missing, or too many."""
+    kinds = itertools.zip_longest(*([event.kind for event in events_of(item)] for item in (dataset, truth)))
+    return Observable("event_order", "events", np.array([float(sum(a != b for a, b in kinds))]))
+
+
+def _limit(run: Planned, name: str, curves: dict[float, dict[str, Observable]]) -> Limit | None:
     """Limit of small steps, if every rung of the ladder gave the observable."""
-    values = [curve[name].values for curve in curves if curve is not None and name in curve]
-    if len(values) != len(run.row.ladder) or not all(np.all(np.isfinite(v)) for v in values):
+    factors = run.row.ladder
+    if len(factors) == 1 or not all(name in curves.get(factor, {}) for factor in factors):
+        return None
+    values = [curves[factor][name].values for factor in factors]
+    if len({v.shape for v in values}) > 1 or not values[0].size or not all(np.all(np.isfinite(v)) for v in values):
         return None
     assert isinstance(run.facts, EngineFacts)  # there are curves
     if run.facts.resolution != "dt":
