@@ -1,24 +1,31 @@
 """Exudyn (https://github.com/jgerstmayr/EXUDYN), an engine for flexible and rigid multibody systems.
 
-It has no joint for a sphere on a curved wall. Three models of one are built here from what it has; see the modules
-:mod:`generic`, :mod:`carrier` and :mod:`rolling_disc`.
+It has no joint for a sphere on a curved wall. Four models of one are built here from what it has; see the modules
+:mod:`generic`, :mod:`carrier`, :mod:`rolling_disc` and :mod:`contact`. The first and the last let the ball slip.
 """
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from importlib.metadata import version
 from typing import ClassVar, Self
 
 from proofroll.engine import Built, Sample
 from proofroll.engines.exudyn.carrier import Carrier
+from proofroll.engines.exudyn.contact import Contact
 from proofroll.engines.exudyn.generic import Generic
 from proofroll.engines.exudyn.rolling_disc import RollingDisc
 from proofroll.engines.exudyn.settings import PRESETS, ExudynSettings
+from proofroll.events import Event
 from proofroll.scene import Capability, Scene
 
-Model = Generic | Carrier | RollingDisc
-MODELS: Mapping[str, type[Model]] = {"generic": Generic, "carrier": Carrier, "rolling_disc": RollingDisc}
+Model = Generic | Carrier | RollingDisc | Contact
+MODELS: Mapping[str, type[Model]] = {
+    "generic": Generic,
+    "carrier": Carrier,
+    "rolling_disc": RollingDisc,
+    "contact": Contact,
+}
 
 
 class Exudyn:
@@ -26,7 +33,12 @@ class Exudyn:
 
     name: ClassVar[str] = "exudyn"
     provides: ClassVar[frozenset[Capability]] = frozenset(
-        {Capability.ROLLING, Capability.CURVED_SURFACE, Capability.ROLLING_RESISTANCE}
+        {
+            Capability.ROLLING,
+            Capability.CURVED_SURFACE,
+            Capability.ROLLING_RESISTANCE,
+            Capability.BOUNDED_FRICTION,
+        }
     )
     settings: ClassVar[type[ExudynSettings]] = ExudynSettings
     presets: ClassVar[Mapping[str, Mapping[str, ExudynSettings]]] = PRESETS
@@ -51,6 +63,10 @@ class Exudyn:
     def sample(self) -> Sample:
         """See :class:`proofroll.engine.Engine`."""
         return self._model.sample()
+
+    def events(self) -> Sequence[Event]:
+        """See :class:`proofroll.engine.LocatesEvents`."""
+        return self._model.events()
 
     def built(self) -> Built:
         """See :class:`proofroll.engine.Engine`."""

@@ -13,11 +13,13 @@ import numpy as np
 
 from proofroll.engine import Built, Sample
 from proofroll.engines.exudyn.ball import add_ball, add_body
+from proofroll.engines.exudyn.friction import refuse_slip
 from proofroll.engines.exudyn.integration import Integration, consistent_start, new_system
 from proofroll.engines.exudyn.local_frame import LocalGeometry, local_geometry
 from proofroll.engines.exudyn.native import Output, exu, items
 from proofroll.engines.exudyn.settings import ExudynSettings
 from proofroll.errors import Refused
+from proofroll.events import Event
 from proofroll.scene import RollingBall
 from proofroll.surfaces import FloatArray, Generator
 
@@ -26,7 +28,8 @@ class Carrier:
     """Ball, carrier, two ``GenericJoint`` and two ``CoordinateConstraint`` at velocity level."""
 
     def __init__(self, body: RollingBall, settings: ExudynSettings) -> None:
-        """Builds and initialises; raises Refused if the wall's generators do not fit one joint."""
+        """Builds and initialises; raises Refused if friction is bounded, or the generators do not fit one joint."""
+        refuse_slip(body)
         local = local_geometry(body.surface, body.u0)
         self.container, self.system = new_system()
         add_marker, add_object = self.system.AddMarker, self.system.AddObject
@@ -96,6 +99,10 @@ class Carrier:
         """See :class:`proofroll.engine.Engine`. The pivot transmits the whole force of the wall."""
         turn = self.system.GetNodeOutput(self.node, Output.RotationMatrix).reshape(3, 3)
         return self.ball.sample(-turn @ self.system.GetObjectOutput(self.joint, Output.ForceLocal))
+
+    def events(self) -> list[Event]:
+        """None: the ball never slips."""
+        return []
 
     def built(self) -> Built:
         """See :class:`proofroll.engine.Engine`."""

@@ -7,16 +7,20 @@ constant coefficients. What is tested is Exudyn's integration of a system with m
 
 from __future__ import annotations
 
+import math
 from typing import Any
 
 import numpy as np
 
 from proofroll.engine import Built, Sample
+from proofroll.engines.exudyn.friction import Sliding, Touch, touch_function
 from proofroll.engines.exudyn.integration import Integration, initial_matrices, new_system
 from proofroll.engines.exudyn.local_frame import LocalGeometry, local_geometry
 from proofroll.engines.exudyn.native import exu, items
 from proofroll.engines.exudyn.settings import ExudynSettings
+from proofroll.engines.exudyn.stick_slip import StickSlip
 from proofroll.errors import Refused
+from proofroll.events import Event
 from proofroll.scene import RollingBall
 from proofroll.surfaces import FloatArray
 
@@ -42,17 +46,24 @@ class Generic:
                 numberOfODE2Coordinates=SIZE,
             )
         )
+        self.friction = Sliding(body.contact.mu_kinetic) if math.isfinite(body.contact.mu_static) else None
         mass = np.diag([m, 0.0, 0.0, J, J, J])
         mass[1:3, 1:3] = m * self.local.tangents.T @ self.local.tangents
         self.object = self.system.AddObject(
             items.ObjectGenericODE2(
-                nodeNumbers=[node], massMatrix=mass, forceUserFunction=_force_function(body, self.local)
+                nodeNumbers=[node], massMatrix=mass, forceUserFunction=_force_function(body, self.local, self.friction)
             )
         )
         self.rolling = self._constrain(node, body.ball.radius)
         self.system.Assemble()
         self._gravity, self._resistance = self._probe(settings)
-        self.integration = Integration(self.system, settings)
+        self.integration: Integration | StickSlip
+        if self.friction is None:
+            self.integration = Integration(self.system, settings)
+        else:
+            self._touch, self._local_gravity = touch_function(body), _weight(body, self.local, np.eye(3))
+            self._tangents: tuple[float, ...] = tuple(self.local.tangents[1:].ravel().tolist())
+            self.integration = StickSlip(self, body, settings)
 
     def _probe(self, settings: ExudynSettings) -> tuple[FloatArray, float | None]:
         """Gravity in the world [m/s²] and f [m], from the forces that Exudyn computes at rest and without spin."""
@@ -88,17 +99,49 @@ class Generic:
         )
 
     def sample(self) -> Sample:
-        """See :class:`proofroll.engine.Engine`. The spin is a quasi-velocity, so there is no orientation to report."""
+        """See :class:`proofroll.engine.Engine`. The spin is a quasi-velocity, so there is no orientation to report.
+
+        While the ball slips, N is the wall's multiplier and the friction its product with μk, against the slip.
+        """
         data = self.system.systemData
         q, q_t, multipliers = data.GetODE2Coordinates(), data.GetODE2Coordinates_t(), data.GetAECoordinates()
         frame = self.surface.frame(q[1:3])
         velocity = self.local.tangents @ q_t[1:3] + np.array([q_t[0], 0.0, 0.0])
+        force = -multipliers
+        if self.friction is not None and self.friction.direction is not None:
+            force[1:] = self.friction.force(self.touch(q, q_t), -force[0])
         return Sample(
             p_WB=self.surface.position(q[1:3]) + q[0] * frame[:, 0],
             v_WB=frame @ velocity,
             w_WB=frame @ q_t[3:],
-            force=-frame @ multipliers,
+            force=frame @ force,
+            sticking=None if self.friction is None else self.friction.direction is None,
         )
+
+    def events(self) -> list[Event]:
+        """Stick and slip so far."""
+        return self.integration.events if isinstance(self.integration, StickSlip) else []
+
+    def touch(self, q: FloatArray, q_t: FloatArray) -> Touch:
+        """See :class:`Switched`."""
+        _, rate1, rate2, w1, w2, w3 = q_t.tolist()
+        t2u, t2v, t3u, t3v = self._tangents
+        g1, g2, g3 = self._local_gravity(q)[:3]
+        return self._touch(t2u * rate1 + t2v * rate2, t3u * rate1 + t3v * rate2, w1, w2, w3, g1, g2, g3)
+
+    def hold(self, direction: tuple[float, float] | None) -> None:
+        """See :class:`Switched`."""
+        assert self.friction is not None
+        if (direction is None) != (self.friction.direction is None):
+            self.system.SetObjectParameter(self.rolling, "activeConnector", direction is None)
+        self.friction.direction = direction
+
+    def without_slip(self, q_t: FloatArray) -> FloatArray:
+        """See :class:`Switched`. The impulse is that of the constraint itself, through the mass matrix."""
+        rows = np.array(self.system.GetObject(self.rolling)["scalingMarker1"])
+        mass = self.system.GetObject(self.object)["massMatrix"].Convert2DenseMatrix()
+        by_impulse = np.linalg.solve(mass, rows.T)
+        return np.asarray(q_t - by_impulse @ np.linalg.solve(rows @ by_impulse, rows @ q_t))
 
     def built(self) -> Built:
         """See :class:`proofroll.engine.Engine`. Gravity and f stem from the forces Exudyn computed."""
@@ -118,14 +161,19 @@ class Generic:
         )
 
 
-def _force_function(body: RollingBall, local: LocalGeometry) -> Any:
+def _base(local: LocalGeometry) -> FloatArray:
+    """∂p/∂(distance, u1, u2) in the local frame."""
+    return np.concatenate([np.eye(3)[:, :1], local.tangents], axis=1)
+
+
+def _force_function(body: RollingBall, local: LocalGeometry, friction: Sliding | None) -> Any:
     """Right-hand side of M q̈ + Cᵀλ = Q as plain floats: Exudyn calls it for every residual."""
     m, J, f = body.ball.mass, body.ball.inertia, body.contact.rolling_resistance
     tangents = local.tangents
     # All inertial terms are quadratic in the velocities: Q_r = Σ c_rij q̇_i q̇_j. Terms with the distance itself as a
     # factor are left out: the constraint keeps it at zero.
     c = np.zeros((SIZE, SIZE, SIZE))
-    base = np.concatenate([np.eye(3)[:, :1], tangents], axis=1)  # ∂p/∂(distance, u1, u2)
+    base = _base(local)
     c[:3, 1:3, 1:3] = -m * np.einsum("ir,ijk->rjk", base, local.second)
     for k in range(2):
         turn = local.turn[:, k]
@@ -149,7 +197,22 @@ def _force_function(body: RollingBall, local: LocalGeometry) -> Any:
                 result[5] += factor * v2
         return result
 
-    return force
+    if friction is None:
+        return force
+    a = body.ball.radius
+
+    def force_and_friction(system: Any, t: float, item: int, q: list[float], rates: list[float]) -> list[float]:
+        result = force(system, t, item, q, rates)
+        if friction.direction is not None:
+            size = -friction.mu_kinetic * result[0]
+            F2, F3 = size * friction.direction[0], size * friction.direction[1]
+            result[1] += t2u * F2 + t3u * F3
+            result[2] += t2v * F2 + t3v * F3
+            result[4] -= a * F3
+            result[5] += a * F2
+        return result
+
+    return force_and_friction
 
 
 def _weight(body: RollingBall, local: LocalGeometry, scaled: FloatArray) -> Any:

@@ -30,8 +30,9 @@ def simulation_settings(settings: ExudynSettings) -> Any:
     result.parallel.numberOfThreads = 1
     time = result.timeIntegration
     time.verboseMode = 0
-    # Otherwise a failing Newton iteration halves the step, down to 1e-8 s, and the run crawls for minutes.
-    time.adaptiveStep = False
+    # Left alone, a failing Newton iteration halves the step down to 1e-8 s, and the run crawls for minutes.
+    time.adaptiveStep = settings.halvings > 0
+    time.minimumStepSize = settings.dt / 2**settings.halvings if settings.halvings else time.minimumStepSize
     time.newton.relativeTolerance = settings.newton_tolerance
     time.newton.absoluteTolerance = settings.newton_tolerance / 100
     time.newton.modifiedNewtonJacUpdatePerStep = settings.jacobian == "step"
@@ -48,23 +49,33 @@ class Integration:
 
     The solver is initialised once. ``SolveSteps`` goes from the start to the end that its iteration data name and keeps
     coordinates, accelerations and multipliers, so moving start and end continues the run.
+
+    Attributes:
+        t: present time [s].
+        complaint: why a user function of the system has stopped the run for good.
     """
 
     def __init__(
-        self, system: Any, settings: ExudynSettings, start: tuple[FloatArray, FloatArray] | None = None
+        self,
+        system: Any,
+        settings: ExudynSettings,
+        start: tuple[FloatArray, FloatArray] | None = None,
+        at: float = 0.0,
     ) -> None:
-        """Initialises the solver at time 0.
+        """Initialises the solver in the system's initial configuration.
 
         Args:
             system: assembled.
             settings: of the adapter.
-            start: accelerations of the coordinates and multipliers at time 0, where the engine cannot find them
-                itself; None: the engine solves for them.
+            start: accelerations of the coordinates and multipliers in that configuration, where the engine cannot find
+                them itself; None: the engine solves for them.
+            at: time of that configuration [s].
 
         Raises:
             Refused: the engine does not accept the model.
         """
-        self.t = 0.0
+        self.t = at
+        self.complaint: str | None = None
         self.dt = settings.dt
         self.system = system
         self.options = simulation_settings(settings)
@@ -85,7 +96,7 @@ class Integration:
             system.systemData.SetAECoordinates(start[1], exu.ConfigurationType.Current)
 
     def advance(self, t: float) -> None:
-        """Moves the system to time ``t`` [s]; see :class:`proofroll.engine.Engine`."""
+        """Moves the system to time ``t`` [s], or to where a user function of the system stops it after a step."""
         steps = whole_steps(self.t, t, self.dt)
         if steps == 0:
             return
@@ -98,6 +109,11 @@ class Integration:
         except Exception as error:  # an error in a user function comes out of the engine with its own type
             raise Diverged(f"Exudyn stopped at {self.solver.it.currentTime:g} s: {_sentence(error)}") from None
         reached = self.solver.it.currentTime
+        if self.solver.output.simulationStoppedByUserFunction:
+            self.t = reached
+            if self.complaint:
+                raise Diverged(f"{self.complaint} at {reached:g} s")
+            return
         # It also reports success when it stopped early, e.g. because exudyn.special.solver.timeout was reached.
         if not done or abs(reached - t) > 0.5 * self.dt:
             raise Diverged(f"Exudyn stopped at {reached:g} s: {self._reason()}")

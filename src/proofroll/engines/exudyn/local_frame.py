@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable
 from dataclasses import dataclass
 
@@ -103,6 +104,29 @@ def frame_at(surface: Surface, u0: FloatArray) -> FrameAt:
         )
 
     return frame
+
+
+def gap_at(surface: Surface, u0: FloatArray) -> Callable[[float, float, float], float]:
+    """The ball's distance from the wall [m] as a fast function of its centre, for callbacks; see :func:`frame_at`."""
+    generators = surface.generators
+    kinds = [] if generators is None else sorted(generator.kind for generator in generators)
+    frame, p0 = surface.frame(u0), surface.position(u0)
+    if kinds == ["translation", "translation"]:
+        (ex, ey, ez), reach = frame[:, 0].tolist(), float(frame[:, 0] @ p0)
+        return lambda x, y, z: reach - x * ex - y * ey - z * ez
+    parallel = generators is not None and abs(np.dot(generators[0].axis, generators[1].axis)) > 1 - 1e-12
+    if generators is not None and kinds == ["rotation", "translation"] and parallel:
+        nx, ny, nz = generators[0].axis
+        radial = p0 - (p0 @ generators[0].axis) * np.asarray(generators[0].axis)
+        radius, outward = float(np.linalg.norm(radial)), float(np.sign(radial @ frame[:, 0]))
+
+        def gap(x: float, y: float, z: float) -> float:
+            along = x * nx + y * ny + z * nz
+            rx, ry, rz = x - along * nx, y - along * ny, z - along * nz
+            return outward * (radius - math.sqrt(rx * rx + ry * ry + rz * rz))
+
+        return gap
+    return lambda x, y, z: float(surface.gap((x, y, z)))
 
 
 def _around(p: FloatArray, axis: FloatArray) -> FloatArray:

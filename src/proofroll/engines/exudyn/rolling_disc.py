@@ -12,10 +12,12 @@ import numpy as np
 
 from proofroll.engine import Built, Sample
 from proofroll.engines.exudyn.ball import add_ball
+from proofroll.engines.exudyn.friction import refuse_slip
 from proofroll.engines.exudyn.integration import Integration, consistent_start, new_system
 from proofroll.engines.exudyn.local_frame import frame_at
 from proofroll.engines.exudyn.native import Output, items
 from proofroll.engines.exudyn.settings import ExudynSettings
+from proofroll.events import Event
 from proofroll.scene import RollingBall
 from proofroll.surfaces import FloatArray
 
@@ -24,7 +26,8 @@ class RollingDisc:
     """A rigid ball and one re-aimed ``ObjectJointRollingDisc``; needs no generators of the surface."""
 
     def __init__(self, body: RollingBall, settings: ExudynSettings) -> None:
-        """Builds and initialises."""
+        """Builds and initialises; raises Refused if friction is bounded."""
+        refuse_slip(body)
         self.container, self.system = new_system()
         ground = self.system.AddObject(items.ObjectGround())
         self.ball = add_ball(self.system, body)
@@ -69,6 +72,10 @@ class RollingDisc:
     def sample(self) -> Sample:
         """See :class:`proofroll.engine.Engine`."""
         return self.ball.sample(self._directions() @ self.system.GetObjectOutput(self.joint, Output.ForceLocal))
+
+    def events(self) -> list[Event]:
+        """None: the ball never slips."""
+        return []
 
     def built(self) -> Built:
         """See :class:`proofroll.engine.Engine`."""

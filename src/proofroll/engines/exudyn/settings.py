@@ -15,7 +15,8 @@ class ExudynSettings:
 
     Attributes:
         formulation: ``generic`` (minimal coordinates and multipliers), ``carrier`` (rigid ball on a massless carrier,
-            built-in joints only) or ``rolling_disc`` (the engine's rolling-disc joint, re-aimed at every iterate).
+            built-in joints only), ``rolling_disc`` (the engine's rolling-disc joint, re-aimed at every iterate) or
+            ``contact`` (its contact with a hollow sphere that follows the ball; penalty and regularised friction).
         preset: which preset the values started from.
         dt: fixed time step [s].
         integrator: ``generalized_alpha`` (constraints at position level, index 3) or ``trapezoidal_index2``
@@ -25,15 +26,23 @@ class ExudynSettings:
         newton_tolerance: relative tolerance of Newton's method [-]; the absolute one is a hundredth of it, which is
             the engine's own ratio.
         jacobian: ``reused`` while Newton's method contracts, or set up again at every ``step``.
+        halvings: how often a step is halved where Newton's method fails, before the run ends. With 0 all steps are dt.
+        stiffness: of the contact's normal force [N/m]; ``contact`` only, as the following.
+        friction_zone: slip velocity up to which friction is proportional to it [m/s].
+        grip: coefficient that stands for unbounded friction [-]; the ball creeps by friction_zone |F| / (grip N).
     """
 
-    formulation: Literal["generic", "carrier", "rolling_disc"] = "generic"
+    formulation: Literal["generic", "carrier", "rolling_disc", "contact"] = "generic"
     preset: Literal["default", "matched", "tuned"] = "matched"
     dt: Annotated[float, Gt(0)] = 1e-4
     integrator: Literal["generalized_alpha", "trapezoidal_index2"] = "trapezoidal_index2"
     spectral_radius: Annotated[float, Interval(ge=0, le=1)] = 0.9
     newton_tolerance: Annotated[float, Interval(gt=0, lt=1)] = 1e-11
     jacobian: Literal["reused", "step"] = "step"
+    halvings: Annotated[int, Interval(ge=0, le=20)] = 0
+    stiffness: Annotated[float, Gt(0)] = 1e7
+    friction_zone: Annotated[float, Gt(0)] = 1e-5
+    grip: Annotated[float, Gt(0)] = 10.0
 
     resolution: ClassVar[str] = "dt"
     # Both methods are of second order in positions, velocities and multipliers.
@@ -70,5 +79,16 @@ PRESETS: Mapping[str, Mapping[str, ExudynSettings]] = {
         # step: the damping of generalized-alpha keeps them quiet (ρ as above), the trapezoidal rule lets them ring
         # (F2 is off by 1e-3 N instead of 2e-5 N, and z by twice as much).
         "matched": ExudynSettings("rolling_disc", "matched", 1e-4, "generalized_alpha", 0.8, 1e-10, "step"),
+    },
+    "contact": {
+        # Integrator, Newton options, adaptive step and friction zone as Exudyn has them; a stiffness it does not have.
+        # The ball creeps by up to 1e-3 m/s, and at a grazing onset the damped integrator leaves the zone too late.
+        "default": ExudynSettings("contact", "default", 1e-3, "generalized_alpha", 0.9, 1e-8, "reused", 10, 1e6, 1e-3),
+        # A hundredth of the default's creep. The trapezoidal rule is the one that does not chatter at the edge of the
+        # zone. Newton's method cannot always pass that edge within a step, which is then halved. Round-off, magnified
+        # by the contact, is larger than what a tighter tolerance would ask for.
+        "matched": ExudynSettings("contact", "matched", 1e-4, "trapezoidal_index2", 0.9, 1e-8, "step", 10, 1e7, 1e-5),
+        # Stiffer: as N falls, the ball comes out of the wall by N/k, and its angle runs away by N/(k c) of its way.
+        "tuned": ExudynSettings("contact", "tuned", 1e-4, "trapezoidal_index2", 0.9, 1e-8, "step", 10, 1e8, 1e-5),
     },
 }

@@ -1,0 +1,198 @@
+"""A rigid ball in contact with a hollow sphere that follows it: Exudyn's penalty contact with regularised friction.
+
+Exudyn has no contact between a ball and a curved wall, but one between a ball and the inside of a sphere
+(``ObjectContactSphereSphere``). The hollow sphere is moved along before every Newton residual so that it touches the
+wall where the ball does; then its normal and its distance are those of the wall. Its friction is proportional to the
+slip velocity up to ``friction_zone`` and constant beyond, so that a ball that sticks creeps.
+"""
+
+from __future__ import annotations
+
+import dataclasses
+import math
+from collections.abc import Callable
+from typing import Any
+
+import numpy as np
+
+from proofroll.certificate import EXACT
+from proofroll.engine import Built, Regularised, Sample
+from proofroll.engines.exudyn.ball import add_ball
+from proofroll.engines.exudyn.integration import Integration, new_system
+from proofroll.engines.exudyn.local_frame import frame_at, gap_at
+from proofroll.engines.exudyn.native import Output, items
+from proofroll.engines.exudyn.settings import ExudynSettings
+from proofroll.errors import Refused
+from proofroll.events import Event, EventKind
+from proofroll.mechanics import newton_euler
+from proofroll.scene import RollingBall
+from proofroll.surfaces import FloatArray
+
+# Radius of the hollow sphere in radii of the ball where the wall is not curved. The larger it is, the less its normal
+# turns between two residuals, and the more the stiffness magnifies the round-off of the distance.
+ON_A_PLANE = 10.0
+# The ball slips once it has left the friction zone and is this many times as fast as its edge: at a grazing onset the
+# time steps throw the slip velocity to and fro across the edge itself.
+SURELY = 2.0
+
+
+class Contact:
+    """A rigid ball and one ``ObjectContactSphereSphere`` with a hollow sphere; needs no generators of the surface."""
+
+    def __init__(self, body: RollingBall, settings: ExudynSettings) -> None:
+        """Builds and initialises; raises Refused if static and kinetic friction differ, or nothing presses the ball."""
+        law = body.contact
+        if law.mu_static != law.mu_kinetic:
+            raise Refused("its contact has one coefficient of friction; make mu_kinetic equal to mu_static")
+        self.bounded = math.isfinite(law.mu_static)
+        mu = law.mu_kinetic if self.bounded else settings.grip
+        self.zone = settings.friction_zone
+        e1 = body.surface.frame(body.u0)[:, 0]
+        force = newton_euler(body, body.p0, body.v0, body.w0)[2]
+        N = float(-force @ e1)
+        if N <= 0:
+            raise Refused("nothing presses the ball against the wall at time 0, so its contact is not closed")
+        friction = force + N * e1
+        # With this slip velocity the softened friction is the one that rolling needs, and need not build up.
+        needed = float(np.linalg.norm(friction))
+        if needed > mu * N and not self.bounded:
+            raise Refused("rolling needs more friction than grip at time 0; use a larger grip")
+        creep = -self.zone * friction / (max(mu * N, needed) or 1.0)
+        sunk = N / settings.stiffness
+        self.container, self.system = new_system()
+        rolling = dataclasses.replace(body, w0=body.w0 + np.cross(e1, creep) / body.ball.radius)
+        self.ball = add_ball(self.system, rolling)
+        radius = body.ball.radius
+        hollow = _hollow_radius(body)
+        self._centre = _centre_function(body, hollow - radius)
+        ground = self.system.AddObject(items.ObjectGround())
+        self.follower = self.system.AddMarker(
+            items.MarkerBodyRigid(bodyNumber=ground, localPosition=self._centre(*body.p0.tolist()))
+        )
+        self.data = self.system.AddNode(
+            items.NodeGenericData(
+                initialCoordinates=[-sunk, float(np.linalg.norm(creep)), 0.0, 0.0], numberOfDataCoordinates=4
+            )
+        )
+        self.contact = self.system.AddObject(
+            items.ObjectContactSphereSphere(
+                markerNumbers=[self.ball.marker, self.follower],
+                nodeNumber=self.data,
+                # By half of what the ball sinks in under the first normal force: at time 0 it is where the scene says.
+                spheresRadii=[radius + sunk / 2, hollow - sunk / 2],
+                isHollowSphere1=True,
+                dynamicFriction=mu,
+                frictionProportionalZone=self.zone,
+                contactStiffness=settings.stiffness,
+            )
+        )
+        self.system.SetPreNewtonResidualUserFunction(self._follow)
+        self.system.Assemble()
+        self._softened = _softened(body, settings, creep, mu * N, hollow)
+        self._t, self._events = 0.0, []
+        self._left: tuple[float, float] | None = None
+        self._sticks = needed <= mu * N
+        if not self._sticks:
+            self._events.append(Event("slip", 0.0, 0.0, 0.0))
+        self.system.SetPostStepUserFunction(self._watch)
+        self.integration = Integration(self.system, settings)
+
+    def _follow(self, system: Any, t: float, newton_iteration: int, discontinuous_iteration: int) -> None:  # noqa: ARG002 -- Exudyn's signature
+        """Moves the hollow sphere to where the ball touches the wall."""
+        x, y, z = system.GetNodeOutput(self.ball.node, Output.Position).tolist()
+        system.SetMarkerParameter(self.follower, "localPosition", self._centre(x, y, z))
+
+    def _watch(self, system: Any, t: float) -> bool:
+        """Called by Exudyn after each step, and once where it starts."""
+        if t <= self._t:
+            return True
+        gap, speed = system.GetNodeOutput(self.data, Output.Coordinates)[:2].tolist()
+        if gap > 0:
+            self._events.append(Event("liftoff", 0.5 * (self._t + t), self._t, t))
+            self.integration.complaint = "the ball leaves the wall"
+            return False
+        slip = speed / self.zone
+        if self._sticks:
+            if slip < 1:
+                self._left = None
+            elif self._left is None:
+                self._left = self._t, t
+            if self._left is not None and slip > SURELY:
+                self._switch("slip", *self._left)
+        elif slip < 1:
+            self._switch("stick", self._t, t)
+        self._t = t
+        return self.integration.complaint is None
+
+    def _switch(self, kind: EventKind, low: float, high: float) -> None:
+        if not self.bounded:
+            self.integration.complaint = "the ball slips, as rolling needs more friction than grip (use a larger grip),"
+            return
+        self._events.append(Event(kind, 0.5 * (low + high), low, high))
+        self._sticks, self._left = kind == "stick", None
+
+    def events(self) -> list[Event]:
+        """Stick and slip so far, each between two steps."""
+        return list(self._events)
+
+    def sample(self) -> Sample:
+        """See :class:`proofroll.engine.Engine`. The force is that of the contact."""
+        force = self.system.GetObjectOutput(self.contact, Output.Force)
+        return dataclasses.replace(self.ball.sample(force), sticking=self._sticks if self.bounded else None)
+
+    def built(self) -> Built:
+        """See :class:`proofroll.engine.Engine`."""
+        contact = self.system.GetObject(self.contact)
+        sunk = -self.system.GetObjectOutput(self.contact, Output.DisplacementLocal)
+        built = self.ball.built(float(contact["spheresRadii"][0] - sunk / 2))
+        return dataclasses.replace(built, regularised=self._softened)
+
+
+def _hollow_radius(body: RollingBall) -> float:
+    """Inner radius of a sphere that is curved as the wall is where it is curved most [m]."""
+    frame = body.surface.frame(body.u0)
+    curvature = (frame.T @ body.surface.normal_gradient(body.p0) @ frame)[1:, 1:]
+    most = float(np.linalg.eigvalsh(curvature)[-1])
+    return body.ball.radius * ON_A_PLANE if most <= 0 else body.ball.radius + 1 / most
+
+
+def _softened(
+    body: RollingBall, settings: ExudynSettings, creep: FloatArray, cone: float, hollow: float
+) -> dict[str, Regularised]:
+    """What differs at time 0: the creep, and forces in which the contact magnifies round-off.
+
+    Args:
+        body: the scene.
+        settings: of the adapter.
+        creep: slip velocity at time 0 [m/s].
+        cone: largest friction at time 0 [N].
+        hollow: radius of the hollow sphere [m].
+    """
+    a, m = body.ball.radius, body.ball.mass
+    speed, spin = float(np.linalg.norm(body.v0)), float(np.linalg.norm(body.w0))
+    slip = float(np.linalg.norm(creep))
+    crept = "friction is proportional to the slip velocity, so the ball creeps in order to be held"
+    # Some roundings of the distance between the centres, and of the velocity at the contact.
+    ulp = 8 * float(np.finfo(float).eps)
+    N = settings.stiffness * ulp * (hollow + float(np.linalg.norm(body.p0)))
+    F = cone / settings.friction_zone * ulp * (speed + a * spin + slip) + N
+    weight = m * float(np.linalg.norm(body.gravity)) or m
+    stiff = "the stiff contact magnifies the round-off of distance and slip velocity"
+    return {
+        "slip": Regularised(1.000001 * slip / (speed or 1.0) + EXACT, crept),
+        "spin": Regularised(1.000001 * slip / a / max(spin, (speed or 1.0) / a) + EXACT, crept),
+        "N": Regularised(N / weight + EXACT, stiff),
+        **{name: Regularised(F / weight + EXACT, stiff) for name in ("F2", "F3", "acceleration")},
+    }
+
+
+def _centre_function(body: RollingBall, distance: float) -> Callable[[float, float, float], list[float]]:
+    """Centre of the hollow sphere for a ball at x, y, z [m]: a touching ball's centre is ``distance`` away from it."""
+    frame, gap = frame_at(body.surface, body.u0), gap_at(body.surface, body.u0)
+
+    def centre(x: float, y: float, z: float) -> list[float]:
+        e = frame(x, y, z)
+        back = gap(x, y, z) - distance
+        return [x + back * e[0], y + back * e[1], z + back * e[2]]
+
+    return centre

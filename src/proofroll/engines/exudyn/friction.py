@@ -1,0 +1,167 @@
+"""Coulomb friction of a ball in the wall's local frame: what it needs to roll, and where it points while slipping.
+
+Two components along e2 and e3 everywhere. While the ball slips, the force is -μk N d with a unit direction d that is
+held over one step, so that Newton's method never meets the kink of the law at rest.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable
+from dataclasses import dataclass
+from typing import NamedTuple
+
+from proofroll.errors import Refused
+from proofroll.scene import RollingBall
+
+# A slip that the needed friction would change within this part of a step is the round-off of a rolling constraint.
+AT_REST = 1e-6
+ROUND_OFF = 1e-12  # of a slip velocity [m/s]
+# Cosine below which a predicted direction is no longer that of a slip which goes on.
+ACROSS = 0.1
+
+
+class Touch(NamedTuple):
+    """What happens at the contact, from a state alone.
+
+    Attributes:
+        N: normal force [N].
+        need2, need3: the friction on the ball that would leave the slip velocity as it is [N].
+        u2, u3: slip velocity [m/s].
+    """
+
+    N: float
+    need2: float
+    need3: float
+    u2: float
+    u3: float
+
+    @property
+    def needed(self) -> float:
+        """Size of the needed friction [N]."""
+        return math.hypot(self.need2, self.need3)
+
+    @property
+    def slip(self) -> float:
+        """Size of the slip velocity [m/s]."""
+        return math.hypot(self.u2, self.u3)
+
+
+@dataclass
+class Sliding:
+    """Kinetic friction as it is built, shared with the function that applies it.
+
+    Attributes:
+        mu_kinetic: |F|/N [-].
+        direction: unit direction of the slip velocity (e2, e3); None: the ball rolls.
+    """
+
+    mu_kinetic: float
+    direction: tuple[float, float] | None = None
+
+    def force(self, touch: Touch, N: float) -> tuple[float, float]:
+        """Friction on the ball along e2 and e3 against its slip velocity [N]."""
+        if self.direction is None:
+            return 0.0, 0.0
+        moves = touch.slip > ROUND_OFF
+        d2, d3 = (touch.u2 / touch.slip, touch.u3 / touch.slip) if moves else self.direction
+        return -self.mu_kinetic * N * d2, -self.mu_kinetic * N * d3
+
+
+# (velocity of the centre along e2 and e3, spin about e1, e2, e3, gravity along e1, e2, e3) -> contact
+TouchAt = Callable[[float, float, float, float, float, float, float, float], Touch]
+
+
+def mobility(body: RollingBall) -> float:
+    """β = 1/m + a²/J: change of the slip velocity per impulse of friction [1/kg]."""
+    return 1 / body.ball.mass + body.ball.radius**2 / body.ball.inertia
+
+
+def refuse_slip(body: RollingBall) -> None:
+    """Raises Refused if friction is bounded, for models whose ball cannot slip."""
+    if math.isfinite(body.contact.mu_static):
+        raise Refused("this formulation only rolls without slip; with bounded friction use generic or contact")
+
+
+def touch_function(body: RollingBall) -> TouchAt:
+    """The contact of a ball on a homogeneous surface, whose curvature in the local frame is the same everywhere.
+
+    The slip velocity u = v + a ω × e1 changes by u̇ = g + βF + (a/J) M × e1 + a ω × ė1 along the tangents, with the
+    moment M of the rolling resistance; N = m (v·ė1 + e1·g), as the ball stays on the wall.
+    """
+    a, m, f = body.ball.radius, body.ball.mass, body.contact.rolling_resistance
+    beta, lever = mobility(body), body.ball.radius / body.ball.inertia
+    frame = body.surface.frame(body.u0)
+    k = (frame.T @ body.surface.normal_gradient(body.p0) @ frame)[1:, 1:]
+    (k22, k23), (k32, k33) = k.tolist()
+
+    def touch(v2: float, v3: float, w1: float, w2: float, w3: float, g1: float, g2: float, g3: float) -> Touch:
+        turn2, turn3 = k22 * v2 + k23 * v3, k32 * v2 + k33 * v3
+        N = m * (v2 * turn2 + v3 * turn3 + g1)
+        free2, free3 = g2 - a * w1 * turn3, g3 + a * w1 * turn2
+        if f:
+            speed = math.hypot(v2, v3)
+            if speed:
+                free2 += lever * f * N * v2 / speed
+                free3 += lever * f * N * v3 / speed
+        return Touch(N, -free2 / beta, -free3 / beta, v2 + a * w3, v3 - a * w2)
+
+    return touch
+
+
+def slip_direction(
+    at: Touch, rate: tuple[float, float], friction: float, beta: float, dt: float, *, inside: bool
+) -> tuple[float, float]:
+    """Unit direction of the slip velocity that stands for the coming step.
+
+    Near rest the direction turns towards that of -need at the rate x = β|need| dt/|u| per step, faster than any step
+    resolves. With the need frozen it is left behind by a factor exp(-x), which gives the direction at the end of the
+    step, and its mean inside the step. Both are of second order where x is small and do not ring where it is large. In
+    the step that brings the ball to rest it is the one direction in which both components end together.
+
+    Args:
+        at: the contact at the start of the step.
+        rate: of the needed friction [N/s].
+        friction: μk N [N].
+        beta: see :func:`mobility`.
+        dt: step [s].
+        inside: the mean direction inside the step instead of the one at its end.
+    """
+    later = 0.5 * dt if inside else dt
+    need2, need3 = at.need2 + later * rate[0], at.need3 + later * rate[1]
+    slip, need = at.slip, math.hypot(need2, need3)
+    if slip <= max(AT_REST * dt * beta * need, ROUND_OFF) and need >= friction and need:
+        return -need2 / need, -need3 / need
+    if slip == 0:
+        return 1.0, 0.0  # friction holds the ball in any direction
+    ahead = _time_to_rest(at, need2, need3, friction, beta)
+    if ahead > dt:
+        x = min(dt * beta * need / slip, 1 / AT_REST)
+        ahead = dt * (_mean(x) if inside else _end(x))
+    w2, w3 = at.u2 - ahead * beta * need2, at.u3 - ahead * beta * need3
+    size = math.hypot(w2, w3)
+    if at.u2 * w2 + at.u3 * w3 <= ACROSS * slip * size:
+        # Friction and need together stop the ball before it is turned around.
+        return at.u2 / slip, at.u3 / slip
+    return w2 / size, w3 / size
+
+
+def _time_to_rest(at: Touch, need2: float, need3: float, friction: float, beta: float) -> float:
+    """Smallest τ > 0 [s] with |u - τ β need| = τ β friction: then one constant direction leads to rest."""
+    # A τ² - 2 B τ + u² = 0, solved for 1/τ, which stays well-defined for A = 0.
+    A = beta * beta * (need2 * need2 + need3 * need3 - friction * friction)
+    B = beta * (at.u2 * need2 + at.u3 * need3)
+    u = at.u2 * at.u2 + at.u3 * at.u3
+    discriminant = B * B - A * u
+    inverse = (B + math.sqrt(discriminant)) / u if discriminant >= 0 else 0.0
+    return 1 / inverse if inverse > 0 else math.inf
+
+
+def _mean(x: float) -> float:
+    """Part θ of the step after which 1/(1 + θx) is the mean of exp(-x) inside the step."""
+    return 0.5 + x / 12 if x < 1e-3 else 1 / -math.expm1(-x) - 1 / x
+
+
+def _end(x: float) -> float:
+    """Part θ of the step after which 1/(1 + θx) is exp(-x); large enough beyond x = 30."""
+    return 1 + x / 2 if x < 1e-6 else math.expm1(min(x, 30.0)) / x

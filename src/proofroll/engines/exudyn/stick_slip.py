@@ -1,0 +1,214 @@
+"""Runs a model whose rolling constraint is switched off while the ball slips, and locates each switch.
+
+Exudyn integrates with its fixed step; a function that it calls after each step stops it when the needed friction has
+left the static cone, or when the slip has turned around. The step is then taken back and divided at the event, which
+keeps the integrator's order, and a fresh solver starts on either side with consistent accelerations.
+"""
+
+from __future__ import annotations
+
+import dataclasses
+from typing import Any, NamedTuple, Protocol
+
+from scipy.optimize import brentq
+
+from proofroll.engine import whole_steps
+from proofroll.engines.exudyn.friction import Touch, mobility, slip_direction
+from proofroll.engines.exudyn.integration import Integration
+from proofroll.engines.exudyn.native import exu
+from proofroll.engines.exudyn.settings import ExudynSettings
+from proofroll.errors import Diverged
+from proofroll.events import Event, EventKind
+from proofroll.scene import RollingBall
+from proofroll.surfaces import FloatArray
+
+# An event is located to this part of a step, far below what one step of the integrator is wrong by.
+LOCATED = 1e-6
+# A ball that friction would stop within this part of a step is at rest.
+AT_REST = 1e-2
+
+
+class Switched(Protocol):
+    """A model with a rolling constraint that can be switched off."""
+
+    system: Any
+
+    def touch(self, q: FloatArray, q_t: FloatArray) -> Touch:
+        """The contact in the state of these coordinates and rates."""
+
+    def hold(self, direction: tuple[float, float] | None) -> None:
+        """Slips along the unit ``direction`` (e2, e3), or rolls where there is none."""
+
+    def without_slip(self, q_t: FloatArray) -> FloatArray:
+        """The rates after the impulse at the contact that ends the slip."""
+
+
+class State(NamedTuple):
+    """Coordinates, their rates, and the contact that follows from them."""
+
+    q: FloatArray
+    q_t: FloatArray
+    touch: Touch
+
+
+class StickSlip:
+    """Drives a :class:`Switched` model; stands in for :class:`Integration`.
+
+    Attributes:
+        t: present time [s].
+        sticking: whether the ball rolls without slip.
+        direction: unit direction of slip in the present step (e2, e3).
+        events: so far.
+    """
+
+    def __init__(self, model: Switched, body: RollingBall, settings: ExudynSettings) -> None:
+        """At time 0, in the state of the system's initial configuration."""
+        self.model, self.system, self.settings = model, model.system, settings
+        self.mu_static, self.mu_kinetic = body.contact.mu_static, body.contact.mu_kinetic
+        self.beta = mobility(body)
+        self.t = 0.0
+        self.events: list[Event] = []
+        self.sticking, self.direction = True, (1.0, 0.0)
+        self.state = self._state(exu.ConfigurationType.Initial)
+        self._before, self._before_t = self.state, 0.0
+        self._need_rate = (0.0, 0.0)  # of the needed friction [N/s]
+        self._watching, self._stopped = False, False
+        self.system.SetPostStepUserFunction(self._watch)
+        if self._margin(self.state.touch) < 0:
+            self._switch("slip", 0.0, 0.0, 0.0)
+        self._restart()
+
+    def advance(self, t: float) -> None:
+        """Moves the system to time ``t`` [s]; see :class:`proofroll.engine.Engine`."""
+        while whole_steps(self.t, t, self.settings.dt) > 0:
+            self._watching, self._stopped = True, False
+            try:
+                self.integration.advance(t)
+            finally:
+                self._watching = False
+            if self.state.touch.N <= 0:
+                self.events.append(Event("liftoff", 0.5 * (self._before_t + self.t), self._before_t, self.t))
+                raise Diverged(f"the ball leaves the wall at {self.t:g} s")
+            if self._stopped:
+                self._divide()
+                self._restart()
+        self.t = self.integration.t = t
+
+    def _watch(self, system: Any, t: float) -> bool:  # noqa: ARG002 -- Exudyn's signature
+        """Called by Exudyn after each step, and once where it starts; False stops it."""
+        if not self._watching:
+            return True
+        elapsed = t - self.t
+        if elapsed > 0.5 * self.settings.dt:
+            self._before, self._before_t = self.state, self.t
+            self.state, self.t = self._state(exu.ConfigurationType.Current), t
+            touch, old = self.state.touch, self._before.touch
+            if self._margin(touch) <= 0 or touch.N <= 0:
+                self._stopped = True
+                return False
+            self._need_rate = (touch.need2 - old.need2) / elapsed, (touch.need3 - old.need3) / elapsed
+        if not self.sticking:
+            self._aim(self.settings.dt)
+        return True
+
+    def _margin(self, touch: Touch) -> float:
+        """Positive while the contact stays as it is: friction left in the cone [N], or slip still forward [m/s]."""
+        if self.sticking:
+            return self.mu_static * touch.N - touch.needed
+        return touch.u2 * self.direction[0] + touch.u3 * self.direction[1]
+
+    def _aim(self, dt: float, *, inside: bool = False) -> None:
+        """Sets the direction of slip for the coming step [s]: for its end, as the solver knows that at its start.
+
+        A step of a fresh solver has one direction throughout, the mean one ``inside``.
+        """
+        friction = self.mu_kinetic * self.state.touch.N
+        self.direction = slip_direction(self.state.touch, self._need_rate, friction, self.beta, dt, inside=inside)
+        self.model.hold(self.direction)
+
+    def _divide(self) -> None:
+        """Takes the last step again, in parts that end where the contact changes."""
+        now, end = self._before_t, self.t
+        self.state = self._before
+        while (left := end - now) > LOCATED * self.settings.dt:
+            if not self.sticking:
+                self._aim(left, inside=True)
+            beyond = self._part(left)
+            if self._margin(beyond.touch) > 0:
+                self.state = beyond
+                break
+            if self.sticking and self._margin(self.state.touch) <= 0:
+                self._switch("slip", now, self._before_t, end)
+                continue
+            if not self.sticking and (self._begun(now) or self._margin(self.state.touch) <= 0):
+                # The cone was only touched: the ball does not begin to slip after all, and the step ends sticking.
+                self._take_back(now)
+                self.state = self._part(left)
+                break
+            part = self._crossing(beyond, left)
+            if part > 0:
+                self.state, now = self._part(part), now + part
+            self._land(now, end)
+
+    def _crossing(self, beyond: State, left: float) -> float:
+        """How long from now until the contact changes [s], by ``left`` [s] at the latest."""
+        ends = {0.0: self._margin(self.state.touch), left: self._margin(beyond.touch)}
+
+        def margin(part: float) -> float:
+            return ends[part] if part in ends else self._margin(self._part(part).touch)
+
+        return float(brentq(margin, 0.0, left, xtol=LOCATED * left))
+
+    def _land(self, now: float, end: float) -> None:
+        """Changes the contact in the present state, where an event was located."""
+        touch = self.state.touch
+        if self.sticking:
+            self._switch("slip", now, self._before_t, end)
+            return
+        holds = touch.needed <= self.mu_static * touch.N
+        if holds:
+            self._switch("stick", now, self._before_t, end)
+        if holds or touch.slip <= AT_REST * self.settings.dt * self.beta * self.mu_kinetic * touch.N:
+            q, q_t = self.state.q, self.model.without_slip(self.state.q_t)
+            self.state = State(q, q_t, self.model.touch(q, q_t))
+
+    def _switch(self, kind: EventKind, now: float, low: float, high: float) -> None:
+        self.events.append(Event(kind, now, low, high))
+        self.sticking = kind == "stick"
+
+    def _begun(self, now: float) -> bool:
+        """Whether the ball began to slip at this very time [s]."""
+        return bool(self.events) and self.events[-1].kind == "slip" and self.events[-1].time == now
+
+    def _take_back(self, now: float) -> None:
+        if self._begun(now):
+            self.events.pop()
+            self.sticking = True
+        else:
+            self._switch("stick", now, self._before_t, now)
+
+    def _part(self, dt: float) -> State:
+        """The state after one step of another size [s] from the present one."""
+        self._set_initial()
+        self.model.hold(None if self.sticking else self.direction)
+        Integration(self.system, dataclasses.replace(self.settings, dt=dt)).advance(dt)
+        return self._state(exu.ConfigurationType.Current)
+
+    def _set_initial(self) -> None:
+        data, initial = self.system.systemData, exu.ConfigurationType.Initial
+        data.SetODE2Coordinates(self.state.q, initial)
+        data.SetODE2Coordinates_t(self.state.q_t, initial)
+
+    def _state(self, configuration: Any) -> State:
+        data = self.system.systemData
+        q, q_t = data.GetODE2Coordinates(configuration), data.GetODE2Coordinates_t(configuration)
+        return State(q, q_t, self.model.touch(q, q_t))
+
+    def _restart(self) -> None:
+        """A fresh solver in the present state."""
+        self._set_initial()
+        if self.sticking:
+            self.model.hold(None)
+        else:
+            self._aim(0.0)
+        self.integration = Integration(self.system, self.settings, at=self.t)
