@@ -4,6 +4,8 @@ from __future__ import annotations
 
 import json
 import sys
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
 
@@ -218,6 +220,82 @@ def report(
     raise typer.Exit(_exit_code(outcomes))
 
 
+@app.command()
+def onset(
+    scene: Annotated[str, typer.Argument(help="Name of a scene, or path of a folder with a scene.toml.")],
+    settings: Annotated[list[str] | None, typer.Option("--set", help="parameter=value in SI units; repeat.")] = None,
+    engine: Annotated[list[str] | None, typer.Option(help="Engine with settings; repeat. All that can slip.")] = None,
+    until: Annotated[float, typer.Option(help="How long to look for a slip [s].")] = 4.0,
+    uncertainty: Annotated[float, typer.Option(help="Relative uncertainty of friction and resistance.")] = 1e-3,
+    out: Out = Path("out"),
+    fresh: Fresh = False,
+    jobs: Jobs = None,
+    as_json: Json = False,
+) -> None:
+    """Say when the ball first slips, in every engine, and how well that is posed."""
+    from proofroll.recording import time_grid
+    from proofroll.studies.onset import onset_study, summary
+
+    time_grid(until, 0.01)
+    with _progress("runs") as advance:
+        study = onset_study(
+            scene,
+            dict(_assignments(settings or [])),
+            _runner(out, fresh, jobs),
+            engines=engine or (),
+            until=until,
+            uncertainty=uncertainty,
+            progress=lambda case, _: advance(case.engine.name),
+        )
+    content = study.content()
+    if as_json:
+        _print_json(content)
+    else:
+        from proofroll.report.terminal import console, onset_table
+
+        console().print(summary(content), markup=False)
+        console().print(onset_table(content))
+    if any(item["verdict"] == "failed" for item in content["engines"]):
+        raise typer.Exit(ENGINE)
+    raise typer.Exit(CONTRADICTED if any(item["verdict"] == "disagree" for item in content["engines"]) else OK)
+
+
+@app.command()
+def regimes(
+    study: Annotated[str, typer.Argument(help="A comparison file with a [regimes] table, or its name.")] = "stick_slip",
+    out: Out = Path("out"),
+    jobs: Jobs = None,
+    as_json: Json = False,
+) -> None:
+    """Draw the map over speed and friction: never slips, slips and recovers, falls."""
+    import os
+
+    from proofroll.comparison_file import load_comparison
+    from proofroll.report.regime_map import draw, regime_content
+    from proofroll.store import Store, write_text
+    from proofroll.studies.regimes import regime_maps
+
+    loaded = load_comparison(study)
+    Store(out)  # fails before the work rather than after it
+    workers = jobs or os.cpu_count() or 1
+    with _progress("runs of the truth", total=loaded.regimes.count if loaded.regimes else None) as advance:
+        maps = regime_maps(loaded, workers, lambda count: advance("runs of the truth", count))
+    content = regime_content(maps)
+    draw(maps, out / "regimes.svg")
+    write_text(out / "regimes.json", json.dumps(content, indent=1))
+    if as_json:
+        _print_json(content)
+        return
+    from proofroll.report.terminal import console
+
+    for item in content["maps"]:
+        said = ", ".join(f"{count} {name}" for name, count in item["counts"].items())
+        console().print(f"f = {item['rolling_resistance']:g} m, {item['runs']} runs of {item['until']:g} s: {said}.")
+        if item["outside_boundaries"] is not None:
+            console().print(f"  {item['outside_boundaries']} of them on the wrong side of the analytic boundaries.")
+    console().print(f"The map is in {out / 'regimes.svg'}, its numbers in {out / 'regimes.json'}.")
+
+
 def _runner(out: Path, fresh: bool, jobs: int | None) -> Runner:
     from proofroll.runner import Runner
     from proofroll.store import Store
@@ -227,20 +305,25 @@ def _runner(out: Path, fresh: bool, jobs: int | None) -> Runner:
 
 def _outcomes(comparisons: list[Any], engines: list[str], runner: Runner) -> list[Outcome]:
     """Runs all comparisons with one progress bar."""
-    from rich.console import Console
-    from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn, TimeElapsedColumn
-
     from proofroll.studies.compare import evaluate, plan
 
     plans = [plan(comparison, engines) for comparison in comparisons]
     cases = {case.key: case for item in plans for case in item.cases}
+    with _progress("cases", total=len(cases)) as advance:
+        results = runner.run(cases.values(), lambda case, _: advance(case.engine.name))
+    return [evaluate(item, results, runner) for item in plans]
+
+
+@contextmanager
+def _progress(what: str, total: int | None = None) -> Iterator[Callable[..., None]]:
+    """A progress bar on standard error; call what it gives with a description and, if not 1, a count."""
+    from rich.console import Console
+    from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn, TimeElapsedColumn
+
     columns = (TextColumn("{task.description}"), BarColumn(), MofNCompleteColumn(), TimeElapsedColumn())
     with Progress(*columns, console=Console(stderr=True), transient=True) as progress:
-        task = progress.add_task("cases", total=len(cases))
-        results = runner.run(
-            cases.values(), lambda case, _: progress.update(task, advance=1, description=case.engine.name)
-        )
-    return [evaluate(item, results, runner) for item in plans]
+        task = progress.add_task(what, total=total)
+        yield lambda description, count=1: progress.update(task, advance=count, description=description)
 
 
 def _exit_code(outcomes: list[Outcome]) -> int:

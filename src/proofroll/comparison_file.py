@@ -103,6 +103,41 @@ class Edge:
 
 
 @dataclass(frozen=True)
+class Axis:
+    """Equally spaced values.
+
+    Attributes:
+        low, high: first and last.
+        count: how many.
+    """
+
+    low: float
+    high: float
+    count: int
+
+
+@dataclass(frozen=True)
+class Regimes:
+    """A map of what becomes of the ball.
+
+    Attributes:
+        speed, mu_static: the axes.
+        rolling_resistance: f [m]; one map for each.
+        until: length of each run [s].
+    """
+
+    speed: Axis
+    mu_static: Axis
+    rolling_resistance: list[float]
+    until: float
+
+    @property
+    def count(self) -> int:
+        """Number of runs of all maps."""
+        return self.speed.count * self.mu_static.count * len(self.rolling_resistance)
+
+
+@dataclass(frozen=True)
 class Comparison:
     """A claim about engines on a scene.
 
@@ -116,6 +151,7 @@ class Comparison:
         bands: tolerances by name.
         rows: engines with settings.
         time_limit: wall seconds a case may take [s].
+        regimes: a map that goes with the comparison, or None.
     """
 
     name: str
@@ -129,6 +165,7 @@ class Comparison:
     bands: dict[str, Band] = field(default_factory=dict)
     rows: list[Row] = field(default_factory=list)
     time_limit: float = 120.0
+    regimes: Regimes | None = None
 
     def combinations(self) -> list[dict[str, float | Edge]]:
         """Every combination of parameters."""

@@ -33,7 +33,7 @@ def test_row_is_as_the_comparison_expects(comparison: Comparison, row: Row, stor
     """At the combination of parameters in the middle of the list, the verdicts are those that the file states."""
     points = comparison.variations(row)
     middle = points[len(points) // 2]
-    single = dataclasses.replace(comparison, rows=[row], vary={key: [value] for key, value in middle.items()}, points=[])
+    single = dataclasses.replace(comparison, rows=[row], vary={}, points=[dict(middle)])
 
     outcome = compare(single, Runner(store, jobs=1))
 

@@ -56,6 +56,28 @@ def verdict_table(content: dict[str, Any]) -> Table:
     return table
 
 
+def onset_table(content: dict[str, Any]) -> Table:
+    """One line per engine: its first slip with bracket, the difference from the truth, and the verdict."""
+    table = Table(box=None, padding=(0, 1, 0, 0))
+    table.add_column("engine", no_wrap=True)
+    table.add_column(Text("first slip [s]"), justify="right", no_wrap=True)
+    table.add_column(Text("between [s]"), no_wrap=True)
+    table.add_column(Text("difference [s]"), justify="right", no_wrap=True)
+    table.add_column("verdict", no_wrap=True)
+    for item in content["engines"]:
+        first = item["onset"]
+        bracket = f"{first['time_low']:.9g} … {first['time_high']:.9g}" if first else ""
+        verdict = item["verdict"] if item["verdict"] != "failed" else f"failed: {item['message']}"
+        table.add_row(
+            Text(item["engine"]),
+            f"{first['time']:.9g}" if first else "none",
+            bracket,
+            number(item["difference"]),
+            Text(verdict),
+        )
+    return table
+
+
 def step(row: dict[str, Any]) -> str:
     """The resolution in few characters: ``1e-3 s``, or ``tol 2e-14``."""
     if not row["resolution"]:
