@@ -293,7 +293,7 @@ def test_two_engines_in_one_process_do_not_disturb_each_other(formulation: str) 
         ("dt=nan", "dt"),
         ("time_constant=1", "time_constant"),
         ("impedance=1", "impedance"),
-        ("preset=tuned", "preset"),
+        ("formulation=facets,preset=tuned", "preset"),
         ("curvature=true", "curvature"),
         ("formulation=free,curvature=true,integrator=RK4", "integrator"),
         ("formulation=free,preset=tuned,cone=pyramidal,friction=1", "cone"),

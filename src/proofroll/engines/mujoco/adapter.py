@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping
+import math
+from collections.abc import Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from typing import Any, ClassVar, Protocol, Self
 
@@ -13,18 +14,22 @@ from proofroll.engine import Built, Sample, whole_steps
 from proofroll.engines.mujoco.chart import Chart
 from proofroll.engines.mujoco.contact import contact_force
 from proofroll.engines.mujoco.free import Facets, Free
+from proofroll.engines.mujoco.friction import BoundedFriction, check_coefficients
 from proofroll.engines.mujoco.model import read_spec, write_physics
 from proofroll.engines.mujoco.settings import PRESETS, MujocoSettings, check, velocity_lag
 from proofroll.engines.mujoco.softness import softness
 from proofroll.engines.mujoco.start import EVALUATIONS, acceleration, start
 from proofroll.errors import Diverged
+from proofroll.events import Event
 from proofroll.scene import Capability, RollingBall, Scene
 
 
 class Formulation(Protocol):
     """One way to present the wall to MuJoCo."""
 
-    def __init__(self, model: Any, body: RollingBall, settings: MujocoSettings) -> None: ...
+    def __init__(
+        self, model: Any, body: RollingBall, settings: MujocoSettings, friction: BoundedFriction | None
+    ) -> None: ...
 
     @staticmethod
     def write(spec: Any, body: RollingBall) -> None:
@@ -52,7 +57,7 @@ class Mujoco:
 
     name: ClassVar[str] = "mujoco"
     provides: ClassVar[frozenset[Capability]] = frozenset(
-        {Capability.ROLLING, Capability.CURVED_SURFACE, Capability.ROLLING_RESISTANCE}
+        {Capability.ROLLING, Capability.CURVED_SURFACE, Capability.ROLLING_RESISTANCE, Capability.BOUNDED_FRICTION}
     )
     settings: ClassVar[type[Any]] = MujocoSettings
     presets: ClassVar[Mapping[str, Mapping[str, Any]]] = PRESETS
@@ -61,14 +66,20 @@ class Mujoco:
         self._model = model
         self._body = body
         self._settings = settings
-        self._formulation = _FORMULATIONS[settings.formulation](model, body, settings)
+        self._friction = BoundedFriction(model, body, settings) if math.isfinite(body.contact.mu_static) else None
+        self._formulation = _FORMULATIONS[settings.formulation](model, body, settings, self._friction)
         self._data = mujoco.MjData(model)
         self._scratch = mujoco.MjData(model)
         self._ball = model.body("ball").id
         self._geom = model.geom("ball").id
         self._steps = 0
         with _silent():
-            start(model, self._data, body, settings, self._formulation)
+            self._start(slips=False)
+            if self._friction is not None and not self._friction.start(self._data):
+                self._start(slips=True)
+
+    def _start(self, *, slips: bool) -> None:
+        start(self._model, self._data, self._body, self._settings, self._formulation, slips=slips)
 
     @staticmethod
     def version() -> str:
@@ -78,9 +89,12 @@ class Mujoco:
     @classmethod
     def build(cls, scene: Scene, settings: MujocoSettings) -> Self:
         """See :class:`proofroll.engine.Engine`."""
-        check(settings)
-        _forget_callbacks()
         body = scene.rolling
+        bounded = math.isfinite(body.contact.mu_static)
+        check(settings, bounded=bounded)
+        if bounded:
+            check_coefficients(body.contact, settings)
+        _forget_callbacks()
         spec = read_spec(scene, settings.formulation)
         write_physics(spec, body, settings)
         _FORMULATIONS[settings.formulation].write(spec, body)
@@ -105,6 +119,7 @@ class Mujoco:
         """See :class:`proofroll.engine.Engine`."""
         data = self._evaluated()
         force = contact_force(self._model, data, self._geom)
+        sticking = None if self._friction is None else self._friction.holds(data)
         data.qvel += velocity_lag(self._settings) * data.qacc
         mujoco.mj_comVel(self._model, data)
         velocity = np.zeros(6)
@@ -115,7 +130,12 @@ class Mujoco:
             w_WB=velocity[:3],
             q_WB=data.xquat[self._ball].copy(),
             force=force,
+            sticking=sticking,
         )
+
+    def events(self) -> Sequence[Event]:
+        """See :class:`proofroll.engine.LocatesEvents`."""
+        return [] if self._friction is None else self._friction.events(self._evaluated())
 
     def built(self) -> Built:
         """See :class:`proofroll.engine.Engine`."""

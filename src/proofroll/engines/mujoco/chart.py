@@ -10,6 +10,7 @@ import mujoco
 import numpy as np
 
 from proofroll.engines.mujoco.contact import apply_resistance, foreseen_normal_force
+from proofroll.engines.mujoco.friction import BoundedFriction, corrects
 from proofroll.engines.mujoco.model import pose, quaternion_of, tangent_plane
 from proofroll.engines.mujoco.settings import MujocoSettings
 from proofroll.errors import Refused
@@ -24,8 +25,16 @@ class Chart:
     ``touch`` rides on ``u1`` and ``u2`` at the wall; the plane takes its pose, and stays a fixed body for MuJoCo.
     """
 
-    def __init__(self, model: Any, body: RollingBall, settings: MujocoSettings) -> None:  # noqa: ARG002 -- the same call for every formulation
+    def __init__(
+        self,
+        model: Any,
+        body: RollingBall,
+        settings: MujocoSettings,
+        friction: BoundedFriction | None,
+    ) -> None:
         self._model = model
+        self._friction = friction
+        self._corrects = corrects(body.contact, settings)
         self._f = body.contact.rolling_resistance
         self._ball = model.body("ball").id
         self._wall = model.geom("wall").id
@@ -60,7 +69,11 @@ class Chart:
     def run(self, data: Any, steps: int) -> None:
         """Makes ``steps`` steps."""
         with self._callbacks():
-            mujoco.mj_step(self._model, data, nstep=steps)
+            if self._friction is None:
+                mujoco.mj_step(self._model, data, nstep=steps)
+                return
+            for _ in range(steps):
+                self._friction.step(data)
 
     def evaluate(self, data: Any) -> None:
         """Computes forces and accelerations of the present state, as a step would."""
@@ -72,11 +85,13 @@ class Chart:
         """MuJoCo's callbacks belong to the process: they are ours only while we compute."""
         mujoco.set_mjcb_contactfilter(self._pose_wall)
         mujoco.set_mjcb_passive(self._resist if self._f else None)
+        mujoco.set_mjcb_control(self._correct if self._corrects else None)
         try:
             yield
         finally:
             mujoco.set_mjcb_contactfilter(None)
             mujoco.set_mjcb_passive(None)
+            mujoco.set_mjcb_control(None)
 
     def _pose_wall(self, model: Any, data: Any, geom1: int, geom2: int) -> int:  # noqa: ARG002 -- MuJoCo's signature
         """Called between kinematics and collision at each stage of RK4; 0 lets the pair collide."""
@@ -90,3 +105,8 @@ class Chart:
         e1 = (-data.site_xmat[self._touch][2::3]).tolist()
         v = data.cvel[self._ball, 3:].tolist()
         apply_resistance(data.xfrc_applied[self._ball, 3:], self._f, N, e1, v)
+
+    def _correct(self, model: Any, data: Any) -> None:  # noqa: ARG002 -- MuJoCo's signature
+        """Called between the contact's reference accelerations and its forces."""
+        if self._friction is not None:
+            self._friction.correct(data, -float(data.qfrc_constraint[self._depth]))

@@ -39,10 +39,10 @@ def foreseen_normal_force(data: Any, N: float) -> float:
         N: normal force of the evaluation before [N].
     """
     t = float(data.time)
-    last, before, N_before, slope = (float(number) for number in data.userdata)
+    last, before, N_before, slope = (float(number) for number in data.userdata[:MEMORY])
     if last > before:
         slope = (N - N_before) / (last - before)
-    data.userdata[:] = (t, last, N, slope)
+    data.userdata[:MEMORY] = (t, last, N, slope)
     return max(N + slope * (t - last), 0.0)
 
 

@@ -9,6 +9,7 @@ import mujoco
 import numpy as np
 
 from proofroll.engines.mujoco.contact import apply_resistance, cross, foreseen_normal_force
+from proofroll.engines.mujoco.friction import BoundedFriction, corrects
 from proofroll.engines.mujoco.model import pose, quaternion_of, tangent_plane
 from proofroll.engines.mujoco.settings import MujocoSettings, normal_lead, own_share, velocity_lag
 from proofroll.errors import Refused
@@ -22,8 +23,16 @@ class Free:
     The plane stands for the wall only to first order: the contact rows lack J̇v (the turning of the normal).
     """
 
-    def __init__(self, model: Any, body: RollingBall, settings: MujocoSettings) -> None:
+    def __init__(
+        self,
+        model: Any,
+        body: RollingBall,
+        settings: MujocoSettings,
+        friction: BoundedFriction | None,
+    ) -> None:
         self._model = model
+        self._friction = friction
+        self._edits = settings.curvature or corrects(body.contact, settings)
         self._surface = body.surface
         self._radius = body.ball.radius
         self._f = body.contact.rolling_resistance
@@ -45,28 +54,32 @@ class Free:
         """Makes ``steps`` steps."""
         for _ in range(steps):
             motion = self._prepare(data)
-            if self._curvature:
+            if self._edits:
                 mujoco.mj_step1(self._model, data)
-                self._add_curvature(data, *motion)
+                self._edit(data, *motion)
                 mujoco.mj_step2(self._model, data)
+                if self._friction is not None:
+                    self._friction.observe(data)
+            elif self._friction is not None:
+                self._friction.step(data)
             else:
                 mujoco.mj_step(self._model, data)
 
     def evaluate(self, data: Any) -> None:
         """Computes forces and accelerations of the present state, as a step would."""
         motion = self._prepare(data)
-        if not self._curvature:
+        if not self._edits:
             mujoco.mj_forward(self._model, data)
             return
         mujoco.mj_fwdPosition(self._model, data)
         mujoco.mj_fwdVelocity(self._model, data)
-        self._add_curvature(data, *motion)
+        self._edit(data, *motion)
         mujoco.mj_fwdActuation(self._model, data)
         mujoco.mj_fwdAcceleration(self._model, data)
         mujoco.mj_fwdConstraint(self._model, data)
 
-    def _prepare(self, data: Any) -> tuple[FloatArray, FloatArray]:
-        """Poses the plane, applies the rolling resistance and returns the present rates and their trend."""
+    def _prepare(self, data: Any) -> tuple[FloatArray, FloatArray, float]:
+        """Poses the plane, applies the rolling resistance and returns the present rates, their trend and the last N."""
         p = data.qpos[:3]
         e1 = self._surface.normal(p)
         rates: FloatArray = data.qvel
@@ -83,15 +96,23 @@ class Free:
         if self._f:
             foreseen = foreseen_normal_force(data, N)
             apply_resistance(data.xfrc_applied[self._ball, 3:], self._f, foreseen, e1.tolist(), rates[:3].tolist())
-        return rates, trend
+        return rates, trend, N
+
+    def _edit(self, data: Any, rates: FloatArray, trend: FloatArray, N: float) -> None:
+        """Changes the contact's reference acceleration as the settings say."""
+        if data.nefc == 0:
+            return
+        if self._curvature:
+            self._add_curvature(data, rates, trend)
+        if self._friction is not None:
+            self._friction.correct(data, N)
 
     def _add_curvature(self, data: Any, rates: FloatArray, trend: FloatArray) -> None:
         """Adds -J̇v to the contact's reference acceleration, less what MuJoCo's damping already gives.
 
-        Differentiating n·v = 0 (n = -e1) and t·(v + a ω × e1) = 0 leaves ė1·v and -a t·(ω × ė1) on the right.
+        Differentiating n·v = 0 (n = -e1) and t·(v + a ω × e1) = 0 leaves ė1·v and -a t·(ω × ė1) on the right. Where
+        the ball slips, the same rows give the acceleration of the slip along the wall.
         """
-        if data.ncon == 0:
-            return
         contact = data.contact[0]
         gradient = self._surface.normal_gradient(data.qpos[:3])
         e1_rate = gradient @ rates[:3]
@@ -99,13 +120,19 @@ class Free:
         rows = contact.frame.reshape(3, 3) @ np.array(cross(w.tolist(), e1_rate.tolist())) * -self._radius
         v = rates[:3] + self._lead * trend[:3]
         rows[0] = v @ gradient @ v
-        data.efc_aref[contact.efc_address : contact.efc_address + 3] += self._share * rows
+        data.efc_aref[contact.efc_address : contact.efc_address + contact.dim] += self._share * rows[: contact.dim]
 
 
 class Facets:
     """The ball on a free joint in a ring of boxes whose faces are tangent to the wall: the obvious concave wall."""
 
-    def __init__(self, model: Any, body: RollingBall, settings: MujocoSettings) -> None:  # noqa: ARG002 -- the same call for every formulation
+    def __init__(
+        self,
+        model: Any,
+        body: RollingBall,
+        settings: MujocoSettings,  # noqa: ARG002 -- the same call for every formulation
+        friction: BoundedFriction | None,  # noqa: ARG002 -- refused before
+    ) -> None:
         self._model = model
         self._surface = body.surface
         self._f = body.contact.rolling_resistance

@@ -2,12 +2,15 @@
 
 from __future__ import annotations
 
+import math
 from typing import Any
 
 import mujoco
 import numpy as np
 
 from proofroll.engines.mujoco.contact import MEMORY
+from proofroll.engines.mujoco.friction import MEMORY as SLIP_MEMORY
+from proofroll.engines.mujoco.friction import condim, corrects
 from proofroll.engines.mujoco.settings import MujocoSettings
 from proofroll.errors import Refused
 from proofroll.scene import RollingBall, Scene
@@ -50,11 +53,13 @@ def write_physics(spec: Any, body: RollingBall, settings: MujocoSettings) -> Non
     option.integrator = _INTEGRATORS[settings.integrator]
     option.cone = _CONES[settings.cone]
     spec.nuserdata = MEMORY if body.contact.rolling_resistance else 0
+    spec.nuserdata += SLIP_MEMORY if corrects(body.contact, settings) else 0
     # A blow-up must be seen: by default MuJoCo puts the model back to its initial state and goes on.
     option.disableflags |= int(mujoco.mjtDisableBit.mjDSBL_AUTORESET)
+    mu = body.contact.mu_static if math.isfinite(body.contact.mu_static) else settings.friction
     for geom in spec.geoms:
-        geom.condim = 3
-        geom.friction = [settings.friction, 0.0, 0.0]
+        geom.condim = condim(mu)
+        geom.friction = [mu, 0.0, 0.0]
         if settings.time_constant is not None:
             geom.solref = [settings.time_constant * settings.dt, 1.0]
         if settings.impedance is not None:

@@ -23,6 +23,8 @@ SHORTEST_TIME_CONSTANT = 2.0
 # contact by the square of the coefficient: at 100 the ball flies through the wall without a warning.
 UNBOUNDED_FRICTION = 1e3
 LARGEST_PYRAMIDAL_FRICTION = 1.0
+# Part of the normal force by which a corrected contact is pressed deeper, so that the next slip does not end it.
+PRELOAD = 0.01
 
 
 @dataclass(frozen=True)
@@ -42,10 +44,13 @@ class MujocoSettings:
         impedance: constant constraint impedance (``solimp``); 1 would be a rigid contact; None: MuJoCo's default,
             0.9 to 0.95 growing with depth.
         friction: coefficient that stands for unbounded friction [-]; with less than the scene needs, the ball slips.
+            Where the scene bounds friction, its coefficients are taken instead.
         start: ``touching``: at depth zero, where a soft contact is not loaded yet; ``settled``: at the depth at which
             the contact already bends the path as the wall does.
         curvature: whether the adapter adds to the contact's reference acceleration the term J̇v, which MuJoCo leaves
             out (``free`` only).
+        cone_correction: whether the adapter takes from the contact's reference acceleration, while the ball slips,
+            the lift that MuJoCo's convex cone gives it.
     """
 
     formulation: Literal["free", "chart", "facets"] = "chart"
@@ -58,6 +63,7 @@ class MujocoSettings:
     friction: Annotated[float, Gt(0)] = UNBOUNDED_FRICTION
     start: Literal["touching", "settled"] = "settled"
     curvature: bool = False
+    cone_correction: bool = False
 
     @property
     def resolution(self) -> str:
@@ -109,21 +115,29 @@ def normal_lead(settings: MujocoSettings) -> float:
     return velocity_lag(settings) * share / (1 - share)
 
 
-def check(settings: MujocoSettings) -> None:
+def check(settings: MujocoSettings, *, bounded: bool) -> None:
     """Rejects combinations that MuJoCo would silently ignore or misread.
+
+    Args:
+        settings: to check.
+        bounded: whether the scene gives the coefficients of friction.
 
     Raises:
         InputError: the first such combination.
     """
-    if settings.cone == "pyramidal" and settings.friction > LARGEST_PYRAMIDAL_FRICTION:
+    if settings.cone == "pyramidal" and not bounded and settings.friction > LARGEST_PYRAMIDAL_FRICTION:
         advice = f"with cone=pyramidal more than {LARGEST_PYRAMIDAL_FRICTION:g} makes the wall soft; set cone=elliptic"
         raise InputError("mujoco: friction", settings.friction, advice)
+    if settings.cone_correction and settings.formulation == "facets":
+        raise InputError("mujoco: cone_correction", True, "facets does not use it; set formulation=free or chart")
+    if settings.cone_correction and settings.formulation == "free" and settings.integrator != "Euler":
+        # mj_step1 and mj_step2, between which the contact is edited, always make an Euler step.
+        raise InputError("mujoco: integrator", settings.integrator, "cone_correction=true needs integrator=Euler")
     if not settings.curvature:
         return
     if settings.formulation != "free":
         raise InputError("mujoco: curvature", True, f"{settings.formulation} does not use it; set formulation=free")
     if settings.integrator != "Euler":
-        # mj_step1 and mj_step2, between which the term is added, always make an Euler step.
         raise InputError("mujoco: integrator", settings.integrator, "curvature=true needs integrator=Euler")
     if settings.cone != "elliptic":
         # A pyramid's rows are sums of normal and friction; the term belongs to each of them alone.
@@ -158,8 +172,10 @@ PRESETS: Mapping[str, Mapping[str, MujocoSettings]] = {
             friction=DEFAULT_FRICTION,
             start="touching",
         ),
-        # In these coordinates J̇v vanishes, so documented options are also the best known ones: no ``tuned``.
+        # In these coordinates J̇v vanishes, so documented options are also the best known ones while the ball rolls.
         "matched": MujocoSettings("chart", "matched"),
+        # Only a slip leaves something to be edited.
+        "tuned": MujocoSettings("chart", "tuned", cone_correction=True),
     },
     "free": {
         "default": _obvious("free"),
@@ -167,7 +183,7 @@ PRESETS: Mapping[str, Mapping[str, MujocoSettings]] = {
         # direction sinks the ball, a ω1 V/c lets it creep, both in proportion to the time constant and so to dt.
         "matched": MujocoSettings("free", "matched", integrator="Euler"),
         # J̇v is put where MuJoCo would have computed it: an edit of mjData.efc_aref that its manual does not describe.
-        "tuned": MujocoSettings("free", "tuned", integrator="Euler", curvature=True),
+        "tuned": MujocoSettings("free", "tuned", integrator="Euler", curvature=True, cone_correction=True),
     },
     # Better options do not rescue it, since each edge between two boxes is a kick: 0.3 m off instead of 1.2 m in 2 s,
     # whatever the step. It shows what the obvious wall costs.

@@ -2,19 +2,30 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Iterator, Mapping
 
 import numpy as np
 
 from proofroll.engine import Regularised
-from proofroll.engines.mujoco.settings import MujocoSettings, impedance, normal_lead, time_constant, velocity_lag
-from proofroll.mechanics import initial_response
+from proofroll.engines.mujoco.friction import corrects
+from proofroll.engines.mujoco.settings import (
+    PRELOAD,
+    MujocoSettings,
+    impedance,
+    normal_lead,
+    time_constant,
+    velocity_lag,
+)
+from proofroll.mechanics import initial_response, newton_euler
 from proofroll.scene import RollingBall
 
 _FORCES = ("acceleration", "N", "F2", "F3")
 # The bounds below are asymptotic in depth/a, and MuJoCo's Newton solver stops at a relative 1e-8.
 _MARGIN = 1.1
 _SOLVER = 1e-8
+# What is left where a state at time 0 is the last of a sequence that converges.
+_SEQUENCE = 1e-6
 
 
 def softness(body: RollingBall, settings: MujocoSettings) -> Mapping[str, Regularised]:
@@ -30,7 +41,8 @@ def softness(body: RollingBall, settings: MujocoSettings) -> Mapping[str, Regula
     # What is missing along the normal at depth zero: the share 1 - d of the load, which the impedance leaves, and the
     # bend of the path where J̇v is missing. Along the wall it is a ω × ė1, divided between motion and friction.
     ahead = 2 * normal_lead(settings) * abs(float(e1_rate @ response))  # how the bend changes until it is needed
-    missing = (1 - least) * load + ahead + (bend if lacks else 0.0)
+    pressed = PRELOAD if corrects(body.contact, settings) else 0.0
+    missing = (1 - least + pressed) * load + ahead + (bend if lacks else 0.0)
     turning = np.cross(body.surface.normal(body.p0), np.cross(body.w0, e1_rate))  # its part along the wall, turned
     creep = a * float(np.linalg.norm(turning)) * r / (1 + r) if lacks else 0.0
     why = "the impedance of a soft contact is below 1" + (" and its rows lack J̇v" if lacks else "")
@@ -45,7 +57,10 @@ def softness(body: RollingBall, settings: MujocoSettings) -> Mapping[str, Regula
     rolls = "MuJoCo's contact point, at which it rolls, lies midway in that depth"
     # The depth shortens the lever of friction, which balances gravity along the wall.
     lever = depth * float(np.linalg.norm(body.gravity))
-    soft = (2 * (1 - least) * load + lever + _MARGIN * creep) / scale + _SOLVER
+    law = _MARGIN * _law_of_friction(body, settings)
+    if law:
+        why += "; as the ball slips from the start, MuJoCo's cone of friction lifts it or turns its friction"
+    soft = (2 * (1 - least) * load + lever + _MARGIN * creep + law) / scale + _SOLVER
     return result | {
         "position": Regularised(depth, sunk),
         "gap": Regularised(depth, sunk),
@@ -60,4 +75,23 @@ def _computed(body: RollingBall, settings: MujocoSettings) -> Iterator[tuple[str
     if body.contact.rolling_resistance:
         yield "rolling resistance", Regularised(_SOLVER, "its torque uses the normal force of the evaluation before")
     if velocity_lag(settings):
-        yield "velocity", Regularised(_SOLVER, "it is MuJoCo's of half a step before plus half a step's acceleration")
+        # With the correction of a slip, that acceleration is the last of a sequence that converges.
+        share = _SEQUENCE if corrects(body.contact, settings) else _SOLVER
+        yield "velocity", Regularised(share, "it is MuJoCo's of half a step before plus half a step's acceleration")
+
+
+def _law_of_friction(body: RollingBall, settings: MujocoSettings) -> float:
+    """Error of the acceleration at time 0 from MuJoCo's law of friction, at most [m/s²]; 0 for a ball that holds."""
+    ball, contact = body.ball, body.contact
+    if math.isinf(contact.mu_static):
+        return 0.0
+    e1 = body.surface.normal(body.p0)
+    force = newton_euler(body, body.p0, body.v0, body.w0)[2]
+    N = -float(force @ e1)
+    needed = float(np.linalg.norm(force + N * e1))
+    pyramidal = settings.cone == "pyramidal"
+    if needed * (math.sqrt(2) if pyramidal else 1.0) <= contact.mu_static * N:
+        return 0.0
+    slip_rate = max(needed - contact.mu_kinetic * N, 0.0) * (1 / ball.mass + ball.radius**2 / ball.inertia)
+    lift = 0.0 if corrects(contact, settings) else contact.mu_kinetic * slip_rate
+    return lift + (contact.mu_kinetic * N / ball.mass if pyramidal else 0.0)

@@ -2,12 +2,15 @@
 
 from __future__ import annotations
 
+import math
+from collections.abc import Callable
 from typing import Any, Protocol
 
 import mujoco
 import numpy as np
 from scipy.optimize import brentq
 
+from proofroll.engines.mujoco.friction import corrects
 from proofroll.engines.mujoco.settings import MujocoSettings, own_share, velocity_lag
 from proofroll.errors import Refused
 from proofroll.scene import RollingBall
@@ -15,6 +18,10 @@ from proofroll.surfaces import FloatArray
 
 # The resistance's torque uses the normal force of the evaluation before: at a standstill in time, repeats converge.
 EVALUATIONS = 3
+# The same where velocities lag.
+_ROUNDS_OF_LAG = 13
+# The correction of a slip has converged when this part of its error is left.
+_SEQUENCE = 1e-10
 # A start "at depth zero" is this part of the radius inside: at zero, round-off would decide whether there is a contact.
 _TOUCHING = 1e-13
 
@@ -53,34 +60,48 @@ def place(model: Any, data: Any, body: RollingBall, depth: float) -> None:
     data.qvel[:] = np.linalg.solve(jacobian, np.concatenate([body.v0, w]))
 
 
-def start(model: Any, data: Any, body: RollingBall, settings: MujocoSettings, formulation: Evaluates) -> None:
-    """The state at time 0 with its own forces.
+def start(
+    model: Any, data: Any, body: RollingBall, settings: MujocoSettings, formulation: Evaluates, *, slips: bool
+) -> None:
+    """The state at time 0 with its own forces; ``slips`` if they are known not to hold the ball.
 
     Raises:
         Refused: the contact is too soft for a settled start.
     """
+    lag, share = velocity_lag(settings), own_share(settings)
+    rounds = _rounds(body, settings, slips)
+
+    def evaluate_at(depth: float) -> None:
+        place(model, data, body, depth)
+        now = data.qvel.copy()
+        for index in range(rounds):
+            before = data.qacc.copy()
+            data.qvel[:] = now - lag * before
+            formulation.evaluate(data)
+            if lag and index % 2:
+                # An error contracts by ``share`` along the contact's rows and vanishes elsewhere. Extrapolation
+                # removes the first and turns the second's sign, so it alternates with plain rounds and the last is
+                # plain.
+                data.qacc[:] = (data.qacc - share * before) / (1 - share)
+
     depth = _TOUCHING * body.ball.radius
     if settings.start == "settled":
-        depth = _settled_depth(model, data, body, settings, formulation)
-    _evaluate_at(depth, model, data, body, settings, formulation)
+        settled = _settled_depth(model, data, body, evaluate_at)
+        # Bounded friction may lift the ball more than the load presses it: then it starts at the surface.
+        depth = settled if math.isinf(body.contact.mu_static) else max(settled, depth)
+    evaluate_at(depth)
 
 
-def _evaluate_at(
-    depth: float, model: Any, data: Any, body: RollingBall, settings: MujocoSettings, formulation: Evaluates
-) -> None:
-    place(model, data, body, depth)
-    now = data.qvel.copy()
-    lag, share = velocity_lag(settings), own_share(settings)
-    # Velocities that lag, and the resistance's torque from the evaluation before, each make it a fixed point.
-    rounds = 13 if lag else EVALUATIONS
-    for index in range(rounds):
-        before = data.qacc.copy()
-        data.qvel[:] = now - lag * before
-        formulation.evaluate(data)
-        if lag and index % 2:
-            # An error contracts by ``share`` along the contact's rows and vanishes elsewhere. Extrapolation removes
-            # the first and turns the second's sign, so it alternates with plain rounds and the last is plain.
-            data.qacc[:] = (data.qacc - share * before) / (1 - share)
+def _rounds(body: RollingBall, settings: MujocoSettings, slips: bool) -> int:
+    """Evaluations at time 0 until all has converged that uses the evaluation before; odd.
+
+    These are velocities that lag, the resistance's torque and the correction of a slip.
+    """
+    rounds = _ROUNDS_OF_LAG if velocity_lag(settings) else EVALUATIONS
+    if slips and corrects(body.contact, settings) and body.contact.mu_kinetic:
+        g = body.contact.mu_kinetic**2 * (1 + 1 / body.ball.inertia_ratio)
+        rounds += 2 * math.ceil(math.log(_SEQUENCE) / math.log(g / (1 + g)))
+    return rounds
 
 
 def acceleration(model: Any, data: Any) -> FloatArray:
@@ -91,7 +112,7 @@ def acceleration(model: Any, data: Any) -> FloatArray:
     return np.asarray(result[3:] + model.opt.gravity)  # MuJoCo reports what an accelerometer would: without gravity
 
 
-def _settled_depth(model: Any, data: Any, body: RollingBall, settings: MujocoSettings, formulation: Evaluates) -> float:
+def _settled_depth(model: Any, data: Any, body: RollingBall, evaluate_at: Callable[[float], None]) -> float:
     """Depth [m] at which the contact bends the path exactly as the wall does: e1·p̈ = -ė1·v.
 
     Only the shape of the wall and the initial velocity enter, no force of the scene's: N follows from MuJoCo.
@@ -100,7 +121,7 @@ def _settled_depth(model: Any, data: Any, body: RollingBall, settings: MujocoSet
     wanted = -float(body.v0 @ body.surface.normal_gradient(body.p0) @ body.v0)
 
     def excess(depth: float) -> float:
-        _evaluate_at(depth, model, data, body, settings, formulation)
+        evaluate_at(depth)
         return float(e1 @ acceleration(model, data)) - wanted
 
     upper = 1e-12 * body.ball.radius

@@ -1,0 +1,179 @@
+"""Bounded friction: whether MuJoCo's contact holds or slips, when that changed, and what a slip needs besides."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Mapping
+from typing import Any
+
+import mujoco
+import numpy as np
+
+from proofroll.engines.mujoco.settings import LARGEST_PYRAMIDAL_FRICTION, PRELOAD, MujocoSettings
+from proofroll.errors import Refused
+from proofroll.events import Event
+from proofroll.scene import Contact, RollingBall
+
+# MuJoCo raises a smaller coefficient to this without a word (mjMINMU), unless the contact has no friction at all.
+SMALLEST_FRICTION = 1e-5
+# Numbers of user data that BoundedFriction.correct keeps: a Jacobian of three rows and MuJoCo's six velocities.
+MEMORY = 18
+# MuJoCo's solver projects a force onto the cone, so one that slips is there to round-off.
+_ON_CONE = 1 - 1e-9
+# The correction vanishes with the slip, so it may begin a little before; then the stages of RK4 agree about it.
+_NEAR_CONE = 1 - 1e-3
+_INTEGRATE: Mapping[str, Callable[[Any, Any], None]] = {
+    "Euler": mujoco.mj_Euler,
+    "RK4": lambda model, data: mujoco.mj_RungeKutta(model, data, 4),
+    "implicitfast": mujoco.mj_implicit,
+}
+
+
+def condim(mu: float) -> int:
+    """MuJoCo's dimension of a contact: 1 without friction, 3 with sliding friction only."""
+    return 3 if mu > 0 else 1
+
+
+def corrects(contact: Contact, settings: MujocoSettings) -> bool:
+    """Whether the contact's reference acceleration is edited for slip."""
+    return settings.cone_correction and 0 < contact.mu_static < math.inf
+
+
+def check_coefficients(contact: Contact, settings: MujocoSettings) -> None:
+    """Rejects what MuJoCo would silently change or cannot hold.
+
+    Raises:
+        Refused: the first such coefficient, or the formulation cannot tell sticking from slipping.
+    """
+    if settings.formulation == "facets":
+        raise Refused("each edge between two boxes throws the ball off the wall, so facets cannot tell when it slips")
+    for mu in (contact.mu_static, contact.mu_kinetic):
+        if 0 < mu < SMALLEST_FRICTION:
+            raise Refused(f"MuJoCo raises a coefficient of friction of {mu:g} to {SMALLEST_FRICTION:g}; 0 is exact")
+    if settings.cone == "pyramidal" and contact.mu_static > LARGEST_PYRAMIDAL_FRICTION:
+        limit = f"{LARGEST_PYRAMIDAL_FRICTION:g}"
+        raise Refused(f"cone=pyramidal with friction above {limit} makes the wall soft; set cone=elliptic")
+
+
+class BoundedFriction:
+    """The ball's one contact, where friction is bounded.
+
+    MuJoCo knows one coefficient. Where the kinetic one is less, it is switched as a user would do it: to the kinetic
+    one once a force is on the cone, back once a force is inside it again.
+
+    Attributes:
+        sticking: whether the last step began with a force inside the cone.
+    """
+
+    def __init__(self, model: Any, body: RollingBall, settings: MujocoSettings) -> None:
+        self._model = model
+        self._static, self._kinetic = body.contact.mu_static, body.contact.mu_kinetic
+        self._mu = self._static
+        self._pyramidal = settings.cone == "pyramidal"
+        self._corrects = corrects(body.contact, settings)
+        self._preload = PRELOAD / body.ball.mass
+        self._radius = body.ball.radius
+        last = int(model.joint("spin").dofadr[0]) + (6 if settings.formulation == "free" else 3)
+        self._spin = slice(last - 3, last)
+        self._integrate = _INTEGRATE[settings.integrator]
+        self._dt = settings.dt
+        self._steps = 0
+        self._events: list[Event] = []
+        self._wrench = np.zeros(6)
+        self.sticking = True
+
+    def start(self, data: Any) -> bool:
+        """Takes the state at time 0 with its own forces, and tells whether they hold the ball; if not, it slips."""
+        if not self.holds(data):
+            self._change(False, Event("slip", 0.0, 0.0, 0.0))
+        return self.sticking
+
+    def step(self, data: Any) -> None:
+        """One mj_step, with a look at the forces before RK4's further stages replace them."""
+        mujoco.mj_checkPos(self._model, data)
+        mujoco.mj_checkVel(self._model, data)
+        mujoco.mj_forward(self._model, data)
+        mujoco.mj_checkAcc(self._model, data)
+        self.observe(data)
+        self._integrate(self._model, data)
+
+    def observe(self, data: Any) -> None:
+        """Takes the forces at the start of a step; once per step."""
+        if self.holds(data) != self.sticking:
+            self._change(not self.sticking, self._event(self._steps))
+        self._steps += 1
+
+    def holds(self, data: Any) -> bool:
+        """Whether the contact force in ``data`` is inside the cone of the present coefficient."""
+        if data.ncon == 0:
+            return False
+        mujoco.mj_contactForce(self._model, data, 0, self._wrench)
+        N, F1, F2 = self._wrench[:3].tolist()
+        # MuJoCo's pyramid lies inside the true cone: along its own tangents it allows |F1| + |F2| = mu N.
+        friction = abs(F1) + abs(F2) if self._pyramidal else math.hypot(F1, F2)
+        return bool(friction < _ON_CONE * self._mu * N)
+
+    def events(self, data: Any) -> list[Event]:
+        """The events so far, each with a bracket of one step.
+
+        Args:
+            data: the present state with its own forces.
+        """
+        changed = self.holds(data) != self.sticking
+        return [*self._events, self._event(self._steps)] if changed else list(self._events)
+
+    def correct(self, data: Any, N: float) -> None:
+        """Takes the lift that MuJoCo's cone gives to a slipping contact out of its reference acceleration.
+
+        MuJoCo's friction is the dual of a convex cone, so what slips along the wall also rises from it: the residual r
+        of the friction rows (acceleration less reference: damping b times the slip, plus its rate) demands the normal
+        acceleration mu |r|, and the contact chatters. That much less is asked for, with r from the slip now and its
+        rate of the evaluation before. Errors of that rate die out as g / (1 + g) per evaluation, g = mu² (1 + m a²/J).
+
+        A rigid contact is loaded by a depth of almost nothing, so that the least error of r would end it: a preload of
+        a hundredth of the normal force keeps the contact.
+
+        Args:
+            data: after the reference accelerations, before the forces.
+            N: normal force of the evaluation before [N].
+        """
+        if not self._corrects or data.nefc == 0 or self._mu == 0:
+            return
+        # The contact is the only constraint of the model. A pyramid's rows are the normal plus and less mu tangents.
+        rows, aref = data.efc_J.reshape(data.nefc, -1), data.efc_aref
+        if self._pyramidal:
+            slip, reference = (rows[0::2] - rows[1::2]) / (2 * self._mu), (aref[0::2] - aref[1::2]) / (2 * self._mu)
+        else:
+            slip, reference = rows[1:3], aref[1:3]
+        # MuJoCo's tangents jump as the wall turns and the ball's own axes turn fast: the acceleration of the evaluation
+        # before is of use only with the Jacobian of that evaluation, in the world.
+        tangents = data.contact.frame[0].reshape(3, 3)[1:]
+        memory = data.userdata[-MEMORY:].reshape(3, -1)
+        r1, r2 = (tangents.dot(memory.dot(data.qacc)) - reference).tolist()
+        memory[:] = tangents.T.dot(slip)
+        lift = self._preload * N
+        if self._near_cone(data, N):
+            # The dual of the pyramid knows the larger component alone.
+            lift += self._mu * (max(abs(r1), abs(r2)) if self._pyramidal else math.hypot(r1, r2))
+        if self._pyramidal:
+            aref[:] -= lift
+        else:
+            aref[0] -= lift
+
+    def _near_cone(self, data: Any, N: float) -> bool:
+        """Whether the friction of the evaluation before was near its bound, by its torque: that needs no frame."""
+        t1, t2, t3 = data.qfrc_constraint[self._spin].tolist()
+        lever = self._radius + 0.5 * float(data.efc_pos[0])  # MuJoCo's contact point lies midway in the depth
+        return math.hypot(t1, t2, t3) >= _NEAR_CONE * self._mu * N * lever
+
+    def _event(self, step: int) -> Event:
+        low, high = max(step - 1, 0) * self._dt, step * self._dt
+        return Event("slip" if self.sticking else "stick", 0.5 * (low + high), low, high)
+
+    def _change(self, sticking: bool, event: Event) -> None:
+        self._events.append(event)
+        self.sticking = sticking
+        if self._static != self._kinetic:
+            self._mu = self._static if sticking else self._kinetic
+            self._model.geom_friction[:, 0] = self._mu
+            self._model.geom_condim[:] = condim(self._mu)
