@@ -67,9 +67,13 @@ def onset_table(content: dict[str, Any]) -> Table:
     for item in content["engines"]:
         first = item["onset"]
         bracket = f"{first['time_low']:.9g} … {first['time_high']:.9g}" if first else ""
-        verdict = item["verdict"] if item["verdict"] != "failed" else f"failed: {item['message']}"
+        verdict = item["verdict"]
+        if verdict in {"failed", "refused"}:
+            verdict += f": {item['message']}"
+        settings = item["settings"]
+        label = (item["name"], settings.get("formulation", ""), settings.get("preset", ""))
         table.add_row(
-            Text(item["engine"]),
+            Text(" ".join(filter(None, label))),
             f"{first['time']:.9g}" if first else "none",
             bracket,
             number(item["difference"]),

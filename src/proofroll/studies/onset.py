@@ -32,7 +32,7 @@ class EngineOnset:
         facts: complete settings, or None if it could not be asked.
         result: how the run ended.
         first: the first slip with its bracket, or None.
-        verdict: ``agree``, ``disagree``, ``ill-posed`` or ``failed``.
+        verdict: ``agree``, ``disagree``, ``ill-posed``, ``refused`` or ``failed``.
     """
 
     engine: str
@@ -61,6 +61,7 @@ class OnsetStudy:
             "engines": [
                 {
                     "engine": item.engine,
+                    "name": parse_engine(item.engine).name,
                     "settings": item.facts.settings if item.facts else {},
                     "status": item.result.status,
                     "message": item.result.message,
@@ -148,6 +149,8 @@ def onset_study(
 
 def _verdict(truth: Onset, result: Result, first: Event | None) -> str:
     """Agreement: the engine's bracket meets the times that the uncertainty of μ and f leaves to the truth."""
+    if result.status == Status.REFUSED:
+        return "refused"
     if result.status != Status.DONE:
         return "failed"
     if truth.verdict == "ill-posed":
