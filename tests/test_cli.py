@@ -134,9 +134,9 @@ def test_broken_toml(proofroll: Proofroll, tmp_path: Path) -> None:
 
 def test_an_engine_that_hangs(proofroll: Proofroll) -> None:
     """A hang ends at the time limit, as a crash of the engine."""
-    code, out, err = proofroll(*with_option("--engine", "hangs"), "--time-limit", "6", "--json")
+    code, out, err = proofroll(*with_option("--engine", "hangs"), "--time-limit", "2", "--json")
     assert code == 3
-    assert err == "proofroll: hangs timeout: no result within 6 s; it was ended\n"
+    assert err == "proofroll: hangs timeout: no result within 2 s; it was ended\n"
     assert json.loads(out)["status"] == "timeout"
 
 

@@ -13,6 +13,7 @@ import numpy as np
 from scipy.interpolate import make_interp_spline
 
 from proofroll.events import events_of
+from proofroll.mechanics import resistance_moment
 from proofroll.scene import RollingBall
 from proofroll.surfaces import FloatArray
 
@@ -114,15 +115,17 @@ def scales(body: RollingBall, truth: xr.Dataset) -> dict[str, float]:
 def energy_balance(body: RollingBall, dataset: xr.Dataset) -> FloatArray:
     """Energy now plus what resistance and friction took, minus the energy at the start [J], shape (time,).
 
-    Rolling resistance takes N f V / a from the ball per second, friction -F · u; N, F, V and u are the engine's own.
+    Rolling resistance takes -M · ω from the ball per second (N f V / a while it rolls), friction -F · u; N, F, ω, V
+    and the slip u are the engine's own.
     """
     balance = dataset["energy"].to_numpy() - float(dataset["energy"][0])
     t, f = dataset["time"].to_numpy(), body.contact.rolling_resistance
     bounded = "sticking" in dataset
     power = np.zeros_like(t)
     if f:
-        speed = np.linalg.norm(dataset["v_WB"].to_numpy(), axis=-1)
-        power += dataset["N"].to_numpy() * f * speed / body.ball.radius
+        e1 = body.surface.normal(dataset["p_WB"].to_numpy())
+        moment = resistance_moment(f, dataset["N"].to_numpy(), e1, dataset["v_WB"].to_numpy())
+        power -= np.einsum("ti,ti->t", moment, dataset["w_WB"].to_numpy())
     if bounded:
         power -= sum(dataset[f"F{i}"].to_numpy() * dataset[f"slip{i}"].to_numpy() for i in (2, 3))
     if np.any(power):

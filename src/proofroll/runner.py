@@ -222,7 +222,7 @@ class Runner:
             by_engine.setdefault(case.engine.name, []).append(case)
         batches: list[list[Case]] = []
         for group in by_engine.values():
-            size = max(1, min(6, -(-len(group) // (2 * self.jobs))))
+            size = max(1, min(16, -(-len(group) // (2 * self.jobs))))
             batches += [group[i : i + size] for i in range(0, len(group), size)]
         return sorted(batches, key=len, reverse=True)
 

@@ -73,4 +73,4 @@ def test_values_that_are_not_finite_differ(value: float) -> None:
 
 def test_verdicts_are_ordered_from_best_to_worst() -> None:
     """Summaries take the worst verdict by this order."""
-    assert list(Verdict) == [Verdict.AGREES, Verdict.CONVERGES, Verdict.DIFFERS, Verdict.FAILED]
+    assert list(Verdict) == ["agrees", "converges", "ill-posed", "differs", "failed"]

@@ -37,7 +37,7 @@ def test_error_bar_covers_the_error() -> None:
 
 @pytest.mark.parametrize("power", [0.5, 1.5, 2.5])
 def test_an_order_that_is_no_integer(power: float) -> None:
-    """An order between two integers is seen, and the error bar covers what the extrapolation gets wrong."""
+    """An order between two integers is seen, and the error bar covers what is left of the error."""
     found = richardson([curve(h, power, 0.0) for h in (0.04, 0.02, 0.01)], 2.0)
     assert found.order == pytest.approx(power, abs=1e-9)
     assert 0 < np.max(np.abs(found.values - LIMIT)) <= found.error_bar
@@ -45,11 +45,10 @@ def test_an_order_that_is_no_integer(power: float) -> None:
 
 @pytest.mark.parametrize("declared", [1, None])
 def test_an_integer_order_in_disguise(declared: int | None) -> None:
-    """Where the next term makes an order 1 look like 1.3 the limit is right, and trusted no further than it shows."""
+    """Where the next term makes an order 1 look like 1.3 nothing is extrapolated, and the error bar covers the rest."""
     found = richardson([LIMIT + 0.01 * h + 0.001 * h**2 for h in (4, 2, 1)], 2.0, declared)
     assert found.order == pytest.approx(1.3, abs=0.01)
-    assert found.values == pytest.approx(LIMIT, abs=1e-12)
-    assert found.error_bar >= 0.01
+    assert np.max(np.abs(found.values - LIMIT)) <= found.error_bar
 
 
 def test_an_order_that_was_not_declared() -> None:

@@ -10,7 +10,7 @@ from proofroll.certificate import certify, first_difference
 from proofroll.conformance.subject import Subject, bits, require, scenes
 from proofroll.engine import Sample
 from proofroll.errors import Refused
-from proofroll.scene import Capability, Scene
+from proofroll.scene import Scene
 
 
 def builds_or_refuses(subject: Subject) -> None:
@@ -28,7 +28,7 @@ def builds_or_refuses(subject: Subject) -> None:
 
 def provides_what_it_says(engine: Any) -> None:
     """For each capability that the engine provides some formulation builds a scene that needs it."""
-    for capability in sorted(engine.provides - {Capability.BOUNDED_FRICTION}):
+    for capability in sorted(engine.provides):
         refusals: list[str] = []
         if not any(
             _some_builds(engine, scene, refusals) for scene in scenes().values() if capability in scene.requires

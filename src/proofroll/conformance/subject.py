@@ -23,7 +23,7 @@ _SPAN = 0.05
 
 @cache
 def scenes() -> dict[str, Scene]:
-    """Scenes in which nothing is zero or symmetric, the most demanding first."""
+    """Scenes in which nothing is zero or symmetric: the smooth motions first, of these the most demanding first."""
     cylinder = {"speed": 3.3, "axial_speed": 0.7, "radial_spin": 12.0}
     plane = {"tilt": 0.35, "speed": 0.8, "cross_speed": 0.5, "normal_spin": 12.0}
     return {
@@ -31,6 +31,7 @@ def scenes() -> dict[str, Scene]:
         "cylinder": load_scene("sphere_in_cylinder", **cylinder),
         "plane-resisting": load_scene("inclined_plane", **plane, rolling_resistance=5e-4),
         "plane": load_scene("inclined_plane", **plane),
+        "cylinder-slipping": load_scene("sphere_in_cylinder", **cylinder, mu_static=0.35),
     }
 
 

@@ -228,3 +228,14 @@ def test_leaving_the_wall_is_said() -> None:
     sliding = Sliding(np.zeros(5), -1.0, np.zeros(3), np.zeros(3), np.zeros(3), np.zeros(3))
     with pytest.raises(Diverged, match="leaves the wall at 0"):
         held(sliding, 0.5)
+
+
+@pytest.mark.parametrize("every", [4.0, 0.02])
+def test_a_crest_that_only_touches_the_cone_ends(every: float) -> None:
+    """At a stair edge the run goes on past the crest, whether or not it begins a slip there."""
+    scene = load_scene("sphere_in_cylinder", speed=4.0, rolling_resistance=5e-4, mu_static=0.391459)
+    dataset = simulate(scene, "pinocchio[formulation=composite,preset=tuned]", until=4.0, every=every)
+    times = [event.time for event in events_of(dataset) if event.kind == "slip"]
+    assert dataset.attrs["status"] == "done"
+    assert times[-1] == pytest.approx(2.5724252, abs=1e-6)
+    assert times[0] == pytest.approx(1.8462752, abs=1e-6) or len(times) == 1

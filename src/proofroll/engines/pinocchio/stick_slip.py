@@ -31,6 +31,9 @@ from proofroll.surfaces import FloatArray
 _HANDOVER = 1e-4
 # |u| at which the rest of a slip is extrapolated, relative to where creeping ended.
 _FLOOR = 1e-6
+# The least values of both, relative to the speed that friction gives while the ball turns by a radian: a slip that
+# barely begins has no |b| to measure by, and |u| below round-off never ends.
+_LEAST_HANDOVER, _LEAST_FLOOR = 1e-10, 1e-14
 # Part of the time that is left until |u| = 0 which one step may take.
 _APPROACH = 0.7
 # Span over which the turning of b is measured, relative to the time in which the ball turns by a radian.
@@ -40,6 +43,9 @@ _STEADY = 100.0
 
 # Friction relative to the normal force, and excess of it, that is round-off.
 _NOISE = 1e-13
+# Excess at which slip begins. Above round-off, so that a crest which only touches the cone cannot begin a slip that
+# ends at the same instant and begins again; where the excess rises through it, it costs about as many seconds.
+_GRAZE = 1e-12
 
 
 class Mode(Enum):
@@ -88,7 +94,7 @@ class AdaptiveStickSlip(Adaptive):
         super().__init__(mechanism, settings)
         self._contact = contact
         self._span = _SPAN * self._turning_time
-        self._handover = 0.0
+        self._handover = self._floor = self._least = 0.0
         self._mode = Mode.STICKING
         self.events: list[Event] = []
         y = np.concatenate([self.q, self.v])
@@ -175,7 +181,7 @@ class AdaptiveStickSlip(Adaptive):
         while solver.status == "running":
             if self._mode is Mode.SLIDING:
                 left = monitor[0] / -monitor[1] if monitor[1] < 0 else math.inf
-                if monitor[0] <= _FLOOR * self._handover and left < math.inf:
+                if monitor[0] <= self._floor and left < math.inf:
                     stop = solver.t + left
                     if stop > end:
                         return self._keep(solver.y + (end - solver.t) * solver.f, end)
@@ -226,14 +232,20 @@ class AdaptiveStickSlip(Adaptive):
             # The excess lies in [-1, 1] and its crests are many steps wide, so far below zero nothing is missed.
             if max(before[0], after[0]) < -0.1 - abs(after[0] - before[0]):
                 return None
-            return self._located(solver, self._excess, before[0], after[0])
+            return self._located(solver, lambda y: self._excess(y) - _GRAZE, before[0] - _GRAZE, after[0] - _GRAZE)
         if self._mode is Mode.CREEPING:
             if after[0] >= self._handover:
                 return self._located(
                     solver, lambda y: self._speed(y, solver.t)[0] - self._handover, -self._handover, after[0]
                 )
-            if after[0] <= 0 and after[1] < 0:
-                return self._located(solver, lambda y: -self._speed(y, solver.t)[0], -before[0], -after[0])
+            # It ends below zero by more than round-off, or the zero at which it began would be found again.
+            if after[0] < -self._least and after[1] < 0:
+                return self._located(
+                    solver,
+                    lambda y: -self._speed(y, solver.t)[0] - self._least,
+                    -before[0] - self._least,
+                    -after[0] - self._least,
+                )
         return None
 
     def _located(
@@ -301,7 +313,11 @@ class AdaptiveStickSlip(Adaptive):
         self._mode = Mode.CREEPING
         free, turning = self._turning(self._data, y)
         rate = max(math.sqrt(turning @ turning), 1.0 / (_STEADY * self._turning_time))
-        self._handover = _HANDOVER * math.sqrt(free.slip_rate @ free.slip_rate) / rate
+        along, strength = unit(free.slip_rate), math.sqrt(free.slip_rate @ free.slip_rate)
+        grip = strength - float(along @ self._slide(self._data, y, along).slip_rate)
+        self._handover = max(_HANDOVER * strength / rate, _LEAST_HANDOVER * grip * self._turning_time)
+        self._least = _LEAST_FLOOR * grip * self._turning_time
+        self._floor = max(_FLOOR * self._handover, self._least)
 
     def _record(self, kind: EventKind, time: float, width: float) -> None:
         width += 4 * float(np.spacing(time))

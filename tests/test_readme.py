@@ -1,0 +1,75 @@
+"""README.md and CONTRIBUTING.md: whatever they tell a person to type works."""
+
+from __future__ import annotations
+
+import re
+import shlex
+import subprocess
+import sys
+import tomllib
+from pathlib import Path
+
+import pytest
+
+ROOT = Path(__file__).resolve().parents[1]
+PROOFROLL = str(Path(sys.executable).with_name("proofroll"))
+
+
+def blocks(name: str, language: str) -> list[str]:
+    """The fenced blocks of a document in a language; an empty language is a block of commands."""
+    text = (ROOT / name).read_text(encoding="utf-8")
+    return re.findall(rf"^ *```{language}\n(.*?)^ *```$", text, flags=re.DOTALL | re.MULTILINE)
+
+
+def commands(program: str) -> list[str]:
+    """The command lines of README.md that start with a program, without their comments."""
+    lines = [line.split("  #")[0].strip() for block in blocks("README.md", "") for line in block.splitlines()]
+    return [line for line in lines if line.startswith(f"{program} ")]
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("line", commands("proofroll"))
+def test_a_command_of_the_readme_works(line: str, tmp_path: Path) -> None:
+    """Every proofroll command of the README ends as expected."""
+    words = [PROOFROLL, *shlex.split(line)[1:]]
+    words = [str(ROOT / word) if word.startswith("comparisons/") else word for word in words]
+    done = subprocess.run(words, cwd=tmp_path, capture_output=True, text=True, timeout=240, check=False)
+    assert done.returncode == 0, done.stderr
+    assert done.stdout
+
+
+@pytest.mark.parametrize("line", commands("make"))
+def test_a_make_target_of_the_readme_exists(line: str) -> None:
+    """Every make command of the README names a target that make would run."""
+    done = subprocess.run(
+        ["make", "--dry-run", *shlex.split(line)[1:]], cwd=ROOT, capture_output=True, text=True, check=False
+    )
+    assert done.returncode == 0, done.stderr
+
+
+@pytest.mark.parametrize("source", blocks("README.md", "python"))
+def test_a_snippet_of_the_readme_runs(source: str, tmp_path: Path) -> None:
+    """Every Python snippet of the README runs in a fresh interpreter."""
+    done = subprocess.run(
+        [sys.executable, "-c", source], cwd=tmp_path, capture_output=True, text=True, timeout=120, check=False
+    )
+    assert done.returncode == 0, done.stderr
+
+
+@pytest.mark.parametrize("name", ["README.md", "CONTRIBUTING.md"])
+def test_an_entry_point_is_valid_toml(name: str) -> None:
+    """The entry point that a document tells an engine's author to write is valid and in our group."""
+    found = blocks(name, "toml")
+    assert found
+    for block in found:
+        text = "\n".join(line.strip() for line in block.splitlines())
+        assert tomllib.loads(text)["project"]["entry-points"]["proofroll.engines"]
+
+
+@pytest.mark.parametrize("name", ["README.md", "CONTRIBUTING.md"])
+def test_links_lead_somewhere(name: str) -> None:
+    """Every relative link of a document leads to a file of the repository."""
+    text = (ROOT / name).read_text(encoding="utf-8")
+    targets = [target for target in re.findall(r"\]\(([^)#]+)\)", text) if "://" not in target]
+    assert targets
+    assert [target for target in targets if not (ROOT / target).exists()] == []
