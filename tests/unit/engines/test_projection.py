@@ -10,6 +10,7 @@ from proofroll.certificate import certify, first_difference
 from proofroll.engines.projection import Projection
 from proofroll.engines.projection.orientation import EulerAngles
 from proofroll.engines.projection.settings import PRESETS
+from proofroll.engines.projection.switching import Switching
 from proofroll.errors import Diverged, InputError
 from proofroll.registry import resolve_settings
 from proofroll.scene import Capability
@@ -167,10 +168,14 @@ def test_certificate_holds(scene, f, engine):
     }
 
 
-def test_provides_rolling_but_no_slip():
-    """It says honestly that bounded friction is not modelled."""
-    assert Capability.ROLLING_RESISTANCE in Projection.provides
-    assert Capability.BOUNDED_FRICTION not in Projection.provides
+def test_unbounded_friction_builds_nothing_for_slip():
+    """Where friction is unbounded the ball has no mode but rolling, says nothing of sticking and has no events."""
+    assert Capability.BOUNDED_FRICTION in Projection.provides
+    engine = build(load("sphere_in_cylinder", speed=4), EXACT[1])
+    engine.advance(0.1)
+    assert not isinstance(engine._motion, Switching)
+    assert engine.sample().sticking is None
+    assert engine.events() == ()
 
 
 @pytest.mark.parametrize("engine", [EXACT[0], CLASSICAL[0]])
@@ -199,7 +204,7 @@ def test_dense_samples_do_not_shrink_the_adaptive_step():
     """A sample a nanosecond after another costs one step, and the step size is what it was before."""
     engine = build(load("sphere_in_cylinder", speed=4), EXACT[0])
     engine.advance(0.1)
-    solver = engine._integrator._solver
+    solver = engine._motion._solver
     wanted, evaluations = solver.h_abs, solver.nfev
     engine.advance(0.1 + 1e-9)
     assert solver.h_abs >= wanted

@@ -3,19 +3,24 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from typing import ClassVar, Self
 
 import numpy as np
 
 import proofroll
 from proofroll.engine import Built, Sample
+from proofroll.engines.projection.friction import Friction
 from proofroll.engines.projection.geometry import geometry_of
-from proofroll.engines.projection.integrators import INTEGRATORS
+from proofroll.engines.projection.integrators import INTEGRATORS, Integrator
 from proofroll.engines.projection.method import ProjectedBall
+from proofroll.engines.projection.modes import Pace
 from proofroll.engines.projection.orientation import EulerAngles, Orientation, RotatingFrame
 from proofroll.engines.projection.settings import PRESETS, ProjectionSettings
+from proofroll.engines.projection.stepping import STEPPERS
+from proofroll.engines.projection.switching import Switching
 from proofroll.errors import Diverged
+from proofroll.events import Event
 from proofroll.scene import Capability, RollingBall, Scene
 from proofroll.surfaces import FloatArray
 
@@ -27,7 +32,12 @@ class Projection:
 
     name: ClassVar[str] = "projection"
     provides: ClassVar[frozenset[Capability]] = frozenset(
-        {Capability.ROLLING, Capability.CURVED_SURFACE, Capability.ROLLING_RESISTANCE}
+        {
+            Capability.ROLLING,
+            Capability.CURVED_SURFACE,
+            Capability.ROLLING_RESISTANCE,
+            Capability.BOUNDED_FRICTION,
+        }
     )
     settings: ClassVar[type[ProjectionSettings]] = ProjectionSettings
     presets: ClassVar[Mapping[str, Mapping[str, ProjectionSettings]]] = PRESETS
@@ -52,49 +62,66 @@ class Projection:
         self._fixed_step = settings.dt if integrator.resolution == "dt" else 0.0
         frame = body.surface.frame(body.u0)
         angles, r = self._orientation.start(frame, frame.T @ body.w0)
-        self._integrator = integrator(
-            self._ball.rates,
-            self._accept,
-            np.concatenate([body.u0, angles, body.udot0, r]),
-            _scales(body, self._orientation.size),
-            getattr(settings, integrator.resolution),
-        )
+        x, resolution = np.concatenate([body.u0, angles, body.udot0, r]), getattr(settings, integrator.resolution)
+        scales = _scales(body, self._orientation.size)
+        self._motion: Integrator | Switching
+        if math.isfinite(body.contact.mu_static):
+            stepper = STEPPERS[settings.integrator](resolution)
+            speed = _speed(body) or 1.0
+            pace = Pace(speed, body.ball.radius / speed, stepper.stability, stepper.reach)
+            friction = Friction(self._ball, body.contact)
+            self._motion = Switching(friction, stepper, x, scales, pace, self._check, settings.elimination)
+        else:
+            self._motion = integrator(self._ball.rates, self._accept, x, scales, resolution)
 
-    def _accept(self, t: float, x: FloatArray) -> FloatArray:
+    def _check(self, t: float, x: FloatArray) -> None:
         n = self._coordinates
         if not math.isfinite(float(x.sum())):
             raise Diverged(f"the state is not finite (NaN or overflow) at t = {t:.6g} s")
         self._orientation.check(t, x[2:n], x[n + 2 :], self._fixed_step)
+
+    def _accept(self, t: float, x: FloatArray) -> FloatArray:
+        self._check(t, x)
         return self._ball.eliminated(x) if self._eliminate else x
 
     def advance(self, t: float) -> None:
         """See :class:`proofroll.engine.Engine`."""
-        start = self._integrator.t
+        start = self._motion.t
         try:
-            with np.errstate(over="ignore", invalid="ignore"):  # found by _accept, and raised as Diverged
-                self._integrator.advance(t)
+            with np.errstate(over="ignore", invalid="ignore"):  # found by _check, and raised as Diverged
+                self._motion.advance(t)
         except ArithmeticError as error:
             raise Diverged(f"{error}, between t = {start:.6g} s and {t:.6g} s") from None
 
+    def events(self) -> Sequence[Event]:
+        """See :class:`proofroll.engine.LocatesEvents`."""
+        return tuple(self._motion.events) if isinstance(self._motion, Switching) else ()
+
     def sample(self) -> Sample:
         """See :class:`proofroll.engine.Engine`."""
-        x = self._integrator.x
+        x = self._motion.x
         kin = self._ball.kinematics(x)
-        response = self._ball.response(kin)
         frame = kin.local.frame
+        if isinstance(self._motion, Switching):
+            force, sticking = self._motion.force, self._motion.mode.sticking
+        else:
+            force, sticking = self._ball.contact_force(self._ball.response(kin)), None
         return Sample(
             p_WB=self._surface.position(x[:2]),
             v_WB=frame @ kin.v[:3],
             w_WB=frame @ kin.v[3:],
             q_WB=self._orientation.quaternion(x[2 : self._coordinates]),
-            force=frame @ self._ball.contact_force(response),
+            force=frame @ force,
+            sticking=sticking,
         )
 
     def built(self) -> Built:
         """See :class:`proofroll.engine.Engine`."""
         ball = self._ball
-        kin = ball.kinematics(self._integrator.x)
-        acceleration = kin.D @ ball.response(kin).acceleration + kin.drift
+        x = self._motion.x
+        kin = ball.kinematics(x)
+        rates = self._motion.rates if isinstance(self._motion, Switching) else ball.rates(x)
+        acceleration = kin.D @ rates[self._coordinates : self._coordinates + 5] + kin.drift
         return Built(
             mass=float(ball.mass[0]),
             inertia=ball.mass[3:].copy(),
@@ -105,17 +132,22 @@ class Projection:
         )
 
 
-def _scales(body: RollingBall, angles: int) -> FloatArray:
-    """Natural size of each component of the state, against which an adaptive step measures absolute errors.
-
-    The lengths are of the order of the ball's radius, the speeds of the initial one or of a fall by one radius.
-    """
+def _speed(body: RollingBall) -> float:
+    """Natural speed [m/s]: the initial one, or that of a fall by one radius."""
     a = body.ball.radius
-    speed = math.hypot(
+    return math.hypot(
         float(np.linalg.norm(body.v0)),
         a * float(np.linalg.norm(body.w0)),
         math.sqrt(a * float(np.linalg.norm(body.gravity))),
     )
+
+
+def _scales(body: RollingBall, angles: int) -> FloatArray:
+    """Natural size of each component of the state, against which an adaptive step measures absolute errors.
+
+    The lengths are of the order of the ball's radius, the speeds of :func:`_speed`.
+    """
+    a, speed = body.ball.radius, _speed(body)
     per_metre = 1 / np.asarray(body.surface.length_scales)
     velocities = [*(speed * per_metre), *np.full(3, speed / a)]
     return np.array([*(a * per_metre), *np.ones(angles), *(velocities if speed else np.ones(5))])

@@ -20,6 +20,15 @@ Accept = Callable[[float, FloatArray], FloatArray]
 TIGHTEST = 100 * float(np.finfo(float).eps)
 
 
+def classical_step(rates: Rates, x: FloatArray, h: float) -> FloatArray:
+    """One step [s] of the classical Runge-Kutta method."""
+    k1 = rates(x)
+    k2 = rates(x + h / 2 * k1)
+    k3 = rates(x + h / 2 * k2)
+    k4 = rates(x + h * k3)
+    return np.asarray(x + h / 6 * (k1 + 2 * (k2 + k3) + k4))
+
+
 class Integrator(Protocol):
     """Moves a state in time.
 
@@ -74,11 +83,7 @@ class RungeKutta4:
         """See :class:`Integrator`."""
         rates, h, start, x = self._rates, self._dt, self.t, self.x
         for step in range(1, whole_steps(start, t, h) + 1):
-            k1 = rates(x)
-            k2 = rates(x + h / 2 * k1)
-            k3 = rates(x + h / 2 * k2)
-            k4 = rates(x + h * k3)
-            x = self._accept(start + step * h, x + h / 6 * (k1 + 2 * (k2 + k3) + k4))
+            x = self._accept(start + step * h, classical_step(rates, x, h))
         self.t, self.x = t, x
 
 

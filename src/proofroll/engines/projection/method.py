@@ -12,6 +12,7 @@ W. Blajer, Multibody Syst. Dyn. 7, 2002, 265-284, for the elimination of constra
 
 from __future__ import annotations
 
+import copy
 import math
 from typing import NamedTuple
 
@@ -120,12 +121,20 @@ class ProjectedBall:
         lever = N * self.rolling_resistance / speed if speed else 0.0
         return np.array([0.0, -lever * v3, lever * v2])
 
-    def response(self, kin: Kinematics) -> Response:
-        """Accelerations and reactions: the tangential projection together with the non-holonomic constraints."""
+    def response(self, kin: Kinematics, drag: FloatArray | None = None) -> Response:
+        """Accelerations and reactions: the tangential projection together with the non-holonomic constraints.
+
+        Args:
+            kin: the state.
+            drag: applied force per newton of normal force, besides the rolling resistance, along v's components and
+                without one along e1, shape (6,).
+        """
         force = self.weight(kin)
         N = self.normal_force(kin, force)
         if self.rolling_resistance:
             force[3:] = self.resistance(kin, N)
+        if drag is not None:
+            force += N * drag
         solution = self._solve(kin, kin.D.T @ force - self.bias(kin), -self.slip_drift(kin))
         return Response(solution[:5], N, solution[5:])
 
@@ -145,22 +154,37 @@ class ProjectedBall:
 
     def rates(self, x: FloatArray) -> FloatArray:
         """ẋ: the angles, if there are any, change at the rates s."""
+        return self.derivative(x, self.response(self.kinematics(x)))
+
+    def derivative(self, x: FloatArray, response: Response) -> FloatArray:
+        """ẋ with the accelerations of ``response``."""
         n = self._coordinates
-        return np.concatenate([x[n : 2 * n], self.response(self.kinematics(x)).acceleration])
+        return np.concatenate([x[n : 2 * n], response.acceleration])
+
+    def with_rows(self, rows: FloatArray) -> ProjectedBall:
+        """The same ball with other active rows of the non-holonomic constraints."""
+        other = copy.copy(self)
+        other.rows = rows
+        return other
 
     def slip(self, x: FloatArray) -> FloatArray:
         """C v: violation of the active rows [m/s]."""
         return self.rows @ self.kinematics(x).v
 
-    def eliminated(self, x: FloatArray) -> FloatArray:
+    def eliminated(self, x: FloatArray, slip: FloatArray | None = None) -> FloatArray:
         """The state with the violation of C v = 0 removed from s (Blajer 2002).
 
         s - M̄⁻¹C_nhᵀ(C_nh M̄⁻¹ C_nhᵀ)⁻¹ C_nh s is the nearest admissible s in the metric of M̄. The correction solves
         a system with the same matrix as the equations of motion.
+
+        Args:
+            x: the state.
+            slip: what C v shall be instead of zero [m/s], one per active row.
         """
         kin = self.kinematics(x)
+        violation = self.rows @ kin.v if slip is None else self.rows @ kin.v - slip
         result = x.copy()
-        result[self._coordinates :] -= self._solve(kin, np.zeros(5), self.rows @ kin.v)[:5]
+        result[self._coordinates :] -= self._solve(kin, np.zeros(5), violation)[:5]
         return result
 
     def _solve(self, kin: Kinematics, upper: FloatArray, lower: FloatArray) -> FloatArray:

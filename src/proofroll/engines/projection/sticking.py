@@ -1,0 +1,103 @@
+"""Contact by static friction: rolling, and standing still under rolling resistance. The state y is x = [q, s]."""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+
+from proofroll.engines.projection.friction import Friction
+from proofroll.engines.projection.method import ProjectedBall
+from proofroll.engines.projection.modes import DIFFERENCE, Exit, Pace, Survey, time_left
+from proofroll.surfaces import FloatArray
+
+
+class _Held:
+    """What every set of active rows has in common."""
+
+    sticking = True
+
+    def __init__(self, ball: ProjectedBall, friction: Friction) -> None:
+        self._ball, self._friction = ball, friction
+
+    def rates(self, y: FloatArray) -> FloatArray:
+        """See :class:`Mode`."""
+        return self._ball.rates(y)
+
+    def x(self, y: FloatArray) -> FloatArray:
+        """See :class:`Mode`."""
+        return y
+
+    def eliminated(self, y: FloatArray) -> FloatArray:
+        """See :class:`Mode`."""
+        return self._ball.eliminated(y)
+
+    def force(self, y: FloatArray) -> FloatArray:
+        """See :class:`Mode`."""
+        return self._ball.contact_force(self._ball.response(self._ball.kinematics(y)))
+
+
+class Stick(_Held):
+    """Rolling without slip: both rows active."""
+
+    def __init__(self, friction: Friction, pace: Pace) -> None:
+        super().__init__(friction.rolling, friction)
+        self._pace = pace
+        self.halts = friction.rolling.rolling_resistance > 0
+        self.exits = (Exit.CONE, Exit.HALT) if self.halts else (Exit.CONE,)
+
+    def survey(self, y: FloatArray) -> Survey:
+        """See :class:`Mode`. With rolling resistance steps shorten towards the place where the centre stands still."""
+        kin = self._ball.kinematics(y)
+        response = self._ball.response(kin)
+        reserve, span = self._friction.reserve(response), DIFFERENCE * self._pace.time
+        ahead = self._ball.kinematics(y + span * self._ball.derivative(y, response))
+        trend = (self._friction.reserve(self._ball.response(ahead)) - reserve) / span
+        if not self.halts:
+            return Survey((reserve,), trend)
+        speed, acceleration = self.speed(y), kin.D @ response.acceleration + kin.drift
+        slowing = float(kin.v[1:3] @ acceleration[1:3]) / speed if speed else 0.0
+        longest = self._pace.reach * time_left(speed, slowing)
+        return Survey((reserve, speed - self._pace.still), trend, longest=longest)
+
+    def speed(self, y: FloatArray) -> float:
+        """Of the centre [m/s]."""
+        return math.hypot(*self._ball.kinematics(y).v[1:3].tolist())
+
+
+class Rest(_Held):
+    """The centre stands still, held by friction and rolling resistance; the ball may spin about the normal.
+
+    Two more rows, ω2 = 0 and ω3 = 0, whose multipliers are the moment of the resistance.
+    """
+
+    exits = ()
+
+    def __init__(self, friction: Friction) -> None:
+        ball = friction.rolling
+        rows = np.vstack([ball.rows, np.eye(6)[4:]])
+        super().__init__(ball.with_rows(rows), friction)
+        self._lever, self._ball.rolling_resistance = ball.rolling_resistance, 0.0
+
+    def holds(self, x: FloatArray) -> bool:
+        """Whether both, friction and resistance, can hold the ball at x."""
+        response = self._ball.response(self._ball.kinematics(x))
+        moment = math.hypot(*response.multipliers[2:].tolist())
+        return self._friction.reserve(response) >= 0 and moment <= self._lever * response.N
+
+    def released(self, x: FloatArray, speed: float) -> FloatArray:
+        """The state x with a speed of the centre [m/s], too small to matter, in the direction in which it sets off.
+
+        It gives the resistance a direction, which it has not at rest.
+        """
+        ball = self._ball.with_rows(self._ball.rows[:2])
+        kin = ball.kinematics(x)
+        acceleration = ball.response(kin).acceleration
+        pull = math.hypot(*(kin.D @ acceleration)[1:3].tolist())
+        result = x.copy()
+        result[-5:-3] += speed / pull * acceleration[:2]
+        return ball.eliminated(result)
+
+    def survey(self, y: FloatArray) -> Survey:  # noqa: ARG002 -- nothing changes any more
+        """See :class:`Mode`."""
+        return Survey(())

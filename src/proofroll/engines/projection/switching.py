@@ -1,0 +1,210 @@
+"""The sequence of sticking and slipping: which mode holds, when it ends, and which comes next."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+
+import numpy as np
+from scipy.optimize import brentq
+
+from proofroll.engines.projection.friction import Friction
+from proofroll.engines.projection.modes import Exit, Mode, Pace, Survey
+from proofroll.engines.projection.slipping import FreeSlip, SlavedSlip
+from proofroll.engines.projection.stepping import Stepper
+from proofroll.engines.projection.sticking import Rest, Stick
+from proofroll.errors import Diverged
+from proofroll.events import Event, EventKind
+from proofroll.surfaces import FloatArray
+
+Check = Callable[[float, FloatArray], None]
+
+# Times are located to this part of the time scale of the motion, or to round-off of the time itself.
+_LOCATED = 1e-12
+# A mode that ends where it started is possible; as many in a row as this are an endless loop.
+_WITHOUT_PROGRESS = 20
+
+
+class Switching:
+    """A ball under bounded friction.
+
+    Attributes:
+        mode: which holds now.
+        stepper: where the motion is.
+        events: so far.
+    """
+
+    def __init__(
+        self,
+        friction: Friction,
+        stepper: Stepper,
+        x: FloatArray,
+        scales: FloatArray,
+        pace: Pace,
+        check: Check,
+        eliminate: bool,
+    ) -> None:
+        """Starts at time 0 in the mode that the state x asks for.
+
+        Args:
+            friction: the ball and its law.
+            stepper: new.
+            x: coordinates and velocities, rolling without slip.
+            scales: natural size of each component of x.
+            pace: of the motion.
+            check: called with the time [s] and x after each step; raises Diverged if x is not to be trusted.
+            eliminate: remove the violation of what C v shall be after each step.
+        """
+        self.stepper = stepper
+        self.events: list[Event] = []
+        self._friction, self._check, self._eliminate, self._pace = friction, check, eliminate, pace
+        self._scales = np.append(scales, [pace.speed, 1.0])
+        self._stick, self._rest = Stick(friction, pace), Rest(friction)
+        self._slaved, self._free = SlavedSlip(friction, pace), FreeSlip(friction, pace)
+        self._idle = 0
+        self._lost: str | None = None
+        self.mode: Mode = self._stick
+        self._survey = Survey(())
+        self._settle(0.0, 0.0, x, was_sticking=True)
+
+    @property
+    def x(self) -> FloatArray:
+        """Coordinates and velocities now."""
+        return self.mode.x(self.stepper.y)
+
+    @property
+    def t(self) -> float:
+        """Present time [s]."""
+        return self.stepper.t
+
+    @property
+    def rates(self) -> FloatArray:
+        """Rates of the state now, those of x first."""
+        return self.mode.rates(self.stepper.y)
+
+    @property
+    def force(self) -> FloatArray:
+        """Force of the wall on the ball now along the local axes [N], shape (3,)."""
+        return self.mode.force(self.stepper.y)
+
+    def advance(self, t: float) -> None:
+        """Moves to time t [s].
+
+        Raises:
+            Diverged: the ball leaves the wall, or the integration gave up.
+        """
+        if self._lost:
+            raise Diverged(self._lost)
+        stepper = self.stepper
+        stepper.aim(t)
+        while stepper.t < t:
+            stepper.step(t, self._survey.longest)
+            survey = self.mode.survey(stepper.y)
+            ended = self._ended(survey)
+            if ended is not None:
+                self._switch(*ended)
+            elif survey.slaved:
+                self._enter(self._slaved, stepper.t, stepper.y[:-1])
+            else:
+                self._survey, self._idle = survey, 0
+
+    def _enter(self, mode: Mode, t: float, y: FloatArray) -> None:
+        def accept(at: float, state: FloatArray) -> FloatArray:
+            self._check(at, mode.x(state))
+            return mode.eliminated(state) if self._eliminate else state
+
+        self.mode = mode
+        self.stepper.begin(t, y, mode.rates, accept, self._scales[: len(y)])
+        self._survey = mode.survey(y)
+
+    def _ended(self, survey: Survey) -> tuple[Exit, float, float] | None:
+        """The first exit within the last step and the times [s] between which it lies."""
+        found = [
+            (*self._crossing(index, self.stepper.t), exit_)
+            for index, exit_ in enumerate(self.mode.exits)
+            if survey.margins[index] < 0
+        ]
+        if not found and self._survey.trend < 0 < survey.trend and self._may_dip(survey):
+            lowest = self._root(lambda t: self._at(t).trend, self.stepper.t_before, self.stepper.t)
+            if self._at(lowest).margins[survey.dips] < 0:
+                found = [(*self._crossing(survey.dips, lowest), self.mode.exits[survey.dips])]
+        if not found:
+            return None
+        low, high, exit_ = min(found, key=lambda one: one[1])
+        return exit_, low, high
+
+    def _may_dip(self, survey: Survey) -> bool:
+        """Whether a margin that was lowest within the last step could, were it a parabola, come anywhere near zero."""
+        bend = (self.stepper.t - self.stepper.t_before) * (survey.trend - self._survey.trend)
+        return min(self._survey.margins[survey.dips], survey.margins[survey.dips]) < bend
+
+    def _at(self, t: float) -> Survey:
+        return self.mode.survey(self.stepper.inside(t))
+
+    def _root(self, function: Callable[[float], float], low: float, high: float) -> float:
+        return float(brentq(function, low, high, xtol=self._resolution(high), rtol=4 * np.finfo(float).eps))
+
+    def _resolution(self, t: float) -> float:
+        return max(_LOCATED * self._pace.time, 4 * float(np.spacing(t)))
+
+    def _crossing(self, index: int, high: float) -> tuple[float, float]:
+        """Times [s] within the last step before and after a margin became negative, which it is at ``high``."""
+        start = self.stepper.t_before
+
+        def margin(t: float) -> float:
+            return self._at(t).margins[index]
+
+        low, width = start, self._resolution(high)
+        if self._survey.margins[index] <= 0:
+            # The margin starts at zero and rises first (a slip starts with none): go back to where it is positive.
+            low = 0.5 * (start + high)
+            while low - start > width and margin(low) <= 0:
+                low, high = 0.5 * (start + low), low
+            if low - start <= width:
+                return start, start
+        root = self._root(margin, low, high)
+        while True:  # what the root search says, with a state on either side
+            before, after = max(low, root - width), min(high, root + width)
+            if (margin(before) > 0 or before == low) and (margin(after) < 0 or after == high):
+                return before, after
+            width *= 4
+
+    def _switch(self, exit_: Exit, low: float, high: float) -> None:
+        self._idle = self._idle + 1 if high == self.stepper.t_before else 0
+        if self._idle > _WITHOUT_PROGRESS:
+            raise Diverged(f"sticking and slipping alternate without end at t = {high:.6g} s")
+        y = self.stepper.inside(high)
+        x = self.mode.x(y)
+        if exit_ is Exit.CONE:
+            self._event("slip", low, high)
+            self._enter(self._slaved, high, np.append(x, 0.0))
+        elif exit_ is Exit.CHANGE:
+            self._enter(self._free, high, self._slaved.freed(y))
+        elif exit_ is Exit.LIFTOFF:
+            self._event("liftoff", low, high)
+            self._enter(self.mode, high, y)
+            self._lost = f"the ball leaves the wall at t = {high:.6g} s; its flight is not modelled"
+            raise Diverged(self._lost)
+        else:
+            self._settle(low, high, x, self.mode.sticking)
+
+    def _settle(self, low: float, high: float, x: FloatArray, was_sticking: bool) -> None:
+        """Goes on from where the contact point stands still, at the state x: sticking if the static cone allows it."""
+        ball = self._friction.rolling
+        if high > 0:
+            x = ball.eliminated(x)
+        speed = self._stick.speed(x) if self._stick.halts else np.inf
+        mode: Mode
+        if speed <= self._pace.settled and self._rest.holds(x):
+            mode, x = self._rest, self._rest.eliminated(x)
+        else:
+            if speed <= 2 * self._pace.still:
+                x = self._rest.released(x, 10 * self._pace.still)
+            holds = self._friction.reserve(ball.response(ball.kinematics(x))) >= 0
+            mode = self._stick if holds else self._slaved
+        if mode.sticking != was_sticking:
+            self._event("stick" if mode.sticking else "slip", low, high)
+        self._enter(mode, high, x if mode.sticking else np.append(x, 0.0))
+
+    def _event(self, kind: EventKind, low: float, high: float) -> None:
+        bracket = self.stepper.bracket(low, high) if high > 0 else (0.0, 0.0)  # how it starts needs no search
+        self.events.append(Event(kind, 0.5 * (low + high), *bracket))

@@ -1,0 +1,341 @@
+"""The projection method under bounded friction: which events, when, what follows them, and the law of friction."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+import proofroll
+from proofroll.engines.projection import slipping
+from proofroll.engines.projection.friction import Friction
+from proofroll.engines.projection.geometry import geometry_of
+from proofroll.engines.projection.method import ProjectedBall
+from proofroll.engines.projection.orientation import EulerAngles, RotatingFrame
+from proofroll.errors import Diverged, InputError
+from proofroll.events import events_of
+from proofroll.mechanics import slip_velocity
+from proofroll.recording import record
+from proofroll.simulation import build, simulate
+from proofroll.surfaces import Cylinder
+
+EULER, FRAME = "projection[formulation=euler]", "projection[formulation=rotating_frame]"
+RK4 = "projection[formulation=rotating_frame,preset=default]"
+EULER_RK4 = "projection[formulation=euler,preset=default]"
+PAPER = {"speed": 4, "rolling_resistance": 5e-4, "mu_static": 0.35}
+G, A, TILT = 9.81, 0.025, 0.35
+
+
+def cylinder(**parameters):
+    """The ball in the cylinder."""
+    return proofroll.load_scene("sphere_in_cylinder", **parameters)
+
+
+def plane(**parameters):
+    """The ball on the plane."""
+    return proofroll.load_scene("inclined_plane", **{"tilt": TILT, "cross_speed": 0, **parameters})
+
+
+def run(scene, engine, until, **settings):
+    """The engine at the time ``until``, reached in one go."""
+    built = build(scene, engine, **settings)
+    built.advance(until)
+    return built
+
+
+def kinds(engine):
+    """The kinds of the events so far."""
+    return [event.kind for event in engine.events()]
+
+
+def times(engine):
+    """The times of the events so far."""
+    return np.array([event.time for event in engine.events()])
+
+
+def local(scene, sample):
+    """N, friction and slip velocity in components along e2 and e3."""
+    frame = scene.rolling.surface.frame(scene.rolling.surface.locate(sample.p_WB))
+    slip = slip_velocity(scene.rolling.ball.radius, frame[:, 0], sample.v_WB, sample.w_WB)
+    force = frame.T @ sample.force
+    return -force[0], force[1:], frame[:, 1:].T @ slip
+
+
+@pytest.fixture(scope="module")
+def paper():
+    """The paper's case to 4 s, sampled."""
+    return simulate(cylinder(**PAPER), FRAME, until=4, every=0.02)
+
+
+def test_papers_case(paper):
+    """It slips, sticks, slips and falls at the times, and to the height, that an independent solver gave."""
+    assert [event.kind for event in events_of(paper)] == ["slip", "stick", "slip"]
+    # the reference is given to these digits
+    assert [event.time for event in events_of(paper)] == pytest.approx([1.720183172, 2.00812799, 2.44969538], abs=6e-9)
+    assert float(paper.z[-1]) == pytest.approx(-2.2976587, abs=6e-8)
+
+
+def test_state_at_the_first_slip():
+    """Where the first slip starts, the ball is where an independent solver has it."""
+    engine = run(cylinder(**PAPER), FRAME, 1.720183172)
+    x = engine._motion.x
+    np.testing.assert_allclose(x[:4], [28.02160251, -0.15342234, 13.44828166, -0.39505144], rtol=0, atol=1e-8)
+    assert x[4] == pytest.approx(-101.7254881, abs=1e-6)
+
+
+def test_law_of_friction_in_slip(paper):
+    """While the ball slips, friction is μ_k N to round-off, against the slip velocity."""
+    slips = paper.where(paper.sticking == 0, drop=True)
+    assert slips.sizes["time"] > 80
+    np.testing.assert_allclose(slips.needed_friction, 0.35, rtol=1e-12)
+    u, F = (np.stack([slips[f"{name}2"], slips[f"{name}3"]]) for name in ("slip", "F"))
+    cosine = np.sum(u * F, axis=0) / np.hypot(*u) / np.hypot(*F)
+    np.testing.assert_allclose(cosine, -1, rtol=0, atol=1e-12)
+
+
+def test_sticking_stays_within_the_cone(paper):
+    """While the ball sticks, the needed friction is below μ_s N and the contact point does not creep."""
+    sticks = paper.where(paper.sticking == 1, drop=True)
+    assert sticks.sizes["time"] > 80
+    assert float(sticks.needed_friction.max()) < 0.35
+    assert float(np.hypot(sticks.slip2, sticks.slip3).max()) < 1e-13
+
+
+def test_samples_and_events_say_the_same(paper):
+    """A sample sticks exactly if the last event before it was no slip."""
+    slip, stick, again = (event.time for event in events_of(paper))
+    t = paper.time.to_numpy()
+    expected = (t < slip) | ((t >= stick) & (t < again))
+    np.testing.assert_array_equal(paper.sticking, expected)
+
+
+@pytest.mark.parametrize(
+    ("parameters", "until", "expected"),
+    [
+        ({"speed": 4, "mu_static": 0.15}, 0.75, [0.176667992, 0.412090574, 0.628116731, 0.710311325]),
+        ({"speed": 4, "mu_static": 0.12}, 0.3, [0.14413074]),
+        ({"speed": 2, "mu_static": 0.35}, 0.3, [0.2166732]),
+        ({"speed": 2, "mu_static": 0.35, "rolling_resistance": 5e-4}, 0.3, [0.20720339]),
+        ({"speed": 6, "mu_static": 0.35, "rolling_resistance": 5e-4}, 3.37, [3.36617197]),
+    ],
+)
+def test_times_of_other_cases(parameters, until, expected):
+    """Slip and stick come, in turn, at the times that an independent solver gave."""
+    engine = run(cylinder(**parameters), FRAME, until)
+    assert kinds(engine) == ["slip", "stick", "slip", "stick"][: len(expected)]
+    assert times(engine) == pytest.approx(expected, abs=6e-9 if len(expected) > 1 else 4e-8)
+
+
+def test_fall():
+    """With μ < g c/V0² the first slip is the fall, and after 3 s it is as deep as an independent solver says."""
+    engine = run(cylinder(speed=4, mu_static=0.12), FRAME, 3.0)
+    assert kinds(engine) == ["slip"]
+    assert engine.sample().p_WB[2] == pytest.approx(-2.7869160, abs=6e-8)
+
+
+def test_formulations_agree():
+    """Euler angles and the rotating frame give the same events and the same path through them."""
+    scene = cylinder(speed=4, mu_static=0.15, mu_kinetic=0.13, rolling_resistance=1e-5)
+    angles, frame = (run(scene, engine, 0.5) for engine in (EULER, FRAME))
+    assert kinds(angles) == kinds(frame) == ["slip", "stick"]
+    np.testing.assert_allclose(times(angles), times(frame), rtol=0, atol=1e-10)
+    np.testing.assert_allclose(angles.sample().p_WB, frame.sample().p_WB, rtol=0, atol=1e-11)
+    np.testing.assert_allclose(angles.sample().force, frame.sample().force, rtol=0, atol=1e-8)
+
+
+@pytest.mark.parametrize("mu_kinetic", [0.35, 0.25])
+def test_size_of_the_start_does_not_matter(monkeypatch, mu_kinetic):
+    """Handing a slip's direction over a decade earlier or later moves events and path by round-off only."""
+    found = []
+    for start in (1e-2, 1e-3, 1e-4):
+        monkeypatch.setattr(slipping, "START", start)
+        engine = run(cylinder(**PAPER, mu_kinetic=mu_kinetic), FRAME, 2.6)
+        found.append([*times(engine), *engine.sample().p_WB])
+    np.testing.assert_allclose(found[1:], [found[0]] * 2, rtol=0, atol=1e-11)  # measured 1e-12
+
+
+def test_slaved_direction_is_the_one_that_is_reached(monkeypatch):
+    """A slip started early, and integrated from there, reaches the direction that a slaved one has from the start."""
+    directions = []
+    for start in (1e-5, 1e-2):
+        monkeypatch.setattr(slipping, "START", start)
+        engine = run(cylinder(**PAPER), FRAME, 1.7222)  # 2 ms of slip: one is free by now, the other slaved
+        directions.append(np.arctan2(*local(cylinder(**PAPER), engine.sample())[2][::-1]))
+        assert isinstance(engine._motion.mode, slipping.FreeSlip if start < 1e-3 else slipping.SlavedSlip)
+    assert directions[0] == pytest.approx(directions[1], abs=1e-7)
+
+
+def test_jump_of_friction():
+    """With μ_k < μ_s the friction drops at once, and the slip grows at (1/m + a²/J)(μ_s - μ_k) N."""
+    scene = cylinder(speed=4, mu_static=0.15, mu_kinetic=0.12)
+    engine = run(scene, FRAME, 0.1767)
+    since = 0.1767 - times(engine)[0]
+    N, friction, slip = local(scene, engine.sample())
+    assert np.hypot(*friction) / N == pytest.approx(0.12, rel=1e-12)
+    ball = scene.rolling.ball
+    growth = (1 / ball.mass + A**2 / ball.inertia) * (0.15 - 0.12) * N
+    assert np.hypot(*slip) / since == pytest.approx(growth, rel=2e-3)  # it grows further as the needed friction does
+
+
+@pytest.mark.parametrize("mu", [0.0, 0.03, 0.08])
+def test_plane(mu):
+    """With tan(tilt) > 3.5 μ it slips from the start: v grows by g(sin - μ cos) t, the slip by g(sin - 3.5 μ cos) t."""
+    scene = plane(speed=0.5, mu_static=mu)
+    engine = build(scene, FRAME)
+    assert engine.events()[0].time == engine.events()[0].time_high == 0
+    recording = record(engine, scene, np.linspace(0, 0.5, 6))
+    ds, t = recording.dataset, np.linspace(0, 0.5, 6)
+    assert not np.any(ds.sticking)
+    np.testing.assert_allclose(ds.down_rate, 0.5 + G * (np.sin(TILT) - mu * np.cos(TILT)) * t, rtol=1e-13)
+    np.testing.assert_allclose(ds.slip2, G * (np.sin(TILT) - 3.5 * mu * np.cos(TILT)) * t, rtol=0, atol=1e-13)
+    np.testing.assert_allclose(ds.F2, -mu * scene.rolling.ball.mass * G * np.cos(TILT), rtol=1e-12)
+
+
+def test_plane_that_is_rough_enough():
+    """With tan(tilt) < 3.5 μ, however little, the ball rolls."""
+    engine = run(plane(speed=0.5, mu_static=np.tan(TILT) / 3.5 * (1 + 1e-9)), FRAME, 0.3)
+    assert engine.events() == ()
+    assert engine.sample().sticking
+
+
+def test_without_friction_it_falls_freely():
+    """With μ = 0 the ball slips from the start, keeps its horizontal speed and falls by g t²/2."""
+    engine = run(cylinder(speed=4, mu_static=0), FRAME, 0.5)
+    assert engine.sample().p_WB[2] == pytest.approx(-G * 0.5**2 / 2, rel=1e-12)
+    assert np.hypot(*engine.sample().v_WB[:2]) == pytest.approx(4, rel=1e-13)
+
+
+def test_crest_within_a_step():
+    """A crest of needed friction that leaves the cone for less than one step is seen, and one just below is not."""
+    crest = 12 / 7 * G * 0.2 / 4**2  # f = 0, first reached at cos νt = -1
+    above, below = (
+        run(cylinder(speed=4, mu_static=crest * scale), FRAME, 0.5, rtol=1e-9) for scale in (1 - 1e-6, 1 + 1e-6)
+    )
+    assert kinds(above) == ["slip", "stick"]
+    assert times(above)[0] == pytest.approx(np.pi / np.sqrt(2 / 7) / 20, abs=3e-4)
+    assert kinds(below) == []
+
+
+def test_many_short_slips():
+    """With f = 0 and μ little above g c/V0² it slips and sticks in turns, ever more shortly, until it settles."""
+    engine = run(cylinder(speed=4, mu_static=0.125), FRAME, 5.3)
+    assert kinds(engine) == ["slip", "stick"] * 16
+    durations = np.diff(times(engine))[::2]
+    assert np.all(np.diff(durations) < 0)
+
+
+def test_fixed_step_brackets_events_by_one_step():
+    """With rk4 each event lies in a bracket of the grid, one step wide, and the run goes on along the grid."""
+    dt = 1e-3
+    engine = run(cylinder(speed=4, mu_static=0.15), RK4, 0.75, dt=dt)
+    assert kinds(engine) == ["slip", "stick", "slip", "stick"]
+    for event in engine.events():
+        assert event.time_low <= event.time <= event.time_high
+        assert event.time_high - event.time_low == pytest.approx(dt, rel=1e-9)
+        assert event.time_low / dt == pytest.approx(round(event.time_low / dt), abs=1e-9)
+    assert times(engine) == pytest.approx([0.176667992, 0.412090574, 0.628116731, 0.710311325], abs=1e-7)
+    with pytest.raises(InputError, match="dt"):
+        engine.advance(0.7505)
+
+
+def test_order_survives_the_events():
+    """Through slip, stick and slip again the error of rk4 still falls with the fourth power of the step."""
+    scene = cylinder(**PAPER)
+    exact = run(scene, FRAME, 2.6).sample().p_WB[2]
+    errors = [abs(run(scene, RK4, 2.6, dt=dt).sample().p_WB[2] - exact) for dt in (2e-2, 1e-2, 5e-3)]
+    assert np.log2(errors[0] / errors[1]) == pytest.approx(4, abs=0.7), errors
+    assert np.log2(errors[1] / errors[2]) == pytest.approx(4, abs=0.7), errors
+
+
+def test_default_has_the_order_of_events_right():
+    """With rk4 at 1 ms and Euler angles the paper's first slip is in the right step, and events in the right order."""
+    engine = run(cylinder(**PAPER), EULER_RK4, 2.5)
+    assert kinds(engine) == ["slip", "stick", "slip"]
+    assert engine.events()[0].time_low <= 1.720183172 <= engine.events()[0].time_high
+
+
+@pytest.mark.parametrize("engine", [FRAME, RK4])
+def test_looking_does_not_disturb(engine):
+    """Samples between two advances, in any mode, change no bit of what follows."""
+    scene = cylinder(speed=4, mu_static=0.15)
+    watched, alone = build(scene, engine), build(scene, engine)
+    for t in (0.1, 0.178, 0.3, 0.42):
+        watched.advance(t)
+        alone.advance(t)
+        watched.sample()
+    np.testing.assert_array_equal(watched.sample().force, alone.sample().force)
+    np.testing.assert_array_equal(watched.sample().p_WB, alone.sample().p_WB)
+    assert watched.events() == alone.events()
+
+
+def test_singularity_is_reported_in_slip():
+    """A slipping ball whose body axis turns into the vertical: euler says so, rotating_frame goes on."""
+    scene = cylinder(speed=4, axial_speed=-4, mu_static=0.05)
+    engine = build(scene, EULER)
+    with pytest.raises(Diverged, match=r"θ reached .* rad .*; use formulation=rotating_frame"):
+        engine.advance(0.5)
+    assert kinds(run(scene, FRAME, 0.5))[0] == "slip"
+
+
+@pytest.mark.parametrize("engine", [FRAME, RK4])
+def test_leaving_the_wall(engine):
+    """In a lying cylinder a ball too slow to pass the top slips and leaves the wall where N = 0; the run ends there."""
+    scene = cylinder(speed=2.2, mu_static=0.3)
+    scene = replace(scene, surfaces=(Cylinder("wall", 0.225, 1.5),))
+    built = build(scene, engine)
+    recording = record(built, scene, np.linspace(0, 1, 11))
+    assert kinds(built) == ["slip", "liftoff"]
+    assert recording.failure == "the ball leaves the wall at t = 0.233181 s; its flight is not modelled"
+    assert [event.kind for event in events_of(recording.dataset)] == ["slip", "liftoff"]
+    assert local(scene, built.sample())[0] == pytest.approx(0, abs=1e-9)
+
+
+@pytest.mark.parametrize("engine", [FRAME, RK4, EULER])
+def test_coming_to_rest(engine):
+    """On a level plane rolling resistance stops the ball after a V²/(2 · 5/7 g f/a), and there it stays, spinning."""
+    scene = plane(tilt=0, speed=0.06, cross_speed=0.08, rolling_resistance=5e-4, mu_static=0.3, normal_spin=4)
+    found = run(scene, engine, 1.0).sample()
+    way = 0.1**2 / (2 * 5 / 7 * G * 5e-4 / A)
+    np.testing.assert_allclose(found.p_WB[:2], [0.6 * way, -0.8 * way], rtol=0, atol=1e-9)
+    np.testing.assert_allclose(found.v_WB, 0, atol=1e-11)
+    np.testing.assert_allclose(found.w_WB, [0, 0, -4], atol=1e-9)
+    assert found.sticking
+
+
+def test_rolling_back():
+    """On a plane too steep for rolling resistance a ball that rolled up stops and rolls back."""
+    scene = plane(tilt=0.2, speed=-0.3, rolling_resistance=5e-4, mu_static=0.3)
+    pull, resistance = 5 / 7 * G * np.sin(0.2), 5 / 7 * G * np.cos(0.2) * 5e-4 / A
+    stop = 0.3 / (pull + resistance)
+    expected = -0.3 * stop / 2 + (pull - resistance) * (1 - stop) ** 2 / 2
+    found = simulate(scene, FRAME, until=1, every=0.5)
+    assert float(found.down[-1]) == pytest.approx(expected, abs=1e-10)
+    assert events_of(found) == []
+
+
+def test_slip_that_reverses():
+    """A slip that stops where sticking is impossible goes on the other way, without an event."""
+    # With f/a = 0.12 a rolling ball would need |F|/N = 0.086 on the level plane.
+    scene = plane(tilt=0, speed=-0.167, rolling_resistance=3e-3, mu_static=0.065)
+    engine = build(scene, FRAME)
+    ds = record(engine, scene, np.linspace(0, 0.34, 18)).dataset
+    assert kinds(engine) == ["slip"]
+    assert float(ds.slip2.min()) < -0.1
+    assert float(ds.slip2.max()) > 1e-3
+
+
+@pytest.mark.parametrize("seed", range(3))
+@pytest.mark.parametrize("orientation", [EulerAngles, RotatingFrame])
+def test_drive_is_the_needed_friction(orientation, seed):
+    """Without friction the slip changes at (1/m + a²/J) times the needed friction reversed, in any state."""
+    rng = np.random.default_rng(seed)
+    scene = cylinder(rolling_resistance=5e-4, mu_static=0.3)
+    describe = orientation()
+    ball = ProjectedBall(scene.rolling, geometry_of(scene.rolling.surface), describe)
+    angles = np.array([0.3, 1.2, -0.7])[: describe.size]
+    kin = ball.kinematics(np.concatenate([rng.uniform(-2, 2, 2), angles, rng.uniform(-1, 1, 5) * [20, 1, 90, 90, 90]]))
+    needed = ball.contact_force(ball.response(kin))[1:]
+    m, J = scene.rolling.ball.mass, scene.rolling.ball.inertia
+    found = Friction(ball, scene.rolling.contact).drive(kin)
+    np.testing.assert_allclose(found, -(1 / m + A**2 / J) * needed, rtol=0, atol=1e-9 * np.max(np.abs(found)))
