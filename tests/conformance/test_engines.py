@@ -14,7 +14,6 @@ from proofroll.registry import engine_names, load_engine
 # Engine -> pattern of checks -> why they are known to fail.
 KNOWN: Mapping[str, Mapping[str, str]] = {
     "mujoco": {
-        "order_is_as_declared[chart-default]": "declares 1; with a time constant of its own the order is that of RK4, 4",
         "order_is_as_declared[facets-*]": "each edge between two facets is a kick, at another moment for every step",
     },
 }

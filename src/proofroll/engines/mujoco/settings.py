@@ -72,9 +72,13 @@ class MujocoSettings:
 
     @property
     def order(self) -> int | None:
-        """Measured; with a time constant that does not shrink with the step the limit is not the rolling ball."""
-        second = self.time_constant is not None and (self.curvature or self.formulation == "chart")
-        return 2 if second else 1
+        """Measured; with a time constant that does not shrink with the step the limit is not the rolling ball.
+
+        Such a contact is a smooth spring, which an integrator follows at its own order: 4 for RK4.
+        """
+        if self.time_constant is None:
+            return 4 if self.integrator == "RK4" else 1
+        return 2 if self.curvature or self.formulation == "chart" else 1
 
 
 def velocity_lag(settings: MujocoSettings) -> float:
