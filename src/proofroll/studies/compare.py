@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import dataclasses
 import itertools
 import json
 from collections.abc import Callable, Iterable, Sequence
@@ -87,6 +88,10 @@ class Outcome:
 def point_name(parameters: dict[str, float]) -> str:
     """A point of the parameters as text, e.g. ``speed=4, rolling_resistance=0.0005``."""
     return ", ".join(f"{key}={value:g}" for key, value in parameters.items())
+
+
+# Observables that hang on when slip begins.
+_OF_EVENTS = frozenset({"first_slip", "event_order"})
 
 
 @dataclass(frozen=True)
@@ -304,19 +309,20 @@ def _judgements(
         if tolerance is None:
             continue
         true, bar = reference.true(name, curve)
-        judgements.append(
-            judge(
-                name,
-                curve.unit,
-                curve.values,
-                true,
-                truth_error_bar=bar,
-                tolerance=tolerance.absolute(reference.sizes.get(name, 1.0)),
-                scale=reference.sizes.get(name, 1.0),
-                limit=_limit(run, name, curves),
-                ill_posed=reference.ill_posed,
-            )
+        judgement = judge(
+            name,
+            curve.unit,
+            curve.values,
+            true,
+            truth_error_bar=bar,
+            tolerance=tolerance.absolute(reference.sizes.get(name, 1.0)),
+            scale=reference.sizes.get(name, 1.0),
+            limit=_limit(run, name, curves),
+            ill_posed=reference.ill_posed,
         )
+        if reference.ill_posed and name in _OF_EVENTS:
+            judgement = dataclasses.replace(judgement, verdict=Verdict.ILL_POSED)  # agreement would be luck
+        judgements.append(judgement)
     return judgements
 
 
@@ -345,7 +351,8 @@ def _contradictions(comparison: Comparison, run: Planned, judgements: list[Judge
     where = f"{run.row.engine} at {point_name(run.parameters)}"
     found = []
     overall = worst(judgements)
-    if overall not in run.row.expect:
+    # Only the truth makes a question ill-posed; where it does, that is expected of every engine.
+    if overall not in {*run.row.expect, Verdict.ILL_POSED}:
         # Which observables make it so; where it is better than expected, all of them do.
         guilty = [judgement for judgement in judgements if judgement.verdict == overall]
         said = "; ".join(_said(judgement) for judgement in guilty)
