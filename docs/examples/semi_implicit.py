@@ -54,4 +54,5 @@ class SemiImplicit:
         return Sample(self.p, self.v, self.w, force=newton_euler(self.body, self.p, self.v, self.w)[2])
 
     def built(self) -> Built:
-        return Built(acceleration=newton_euler(self.body, self.p, self.v, self.w)[0])
+        resistance = self.body.contact.rolling_resistance
+        return Built(rolling_resistance=resistance, acceleration=newton_euler(self.body, self.p, self.v, self.w)[0])

@@ -7,7 +7,12 @@ from typing import Any
 
 import numpy as np
 
-from proofroll.mechanics import initial_response, slip_velocity
+from proofroll.mechanics import (
+    initial_angular_acceleration,
+    initial_response,
+    natural_acceleration,
+    slip_velocity,
+)
 from proofroll.scene import Scene
 
 # Engines that compute in double precision reproduce the scene's numbers to this relative difference.
@@ -42,19 +47,25 @@ class Line:
 
 
 def certify(engine: Any, scene: Scene) -> list[Line]:
-    """Compares a freshly built engine with the scene. Quantities about which the engine is silent are left out."""
+    """Compares a freshly built engine with the scene.
+
+    Quantities about which the engine is silent are left out, except those that the scene requires it to have:
+    rolling resistance and bounded friction.
+    """
     body = scene.rolling
     built, sample = engine.built(), engine.sample()
     acceleration, force = initial_response(body)
+    natural = natural_acceleration(body)
     frame = body.surface.frame(body.u0)
     speed = float(np.linalg.norm(body.v0)) or 1.0
-    weight = body.ball.mass * max(float(np.linalg.norm(body.gravity)), float(np.linalg.norm(acceleration)))
     spin = max(float(np.linalg.norm(body.w0)), speed / body.ball.radius)
     lines: list[Line] = []
 
-    def compare(quantity: str, unit: str, expected: Any, found: Any, scale: float) -> None:
+    def compare(quantity: str, unit: str, expected: Any, found: Any, scale: float, required: bool = False) -> None:
         if found is None:
-            return
+            if not required:
+                return
+            found = np.nan
         want, got = np.atleast_1d(np.asarray(expected, float)), np.atleast_1d(np.asarray(found, float))
         difference = float(np.max(np.abs(got - want))) / scale if got.shape == want.shape else float("inf")
         soft = built.regularised.get(quantity)
@@ -75,17 +86,35 @@ def certify(engine: Any, scene: Scene) -> list[Line]:
     compare("gravity", "m/s^2", body.gravity, built.gravity, float(np.linalg.norm(body.gravity)) or 1.0)
     compare("ball radius", "m", body.ball.radius, built.ball_radius, body.ball.radius)
     f = body.contact.rolling_resistance
-    compare("rolling resistance", "m", f, built.rolling_resistance, f or body.ball.radius)
+    compare("rolling resistance", "m", f, built.rolling_resistance, f or body.ball.radius, required=f > 0)
+    for name, expected, found in (
+        ("static friction", body.contact.mu_static, built.mu_static),
+        ("kinetic friction", body.contact.mu_kinetic, built.mu_kinetic),
+    ):
+        bounded = np.isfinite(expected)
+        if bounded:
+            compare(name, "1", expected, found, expected or 1.0, required=True)
+        elif found is not None:  # a number that stands for no bound is the closer to it, the larger it is
+            compare(f"1 / {name}", "1", 0.0, 1 / found if found else np.inf, 1.0)
     compare("position", "m", body.p0, sample.p_WB, body.ball.radius)
     compare("gap", "m", 0.0, body.surface.gap(sample.p_WB), body.ball.radius)
+    compare("gap in the engine", "m", 0.0, built.gap, body.ball.radius)
     compare("velocity", "m/s", body.v0, sample.v_WB, speed)
     compare("spin", "rad/s", body.w0, sample.w_WB, spin)
     slip = slip_velocity(body.ball.radius, body.surface.normal(sample.p_WB), sample.v_WB, sample.w_WB)
     compare("slip", "m/s", np.zeros(3), slip, speed)
-    compare("acceleration", "m/s^2", acceleration, built.acceleration, float(np.linalg.norm(acceleration)) or 1.0)
+    compare("acceleration", "m/s^2", acceleration, built.acceleration, natural)
+    turning = initial_angular_acceleration(body)
+    compare("angular acceleration", "rad/s^2", turning, built.angular_acceleration, natural / body.ball.radius)
     if sample.force is not None:
         for index, (name, sign) in enumerate((("N", -1.0), ("F2", 1.0), ("F3", 1.0))):
-            compare(name, "N", sign * force @ frame[:, index], sign * sample.force @ frame[:, index], weight)
+            compare(
+                name,
+                "N",
+                sign * force @ frame[:, index],
+                sign * sample.force @ frame[:, index],
+                body.ball.mass * natural,
+            )
     return lines
 
 

@@ -208,7 +208,8 @@ def report(
     runner = _runner(out, fresh, jobs)
     outcomes = _outcomes(loaded, engine or [], runner)
     command = "proofroll report " + " ".join(studies or [])
-    content = write_report(outcomes, runner.store, out, command.strip())
+    maps = [_regime_maps(item, jobs) if item.regimes else [] for item in loaded]
+    content = write_report(outcomes, runner.store, out, command.strip(), maps)
     if as_json:
         _print_json(content)
     else:
@@ -268,18 +269,13 @@ def regimes(
     as_json: Json = False,
 ) -> None:
     """Draw the map over speed and friction: never slips, slips and recovers, falls."""
-    import os
-
     from proofroll.comparison_file import load_comparison
     from proofroll.report.regime_map import draw, regime_content
     from proofroll.store import Store, write_text
-    from proofroll.studies.regimes import regime_maps
 
     loaded = load_comparison(study)
     Store(out)  # fails before the work rather than after it
-    workers = jobs or os.cpu_count() or 1
-    with _progress("runs of the truth", total=loaded.regimes.count if loaded.regimes else None) as advance:
-        maps = regime_maps(loaded, workers, lambda count: advance("runs of the truth", count))
+    maps = _regime_maps(loaded, jobs)
     content = regime_content(maps)
     draw(maps, out / "regimes.svg")
     write_text(out / "regimes.json", json.dumps(content, indent=1))
@@ -312,6 +308,17 @@ def _outcomes(comparisons: list[Any], engines: list[str], runner: Runner) -> lis
     with _progress("cases", total=len(cases)) as advance:
         results = runner.run(cases.values(), lambda case, _: advance(case.engine.name))
     return [evaluate(item, results, runner) for item in plans]
+
+
+def _regime_maps(comparison: Any, jobs: int | None) -> list[Any]:
+    """The comparison's regime maps, with a progress bar."""
+    import os
+
+    from proofroll.studies.regimes import regime_maps
+
+    total = comparison.regimes.count if comparison.regimes else None
+    with _progress("runs of the truth", total=total) as advance:
+        return regime_maps(comparison, jobs or os.cpu_count() or 1, lambda count: advance("runs of the truth", count))
 
 
 @contextmanager

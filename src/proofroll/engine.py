@@ -59,10 +59,16 @@ class Built:
         inertia: central inertia of the ball, principal values [kg m²], shape (3,).
         gravity: acceleration of gravity in the world [m/s²], shape (3,).
         ball_radius: [m].
-        rolling_resistance: f [m]; 0 or None where nothing of the kind was built.
+        rolling_resistance: f [m]; 0 where nothing of the kind was built. None counts as missing where f > 0.
+        mu_static, mu_kinetic: coefficients of friction [-]; inf where friction has no bound. None counts as missing
+            where friction is bounded.
+        gap: distance of the ball from the engine's own wall at time 0 [m].
         acceleration: of the ball's centre at time 0 [m/s²], shape (3,).
+        angular_acceleration: of the ball at time 0 in the world [rad/s²], shape (3,).
         regularised: names of certificate quantities (``gap``, ``slip``, ``spin``, ``acceleration``, ``N``, ``F2``, …)
-            that the model softens, with tolerance and reason.
+            that the model softens, with tolerance and reason. Tolerances of acceleration, N, F2 and F3 are relative
+            to :func:`proofroll.mechanics.natural_acceleration`; one of ``1 / static friction``, where the scene has no
+            bound and the engine needs a number, to 1/mu.
     """
 
     mass: float | None = None
@@ -70,7 +76,11 @@ class Built:
     gravity: FloatArray | None = None
     ball_radius: float | None = None
     rolling_resistance: float | None = None
+    mu_static: float | None = None
+    mu_kinetic: float | None = None
+    gap: float | None = None
     acceleration: FloatArray | None = None
+    angular_acceleration: FloatArray | None = None
     regularised: Mapping[str, Regularised] = field(default_factory=dict)
 
 

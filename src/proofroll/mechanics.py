@@ -36,6 +36,15 @@ def energy(body: RollingBall, p_WB: FloatArray, v_WB: FloatArray, w_WB: FloatArr
     return np.asarray(kinetic - m * p_WB @ body.gravity)
 
 
+def natural_acceleration(body: RollingBall) -> float:
+    """What accelerations, and times the mass forces, are measured by at time 0: max(g, |p̈|) [m/s²], never zero.
+
+    The certificate's relative differences of acceleration, N, F2 and F3 refer to it.
+    """
+    acceleration = initial_response(body)[0]
+    return max(float(np.linalg.norm(body.gravity)), float(np.linalg.norm(acceleration))) or 1.0
+
+
 def initial_response(body: RollingBall) -> tuple[FloatArray, FloatArray]:
     """Acceleration of the centre [m/s²] and force of the wall on the ball [N] at time 0, each shape (3,).
 
@@ -53,6 +62,15 @@ def initial_response(body: RollingBall) -> tuple[FloatArray, FloatArray]:
         return acceleration, force
     force = normal + friction * (body.contact.mu_kinetic * press / needed)
     return force / body.ball.mass + body.gravity, force
+
+
+def initial_angular_acceleration(body: RollingBall) -> FloatArray:
+    """ω̇ at time 0 in the world [rad/s²], shape (3,): moments of the wall's force and of the resistance, over J."""
+    _, force = initial_response(body)
+    e1 = body.surface.normal(body.p0)
+    moment = body.ball.radius * np.cross(e1, force)
+    moment += resistance_moment(body.contact.rolling_resistance, -force @ e1, e1, body.v0)
+    return np.asarray(moment / body.ball.inertia)
 
 
 def newton_euler(

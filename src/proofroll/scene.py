@@ -189,6 +189,11 @@ class Scene:
 
     @cached_property
     def digest(self) -> str:
-        """Hash of everything that decides the motion (not of the title or the folder)."""
+        """Hash of everything that decides the motion: the mechanics, and the engine-native files beside them."""
         content = {key: value for key, value in asdict(self).items() if key not in {"title", "folder", "parameters"}}
-        return hashlib.sha256(json.dumps(content, sort_keys=True, default=str).encode()).hexdigest()[:16]
+        found = hashlib.sha256(json.dumps(content, sort_keys=True, default=str).encode())
+        if self.folder != Path():
+            for file in sorted(self.folder.iterdir()):
+                if file.is_file() and file.suffix not in {".toml", ".md"}:
+                    found.update(file.name.encode() + file.read_bytes())
+        return found.hexdigest()[:16]

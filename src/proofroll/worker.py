@@ -160,7 +160,7 @@ def _run(case: Case, out: Path) -> Result:
         return Result(Status.DIVERGED, str(error), versions=versions)
     timings: list[float] = []
     if recording.failure is None and case.timed and case.until > 0:
-        timings = _clean_runs(kind, scene, settings, case.until)
+        timings = _clean_runs(kind, scene, settings, times)
     result = Result(
         status=Status.DONE if recording.failure is None else Status.DIVERGED,
         message=recording.failure or f"reached {case.until:g} s",
@@ -200,13 +200,18 @@ def _run_truth(scene: Any, times: Any, out: Path, versions: dict[str, str]) -> R
     return Result(Status.DONE, message, wall_seconds=wall, versions=versions, trajectory=out.name)
 
 
-def _clean_runs(kind: Any, scene: Any, settings: Any, until: float) -> list[float]:
-    """Wall seconds of runs that only advance, each on an engine built for it."""
+def _clean_runs(kind: Any, scene: Any, settings: Any, times: Any) -> list[float]:
+    """Wall seconds of runs that only advance, each on an engine built for it.
+
+    They stop where the sampled run stopped: an adaptive step that may run past a sample is another, cheaper one.
+    """
+    grid = [float(t) for t in times[1:]]
     timings: list[float] = []
     while len(timings) < _TIMED_RUNS and sum(timings) < _TIMED_SECONDS:
         engine = kind.build(scene, settings)
         start = time.perf_counter()
-        engine.advance(until)
+        for t in grid:
+            engine.advance(t)
         timings.append(time.perf_counter() - start)
     return timings
 

@@ -129,6 +129,7 @@ class Projection:
             ball_radius=float(ball.rows[0, 5]),
             rolling_resistance=ball.rolling_resistance,
             acceleration=kin.local.frame @ acceleration[:3],
+            angular_acceleration=kin.local.frame @ acceleration[3:],
         )
 
 
