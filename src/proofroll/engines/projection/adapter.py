@@ -65,12 +65,13 @@ class Projection:
         x, resolution = np.concatenate([body.u0, angles, body.udot0, r]), getattr(settings, integrator.resolution)
         scales = _scales(body, self._orientation.size)
         self._motion: Integrator | Switching
+        self._friction: Friction | None = None
         if math.isfinite(body.contact.mu_static):
             stepper = STEPPERS[settings.integrator](resolution)
             speed = _speed(body) or 1.0
             pace = Pace(speed, body.ball.radius / speed, stepper.stability, stepper.reach)
-            friction = Friction(self._ball, body.contact)
-            self._motion = Switching(friction, stepper, x, scales, pace, self._check, settings.elimination)
+            self._friction = Friction(self._ball, body.contact)
+            self._motion = Switching(self._friction, stepper, x, scales, pace, self._check, settings.elimination)
         else:
             self._motion = integrator(self._ball.rates, self._accept, x, scales, resolution)
 
@@ -128,6 +129,8 @@ class Projection:
             gravity=kin.local.frame @ (ball.weight(kin)[:3] / ball.mass[:3]),
             ball_radius=float(ball.rows[0, 5]),
             rolling_resistance=ball.rolling_resistance,
+            mu_static=self._friction.mu_static if self._friction else None,
+            mu_kinetic=self._friction.mu_kinetic if self._friction else None,
             acceleration=kin.local.frame @ acceleration[:3],
             angular_acceleration=kin.local.frame @ acceleration[3:],
         )

@@ -56,18 +56,19 @@ class Friction:
     Attributes:
         rolling: the ball with both rows active.
         sliding: the ball with none.
+        mu_static, mu_kinetic: coefficients [-].
     """
 
     def __init__(self, ball: ProjectedBall, contact: Contact) -> None:
         self.rolling, self.sliding = ball, ball.with_rows(ball.rows[:0])
         self._rows = ball.rows
-        self._mu_static, self._mu_kinetic = contact.mu_static, contact.mu_kinetic
+        self.mu_static, self.mu_kinetic = contact.mu_static, contact.mu_kinetic
         self._mobility = float(ball.rows[0] ** 2 @ (1 / ball.mass))  # C M⁻¹ Cᵀ [1/kg]
         self._weight = float(ball.mass[0] * np.linalg.norm(ball.gravity))
 
     def reserve(self, response: Response) -> float:
         """What the static cone leaves [N], from the reactions of sticking; negative where the ball must slip."""
-        available, needed = self._mu_static * response.N, math.hypot(*response.multipliers[:2].tolist())
+        available, needed = self.mu_static * response.N, math.hypot(*response.multipliers[:2].tolist())
         return available - needed + _ON_CONE * (abs(available) + self._weight)
 
     def drive(self, kin: Kinematics) -> FloatArray:
@@ -76,15 +77,15 @@ class Friction:
 
     def slide(self, kin: Kinematics, direction: FloatArray) -> Sliding:
         """The ball slipping along ``direction``, shape (2,)."""
-        response = self.sliding.response(kin, -self._mu_kinetic * (direction @ self._rows))
+        response = self.sliding.response(kin, -self.mu_kinetic * (direction @ self._rows))
         rate = self._slip_rate(kin, response)
         growth, across = direction @ rate, direction[0] * rate[1] - direction[1] * rate[0]
-        drive = rate + self._mobility * self._mu_kinetic * response.N * direction
+        drive = rate + self._mobility * self.mu_kinetic * response.N * direction
         return Sliding(response, direction, drive, float(growth), float(across))
 
     def force(self, sliding: Sliding) -> FloatArray:
         """Force of the wall on the slipping ball along the local axes [N], shape (3,)."""
-        friction = -self._mu_kinetic * sliding.response.N * (sliding.direction @ self._rows)
+        friction = -self.mu_kinetic * sliding.response.N * (sliding.direction @ self._rows)
         return self.sliding.contact_force(sliding.response) + friction[:3]
 
     def _slip_rate(self, kin: Kinematics, response: Response) -> FloatArray:
