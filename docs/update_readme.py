@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import os
 import re
 import tempfile
 from pathlib import Path
@@ -13,9 +14,11 @@ import numpy as np
 from proofroll.comparison_file import load_comparison
 from proofroll.report.content import outcome_content
 from proofroll.report.markdown import verdict_table
+from proofroll.report.regime_map import draw as draw_regimes
 from proofroll.runner import Runner
 from proofroll.store import Store
 from proofroll.studies.compare import Outcome, compare, point_name
+from proofroll.studies.regimes import regime_maps
 from proofroll.trajectory import read
 
 ROOT = Path(__file__).resolve().parents[1]
@@ -69,6 +72,7 @@ def main() -> None:
         runner = Runner(Store(Path(folder)))
         outcome = compare(load_comparison("paper"), runner)
         draw(outcome, runner.store, ROOT / "docs" / "picture.svg")
+    draw_regimes(regime_maps(load_comparison("stick_slip"), workers=os.cpu_count() or 1), ROOT / "docs" / "regimes.svg")
     table = verdict_table(outcome_content(outcome))
     readme = ROOT / "README.md"
     text = re.sub(
