@@ -11,6 +11,9 @@ from typing import Any
 
 import pytest
 
+from proofroll.report.html import page, report_content
+from proofroll.report.plots import point_curves
+
 
 @pytest.fixture
 def browse(tmp_path: Path) -> Callable[[Path, str], tuple[str, str, list[str]]]:
@@ -107,3 +110,23 @@ def test_figures_of_a_section_act_together(
     assert console == ""
     found = json.loads(next(attributes["data-found"] for tag, attributes in parse(dom).tags if tag == "body"))
     assert found == {"told": 6, "ranges": ["0.25 0.5"] * 6, "labels": [1] * 5, "off": 2}
+
+
+def test_first_slips_and_bounds_of_friction_are_drawn(
+    made: Any, tmp_path: Path, browse: Callable[..., tuple[str, str, list[str]]]
+) -> None:
+    """A line with its name for each bound, and a marker for each first slip, switched with its row."""
+    content = report_content([made[0]], made[1], "proofroll report invented")
+    comparison = content["comparisons"][0]
+    event = {"kind": "slip", "time": 0.5, "time_low": 0.5, "time_high": 0.51}
+    comparison["truths"][0] |= {"events": [event], "mu_static": 0.3, "mu_kinetic": 0.2}
+    known = dict.fromkeys(("by_mu", "by_f", "edge_below", "edge_above", "distance", "earliest", "latest"))
+    comparison["truths"][0]["onset"] = {**known, "time": 0.5, "uncertainty": 1e-3, "verdict": "well-posed"}
+    for run in comparison["runs"]:
+        run |= {"events": [event], "onset_verdict": "agree"}
+    file = tmp_path / "slips.html"
+    file.write_text(page(content, [point_curves(*made)]), encoding="utf-8")
+    dom, console, _ = browse(file, shows="μ kinetic = 0.2")
+    assert console == ""
+    assert "μ static = 0.3" in dom
+    assert dom.count('<path class="point"') == 5, "of the truth and of four runs"

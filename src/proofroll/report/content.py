@@ -10,6 +10,7 @@ from typing import Any
 import proofroll
 from proofroll.agreement import Judgement, Verdict
 from proofroll.case import Status
+from proofroll.registry import parse_engine
 from proofroll.studies.compare import Outcome, Run, point_name
 
 
@@ -42,6 +43,7 @@ def outcome_content(outcome: Outcome) -> dict[str, Any]:
         "until": comparison.until,
         "every": comparison.every,
         "vary": comparison.vary,
+        "points": comparison.points,
         "as_expected": not outcome.contradictions,
         "contradictions": outcome.contradictions,
         "tolerances": {
@@ -89,20 +91,22 @@ def _tolerance(value: float, relative: bool) -> str:
 def _row(runs: list[Run]) -> dict[str, Any]:
     """Summary over the points of the parameters: the worst of everything."""
     first = runs[0]
-    names = list(dict.fromkeys(judgement.observable for run in runs for judgement in run.judgements))
+    # A point at which the question is ill-posed says nothing about an engine.
+    judged = [run for run in runs if run.verdict != Verdict.ILL_POSED] or runs
+    names = list(dict.fromkeys(judgement.observable for run in judged for judgement in run.judgements))
     timings = [run.result.seconds_per_second for run in runs if run.result.seconds_per_second is not None]
     order = list(Verdict)
     return {
         "engine": first.row.engine,
         **_settings(first),
-        "verdict": max((run.verdict for run in runs), key=order.index),
+        "verdict": max((run.verdict for run in judged), key=order.index),
         "verdicts": {verdict.value: sum(run.verdict == verdict for run in runs) for verdict in Verdict},
         "expected": first.row.expect,
         "expected_for": first.row.expect_for,
         "because": first.row.because,
         "tolerance": first.row.tolerance,
         "as_expected": not any(run.contradictions for run in runs),
-        "observables": {name: _worst(runs, name) for name in names},
+        "observables": {name: _worst(judged, name) for name in names},
         "seconds_per_second": max(timings, default=None),
         "message": next((run.result.message for run in runs if run.result.status != Status.DONE), ""),
     }
@@ -120,6 +124,14 @@ def _worst(runs: list[Run], name: str) -> dict[str, Any]:
     return {**dataclasses.asdict(worst), "point": point_name(where.parameters)}
 
 
+def _setting(run: Run, preset: str | None, resolution: str | None) -> str:
+    """The preset, and whatever else the comparison file chose besides the step: ``cone=pyramidal``."""
+    usual = {"formulation", "preset", resolution}
+    chosen = [f"{key}={value}" for key, value in parse_engine(run.row.engine).options.items() if key not in usual]
+    shown = [] if preset is None or (chosen and preset == "matched") else [preset]
+    return " ".join([*shown, *chosen])
+
+
 def _settings(run: Run) -> dict[str, Any]:
     settings = run.facts.settings if run.facts else {}
     resolution = run.facts.resolution if run.facts else None
@@ -127,6 +139,7 @@ def _settings(run: Run) -> dict[str, Any]:
         "name": run.facts.name if run.facts else run.row.engine.partition("[")[0],
         "formulation": settings.get("formulation"),
         "preset": settings.get("preset"),
+        "setting": _setting(run, settings.get("preset"), resolution),
         "resolution": resolution,
         "resolution_value": settings.get(resolution) if resolution else None,
         "declared_order": run.facts.order if run.facts else None,

@@ -5,7 +5,7 @@ from __future__ import annotations
 from typing import Any
 
 from proofroll.metrics import OBSERVABLES
-from proofroll.report.labels import number, symbol, unit
+from proofroll.report.labels import names, number, symbol, unit
 from proofroll.report.scores import Score, cheapest, recommendation, scores
 
 # The accuracy for which the first paragraph names a setting: a line in a figure.
@@ -17,7 +17,13 @@ def findings(content: dict[str, Any]) -> dict[str, Any]:
     found = scores(content)
     return {
         "answer": _answer(content, found),
-        "sentences": [_closest(found), _obvious(content, found), _surprises(content)],
+        "sentences": [
+            _closest(found),
+            _obvious(content, found),
+            *_order(content),
+            *_ill_posed(content),
+            _surprises(content),
+        ],
         "recommendation": recommendation(found),
     }
 
@@ -28,6 +34,7 @@ def _answer(content: dict[str, Any], found: list[Score]) -> str:
     said = {
         "agrees": ("agrees", "agree", "with the truth in every observable and every case"),
         "converges": ("needs", "need", "a finer step"),
+        "ill-posed": ("is", "are", "beyond judgement somewhere, where the question is ill-posed"),
         "differs": ("differs", "differ", "somewhere however small the step"),
         "failed": ("gives", "give", "no result somewhere"),
     }
@@ -93,16 +100,54 @@ def _obvious(content: dict[str, Any], found: list[Score]) -> str:
         return "What the obvious model costs cannot be said: no default setting stands beside another one." + failed
     factor, score, best = worst
     return (
-        f"The obvious model costs most with {score.name}: {_off(rows[score.index])}, which relative to the range is "
+        f"The obvious model costs most with {score.name}: {_off(content, score.index)}, which relative to the range is "
         f"{number(factor, 1)} times the error of {best.name}.{failed}"
     )
 
 
-def _off(row: dict[str, Any]) -> str:
-    """A row's largest error of a coordinate, in its unit."""
-    errors = {name: j for name, j in row["observables"].items() if name not in OBSERVABLES}
-    name, judgement = max(errors.items(), key=lambda item: item[1]["error"] / item[1]["scale"])
-    return f"its {symbol(name)} is off by {number(judgement['error'])} {unit(judgement['unit'])}".rstrip()
+def _off(content: dict[str, Any], index: int) -> str:
+    """A row's largest error of a coordinate, in its unit, where it can be judged."""
+    judged = [judgement for run in content["runs"] if run["row"] == index for judgement in run["judgements"]]
+    errors = [j for j in judged if j["observable"] not in OBSERVABLES and j["verdict"] != "ill-posed"]
+    worst = max(errors, key=lambda judgement: judgement["error"] / judgement["scale"])
+    return f"its {symbol(worst['observable'])} is off by {number(worst['error'])} {unit(worst['unit'])}".rstrip()
+
+
+def _order(content: dict[str, Any]) -> list[str]:
+    """Who slips and sticks in another order than the truth; nothing where no order was judged."""
+    judged = [
+        (run, judgement)
+        for run in content["runs"]
+        for judgement in run["judgements"]
+        if judgement["observable"] == "event_order" and judgement["verdict"] != "ill-posed"
+    ]
+    if not judged:
+        return []
+    wrong: dict[int, int] = {}
+    for run, judgement in judged:
+        if judgement["verdict"] != "agrees":
+            wrong[run["row"]] = wrong.get(run["row"], 0) + 1
+    if not wrong:
+        return ["Every setting slips and sticks in the truth's order, wherever that is well posed."]
+    shown = names(content["rows"])
+    cases = {row: sum(run["row"] == row for run, _ in judged) for row in wrong}
+    said = _joined([f"{shown[row]} ({count} of {cases[row]} cases)" for row, count in wrong.items()])
+    return [f"Events missing, added or of another kind than the truth's: {said}."]
+
+
+def _ill_posed(content: dict[str, Any]) -> list[str]:
+    """Where the time of the first slip hangs on less than the parameters are known to."""
+    onsets = [(truth["point"], truth["onset"]) for truth in content["truths"] if "onset" in truth]
+    found = [(point, onset) for point, onset in onsets if onset["verdict"] == "ill-posed"]
+    if not found:
+        return []
+    known = f"{100 * found[0][1]['uncertainty']:.3g} %"
+    where = "; ".join(point for point, _ in found)
+    return [
+        f"In {len(found)} of {len(onsets)} cases the first slip is ill-posed ({where}): a change of the friction or "
+        f"the rolling resistance by {known} makes it, removes it or moves it to another rise of the needed friction. "
+        "No setting is judged there."
+    ]
 
 
 def _surprises(content: dict[str, Any]) -> str:

@@ -8,19 +8,27 @@ from datetime import UTC, datetime
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from proofroll.report import labels, tables
+from proofroll.report import labels, onset_tables, tables
 from proofroll.report.content import environment, outcome_content, plain
 from proofroll.report.findings import findings
+from proofroll.report.onsets import add_events, mark, truth_facts
 from proofroll.report.plots import point_curves, styles
+from proofroll.report.regime_map import counts, inline
+from proofroll.scene_file import load_scene
 from proofroll.store import Store, write_text
 from proofroll.studies.compare import Outcome
 from proofroll.trajectory import read
 
 if TYPE_CHECKING:
+    from collections.abc import Sequence
+
     import jinja2
+    import xarray as xr
+
+    Maps = Sequence[Sequence[xr.Dataset]]
 
 
-def write_report(outcomes: list[Outcome], store: Store, out: Path, command: str) -> dict[str, Any]:
+def write_report(outcomes: list[Outcome], store: Store, out: Path, command: str, maps: Maps = ()) -> dict[str, Any]:
     """Writes ``report.html`` and ``report.json``.
 
     Args:
@@ -28,6 +36,7 @@ def write_report(outcomes: list[Outcome], store: Store, out: Path, command: str)
         store: where the trajectories are.
         out: folder of the report.
         command: that makes the report again.
+        maps: the regime maps of each comparison, empty where it has none.
 
     Returns:
         the content of both files as plain data: ``date``, ``comparisons`` and ``environment``.
@@ -35,19 +44,24 @@ def write_report(outcomes: list[Outcome], store: Store, out: Path, command: str)
     Raises:
         ProofrollError: the folder cannot be written.
     """
-    content = report_content(outcomes, store, command)
+    content = report_content(outcomes, store, command, maps)
     curves = [point_curves(outcome, store) for outcome in outcomes]
+    pictures = [inline(found, f"map{index}-") if found else "" for index, found in enumerate(maps)]
     write_text(out / "report.json", json.dumps(content, indent=1, allow_nan=False) + "\n")
-    write_text(out / "report.html", page(content, curves))
+    write_text(out / "report.html", page(content, curves, pictures))
     return content
 
 
-def report_content(outcomes: list[Outcome], store: Store, command: str) -> dict[str, Any]:
+def report_content(outcomes: list[Outcome], store: Store, command: str, maps: Maps = ()) -> dict[str, Any]:
     """All that the report says, as plain data."""
     comparisons = []
-    for outcome in outcomes:
+    for index, outcome in enumerate(outcomes):
         content = outcome_content(outcome)
-        comparisons.append({**content, "truths": _truths(outcome, store), "findings": findings(content)})
+        content["truths"] = _truths(outcome, store)
+        content["findings"] = findings(content)
+        content["regimes"] = counts(maps[index]) if index < len(maps) else []
+        add_events(content, outcome.runs, store)
+        comparisons.append(content)
     versions: dict[str, str] = {}
     for outcome in outcomes:
         for run in outcome.runs:
@@ -60,18 +74,19 @@ def report_content(outcomes: list[Outcome], store: Store, command: str) -> dict[
     return dict(plain(content))
 
 
-def page(content: dict[str, Any], curves: list[list[dict[str, Any]]]) -> str:
+def page(content: dict[str, Any], curves: list[list[dict[str, Any]]], pictures: Sequence[str] = ()) -> str:
     """The HTML page.
 
     Args:
         content: from :func:`report_content`.
         curves: from :func:`proofroll.report.plots.point_curves`, one list for each comparison.
+        pictures: for each comparison its regime maps as markup, empty where it has none.
     """
     import plotly.offline
 
     drawn = {
         "rows": [_drawn_rows(comparison) for comparison in content["comparisons"]],
-        "points": curves,
+        "points": [mark(*pair) for pair in zip(content["comparisons"], curves, strict=True)],
     }
     text = (
         _templates()
@@ -79,6 +94,7 @@ def page(content: dict[str, Any], curves: list[list[dict[str, Any]]]) -> str:
         .render(
             content=content,
             curves=curves,
+            pictures=[*pictures, *[""] * (len(content["comparisons"]) - len(pictures))],
             styles=[styles(comparison["rows"]) for comparison in content["comparisons"]],
             data=_script_json(drawn),
             plotly=plotly.offline.get_plotlyjs(),
@@ -116,9 +132,13 @@ def _templates() -> jinja2.Environment:
         "unit": labels.unit,
         "values": labels.values,
         "settings": labels.settings_text,
+        "clock": onset_tables.clock,
+        "bracket": onset_tables.bracket,
+        "between": onset_tables.between,
     }
     made.globals |= {
         "tables": tables,
+        "onsets": onset_tables,
         "names": labels.names,
         "symbols": labels.SYMBOLS,
         "meanings": labels.MEANINGS,
@@ -149,5 +169,6 @@ def _truths(outcome: Outcome, store: Store) -> list[dict[str, Any]]:
                 for key, curve in dataset.data_vars.items()
                 if curve.dims == ("time",) and "error_bar" in curve.attrs
             }
+            entry |= truth_facts(dataset, load_scene(case.scene, **case.parameters))
         found.append(entry)
     return found

@@ -5,10 +5,11 @@ from __future__ import annotations
 import unicodedata
 from typing import Any
 
-SYMBOLS = {"agrees": "✓", "converges": "≈", "differs": "✗", "failed": "!"}
+SYMBOLS = {"agrees": "✓", "converges": "≈", "ill-posed": "?", "differs": "✗", "failed": "!"}
 MEANINGS = {
     "agrees": "within tolerance at this step",
     "converges": "not within tolerance yet, but the limit of small steps is the truth: right physics, step too coarse",
+    "ill-posed": "here the answer hangs on less than the parameters are known to: nobody is judged by it",
     "differs": "the limit of small steps is something else: the model's form differs",
     "failed": "there is no result; the row says why",
 }
@@ -54,14 +55,14 @@ def step(row: dict[str, Any]) -> str:
 
 def setting(row: dict[str, Any]) -> str:
     """Formulation and preset of a row, or what the comparison file calls it."""
-    return " ".join(str(part) for part in (row["formulation"], row["preset"]) if part) or str(row["engine"])
+    return " ".join(str(part) for part in (row["formulation"], row["setting"]) if part) or str(row["engine"])
 
 
 def names(rows: list[dict[str, Any]]) -> list[str]:
     """A short name for each row, unlike that of any other row: the comparison file's text where need be."""
     short = []
     for row in rows:
-        words = [row["name"], row["formulation"], row["preset"]]
+        words = [row["name"], row["formulation"], row["setting"]]
         short.append(" ".join([*(str(word) for word in words if word), *([f"({step(row)})"] if step(row) else [])]))
     return [name if short.count(name) == 1 else str(row["engine"]) for name, row in zip(short, rows, strict=True)]
 

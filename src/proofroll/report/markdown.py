@@ -4,7 +4,8 @@ from __future__ import annotations
 
 from typing import Any
 
-from proofroll.report.terminal import SYMBOLS, columns, number, step
+from proofroll.report.labels import SYMBOLS
+from proofroll.report.terminal import columns, number, step
 
 
 def verdict_table(content: dict[str, Any]) -> str:
@@ -14,7 +15,7 @@ def verdict_table(content: dict[str, Any]) -> str:
     lines = ["| " + " | ".join(head) + " |", "|" + "---|" * len(head)]
     for row in content["rows"]:
         errors = [row["observables"][name]["error"] if name in row["observables"] else None for name, _ in names]
-        cells = [row["name"], row["formulation"] or "", row["preset"] or "", step(row)]
+        cells = [row["name"], row["formulation"] or "", row["setting"], step(row)]
         cells.append(f"{SYMBOLS[row['verdict']]} {row['verdict']}")
         cells += [number(error) for error in errors]
         cells.append(number(row["seconds_per_second"]))

@@ -70,7 +70,7 @@ def styles(rows: list[dict[str, Any]]) -> list[dict[str, Any]]:
             "colour": engines.index(row["name"]) % COLOURS,
             "dash": DASHES[formulations[row["name"]].index(row["formulation"]) % len(DASHES)],
             "width": widths.get(row["preset"], 1.7),
-            "opacity": 1 if row["verdict"] in {"agrees", "converges"} else 0.5,  # not to hide those that agree
+            "opacity": 0.5 if row["verdict"] in {"differs", "failed"} else 1,  # not to hide those that agree
         }
         for row in rows
     ]
@@ -95,6 +95,14 @@ def kept(length: int, curves: list[FloatArray], most: int = MOST_POINTS) -> np.t
     return np.array(sorted(chosen))
 
 
+def stored(path: Path, names: list[str]) -> dict[str, np.typing.NDArray[Any]]:
+    """Some variables of a trajectory: a tenth of the time that reading it whole takes."""
+    import h5netcdf
+
+    with h5netcdf.File(path) as file:
+        return {name: np.asarray(file[name][...]) for name in names if name in file.variables}
+
+
 def _engines(outcome: Outcome, store: Store, point: str, drawn: list[str]) -> list[tuple[int, Curves]]:
     """Row number and curves of every run at a point that has a trajectory."""
     numbers: dict[int, int] = {}
@@ -103,16 +111,8 @@ def _engines(outcome: Outcome, store: Store, point: str, drawn: list[str]) -> li
         number = numbers.setdefault(id(run.row), len(numbers))
         if point_name(run.parameters) == point and _has_trajectory(run, store):
             assert run.case is not None  # it has a trajectory
-            found.append((number, _curves(store.trajectory(run.case), drawn)))
+            found.append((number, stored(store.trajectory(run.case), drawn)))
     return found
-
-
-def _curves(path: Path, names: list[str]) -> Curves:
-    """Some variables of a trajectory: a tenth of the time that reading it whole takes."""
-    import h5netcdf
-
-    with h5netcdf.File(path) as file:
-        return {name: np.asarray(file[name][...]) for name in names if name in file.variables}
 
 
 def _has_trajectory(run: Run, store: Store) -> bool:

@@ -2,12 +2,16 @@
 
 from __future__ import annotations
 
+import io
+import re
 from collections.abc import Sequence
+from fractions import Fraction
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from proofroll.files import replacing
 from proofroll.report.content import plain
 from proofroll.truth.regimes import Regime
 
@@ -16,6 +20,8 @@ if TYPE_CHECKING:
 
 _WORDS = {Regime.NEVER_SLIPS: "never slips", Regime.RECOVERS: "slips and recovers", Regime.FALLS: "falls"}
 _COLOURS = {Regime.NEVER_SLIPS: "#2f7f5f", Regime.RECOVERS: "#e8b64c", Regime.FALLS: "#b5473c"}
+# The analytic boundaries: how each is drawn, and what it parts.
+_LINES = {"mu_falls": ("--", "below it falls (f = 0)"), "mu_slips": ("-", "above it never slips (f = 0)")}
 
 
 def regime_content(maps: Sequence[xr.Dataset]) -> dict[str, Any]:
@@ -50,22 +56,67 @@ def _outside(item: xr.Dataset) -> int | None:
     return int(np.sum(expected != item["regime"].to_numpy()))
 
 
+def counts(maps: Sequence[xr.Dataset]) -> list[dict[str, Any]]:
+    """What of the maps goes into a report: how many runs became what, and the analytic boundaries."""
+    kept = ("rolling_resistance", "until", "runs", "counts", "outside_boundaries")
+    found = [{key: item[key] for key in kept} for item in regime_content(maps)["maps"]]
+    for entry, item in zip(found, maps, strict=True):
+        entry["axes"] = {
+            name: {"low": float(item[name].min()), "high": float(item[name].max()), "count": item.sizes[name]}
+            for name in ("speed", "mu_static")
+        }
+        entry["boundaries"] = boundaries(item)
+    return list(plain(found))
+
+
+def boundaries(item: xr.Dataset) -> dict[str, str]:
+    """The analytic boundaries of a map with their formula; empty where there are none."""
+    if "mu_falls" not in item:
+        return {}
+    factor = Fraction(float(item["mu_slips"][0] / item["mu_falls"][0])).limit_denominator(1000)
+    return {"mu_falls": "μ = g c / V0²", "mu_slips": f"μ = ({factor}) g c / V0²"}
+
+
 def draw(maps: Sequence[xr.Dataset], path: Path) -> None:
     """Writes the maps side by side as an SVG file.
 
     Raises:
         Missing: matplotlib is not installed.
     """
+    text = _svg(maps)
+    with replacing(path) as temporary:
+        temporary.write_text(text, encoding="utf-8")
+
+
+def inline(maps: Sequence[xr.Dataset], prefix: str) -> str:
+    """The picture as an element of a page: its ids begin with ``prefix``, and it has no style that others would see.
+
+    Raises:
+        Missing: matplotlib is not installed.
+    """
+    text = _svg(maps)
+    text = text[text.index("<svg") :]
+    text = re.sub(r"<(metadata|style)\b.*?</\1>", "", text, flags=re.DOTALL)
+    start, _, rest = text.partition(">")
+    text = re.sub(r' (?:xmlns(?::\w+)?|version|width|height)="[^"]*"', "", start) + ">" + rest
+    # Only ids that something refers to: equal images would share theirs.
+    text = re.sub(r' id="([^"]*)"', lambda found: f' id="{prefix}{found[1]}"' if f"#{found[1]}" in text else "", text)
+    text = re.sub(r'href="#', f'href="#{prefix}', text)
+    return re.sub(r"url\(#", f"url(#{prefix}", text)
+
+
+def _svg(maps: Sequence[xr.Dataset]) -> str:
     from proofroll.errors import Missing
 
     try:
         import matplotlib as mpl
         from matplotlib.colors import ListedColormap
         from matplotlib.figure import Figure
+        from matplotlib.lines import Line2D
         from matplotlib.patches import Patch
     except ImportError:
         raise Missing("drawing needs matplotlib: pip install 'proofroll[report]'") from None
-    with mpl.rc_context({"svg.hashsalt": "proofroll", "font.size": 9}):
+    with mpl.rc_context({"svg.hashsalt": "proofroll", "svg.fonttype": "none", "font.size": 9}):
         figure = Figure(figsize=(5.2 * len(maps), 4.2), layout="constrained")
         colours = ListedColormap([_COLOURS[regime] for regime in Regime])
         for index, item in enumerate(maps):
@@ -73,7 +124,7 @@ def draw(maps: Sequence[xr.Dataset], path: Path) -> None:
             axes.pcolormesh(
                 item["speed"], item["mu_static"], item["regime"].T, cmap=colours, vmin=0, vmax=2, rasterized=True
             )
-            for name, style in (("mu_falls", "--"), ("mu_slips", "-")):
+            for name, (style, _) in _LINES.items():
                 if name in item:
                     axes.plot(item["speed"], item[name], color="black", ls=style, lw=1)
             axes.set(
@@ -83,6 +134,11 @@ def draw(maps: Sequence[xr.Dataset], path: Path) -> None:
                 ylabel="static friction [-]",
                 title=f"rolling resistance f = {item.attrs['rolling_resistance']:g} m, {item.attrs['until']:g} s",
             )
-        handles = [Patch(color=_COLOURS[regime], label=word) for regime, word in _WORDS.items()]
-        figure.legend(handles=handles, loc="outside lower center", ncols=3, frameon=False)
-        figure.savefig(path, metadata={"Date": None})
+        handles: list[Any] = [Patch(color=_COLOURS[regime], label=word) for regime, word in _WORDS.items()]
+        for name, formula in next((found for item in maps if (found := boundaries(item))), {}).items():
+            style, meaning = _LINES[name]
+            handles.append(Line2D([], [], color="black", ls=style, lw=1, label=f"{formula}: {meaning}"))
+        figure.legend(handles=handles, loc="outside lower center", ncols=3 if len(maps) > 1 else 1, frameon=False)
+        text = io.StringIO()
+        figure.savefig(text, format="svg", metadata={"Date": None})
+    return text.getvalue()

@@ -93,11 +93,17 @@ def _judged(content: dict[str, Any]) -> list[str]:
 
 
 def _relative(runs: list[dict[str, Any]], group: Any) -> float | None:
-    """Largest error with the truth's error bar, over its scale; None where something is missing."""
+    """Largest error with the truth's error bar, over its scale; None where something is missing.
+
+    What cannot be judged, because the question is ill-posed, is left out.
+    """
     sizes: list[float] = []
     for run in runs:
         chosen = [judgement for judgement in run["judgements"] if judgement["observable"] in group]
-        if run["status"] != "done" or not chosen or any(judgement["error"] is None for judgement in chosen):
+        if run["status"] != "done" or not chosen:
+            return None
+        chosen = [judgement for judgement in chosen if judgement["verdict"] != "ill-posed"]
+        if any(judgement["error"] is None for judgement in chosen):
             return None
         # What the truth does not know it cannot vouch for.
         sizes += [(judgement["error"] + judgement["truth_error_bar"]) / judgement["scale"] for judgement in chosen]

@@ -131,9 +131,11 @@ def _head(row: dict[str, Any]) -> dict[str, Any]:
 
 
 def _verdict_text(row: dict[str, Any]) -> str:
-    """The verdict; with a count where only some of the points have it."""
+    """The verdict; with a count where only some of the points have it, or the question is ill-posed at some."""
     count, total = row["verdicts"].get(row["verdict"], 0), sum(row["verdicts"].values())
-    return str(row["verdict"]) if count == total else f"{row['verdict']} {count}/{total}"
+    text = str(row["verdict"]) if count == total else f"{row['verdict']} {count}/{total}"
+    beyond = row["verdicts"].get("ill-posed", 0)
+    return f"{text}, {SYMBOLS['ill-posed']} {beyond}" if beyond and row["verdict"] != "ill-posed" else text
 
 
 def _cell(judgement: dict[str, Any], href: str) -> dict[str, Any]:

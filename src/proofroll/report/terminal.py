@@ -9,10 +9,10 @@ from rich.table import Table
 from rich.text import Text
 
 from proofroll.metrics import OBSERVABLES
+from proofroll.report.labels import SYMBOLS
 
 WIDTH = 100
-SYMBOLS = {"agrees": "✓", "converges": "≈", "differs": "✗", "failed": "!"}
-_STYLES = {"agrees": "green", "converges": "yellow", "differs": "red", "failed": "bold red"}
+_STYLES = {"agrees": "green", "converges": "yellow", "ill-posed": "cyan", "differs": "red", "failed": "bold red"}
 
 
 def console() -> Console:
@@ -45,7 +45,7 @@ def verdict_table(content: dict[str, Any]) -> Table:
         shown = [observables[name] for name, _ in names if name in observables]
         worst: dict[str, Any] = max(shown, key=lambda item: float(item["error"] or 0) / item["tolerance"], default={})
         table.add_row(
-            Text(" ".join(filter(None, (row["name"], row["formulation"], row["preset"])))),
+            Text(" ".join(filter(None, (row["name"], row["formulation"], row["setting"])))),
             step(row),
             Text(f"{SYMBOLS[verdict]} {verdict}", style=_STYLES[verdict]),
             *(number(observables[name]["error"] if name in observables else None) for name, _ in names),
@@ -106,7 +106,7 @@ def closing_lines(content: dict[str, Any]) -> list[str]:
     rows = content["rows"]
     counts = {verdict: sum(row["verdict"] == verdict for row in rows) for verdict in SYMBOLS}
     said = ", ".join(f"{count} {verdict}" for verdict, count in counts.items() if count)
-    lines = [f"{len(rows)} engine settings over {len(content['runs']) // max(1, len(rows))} cases each: {said}."]
+    lines = [f"{len(rows)} engine settings, {len(content['runs'])} runs in all: {said}."]
     if content["contradictions"]:
         lines.append(
             f"{len(content['contradictions'])} findings contradict what {content['name']} expects (!! above); first:"

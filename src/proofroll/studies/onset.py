@@ -143,11 +143,11 @@ def onset_study(
         if result.trajectory is not None:
             events = events_of(read(runner.store.trajectory(case)))
             first = next((event for event in events if event.kind == "slip"), None)
-        rows.append(EngineOnset(name, found, result, first, _verdict(truth, result, first)))
+        rows.append(EngineOnset(name, found, result, first, onset_verdict(truth, result, first)))
     return OnsetStudy(loaded, until, truth, rows)
 
 
-def _verdict(truth: Onset, result: Result, first: Event | None) -> str:
+def onset_verdict(truth: Onset, result: Result, first: Event | None) -> str:
     """Agreement: the engine's bracket meets the times that the uncertainty of μ and f leaves to the truth."""
     if result.status == Status.REFUSED:
         return "refused"

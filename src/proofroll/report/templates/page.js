@@ -50,12 +50,31 @@
       type: "scatter", mode: "lines", x: time, y: observable.truth, meta: -1, line: { color: css("--truth"), width: 6 },
       hovertemplate: label("truth", literal(observable.symbol) + " ="),
     };
-    return [truth, ...above, ...below];
+    return [truth, ...above, ...below, ...onsets(figure)];
   }
 
+  // First slips, on the line that the needed friction must reach.
+  function onsets(figure) {
+    const { c, rows, observable } = contents(figure);
+    return (observable.marks ?? []).map(({ row, time }) => ({
+      type: "scatter", mode: "markers", x: [time], y: [observable.bounds[0].value], meta: row, visible: !off(c).has(row),
+      marker: row < 0
+        ? { symbol: "diamond", size: 12, color: css("--truth") }
+        : { symbol: "circle-open", size: 9, color: css(`--e${rows[row].colour}`), line: { width: rows[row].width } },
+      hovertemplate: `<b>${literal(row < 0 ? "truth" : rows[row].name)}</b><br>first slip at %{x:.7g} s<extra></extra>`,
+    }));
+  }
+
+  // The bounds of friction: a line each, named at its right end.
+  const lines = ({ bounds }) => (bounds ?? []).map(({ value }) => (
+    { type: "line", xref: "paper", x0: 0, x1: 1, yref: "y", y0: value, y1: value, line: { color: css("--ink"), width: 1, dash: "dash" } }));
+  const named = ({ bounds }) => (bounds ?? []).map(({ name, value }) => (
+    { xref: "paper", x: 1, yref: "y", y: value, xanchor: "right", yanchor: "bottom", showarrow: false, font: { size: 11 },
+      text: `${literal(name)} = ${value}` }));
+
   // The frame follows the truth: an engine that flies off must not flatten it. Double-click shows everything.
-  function frame({ truth, scale }) {
-    const known = truth.filter((v) => v !== null);
+  function frame({ truth, scale, bounds }) {
+    const known = [...truth, ...(bounds ?? []).map(({ value }) => value)].filter((v) => v !== null);
     const low = Math.min(...known), high = Math.max(...known);
     const half = Math.max(0.65 * (high - low), 0.03 * scale) || 1;
     return [(low + high) / 2 - half, (low + high) / 2 + half];
@@ -85,16 +104,17 @@
       paper_bgcolor: "rgba(0,0,0,0)", plot_bgcolor: "rgba(0,0,0,0)", hovermode: "closest", dragmode: touch ? false : "zoom",
       font: { family: css("--sans"), size: 12, color: css("--ink") },
       hoverlabel: { bgcolor: css("--paper"), bordercolor: css("--muted"), font: { color: css("--ink") }, align: "left" },
-      xaxis: { ...axis, anchor: "y2", title: { text: "time [s]", standoff: 6 } },
+      xaxis: { ...axis, anchor: "y2", rangemode: "nonnegative", title: { text: "time [s]", standoff: 6 } },
       yaxis: { ...axis, domain: [0.5, 1], range: frame(observable), title: { text: literal(observable.symbol) + unit, standoff: 6 } },
       yaxis2: {
         ...axis, domain: [0, 0.44], type: "log", range: log, exponentformat: "power", dtick: Math.max(1, Math.ceil((log[1] - log[0]) / 5)),
         title: { text: "distance" + unit, standoff: 6 },
       },
-      shapes: observable.error_bar
+      annotations: named(observable),
+      shapes: [...lines(observable), ...(observable.error_bar
         ? [{ type: "rect", xref: "paper", x0: 0, x1: 1, yref: "y2", y0: 10 ** log[0], y1: observable.error_bar,
              fillcolor: css("--bar"), line: { width: 0 }, layer: "below" }]
-        : [],
+        : [])],
     };
   }
 

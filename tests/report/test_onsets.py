@@ -1,0 +1,241 @@
+"""Bounded friction in the report: events, the first slip with its conditioning, and points that nobody is judged by."""
+
+from __future__ import annotations
+
+import copy
+import dataclasses
+import json
+import math
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import plotly.offline
+import pytest
+
+from proofroll.agreement import Judgement, Verdict
+from proofroll.case import Case, EngineFacts, Result, Status
+from proofroll.comparison_file import Band, Comparison, Row, Tolerance
+from proofroll.events import Event, events_of, with_events
+from proofroll.report.html import page, report_content, write_report
+from proofroll.report.labels import MEANINGS, SYMBOLS
+from proofroll.report.markdown import verdict_table as markdown_table
+from proofroll.report.onset_tables import bracket, clock, conditioning, slip_table
+from proofroll.report.onsets import CURVE, mark
+from proofroll.report.plots import point_curves
+from proofroll.report.scores import scores
+from proofroll.report.terminal import closing_lines, console, verdict_table
+from proofroll.scene_file import load_scene
+from proofroll.store import Store
+from proofroll.studies.compare import Outcome, Run, point_name
+from proofroll.trajectory import write
+from proofroll.truth import truth
+from proofroll.truth.onset import onset
+
+UNTIL, EVERY = 2.1, 0.05
+WELL = {"speed": 4.0, "rolling_resistance": 5e-4, "mu_static": 0.35}
+EDGE = {"speed": 4.0, "rolling_resistance": 5e-4, "mu_static": 0.391459}
+FREE = {"speed": 4.0}
+COMMAND = "proofroll report slipping"
+
+
+def judgement(name: str, error: float, verdict: Verdict) -> Judgement:
+    """One invented judgement."""
+    return Judgement(name, "m", error, 1e-12, 1e-3, 1.0, verdict)
+
+
+@pytest.fixture(scope="module")
+def slipping(tmp_path_factory: pytest.TempPathFactory) -> tuple[Outcome, Store]:
+    """Rows that slip as the truth does, too often and never, and one that is refused; one point has no bound."""
+    store = Store(tmp_path_factory.mktemp("slipping") / "cases")
+    rows = [Row("alpha", "band"), Row("beta", "band"), Row("gamma", "band"), Row("delta", "band")]
+    bounds = dict.fromkeys(("z", "N", "event_order"), Tolerance(1e-3, True))
+    band = {"band": Band("a reason", bounds)}
+    comparison = Comparison("slipping", "Slipping", "Who slips?", "sphere_in_cylinder", UNTIL, EVERY, bands=band)
+    comparison = dataclasses.replace(comparison, rows=rows, points=[WELL, EDGE, FREE])
+    times = np.linspace(0.0, UNTIL, round(UNTIL / EVERY) + 1)
+    runs, truths = [], {}
+    for point in (WELL, EDGE, FREE):
+        scene = load_scene("sphere_in_cylinder", **point)
+        dataset = truth(scene, times)
+        if "sticking" in dataset:
+            dataset.attrs["onset"] = json.dumps(dataclasses.asdict(onset(scene, UNTIL)))
+        true = events_of(dataset)
+        slips = [Event(e.kind, e.time + 1e-7, e.time - 1e-6, e.time + 1e-6) for e in true]
+        often = [
+            Event(k, t, t - 5e-3, t + 5e-3) for k, t in zip(["slip", "stick"] * 3, np.arange(1, 7) / 4, strict=True)
+        ]
+        verdict = Verdict.ILL_POSED if point is EDGE else Verdict.DIFFERS
+        for row, events in zip(rows, (slips, often if true else [], [], None), strict=True):
+            case = Case("sphere_in_cylinder", point, scene.digest, EngineFacts(row.engine, "1", "c", {}), UNTIL, EVERY)
+            if events is None:
+                result = Result(Status.REFUSED, "needs <b>more</b>")
+                runs.append(Run(row, point, case.engine, result, [], [], case))
+                continue
+            write(with_events(dataset.drop_dims("event"), events) if true else dataset, store.trajectory(case))
+            worse = verdict if row.engine != "alpha" and true else Verdict.AGREES
+            judged = [
+                judgement("z", math.inf if worse is Verdict.ILL_POSED else 1e-6, worse),
+                judgement("N", 0.0, worse),
+            ]
+            if true:
+                judged.append(judgement("event_order", float(worse is not Verdict.AGREES), worse))
+            result = Result(Status.DONE, "done", seconds_per_second=1.0, trajectory=store.trajectory(case).name)
+            runs.append(Run(row, point, case.engine, result, judged, [], case))
+        truths[point_name(point)] = Case(
+            "sphere_in_cylinder", point, "d", EngineFacts("truth", "1", "c", {}), UNTIL, EVERY
+        )
+        write(dataset, store.trajectory(truths[point_name(point)]))
+    order = {id(row): index for index, row in enumerate(rows)}
+    return Outcome(comparison, sorted(runs, key=lambda run: order[id(run.row)]), truths), store
+
+
+@pytest.fixture(scope="module")
+def content(slipping: tuple[Outcome, Store]) -> dict[str, Any]:
+    """The report's content."""
+    return report_content([slipping[0]], slipping[1], COMMAND)
+
+
+def shown(content: dict[str, Any], slipping: tuple[Outcome, Store]) -> str:
+    """The page without plotly."""
+    return page(content, [point_curves(*slipping)]).replace(plotly.offline.get_plotlyjs(), "")
+
+
+def runs_at(content: dict[str, Any], point: dict[str, float]) -> dict[str, dict[str, Any]]:
+    """The runs at a point by engine."""
+    found = content["comparisons"][0]["runs"]
+    return {run["engine"]: run for run in found if run["point"] == point_name(point)}
+
+
+def truth_at(content: dict[str, Any], point: dict[str, float]) -> dict[str, Any]:
+    """The truth's entry of a point."""
+    entries = content["comparisons"][0]["truths"]
+    return next(dict(entry) for entry in entries if entry["point"] == point_name(point))
+
+
+def test_data_holds_events_onsets_and_their_verdicts(content: dict[str, Any]) -> None:
+    """Each run its events with brackets, each truth its conditioning; where friction has no bound, neither."""
+    runs = runs_at(content, WELL)
+    assert [event["kind"] for event in runs["alpha"]["events"]] == ["slip", "stick"]
+    assert set(runs["alpha"]["events"][0]) == {"kind", "time", "time_low", "time_high"}
+    assert runs["gamma"]["events"] == runs["delta"]["events"] == []
+    verdicts = {name: run["onset_verdict"] for name, run in runs.items()}
+    assert verdicts == {"alpha": "agree", "beta": "disagree", "gamma": "disagree", "delta": "refused"}
+    entry = truth_at(content, WELL)
+    assert entry["onset"]["time"] == pytest.approx(1.7201831716, abs=1e-8)
+    assert entry["onset"]["verdict"] == "well-posed"
+    assert (entry["mu_static"], len(entry["events"])) == (0.35, 2)
+    assert "onset" not in truth_at(content, FREE)
+    assert "onset_verdict" not in runs_at(content, FREE)["alpha"]
+    assert {run["onset_verdict"] for run in runs_at(content, EDGE).values()} == {"ill-posed", "refused"}
+
+
+def test_table_says_what_is_missing_added_and_left_out(content: dict[str, Any]) -> None:
+    """Events stand beside the truth's of the same number; more than the table holds are counted."""
+    table = slip_table(content["comparisons"][0], 0, 0, truth_at(content, WELL))
+    alpha, beta, gamma, delta = table["lines"]
+    assert alpha["in_order"]
+    assert alpha["difference"] == alpha["cells"][0]["difference"] == "+1e-7"
+    assert [cell["wrong"] for cell in beta["cells"]] == ["", "", "not in the truth", "not in the truth"]
+    assert (beta["count"], beta["more"], beta["in_order"]) == (6, 2, False)
+    assert [cell["wrong"] for cell in gamma["cells"]] == ["missing", "missing", "", ""]
+    assert (gamma["first"], gamma["difference"]) == (None, "–")
+    assert delta["message"] == "refused: needs <b>more</b>"
+    assert table["wrong"] == "differs"
+    assert slip_table(content["comparisons"][0], 0, 1, truth_at(content, EDGE))["wrong"] == "ill-posed"
+
+
+def test_conditioning_names_the_edges(content: dict[str, Any]) -> None:
+    """Time, sensitivities, edges and the distance to the nearer of them; and what there is to say without a slip."""
+    facts = dict(conditioning(truth_at(content, WELL), UNTIL))
+    assert facts["First slip"].startswith("1.72018317 s; 1.71963 s with μ smaller")
+    assert facts["d ln t / d ln μ"] == "0.3227"
+    assert "μ = 0.391459 above, the nearest 11.8 % from μ = 0.35" in facts["Stair edges"]
+    never = truth_at(content, WELL)
+    never["onset"] = {**dict.fromkeys(never["onset"]), "uncertainty": 1e-3, "verdict": "well-posed"}
+    assert dict(conditioning(never, UNTIL)) == {"First slip": "none until 2.1 s", "Stair edges": "none until 2.1 s"}
+
+
+def test_first_slips_are_marked_on_the_needed_friction(
+    content: dict[str, Any], slipping: tuple[Outcome, Store]
+) -> None:
+    """The bound and every onset, on that curve alone and only where friction is bounded."""
+    entries = mark(content["comparisons"][0], point_curves(*slipping))
+    by_point = {entry["point"]: {item["name"]: item for item in entry["observables"]} for entry in entries}
+    marked = by_point[point_name(WELL)][CURVE]
+    assert [item["row"] for item in marked["marks"]] == [-1, 0, 1]
+    assert marked["bounds"] == [{"name": "μ static", "value": 0.35}]
+    assert not any("marks" in item for item in by_point[point_name(FREE)].values())
+    assert "marks" not in by_point[point_name(WELL)]["z"]
+
+
+def test_page_shows_ill_posed_points_without_colour(content: dict[str, Any], slipping: Any, parse: Any) -> None:
+    """A sign and a word for the verdict, its meaning in the legend, and no blame for other events."""
+    html = shown(content, slipping)
+    text = " ".join(parse(html).text.split())
+    assert '<span aria-hidden="true">?</span><span class="vh">ill-posed</span>' in html
+    assert '<b class="v ill-posed">? ill-posed here</b>' in html
+    assert MEANINGS["ill-posed"] in text
+    assert "? 6, not 2" in text
+    assert "✗ 6, not 2" in text
+    assert "needs <b>more</b>" in text, "shown as text"
+    assert "and 3 points" not in text
+    assert "3 points of their own" in text
+
+
+def test_every_verdict_can_be_said(content: dict[str, Any]) -> None:
+    """Signs, meanings, terminal and Markdown know every verdict."""
+    assert set(SYMBOLS) == set(MEANINGS) == {verdict.value for verdict in Verdict}
+    assert len(set(SYMBOLS.values())) == len(SYMBOLS)
+    changed = copy.deepcopy(content["comparisons"][0])
+    changed["rows"][0]["verdict"] = "ill-posed"
+    out = console()
+    with out.capture() as capture:
+        out.print(verdict_table(changed))
+    assert "? ill-posed" in capture.get()
+    assert "1 ill-posed" in closing_lines(changed)[0]
+    assert "? ill-posed" in markdown_table(changed)
+
+
+def test_findings_and_scores_leave_ill_posed_points_out(content: dict[str, Any]) -> None:
+    """Nobody is measured there, and a sentence says where that is; wrong orders elsewhere are named."""
+    comparison = content["comparisons"][0]
+    said = " ".join(comparison["findings"]["sentences"])
+    assert (
+        "In 1 of 2 cases the first slip is ill-posed (speed=4, rolling_resistance=0.0005, mu_static=0.391459)" in said
+    )
+    assert "than the truth's: beta (1 of 1 cases) and gamma (1 of 1 cases)." in said
+    assert [score.motion for score in scores(comparison)] == [pytest.approx(1e-6, rel=1e-5)] * 3 + [None]
+
+
+def test_events_without_numbers_do_not_break_the_page(content: dict[str, Any], slipping: Any) -> None:
+    """What is not finite is null in the data and a dash on the page."""
+    changed = copy.deepcopy(content)
+    empty = {"kind": "slip", "time": None, "time_low": None, "time_high": None}
+    for run in changed["comparisons"][0]["runs"]:
+        run["events"] = [empty, {**empty, "time": 1.0}] if run["events"] else []
+    changed["comparisons"][0]["truths"][0]["onset"]["distance"] = None
+    assert "no bracket" in shown(changed, slipping)
+
+
+@pytest.mark.parametrize(
+    ("event", "said"),
+    [
+        ((1.7205, 1.72, 1.721), ("1.7205", "±5e-4")),
+        ((1.72018317162, 1.72018317161, 1.72018317163), ("1.720183172", "±1e-11")),
+        ((1.5, 1.5, 1.5), ("1.5", "±0")),
+        ((1.0, 0.9, 1.001), ("1.000", "-0.1 +1e-3")),
+    ],
+)
+def test_times_are_shown_to_the_digits_of_their_brackets(event: tuple[float, ...], said: tuple[str, str]) -> None:
+    """No digit that the bracket takes away."""
+    named = dict(zip(("time", "time_low", "time_high"), event, strict=True))
+    assert (clock(named), bracket(named)) == said
+
+
+def test_written_report_names_no_finite_number_it_has_not(slipping: tuple[Outcome, Store], tmp_path: Path) -> None:
+    """The file is JSON that every reader accepts, infinite distances included."""
+    write_report([slipping[0]], slipping[1], tmp_path, COMMAND)
+    text = (tmp_path / "report.json").read_text(encoding="utf-8")
+    assert "Infinity" not in text
+    assert "NaN" not in text
