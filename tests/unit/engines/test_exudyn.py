@@ -223,6 +223,13 @@ def test_default_preset_is_the_engines_default(formulation: str) -> None:
         ({"integrator": "euler"}, "integrator"),
         ({"newton_tolerance": 2}, "newton_tolerance"),
         ({"step": 1e-3}, "no such setting"),
+        ({"formulation": "generic", "stiffness": 5}, "stiffness = 5.*generic does not use it; set formulation=contact"),
+        ({"formulation": "generic", "grip": 10}, "grip = 10.*generic does not use it"),
+        ({"formulation": "carrier", "friction_zone": 1e-5}, "carrier does not use it"),
+        ({"formulation": "rolling_disc", "halvings": 0}, "rolling_disc does not use it"),
+        ({"spectral_radius": 0.9}, "trapezoidal rule has no damping; set integrator=generalized_alpha"),
+        ({"formulation": "contact", "spectral_radius": 0.9}, "trapezoidal rule has no damping"),
+        ({"formulation": "contact", "stiffness": None}, "formulation=contact needs a number"),
     ],
 )
 def test_wrong_settings_give_one_clear_line(options: dict[str, Any], words: str) -> None:
@@ -245,6 +252,27 @@ def test_every_preset_is_complete() -> None:
     for formulation, presets in Exudyn.presets.items():
         for name, settings in presets.items():
             assert resolve_settings(Exudyn, {"formulation": formulation, "preset": name}) == settings
+
+
+def test_another_integrator_over_a_preset() -> None:
+    """The damping of a preset goes with its integrator, and comes with the engine's own value with the other one."""
+    from proofroll.engines.exudyn import Exudyn
+
+    tuned = {"formulation": "carrier", "preset": "tuned"}
+    undamped = resolve_settings(Exudyn, {**tuned, "integrator": "trapezoidal_index2"})
+    assert undamped.spectral_radius is None
+    assert resolve_settings(Exudyn, dataclasses.asdict(undamped)) == undamped
+    assert resolve_settings(Exudyn, {**tuned, "spectral_radius": "0.6"}).spectral_radius == 0.6
+    damped = build(cylinder(), "exudyn", integrator="generalized_alpha")
+    assert damped._model.integration.options.timeIntegration.generalizedAlpha.spectralRadius == 0.9
+
+
+def test_summary_is_one_sentence() -> None:
+    """What is shown of the engine is a sentence about it."""
+    from proofroll.engines.exudyn import Exudyn
+
+    assert (Exudyn.__doc__ or "").startswith("Exudyn")
+    assert "\n" not in (Exudyn.__doc__ or "\n")
 
 
 def test_timeout_of_the_engine_is_noticed() -> None:

@@ -29,7 +29,7 @@ MODELS: Mapping[str, type[Model]] = {
 
 
 class Exudyn:
-    """See :class:`proofroll.engine.Engine`."""
+    """Exudyn's implicit integration of multibody systems with constraints, or with its penalty contact."""
 
     name: ClassVar[str] = "exudyn"
     provides: ClassVar[frozenset[Capability]] = frozenset(

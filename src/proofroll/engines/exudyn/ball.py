@@ -8,8 +8,9 @@ from typing import Any
 import numpy as np
 
 from proofroll.engine import Built, Sample
-from proofroll.engines.exudyn.local_frame import FrameAt, frame_at
+from proofroll.engines.exudyn.local_frame import FrameAt, curvature, frame_at
 from proofroll.engines.exudyn.native import Output, items
+from proofroll.engines.exudyn.resistance import resistance_moment
 from proofroll.scene import RollingBall
 from proofroll.surfaces import FloatArray
 
@@ -45,8 +46,8 @@ class RigidBall:
             force=force,
         )
 
-    def built(self, ball_radius: float | None) -> Built:
-        """Everything but the radius, which the joints hold."""
+    def built(self, ball_radius: float | None, gap: float | None) -> Built:
+        """Everything but the radius [m] and the gap [m], which joints or contact hold."""
         body = self.system.GetObject(self.body)
         return Built(
             mass=body["mass"],
@@ -54,9 +55,11 @@ class RigidBall:
             gravity=np.array(self.system.GetLoad(self.weight)["loadVector"]),
             ball_radius=ball_radius,
             rolling_resistance=(
-                None if self.resistance is None else float(self.system.GetLoad(self.resistance)["loadVector"][0])
+                0.0 if self.resistance is None else float(self.system.GetLoad(self.resistance)["loadVector"][0])
             ),
+            gap=gap,
             acceleration=self.system.GetNodeOutput(self.node, Output.Acceleration),
+            angular_acceleration=self.system.GetNodeOutput(self.node, Output.AngularAcceleration),
         )
 
 
@@ -104,7 +107,7 @@ def _resistance(rolling: RollingBall, node: Any) -> Any:
     N = m (v·(∂e1/∂p)v + e1·g). The last multiplier instead would lag by an iterate and make the moment ring with it.
     """
     frame: FrameAt = frame_at(rolling.surface, rolling.u0)
-    curvature = _curvature(rolling)
+    bend = _bend(rolling)
     m = rolling.ball.mass
     gx, gy, gz = rolling.gravity.tolist()
     position, velocity = Output.Position, Output.Velocity
@@ -112,19 +115,16 @@ def _resistance(rolling: RollingBall, node: Any) -> Any:
     def moment(system: Any, t: float, load: Any) -> list[float]:  # noqa: ARG001 -- Exudyn's signature
         x, y, z = system.GetNodeOutput(node, position).tolist()
         vx, vy, vz = system.GetNodeOutput(node, velocity).tolist()
-        speed = (vx * vx + vy * vy + vz * vz) ** 0.5
-        if not speed:
-            return [0.0, 0.0, 0.0]
         e = frame(x, y, z)
         v2, v3 = vx * e[3] + vy * e[4] + vz * e[5], vx * e[6] + vy * e[7] + vz * e[8]
-        N = m * (curvature(x, y, z, v2, v3) + e[0] * gx + e[1] * gy + e[2] * gz)
-        factor = -load[0] * N / speed
-        return [factor * (vy * e[2] - vz * e[1]), factor * (vz * e[0] - vx * e[2]), factor * (vx * e[1] - vy * e[0])]
+        N = m * (bend(x, y, z, v2, v3) + e[0] * gx + e[1] * gy + e[2] * gz)
+        M2, M3 = resistance_moment(load[0], N, v2, v3)
+        return [M2 * e[3] + M3 * e[6], M2 * e[4] + M3 * e[7], M2 * e[5] + M3 * e[8]]
 
     return moment
 
 
-def _curvature(rolling: RollingBall) -> Any:
+def _bend(rolling: RollingBall) -> Any:
     """v·(∂e1/∂p)v [m/s²] as a function of place and of v along e2 and e3."""
     surface = rolling.surface
     if surface.generators is None:
@@ -135,7 +135,5 @@ def _curvature(rolling: RollingBall) -> Any:
             return float(v @ surface.normal_gradient(p) @ v)
 
         return anywhere
-    frame = surface.frame(rolling.u0)
-    local = frame.T @ surface.normal_gradient(rolling.p0) @ frame
-    k22, k23, k33 = float(local[1, 1]), float(2 * local[1, 2]), float(local[2, 2])
-    return lambda x, y, z, v2, v3: k22 * v2 * v2 + k23 * v2 * v3 + k33 * v3 * v3  # noqa: ARG005 -- same everywhere
+    (k22, k23), (_, k33) = curvature(surface, rolling.u0).tolist()
+    return lambda x, y, z, v2, v3: k22 * v2 * v2 + 2 * k23 * v2 * v3 + k33 * v3 * v3  # noqa: ARG005 -- same everywhere

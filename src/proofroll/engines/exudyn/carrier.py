@@ -44,7 +44,7 @@ class Carrier:
         guide = [add_marker(items.MarkerBodyRigid(bodyNumber=end, localHT=transform)) for end in ends]
         add_object(items.GenericJoint(markerNumbers=guide, constrainedAxes=constrained))
         # The carrier is not turned at time 0, so the ball's centre in it is its place in the world.
-        self.centre = body.p0
+        self.centre, self.normal = body.p0, body.surface.frame(body.u0)[:, 0]
         pivot = add_marker(items.MarkerBodyRigid(bodyNumber=self.carrier, localPosition=self.centre))
         self.joint = add_object(
             items.GenericJoint(markerNumbers=[pivot, self.ball.marker], constrainedAxes=[1, 1, 1, 0, 0, 0])
@@ -107,7 +107,9 @@ class Carrier:
     def built(self) -> Built:
         """See :class:`proofroll.engine.Engine`."""
         item, rate = self.rolling[1]
-        return self.ball.built(abs(self.system.GetObject(item)["factor1"] * rate))
+        # How far the ball's centre is from its place in the carrier, which is not turned at time 0.
+        off = self.system.GetObjectOutput(self.joint, Output.DisplacementLocal)
+        return self.ball.built(abs(self.system.GetObject(item)["factor1"] * rate), -float(off @ self.normal))
 
 
 def _joint_axes(generators: tuple[Generator, Generator]) -> tuple[FloatArray, list[int]]:

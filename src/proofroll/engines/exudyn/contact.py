@@ -15,16 +15,15 @@ from typing import Any
 
 import numpy as np
 
-from proofroll.certificate import EXACT
 from proofroll.engine import Built, Regularised, Sample
 from proofroll.engines.exudyn.ball import add_ball
 from proofroll.engines.exudyn.integration import Integration, new_system
-from proofroll.engines.exudyn.local_frame import frame_at, gap_at
+from proofroll.engines.exudyn.local_frame import curvature, frame_at, gap_at
 from proofroll.engines.exudyn.native import Output, items
 from proofroll.engines.exudyn.settings import ExudynSettings
 from proofroll.errors import Refused
 from proofroll.events import Event, EventKind
-from proofroll.mechanics import newton_euler
+from proofroll.mechanics import natural_acceleration, newton_euler
 from proofroll.scene import RollingBall
 from proofroll.surfaces import FloatArray
 
@@ -34,6 +33,8 @@ ON_A_PLANE = 10.0
 # The ball slips once it has left the friction zone and is this many times as fast as its edge: at a grazing onset the
 # time steps throw the slip velocity to and fro across the edge itself.
 SURELY = 2.0
+# What double precision leaves of any quantity, relative to its scale.
+ROUND_OFF = 1e-12
 
 
 class Contact:
@@ -45,8 +46,8 @@ class Contact:
         if law.mu_static != law.mu_kinetic:
             raise Refused("its contact has one coefficient of friction; make mu_kinetic equal to mu_static")
         self.bounded = math.isfinite(law.mu_static)
-        mu = law.mu_kinetic if self.bounded else settings.grip
-        self.zone = settings.friction_zone
+        stiffness, self.zone, grip = settings.penalty
+        mu = law.mu_kinetic if self.bounded else grip
         e1 = body.surface.frame(body.u0)[:, 0]
         force = newton_euler(body, body.p0, body.v0, body.w0)[2]
         N = float(-force @ e1)
@@ -58,7 +59,7 @@ class Contact:
         if needed > mu * N and not self.bounded:
             raise Refused("rolling needs more friction than grip at time 0; use a larger grip")
         creep = -self.zone * friction / (max(mu * N, needed) or 1.0)
-        sunk = N / settings.stiffness
+        sunk = N / stiffness
         self.container, self.system = new_system()
         rolling = dataclasses.replace(body, w0=body.w0 + np.cross(e1, creep) / body.ball.radius)
         self.ball = add_ball(self.system, rolling)
@@ -83,12 +84,12 @@ class Contact:
                 isHollowSphere1=True,
                 dynamicFriction=mu,
                 frictionProportionalZone=self.zone,
-                contactStiffness=settings.stiffness,
+                contactStiffness=stiffness,
             )
         )
         self.system.SetPreNewtonResidualUserFunction(self._follow)
         self.system.Assemble()
-        self._softened = _softened(body, settings, creep, mu * N, hollow)
+        self._softened = _softened(body, settings, creep, N, mu, hollow)
         self._t, self._events = 0.0, []
         self._left: tuple[float, float] | None = None
         self._sticks = needed <= mu * N
@@ -143,47 +144,58 @@ class Contact:
     def built(self) -> Built:
         """See :class:`proofroll.engine.Engine`."""
         contact = self.system.GetObject(self.contact)
-        sunk = -self.system.GetObjectOutput(self.contact, Output.DisplacementLocal)
-        built = self.ball.built(float(contact["spheresRadii"][0] - sunk / 2))
-        return dataclasses.replace(built, regularised=self._softened)
+        gap = float(self.system.GetObjectOutput(self.contact, Output.DisplacementLocal))
+        built = self.ball.built(float(contact["spheresRadii"][0] + gap / 2), gap)
+        mu = float(contact["dynamicFriction"])
+        return dataclasses.replace(built, mu_static=mu, mu_kinetic=mu, regularised=self._softened)
 
 
 def _hollow_radius(body: RollingBall) -> float:
     """Inner radius of a sphere that is curved as the wall is where it is curved most [m]."""
-    frame = body.surface.frame(body.u0)
-    curvature = (frame.T @ body.surface.normal_gradient(body.p0) @ frame)[1:, 1:]
-    most = float(np.linalg.eigvalsh(curvature)[-1])
+    most = float(np.linalg.eigvalsh(curvature(body.surface, body.u0))[-1])
     return body.ball.radius * ON_A_PLANE if most <= 0 else body.ball.radius + 1 / most
 
 
 def _softened(
-    body: RollingBall, settings: ExudynSettings, creep: FloatArray, cone: float, hollow: float
+    body: RollingBall, settings: ExudynSettings, creep: FloatArray, press: float, mu: float, hollow: float
 ) -> dict[str, Regularised]:
-    """What differs at time 0: the creep, and forces in which the contact magnifies round-off.
+    """What differs at time 0: creep, depth, the bound of friction, and forces in which the contact magnifies round-off.
 
     Args:
         body: the scene.
         settings: of the adapter.
         creep: slip velocity at time 0 [m/s].
-        cone: largest friction at time 0 [N].
+        press: normal force at time 0 [N].
+        mu: coefficient of friction that is built [-].
         hollow: radius of the hollow sphere [m].
     """
-    a, m = body.ball.radius, body.ball.mass
+    a, m, J = body.ball.radius, body.ball.mass, body.ball.inertia
+    stiffness, zone, _ = settings.penalty
     speed, spin = float(np.linalg.norm(body.v0)), float(np.linalg.norm(body.w0))
     slip = float(np.linalg.norm(creep))
     crept = "friction is proportional to the slip velocity, so the ball creeps in order to be held"
     # Some roundings of the distance between the centres, and of the velocity at the contact.
     ulp = 8 * float(np.finfo(float).eps)
-    N = settings.stiffness * ulp * (hollow + float(np.linalg.norm(body.p0)))
-    F = cone / settings.friction_zone * ulp * (speed + a * spin + slip) + N
-    weight = m * float(np.linalg.norm(body.gravity)) or m
+    distance = ulp * (hollow + float(np.linalg.norm(body.p0)))
+    N = stiffness * distance
+    F = mu * press / zone * ulp * (speed + a * spin + slip) + N
+    natural = natural_acceleration(body)
     stiff = "the stiff contact magnifies the round-off of distance and slip velocity"
-    return {
-        "slip": Regularised(1.000001 * slip / (speed or 1.0) + EXACT, crept),
-        "spin": Regularised(1.000001 * slip / a / max(spin, (speed or 1.0) / a) + EXACT, crept),
-        "N": Regularised(N / weight + EXACT, stiff),
-        **{name: Regularised(F / weight + EXACT, stiff) for name in ("F2", "F3", "acceleration")},
+    softened = {
+        "gap in the engine": Regularised(
+            (press / stiffness + distance) / a + ROUND_OFF, "the contact presses as deep as the ball has sunk in"
+        ),
+        "slip": Regularised(1.000001 * slip / (speed or 1.0) + ROUND_OFF, crept),
+        "spin": Regularised(1.000001 * slip / a / max(spin, (speed or 1.0) / a) + ROUND_OFF, crept),
+        "N": Regularised(N / (m * natural) + ROUND_OFF, stiff),
+        **{name: Regularised(F / (m * natural) + ROUND_OFF, stiff) for name in ("F2", "F3", "acceleration")},
+        # The moment a F about the centre, over J.
+        "angular acceleration": Regularised(m * a**2 / J * F / (m * natural) + ROUND_OFF, stiff),
     }
+    if not math.isfinite(body.contact.mu_static):
+        grips = "a grip stands for friction without bound; a run that needs more of it is ended"
+        softened |= {f"1 / {name} friction": Regularised(1 / mu + ROUND_OFF, grips) for name in ("static", "kinetic")}
+    return softened
 
 
 def _centre_function(body: RollingBall, distance: float) -> Callable[[float, float, float], list[float]]:

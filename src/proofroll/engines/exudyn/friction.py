@@ -11,6 +11,8 @@ from collections.abc import Callable
 from dataclasses import dataclass
 from typing import NamedTuple
 
+from proofroll.engines.exudyn.local_frame import curvature
+from proofroll.engines.exudyn.resistance import resistance_moment
 from proofroll.errors import Refused
 from proofroll.scene import RollingBall
 
@@ -53,19 +55,18 @@ class Sliding:
 
     Attributes:
         mu_kinetic: |F|/N [-].
-        direction: unit direction of the slip velocity (e2, e3); None: the ball rolls.
+        direction: unit direction of slip (e2, e3) for the coming step; None: the ball rolls.
+        applied: the one with which the present state was computed.
     """
 
     mu_kinetic: float
     direction: tuple[float, float] | None = None
+    applied: tuple[float, float] | None = None
 
-    def force(self, touch: Touch, N: float) -> tuple[float, float]:
-        """Friction on the ball along e2 and e3 against its slip velocity [N]."""
-        if self.direction is None:
-            return 0.0, 0.0
-        moves = touch.slip > ROUND_OFF
-        d2, d3 = (touch.u2 / touch.slip, touch.u3 / touch.slip) if moves else self.direction
-        return -self.mu_kinetic * N * d2, -self.mu_kinetic * N * d3
+    def force(self, direction: tuple[float, float], N: float) -> tuple[float, float]:
+        """Friction on the ball along e2 and e3 [N]."""
+        size = -self.mu_kinetic * N
+        return size * direction[0], size * direction[1]
 
 
 # (velocity of the centre along e2 and e3, spin about e1, e2, e3, gravity along e1, e2, e3) -> contact
@@ -91,19 +92,16 @@ def touch_function(body: RollingBall) -> TouchAt:
     """
     a, m, f = body.ball.radius, body.ball.mass, body.contact.rolling_resistance
     beta, lever = mobility(body), body.ball.radius / body.ball.inertia
-    frame = body.surface.frame(body.u0)
-    k = (frame.T @ body.surface.normal_gradient(body.p0) @ frame)[1:, 1:]
-    (k22, k23), (k32, k33) = k.tolist()
+    (k22, k23), (k32, k33) = curvature(body.surface, body.u0).tolist()
 
     def touch(v2: float, v3: float, w1: float, w2: float, w3: float, g1: float, g2: float, g3: float) -> Touch:
         turn2, turn3 = k22 * v2 + k23 * v3, k32 * v2 + k33 * v3
         N = m * (v2 * turn2 + v3 * turn3 + g1)
         free2, free3 = g2 - a * w1 * turn3, g3 + a * w1 * turn2
         if f:
-            speed = math.hypot(v2, v3)
-            if speed:
-                free2 += lever * f * N * v2 / speed
-                free3 += lever * f * N * v3 / speed
+            M2, M3 = resistance_moment(f, N, v2, v3)
+            free2 += lever * M3
+            free3 -= lever * M2
         return Touch(N, -free2 / beta, -free3 / beta, v2 + a * w3, v3 - a * w2)
 
     return touch

@@ -17,6 +17,7 @@ from proofroll.engines.exudyn.friction import Sliding, Touch, touch_function
 from proofroll.engines.exudyn.integration import Integration, initial_matrices, new_system
 from proofroll.engines.exudyn.local_frame import LocalGeometry, local_geometry
 from proofroll.engines.exudyn.native import exu, items
+from proofroll.engines.exudyn.resistance import resistance_moment
 from proofroll.engines.exudyn.settings import ExudynSettings
 from proofroll.engines.exudyn.stick_slip import StickSlip
 from proofroll.errors import Refused
@@ -56,7 +57,7 @@ class Generic:
         )
         self.rolling = self._constrain(node, body.ball.radius)
         self.system.Assemble()
-        self._gravity, self._resistance = self._probe(settings)
+        self._gravity, self._resistance, self._mu_kinetic = self._probe(settings)
         self.integration: Integration | StickSlip
         if self.friction is None:
             self.integration = Integration(self.system, settings)
@@ -65,21 +66,31 @@ class Generic:
             self._tangents: tuple[float, ...] = tuple(self.local.tangents[1:].ravel().tolist())
             self.integration = StickSlip(self, body, settings)
 
-    def _probe(self, settings: ExudynSettings) -> tuple[FloatArray, float | None]:
-        """Gravity in the world [m/s²] and f [m], from the forces that Exudyn computes at rest and without spin."""
+    def _probe(self, settings: ExudynSettings) -> tuple[FloatArray, float | None, float | None]:
+        """Gravity in the world [m/s²], f [m] and μk [-], from the forces that Exudyn computes without spin."""
         data, initial = self.system.systemData, exu.ConfigurationType.Initial
         q, q_t = data.GetODE2Coordinates(initial), data.GetODE2Coordinates_t(initial)
         # Without spin, the only moment is that of the rolling resistance, and the force along the distance is N.
-        moving = np.array([q_t[0], q_t[1], q_t[2], 0.0, 0.0, 0.0])
-        forces = {}
-        for name, rates in (("rest", np.zeros(SIZE)), ("moving", moving)):
+        moving = np.array([0.0, *(q_t[1:3] if np.any(q_t[1:3]) else (1.0, 1.0)), 0.0, 0.0, 0.0])
+
+        def forces(rates: FloatArray) -> tuple[float, FloatArray, FloatArray, FloatArray]:
+            """Mass, force and moment in the local frame, when moving so, and what slip adds to the force."""
             data.SetODE2Coordinates_t(rates, initial)
-            mass, _, forces[name] = initial_matrices(self.system, settings)
+            mass, _, rolling = initial_matrices(self.system, settings)
+            slipping = rolling
+            if self.friction is not None:
+                self.friction.direction = 0.6, 0.8
+                slipping = initial_matrices(self.system, settings)[2]
+                self.friction.direction = None
+            to_force = np.linalg.inv(_base(self.local)).T
+            return mass[0, 0], to_force @ rolling[:3], rolling[3:], to_force @ (slipping - rolling)[:3]
+
+        mass, weight, _, _ = forces(np.zeros(SIZE))
+        _, press, moment, friction = forces(moving)
         data.SetODE2Coordinates_t(q_t, initial)
-        local = np.concatenate([forces["rest"][:1], np.linalg.solve(self.local.tangents[1:].T, forces["rest"][1:3])])
-        N, moment = abs(forces["moving"][0]), float(np.linalg.norm(forces["moving"][3:]))
-        known = bool(np.any(moving)) and N > 0
-        return self.surface.frame(q[1:3]) @ local / mass[0, 0], moment / N if known else None
+        N = abs(float(press[0]))
+        f, mu = (float(np.linalg.norm(x)) / N if N > 0 else None for x in (moment, friction))
+        return self.surface.frame(q[1:3]) @ weight / mass, f, None if self.friction is None else mu
 
     def _constrain(self, node: Any, radius: float) -> Any:
         """The wall first and then rolling, so that the multipliers are N, -F2, -F3."""
@@ -101,21 +112,21 @@ class Generic:
     def sample(self) -> Sample:
         """See :class:`proofroll.engine.Engine`. The spin is a quasi-velocity, so there is no orientation to report.
 
-        While the ball slips, N is the wall's multiplier and the friction its product with μk, against the slip.
+        While the ball slips, N is the wall's multiplier, and the friction what Exudyn was given for this state.
         """
         data = self.system.systemData
         q, q_t, multipliers = data.GetODE2Coordinates(), data.GetODE2Coordinates_t(), data.GetAECoordinates()
         frame = self.surface.frame(q[1:3])
         velocity = self.local.tangents @ q_t[1:3] + np.array([q_t[0], 0.0, 0.0])
         force = -multipliers
-        if self.friction is not None and self.friction.direction is not None:
-            force[1:] = self.friction.force(self.touch(q, q_t), -force[0])
+        if self.friction is not None and self.friction.applied is not None:
+            force[1:] = self.friction.force(self.friction.applied, self.touch(q, q_t).N)
         return Sample(
             p_WB=self.surface.position(q[1:3]) + q[0] * frame[:, 0],
             v_WB=frame @ velocity,
             w_WB=frame @ q_t[3:],
             force=frame @ force,
-            sticking=None if self.friction is None else self.friction.direction is None,
+            sticking=None if self.friction is None else self.friction.applied is None,
         )
 
     def events(self) -> list[Event]:
@@ -136,6 +147,11 @@ class Generic:
             self.system.SetObjectParameter(self.rolling, "activeConnector", direction is None)
         self.friction.direction = direction
 
+    def reached(self) -> None:
+        """See :class:`Switched`."""
+        assert self.friction is not None
+        self.friction.applied = self.friction.direction
+
     def without_slip(self, q_t: FloatArray) -> FloatArray:
         """See :class:`Switched`. The impulse is that of the constraint itself, through the mass matrix."""
         rows = np.array(self.system.GetObject(self.rolling)["scalingMarker1"])
@@ -144,20 +160,26 @@ class Generic:
         return np.asarray(q_t - by_impulse @ np.linalg.solve(rows @ by_impulse, rows @ q_t))
 
     def built(self) -> Built:
-        """See :class:`proofroll.engine.Engine`. Gravity and f stem from the forces Exudyn computed."""
+        """See :class:`proofroll.engine.Engine`. Gravity, f and μk stem from the forces Exudyn computed."""
         mass = self.system.GetObject(self.object)["massMatrix"].Convert2DenseMatrix()
         data = self.system.systemData
         q, q_t, q_tt = data.GetODE2Coordinates(), data.GetODE2Coordinates_t(), data.GetODE2Coordinates_tt()
         tangents, frame = self.local.tangents, self.surface.frame(q[1:3])
         acceleration = tangents @ q_tt[1:3] + np.einsum("ijk,j,k->i", self.local.second, q_t[1:3], q_t[1:3])
         acceleration[0] += q_tt[0]
+        # The spin is given in a frame that turns.
+        angular_acceleration = q_tt[3:] + np.cross(self.local.turn @ q_t[1:3], q_t[3:])
         return Built(
             mass=float(mass[0, 0]),
             inertia=np.diag(mass)[3:],
             gravity=self._gravity,
             ball_radius=float(np.array(self.system.GetObject(self.rolling)["scalingMarker1"])[0, 5]),
             rolling_resistance=self._resistance,
+            mu_static=self.integration.mu_static if isinstance(self.integration, StickSlip) else None,
+            mu_kinetic=self._mu_kinetic,
+            gap=-float(q[0]),
             acceleration=frame @ acceleration,
+            angular_acceleration=frame @ angular_acceleration,
         )
 
 
@@ -189,12 +211,10 @@ def _force_function(body: RollingBall, local: LocalGeometry, friction: Sliding |
             result[row] += factor * rates[i] * rates[j]
         if f:
             v2, v3 = t2u * rates[1] + t2v * rates[2], t3u * rates[1] + t3v * rates[2]
-            speed = (v2 * v2 + v3 * v3) ** 0.5
-            if speed:
-                # Along the distance nothing accelerates, so its force is N; the moment is -f N (v/V) × e1.
-                factor = f * result[0] / speed
-                result[4] -= factor * v3
-                result[5] += factor * v2
+            # Along the distance nothing accelerates, so its force is N.
+            M2, M3 = resistance_moment(f, result[0], v2, v3)
+            result[4] += M2
+            result[5] += M3
         return result
 
     if friction is None:
@@ -204,8 +224,7 @@ def _force_function(body: RollingBall, local: LocalGeometry, friction: Sliding |
     def force_and_friction(system: Any, t: float, item: int, q: list[float], rates: list[float]) -> list[float]:
         result = force(system, t, item, q, rates)
         if friction.direction is not None:
-            size = -friction.mu_kinetic * result[0]
-            F2, F3 = size * friction.direction[0], size * friction.direction[1]
+            F2, F3 = friction.force(friction.direction, result[0])
             result[1] += t2u * F2 + t3u * F3
             result[2] += t2v * F2 + t3v * F3
             result[4] -= a * F3

@@ -31,13 +31,15 @@ def simulation_settings(settings: ExudynSettings) -> Any:
     time = result.timeIntegration
     time.verboseMode = 0
     # Left alone, a failing Newton iteration halves the step down to 1e-8 s, and the run crawls for minutes.
-    time.adaptiveStep = settings.halvings > 0
-    time.minimumStepSize = settings.dt / 2**settings.halvings if settings.halvings else time.minimumStepSize
+    time.adaptiveStep = bool(settings.halvings)
+    if settings.halvings:
+        time.minimumStepSize = settings.dt / 2**settings.halvings
     time.newton.relativeTolerance = settings.newton_tolerance
     time.newton.absoluteTolerance = settings.newton_tolerance / 100
     time.newton.modifiedNewtonJacUpdatePerStep = settings.jacobian == "step"
     alpha = time.generalizedAlpha
-    alpha.spectralRadius = settings.spectral_radius
+    if settings.spectral_radius is not None:
+        alpha.spectralRadius = settings.spectral_radius
     alpha.useNewmark = alpha.useIndex2Constraints = settings.integrator == "trapezoidal_index2"
     time.numberOfSteps = 1
     time.endTime = settings.dt

@@ -67,6 +67,12 @@ def _coefficients(
     return tangents, second, turn
 
 
+def curvature(surface: Surface, u0: FloatArray) -> FloatArray:
+    """∂e1/∂p along e2 and e3 in the local frame [1/m], symmetric, shape (2, 2); the same everywhere if homogeneous."""
+    frame = surface.frame(u0)
+    return np.asarray((frame.T @ surface.normal_gradient(surface.position(u0)) @ frame)[1:, 1:])
+
+
 def frame_at(surface: Surface, u0: FloatArray) -> FrameAt:
     """The local frame as a fast function of the ball's centre, for callbacks that run at every Newton iterate.
 

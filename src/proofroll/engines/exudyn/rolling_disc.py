@@ -78,5 +78,5 @@ class RollingDisc:
         return []
 
     def built(self) -> Built:
-        """See :class:`proofroll.engine.Engine`."""
-        return self.ball.built(self.system.GetObject(self.joint)["discRadius"])
+        """See :class:`proofroll.engine.Engine`. The joint holds velocities only and knows no distance."""
+        return self.ball.built(self.system.GetObject(self.joint)["discRadius"], None)

@@ -8,10 +8,12 @@ from typing import Annotated, ClassVar, Literal
 
 from annotated_types import Gt, Interval
 
+from proofroll.errors import InputError
+
 
 @dataclass(frozen=True)
 class ExudynSettings:
-    """How Exudyn models the scene and integrates it.
+    """How Exudyn models the scene and integrates it. A setting that would do nothing is None.
 
     Attributes:
         formulation: ``generic`` (minimal coordinates and multipliers), ``carrier`` (rigid ball on a massless carrier,
@@ -21,13 +23,14 @@ class ExudynSettings:
         dt: fixed time step [s].
         integrator: ``generalized_alpha`` (constraints at position level, index 3) or ``trapezoidal_index2``
             (undamped, constraints at velocity level).
-        spectral_radius: of the generalized-alpha method at infinite frequency [-]; 1 damps nothing. The trapezoidal
-            rule has no damping and does not look at it.
+        spectral_radius: of the generalized-alpha method at infinite frequency [-]; 1 damps nothing. None: the engine's
+            own, 0.9. The trapezoidal rule has no damping and does not look at it.
         newton_tolerance: relative tolerance of Newton's method [-]; the absolute one is a hundredth of it, which is
             the engine's own ratio.
         jacobian: ``reused`` while Newton's method contracts, or set up again at every ``step``.
-        halvings: how often a step is halved where Newton's method fails, before the run ends. With 0 all steps are dt.
-        stiffness: of the contact's normal force [N/m]; ``contact`` only, as the following.
+        halvings: how often a step is halved where Newton's method fails, before the run ends; ``contact`` only, as the
+            following. With 0, and in the other formulations, all steps are dt.
+        stiffness: of the contact's normal force [N/m].
         friction_zone: slip velocity up to which friction is proportional to it [m/s].
         grip: coefficient that stands for unbounded friction [-]; the ball creeps by friction_zone |F| / (grip N).
     """
@@ -36,38 +39,80 @@ class ExudynSettings:
     preset: Literal["default", "matched", "tuned"] = "matched"
     dt: Annotated[float, Gt(0)] = 1e-4
     integrator: Literal["generalized_alpha", "trapezoidal_index2"] = "trapezoidal_index2"
-    spectral_radius: Annotated[float, Interval(ge=0, le=1)] = 0.9
+    spectral_radius: Annotated[float, Interval(ge=0, le=1)] | None = None
     newton_tolerance: Annotated[float, Interval(gt=0, lt=1)] = 1e-11
     jacobian: Literal["reused", "step"] = "step"
-    halvings: Annotated[int, Interval(ge=0, le=20)] = 0
-    stiffness: Annotated[float, Gt(0)] = 1e7
-    friction_zone: Annotated[float, Gt(0)] = 1e-5
-    grip: Annotated[float, Gt(0)] = 10.0
+    halvings: Annotated[int, Interval(ge=0, le=20)] | None = None
+    stiffness: Annotated[float, Gt(0)] | None = None
+    friction_zone: Annotated[float, Gt(0)] | None = None
+    grip: Annotated[float, Gt(0)] | None = None
 
     resolution: ClassVar[str] = "dt"
     # Both methods are of second order in positions, velocities and multipliers.
     order: ClassVar[int] = 2
 
+    def __post_init__(self) -> None:
+        """Accepts only settings that have an effect, and all that the formulation needs.
+
+        Raises:
+            InputError: otherwise.
+        """
+        if self.integrator == "trapezoidal_index2":
+            self._has_no("spectral_radius", "the trapezoidal rule has no damping; set integrator=generalized_alpha")
+        for name in CONTACT_ONLY:
+            if self.formulation != "contact":
+                self._has_no(name, f"{self.formulation} does not use it; set formulation=contact")
+            elif getattr(self, name) is None:
+                raise InputError(f"exudyn: {name}", None, "formulation=contact needs a number")
+
+    def _has_no(self, name: str, advice: str) -> None:
+        value = getattr(self, name)
+        if value is None:
+            return
+        # A preset's own value was not asked for: another integrator was put over the preset that needs it.
+        if value != getattr(PRESETS.get(self.formulation, {}).get(self.preset), name, None):
+            raise InputError(f"exudyn: {name}", value, advice)
+        object.__setattr__(self, name, None)
+
+    @property
+    def penalty(self) -> tuple[float, float, float]:
+        """Stiffness [N/m], friction zone [m/s] and grip [-] of the contact."""
+        assert self.stiffness is not None  # see __post_init__, here and below
+        assert self.friction_zone is not None
+        assert self.grip is not None
+        return self.stiffness, self.friction_zone, self.grip
+
+
+CONTACT_ONLY = ("halvings", "stiffness", "friction_zone", "grip")
+
+
+# ``default`` is Exudyn's own choice of integrator, damping and Newton options at a common step of 1e-3 s. Its own step,
+# a hundredth of the simulated time, is no choice of one; with the 1e-2 s that it is for a second, the ball turns by
+# 1.6 rad per step. So ``default`` tells what those options do, not what a script gives that sets no step. Its adaptive
+# step is taken over by ``contact`` alone: see ``simulation_settings``.
+
 
 def _default(formulation: Literal["generic", "carrier", "rolling_disc"]) -> ExudynSettings:
-    # Exudyn's own choice of integrator, damping and Newton options. Its tolerance of 1e-8 is felt: with rolling
-    # resistance it moves z by about 1e-6 m at dt = 1e-3, and leaves noise of 0.3 N in the carrier's F2. With rigid
-    # bodies, ρ = 0.9 stops being stable where the ball turns by more than about 0.3 rad per step.
-    # Only its adaptive step is not taken over: see ``simulation_settings``.
+    # The tolerance of 1e-8 is felt: with rolling resistance it moves z by about 1e-6 m at dt = 1e-3, and leaves noise
+    # of 0.3 N in the carrier's F2. With rigid bodies, ρ = 0.9 stops being stable where the ball turns by more than
+    # about 0.3 rad per step.
     return ExudynSettings(formulation, "default", 1e-3, "generalized_alpha", 0.9, 1e-8, "reused")
 
+
+# Above what any scene needs to roll; the larger it is, the steeper friction rises inside its zone.
+GRIP = 10.0
 
 PRESETS: Mapping[str, Mapping[str, ExudynSettings]] = {
     "generic": {
         "default": _default("generic"),
         # Constant constraint matrix: the undamped trapezoidal rule is exact in the constraints, and its multipliers
         # start consistent, so that they do not ring. The Jacobian barely changes.
-        "matched": ExudynSettings("generic", "matched", 1e-4, "trapezoidal_index2", 0.9, 1e-11, "reused"),
+        "matched": ExudynSettings("generic", "matched", 1e-4, "trapezoidal_index2", None, 1e-11, "reused"),
     },
     "carrier": {
         "default": _default("carrier"),
         # A new Jacobian at every step costs less than the seven iterations per step that an old one needs.
-        "matched": ExudynSettings("carrier", "matched", 1e-4, "trapezoidal_index2", 0.9, 1e-10, "step"),
+        "matched": ExudynSettings("carrier", "matched", 1e-4, "trapezoidal_index2", None, 1e-10, "step"),
         # Index 3 keeps the gap closed to round-off (index 2 lets it open by 1e-7 m), slips less and is a little more
         # accurate without rolling resistance. ρ = 0.8 damps the multipliers enough to stay stable up to half a radian
         # of spin per step (0.9: up to 0.3) at the price of a tenth more energy error; 0.6 costs twice the energy error.
@@ -83,12 +128,18 @@ PRESETS: Mapping[str, Mapping[str, ExudynSettings]] = {
     "contact": {
         # Integrator, Newton options, adaptive step and friction zone as Exudyn has them; a stiffness it does not have.
         # The ball creeps by up to 1e-3 m/s, and at a grazing onset the damped integrator leaves the zone too late.
-        "default": ExudynSettings("contact", "default", 1e-3, "generalized_alpha", 0.9, 1e-8, "reused", 10, 1e6, 1e-3),
+        "default": ExudynSettings(
+            "contact", "default", 1e-3, "generalized_alpha", 0.9, 1e-8, "reused", 10, 1e6, 1e-3, GRIP
+        ),
         # A hundredth of the default's creep. The trapezoidal rule is the one that does not chatter at the edge of the
         # zone. Newton's method cannot always pass that edge within a step, which is then halved. Round-off, magnified
         # by the contact, is larger than what a tighter tolerance would ask for.
-        "matched": ExudynSettings("contact", "matched", 1e-4, "trapezoidal_index2", 0.9, 1e-8, "step", 10, 1e7, 1e-5),
+        "matched": ExudynSettings(
+            "contact", "matched", 1e-4, "trapezoidal_index2", None, 1e-8, "step", 10, 1e7, 1e-5, GRIP
+        ),
         # Stiffer: as N falls, the ball comes out of the wall by N/k, and its angle runs away by N/(k c) of its way.
-        "tuned": ExudynSettings("contact", "tuned", 1e-4, "trapezoidal_index2", 0.9, 1e-8, "step", 10, 1e8, 1e-5),
+        "tuned": ExudynSettings(
+            "contact", "tuned", 1e-4, "trapezoidal_index2", None, 1e-8, "step", 10, 1e8, 1e-5, GRIP
+        ),
     },
 }

@@ -37,7 +37,10 @@ class Switched(Protocol):
         """The contact in the state of these coordinates and rates."""
 
     def hold(self, direction: tuple[float, float] | None) -> None:
-        """Slips along the unit ``direction`` (e2, e3), or rolls where there is none."""
+        """From now on slips along the unit ``direction`` (e2, e3), or rolls where there is none."""
+
+    def reached(self) -> None:
+        """The present state was computed with what is held now."""
 
     def without_slip(self, q_t: FloatArray) -> FloatArray:
         """The rates after the impulse at the contact that ends the slip."""
@@ -102,6 +105,7 @@ class StickSlip:
         if elapsed > 0.5 * self.settings.dt:
             self._before, self._before_t = self.state, self.t
             self.state, self.t = self._state(exu.ConfigurationType.Current), t
+            self.model.reached()
             touch, old = self.state.touch, self._before.touch
             if self._margin(touch) <= 0 or touch.N <= 0:
                 self._stopped = True
@@ -211,4 +215,5 @@ class StickSlip:
             self.model.hold(None)
         else:
             self._aim(0.0)
+        self.model.reached()
         self.integration = Integration(self.system, self.settings, at=self.t)
