@@ -158,13 +158,15 @@ def test_law_of_friction(formulation: str, law: float, beside: float, creep: flo
     assert float(slip[~slipping].max()) < creep
 
 
-# The contact's normal force is felt to the round-off that its stiffness magnifies, and to Newton's tolerance.
+# In newtons and newton metres: what the presets' tolerances of Newton's method leave, 1e-8 in the last two. The contact
+# leaves 2.5e-4 N where the ball sticks, as its friction rises by 1.4 N per µm/s. A friction of 12 N reported 6 % beside
+# the applied one would be off by 0.7 N.
 @pytest.mark.parametrize(
     ("settings", "exact"),
     [
         ({"formulation": "generic", "dt": 1e-3}, 1e-9),
-        ({"formulation": "generic", "preset": "default"}, 1e-9),
-        ({"formulation": "contact", "dt": 1e-3}, 1e-5),
+        ({"formulation": "generic", "preset": "default"}, 1e-6),
+        ({"formulation": "contact", "dt": 1e-3}, 5e-4),
     ],
 )
 def test_reported_friction_is_the_applied_one(settings: dict[str, Any], exact: float) -> None:
