@@ -69,7 +69,7 @@ def judge(
     limit_error = None if limit is None else _distance(limit.values, true)
     if error <= tolerance:
         verdict = Verdict.AGREES
-    elif limit is not None and limit_error is not None and _converges(error, limit, limit_error, truth_error_bar):
+    elif np.isfinite(error) and limit is not None and _converges(tolerance, limit, limit_error, truth_error_bar):
         verdict = Verdict.CONVERGES
     else:
         verdict = Verdict.ILL_POSED if ill_posed else Verdict.DIFFERS
@@ -87,13 +87,13 @@ def judge(
     )
 
 
-def _converges(error: float, limit: Limit, limit_error: float, truth_error_bar: float) -> bool:
-    """The limit is the truth within both error bars, and the limit says more than the run itself did.
+def _converges(tolerance: float, limit: Limit, limit_error: float | None, truth_error_bar: float) -> bool:
+    """The limit is the truth within both error bars, and is known to within the tolerance.
 
     Without the second condition a scattered ladder, whose error bar is as large as its error, would pass.
     """
-    believable = limit.error_bar < 0.5 * error < float("inf")
-    return limit_error <= limit.error_bar + truth_error_bar and believable
+    near = limit_error is not None and limit_error <= limit.error_bar + truth_error_bar
+    return near and limit.error_bar <= tolerance
 
 
 def _distance(values: FloatArray, true: FloatArray) -> float:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import signal
 import sys
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
@@ -25,7 +26,7 @@ app = typer.Typer(
     rich_markup_mode=None,
 )
 
-OK, CONTRADICTED, USAGE, ENGINE = 0, 1, 2, 3
+OK, CONTRADICTED, USAGE, ENGINE, INTERRUPTED = 0, 1, 2, 3, 130
 
 Json = Annotated[bool, typer.Option("--json", help="Print one JSON document on standard output, nothing else.")]
 Out = Annotated[Path, typer.Option("--out", help="Folder for results; what is there is reused.")]
@@ -395,6 +396,7 @@ def _given(error: typer.TyperException) -> str:
 
 def main() -> None:
     """Entry point: every problem is one line on standard error and an exit code."""
+    signal.signal(signal.SIGTERM, signal.default_int_handler)  # a time limit from outside also ends the workers
     try:
         code = app(standalone_mode=False)
     except typer.TyperException as error:
@@ -410,10 +412,11 @@ def main() -> None:
         _complain(str(error))
         code = ENGINE if isinstance(error, (Missing, WorkerDied, Refused)) else USAGE
     except (KeyboardInterrupt, typer.Abort):
-        _complain("interrupted; what was finished is stored and will be reused")
-        code = 130
+        code = INTERRUPTED
     except BrokenPipeError:
         code = OK  # the reader of our output has seen enough
+    if code == INTERRUPTED:
+        _complain("interrupted; cases of a comparison that were finished are stored and will be reused")
     sys.exit(code or OK)
 
 

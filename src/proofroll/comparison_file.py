@@ -5,180 +5,21 @@ from __future__ import annotations
 import itertools
 import math
 import tomllib
-from collections.abc import Iterable
-from dataclasses import dataclass, field
+from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
 
 from pydantic import ConfigDict, TypeAdapter, ValidationError
 
 from proofroll.agreement import Verdict
+from proofroll.comparison import Band, Comparison, ExceptAt, Row, Tolerance
 from proofroll.errors import InputError
 from proofroll.folders import data_folder
-from proofroll.metrics import OBSERVABLES
+from proofroll.metrics import WITHOUT_SCALE, units
+from proofroll.recording import time_grid
 from proofroll.scene_file import first_problem, load_scene
 
 _LADDER_RUNGS = 3
-
-
-@dataclass(frozen=True)
-class Tolerance:
-    """How far an observable may be from the truth.
-
-    Attributes:
-        value: in the unit of the observable, or as a fraction of its scale.
-        relative: whether it is a fraction.
-    """
-
-    value: float
-    relative: bool
-
-    def absolute(self, scale: float) -> float:
-        """In the unit of the observable."""
-        return self.value * scale if self.relative else self.value
-
-    @classmethod
-    def parse(cls, field_name: str, text: object) -> Tolerance:
-        """Reads ``"6e-5 m"`` or ``"0.1 %"``.
-
-        Raises:
-            InputError: the text has another form.
-        """
-        number, _, unit = str(text).partition(" ")
-        try:
-            value = float(number)
-        except ValueError:
-            raise InputError(field_name, text, 'write a number and a unit, "6e-5 m", or "0.1 %" of the scale') from None
-        if not (math.isfinite(value) and value > 0 and unit.strip()):
-            raise InputError(field_name, text, 'write a positive number and a unit, "6e-5 m", or "0.1 %" of the scale')
-        return cls(value / 100, True) if unit.strip() == "%" else cls(value, False)
-
-
-@dataclass(frozen=True)
-class Band:
-    """A set of tolerances by observable, with the reason for them."""
-
-    because: str
-    bounds: dict[str, Tolerance]
-
-
-@dataclass(frozen=True)
-class Row:
-    """One engine with settings, and what is expected of it.
-
-    Attributes:
-        engine: ``name[key=value,…]``.
-        tolerance: name of a band of tolerances.
-        expect: expected verdicts on the row as a whole, which is the worst of its observables.
-        expect_for: observable -> expected verdicts on it alone.
-        because: why something else than agreement is expected.
-        ladder: factors on the step, coarse first; 1 is the run itself. [1]: no ladder, so no limit of small steps.
-        only: parameter -> values for which this row is run (all if absent).
-        order: observable -> lowest and highest order that is expected.
-        limit: observable -> largest expected distance of the limit of small steps from the truth.
-        bound: observable -> tolerance that replaces the band's.
-    """
-
-    engine: str
-    tolerance: str
-    expect: list[Verdict] = field(default_factory=lambda: [Verdict.AGREES])
-    expect_for: dict[str, list[Verdict]] = field(default_factory=dict)
-    because: str = ""
-    ladder: list[float] = field(default_factory=lambda: [4.0, 2.0, 1.0])
-    only: dict[str, list[float]] = field(default_factory=dict)
-    order: dict[str, tuple[float, float]] = field(default_factory=dict)
-    limit: dict[str, Tolerance] = field(default_factory=dict)
-    bound: dict[str, Tolerance] = field(default_factory=dict)
-
-
-@dataclass(frozen=True)
-class Edge:
-    """A value of a parameter at which the time of the first slip jumps, to be found between two others.
-
-    Attributes:
-        edge_between: the two values.
-    """
-
-    edge_between: tuple[float, float]
-
-
-@dataclass(frozen=True)
-class Axis:
-    """Equally spaced values.
-
-    Attributes:
-        low, high: first and last.
-        count: how many.
-    """
-
-    low: float
-    high: float
-    count: int
-
-
-@dataclass(frozen=True)
-class Regimes:
-    """A map of what becomes of the ball.
-
-    Attributes:
-        speed, mu_static: the axes.
-        rolling_resistance: f [m]; one map for each.
-        until: length of each run [s].
-    """
-
-    speed: Axis
-    mu_static: Axis
-    rolling_resistance: list[float]
-    until: float
-
-    @property
-    def count(self) -> int:
-        """Number of runs of all maps."""
-        return self.speed.count * self.mu_static.count * len(self.rolling_resistance)
-
-
-@dataclass(frozen=True)
-class Comparison:
-    """A claim about engines on a scene.
-
-    Attributes:
-        name: of the file, without ending.
-        title, question: for a person.
-        scene: name of the scene.
-        until, every: last time and sampling interval [s].
-        vary: parameter -> values; every combination is run.
-        points: further combinations, each with parameters of its own.
-        bands: tolerances by name.
-        rows: engines with settings.
-        time_limit: wall seconds a case may take [s].
-        regimes: a map that goes with the comparison, or None.
-    """
-
-    name: str
-    title: str
-    question: str
-    scene: str
-    until: float
-    every: float
-    vary: dict[str, list[float]] = field(default_factory=dict)
-    points: list[dict[str, float | Edge]] = field(default_factory=list)
-    bands: dict[str, Band] = field(default_factory=dict)
-    rows: list[Row] = field(default_factory=list)
-    time_limit: float = 120.0
-    regimes: Regimes | None = None
-
-    def combinations(self) -> list[dict[str, float | Edge]]:
-        """Every combination of parameters."""
-        found: list[dict[str, float | Edge]] = [*self.points]
-        if self.vary:
-            for values in itertools.product(*self.vary.values()):
-                found.append(dict(zip(self.vary, values, strict=True)))
-        return found
-
-    def variations(self, row: Row) -> list[dict[str, float]]:
-        """The combinations of parameters for which the row is run, once every edge has been found."""
-        numbers = [{k: v for k, v in point.items() if isinstance(v, float)} for point in self.combinations()]
-        return [point for point in numbers if all(point.get(key) in allowed for key, allowed in row.only.items())]
 
 
 def comparison_names() -> list[str]:
@@ -228,10 +69,23 @@ def _comparison(path: Path, content: dict[str, Any]) -> Comparison:
     except ValidationError as error:
         raise first_problem(error, where) from None
     for name, band in comparison.bands.items():
-        _check_observables(f"{where}: tolerances.{name}", comparison, band.bounds)
+        _check_bounds(f"{where}: tolerances.{name}", comparison, band.bounds)
     for index, row in enumerate(comparison.rows):
         _check(f"{where}: rows.{index}", row, comparison)
+    _check_times(where, comparison)
     return comparison
+
+
+def _check_times(where: str, comparison: Comparison) -> None:
+    time_grid(comparison.until, comparison.every)
+    lengths = {"time_limit": comparison.time_limit}
+    if comparison.regimes is not None:
+        lengths["regimes.until"] = comparison.regimes.until
+        if not comparison.regimes.rolling_resistance:
+            raise InputError(f"{where}: regimes.rolling_resistance", [], "give at least one value in m")
+    for name, value in lengths.items():
+        if not (math.isfinite(value) and value > 0):
+            raise InputError(f"{where}: {name}", value, "give a positive, finite time in s")
 
 
 def _table(where: str, value: object) -> dict[str, Any]:
@@ -257,6 +111,9 @@ def _prepared(where: str, content: object) -> dict[str, Any]:
             row[key] = {name: Tolerance.parse(f"{where}.{key}.{name}", text) for name, text in bounds.items()}
     if isinstance(row.get("expect"), str):
         row["expect"] = [row["expect"]]
+    for exception in row.get("except_at", []):
+        if isinstance(exception, dict) and isinstance(exception.get("expect"), str):
+            exception["expect"] = [exception["expect"]]
     if "expect_for" in row:
         expected = _table(f"{where}.expect_for", row["expect_for"])
         row["expect_for"] = {k: [v] if isinstance(v, str) else v for k, v in expected.items()}
@@ -269,22 +126,41 @@ def _check(where: str, row: Row, comparison: Comparison) -> None:
         raise InputError(f"{where}.tolerance", row.tolerance, f"choose one of {', '.join(comparison.bands)}")
     if row.ladder != [1.0]:
         _check_ladder(where, row.ladder)
-    verdicts = {*row.expect, *itertools.chain.from_iterable(row.expect_for.values())}
-    if verdicts - {Verdict.AGREES} and not row.because:
+    _check_expectations(where, row)
+    _check_bounds(where, comparison, dict.fromkeys([*row.expect_for, *row.order]))
+    _check_bounds(where, comparison, row.limit)
+    _check_bounds(where, comparison, row.bound)
+    _check_points(f"{where}.only", comparison, row.only)
+    for exception in row.except_at:
+        _check_points(f"{where}.except_at", comparison, exception.where)
+    if not comparison.combinations(row.only):
+        raise InputError(f"{where}.only", row.only, "no point of the comparison fits, so the row would never be run")
+
+
+def _check_expectations(where: str, row: Row) -> None:
+    claims = [row.expect, *row.expect_for.values(), *(exception.expect for exception in row.except_at)]
+    for claim in claims:
+        if {Verdict.AGREES, Verdict.DIFFERS} <= set(claim):
+            advice = "that holds for any engine; say with except_at where it agrees and where it differs"
+            raise InputError(f"{where}.expect", " or ".join(claim), advice)
+    if {*itertools.chain.from_iterable(claims)} - {Verdict.AGREES} and not row.because:
         raise InputError(f"{where}.because", "nothing", "an expectation other than agreement needs its reason; add it")
-    _check_observables(where, comparison, [*row.expect_for, *row.order, *row.limit, *row.bound])
+
+
+def _check_points(where: str, comparison: Comparison, chosen: Mapping[str, list[float]]) -> None:
+    """Every value that is chosen is one that the comparison has."""
     given: dict[str, list[float]] = {}
     for point in comparison.combinations():
         for key, value in point.items():
             if isinstance(value, float):
                 given.setdefault(key, []).append(value)
-    for key, values in row.only.items():
+    for key, values in chosen.items():
         if key not in given:
-            raise InputError(f"{where}.only", key, f"the comparison varies {', '.join(given)}")
+            raise InputError(f"{where}.{key}", values, f"the comparison varies {', '.join(given)}")
         for value in values:
             if value not in given[key]:
                 known = ", ".join(f"{item:g}" for item in dict.fromkeys(given[key]))
-                raise InputError(f"{where}.only.{key}", value, f"the comparison has only {known}")
+                raise InputError(f"{where}.{key}", value, f"the comparison has only {known}")
 
 
 def _check_ladder(where: str, ladder: list[float]) -> None:
@@ -295,14 +171,19 @@ def _check_ladder(where: str, ladder: list[float]) -> None:
         raise InputError(f"{where}.ladder", ladder, "neighbouring factors must have the same ratio")
 
 
-def _check_observables(where: str, comparison: Comparison, names: Iterable[str]) -> None:
-    known = (*load_scene(comparison.scene).rolling.surface.coordinates, *OBSERVABLES)
-    for name in names:
+def _check_bounds(where: str, comparison: Comparison, bounds: Mapping[str, Tolerance | None]) -> None:
+    """Every name is an observable of the scene, and every tolerance is in its unit."""
+    known = units(load_scene(comparison.scene).rolling)
+    for name, bound in bounds.items():
         if name not in known:
             raise InputError(
                 f"{where}: observable", name, f"there is no such observable; choose from {', '.join(known)}"
             )
+        if bound is not None and bound.relative and name in WITHOUT_SCALE:
+            raise InputError(f"{where}: {name}", "%", f"it has no size of its own; give a number in {known[name]}")
+        if bound is not None and not bound.relative and bound.unit != known[name]:
+            raise InputError(f"{where}: {name}", bound.unit, f"its unit is {known[name]}")
 
 
-for _typed in (Comparison, Row):
+for _typed in (Comparison, Row, ExceptAt):
     setattr(_typed, "__pydantic_config__", ConfigDict(extra="forbid"))  # noqa: B010 -- the name is pydantic's, not the class's

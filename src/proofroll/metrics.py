@@ -21,19 +21,24 @@ if TYPE_CHECKING:
     import xarray as xr
 
 # Observables besides the coordinates of the scene's surface.
-OBSERVABLES = (
-    "N",
-    "F2",
-    "F3",
-    "needed_friction",
-    "energy_balance",
-    "force_audit",
-    "gap",
-    "slip",
-    "creep",
-    "first_slip",
-    "event_order",
-)
+_UNITS = {
+    "N": "N",
+    "F2": "N",
+    "F3": "N",
+    "needed_friction": "1",
+    "energy_balance": "J",
+    "force_audit": "N",
+    "gap": "m",
+    "slip": "m/s",
+    "creep": "m",
+    "first_slip": "s",
+    "event_times": "s",
+    "event_order": "events",
+}
+OBSERVABLES = tuple(_UNITS)
+# Observables that have no size of their own to which a percentage could refer.
+WITHOUT_SCALE = frozenset({"first_slip", "event_times", "event_order"})
+
 
 # Degree of the splines through the samples. Sampled twenty times per oscillation of z, a derivative of degree 7 is
 # good to about 1e-6 of its size; what is left is measured on the truth and reported as the error bar.
@@ -81,10 +86,14 @@ def observables(body: RollingBall, dataset: xr.Dataset) -> dict[str, Observable]
         if "N" in dataset or not body.contact.rolling_resistance:
             put("energy_balance", "J", energy_balance(body, dataset))
         if "N" in dataset:
-            put("force_audit", "N", force_audit(body, dataset))
+            audited = force_audit(body, dataset)
+            if audited.size:
+                put("force_audit", "N", audited)
     if "sticking" in dataset:
-        slips = [event.time for event in events_of(dataset) if event.kind == "slip"]
+        events = events_of(dataset)
+        slips = [event.time for event in events if event.kind == "slip"]
         put("first_slip", "s", np.array(slips[:1]))
+        put("event_times", "s", np.array([event.time for event in events]))
         put("creep", "m", np.array([_creep(curves["slip"].values, dataset)]))
     return curves
 
@@ -94,6 +103,11 @@ def _creep(slip: FloatArray, dataset: xr.Dataset) -> float:
     sticking, t = dataset["sticking"].to_numpy().astype(bool), dataset["time"].to_numpy()
     both = sticking[1:] & sticking[:-1]
     return float(np.sum(both * np.diff(t) * (slip[1:] + slip[:-1]) / 2))
+
+
+def units(body: RollingBall) -> dict[str, str]:
+    """Unit of every observable that a comparison may name."""
+    return dict(zip(body.surface.coordinates, body.surface.units, strict=True)) | _UNITS
 
 
 def scales(body: RollingBall, truth: xr.Dataset) -> dict[str, float]:

@@ -11,7 +11,7 @@ import numpy as np
 from proofroll.engine import LocatesEvents, Sample
 from proofroll.errors import Diverged, InputError
 from proofroll.events import between_samples, with_events
-from proofroll.scene import Scene
+from proofroll.scene import Capability, Scene
 from proofroll.surfaces import FloatArray
 from proofroll.trajectory import from_samples
 
@@ -69,6 +69,8 @@ def record(engine: Any, scene: Scene, times: FloatArray) -> Recording:
         except Diverged as error:
             failure = str(error)
             break
+    if Capability.BOUNDED_FRICTION in scene.requires and any(sample.sticking is None for sample in samples):
+        failure = failure or "the engine does not say whether the ball sticks or slips"
     dataset = from_samples(scene, times, samples)
     if "sticking" in dataset:
         located = isinstance(engine, LocatesEvents)

@@ -28,9 +28,10 @@ def load_engine(name: str) -> Any:
     point = _entry_point(name)
     try:
         return point.load()
-    except ImportError as error:
+    except ModuleNotFoundError as error:
         module = error.name or str(error)
-        raise Missing(f"{name} is not installed here ({module} is missing): pip install 'proofroll[{name}]'") from None
+        how = f"pip install 'proofroll[{name}]'" if point.value.startswith("proofroll.") else f"pip install {module}"
+        raise Missing(f"{name} is not installed here ({module} is missing): {how}") from None
 
 
 def _entry_point(name: str) -> EntryPoint:

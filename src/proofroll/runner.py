@@ -238,6 +238,8 @@ class Runner:
                     self._workers.add(worker)
                 try:
                     result = _ask(worker, case, self.store.trajectory(case))
+                except InputError as error:  # a step that does not divide the grid, say: this case's own affair
+                    result = Result(Status.REFUSED, str(error), versions={case.engine.name: case.engine.version})
                 except WorkerDied as error:
                     result = _lost(case, error)
                     self._drop(worker)

@@ -249,7 +249,8 @@ def _check_bounds(name: str, parameter: Parameter, values: Mapping[str, float], 
         limit = values[bound] if isinstance(bound, str) else bound
         if not holds(value, limit):
             shown = f"{bound} = {limit:g}" if isinstance(bound, str) else f"{limit:g}"
-            raise InputError(name, value, f"{parameter.meaning} must be {words} {shown} {parameter.unit}")
+            unit = "" if parameter.unit == "1" else f" {parameter.unit}"
+            raise InputError(name, value, f"{parameter.meaning} must be {words} {shown}{unit}")
 
 
 def _substituted(content: Any, values: Mapping[str, float], where: str) -> Any:

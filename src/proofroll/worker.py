@@ -6,6 +6,7 @@ answers, and what an engine breaks costs only this process.
 
 from __future__ import annotations
 
+import contextlib
 import dataclasses
 import gc
 import hashlib
@@ -15,8 +16,10 @@ import os
 import platform
 import statistics
 import sys
+import threading
 import time
 from collections.abc import Callable
+from importlib import metadata
 from pathlib import Path
 from typing import Any
 
@@ -45,10 +48,18 @@ _TIMED_RUNS = 5
 
 def main(answers: int) -> None:
     """Serves requests; ``answers`` is the file descriptor for the answers."""
+    threading.Thread(target=_end_with, args=(os.getppid(),), daemon=True).start()
     with os.fdopen(answers, "w", encoding="utf-8") as pipe:
         for line in sys.stdin:
             pipe.write(json.dumps(_answer(json.loads(line))) + "\n")
             pipe.flush()
+
+
+def _end_with(parent: int) -> None:
+    """Ends this process when its parent is gone, even in the middle of a case."""
+    while os.getppid() == parent:
+        time.sleep(0.5)
+    os._exit(1)
 
 
 def _answer(request: dict[str, Any]) -> dict[str, Any]:
@@ -89,13 +100,13 @@ def resolve(engine: str, options: dict[str, Any]) -> dict[str, Any]:
         if options:
             raise InputError("truth", ", ".join(options), "the truth has no settings; leave them out")
         code = _digest([Path(proofroll.__file__).parent / "truth"])
-        return dataclasses.asdict(EngineFacts("truth", proofroll.__version__, code, {}))
+        return dataclasses.asdict(EngineFacts("truth", _truth_version(), code, {}))
     from proofroll.registry import load_engine, resolve_settings
 
     kind = load_engine(engine)
     settings = resolve_settings(kind, options)
     source = Path(inspect.getfile(kind))
-    package = source.parent.name == engine
+    package = (source.parent / "__init__.py").is_file() and source.parent.name != "engines"
     facts = EngineFacts(
         name=engine,
         version=kind.version(),
@@ -105,6 +116,15 @@ def resolve(engine: str, options: dict[str, Any]) -> dict[str, Any]:
         order=settings.order,
     )
     return dataclasses.asdict(facts)
+
+
+def _truth_version() -> str:
+    """Of proofroll, and of the libraries by which the truth is integrated."""
+    found = [f"proofroll {proofroll.__version__}"]
+    for name in ("numpy", "scipy", "heyoka"):
+        with contextlib.suppress(metadata.PackageNotFoundError):
+            found.append(f"{name} {metadata.version(name)}")
+    return ", ".join(found)
 
 
 def _digest(sources: list[Path]) -> str:

@@ -7,7 +7,8 @@ from pathlib import Path
 
 import pytest
 
-from proofroll.comparison_file import Comparison, Row, comparison_names, load_comparison
+from proofroll.comparison import Comparison, Row
+from proofroll.comparison_file import comparison_names, load_comparison
 from proofroll.registry import engine_names, load_engine, parse_engine, resolve_settings
 from proofroll.runner import Runner
 from proofroll.store import Store

@@ -80,5 +80,10 @@ class Tiny:
         """See :class:`proofroll.engine.Engine`."""
         ball = self.body.ball
         return Built(
-            ball.mass, np.full(3, ball.inertia), self.body.gravity, ball.radius, None, initial_response(self.body)[0]
+            mass=ball.mass,
+            inertia=np.full(3, ball.inertia),
+            gravity=self.body.gravity,
+            ball_radius=ball.radius,
+            rolling_resistance=self.body.contact.rolling_resistance,
+            acceleration=initial_response(self.body)[0],
         )

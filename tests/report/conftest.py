@@ -13,7 +13,7 @@ import pytest
 
 from proofroll.agreement import Verdict, judge
 from proofroll.case import Case, EngineFacts, Result, Status
-from proofroll.comparison_file import Band, Comparison, Row, Tolerance
+from proofroll.comparison import Band, Comparison, Row, Tolerance
 from proofroll.metrics import observables, scales
 from proofroll.report.html import write_report
 from proofroll.scene_file import load_scene

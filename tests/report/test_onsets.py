@@ -15,7 +15,7 @@ import pytest
 
 from proofroll.agreement import Judgement, Verdict
 from proofroll.case import Case, EngineFacts, Result, Status
-from proofroll.comparison_file import Band, Comparison, Row, Tolerance
+from proofroll.comparison import Band, Comparison, Row, Tolerance
 from proofroll.events import Event, events_of, with_events
 from proofroll.report.html import page, report_content, write_report
 from proofroll.report.labels import MEANINGS, SYMBOLS

@@ -6,7 +6,8 @@ from pathlib import Path
 import pytest
 
 from proofroll.agreement import Verdict
-from proofroll.comparison_file import Comparison, Tolerance, comparison_names, load_comparison
+from proofroll.comparison import Comparison, Tolerance
+from proofroll.comparison_file import comparison_names, load_comparison
 from proofroll.errors import InputError
 
 TEXT = """
@@ -66,7 +67,7 @@ def test_a_comparison(load: Callable[..., Comparison]) -> None:
     assert plain.ladder == [4, 2, 1]
     assert free.ladder == [1, 0.5, 0.25]
     assert free.order == {"z": (0.9, 1.1)}
-    assert free.limit == {"z": Tolerance(3e-5, False)}
+    assert free.limit == {"z": Tolerance(3e-5, False, "m")}
     assert free.bound == {"F3": Tolerance(0.02, True)}
     assert comparison.bands["tight"].because == "round-off"
 
@@ -125,7 +126,7 @@ def test_tolerances_of_another_form(text: object) -> None:
         ("ladder = [1, 0.5, 0.25]", "ladder = [1, 0.5, 0.1]", ["rows.1.ladder", "same ratio"]),
         ("ladder = [1, 0.5, 0.25]", "ladder = [1, 1, 1]", ["rows.1.ladder"]),
         ("ladder = [1, 0.5, 0.25]", "ladder = [1, 0.5, -0.25]", ["rows.1.ladder"]),
-        ("only = { speed = [4] }", "only = { sped = [4] }", ["rows.1.only", "'sped'", "varies speed"]),
+        ("only = { speed = [4] }", "only = { sped = [4] }", ["rows.1.only", "sped", "varies speed"]),
         ("only = { speed = [4] }", "only = { speed = [5] }", ["rows.1.only.speed = 5", "has only 2, 4"]),
         ('N = "0.1 %"', 'n = "0.1 %"', ["tolerances.tight", "'n'", "no such observable; choose from gamma, z, N"]),
         ('scene = "sphere_in_cylinder"', 'scene = "sphere"', ["scene = 'sphere'"]),

@@ -94,10 +94,15 @@ def test_progress_is_told_of_every_case_once(tmp_path: Path, make_case: MakeCase
     assert sorted(seen) == [("oracle", Status.DONE, True), ("refuses", Status.REFUSED, True)]
 
 
-def test_what_the_user_does_wrong_is_raised(tmp_path: Path, make_case: MakeCase) -> None:
-    """A setting that does not exist is the user's error, not a crash of the engine."""
+def test_a_case_that_makes_no_sense_costs_only_itself(tmp_path: Path, make_case: MakeCase) -> None:
+    """A setting that does not exist is that case's refusal; the other cases arrive, and alone it is raised."""
+    wrong, right = make_case("oracle", settings={"speed": 3}), make_case("oracle")
+    results = Runner(Store(tmp_path), jobs=1).run([wrong, right])
+    assert results[wrong.key].status is Status.REFUSED
+    assert "no such setting" in results[wrong.key].message
+    assert results[right.key].status is Status.DONE
     with pytest.raises(InputError, match=r"oracle: speed = .*no such setting"):
-        Runner(Store(tmp_path), jobs=1).run([make_case("oracle", settings={"speed": 3})])
+        run_one(wrong, tmp_path / "out.nc")
 
 
 def test_an_error_in_progress_ends_the_run(tmp_path: Path, make_case: MakeCase) -> None:

@@ -13,7 +13,7 @@ import numpy as np
 
 from proofroll.agreement import Judgement, Verdict, judge
 from proofroll.case import Case, EngineFacts, Result, Status
-from proofroll.comparison_file import Band, Comparison, Row
+from proofroll.comparison import Band, Comparison, Row
 from proofroll.convergence import Limit, richardson, tightest
 from proofroll.errors import InputError, Missing, ProofrollError
 from proofroll.events import events_of
@@ -80,18 +80,21 @@ class Outcome:
 
     @property
     def lost(self) -> list[Run]:
-        """Runs whose engine is missing, crashed or hung."""
+        """Runs whose engine is missing, crashed or hung, though the comparison does not expect a failure."""
         broken = {Status.MISSING, Status.CRASHED, Status.TIMEOUT}
-        return [run for run in self.runs if run.result.status in broken]
+        lost = [run for run in self.runs if run.result.status in broken]
+        return [run for run in lost if Verdict.FAILED not in run.row.expected(run.parameters)]
 
 
 def point_name(parameters: dict[str, float]) -> str:
     """A point of the parameters as text, e.g. ``speed=4, rolling_resistance=0.0005``."""
-    return ", ".join(f"{key}={value:g}" for key, value in parameters.items())
+    return ", ".join(f"{key}={value:.12g}" for key, value in parameters.items())
 
 
 # Observables that hang on when slip begins.
-_OF_EVENTS = frozenset({"first_slip", "event_order"})
+_OF_EVENTS = frozenset({"first_slip", "event_order", "event_times"})
+# Observables that are judged even where the time of slip is ill-posed: they hold on every path.
+_EVERYWHERE = frozenset({"energy_balance", "force_audit", "gap", "creep"})
 
 
 @dataclass(frozen=True)
@@ -212,8 +215,13 @@ def evaluate(planned: Plan, results: dict[str, Result], runner: Runner) -> Outco
             judged.append(_failed(run, run.facts, result))
             continue
         name = point_name(run.parameters)
+        truth = results[planned.truths[name].key]
+        if truth.status != Status.DONE:
+            nothing = Result(Status.REFUSED, f"there is no truth here: {truth.message}", versions=result.versions)
+            judged.append(_failed(run, run.facts, nothing))
+            continue
         if name not in references:
-            references[name] = _reference(comparison, run.parameters, planned.truths[name], results, runner)
+            references[name] = _reference(comparison, run.parameters, planned.truths[name], runner)
         trajectories = {
             factor: read(runner.store.trajectory(case))
             for factor, case in run.ladder.items()
@@ -256,9 +264,9 @@ class _Reference:
         if name == "event_order":
             return np.zeros(1), 0.0
         values = self.curves[name].values
-        if name == "first_slip":
-            events = [event for event in events_of(self.dataset) if event.kind == "slip"]
-            return values, events[0].time_high - events[0].time_low if events else 0.0
+        if name in _OF_EVENTS:
+            events = events_of(self.dataset)
+            return values, max((event.time_high - event.time_low for event in events), default=0.0)
         if name == "slip" and "sticking" in self.dataset:
             return values, float(np.hypot(*(self.dataset[f"slip{i}"].attrs["error_bar"] for i in (2, 3))))
         if name not in self.dataset or name == "gap":
@@ -267,12 +275,7 @@ class _Reference:
         return values, float(self.dataset[name].attrs["error_bar"])
 
 
-def _reference(
-    comparison: Comparison, point: dict[str, float], case: Case, results: dict[str, Result], runner: Runner
-) -> _Reference:
-    result = results[case.key]
-    if result.status != Status.DONE:
-        raise ProofrollError(f"there is no truth for {comparison.scene} ({point_name(point)}): {result.message}")
+def _reference(comparison: Comparison, point: dict[str, float], case: Case, runner: Runner) -> _Reference:
     scene = load_scene(comparison.scene, **point)
     dataset = read(runner.store.trajectory(case))
     return _Reference(scene, dataset, observables(scene.rolling, dataset), scales(scene.rolling, dataset))
@@ -290,7 +293,7 @@ def _absent(run: Planned) -> Run:
 
 
 def _failed(run: Planned, facts: EngineFacts, result: Result) -> Run:
-    expected = Verdict.FAILED in run.row.expect
+    expected = Verdict.FAILED in run.row.expected(run.parameters)
     sentence = f"{run.row.engine} at {point_name(run.parameters)} {result.status}: {result.message}"
     return Run(run.row, run.parameters, facts, result, [], [] if expected else [sentence], run.ladder[1.0])
 
@@ -318,7 +321,7 @@ def _judgements(
             tolerance=tolerance.absolute(reference.sizes.get(name, 1.0)),
             scale=reference.sizes.get(name, 1.0),
             limit=_limit(run, name, curves),
-            ill_posed=reference.ill_posed,
+            ill_posed=reference.ill_posed and name not in _EVERYWHERE,
         )
         if reference.ill_posed and name in _OF_EVENTS:
             judgement = dataclasses.replace(judgement, verdict=Verdict.ILL_POSED)  # agreement would be luck
@@ -352,16 +355,17 @@ def _contradictions(comparison: Comparison, run: Planned, judgements: list[Judge
     found = []
     overall = worst(judgements)
     # Only the truth makes a question ill-posed; where it does, that is expected of every engine.
-    if overall not in {*run.row.expect, Verdict.ILL_POSED}:
+    expected = run.row.expected(run.parameters)
+    if overall not in {*expected, Verdict.ILL_POSED}:
         # Which observables make it so; where it is better than expected, all of them do.
         guilty = [judgement for judgement in judgements if judgement.verdict == overall]
         said = "; ".join(_said(judgement) for judgement in guilty)
-        found.append(f"{where} {overall}, expected: {' or '.join(run.row.expect)} ({said})")
+        found.append(f"{where} {overall}, expected: {' or '.join(expected)} ({said})")
     for judgement in judgements:
         name = judgement.observable
-        expected = run.row.expect_for.get(name)
-        if expected is not None and judgement.verdict not in expected:
-            found.append(f"{where}: {_said(judgement)}, expected: {' or '.join(expected)}")
+        alone = run.row.expect_for.get(name)
+        if alone is not None and judgement.verdict not in alone:
+            found.append(f"{where}: {_said(judgement)}, expected: {' or '.join(alone)}")
         if name in run.row.order and not _within(judgement.order, run.row.order[name]):
             low, high = run.row.order[name]
             found.append(f"{where}: order of {name} is {judgement.order}, expected {low:g} to {high:g}")
@@ -369,8 +373,10 @@ def _contradictions(comparison: Comparison, run: Planned, judgements: list[Judge
             allowed = run.row.limit[name].absolute(judgement.scale)
             if judgement.limit_error is None or judgement.limit_error > allowed:
                 found.append(f"{where}: limit of {name} is off by {judgement.limit_error}, expected {allowed:.3g}")
-    missing = [name for name in run.row.expect_for if name not in {j.observable for j in judgements}]
-    found += [f"{where}: {name} is not reported, though {comparison.name} expects a verdict on it" for name in missing]
+    row = run.row
+    claimed = {*comparison.bands[row.tolerance].bounds, *row.bound, *row.expect_for, *row.order, *row.limit}
+    for name in sorted(claimed - {judgement.observable for judgement in judgements}):
+        found.append(f"{where}: {name} is not reported, though {comparison.name} makes a claim about it")
     return found
 
 

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import dataclasses
-import json
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
@@ -177,10 +176,3 @@ def summary(content: dict[str, Any]) -> str:
 
 def _number(value: float | None) -> str:
     return "none" if value is None else f"{value:.4g}"
-
-
-def as_json(study: OnsetStudy) -> str:
-    """The study as one JSON document."""
-    from proofroll.report.content import plain
-
-    return json.dumps(plain(study.content()), indent=1)

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import dataclasses
 
-from proofroll.comparison_file import Comparison, Edge
+from proofroll.comparison import Comparison, Edge
 from proofroll.errors import InputError
 from proofroll.scene_file import load_scene
 

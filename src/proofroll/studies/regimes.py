@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from proofroll.comparison_file import Comparison
+from proofroll.comparison import Comparison
 from proofroll.errors import InputError
 from proofroll.scene_file import load_scene
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import threading
 from collections.abc import Mapping
 
 from proofroll.case import Case
@@ -19,8 +20,8 @@ def single_case(
     Raises:
         InputError, Missing: something that was given does not exist or makes no sense.
     """
-    if not time_limit > 0:
-        raise InputError("time_limit", time_limit, "give a positive time in s")
+    if not 0 < time_limit <= threading.TIMEOUT_MAX:
+        raise InputError("time_limit", time_limit, "give a positive, finite time in s")
     spec = parse_engine(engine)
     loaded = load_scene(scene, **parameters)  # type: ignore[arg-type]  # text is checked and converted there
     facts = resolve([(spec.name, spec.options)])[0]

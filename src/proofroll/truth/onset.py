@@ -28,7 +28,7 @@ class Onset:
         uncertainty: of μ and f, relative, for which the verdict holds [-].
         verdict: ``ill-posed`` where a change within the uncertainty moves the slip to another rise of the needed
             friction, or makes or removes it.
-        earliest, latest: time of the first slip with μ and f at the ends of their ranges [s]; None: no slip.
+        earliest, latest: of the first slip with μ and f at the corners of their ranges [s]; None: no slip.
     """
 
     time: float | None
@@ -74,8 +74,11 @@ def onset(scene: Scene, until: float, uncertainty: float = 1e-3) -> Onset:
     edges = curve.edges()
     below, above = max(edges[edges <= mu], default=None), min(edges[edges > mu], default=None)
     distances = [abs(float(edge) / mu - 1) for edge in (below, above) if edge is not None and mu > 0]
-    stairs = [_stair(_changed(body, sign * uncertainty, until), mu * (1 - sign * uncertainty)) for sign in (1, -1)]
+    # Every corner of the ranges of f and μ: more resistance does not always mean an earlier slip.
+    changed = [_changed(body, sign * uncertainty, until) for sign in (1, -1)]
+    stairs = [_stair(each, mu * (1 + sign * uncertainty)) for each in changed for sign in (1, -1)]
     own = _stair(curve, mu)
+    times = [stair[0] for stair in (own, *stairs) if stair[0] is not None]
     return Onset(
         time=time,
         by_mu=by_mu,
@@ -85,8 +88,8 @@ def onset(scene: Scene, until: float, uncertainty: float = 1e-3) -> Onset:
         distance=min(distances, default=float("inf")),
         uncertainty=uncertainty,
         verdict="well-posed" if all(stair[1] == own[1] for stair in stairs) else "ill-posed",
-        earliest=stairs[0][0],
-        latest=stairs[1][0],
+        earliest=min(times, default=None),
+        latest=max(times, default=None),
     )
 
 

@@ -93,6 +93,11 @@ def _integrate(rates: Callable[[FloatArray], FloatArray], start: FloatArray, tim
             message = solver.step()
             if message is not None:
                 raise Diverged(f"the truth could not be integrated past {solver.t:g} s: {message}")
+            if solver.status == "running" and solver.step_size < 1e-12 * span:
+                raise Diverged(
+                    f"the ball comes to rest at {solver.t:g} s, where rolling resistance has no direction; "
+                    "with a finite mu_static, however large, the truth goes on past that"
+                )
             step = max(solver.step_size, 1e-3 * span)
         states[index] = solver.y
     return states

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import dataclasses
 import functools
 import itertools
 
@@ -13,6 +14,7 @@ from proofroll.events import events_of
 from proofroll.recording import record, time_grid
 from proofroll.scene_file import load_scene
 from proofroll.simulation import build, simulate
+from proofroll.surfaces import Cylinder
 
 CYLINDER, PLANE = "sphere_in_cylinder", "inclined_plane"
 TUNED = ["formulation=chart,preset=tuned", "formulation=free,preset=tuned"]
@@ -239,6 +241,46 @@ def test_sampling_and_rebuilding_change_nothing(engine: str) -> None:
     np.testing.assert_array_equal(often._data.qpos, once._data.qpos)
     np.testing.assert_array_equal(often._data.qvel, once._data.qvel)
     assert often.events() == once.events() != []
+
+
+@pytest.mark.parametrize("engine", [*TUNED, "formulation=chart", "formulation=free", "formulation=free,preset=default"])
+def test_flight_is_one_liftoff(engine: str) -> None:
+    """A ball that falls off a leaning wall has one liftoff, no stick or slip in the air, and events after it lands."""
+    scene = load_scene(CYLINDER, mu_static=0.8, speed=2.0)
+    leaning = dataclasses.replace(scene, surfaces=(Cylinder("wall", scene.surfaces[0].radius, tilt=1.2),))
+    true = events_of(simulate(leaning, "truth", until=0.3, every=0.05))
+    assert [event.kind for event in true] == ["slip", "liftoff"]
+    ds = record(build(leaning, f"mujoco[{engine}]"), leaning, time_grid(0.6, 0.01)).dataset
+    events = events_of(ds)
+    left = [event for event in events if event.kind == "liftoff"]
+    assert len(left) == 1
+    # What MuJoCo's cone lifts leaves early, and what its default contact lets sink leaves late.
+    assert left[0].time == pytest.approx(true[1].time, abs=2e-3 if engine in TUNED else 2.5e-2)
+    assert not [event for event in events if left[0].time < event.time < 0.5]
+    assert [event.kind for event in events if event.time > 0.5][:1] == ["stick"]
+    assert not ds.sticking.where((ds.time > 0.28) & (ds.time < 0.5), drop=True).any()
+
+
+def test_hops_are_not_liftoffs() -> None:
+    """A contact that chatters slips all the while it does, 25 steps at a time without a force: nothing else is told."""
+    for engine in ("formulation=chart", "formulation=free"):
+        ds = run("blajer", engine)
+        # After 3.7 s the free ball is thrown 40 mm off the wall, more than its radius: those are flights.
+        before = [event for event in events_of(ds) if event.time < 3.0]
+        assert "liftoff" not in {event.kind for event in before}
+        assert before[-1].kind == "slip"
+        assert before[-1].time < 2.5
+        assert float(ds.N.where((ds.time > 2.5) & (ds.time < 3.0)).min()) == 0.0
+
+
+def test_damping_of_the_slip_with_bounded_friction() -> None:
+    """With a contact pair the coefficients are switched in the pair, and events and fall are those of the truth."""
+    engine = "formulation=free,cone_correction=true,friction_damping=1.9"
+    assert_events("kinetic", engine, 1e-2)
+    built = build(load_scene(CYLINDER, **CASES["kinetic"][0]), f"mujoco[{engine}]")
+    for until, mu in ((1.7, 0.35), (1.9, 0.3)):
+        built.advance(until)
+        assert built._evaluated().contact[0].friction[0] == mu
 
 
 @pytest.mark.parametrize("engine", TUNED)

@@ -433,8 +433,10 @@ def changed(scene: Scene, parameters: dict[str, float]) -> Scene:
     return dataclasses.replace(scene, balls=(ball,), contacts=(contact,), gravity=gravity)
 
 
-@pytest.mark.parametrize("change", CHANGES)
-@pytest.mark.parametrize("name", CHANGED_SCENES)
+@pytest.mark.parametrize(
+    ("name", "change"),
+    [(name, change) for name in CHANGED_SCENES for change in CHANGES if change != "mu halved" or "slipping" in name],
+)
 @pytest.mark.parametrize(
     "engine",
     [
@@ -445,8 +447,6 @@ def changed(scene: Scene, parameters: dict[str, float]) -> Scene:
 def test_the_certificate_notices(engine: str, name: str, change: str) -> None:
     """An engine built from another scene fails the certificate: by the number itself, and by the motion it causes."""
     scene, (parameters, quantity) = CHANGED_SCENES[name], CHANGES[change]
-    if change == "mu halved" and not np.isfinite(scene.contacts[0].mu_static):
-        pytest.skip("friction has no bound here")
     engine = f"pinocchio[{engine}]"
     lines = certify(build(changed(scene, parameters), engine), scene)
     failing = {line.quantity for line in lines if not line.holds}

@@ -12,15 +12,16 @@ import numpy as np
 
 from proofroll.engine import Built, Sample, whole_steps
 from proofroll.engines.mujoco.chart import Chart
-from proofroll.engines.mujoco.contact import contact_force
+from proofroll.engines.mujoco.contact import Resistance, contact_coefficient, contact_force
 from proofroll.engines.mujoco.free import Facets, Free
 from proofroll.engines.mujoco.friction import BoundedFriction, check_coefficients
 from proofroll.engines.mujoco.model import read_spec, write_physics
 from proofroll.engines.mujoco.settings import PRESETS, MujocoSettings, check, velocity_lag
 from proofroll.engines.mujoco.softness import softness
-from proofroll.engines.mujoco.start import EVALUATIONS, acceleration, start
+from proofroll.engines.mujoco.start import EVALUATIONS, accelerations, start
 from proofroll.errors import Diverged
 from proofroll.events import Event
+from proofroll.mechanics import natural_acceleration
 from proofroll.scene import Capability, RollingBall, Scene
 
 
@@ -34,6 +35,10 @@ class Formulation(Protocol):
     @staticmethod
     def write(spec: Any, body: RollingBall) -> None:
         """Sets the numbers of the wall and of the joints."""
+
+    @property
+    def resistance(self) -> Resistance:
+        """The torque of rolling resistance that its steps apply."""
 
     def run(self, data: Any, steps: int) -> None:
         """Makes ``steps`` steps."""
@@ -50,6 +55,8 @@ _FATAL = (
     (mujoco.mjtWarning.mjWARN_CONTACTFULL, "there are more contacts than MuJoCo holds"),
     (mujoco.mjtWarning.mjWARN_CNSTRFULL, "there are more constraints than MuJoCo holds"),
 )
+# Part of the natural force above which a normal force is more than round-off.
+_PRESSED = 1e-6
 
 
 class Mujoco:
@@ -72,6 +79,8 @@ class Mujoco:
         self._scratch = mujoco.MjData(model)
         self._ball = model.body("ball").id
         self._geom = model.geom("ball").id
+        wall = model.geom("wall").id if settings.formulation != "facets" else int(model.body("wall").geomadr[0])
+        self._geoms = (wall, self._geom)
         self._steps = 0
         with _silent():
             self._start(slips=False)
@@ -139,24 +148,47 @@ class Mujoco:
 
     def built(self) -> Built:
         """See :class:`proofroll.engine.Engine`."""
-        model, data = self._model, self._evaluated()
+        model = self._model
+        static, kinetic = self._coefficients()
+        data = self._evaluated()
+        gap = min(data.contact.dist) if data.ncon else None
+        acceleration, turning = accelerations(model, data)
         return Built(
             mass=float(model.body_mass[self._ball]),
             inertia=model.body_inertia[self._ball].copy(),
             gravity=model.opt.gravity.copy(),
             ball_radius=float(model.geom_size[self._geom, 0]),
             rolling_resistance=self._lever(data),
-            acceleration=acceleration(model, data),
+            mu_static=static,
+            mu_kinetic=kinetic,
+            gap=None if gap is None else float(gap),
+            acceleration=acceleration,
+            angular_acceleration=turning,
             regularised=softness(self._body, self._settings),
         )
 
-    def _lever(self, data: Any) -> float | None:
-        """Lever f [m] from the torque and the normal force that MuJoCo uses; None without a normal force."""
+    def _coefficients(self) -> tuple[float, float]:
+        """Static and kinetic coefficient of friction that MuJoCo's contact has, or will have."""
+
+        def read() -> float:
+            return contact_coefficient(self._model, self._evaluated(), self._geoms)
+
+        if self._friction is None:
+            mu = read()
+            return mu, mu
+        return self._friction.coefficients(read)
+
+    def _lever(self, data: Any) -> float:
+        """Lever f [m]: of the torque that acts, by the normal force; where neither can be, of the law of the torque.
+
+        A ball at rest has no direction of rolling, and a start at depth zero may have no normal force yet.
+        """
         torque = float(np.linalg.norm(data.xfrc_applied[self._ball, 3:]))
         N = -float(contact_force(self._model, data, self._geom) @ self._body.surface.normal(data.xpos[self._ball]))
-        if torque == 0:
-            return 0.0 if not self._body.contact.rolling_resistance else None
-        return torque / N
+        least = _PRESSED * self._body.ball.mass * natural_acceleration(self._body)
+        if least < N and (torque > 0 or np.any(self._body.v0)):
+            return torque / N
+        return self._formulation.resistance.lever()
 
     def _evaluated(self) -> Any:
         """A copy of the present state with its own forces: after a step MjData holds those of the last stage."""

@@ -9,7 +9,7 @@ from typing import Any
 import mujoco
 import numpy as np
 
-from proofroll.engines.mujoco.contact import apply_resistance, foreseen_normal_force
+from proofroll.engines.mujoco.contact import Resistance, foreseen_normal_force
 from proofroll.engines.mujoco.friction import BoundedFriction, corrects
 from proofroll.engines.mujoco.model import pose, quaternion_of, tangent_plane
 from proofroll.engines.mujoco.settings import MujocoSettings
@@ -35,7 +35,7 @@ class Chart:
         self._model = model
         self._friction = friction
         self._corrects = corrects(body.contact, settings)
-        self._f = body.contact.rolling_resistance
+        self.resistance = Resistance(body.contact.rolling_resistance)
         self._ball = model.body("ball").id
         self._wall = model.geom("wall").id
         self._touch = model.site("touch").id
@@ -84,7 +84,7 @@ class Chart:
     def _callbacks(self) -> Iterator[None]:
         """MuJoCo's callbacks belong to the process: they are ours only while we compute."""
         mujoco.set_mjcb_contactfilter(self._pose_wall)
-        mujoco.set_mjcb_passive(self._resist if self._f else None)
+        mujoco.set_mjcb_passive(self._resist if self.resistance.f else None)
         mujoco.set_mjcb_control(self._correct if self._corrects else None)
         try:
             yield
@@ -104,7 +104,7 @@ class Chart:
         N = foreseen_normal_force(data, -float(data.qfrc_constraint[self._depth]))
         e1 = (-data.site_xmat[self._touch][2::3]).tolist()
         v = data.cvel[self._ball, 3:].tolist()
-        apply_resistance(data.xfrc_applied[self._ball, 3:], self._f, N, e1, v)
+        self.resistance.apply(data.xfrc_applied[self._ball, 3:], N, e1, v)
 
     def _correct(self, model: Any, data: Any) -> None:  # noqa: ARG002 -- MuJoCo's signature
         """Called between the contact's reference accelerations and its forces."""

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
+from dataclasses import dataclass
 from typing import Any
 
 import mujoco
@@ -46,26 +47,52 @@ def foreseen_normal_force(data: Any, N: float) -> float:
     return max(N + slope * (t - last), 0.0)
 
 
-def apply_resistance(torque: Any, f: float, N: float, e1: Sequence[float], v: Sequence[float]) -> None:
-    """Writes the moment of the rolling resistance, -f N (v/V) × e1 [N m], into ``torque``.
+def contact_coefficient(model: Any, data: Any, geoms: tuple[int, int]) -> float:
+    """Coefficient of friction of the first contact as MuJoCo combined it [-]; without contact, as it would."""
+    if data.ncon:
+        contact = data.contact[0]
+        return float(contact.friction[0]) if contact.dim > 1 else 0.0
+    if model.npair:
+        return float(model.pair_friction[0, 0]) if model.pair_dim[0] > 1 else 0.0
+    sliding = max(model.geom_condim[index] for index in geoms) > 1
+    return float(max(model.geom_friction[index, 0] for index in geoms)) if sliding else 0.0
 
-    MuJoCo's own rolling friction (condim 6) does not model it: there sliding and rolling share one cone.
-    Scalars, because this runs at each step and numpy's overhead on three numbers would outweigh MuJoCo's work.
 
-    Args:
-        torque: to write to, shape (3,).
-        f: coefficient of rolling resistance [m].
-        N: normal force of MuJoCo's own contact [N].
-        e1: unit normal from the ball to the wall.
-        v: velocity of the centre in the world [m/s].
+@dataclass(frozen=True)
+class Resistance:
+    """The torque of rolling resistance.
+
+    Attributes:
+        f: how far the normal force is shifted forward [m].
     """
-    speed = math.hypot(v[0], v[1], v[2])
-    if speed == 0:
-        torque[:] = 0.0
-        return
-    scale = -f * N / speed
-    c0, c1, c2 = cross(v, e1)
-    torque[0], torque[1], torque[2] = scale * c0, scale * c1, scale * c2
+
+    f: float
+
+    def apply(self, torque: Any, N: float, e1: Sequence[float], v: Sequence[float]) -> None:
+        """Writes the moment -f N (v/V) × e1 [N m] into ``torque``.
+
+        MuJoCo's own rolling friction (condim 6) does not model it: there sliding and rolling share one cone.
+        Scalars, because this runs at each step and numpy's overhead on three numbers would outweigh MuJoCo's work.
+
+        Args:
+            torque: to write to, shape (3,).
+            N: normal force of MuJoCo's own contact [N].
+            e1: unit normal from the ball to the wall.
+            v: velocity of the centre in the world [m/s].
+        """
+        speed = math.hypot(v[0], v[1], v[2])
+        if speed == 0:
+            torque[:] = 0.0
+            return
+        scale = -self.f * N / speed
+        c0, c1, c2 = cross(v, e1)
+        torque[0], torque[1], torque[2] = scale * c0, scale * c1, scale * c2
+
+    def lever(self) -> float:
+        """The lever that the torque has at a normal force of 1 N and a speed of 1 m/s [m]."""
+        torque = np.zeros(3)
+        self.apply(torque, 1.0, (1.0, 0.0, 0.0), (0.0, 1.0, 0.0))
+        return float(np.linalg.norm(torque))
 
 
 def cross(x: Sequence[float], y: Sequence[float]) -> tuple[float, float, float]:

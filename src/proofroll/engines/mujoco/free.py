@@ -8,13 +8,16 @@ from typing import Any
 import mujoco
 import numpy as np
 
-from proofroll.engines.mujoco.contact import apply_resistance, cross, foreseen_normal_force
+from proofroll.engines.mujoco.contact import Resistance, cross, foreseen_normal_force
 from proofroll.engines.mujoco.friction import BoundedFriction, corrects
 from proofroll.engines.mujoco.model import pose, quaternion_of, tangent_plane
 from proofroll.engines.mujoco.settings import MujocoSettings, normal_lead, own_share, velocity_lag
-from proofroll.errors import Refused
+from proofroll.errors import Diverged, Refused
 from proofroll.scene import RollingBall
 from proofroll.surfaces import FloatArray
+
+# A velocity that is this part of what half a step adds to it is round-off, and has no direction: the ball is at rest.
+_AT_REST = 1e-6
 
 
 class Free:
@@ -35,7 +38,7 @@ class Free:
         self._edits = settings.curvature or corrects(body.contact, settings)
         self._surface = body.surface
         self._radius = body.ball.radius
-        self._f = body.contact.rolling_resistance
+        self.resistance = Resistance(body.contact.rolling_resistance)
         self._ball = model.body("ball").id
         self._wall = model.geom("wall").id
         self._curvature = settings.curvature
@@ -93,9 +96,11 @@ class Free:
             rates[:3] -= (rates[:3] @ e1) * e1
         data.mocap_pos[0] = p + (self._radius + self._surface.gap(p)) * e1
         mujoco.mju_quatZ2Vec(data.mocap_quat[0], -e1)
-        if self._f:
+        if self.resistance.f:
             foreseen = foreseen_normal_force(data, N)
-            apply_resistance(data.xfrc_applied[self._ball, 3:], self._f, foreseen, e1.tolist(), rates[:3].tolist())
+            if self._half and np.linalg.norm(rates[:3]) < _AT_REST * self._half * np.linalg.norm(trend[:3]):
+                rates[:3] = 0.0
+            self.resistance.apply(data.xfrc_applied[self._ball, 3:], foreseen, e1.tolist(), rates[:3].tolist())
         return rates, trend, N
 
     def _edit(self, data: Any, rates: FloatArray, trend: FloatArray, N: float) -> None:
@@ -135,17 +140,25 @@ class Facets:
     ) -> None:
         self._model = model
         self._surface = body.surface
-        self._f = body.contact.rolling_resistance
+        self.resistance = Resistance(body.contact.rolling_resistance)
         self._ball = model.body("ball").id
+        wall = model.body("wall")
+        axis = np.zeros(9)
+        mujoco.mju_quat2Mat(axis, wall.quat)
+        # The ring's axis is the body's third: the surface's second direction (``write``).
+        self._axis = axis[2::3].copy()
+        self._half_length = float(model.geom_size[wall.geomadr[0], 2])
 
     @staticmethod
     def write(spec: Any, body: RollingBall) -> None:
         """Turns the ring into the surface's axis and makes each face tangent to the wall.
 
         The file turns the boxes about the ring's axis (``replicate``); MuJoCo applies that to the poses given here.
+        How many boxes there are, how thick and how long they are, is the file's.
 
         Raises:
-            Refused: the surface is not one that a rotation slides along itself, so a ring would not enclose it.
+            Refused: the surface is not one that a rotation slides along itself, so a ring would not enclose it, or the
+                ring is too short for the ball's way along its axis.
         """
         generators = body.surface.generators
         if generators is None or generators[0].kind != "rotation":
@@ -156,6 +169,12 @@ class Facets:
         spec.body("ball").pos = body.p0
         pose(spec.body("wall"), np.zeros(3), quaternion_of(frame))
         boxes = spec.body("wall").geoms
+        half_length, reach = float(boxes[0].size[2]), _reach(body, frame[:, 2])
+        if reach > half_length:
+            raise Refused(
+                f"the ring of boxes ends {half_length:g} m from its middle, and a ball that rolls would get "
+                f"{reach:.3g} m far; lengthen the boxes in mujoco_facets.xml"
+            )
         for box in boxes:
             thickness, _, height = box.size
             box.pos = face + np.array([thickness, 0.0, 0.0])
@@ -163,20 +182,40 @@ class Facets:
 
     def run(self, data: Any, steps: int) -> None:
         """Makes ``steps`` steps."""
-        if not self._f:
+        if not self.resistance.f:
             mujoco.mj_step(self._model, data, nstep=steps)
-            return
-        for _ in range(steps):
-            self._resist(data)
-            mujoco.mj_step(self._model, data)
+        else:
+            for _ in range(steps):
+                self._resist(data)
+                mujoco.mj_step(self._model, data)
+        # Rolling resistance, and the kicks, take away what holds the ball up: it may fall further than at first.
+        if abs(float(self._axis @ data.qpos[:3])) > self._half_length:
+            raise Diverged(f"the ball has left the ring of boxes, which ends {self._half_length:g} m from its middle")
 
     def evaluate(self, data: Any) -> None:
         """Computes forces and accelerations of the present state, as a step would."""
-        if self._f:
+        if self.resistance.f:
             self._resist(data)
         mujoco.mj_forward(self._model, data)
 
     def _resist(self, data: Any) -> None:
         e1: FloatArray = self._surface.normal(data.qpos[:3])
         N = -float(data.qfrc_constraint[:3] @ e1)
-        apply_resistance(data.xfrc_applied[self._ball, 3:], self._f, N, e1.tolist(), data.qvel[:3].tolist())
+        self.resistance.apply(data.xfrc_applied[self._ball, 3:], N, e1.tolist(), data.qvel[:3].tolist())
+
+
+def _reach(body: RollingBall, axis: FloatArray) -> float:
+    """How far from the origin a ball that rolls without losses gets along the axis of a cylinder [m].
+
+    Rolling round at the constant rate Ω, it moves along the axis as an oscillator of ω² = r Ω² / (1 + r), r = J/(m a²),
+    about the place where gravity and the torque of the initial spin about the normal balance.
+    """
+    r = body.ball.inertia_ratio
+    turning = body.surface.normal_gradient(body.p0) @ body.v0
+    rate = float(np.linalg.norm(turning))
+    if rate == 0:
+        return math.inf if axis @ body.gravity else 0.0
+    along, spin = float(axis @ body.v0), float(body.surface.normal(body.p0) @ body.w0)
+    square = r / (1 + r) * rate**2
+    middle = (abs(float(axis @ body.gravity)) + r * rate * body.ball.radius * abs(spin)) / (1 + r) / square
+    return abs(float(axis @ body.p0)) + middle + math.hypot(middle, along / math.sqrt(square))

@@ -11,7 +11,7 @@ import numpy as np
 
 from proofroll.engines.mujoco.settings import LARGEST_PYRAMIDAL_FRICTION, PRELOAD, MujocoSettings
 from proofroll.errors import Refused
-from proofroll.events import Event
+from proofroll.events import Event, EventKind
 from proofroll.scene import Contact, RollingBall
 
 # MuJoCo raises a smaller coefficient to this without a word (mjMINMU), unless the contact has no friction at all.
@@ -61,8 +61,14 @@ class BoundedFriction:
     MuJoCo knows one coefficient. Where the kinetic one is less, it is switched as a user would do it: to the kinetic
     one once a force is on the cone, back once a force is inside it again.
 
+    A contact without a normal force neither sticks nor slips. MuJoCo's cone lifts a slipping ball, which comes back
+    (``correct``): hops of up to 0.05 s, be it 50 steps of 1e-3 s or 130 of 2.5e-4 s, so that no number of steps tells a
+    hop from a flight; the distance does, for a hop is a fraction of the radius high. What was before a hop goes on
+    after it, unless the ball comes back otherwise. A loss that takes the ball further than its radius from the wall is
+    a liftoff: one event, at the beginning of the loss.
+
     Attributes:
-        sticking: whether the last step began with a force inside the cone.
+        sticking: whether the last step with a normal force began with a force inside the cone.
     """
 
     def __init__(self, model: Any, body: RollingBall, settings: MujocoSettings) -> None:
@@ -73,11 +79,15 @@ class BoundedFriction:
         self._corrects = corrects(body.contact, settings)
         self._preload = PRELOAD / body.ball.mass
         self._radius = body.ball.radius
+        self._surface = body.surface
+        self._ball = model.body("ball").id
         last = int(model.joint("spin").dofadr[0]) + (6 if settings.formulation == "free" else 3)
         self._spin = slice(last - 3, last)
         self._integrate = _INTEGRATE[settings.integrator]
         self._dt = settings.dt
         self._steps = 0
+        self._lost: int | None = None  # first of the steps without a normal force that have not ended
+        self._flies = False  # whether these were told as a liftoff
         self._events: list[Event] = []
         self._wrench = np.zeros(6)
         self.sticking = True
@@ -99,15 +109,35 @@ class BoundedFriction:
 
     def observe(self, data: Any) -> None:
         """Takes the forces at the start of a step; once per step."""
-        if self.holds(data) != self.sticking:
-            self._change(not self.sticking, self._event(self._steps))
+        if not self._presses(data):
+            self._miss(data)
+        else:
+            if self.holds(data) != self.sticking:
+                # A ball that comes back slipping has slipped since it was lost.
+                began = self._steps if self._lost is None or self._flies else self._lost
+                self._change(not self.sticking, self._event(began if self.sticking else self._steps))
+            self._lost, self._flies = None, False
         self._steps += 1
 
-    def holds(self, data: Any) -> bool:
-        """Whether the contact force in ``data`` is inside the cone of the present coefficient."""
+    def _miss(self, data: Any) -> None:
+        """One step without a normal force."""
+        if self._lost is None:
+            self._lost = self._steps
+        if not self._flies and float(self._surface.gap(data.xpos[self._ball])) > self._radius:
+            self._flies = True
+            self._change(False, self._event(self._lost, "liftoff"))
+
+    def _presses(self, data: Any) -> bool:
+        """Whether there is a contact with a normal force; the force goes to ``self._wrench``."""
         if data.ncon == 0:
             return False
         mujoco.mj_contactForce(self._model, data, 0, self._wrench)
+        return bool(self._wrench[0] > 0)
+
+    def holds(self, data: Any) -> bool:
+        """Whether there is a contact force in ``data`` and it is inside the cone of the present coefficient."""
+        if not self._presses(data):
+            return False
         N, F1, F2 = self._wrench[:3].tolist()
         # MuJoCo's pyramid lies inside the true cone: along its own tangents it allows |F1| + |F2| = mu N.
         friction = abs(F1) + abs(F2) if self._pyramidal else math.hypot(F1, F2)
@@ -119,8 +149,19 @@ class BoundedFriction:
         Args:
             data: the present state with its own forces.
         """
-        changed = self.holds(data) != self.sticking
-        return [*self._events, self._event(self._steps)] if changed else list(self._events)
+        if not self._presses(data) or self.holds(data) == self.sticking:
+            return list(self._events)
+        slips_since = self._lost if self.sticking and self._lost is not None and not self._flies else self._steps
+        return [*self._events, self._event(slips_since)]
+
+    def coefficients(self, read: Callable[[], float]) -> tuple[float, float]:
+        """Coefficients while the ball sticks and while it slips, with ``read`` giving that of the model as it is."""
+        now, found = self._mu, []
+        for mu in (self._static, self._kinetic):
+            self._write(mu)
+            found.append(read())
+        self._write(now)
+        return found[0], found[1]
 
     def correct(self, data: Any, N: float) -> None:
         """Takes the lift that MuJoCo's cone gives to a slipping contact out of its reference acceleration.
@@ -166,14 +207,20 @@ class BoundedFriction:
         lever = self._radius + 0.5 * float(data.efc_pos[0])  # MuJoCo's contact point lies midway in the depth
         return math.hypot(t1, t2, t3) >= _NEAR_CONE * self._mu * N * lever
 
-    def _event(self, step: int) -> Event:
+    def _event(self, step: int, kind: EventKind | None = None) -> Event:
         low, high = max(step - 1, 0) * self._dt, step * self._dt
-        return Event("slip" if self.sticking else "stick", 0.5 * (low + high), low, high)
+        return Event(kind or ("slip" if self.sticking else "stick"), 0.5 * (low + high), low, high)
 
     def _change(self, sticking: bool, event: Event) -> None:
         self._events.append(event)
         self.sticking = sticking
         if self._static != self._kinetic:
-            self._mu = self._static if sticking else self._kinetic
-            self._model.geom_friction[:, 0] = self._mu
-            self._model.geom_condim[:] = condim(self._mu)
+            self._write(self._static if sticking else self._kinetic)
+
+    def _write(self, mu: float) -> None:
+        """Sets the coefficient in the model, also in the contact pair if there is one."""
+        self._mu = mu
+        self._model.geom_friction[:, 0] = mu
+        self._model.geom_condim[:] = condim(mu)
+        self._model.pair_friction[:, :2] = mu
+        self._model.pair_dim[:] = condim(mu)

@@ -6,7 +6,7 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import Annotated, Literal
 
-from annotated_types import Ge, Gt, Le
+from annotated_types import Ge, Gt, Le, Lt
 
 from proofroll.errors import InputError
 
@@ -15,7 +15,8 @@ DEFAULT_STEP = 2e-3
 DEFAULT_FRICTION = 1.0
 DEFAULT_TIME_CONSTANT = 0.02
 DEFAULT_IMPEDANCE = (0.9, 0.95)
-# MuJoCo clips to these without a word: mjMAXIMP, and two steps (refsafe).
+# MuJoCo clips to these without a word: mjMINIMP, mjMAXIMP, and two steps (refsafe).
+SMALLEST_IMPEDANCE = 1e-4
 LARGEST_IMPEDANCE = 0.9999
 SHORTEST_TIME_CONSTANT = 2.0
 # MuJoCo has no unbounded friction. With the elliptic cone any coefficient above the needed one gives the same motion
@@ -45,6 +46,10 @@ class MujocoSettings:
             0.9 to 0.95 growing with depth.
         friction: coefficient that stands for unbounded friction [-]; with less than the scene needs, the ball slips.
             Where the scene bounds friction, its coefficients are taken instead.
+        friction_damping: of the slip, in units of 1/dt (``solreffriction`` of a contact pair in its direct format);
+            None: as in the normal direction. An Euler step moves the ball with the velocity at its end, along the wall
+            as it was at its beginning; at a damping of 2/dt, where it would end to be stable, the creep that this gives
+            cancels the one that the missing J̇v leaves (``free`` only).
         start: ``touching``: at depth zero, where a soft contact is not loaded yet; ``settled``: at the depth at which
             the contact already bends the path as the wall does.
         curvature: whether the adapter adds to the contact's reference acceleration the term J̇v, which MuJoCo leaves
@@ -59,8 +64,9 @@ class MujocoSettings:
     integrator: Literal["Euler", "RK4", "implicitfast"] = "RK4"
     cone: Literal["pyramidal", "elliptic"] = "elliptic"
     time_constant: Annotated[float, Ge(SHORTEST_TIME_CONSTANT)] | None = SHORTEST_TIME_CONSTANT
-    impedance: Annotated[float, Gt(0), Le(LARGEST_IMPEDANCE)] | None = LARGEST_IMPEDANCE
+    impedance: Annotated[float, Ge(SMALLEST_IMPEDANCE), Le(LARGEST_IMPEDANCE)] | None = LARGEST_IMPEDANCE
     friction: Annotated[float, Gt(0)] = UNBOUNDED_FRICTION
+    friction_damping: Annotated[float, Gt(0), Lt(2)] | None = None
     start: Literal["touching", "settled"] = "settled"
     curvature: bool = False
     cone_correction: bool = False
@@ -137,6 +143,8 @@ def check(settings: MujocoSettings, *, bounded: bool) -> None:
     if settings.cone_correction and settings.formulation == "free" and settings.integrator != "Euler":
         # mj_step1 and mj_step2, between which the contact is edited, always make an Euler step.
         raise InputError("mujoco: integrator", settings.integrator, "cone_correction=true needs integrator=Euler")
+    if settings.friction_damping is not None:
+        _check_friction_damping(settings)
     if not settings.curvature:
         return
     if settings.formulation != "free":
@@ -146,6 +154,26 @@ def check(settings: MujocoSettings, *, bounded: bool) -> None:
     if settings.cone != "elliptic":
         # A pyramid's rows are sums of normal and friction; the term belongs to each of them alone.
         raise InputError("mujoco: cone", settings.cone, "curvature=true needs cone=elliptic")
+    share = own_share(settings)
+    if share >= 1:
+        # MuJoCo's damping would supply all of J̇v or more of it: nothing is left to add.
+        advice = f"curvature=true needs impedance times time_constant above 1, not {1 / share:.4g}"
+        raise InputError("mujoco: impedance", impedance(settings)[1], advice)
+
+
+def _check_friction_damping(settings: MujocoSettings) -> None:
+    """What :func:`check` says about a damping of its own for the slip."""
+    value = settings.friction_damping
+    if settings.formulation != "free":
+        # MuJoCo asks no contact filter about a pair, so the chart's plane would stay; facets has a pair for each box.
+        advice = f"{settings.formulation} does not use it; set formulation=free"
+        raise InputError("mujoco: friction_damping", value, advice)
+    if settings.cone != "elliptic":
+        # MuJoCo ignores it there, for the pyramid's rows mix normal and friction.
+        raise InputError("mujoco: friction_damping", value, "it needs cone=elliptic")
+    if settings.curvature:
+        # What J̇v leaves to be added is reckoned with the damping of the normal direction.
+        raise InputError("mujoco: friction_damping", value, "curvature=true sets what the slip needs; leave it out")
 
 
 def _obvious(formulation: Literal["free", "facets"]) -> MujocoSettings:
@@ -183,8 +211,10 @@ PRESETS: Mapping[str, Mapping[str, MujocoSettings]] = {
     },
     "free": {
         "default": _obvious("free"),
-        # The hardest contact that the documentation allows. What is left is the missing J̇v: V²/c in the normal
-        # direction sinks the ball, a ω1 V/c lets it creep, both in proportion to the time constant and so to dt.
+        # The shortest time constant and the largest impedance that MuJoCo allows, the options that its documentation
+        # names for a hard contact. What is left is the missing J̇v: V²/c in the normal direction sinks the ball,
+        # a ω1 V/c lets it creep, both in proportion to the time constant and so to dt. friction_damping, documented
+        # too but for contact pairs alone, reduces the creep; it is an option, not part of this preset.
         "matched": MujocoSettings("free", "matched", integrator="Euler"),
         # J̇v is put where MuJoCo would have computed it: an edit of mjData.efc_aref that its manual does not describe.
         "tuned": MujocoSettings("free", "tuned", integrator="Euler", curvature=True, cone_correction=True),

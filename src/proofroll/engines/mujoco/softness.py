@@ -17,13 +17,14 @@ from proofroll.engines.mujoco.settings import (
     time_constant,
     velocity_lag,
 )
-from proofroll.mechanics import initial_response, newton_euler
+from proofroll.mechanics import initial_response, natural_acceleration, newton_euler
 from proofroll.scene import RollingBall
 
 _FORCES = ("acceleration", "N", "F2", "F3")
 # The bounds below are asymptotic in depth/a, and MuJoCo's Newton solver stops at a relative 1e-8.
 _MARGIN = 1.1
 _SOLVER = 1e-8
+_ROUND_OFF = 1e-12
 # What is left where a state at time 0 is the last of a sequence that converges.
 _SEQUENCE = 1e-6
 
@@ -31,47 +32,70 @@ _SEQUENCE = 1e-6
 def softness(body: RollingBall, settings: MujocoSettings) -> Mapping[str, Regularised]:
     """Names of certificate quantities with tolerance and reason."""
     a, r = body.ball.radius, body.ball.inertia_ratio
+    e1 = body.surface.normal(body.p0)
     e1_rate = body.surface.normal_gradient(body.p0) @ body.v0
     bend = abs(float(e1_rate @ body.v0))
-    load = bend + float(np.linalg.norm(body.gravity))
+    gravity = float(np.linalg.norm(body.gravity))
+    load = bend + gravity
     least, most = impedance(settings)
-    response = initial_response(body)[0]
-    scale = float(np.linalg.norm(response)) or 1.0
+    scale = natural_acceleration(body)
     lacks = settings.formulation != "chart" and not settings.curvature
     # What is missing along the normal at depth zero: the share 1 - d of the load, which the impedance leaves, and the
     # bend of the path where J̇v is missing. Along the wall it is a ω × ė1, divided between motion and friction.
-    ahead = 2 * normal_lead(settings) * abs(float(e1_rate @ response))  # how the bend changes until it is needed
+    # How the bend changes until it is needed comes on top.
+    ahead = 2 * normal_lead(settings) * abs(float(e1_rate @ initial_response(body)[0]))
     pressed = PRELOAD if corrects(body.contact, settings) else 0.0
     missing = (1 - least + pressed) * load + ahead + (bend if lacks else 0.0)
-    turning = np.cross(body.surface.normal(body.p0), np.cross(body.w0, e1_rate))  # its part along the wall, turned
+    turning = np.cross(e1, np.cross(body.w0, e1_rate))  # its part along the wall, turned
     creep = a * float(np.linalg.norm(turning)) * r / (1 + r) if lacks else 0.0
     why = "the impedance of a soft contact is below 1" + (" and its rows lack J̇v" if lacks else "")
     result = dict(_computed(body, settings))
     if settings.start == "touching":
-        unloaded = f"{why}; at depth zero, where the ball starts, no depth makes up for it, nor holds the friction"
-        free_fall = float(np.linalg.norm(body.gravity))
-        return result | dict.fromkeys(_FORCES, Regularised(_MARGIN * (missing + creep + free_fall) / scale, unloaded))
-    # A settled start has the depth at which the reference acceleration k depth, k = 1 / (dmax tc)², supplies it.
-    depth = _MARGIN * missing * (most * time_constant(settings)) ** 2 / least / a
+        # Only what the unloaded contact supplies is there to hold the friction.
+        supplied = least * max(float(body.gravity @ e1) + (0.0 if lacks else bend), 0.0)
+        lost = _law_of_friction(body, settings, supplied * body.ball.mass)
+        why += "; the ball starts at depth zero, where no depth makes up for it"
+        if lost:
+            why += " and what normal force there is does not hold the friction"
+        soft = _MARGIN * (missing + creep + lost) / scale + _SOLVER
+        if soft >= 1:
+            why += ": accelerations and forces at time 0 are not checked"
+        return result | _dynamics(body, soft, why)
+    # A settled start has the depth at which the reference acceleration k depth, k = d / (dmax tc)², supplies it as a
+    # part d of the acceleration.
+    depth = _MARGIN * missing * (most * time_constant(settings) / least) ** 2 / a
     sunk = f"a soft contact carries the load only at a depth, {depth:.1e} of the radius at most"
     rolls = "MuJoCo's contact point, at which it rolls, lies midway in that depth"
     # The depth shortens the lever of friction, which balances gravity along the wall.
-    lever = depth * float(np.linalg.norm(body.gravity))
-    law = _MARGIN * _law_of_friction(body, settings)
+    law = _MARGIN * _law_of_friction(body, settings, None)
     if law:
         why += "; as the ball slips from the start, MuJoCo's cone of friction lifts it or turns its friction"
-    soft = (2 * (1 - least) * load + lever + _MARGIN * creep + law) / scale + _SOLVER
+    soft = (2 * (1 - least) * load + depth * gravity + _MARGIN * creep + law) / scale + _SOLVER
     return result | {
         "position": Regularised(depth, sunk),
         "gap": Regularised(depth, sunk),
+        "gap in the engine": Regularised(depth, sunk),
         "spin": Regularised(depth / 2 + _SOLVER, rolls),
         "slip": Regularised(depth / 2, rolls),
-        **dict.fromkeys(_FORCES, Regularised(soft, why)),
+        **_dynamics(body, soft, why),
     }
 
 
+def _dynamics(body: RollingBall, soft: float, why: str) -> dict[str, Regularised]:
+    """Tolerances of accelerations and forces, where those of the centre are ``soft``.
+
+    What friction is off by per mass, times a, the turning is off by times m a²/J; rolling resistance adds f to a.
+    """
+    turning = soft * (1 + body.contact.rolling_resistance / body.ball.radius) / body.ball.inertia_ratio
+    return dict.fromkeys(_FORCES, Regularised(soft, why)) | {"angular acceleration": Regularised(turning, why)}
+
+
 def _computed(body: RollingBall, settings: MujocoSettings) -> Iterator[tuple[str, Regularised]]:
-    """What is exact but for the solver, because forces enter it."""
+    """What is exact but for the solver, because forces enter it, and what stands for unbounded friction."""
+    if math.isinf(body.contact.mu_static):
+        stands = f"MuJoCo has no unbounded friction: a coefficient of {settings.friction:g} stands for it"
+        for name in ("1 / static friction", "1 / kinetic friction"):
+            yield name, Regularised((1 + _ROUND_OFF) / settings.friction, stands)
     if body.contact.rolling_resistance:
         yield "rolling resistance", Regularised(_SOLVER, "its torque uses the normal force of the evaluation before")
     if velocity_lag(settings):
@@ -80,18 +104,29 @@ def _computed(body: RollingBall, settings: MujocoSettings) -> Iterator[tuple[str
         yield "velocity", Regularised(share, "it is MuJoCo's of half a step before plus half a step's acceleration")
 
 
-def _law_of_friction(body: RollingBall, settings: MujocoSettings) -> float:
-    """Error of the acceleration at time 0 from MuJoCo's law of friction, at most [m/s²]; 0 for a ball that holds."""
+def _law_of_friction(body: RollingBall, settings: MujocoSettings, unloaded: float | None) -> float:
+    """Error of the acceleration at time 0 from MuJoCo's law of friction, at most [m/s²]; 0 for a ball that holds.
+
+    Args:
+        body: the scene's.
+        settings: the engine's.
+        unloaded: normal force of a contact that is not loaded yet [N]; None if it is.
+    """
     ball, contact = body.ball, body.contact
-    if math.isinf(contact.mu_static):
-        return 0.0
+    bounded = math.isfinite(contact.mu_static)
+    static, kinetic = (contact.mu_static, contact.mu_kinetic) if bounded else (settings.friction, settings.friction)
     e1 = body.surface.normal(body.p0)
     force = newton_euler(body, body.p0, body.v0, body.w0)[2]
-    N = -float(force @ e1)
-    needed = float(np.linalg.norm(force + N * e1))
+    loaded = -float(force @ e1)
+    needed = float(np.linalg.norm(force + loaded * e1))
+    if not bounded and (unloaded is None or needed > static * loaded):
+        return 0.0  # a ball that slips under its full load has not enough friction: nothing to be excused
+    N = loaded if unloaded is None else unloaded
     pyramidal = settings.cone == "pyramidal"
-    if needed * (math.sqrt(2) if pyramidal else 1.0) <= contact.mu_static * N:
+    if needed * (math.sqrt(2) if pyramidal else 1.0) <= static * N:
         return 0.0
-    slip_rate = max(needed - contact.mu_kinetic * N, 0.0) * (1 / ball.mass + ball.radius**2 / ball.inertia)
-    lift = 0.0 if corrects(contact, settings) else contact.mu_kinetic * slip_rate
-    return lift + (contact.mu_kinetic * N / ball.mass if pyramidal else 0.0)
+    slip_rate = max(needed - kinetic * N, 0.0) * (1 / ball.mass + ball.radius**2 / ball.inertia)
+    lift = 0.0 if corrects(contact, settings) else kinetic * slip_rate
+    # The friction of the unloaded contact is another one altogether, the loaded pyramid's is turned.
+    wrong = (min(needed, static * loaded) if unloaded is not None else 0.0) + (kinetic * N if pyramidal else 0.0)
+    return lift + wrong / ball.mass

@@ -11,15 +11,18 @@ import numpy as np
 from scipy.optimize import brentq
 
 from proofroll.engines.mujoco.friction import corrects
-from proofroll.engines.mujoco.settings import MujocoSettings, own_share, velocity_lag
+from proofroll.engines.mujoco.settings import MujocoSettings, impedance, time_constant, velocity_lag
 from proofroll.errors import Refused
 from proofroll.scene import RollingBall
 from proofroll.surfaces import FloatArray
 
 # The resistance's torque uses the normal force of the evaluation before: at a standstill in time, repeats converge.
 EVALUATIONS = 3
-# The same where velocities lag.
+# The same where velocities lag; where the contact is soft the rows of friction lag otherwise than the normal one, and
+# the extrapolation removes less of the error.
 _ROUNDS_OF_LAG = 13
+_ROUNDS_OF_SOFT_LAG = 25
+_SOFT = 0.9
 # The correction of a slip has converged when this part of its error is left.
 _SEQUENCE = 1e-10
 # A start "at depth zero" is this part of the radius inside: at zero, round-off would decide whether there is a contact.
@@ -68,7 +71,9 @@ def start(
     Raises:
         Refused: the contact is too soft for a settled start.
     """
-    lag, share = velocity_lag(settings), own_share(settings)
+    lag = velocity_lag(settings)
+    # What lags is damped by b = 2 / (d tc), of which a soft contact turns the part d into acceleration.
+    share = 2 * lag / time_constant(settings)
     rounds = _rounds(body, settings, slips)
 
     def evaluate_at(depth: float) -> None:
@@ -97,19 +102,22 @@ def _rounds(body: RollingBall, settings: MujocoSettings, slips: bool) -> int:
 
     These are velocities that lag, the resistance's torque and the correction of a slip.
     """
-    rounds = _ROUNDS_OF_LAG if velocity_lag(settings) else EVALUATIONS
+    rounds = EVALUATIONS
+    if velocity_lag(settings):
+        rounds = _ROUNDS_OF_LAG if impedance(settings)[0] >= _SOFT else _ROUNDS_OF_SOFT_LAG
     if slips and corrects(body.contact, settings) and body.contact.mu_kinetic:
         g = body.contact.mu_kinetic**2 * (1 + 1 / body.ball.inertia_ratio)
         rounds += 2 * math.ceil(math.log(_SEQUENCE) / math.log(g / (1 + g)))
     return rounds
 
 
-def acceleration(model: Any, data: Any) -> FloatArray:
-    """Of the ball's centre in the world after an evaluation [m/s²], shape (3,)."""
+def accelerations(model: Any, data: Any) -> tuple[FloatArray, FloatArray]:
+    """Of the ball's centre [m/s²] and of its turning [rad/s²] in the world after an evaluation, each shape (3,)."""
     result = np.zeros(6)
     mujoco.mj_rnePostConstraint(model, data)
     mujoco.mj_objectAcceleration(model, data, mujoco.mjtObj.mjOBJ_BODY, model.body("ball").id, result, 0)
-    return np.asarray(result[3:] + model.opt.gravity)  # MuJoCo reports what an accelerometer would: without gravity
+    # MuJoCo reports what an accelerometer would: without gravity.
+    return np.asarray(result[3:] + model.opt.gravity), result[:3]
 
 
 def _settled_depth(model: Any, data: Any, body: RollingBall, evaluate_at: Callable[[float], None]) -> float:
@@ -122,7 +130,7 @@ def _settled_depth(model: Any, data: Any, body: RollingBall, evaluate_at: Callab
 
     def excess(depth: float) -> float:
         evaluate_at(depth)
-        return float(e1 @ acceleration(model, data)) - wanted
+        return float(e1 @ accelerations(model, data)[0]) - wanted
 
     upper = 1e-12 * body.ball.radius
     if excess(upper) <= 0:
@@ -130,5 +138,6 @@ def _settled_depth(model: Any, data: Any, body: RollingBall, evaluate_at: Callab
     while excess(upper) > 0:
         upper *= 10
         if upper > body.ball.radius:
-            raise Refused("the contact is so soft that the ball would sink into the wall; take a smaller dt")
+            advice = "take a smaller dt or a larger impedance"
+            raise Refused(f"the contact is so soft that the ball would sink into the wall; {advice}")
     return float(brentq(excess, upper / 10, upper, xtol=1e-14 * upper, rtol=1e-14))

@@ -16,7 +16,7 @@ from proofroll.scene import Capability, Scene
 
 
 class Pinocchio:
-    """See :class:`proofroll.engine.Engine`."""
+    """Pinocchio's equations of motion with rows of rolling put to them, or its own solver of contact with friction."""
 
     name: ClassVar[str] = "pinocchio"
     provides: ClassVar[frozenset[Capability]] = frozenset(

@@ -8,14 +8,14 @@ from typing import Any
 import numpy as np
 import pinocchio as pin
 
-from proofroll.engines.pinocchio.mechanism import Sliding
+from proofroll.engines.pinocchio.mechanism import Mechanism, Sliding
 from proofroll.engines.pinocchio.rows import BallTerms, ball_terms, resistance, rolling_rows
 from proofroll.errors import Refused
 from proofroll.scene import RollingBall
 from proofroll.surfaces import FloatArray, Generator
 
 
-class Composite:
+class Composite(Mechanism):
     """Two joints along the generators carry a massless carriage; a spherical joint in it carries the ball.
 
     Coordinates are (u1, u2, orientation of the ball in the carriage), velocities (u̇1, u̇2, spin relative to the
@@ -32,20 +32,13 @@ class Composite:
         generators = body.surface.generators
         if generators is None:
             raise Refused("composite joints need a surface that slides along itself; use formulation=free_flyer")
-        self._radius = body.ball.radius
-        self._f = body.contact.rolling_resistance
-        self._mu_kinetic = body.contact.mu_kinetic
+        super().__init__(body)
         self._frame0 = body.surface.frame(np.zeros(2))
-        self.model = pin.Model()
-        self.model.gravity.linear = body.gravity
         self._carriage = 0
         for name, generator in zip(body.surface.coordinates, generators, strict=True):
             self._carriage = self.model.addJoint(self._carriage, _joint(generator), pin.SE3.Identity(), name)
         placement = pin.SE3(self._frame0, body.surface.position(np.zeros(2)))
-        self.ball = self.model.addJoint(self._carriage, pin.JointModelSpherical(), placement, body.ball.name)
-        inertia = pin.Inertia(body.ball.mass, np.zeros(3), body.ball.inertia * np.eye(3))
-        self.model.appendBodyToJoint(self.ball, inertia, pin.SE3.Identity())
-        self._rest = np.zeros(self.model.nv)
+        self._add_ball(body, self._carriage, pin.JointModelSpherical(), placement)
 
         data = self.model.createData()
         self.q0 = np.concatenate([body.u0, [0.0, 0.0, 0.0, 1.0]])
@@ -54,10 +47,9 @@ class Composite:
             self.q0[2:] = pin.Quaternion(data.oMi[self.ball].rotation.T.copy()).coeffs()
         jacobian = ball_terms(self.model, data, self.ball, self.q0, self._rest).jacobian
         self.v0 = np.linalg.lstsq(jacobian, np.concatenate([body.v0, body.w0]), rcond=None)[0]
-        speed = float(np.linalg.norm(body.v0)) or np.sqrt(np.linalg.norm(body.gravity) * self._radius)
         metres = np.asarray(body.surface.length_scales)
         self.q_scale = np.concatenate([self._radius / metres, np.ones(4)])
-        self.v_scale = np.concatenate([speed / metres, np.full(3, speed / self._radius)])
+        self.v_scale = np.concatenate([self._speed / metres, np.full(3, self._speed / self._radius)])
 
     def _rows(self, data: Any, q: FloatArray, v: FloatArray) -> tuple[BallTerms, FloatArray, FloatArray, FloatArray]:
         """Terms of the ball, local frame, rows and drift of rolling."""
@@ -66,7 +58,7 @@ class Composite:
         turning = pin.getVelocity(self.model, data, self._carriage, pin.LOCAL_WORLD_ALIGNED).angular
         return terms, frame, *rolling_rows(terms, self._radius, frame, pin.skew(turning) @ frame[:, 0])
 
-    def _normal_force(self, data: Any, e1: FloatArray) -> float:
+    def _transmitted(self, data: Any, e1: FloatArray) -> float:
         """N [N] from the wrench in the spherical joint that the last pass of Pinocchio left in ``data``."""
         return -float(e1 @ (data.oMi[self.ball].rotation @ data.f[self.ball].linear))
 
@@ -76,46 +68,33 @@ class Composite:
         torque = self._rest
         if self._f:
             # The joints cannot accelerate the ball along e1, so N follows from the bias pass alone.
-            torque = resistance(terms, self._f, frame[:, 0]) * self._normal_force(data, frame[:, 0])
+            torque = resistance(terms, self._f, frame[:, 0]) * self._transmitted(data, frame[:, 0])
         acceleration = pin.forwardDynamics(self.model, data, torque, rows, drift)
         return np.array(acceleration), np.array(data.lambda_c)
+
+    def normal_force(self, data: Any) -> float:
+        """See :class:`~proofroll.engines.pinocchio.mechanism.Mechanism`; forwardDynamics leaves the bias pass alone."""
+        return self._transmitted(data, data.oMi[self._carriage].rotation @ self._frame0[:, 0])
 
     def reaction(self, data: Any, q: FloatArray, v: FloatArray) -> tuple[FloatArray, FloatArray]:
         """Joint acceleration, and the wall's force: N from the joint's wrench, F2 and F3 from the multipliers."""
         acceleration, friction = self.respond(data, q, v)
         frame = data.oMi[self._carriage].rotation @ self._frame0
         pin.rnea(self.model, data, q, v, acceleration)
-        return acceleration, frame @ np.array([-self._normal_force(data, frame[:, 0]), *friction])
-
-    def project(self, data: Any, q: FloatArray, v: FloatArray) -> tuple[FloatArray, FloatArray]:
-        """Removes slip by an impulse at the contact."""
-        rows = self._rows(data, q, v)[2]
-        return q, np.array(pin.impulseDynamics(self.model, data, v, rows))
-
-    def rolling_row(self, data: Any, q: FloatArray, v: FloatArray) -> FloatArray:
-        """Row of slip along e2, shape (nv,)."""
-        return np.asarray(self._rows(data, q, v)[2][0])
-
-    def resistance(self, data: Any, q: FloatArray, v: FloatArray) -> FloatArray | None:
-        """Rolling resistance on the joints per unit of normal force [m], shape (nv,); None if none was built."""
-        if not self._f:
-            return None
-        terms, frame = self._rows(data, q, v)[:2]
-        return resistance(terms, self._f, frame[:, 0])
+        return acceleration, frame @ np.array([-self._transmitted(data, frame[:, 0]), *friction])
 
     def needed(self, data: Any, q: FloatArray, v: FloatArray) -> tuple[float, float]:
         """See :class:`~proofroll.engines.pinocchio.mechanism.Mechanism`."""
         friction = self.respond(data, q, v)[1]
-        e1 = data.oMi[self._carriage].rotation @ self._frame0[:, 0]
-        return math.hypot(*friction), self._normal_force(data, e1)  # forwardDynamics leaves the bias pass alone
+        return math.hypot(*friction), self.normal_force(data)
 
     def slide(self, data: Any, q: FloatArray, v: FloatArray, direction: FloatArray) -> Sliding:
         """See :class:`~proofroll.engines.pinocchio.mechanism.Mechanism`; the friction is put to the joints."""
         terms, frame, rows, drift = self._rows(data, q, v)
         e1, along = frame[:, 0], frame[:, 1:]
         # Friction along the wall cannot change N, no more than the joints can.
-        normal_force = self._normal_force(data, e1)
-        friction = -self._mu_kinetic * normal_force * (along.T @ direction)
+        normal_force = self._transmitted(data, e1)
+        friction = self.friction(normal_force, along.T @ direction)
         torque = rows.T @ friction
         if self._f:
             torque += normal_force * resistance(terms, self._f, e1)
@@ -129,7 +108,7 @@ class Composite:
         """See :class:`~proofroll.engines.pinocchio.mechanism.Mechanism`; N from the joint's wrench."""
         sliding = self.slide(data, q, v, direction)
         pin.rnea(self.model, data, q, v, sliding.acceleration)
-        force = sliding.friction - self._normal_force(data, sliding.e1) * sliding.e1
+        force = sliding.friction - self._transmitted(data, sliding.e1) * sliding.e1
         return sliding.acceleration, np.asarray(force)
 
     def project_sliding(self, data: Any, q: FloatArray, v: FloatArray) -> tuple[FloatArray, FloatArray]:  # noqa: ARG002 -- the protocol's

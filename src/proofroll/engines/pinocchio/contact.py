@@ -15,7 +15,8 @@ from typing import Any
 import numpy as np
 import pinocchio as pin
 
-from proofroll.engine import Built, Regularised, Sample, whole_steps
+from proofroll.engine import Built, Sample, whole_steps
+from proofroll.engines.pinocchio.contact_tolerances import softened
 from proofroll.engines.pinocchio.settings import PinocchioSettings
 from proofroll.errors import Diverged, Refused
 from proofroll.events import Event, EventKind
@@ -69,6 +70,7 @@ class ContactRun:
         """
         self._body, self._settings = body, settings
         self._dt = float(settings.dt or 0.0)
+        self._solver_kind, self._tolerance = settings.solver or "pgs", float(settings.solver_tolerance or 0.0)
         self._leapfrog = settings.integrator == "leapfrog"
         self.model = pin.Model()
         self.model.gravity.linear = body.gravity
@@ -87,10 +89,10 @@ class ContactRun:
         self._datas.append(self._models[0].createData())
         self._point = self._models[0].extract()  # refers to the model in the vector
         self._bounded = math.isfinite(body.contact.mu_static)
-        unbounded = _UNBOUNDED_FRICTION[settings.solver]
+        unbounded = _UNBOUNDED_FRICTION[self._solver_kind]
         self._mu_static = body.contact.mu_static if self._bounded else unbounded
         self._mu_kinetic = body.contact.mu_kinetic if self._bounded else unbounded
-        self._solver, self._options, self._result = _solver(settings)
+        self._solver, self._options, self._result = _solver(self._solver_kind, self._tolerance)
 
         self._status: EventKind = "stick"
         self._pressed = False
@@ -209,8 +211,8 @@ class ContactRun:
         found = self._solver.solve(delassus, free, self._models, self._datas, self._options, self._result)
         if not found:
             raise Diverged(
-                f"Pinocchio's {self._settings.solver} solver did not reach solver_tolerance="
-                f"{self._settings.solver_tolerance:g} at {self._time:g} s"
+                f"Pinocchio's {self._solver_kind} solver did not reach solver_tolerance={self._tolerance:g} "
+                f"at {self._time:g} s"
             )
         return np.array(self._result.retrieveConstraintImpulses())
 
@@ -243,47 +245,52 @@ class ContactRun:
         kick = self._kick()
         self._normal_force = kept
         inertia = self.model.inertias[self._ball]
-        f: float | None = 0.0
+        pose, point = self._data.oMi[self._ball], self._datas[0].extract()
+        f = 0.0
         if self._body.contact.rolling_resistance:
-            pose = self._data.oMi[self._ball]
-            torque = self._resistance(pose.translation, pose.rotation, kick.before[:3])
-            f = float(np.linalg.norm(torque)) or None
+            # At rest it has no direction, so it is looked at in motion: along the first axis of the plane.
+            along = self._point.joint1_placement.rotation[:, 0]
+            f = float(np.linalg.norm(self._resistance(pose.translation, pose.rotation, along)))
+        acceleration = (kick.v - kick.before) / kick.span
         return Built(
             mass=float(inertia.mass),
             inertia=np.linalg.eigvalsh(inertia.inertia),
             gravity=self.model.gravity.linear.copy(),
             ball_radius=float(np.linalg.norm(self._point.joint2_placement.translation)),
             rolling_resistance=f,
-            acceleration=(kick.v - kick.before)[:3] / kick.span,
-            regularised=self._softened(),
+            mu_static=self._friction(self._mu_static),
+            mu_kinetic=self._friction(self._mu_kinetic),
+            # The plane is posed at the contact; how far the wall is from there, the solver is told besides.
+            gap=float(point.c1Mc2.translation[2] + self._body.surface.gap(pose.translation)),
+            acceleration=acceleration[:3],
+            angular_acceleration=pose.rotation @ acceleration[3:],
+            regularised=softened(
+                self._body,
+                bends=self._leapfrog,
+                dt=self._dt,
+                impulse=0.0 if self._solver_kind == "pgs" else self._tolerance,
+                unbounded=None if self._bounded else _UNBOUNDED_FRICTION[self._solver_kind],
+            ),
         )
 
-    def _softened(self) -> dict[str, Regularised]:
-        if self._leapfrog:
-            because = "the impulse of a step is found to solver_tolerance, the gap to round-off"
-            # An error of velocity makes one of acceleration when divided by the step, one of position when divided
-            # again; the latter are compared with gravity, which no smaller scale of the certificate undercuts.
-            rounding = float(np.finfo(float).eps) * self._body.ball.radius / self._dt**2
-            gravity = float(np.linalg.norm(self._body.gravity)) or 1.0
-            tolerance = 10 * (self._settings.solver_tolerance / self._dt + rounding / gravity)
-        else:
-            because = "for the length of a step the wall is a plane, and at time 0 it does not yet bend the path"
-            tolerance = 1.0
-        return {name: Regularised(tolerance, because) for name in ("N", "F2", "F3", "acceleration")}
+    def _friction(self, mu: float) -> float:
+        """What the cone of the constraint holds if it is given ``mu``, as before each impulse."""
+        self._point.setFriction(mu)
+        return float(self._point.getFriction())
 
     def events(self) -> tuple[Event, ...]:
         """See :class:`proofroll.engine.LocatesEvents`; none with unbounded friction."""
         return tuple(self._events) if self._bounded else ()
 
 
-def _solver(settings: PinocchioSettings) -> tuple[Any, Any, Any]:
+def _solver(kind: str, tolerance: float) -> tuple[Any, Any, Any]:
     """Solver, its options and its result for one contact."""
-    if settings.solver == "pgs":
+    if kind == "pgs":
         solver, options, result = pin.PGSConstraintSolver(3), pin.PGSSolverSettings(), pin.PGSSolverResult()
     else:
         solver, options, result = pin.ADMMConstraintSolver(3), pin.ADMMSolverSettings(), pin.ADMMSolverResult()
         options.max_iterations = _ADMM_ITERATIONS
     for name in ("feasibility", "complementarity"):
-        for kind in ("absolute", "relative"):
-            setattr(options, f"{kind}_{name}_tol", settings.solver_tolerance)
+        for bound in ("absolute", "relative"):
+            setattr(options, f"{bound}_{name}_tol", tolerance)
     return solver, options, result

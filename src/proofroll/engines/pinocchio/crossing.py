@@ -1,11 +1,15 @@
-"""Where a smooth function of time first becomes positive."""
+"""Where a smooth function first becomes positive: of time, or of the state in the last step of an integration."""
 
 from __future__ import annotations
 
 from collections.abc import Callable
+from typing import Any
 
 import numpy as np
+from scipy.integrate import DOP853
 from scipy.optimize import brentq, minimize_scalar
+
+from proofroll.surfaces import FloatArray
 
 # Between the ends of an interval the function is looked at so many times, enough for one crest.
 _LOOKS = 4
@@ -39,3 +43,50 @@ def first_rise(g: Callable[[float], float], low: float, high: float, at_low: flo
     if values[index - 1] >= 0:
         return float(times[index - 1])
     return float(brentq(g, times[index - 1], times[index], xtol=1e-14, rtol=1e-15))
+
+
+def located(
+    solver: Any, g: Callable[[FloatArray], float], before: float, after: float, span: float
+) -> tuple[float, float, FloatArray] | None:
+    """Where ``g`` first rises through zero in the last step of a DOP853 ``solver``.
+
+    Args:
+        solver: after a step.
+        g: function of the state.
+        before: its value at the start of the step.
+        after: its value at the end.
+        span: [s] over which the slope of ``g`` is measured.
+
+    Returns:
+        Time [s], half the width of its bracket [s], and the state then; None if ``g`` does not rise through zero.
+    """
+    dense = solver.dense_output()
+    low, high = float(solver.t_old), float(solver.t)
+    time = first_rise(lambda t: g(dense(t)), low, high, before, after)
+    if time is None:
+        return None
+    # The dense output is of lower order than the steps: Newton's method on states that were integrated there.
+    y, width = _integrated(solver, time), 0.0
+    for _ in range(3):
+        rates = solver.fun(time, y)
+        slope = (g(y + span * rates) - g(y - span * rates)) / (2 * span)
+        better = time - g(y) / slope if slope > 0 else time
+        if not low <= better <= high or abs(better - time) > 0.1 * (high - low):
+            break  # a crest that only touches zero has no slope to go by
+        width = abs(better - time)
+        if width <= 2 * np.spacing(time):
+            break
+        time, y = better, _integrated(solver, better)
+    return time, width, y
+
+
+def _integrated(solver: Any, time: float) -> FloatArray:
+    """The state at ``time``, integrated from the start of the last step."""
+    if time <= solver.t_old:
+        return np.asarray(solver.y_old)
+    part = DOP853(
+        solver.fun, solver.t_old, solver.y_old, time, rtol=solver.rtol, atol=solver.atol, first_step=time - solver.t_old
+    )
+    while part.status == "running":
+        part.step()
+    return np.asarray(part.y)

@@ -8,13 +8,13 @@ from typing import Any
 import numpy as np
 import pinocchio as pin
 
-from proofroll.engines.pinocchio.mechanism import Sliding
+from proofroll.engines.pinocchio.mechanism import Mechanism, Sliding
 from proofroll.engines.pinocchio.rows import BallTerms, ball_terms, resistance, rolling_rows
 from proofroll.scene import RollingBall
 from proofroll.surfaces import FloatArray
 
 
-class FreeFlyer:
+class FreeFlyer(Mechanism):
     """Six freedoms; the rows come from the signed distance to the surface and its derivatives.
 
     Velocities are those of the free-flyer joint, in the ball's own axes. The multipliers are the components of the
@@ -23,22 +23,14 @@ class FreeFlyer:
 
     def __init__(self, body: RollingBall, orientation: bool) -> None:
         """See :class:`~proofroll.engines.pinocchio.mechanism.Mechanism`."""
-        self._radius = body.ball.radius
-        self._f = body.contact.rolling_resistance
-        self._mu_kinetic = body.contact.mu_kinetic
+        super().__init__(body)
         self._surface = body.surface
         self._orientation = orientation
-        self.model = pin.Model()
-        self.model.gravity.linear = body.gravity
-        self.ball = self.model.addJoint(0, pin.JointModelFreeFlyer(), pin.SE3.Identity(), body.ball.name)
-        inertia = pin.Inertia(body.ball.mass, np.zeros(3), body.ball.inertia * np.eye(3))
-        self.model.appendBodyToJoint(self.ball, inertia, pin.SE3.Identity())
-        self._rest = np.zeros(self.model.nv)
+        self._add_ball(body, 0, pin.JointModelFreeFlyer(), pin.SE3.Identity())
         self.q0 = np.concatenate([body.p0, [0.0, 0.0, 0.0, 1.0]])
         self.v0 = np.concatenate([body.v0, body.w0])
-        speed = float(np.linalg.norm(body.v0)) or np.sqrt(np.linalg.norm(body.gravity) * self._radius)
         self.q_scale = np.concatenate([np.full(3, self._radius), np.ones(4)])
-        self.v_scale = np.concatenate([np.full(3, speed), np.full(3, speed / self._radius)])
+        self.v_scale = np.concatenate([np.full(3, self._speed), np.full(3, self._speed / self._radius)])
 
     def _rows(self, data: Any, q: FloatArray, v: FloatArray) -> tuple[BallTerms, FloatArray, FloatArray, FloatArray]:
         """Terms of the ball, local frame, rows and drift: first the surface, then the two of rolling."""
@@ -67,6 +59,7 @@ class FreeFlyer:
         matrix[:6, 6:] = -columns
         matrix[6:, :6] = rows
         solution = np.linalg.solve(matrix, np.concatenate([-data.nle, -drift]))
+        data.lambda_c = solution[6:]  # where forwardDynamics leaves them
         return solution[:6], solution[6:], frame
 
     def respond(self, data: Any, q: FloatArray, v: FloatArray) -> tuple[FloatArray, FloatArray]:
@@ -77,28 +70,24 @@ class FreeFlyer:
             acceleration[:3] += pin.skew(v[3:]) @ v[:3]
         return acceleration, multipliers
 
+    def normal_force(self, data: Any) -> float:
+        """See :class:`~proofroll.engines.pinocchio.mechanism.Mechanism`."""
+        return -float(data.lambda_c[0])
+
     def reaction(self, data: Any, q: FloatArray, v: FloatArray) -> tuple[FloatArray, FloatArray]:
         """Joint acceleration, and the wall's force from the multipliers."""
         acceleration, multipliers, frame = self._solve(data, q, v)
         return acceleration, frame @ multipliers
 
-    def project(self, data: Any, q: FloatArray, v: FloatArray) -> tuple[FloatArray, FloatArray]:
-        """Moves the centre onto the surface along its normal, then removes sinking and slip by an impulse."""
+    def on_surface(self, q: FloatArray) -> FloatArray:
+        """The configuration with the centre moved onto the surface along its normal."""
         q = q.copy()
         q[:3] += self._surface.gap(q[:3]) * self._surface.normal(q[:3])
-        rows = self._rows(data, q, v)[2]
-        return q, np.array(pin.impulseDynamics(self.model, data, v, rows))
+        return q
 
-    def rolling_row(self, data: Any, q: FloatArray, v: FloatArray) -> FloatArray:
-        """Row of slip along e2, shape (nv,)."""
-        return np.asarray(self._rows(data, q, v)[2][1])
-
-    def resistance(self, data: Any, q: FloatArray, v: FloatArray) -> FloatArray | None:
-        """Rolling resistance on the joints per unit of normal force [m], shape (nv,); None if none was built."""
-        if not self._f:
-            return None
-        terms, frame = self._rows(data, q, v)[:2]
-        return resistance(terms, self._f, frame[:, 0])
+    def gap(self, q: FloatArray) -> float:
+        """Value of the row of the surface [m]."""
+        return float(self._surface.gap(q[:3]))
 
     def needed(self, data: Any, q: FloatArray, v: FloatArray) -> tuple[float, float]:
         """See :class:`~proofroll.engines.pinocchio.mechanism.Mechanism`."""
@@ -109,7 +98,7 @@ class FreeFlyer:
         """One row, that of the surface; friction and rolling resistance are columns, for both follow N."""
         terms, frame, rows, drift = self._rows(data, q, v)
         e1, along = frame[:, 0], frame[:, 1:]
-        against = -self._mu_kinetic * (along.T @ direction)
+        against = self.friction(1.0, along.T @ direction)  # per unit of N
         column = rows[0] - against @ rows[1:]
         if self._f:
             column = column - resistance(terms, self._f, e1)
@@ -139,7 +128,6 @@ class FreeFlyer:
 
     def project_sliding(self, data: Any, q: FloatArray, v: FloatArray) -> tuple[FloatArray, FloatArray]:
         """See :class:`~proofroll.engines.pinocchio.mechanism.Mechanism`."""
-        q = q.copy()
-        q[:3] += self._surface.gap(q[:3]) * self._surface.normal(q[:3])
+        q = self.on_surface(q)
         rows = self._rows(data, q, v)[2]
         return q, np.array(pin.impulseDynamics(self.model, data, v, rows[:1]))

@@ -20,9 +20,11 @@ class StickSlip(Integrator, Protocol):
 
     Attributes:
         events: so far.
+        mu_static: largest |F|/N while sticking [-].
     """
 
     events: list[Event]
+    mu_static: float
 
     @property
     def sticking(self) -> bool:

@@ -9,7 +9,7 @@ import pinocchio as pin
 from scipy.integrate import DOP853
 
 from proofroll.engine import whole_steps
-from proofroll.engines.pinocchio.mechanism import Mechanism
+from proofroll.engines.pinocchio.mechanism import Mechanism, left_the_wall
 from proofroll.engines.pinocchio.settings import PinocchioSettings
 from proofroll.errors import Diverged
 from proofroll.surfaces import FloatArray
@@ -29,7 +29,7 @@ class Integrator(Protocol):
         """From ``start`` to ``end`` [s].
 
         Raises:
-            Diverged: no step is small enough, or the rows have become dependent.
+            Diverged: no step is small enough, the rows have become dependent, or the wall would have to pull.
         """
 
 
@@ -60,30 +60,43 @@ class FixedStep:
         self._model, self._data = mechanism.model, mechanism.model.createData()
         self._moving = _moving(mechanism, settings)
         self._dt = float(settings.dt or 0.0)
+        self._start: FloatArray | None = None
         self.q, self.v = mechanism.q0.copy(), mechanism.v0.copy()
 
     def advance(self, start: float, end: float) -> None:
         """See :class:`Integrator`."""
         try:
-            for _ in range(whole_steps(start, end, self._dt)):
-                self._step(self._dt)
-                if self._settings.projection:
-                    self.q, self.v = self._mechanism.project(self._data, self.q, self.v)
+            for number in range(whole_steps(start, end, self._dt)):
+                self._advance_one(start + number * self._dt)
         except np.linalg.LinAlgError as error:
             raise Diverged(f"the equations became singular between {start:g} s and {end:g} s ({error})") from None
+
+    def _advance_one(self, time: float) -> None:
+        self._step(self._dt, self._pressed(time) if self._start is None else self._start)
+        if self._settings.projection:
+            self.q, self.v = self._mechanism.project(self._data, self.q, self.v)
+        self._start = self._pressed(time + self._dt)
+
+    def _pressed(self, time: float) -> FloatArray:
+        """Acceleration at the end of a step, with which the next one starts; ends the run if the wall would pull."""
+        acceleration = self._acceleration(self.q, self.v)
+        if self._mechanism.normal_force(self._data) < -self._mechanism.faint:
+            raise left_the_wall(f"before {time:.6g} s")
+        return acceleration
 
     def _acceleration(self, q: FloatArray, v: FloatArray) -> FloatArray:
         return self._mechanism.respond(self._data, q, v)[0]
 
-    def _step(self, h: float) -> None:
+    def _step(self, h: float, acceleration: FloatArray) -> None:
+        """One step of ``h`` [s]; the acceleration is that at its start."""
         raise NotImplementedError
 
 
 class SemiImplicitEuler(FixedStep):
     """Velocity first, then the configuration with the new velocity."""
 
-    def _step(self, h: float) -> None:
-        self.v = self.v + h * self._acceleration(self.q, self.v)
+    def _step(self, h: float, acceleration: FloatArray) -> None:
+        self.v = self.v + h * acceleration
         self.q = pin.integrate(self._model, self.q, h * self._moving * self.v)
 
 
@@ -95,23 +108,19 @@ class RungeKutta4(FixedStep):
     without it the orientation is of order 2. ``rk4_dexpinv`` has the term.
     """
 
-    def _rate(self, displacement: FloatArray | None, v: FloatArray) -> FloatArray:
+    def _rate(self, displacement: FloatArray, v: FloatArray) -> FloatArray:
         moving = self._moving * v
-        if displacement is None or self._settings.integrator == "rk4":
+        if self._settings.integrator == "rk4":
             return moving
         dexp = pin.dIntegrate(self._model, self.q, displacement, pin.ARG1)
         return np.asarray(np.linalg.solve(dexp, moving))
 
-    def _step(self, h: float) -> None:
-        rates: list[FloatArray] = []
-        accelerations: list[FloatArray] = []
-        for reach in (0.0, 0.5 * h, 0.5 * h, h):
-            if not rates:
-                q, v, displacement = self.q, self.v, None
-            else:
-                displacement = reach * rates[-1]
-                q = pin.integrate(self._model, self.q, displacement)
-                v = self.v + reach * accelerations[-1]
+    def _step(self, h: float, acceleration: FloatArray) -> None:
+        rates, accelerations = [self._moving * self.v], [acceleration]
+        for reach in (0.5 * h, 0.5 * h, h):
+            displacement = reach * rates[-1]
+            q = pin.integrate(self._model, self.q, displacement)
+            v = self.v + reach * accelerations[-1]
             rates.append(self._rate(displacement, v))
             accelerations.append(self._acceleration(q, v))
         q1, q2, q3, q4 = rates
@@ -123,7 +132,7 @@ class RungeKutta4(FixedStep):
 # A step shorter than this part of the time in which the ball turns by a radian, this many times in a row, leads
 # nowhere: ordinary steps are a hundred times longer, and one jump of the forces is passed in a few dozen.
 _SHORT = 1e-4
-PATIENCE = 500
+_PATIENCE = 500
 
 
 class Adaptive:
@@ -139,6 +148,7 @@ class Adaptive:
         self._atol = 1e-2 * self._rtol * np.concatenate([mechanism.q_scale, mechanism.v_scale])
         self._turning_time = mechanism.q_scale[0] / mechanism.v_scale[0]
         self._step: float | None = None
+        self._short_steps = 0
         self.q, self.v = mechanism.q0.copy(), mechanism.v0.copy()
 
     def _rates(self, _: float, y: FloatArray) -> FloatArray:
@@ -156,22 +166,17 @@ class Adaptive:
             return
         first = None if self._step is None else min(self._step, end - start)
         state = np.concatenate([self.q, self.v])
-        longest, short_steps = 0.0, 0
+        longest, self._short_steps = 0.0, 0
         try:
             solver = DOP853(self._rates, start, state, end, rtol=self._rtol, atol=self._atol, first_step=first)
             while solver.status == "running":
-                message = solver.step()
-                if message is not None:
-                    raise Diverged(f"the motion could not be integrated past {solver.t:g} s: {message}")
+                self._make_step(solver)
                 longest = max(longest, solver.step_size)
-                short_steps = short_steps + 1 if self._is_short(solver) else 0
-                if short_steps > PATIENCE:
-                    raise Diverged(
-                        f"the steps became too short at {solver.t:g} s: the forces jump there, as rolling resistance "
-                        "does when the ball comes to rest"
-                    )
                 if self._settings.projection:
                     self._put_back(solver)
+                # The rates that were found last are those at the end of the step, with projection or without.
+                if self._mechanism.normal_force(self._data) < -self._mechanism.faint:
+                    raise left_the_wall(f"before {solver.t:.6g} s")
         except np.linalg.LinAlgError as error:
             raise Diverged(f"the equations became singular between {start:g} s and {end:g} s ({error})") from None
         # The step that ends at ``end`` may be short; the next start must not inherit that.
@@ -179,9 +184,23 @@ class Adaptive:
         nq = self._model.nq
         self.q, self.v = pin.normalize(self._model, solver.y[:nq]), solver.y[nq:]
 
-    def _is_short(self, solver: Any) -> bool:
+    def _make_step(self, solver: Any) -> None:
+        """One step.
+
+        Raises:
+            Diverged: none is small enough, or too many in a row are too short.
+        """
+        message = solver.step()
+        if message is not None:
+            raise Diverged(f"the motion could not be integrated past {solver.t:g} s: {message}")
         faster = max(1.0, float(np.max(np.abs(solver.y[self._model.nq :]) / self._mechanism.v_scale)))
-        return bool(solver.step_size * faster < _SHORT * self._turning_time)
+        is_short = solver.step_size * faster < _SHORT * self._turning_time
+        self._short_steps = self._short_steps + 1 if is_short else 0
+        if self._short_steps > _PATIENCE:
+            raise Diverged(
+                f"the steps became too short at {solver.t:g} s: the forces jump there, as rolling resistance "
+                "does when the ball comes to rest"
+            )
 
     def _put_back(self, solver: Any) -> None:
         nq = self._model.nq

@@ -1,11 +1,22 @@
-"""What the two formulations have in common, for the integrators and the adapter."""
+"""What the two formulations with rows have in common, for the integrators and the adapter."""
 
 from __future__ import annotations
 
+from abc import ABC, abstractmethod
 from dataclasses import dataclass
-from typing import Any, Protocol
+from typing import Any
 
+import numpy as np
+import pinocchio as pin
+
+from proofroll.engines.pinocchio.rows import BallTerms, resistance
+from proofroll.errors import Diverged
+from proofroll.scene import RollingBall
 from proofroll.surfaces import FloatArray
+
+# A pull of the wall smaller than this part of the ball's weight, and of the force that turns its path by a radius, is
+# round-off.
+_FAINT = 1e-9
 
 
 @dataclass(frozen=True, slots=True)
@@ -29,7 +40,12 @@ class Sliding:
     e1: FloatArray
 
 
-class Mechanism(Protocol):
+def left_the_wall(when: str) -> Diverged:
+    """What ends the run where the wall would have to pull; ``when`` is e.g. ``at 0.2 s``."""
+    return Diverged(f"the ball leaves the wall {when}, which this formulation does not model")
+
+
+class Mechanism(ABC):
     """A ball on its surface as a Pinocchio model with rows on top.
 
     Every method takes the ``data`` that it may overwrite, so that sampling leaves the running data alone.
@@ -39,43 +55,101 @@ class Mechanism(Protocol):
         ball: index of the joint that carries the ball.
         q0, v0: joint configuration and velocity at time 0.
         q_scale, v_scale: natural sizes of their components, for tolerances.
+        faint: size of normal force that is round-off [N].
     """
 
-    model: Any
     ball: int
     q0: FloatArray
     v0: FloatArray
     q_scale: FloatArray
     v_scale: FloatArray
 
+    def __init__(self, body: RollingBall) -> None:
+        self._radius = body.ball.radius
+        self._f = body.contact.rolling_resistance
+        self._mu_kinetic = body.contact.mu_kinetic
+        self.model: Any = pin.Model()
+        self.model.gravity.linear = body.gravity
+        gravity = float(np.linalg.norm(body.gravity))
+        self._speed = float(np.linalg.norm(body.v0)) or float(np.sqrt(gravity * self._radius))
+        self.faint = _FAINT * body.ball.mass * (gravity + self._speed**2 / self._radius)
+
+    def _add_ball(self, body: RollingBall, parent: int, joint: Any, placement: Any) -> None:
+        self.ball = self.model.addJoint(parent, joint, placement, body.ball.name)
+        inertia = pin.Inertia(body.ball.mass, np.zeros(3), body.ball.inertia * np.eye(3))
+        self.model.appendBodyToJoint(self.ball, inertia, pin.SE3.Identity())
+        self._rest = np.zeros(self.model.nv)
+
+    @abstractmethod
+    def _rows(self, data: Any, q: FloatArray, v: FloatArray) -> tuple[BallTerms, FloatArray, FloatArray, FloatArray]:
+        """Terms of the ball, local frame, rows and drift; the last two rows are those of rolling."""
+
+    @abstractmethod
     def respond(self, data: Any, q: FloatArray, v: FloatArray) -> tuple[FloatArray, FloatArray]:
         """Joint acceleration, shape (nv,), and multipliers of the rows [N]."""
 
+    @abstractmethod
+    def normal_force(self, data: Any) -> float:
+        """N [N] that the last :meth:`respond` left in ``data``."""
+
+    @abstractmethod
     def reaction(self, data: Any, q: FloatArray, v: FloatArray) -> tuple[FloatArray, FloatArray]:
         """Joint acceleration, shape (nv,), and force of the wall on the ball in the world [N], shape (3,)."""
 
-    def project(self, data: Any, q: FloatArray, v: FloatArray) -> tuple[FloatArray, FloatArray]:
-        """The state put back on the constraints, velocities orthogonally in the metric of the mass (Blajer 2002)."""
-
-    def rolling_row(self, data: Any, q: FloatArray, v: FloatArray) -> FloatArray:
-        """Row of slip along e2, shape (nv,)."""
-
-    def resistance(self, data: Any, q: FloatArray, v: FloatArray) -> FloatArray | None:
-        """Rolling resistance on the joints per unit of normal force [m], shape (nv,); None if none was built."""
-
+    @abstractmethod
     def needed(self, data: Any, q: FloatArray, v: FloatArray) -> tuple[float, float]:
         """Friction that it takes to keep the slip velocity as it is [N], and N [N]."""
 
+    @abstractmethod
     def slide(self, data: Any, q: FloatArray, v: FloatArray, direction: FloatArray) -> Sliding:
         """The ball on its surface with friction mu_kinetic N against ``direction``, shape (3,), in the world.
 
         The direction is a unit vector along the wall; zero leaves the friction out.
         """
 
+    @abstractmethod
     def sliding_reaction(
         self, data: Any, q: FloatArray, v: FloatArray, direction: FloatArray
     ) -> tuple[FloatArray, FloatArray]:
         """As :meth:`reaction`, while sliding against ``direction``."""
 
+    @abstractmethod
     def project_sliding(self, data: Any, q: FloatArray, v: FloatArray) -> tuple[FloatArray, FloatArray]:
         """The state put back on the surface alone; the same arrays if it cannot have left it."""
+
+    def friction(self, normal_force: float, direction: FloatArray) -> FloatArray:
+        """Friction [N] while sliding along ``direction``; both by components along e2 and e3, shape (2,)."""
+        return -self._mu_kinetic * normal_force * direction
+
+    def on_surface(self, q: FloatArray) -> FloatArray:
+        """The configuration with the centre put back on the surface; here the joints hold it there."""
+        return q
+
+    def gap(self, q: FloatArray) -> float | None:  # noqa: ARG002 -- for those that have one
+        """Value of the row of the surface [m]; None where there is no such row."""
+        return None
+
+    def project(self, data: Any, q: FloatArray, v: FloatArray) -> tuple[FloatArray, FloatArray]:
+        """The state put back on the constraints, velocities orthogonally in the metric of the mass (Blajer 2002).
+
+        The centre moves along the normal; an impulse at the contact removes slip, and sinking where that is possible.
+        """
+        q = self.on_surface(q)
+        rows = self._rows(data, q, v)[2]
+        return q, np.array(pin.impulseDynamics(self.model, data, v, rows))
+
+    def rolling_row(self, data: Any, q: FloatArray, v: FloatArray) -> FloatArray:
+        """Row of slip along e2, shape (nv,)."""
+        return np.asarray(self._rows(data, q, v)[2][-2])
+
+    def resistance(self, data: Any, q: FloatArray, v: FloatArray) -> FloatArray | None:
+        """Rolling resistance on the joints per unit of normal force [m], shape (nv,); None if none was built."""
+        if not self._f:
+            return None
+        terms, frame = self._rows(data, q, v)[:2]
+        return resistance(terms, self._f, frame[:, 0])
+
+    def along(self, data: Any, q: FloatArray) -> FloatArray:
+        """Joint velocity at which the centre moves along e2 at 1 m/s and the ball does not turn, shape (nv,)."""
+        terms, frame = self._rows(data, q, self._rest)[:2]
+        return np.asarray(np.linalg.lstsq(terms.jacobian, np.concatenate([frame[:, 1], np.zeros(3)]), rcond=None)[0])

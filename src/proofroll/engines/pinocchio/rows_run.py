@@ -63,19 +63,27 @@ class RowsRun:
         model, data, ball = mechanism.model, mechanism.model.createData(), mechanism.ball
         inertia = model.inertias[ball]
         # In both formulations the spin is last, in orthonormal axes: the row of slip has the length a there, and
-        # rolling resistance the length f (at rest it has no direction, and nothing can be read).
+        # rolling resistance the length f. At rest that has no direction, so it is looked at in motion.
         radius = float(np.linalg.norm(mechanism.rolling_row(data, q, v)[-3:]))
-        torque = mechanism.resistance(data, q, v)
-        f = 0.0 if torque is None else float(np.linalg.norm(torque[-3:])) or None
+        torque = mechanism.resistance(data, q, mechanism.along(data, q))
+        mu_static, mu_kinetic = None, None  # without a bound nothing stands for it: the rows of rolling hold always
+        if isinstance(self.motion, StickSlip):
+            mu_static = self.motion.mu_static
+            mu_kinetic = float(np.linalg.norm(mechanism.friction(1.0, np.array([1.0, 0.0]))))
         acceleration = self._reaction(data)[0]
         pin.forwardKinematics(model, data, q, v, acceleration)
+        of_ball = pin.getClassicalAcceleration(model, data, ball, pin.LOCAL_WORLD_ALIGNED)
         return Built(
             mass=float(inertia.mass),
             inertia=np.linalg.eigvalsh(inertia.inertia),
             gravity=model.gravity.linear.copy(),
             ball_radius=radius,
-            rolling_resistance=f,
-            acceleration=pin.getClassicalAcceleration(model, data, ball, pin.LOCAL_WORLD_ALIGNED).linear.copy(),
+            rolling_resistance=0.0 if torque is None else float(np.linalg.norm(torque[-3:])),
+            mu_static=mu_static,
+            mu_kinetic=mu_kinetic,
+            gap=mechanism.gap(q),
+            acceleration=of_ball.linear.copy(),
+            angular_acceleration=of_ball.angular.copy(),
         )
 
     def _reaction(self, data: Any) -> tuple[FloatArray, FloatArray]:

@@ -35,8 +35,9 @@ class PinocchioSettings:
         orientation: integrate the orientation of the ball. Its inertia is the same about every axis, so the motion
             does not depend on it, and without it the fast turning needs no small steps.
         projection: put the state back on the constraints after each step; not in ``contact``, where the solver does.
-        solver: of ``contact``: projected Gauss-Seidel or alternating directions (ADMM).
-        solver_tolerance: of ``contact``: feasibility [m/s] and complementarity [J], both also relative [-].
+        solver: of ``contact``: projected Gauss-Seidel or alternating directions (ADMM); None with the others.
+        solver_tolerance: of ``contact``: feasibility [m/s] and complementarity [J], both also relative [-]; None with
+            the others.
     """
 
     formulation: Literal["composite", "free_flyer", "contact"] = "composite"
@@ -46,15 +47,26 @@ class PinocchioSettings:
     rtol: Annotated[float, Ge(TIGHTEST_RTOL)] | None = 1e-13
     orientation: bool = True
     projection: bool = True
-    solver: Literal["pgs", "admm"] = "pgs"
-    solver_tolerance: Annotated[float, Gt(0)] = 1e-12
+    solver: Literal["pgs", "admm"] | None = None
+    solver_tolerance: Annotated[float, Gt(0)] | None = None
 
     def __post_init__(self) -> None:
-        """A fixed step has dt and no rtol, an adaptive one rtol and no dt.
+        """Refuses what the formulation or the integrator does not have, and what would change nothing.
 
         Raises:
-            InputError: otherwise, or the formulation has no such option.
+            InputError: a setting does not go with another.
         """
+        self._check_formulation()
+        self._check_resolution()
+
+    def _check_formulation(self) -> None:
+        for name in ("solver", "solver_tolerance"):
+            value = getattr(self, name)
+            if self.formulation != "contact" and value is not None:
+                advice = f"{self.formulation} has no contact solver; leave it out, or take formulation=contact"
+                raise InputError(f"pinocchio: {name}", value, advice)
+            if self.formulation == "contact" and value is None:
+                raise InputError(f"pinocchio: {name}", value, "contact needs one; its presets have one")
         if (self.formulation == "contact") != (self.integrator in _OF_CONTACT) and (
             self.formulation == "contact" or self.integrator == "leapfrog"
         ):
@@ -68,6 +80,9 @@ class PinocchioSettings:
             )
         if self.formulation == "contact" and not self.orientation:
             raise InputError("pinocchio: orientation", self.orientation, "contact always turns the ball; leave it out")
+
+    def _check_resolution(self) -> None:
+        """A fixed step has dt and no rtol, an adaptive one rtol and no dt."""
         if self.integrator == "dop853":
             if self.dt is not None:
                 advice = "dop853 chooses its steps; set rtol instead, or take the fixed steps of preset=default"
@@ -118,9 +133,18 @@ PRESETS: Mapping[str, Mapping[str, PinocchioSettings]] = {
     "contact": {
         # what one writes first: the plane where the ball is when the step begins, the solver as it comes
         "default": PinocchioSettings(
-            "contact", "default", "semi_implicit_euler", 1e-3, None, projection=False, solver_tolerance=1e-6
+            "contact",
+            "default",
+            "semi_implicit_euler",
+            1e-3,
+            None,
+            projection=False,
+            solver="pgs",
+            solver_tolerance=1e-6,
         ),
         # the same contact, with its turning during a step taken into account, and solved to round-off
-        "matched": PinocchioSettings("contact", "matched", "leapfrog", 1e-3, None, projection=False),
+        "matched": PinocchioSettings(
+            "contact", "matched", "leapfrog", 1e-3, None, projection=False, solver="pgs", solver_tolerance=1e-12
+        ),
     },
 }

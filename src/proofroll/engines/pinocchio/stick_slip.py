@@ -10,7 +10,6 @@ the rate that friction takes from |u|, that is the direction of b, lagging by |u
 from __future__ import annotations
 
 import math
-from collections.abc import Callable
 from enum import Enum, auto
 from typing import Any
 
@@ -18,9 +17,9 @@ import numpy as np
 import pinocchio as pin
 from scipy.integrate import DOP853
 
-from proofroll.engines.pinocchio.crossing import first_rise
-from proofroll.engines.pinocchio.integrators import PATIENCE, Adaptive
-from proofroll.engines.pinocchio.mechanism import Mechanism, Sliding
+from proofroll.engines.pinocchio.crossing import located
+from proofroll.engines.pinocchio.integrators import Adaptive
+from proofroll.engines.pinocchio.mechanism import Mechanism, Sliding, left_the_wall
 from proofroll.engines.pinocchio.settings import PinocchioSettings
 from proofroll.errors import Diverged
 from proofroll.events import Event, EventKind
@@ -62,24 +61,17 @@ def unit(vector: FloatArray) -> FloatArray:
     return vector / length if length > 0 else vector
 
 
-def excess(mechanism: Mechanism, data: Any, q: FloatArray, v: FloatArray, contact: Contact) -> float:
-    """(needed - available) / (needed + available) friction while sticking [-]; slip begins where it is positive."""
+def excess(mechanism: Mechanism, data: Any, q: FloatArray, v: FloatArray, mu_static: float) -> tuple[float, float]:
+    """(needed - available) / (needed + available) friction while sticking [-], and N [N].
+
+    Slip begins where the first is positive.
+    """
     needed, normal_force = mechanism.needed(data, q, v)
-    available = contact.mu_static * normal_force
+    available = mu_static * normal_force
     # A friction of round-off is needed even where none is: it must not count as more than none (mu_static = 0).
     noise = _NOISE * abs(normal_force)
-    return (needed - available - noise) / max(needed + abs(available) + noise, np.finfo(float).tiny)
-
-
-def held(sliding: Sliding, time: float) -> Sliding:
-    """The same, if the wall presses.
-
-    Raises:
-        Diverged: the normal force is gone.
-    """
-    if sliding.normal_force < 0:
-        raise Diverged(f"the ball leaves the wall at {time:.6g} s, which this formulation does not model")
-    return sliding
+    size = max(needed + abs(available) + noise, np.finfo(float).tiny)
+    return (needed - available - noise) / size, normal_force
 
 
 class AdaptiveStickSlip(Adaptive):
@@ -87,12 +79,13 @@ class AdaptiveStickSlip(Adaptive):
 
     Attributes:
         events: so far.
+        mu_static: largest |F|/N while sticking [-].
         sticking: whether the ball sticks now.
     """
 
     def __init__(self, mechanism: Mechanism, settings: PinocchioSettings, contact: Contact) -> None:
         super().__init__(mechanism, settings)
-        self._contact = contact
+        self.mu_static = contact.mu_static
         self._span = _SPAN * self._turning_time
         self._handover = self._floor = self._least = 0.0
         self._mode = Mode.STICKING
@@ -132,7 +125,12 @@ class AdaptiveStickSlip(Adaptive):
         return self._mechanism.slide(data, *self._split(y), direction)
 
     def _excess(self, y: FloatArray) -> float:
-        return excess(self._mechanism, self._data, *self._split(y), self._contact)
+        return excess(self._mechanism, self._data, *self._split(y), self.mu_static)[0]
+
+    def _normal_force(self, y: FloatArray) -> float:
+        if self._mode is Mode.STICKING:
+            return excess(self._mechanism, self._data, *self._split(y), self.mu_static)[1]
+        return self._slide(self._data, y, self._direction(self._data, y)).normal_force
 
     def _turning(self, data: Any, y: FloatArray) -> tuple[Sliding, FloatArray]:
         """The ball without friction, and the rate at which the direction of its slip_rate turns [1/s], shape (3,)."""
@@ -163,11 +161,11 @@ class AdaptiveStickSlip(Adaptive):
             return self._rates(t, y)
         return self._sliding_rates(self._data, y, self._direction(self._data, y))[0]
 
-    def _speed(self, y: FloatArray, time: float) -> tuple[float, float]:
-        """|u| [m/s], in creeping with its sign, and its rate [m/s²]."""
+    def _speed(self, y: FloatArray) -> tuple[float, float, float]:
+        """|u| [m/s], in creeping with its sign, its rate [m/s²], and N [N]."""
         direction = self._direction(self._data, y)
-        sliding = held(self._slide(self._data, y, direction), time)
-        return float(sliding.slip @ direction), float(sliding.slip_rate @ direction)
+        sliding = self._slide(self._data, y, direction)
+        return float(sliding.slip @ direction), float(sliding.slip_rate @ direction), sliding.normal_force
 
     # -- from event to event ----------------------------------------------------------------------------------------
 
@@ -176,8 +174,8 @@ class AdaptiveStickSlip(Adaptive):
         y = np.concatenate([self.q, self.v])
         first = None if self._step is None else min(self._step, end - start)
         solver = DOP853(self._law, start, y, end, rtol=self._rtol, atol=self._atol, first_step=first)
-        monitor = self._monitor(y, start)
-        longest, short_steps = 0.0, 0
+        monitor = self._monitor(y)
+        longest, self._short_steps = 0.0, 0
         while solver.status == "running":
             if self._mode is Mode.SLIDING:
                 left = monitor[0] / -monitor[1] if monitor[1] < 0 else math.inf
@@ -187,20 +185,14 @@ class AdaptiveStickSlip(Adaptive):
                         return self._keep(solver.y + (end - solver.t) * solver.f, end)
                     return self._switch(stop, left, solver.y + left * solver.f)
                 solver.max_step = max(_APPROACH * left, 1e-300)
-            message = solver.step()
-            if message is not None:
-                raise Diverged(f"the motion could not be integrated past {solver.t:g} s: {message}")
-            before, monitor = monitor, self._monitor(solver.y, solver.t)
+            self._make_step(solver)
+            before, monitor = monitor, self._monitor(solver.y)
             stop = self._stop(solver, before, monitor)
+            if monitor[2] < -self._mechanism.faint:
+                self._leave(solver, before[2], monitor[2], stop)
             if stop is not None:
                 return self._switch(*stop)
             longest = max(longest, solver.step_size)
-            short_steps = short_steps + 1 if self._is_short(solver) else 0
-            if short_steps > PATIENCE:
-                raise Diverged(
-                    f"the steps became too short at {solver.t:g} s: the forces jump there, as rolling resistance "
-                    "does when the ball comes to rest"
-                )
             if self._settings.projection:
                 self._put_back(solver)
         self._step = max(longest, self._step or 0.0) if first == end - start else longest
@@ -220,80 +212,58 @@ class AdaptiveStickSlip(Adaptive):
             solver.y = np.concatenate(back)
             solver.f = self._law(solver.t, solver.y)
 
-    def _monitor(self, y: FloatArray, time: float) -> tuple[float, float]:
-        """What may end the mode: the excess of needed friction when sticking, else |u| and its rate."""
-        return (self._excess(y), 0.0) if self._mode is Mode.STICKING else self._speed(y, time)
+    def _monitor(self, y: FloatArray) -> tuple[float, float, float]:
+        """What may end the mode, the excess of needed friction when sticking, else |u| and its rate; and N [N]."""
+        if self._mode is not Mode.STICKING:
+            return self._speed(y)
+        beyond, normal_force = excess(self._mechanism, self._data, *self._split(y), self.mu_static)
+        return beyond, 0.0, normal_force
 
     def _stop(
-        self, solver: Any, before: tuple[float, float], after: tuple[float, float]
+        self, solver: Any, before: tuple[float, float, float], after: tuple[float, float, float]
     ) -> tuple[float, float, FloatArray] | None:
         """Time at which the mode ended within the last step [s], half the width of its bracket [s], and state."""
         if self._mode is Mode.STICKING:
             # The excess lies in [-1, 1] and its crests are many steps wide, so far below zero nothing is missed.
             if max(before[0], after[0]) < -0.1 - abs(after[0] - before[0]):
                 return None
-            return self._located(solver, lambda y: self._excess(y) - _GRAZE, before[0] - _GRAZE, after[0] - _GRAZE)
+            return located(
+                solver, lambda y: self._excess(y) - _GRAZE, before[0] - _GRAZE, after[0] - _GRAZE, self._span
+            )
         if self._mode is Mode.CREEPING:
             if after[0] >= self._handover:
-                return self._located(
-                    solver, lambda y: self._speed(y, solver.t)[0] - self._handover, -self._handover, after[0]
+                return located(
+                    solver, lambda y: self._speed(y)[0] - self._handover, -self._handover, after[0], self._span
                 )
             # It ends below zero by more than round-off, or the zero at which it began would be found again.
             if after[0] < -self._least and after[1] < 0:
-                return self._located(
+                return located(
                     solver,
-                    lambda y: -self._speed(y, solver.t)[0] - self._least,
+                    lambda y: -self._speed(y)[0] - self._least,
                     -before[0] - self._least,
                     -after[0] - self._least,
+                    self._span,
                 )
         return None
 
-    def _located(
-        self, solver: Any, g: Callable[[FloatArray], float], before: float, after: float
-    ) -> tuple[float, float, FloatArray] | None:
-        """Where ``g`` first rises through zero in the last step."""
-        dense = solver.dense_output()
-        low, high = float(solver.t_old), float(solver.t)
-        time = first_rise(lambda t: g(dense(t)), low, high, before, after)
-        if time is None:
-            return None
-        # The dense output is of lower order than the steps: Newton's method on states that were integrated there.
-        y, width = self._integrated(solver, time), 0.0
-        for _ in range(3):
-            rates = self._law(time, y)
-            slope = (g(y + self._span * rates) - g(y - self._span * rates)) / (2 * self._span)
-            better = time - g(y) / slope if slope > 0 else time
-            if not low <= better <= high or abs(better - time) > 0.1 * (high - low):
-                break  # a crest that only touches zero has no slope to go by
-            width = abs(better - time)
-            if width <= 2 * np.spacing(time):
-                break
-            time, y = better, self._integrated(solver, better)
-        return time, width, y
+    def _leave(self, solver: Any, before: float, after: float, stop: tuple[float, float, FloatArray] | None) -> None:
+        """Says that the ball leaves the wall where N falls through zero, unless the mode ends before that.
 
-    def _integrated(self, solver: Any, time: float) -> FloatArray:
-        """The state at ``time``, integrated from the start of the last step."""
-        if time <= solver.t_old:
-            return np.asarray(solver.y_old)
-        part = DOP853(
-            self._law,
-            solver.t_old,
-            solver.y_old,
-            time,
-            rtol=self._rtol,
-            atol=self._atol,
-            first_step=time - solver.t_old,
-        )
-        while part.status == "running":
-            part.step()
-        return np.asarray(part.y)
+        Raises:
+            Diverged: the ball leaves the wall.
+        """
+        lift = located(solver, lambda y: -self._normal_force(y), -before, -after, self._span)
+        time, width = lift[:2] if lift is not None else (float(solver.t), float(solver.step_size))
+        if stop is None or time <= stop[0]:
+            self._record("liftoff", time, width)
+            raise left_the_wall(f"at {time:.6g} s")
 
     def _switch(self, time: float, width: float, y: FloatArray) -> float:
         """Enters the mode that follows the state at which the last one ended."""
         self._step = None
         self.q, self.v = self._split(y)
         was = self._mode
-        if was is Mode.CREEPING and self._speed(y, time)[0] > 0.5 * self._handover:
+        if was is Mode.CREEPING and self._speed(y)[0] > 0.5 * self._handover:
             self._mode = Mode.SLIDING
             return time
         # The contact point is at rest up to round-off; the ball sticks if it can.

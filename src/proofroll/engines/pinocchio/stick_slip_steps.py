@@ -7,12 +7,10 @@ from typing import Any
 
 import numpy as np
 
-from proofroll.engine import whole_steps
 from proofroll.engines.pinocchio.integrators import FixedStep, RungeKutta4, SemiImplicitEuler
-from proofroll.engines.pinocchio.mechanism import Mechanism
+from proofroll.engines.pinocchio.mechanism import Mechanism, Sliding, left_the_wall
 from proofroll.engines.pinocchio.settings import PinocchioSettings
-from proofroll.engines.pinocchio.stick_slip import excess, held, unit
-from proofroll.errors import Diverged
+from proofroll.engines.pinocchio.stick_slip import excess, unit
 from proofroll.events import Event
 from proofroll.scene import Contact
 from proofroll.surfaces import FloatArray
@@ -23,15 +21,17 @@ class FixedStickSlip(FixedStep):
 
     Attributes:
         events: so far; the time is interpolated, the bracket is the step.
+        mu_static: largest |F|/N while sticking [-].
         sticking: whether the ball sticks now.
     """
 
     def __init__(self, mechanism: Mechanism, settings: PinocchioSettings, contact: Contact) -> None:
         super().__init__(mechanism, settings)
-        self._contact = contact
+        self.mu_static = contact.mu_static
         self.events: list[Event] = []
-        self._excess = excess(mechanism, self._data, self.q, self.v, contact)
+        self._excess, self._normal_force = excess(mechanism, self._data, self.q, self.v, self.mu_static)
         self.sticking = self._excess <= 0
+        self._free = self._without_friction()
         if not self.sticking:
             self.events.append(Event("slip", 0.0, 0.0, 0.0))
 
@@ -42,31 +42,46 @@ class FixedStickSlip(FixedStep):
         direction = self._direction(data, self.q, self.v)
         return self._mechanism.sliding_reaction(data, self.q, self.v, direction)
 
-    def advance(self, start: float, end: float) -> None:
-        """See :class:`~proofroll.engines.pinocchio.integrators.Integrator`."""
-        try:
-            for number in range(whole_steps(start, end, self._dt)):
-                self._advance_one(start + number * self._dt)
-        except np.linalg.LinAlgError as error:
-            raise Diverged(f"the equations became singular between {start:g} s and {end:g} s ({error})") from None
-
     def _advance_one(self, time: float) -> None:
         if not self.sticking:
             self._stick_if_it_can(time)
-        self._step(self._dt)
+        self._step(self._dt, self._acceleration(self.q, self.v))
         if self._settings.projection:
             put_back = self._mechanism.project if self.sticking else self._mechanism.project_sliding
             self.q, self.v = put_back(self._data, self.q, self.v)
         if self.sticking:
-            before, self._excess = self._excess, excess(self._mechanism, self._data, self.q, self.v, self._contact)
-            if self._excess > 0:
-                part = min(max(before / (before - self._excess), 0.0), 1.0) if before < 0 else 0.0
-                self.events.append(Event("slip", time + part * self._dt, time, time + self._dt))
-                self.sticking = False
+            before = self._excess
+            self._excess, normal_force = excess(self._mechanism, self._data, self.q, self.v, self.mu_static)
+            if self._excess <= 0:
+                self._must_press(time + self._dt, normal_force)
+                return
+            part = min(max(before / (before - self._excess), 0.0), 1.0) if before < 0 else 0.0
+            self.events.append(Event("slip", time + part * self._dt, time, time + self._dt))
+            self.sticking = False
+        self._free = self._without_friction()
+        self._must_press(time + self._dt, self._free.normal_force)
+
+    def _without_friction(self) -> Sliding:
+        return self._mechanism.slide(self._data, self.q, self.v, np.zeros(3))
+
+    def _must_press(self, time: float, normal_force: float) -> None:
+        """Remembers N [N]; ends the run if it is gone.
+
+        Raises:
+            Diverged: the ball leaves the wall.
+        """
+        before, self._normal_force = self._normal_force, normal_force
+        if normal_force >= -self._mechanism.faint:
+            return
+        low = max(time - self._dt, 0.0)
+        best = low + (time - low) * before / (before - normal_force) if before > 0 else low
+        best = max([best, *(event.time for event in self.events[-1:])])  # after the slip that comes with it
+        self.events.append(Event("liftoff", best, low, time))
+        raise left_the_wall(f"at {best:.6g} s")
 
     def _stick_if_it_can(self, time: float) -> None:
         """Sticks if friction can bring the contact point to rest within the step and keep it so."""
-        free = held(self._mechanism.slide(self._data, self.q, self.v, np.zeros(3)), time)
+        free = self._free
         along = unit(free.slip + self._dt * free.slip_rate)
         # what friction takes from the slip velocity in a step if it acts along that velocity
         taken = free.slip_rate - self._mechanism.slide(self._data, self.q, self.v, along).slip_rate
@@ -74,7 +89,7 @@ class FixedStickSlip(FixedStep):
         if math.sqrt(ahead @ ahead) > self._dt * math.sqrt(taken @ taken):
             return
         q, v = self._mechanism.project(self._data, self.q, self.v)
-        needed = excess(self._mechanism, self._data, q, v, self._contact)
+        needed, self._normal_force = excess(self._mechanism, self._data, q, v, self.mu_static)
         if needed > 0:
             return
         slowing = math.sqrt((free.slip_rate - taken) @ (free.slip_rate - taken))
