@@ -257,9 +257,11 @@ def onset(
 
         console().print(summary(content), markup=False)
         console().print(onset_table(content))
-    if any(item["verdict"] == "failed" for item in content["engines"]):
+    verdicts = {item["verdict"] for item in content["engines"]}
+    # A refusal is an answer where nobody asked for that engine in particular.
+    if "failed" in verdicts or (engine and "refused" in verdicts):
         raise typer.Exit(ENGINE)
-    raise typer.Exit(CONTRADICTED if any(item["verdict"] == "disagree" for item in content["engines"]) else OK)
+    raise typer.Exit(CONTRADICTED if "disagree" in verdicts else OK)
 
 
 @app.command()

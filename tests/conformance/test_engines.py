@@ -14,6 +14,8 @@ from proofroll.registry import engine_names, load_engine
 # Engine -> pattern of checks -> why they are known to fail.
 KNOWN: Mapping[str, Mapping[str, str]] = {
     "mujoco": {
+        "order_is_as_declared[chart-default]": "at 2e-3 s the fourth-order error of the soft contact hides the "
+        "second-order one of the resistance torque",
         "order_is_as_declared[facets-*]": "each edge between two facets is a kick, at another moment for every step",
     },
 }

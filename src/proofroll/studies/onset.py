@@ -11,7 +11,7 @@ from proofroll.case import Case, EngineFacts, Result, Status
 from proofroll.errors import InputError, ProofrollError
 from proofroll.events import Event, events_of
 from proofroll.registry import engine_names, parse_engine
-from proofroll.runner import Runner, describe, resolve
+from proofroll.runner import Runner, WorkerDied, describe, resolve
 from proofroll.scene import Capability, Scene
 from proofroll.scene_file import load_scene
 from proofroll.trajectory import read
@@ -135,7 +135,8 @@ def onset_study(
     rows = []
     for name, found, case in zip(names, facts, cases, strict=True):
         if case is None or not isinstance(found, EngineFacts):
-            rows.append(EngineOnset(name, None, Result(Status.MISSING, str(found)), None, "failed"))
+            status = found.status if isinstance(found, WorkerDied) else Status.MISSING
+            rows.append(EngineOnset(name, None, Result(status, str(found)), None, "failed"))
             continue
         result = results[case.key]
         first = None

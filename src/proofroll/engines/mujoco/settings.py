@@ -78,12 +78,14 @@ class MujocoSettings:
 
     @property
     def order(self) -> int | None:
-        """Measured; with a time constant that does not shrink with the step the limit is not the rolling ball.
+        """Measured, and the least of all scenes; a time constant that does not shrink has another limit.
 
-        Such a contact is a smooth spring, which an integrator follows at its own order: 4 for RK4.
+        Such a contact is a smooth spring, which RK4 follows at its own order of 4. Rolling resistance takes that down
+        to 2, for its torque uses a normal force that is extrapolated linearly in time. The same holds of the chart's
+        other contacts and of J̇v.
         """
-        if self.time_constant is None:
-            return 4 if self.integrator == "RK4" else 1
+        if self.time_constant is None and self.integrator != "RK4":
+            return 1
         return 2 if self.curvature or self.formulation == "chart" else 1
 
 
