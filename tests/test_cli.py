@@ -90,6 +90,8 @@ BAD = {
     "NaN for the end": (with_option("--until", "nan"), 2, ["until = nan", "finite"]),
     "no interval": (with_option("--every", "0"), 2, ["every = 0", "positive"]),
     "no time limit": (with_option("--time-limit", "0"), 2, ["time_limit = 0", "positive"]),
+    "endless time limit": (with_option("--time-limit", "inf"), 2, ["time_limit = inf", "finite"]),
+    "NaN for the time limit": (with_option("--time-limit", "nan"), 2, ["time_limit = nan", "finite"]),
     "output in a file": (with_option("--out", "/dev/null/run.nc"), 2, ["/dev/null", "cannot be written"]),
     "output is a folder": (with_option("--out", "/tmp"), 2, ["--out = '/tmp'", "folder"]),
     "unknown option": ([*RUN, "--colour", "red"], 2, ["--colour"]),
@@ -274,6 +276,135 @@ def test_compare_restricted_to_an_engine(proofroll: Proofroll, tmp_path: Path) -
     assert "claim compares oracle" in err
 
 
+# The paper's case, and one that slips early, in an engine that locates its events.
+PAPER = ["--set", "rolling_resistance=5e-4", "--set", "mu_static=0.35"]
+EARLY = ["onset", "sphere_in_cylinder", "--set", "mu_static=0.12", "--until", "0.2"]
+LOCATING = "projection[formulation=rotating_frame]"
+
+
+def test_run_lists_events(proofroll: Proofroll) -> None:
+    """With bounded friction ``run --json`` lists each slip and stick with its time and its bracket."""
+    code, out, err = proofroll(
+        "run", "sphere_in_cylinder", "--engine", LOCATING, *PAPER, "--until", "2.1", "--every", "0.05", "--json"
+    )
+    assert (code, err) == (0, "")
+    events = json.loads(out)["events"]
+    assert [set(event) for event in events] == [{"kind", "time", "time_low", "time_high"}] * 2
+    assert [event["kind"] for event in events] == ["slip", "stick"]
+    for event, expected in zip(events, (1.720183172, 2.00812799), strict=True):
+        assert event["time"] == pytest.approx(expected, abs=1e-8)
+        assert event["time_low"] <= event["time"] <= event["time_high"] < event["time_low"] + 1e-9
+
+
+@pytest.mark.parametrize(
+    ("engine", "code", "verdict", "status"),
+    [
+        (LOCATING, 0, "agree", "done"),
+        ("broken[formulation=hidden_inertia]", 1, "disagree", "done"),
+        ("refuses", 3, "refused", "refused"),
+        ("absent", 3, "failed", "missing"),
+    ],
+)
+def test_onset(proofroll: Proofroll, tmp_path: Path, engine: str, code: int, verdict: str, status: str) -> None:
+    """An engine that slips with the truth ends with 0, one that does not with 1, one asked for in vain with 3."""
+    found, out, err = proofroll(*EARLY, "--engine", engine, "--out", str(tmp_path), "--json")
+    assert found == code, err
+    assert "Traceback" not in err
+    document = json.loads(out)
+    assert set(document) >= {"scene", "parameters", "until", "truth", "engines"}
+    assert set(document["truth"]) >= {
+        "time", "by_mu", "by_f", "edge_below", "edge_above", "distance", "uncertainty", "verdict", "earliest", "latest",
+    }  # fmt: skip
+    assert document["truth"]["time"] == pytest.approx(0.14413074, abs=1e-8)
+    (row,) = document["engines"]
+    assert set(row) >= {"engine", "name", "settings", "status", "message", "onset", "difference", "verdict"}
+    assert (row["engine"], row["verdict"], row["status"]) == (engine, verdict, status)
+    assert (row["onset"] is not None) == (status == "done")
+    if code == 0:
+        assert set(row["onset"]) == {"kind", "time", "time_low", "time_high"}
+        assert abs(row["difference"]) < 1e-9
+
+
+def test_onset_where_nobody_was_asked_for(
+    proofroll: Proofroll, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Among engines that were not asked for by name a refusal is an answer; what a person reads fits 100 columns."""
+    monkeypatch.setattr("proofroll.studies.onset.default_engines", lambda: ["refuses"])
+    code, out, err = proofroll(*EARLY, "--out", str(tmp_path))
+    assert code == 0, err
+    assert "first slips at 0.144130" in out
+    assert "refused" in out
+    assert max(map(len, out.splitlines())) <= 100
+
+
+@pytest.mark.parametrize(
+    ("settings", "words"),
+    [
+        ([], ["mu_static", "never slips", "--set mu_static="]),
+        (["mu_static=inf"], ["mu_static", "never slips", "--set mu_static="]),
+        (["mu_static=-1"], ["mu_static = -1", "at least 0"]),
+        (["mu_static=0.3", "mu_kinetic=0.4"], ["mu_kinetic = 0.4", "at most mu_static = 0.3"]),
+        (["mu_static=nan"], ["mu_static = 'nan'", "finite"]),
+    ],
+    ids=["unbounded", "infinite", "negative", "kinetic above static", "NaN"],
+)
+def test_onset_of_friction_that_makes_no_sense(
+    proofroll: Proofroll, tmp_path: Path, settings: list[str], words: list[str]
+) -> None:
+    """Friction without a bound, or with one that makes no sense, gives one line and the exit code of wrong usage."""
+    given = [word for setting in settings for word in ("--set", setting)]
+    code, out, err = proofroll("onset", "sphere_in_cylinder", *given, "--out", str(tmp_path), "--json")
+    assert (code, out) == (2, "")
+    for word in words:
+        assert word in err
+    assert "Traceback" not in err
+    assert err.startswith("proofroll: ")
+    assert err.count("\n") == 1
+
+
+MAP = """
+[regimes]
+until = 0.5
+rolling_resistance = [0.0]
+speed = { low = 2, high = 6, count = 3 }
+mu_static = { low = 0.05, high = 0.8, count = 3 }
+"""
+
+
+def test_regimes(proofroll: Proofroll, tmp_path: Path) -> None:
+    """A map of 3 x 3 runs is printed as one JSON document, the same that is written beside the picture."""
+    (tmp_path / "claim.toml").write_text(COMPARISON.replace("ENGINE", "oracle") + MAP)
+    arguments = ["regimes", str(tmp_path / "claim.toml"), "--out", str(tmp_path / "out"), "--jobs", "1"]
+    code, out, err = proofroll(*arguments, "--json")
+    assert code == 0, err
+    document = json.loads(out)
+    assert set(document) == {"maps", "regimes"}
+    (found,) = document["maps"]
+    assert set(found) >= {
+        "rolling_resistance", "until", "runs", "counts", "outside_boundaries", "speed", "mu_static", "regime",
+        "first_slip",
+    }  # fmt: skip
+    assert (found["rolling_resistance"], found["until"], found["runs"], found["outside_boundaries"]) == (0, 0.5, 9, 0)
+    assert found["counts"] == {"never slips": 4, "slips and recovers": 1, "falls": 4}
+    assert (found["speed"], found["mu_static"]) == ([2, 4, 6], pytest.approx([0.05, 0.425, 0.8]))
+    assert [found["first_slip"][i][j] is None for i in range(3) for j in range(3)] == [
+        document["regimes"][str(found["regime"][i][j])] == "never slips" for i in range(3) for j in range(3)
+    ]
+    assert json.loads((tmp_path / "out" / "regimes.json").read_text()) == document
+    assert "<svg" in (tmp_path / "out" / "regimes.svg").read_text()[:2000]
+
+
+def test_regimes_of_a_file_without_a_map(proofroll: Proofroll, tmp_path: Path) -> None:
+    """A comparison that has no table of regimes gives one line that says to add one."""
+    (tmp_path / "claim.toml").write_text(COMPARISON.replace("ENGINE", "oracle"))
+    code, out, err = proofroll("regimes", str(tmp_path / "claim.toml"), "--out", str(tmp_path / "out"), "--json")
+    assert (code, out) == (2, "")
+    assert "claim: regimes" in err
+    assert "[regimes]" in err
+    assert err.startswith("proofroll: ")
+    assert err.count("\n") == 1
+
+
 def fresh(code: str) -> dict[str, Any]:
     """Modules that are loaded after some code ran in a new interpreter, and its exit code."""
     script = (
@@ -300,7 +431,7 @@ def test_help_and_version(proofroll: Proofroll) -> None:
     """Help names every command; the version is that of the package; no command at all is wrong usage with help."""
     code, out, _ = proofroll("--help")
     assert code == 0
-    for command in ("scenes", "engines", "run", "compare", "report"):
+    for command in ("scenes", "engines", "run", "compare", "report", "onset", "regimes"):
         assert command in out
     assert proofroll("--version") == (0, "proofroll 0.1.0\n", "")
     assert proofroll()[0] == 2

@@ -11,6 +11,9 @@ from pathlib import Path
 
 import pytest
 
+from proofroll.agreement import Verdict
+from proofroll.comparison_file import load_comparison
+
 ROOT = Path(__file__).resolve().parents[1]
 PROOFROLL = str(Path(sys.executable).with_name("proofroll"))
 
@@ -64,6 +67,24 @@ def test_an_entry_point_is_valid_toml(name: str) -> None:
     for block in found:
         text = "\n".join(line.strip() for line in block.splitlines())
         assert tomllib.loads(text)["project"]["entry-points"]["proofroll.engines"]
+
+
+@pytest.mark.parametrize("name", ["docs/picture.svg", "docs/regimes.svg"])
+def test_a_picture_is_there(name: str) -> None:
+    """Every picture that the README shows is there, and is a picture."""
+    assert f"]({name})" in (ROOT / "README.md").read_text(encoding="utf-8")
+    path = ROOT / name
+    assert path.is_file()
+    assert "<svg" in path.read_text(encoding="utf-8")[:2000]
+
+
+def test_the_verdict_table_is_whole() -> None:
+    """The table of the README has one line for each row of the paper's comparison, each with a verdict."""
+    text = (ROOT / "README.md").read_text(encoding="utf-8")
+    table = text.partition("<!-- verdicts:begin -->\n")[2].partition("<!-- verdicts:end -->")[0].splitlines()
+    lines = table[2:]  # below the head and its rule
+    assert len(lines) == len(load_comparison("paper").rows)
+    assert [line for line in lines if not any(f" {verdict} |" in line for verdict in Verdict)] == []
 
 
 @pytest.mark.parametrize("name", ["README.md", "CONTRIBUTING.md"])

@@ -89,7 +89,7 @@ class Result:
         message: one sentence about it.
         wall_seconds: inside ``advance`` during the sampled run [s].
         seconds_per_second: median wall seconds per simulated second of clean runs that only advance, or None.
-        timings: the single clean runs [s].
+        timings: of the single clean runs, wall seconds per simulated second.
         certificate: lines of the certificate, as dictionaries.
         versions: of the engine, of proofroll and of Python.
         trajectory: file of the trajectory in the store, or None if there is none.

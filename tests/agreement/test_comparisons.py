@@ -7,7 +7,8 @@ from pathlib import Path
 
 import pytest
 
-from proofroll.comparison import Comparison, Row
+from proofroll.agreement import Verdict
+from proofroll.comparison import Comparison, Edge, Row
 from proofroll.comparison_file import comparison_names, load_comparison
 from proofroll.registry import engine_names, load_engine, parse_engine, resolve_settings
 from proofroll.runner import Runner
@@ -41,6 +42,34 @@ def test_row_is_as_the_comparison_expects(comparison: Comparison, row: Row, stor
 
     assert outcome.contradictions == []
     assert outcome.lost == []
+
+
+# Observables that hang on when slip begins.
+EVENTS = {"first_slip", "event_times", "event_order"}
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize(
+    "engine",
+    ["projection[formulation=rotating_frame]", "exudyn[formulation=generic]", "mujoco[formulation=chart,preset=tuned]"],
+)
+def test_row_at_the_special_points(engine: str, store: Store) -> None:
+    """Claims hold with kinetic friction below static, and at a stair edge, where the time of slip is not judged."""
+    comparison = load_comparison("stick_slip")
+    (row,) = (row for row in comparison.rows if row.engine == engine)
+    special = [point for point in comparison.points if "mu_kinetic" in point or isinstance(point["mu_static"], Edge)]
+
+    outcome = compare(dataclasses.replace(comparison, rows=[row], vary={}, points=special), Runner(store, jobs=1))
+
+    assert outcome.contradictions == []
+    assert outcome.lost == []
+    kinetic, edge = outcome.runs
+    assert kinetic.parameters["mu_kinetic"] < kinetic.parameters["mu_static"]
+    assert Verdict.ILL_POSED not in {judgement.verdict for judgement in kinetic.judgements}
+    assert edge.parameters["mu_static"] == 0.391459
+    verdicts = {judgement.observable: judgement.verdict for judgement in edge.judgements}
+    assert {verdicts[name] for name in EVENTS} == {Verdict.ILL_POSED}
+    assert verdicts["energy_balance"] is Verdict.AGREES
 
 
 # Formulation and preset -> why the paper's comparison leaves them out.

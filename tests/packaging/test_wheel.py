@@ -50,7 +50,7 @@ def python(installed: Path, folder: Path, *arguments: str) -> subprocess.Complet
 
 
 def test_contents(wheel: Path) -> None:
-    """The wheel holds the package, its models, comparisons and license, and no tests."""
+    """The wheel holds the package, its models, comparisons, templates and license, and no tests."""
     with zipfile.ZipFile(wheel) as archive:
         names = archive.namelist()
     for name in (
@@ -64,7 +64,9 @@ def test_contents(wheel: Path) -> None:
     claims = {path.relative_to(REPOSITORY).as_posix() for path in (REPOSITORY / "comparisons").glob("*.toml")}
     assert claims
     assert {f"proofroll/{name}" for name in models | claims} <= set(names)
-    pages = {path.relative_to(REPOSITORY / "src").as_posix() for path in (REPOSITORY / "src").rglob("*.j2")}
+    templates = REPOSITORY / "src" / "proofroll" / "report" / "templates"
+    pages = {path.relative_to(REPOSITORY / "src").as_posix() for path in templates.rglob("*") if path.is_file()}
+    assert pages
     assert pages <= set(names)
     assert any(name.endswith("LICENSE") for name in names)
     assert not any(name.startswith(("tests/", "proofroll/tests/")) for name in names)

@@ -133,6 +133,18 @@ class Hangs(Oracle):
         time.sleep(600)
 
 
+class HangsAloud(Hangs):
+    """Hangs, and tells its process's id to the named pipe of the environment, which that process then keeps open."""
+
+    name = "hangs_aloud"
+
+    def advance(self, t: float) -> None:
+        """See :class:`proofroll.engine.Engine`."""
+        self.pipe = os.open(os.environ["HANGS_ALOUD"], os.O_WRONLY)
+        os.write(self.pipe, f"{os.getpid()}\n".encode())
+        super().advance(t)
+
+
 class Raises(Oracle):
     """Raises something over two lines."""
 
@@ -191,5 +203,18 @@ class Refuses(Oracle):
 # Entry points of all of them; "absent" needs a module that nobody has.
 ENTRY_POINTS = {
     kind.name: f"hostile:{kind.__name__}"
-    for kind in (Oracle, Garbage, Exits, Moody, Segfaults, Hangs, Raises, SaysExit, NotANumber, GivesUp, Refuses)
+    for kind in (
+        Oracle,
+        Garbage,
+        Exits,
+        Moody,
+        Segfaults,
+        Hangs,
+        HangsAloud,
+        Raises,
+        SaysExit,
+        NotANumber,
+        GivesUp,
+        Refuses,
+    )
 } | {"absent": "no_such_module_anywhere:Engine", "misspelt": "hostile:NoSuchClass"}

@@ -8,7 +8,7 @@ import pytest
 
 from proofroll.certificate import EXACT, Line, certify, first_difference
 from proofroll.engine import Built, Regularised, Sample
-from proofroll.mechanics import initial_response
+from proofroll.mechanics import initial_angular_acceleration, initial_response, natural_acceleration
 from proofroll.scene import Scene
 from proofroll.scene_file import load_scene
 
@@ -119,3 +119,59 @@ def test_the_sentence_names_the_first_difference() -> None:
         "the engine's model differs from the scene: gravity is 0, 0, -9.8 instead of 0, 0, -9.81 m/s^2 "
         "(relative difference 0.001, allowed 1e-12)"
     )
+
+
+SLIPPING = load_scene("sphere_in_cylinder", rolling_resistance=5e-4, mu_static=0.35, mu_kinetic=0.25)
+FRICTION: dict[str, Any] = {
+    "mu_static": 0.35,
+    "mu_kinetic": 0.25,
+    "angular_acceleration": initial_angular_acceleration(SLIPPING.rolling),
+}
+
+
+def test_friction_and_angular_acceleration_are_certified() -> None:
+    """An engine that built the scene's friction and resistance passes, and each has its line."""
+    lines = certify(Stub(SLIPPING, **FRICTION), SLIPPING)
+    assert first_difference(lines) is None
+    named = {line.quantity for line in lines}
+    assert {"rolling resistance", "static friction", "kinetic friction", "angular acceleration"} <= named
+
+
+@pytest.mark.parametrize(
+    ("quantity", "built"),
+    [
+        ("static friction", {"mu_static": None}),
+        ("kinetic friction", {"mu_kinetic": None}),
+        ("rolling resistance", {"rolling_resistance": None}),
+        ("static friction", {"mu_static": 0.35 * (1 + PART)}),
+        ("static friction", {"mu_static": np.inf}),
+        ("kinetic friction", {"mu_kinetic": 0.35}),
+        ("rolling resistance", {"rolling_resistance": 0.0}),
+        (
+            "angular acceleration",
+            {
+                "angular_acceleration": FRICTION["angular_acceleration"]
+                + [0, 0, PART * natural_acceleration(SLIPPING.rolling) / 0.025]
+            },
+        ),
+        ("angular acceleration", {"angular_acceleration": -FRICTION["angular_acceleration"]}),
+    ],
+)
+def test_friction_and_resistance_are_watched(quantity: str, built: dict[str, Any]) -> None:
+    """What the scene requires and the engine does not read back, or reads back otherwise, fails in one sentence."""
+    lines = certify(Stub(SLIPPING, **(FRICTION | built)), SLIPPING)
+    assert [line.quantity for line in lines if not line.holds] == [quantity]
+    sentence = first_difference(lines)
+    assert sentence is not None
+    assert sentence.startswith(f"the engine's model differs from the scene: {quantity} is ")
+    assert "\n" not in sentence
+
+
+def test_friction_that_the_scene_does_not_bound() -> None:
+    """Where the scene has no bound, an engine without one passes, and one with a number of its own does not."""
+    scene = load_scene("sphere_in_cylinder")
+    assert first_difference(certify(Stub(scene, mu_static=np.inf, mu_kinetic=np.inf), scene)) is None
+    for mu in (0.0, 1.0, 1e9):
+        sentence = first_difference(certify(Stub(scene, mu_static=mu), scene))
+        assert sentence is not None
+        assert "1 / static friction" in sentence

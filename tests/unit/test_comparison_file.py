@@ -43,6 +43,20 @@ limit = { z = "3e-5 m" }
 bound = { F3 = "2 %" }
 """
 
+# Lines of the two rows after which something is added.
+FIRST, SOFT = 'tolerance = "tight"', 'because = "the contact is soft"'
+
+
+def excepted(where: str, expect: str, after: str = SOFT) -> str:
+    """A line of a row, and an exception to what the row expects."""
+    return f"{after}\nexcept_at = [{{ where = {{ {where} }}, expect = {expect} }}]"
+
+
+def regimes(until: str) -> str:
+    """The table of a map of four runs."""
+    axis = "{ low = 1, high = 2, count = 2 }"
+    return f"[regimes]\nuntil = {until}\nrolling_resistance = [0]\nspeed = {axis}\nmu_static = {axis}"
+
 
 @pytest.fixture
 def load(tmp_path: Path) -> Callable[..., Comparison]:
@@ -77,6 +91,42 @@ def test_expected_verdicts(load: Callable[..., Comparison]) -> None:
     free = load().rows[1]
     assert free.expect == [Verdict.CONVERGES]
     assert free.expect_for == {"N": [Verdict.AGREES, Verdict.CONVERGES], "F2": [Verdict.DIFFERS]}
+
+
+def test_exceptions_override(load: Callable[..., Comparison]) -> None:
+    """At a point of an exception its verdicts are expected, the first one's that fits; elsewhere the row's."""
+    first = '{ where = { speed = [2] }, expect = "agrees" }'
+    second = '{ where = { speed = [2, 4] }, expect = "differs" }'
+    free = load(SOFT, f"{SOFT}\nexcept_at = [{first}, {second}]").rows[1]
+    assert free.expected({"speed": 2.0, "rolling_resistance": 0.0}) == [Verdict.AGREES]
+    assert free.expected({"speed": 4.0, "rolling_resistance": 5e-4}) == [Verdict.DIFFERS]
+    assert free.expected({"speed": 6.0, "rolling_resistance": 0.0}) == [Verdict.CONVERGES]
+
+
+def test_an_exception_needs_every_parameter_to_fit(load: Callable[..., Comparison]) -> None:
+    """An exception for two parameters holds only where both have a value of its lists."""
+    free = load(SOFT, excepted("speed = [4], rolling_resistance = [0.0]", '["differs", "failed"]')).rows[1]
+    assert free.expected({"speed": 4.0, "rolling_resistance": 0.0}) == [Verdict.DIFFERS, Verdict.FAILED]
+    assert free.expected({"speed": 4.0, "rolling_resistance": 5e-4}) == [Verdict.CONVERGES]
+
+
+def test_a_row_that_fits_no_point(tmp_path: Path) -> None:
+    """A row whose values all exist, but at no point together, would never be run, and is refused."""
+    points = "[[points]]\nspeed = 4\nrolling_resistance = 0.0\n\n[[points]]\nspeed = 2\nrolling_resistance = 5e-4\n"
+    text = TEXT.replace("[vary]\nspeed = [2, 4]\nrolling_resistance = [0.0, 5e-4]\n", points)
+    path = tmp_path / "claim.toml"
+    path.write_text(text)
+    assert len(load_comparison(str(path)).variations(load_comparison(str(path)).rows[1])) == 1
+    path.write_text(text.replace("only = { speed = [4] }", "only = { speed = [4], rolling_resistance = [5e-4] }"))
+    with pytest.raises(InputError, match=r"rows\.1\.only.*no point of the comparison fits"):
+        load_comparison(str(path))
+
+
+def test_a_map(load: Callable[..., Comparison]) -> None:
+    """A table of regimes is read with its axes, and says how many runs it takes."""
+    found = load("[tolerances.tight]", f"{regimes('4')}\n[tolerances.tight]").regimes
+    assert found is not None
+    assert (found.until, found.rolling_resistance, found.count) == (4.0, [0.0], 4)
 
 
 def test_variations(load: Callable[..., Comparison]) -> None:
@@ -136,6 +186,28 @@ def test_tolerances_of_another_form(text: object) -> None:
         ('limit = { z = "3e-5 m" }', "limit = 3e-5", ["rows.1.limit"]),
         ('expect_for = { N = ["agrees", "converges"], F2 = "differs" }', "expect_for = 3", ["rows.1.expect_for"]),
         ("[tolerances.tight]", "[tolerances]\nloose = 3\n[tolerances.tight]", ["tolerances.loose"]),
+        ('expect = "converges"', 'expect = ["agrees", "differs"]', ["rows.1.expect", "agrees or differs", "except_at"]),
+        ('F2 = "differs"', 'F2 = ["differs", "agrees"]', ["rows.1.expect", "differs or agrees", "except_at"]),
+        (SOFT, excepted("speed = [4]", '["agrees", "differs"]'), ["rows.1.expect", "agrees or differs", "any engine"]),
+        (SOFT, excepted("sped = [4]", '"differs"'), ["rows.1.except_at.sped", "varies speed, rolling_resistance"]),
+        (SOFT, excepted("speed = [5]", '"differs"'), ["rows.1.except_at.speed = 5", "has only 2, 4"]),
+        (SOFT, excepted("speed = 4", '"differs"'), ["rows.1.except_at.0.where.speed", "list"]),
+        (SOFT, excepted("speed = [4]", '"maybe"'), ["rows.1.except_at.0.expect", "maybe", "'converges'"]),
+        (SOFT, f"{SOFT}\nexcept_at = [3]", ["rows.1.except_at.0 = 3"]),
+        (SOFT, f"{SOFT}\nexcept_at = 3", ["rows.1.except_at = 3"]),
+        (SOFT, f"{SOFT}\nexcept_at = [{{ where = {{ speed = [4] }} }}]", ["rows.1.except_at.0.expect", "required"]),
+        (FIRST, excepted("speed = [4]", '"differs"', FIRST), ["rows.0.because", "needs its reason"]),
+        ('z = "1e-10 m"', 'z = "1e-10 mm"', ["tolerances.tight: z = 'mm'", "its unit is m"]),
+        ('N = "0.1 %"', 'gamma = "5e-3 m"', ["tolerances.tight: gamma = 'm'", "its unit is rad"]),
+        ('limit = { z = "3e-5 m" }', 'limit = { z = "3e-5 s" }', ["rows.1: z = 's'", "its unit is m"]),
+        ('bound = { F3 = "2 %" }', 'bound = { F3 = "2 kN" }', ["rows.1: F3 = 'kN'", "its unit is N"]),
+        ('N = "0.1 %"', 'first_slip = "1 %"', ["tolerances.tight: first_slip = '%'", "no size of its own", "in s"]),
+        ('bound = { F3 = "2 %" }', 'bound = { event_times = "2 %" }', ["rows.1: event_times = '%'", "in s"]),
+        ("speed = [2, 4]", "speed = []", ["rows.0.only", "no point"]),
+        ("every = 0.01", "every = 0.01\ntime_limit = -1", ["time_limit = -1", "positive, finite time in s"]),
+        ("every = 0.01", "every = 0.01\ntime_limit = inf", ["time_limit = inf", "positive, finite time in s"]),
+        ("[tolerances.tight]", f"{regimes('-4')}\n[tolerances.tight]", ["regimes.until = -4", "positive, finite time"]),
+        ("[tolerances.tight]", f"{regimes('nan')}\n[tolerances.tight]", ["regimes.until = nan", "positive, finite"]),
     ],
 )  # fmt: skip
 def test_broken_comparisons(load: Callable[..., Comparison], old: str, new: str, words: list[str]) -> None:

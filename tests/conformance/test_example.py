@@ -1,0 +1,71 @@
+"""The example that an engine's author starts from keeps every promise that is made of it."""
+
+from __future__ import annotations
+
+import importlib.util
+import os
+import sys
+from collections.abc import Callable, Mapping
+from pathlib import Path
+from types import ModuleType
+
+import pytest
+
+from proofroll.case import Status
+from proofroll.conformance import Check, checks
+from proofroll.runner import Runner
+from proofroll.store import Store
+from proofroll.studies.single import single_case
+
+EXAMPLE = Path(__file__).resolve().parents[2] / "docs" / "examples" / "semi_implicit.py"
+
+
+def example() -> ModuleType:
+    """The example's module, imported from its path, as its entry point will find it."""
+    spec = importlib.util.spec_from_file_location(EXAMPLE.stem, EXAMPLE)
+    assert spec is not None
+    assert spec.loader is not None
+    module = importlib.util.module_from_spec(spec)
+    sys.modules[EXAMPLE.stem] = module
+    spec.loader.exec_module(module)
+    return module
+
+
+SEMI_IMPLICIT = example().SemiImplicit
+
+
+@pytest.fixture(autouse=True)
+def example_is_installed(install_engines: Callable[[Mapping[str, str]], None], monkeypatch: pytest.MonkeyPatch) -> None:
+    """The example as an installed package, to this process and to its workers."""
+    install_engines({"semi_implicit": "semi_implicit:SemiImplicit"})
+    monkeypatch.setenv("PYTHONPATH", os.pathsep.join([str(EXAMPLE.parent), os.environ["PYTHONPATH"]]))
+
+
+def test_the_example_is_short() -> None:
+    """The example has at most 60 lines."""
+    assert len(EXAMPLE.read_text(encoding="utf-8").splitlines()) <= 60
+
+
+def test_the_example_is_checked_on_both_scenes() -> None:
+    """The checks build the example on the cylinder and on the plane, and none of them is excused."""
+    names = [check.name for check in checks(SEMI_IMPLICIT)]
+    for scene in ("cylinder", "cylinder-resisting", "plane", "plane-resisting"):
+        assert f"certificate_holds[newton_euler-default-{scene}]" in names
+
+
+@pytest.mark.parametrize("check", checks(SEMI_IMPLICIT))
+def test_the_example_conforms(check: Check) -> None:
+    """The example keeps a promise of the protocol."""
+    check()
+
+
+def test_the_example_runs(tmp_path: Path) -> None:
+    """Both scenes run in the example from a worker process, past the certificate and to the end."""
+    cases = [
+        single_case(scene, {"rolling_resistance": 5e-4}, "semi_implicit", until=0.1, every=0.05, time_limit=60.0)
+        for scene in ("sphere_in_cylinder", "inclined_plane")
+    ]
+    results = Runner(Store(tmp_path), jobs=1).run(cases)
+    for case in cases:
+        assert (results[case.key].status, results[case.key].message) == (Status.DONE, "reached 0.1 s")
+        assert results[case.key].certificate

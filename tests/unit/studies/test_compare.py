@@ -1,0 +1,211 @@
+"""What a comparison makes of results: claims about nothing, exceptions, ill-posed questions, missing truths."""
+
+from __future__ import annotations
+
+import dataclasses
+import json
+from collections.abc import Callable, Mapping
+from pathlib import Path
+
+import pytest
+import xarray as xr
+from hostile import ENTRY_POINTS
+
+from proofroll.agreement import Verdict
+from proofroll.case import Case, EngineFacts, Result, Status
+from proofroll.comparison import Band, Comparison, ExceptAt, Row, Tolerance
+from proofroll.recording import time_grid
+from proofroll.runner import Runner
+from proofroll.scene import Capability, Scene
+from proofroll.scene_file import load_scene
+from proofroll.simulation import simulate
+from proofroll.store import Store
+from proofroll.studies.compare import Outcome, Plan, Planned, compare, evaluate, point_name
+from proofroll.trajectory import write
+from proofroll.truth import truth
+from proofroll.truth.onset import onset
+
+FACTS = EngineFacts("alpha", "1", "code", {"dt": 1e-3}, "dt", 2)
+TRUTH = EngineFacts("truth", "1", "code", {})
+ROW = Row("alpha", "tight", ladder=[1.0])
+TIGHT = {"gamma": Tolerance(1e-9, False, "rad"), "z": Tolerance(1e-9, False, "m")}
+
+Answer = Callable[[Scene, xr.Dataset], xr.Dataset | Result]
+
+
+def claim(rows: list[Row], speeds: list[float], bounds: Mapping[str, Tolerance] | None = None) -> Comparison:
+    """A comparison at some speeds."""
+    band = Band("the engine gives the truth", dict(bounds or TIGHT))
+    vary = {"speed": speeds}
+    comparison = Comparison("claim", "A claim", "Does it hold?", "sphere_in_cylinder", 0.4, 0.02, vary=vary)
+    return dataclasses.replace(comparison, bands={"tight": band}, rows=rows)
+
+
+def judged(folder: Path, comparison: Comparison, answer: Answer, true: Mapping[float, Result] | None = None) -> Outcome:
+    """The outcome where every row's engine gives what ``answer`` makes of the truth; ``true``: speeds without one."""
+    store, results = Store(folder), dict[str, Result]()
+    runs, truths = list[Planned](), dict[str, Case]()
+
+    def put(case: Case, given: xr.Dataset | Result) -> Case:
+        if isinstance(given, xr.Dataset):
+            write(given, store.trajectory(case))
+            given = Result(Status.DONE, "reached the end", trajectory=store.trajectory(case).name)
+        results[case.key] = given
+        return case
+
+    for row in comparison.rows:
+        for point in comparison.variations(row):
+            scene = load_scene(comparison.scene, **point)
+            dataset = truth(scene, time_grid(comparison.until, comparison.every))
+            if Capability.BOUNDED_FRICTION in scene.requires:
+                dataset.attrs["onset"] = json.dumps(dataclasses.asdict(onset(scene, comparison.until)))
+            facts = dataclasses.replace(FACTS, name=row.engine)
+            given = (comparison.scene, point, scene.digest)
+            truths[point_name(point)] = put(
+                Case(*given, TRUTH, comparison.until, comparison.every), (true or {}).get(point["speed"], dataset)
+            )
+            own = put(Case(*given, facts, comparison.until, comparison.every), answer(scene, dataset))
+            runs.append(Planned(row, point, facts, {1.0: own}))
+    return evaluate(Plan(comparison, truths, runs), results, Runner(store, jobs=1))
+
+
+def the_truth(_: Scene, dataset: xr.Dataset) -> xr.Dataset:
+    """An engine without error."""
+    return dataset
+
+
+def off(_: Scene, dataset: xr.Dataset) -> xr.Dataset:
+    """An engine whose ball is a millimetre too high."""
+    return dataset.assign(z=dataset["z"] + 1e-3)
+
+
+def test_a_claim_that_holds(tmp_path: Path) -> None:
+    """An engine that gives the truth contradicts nothing, and one that is off contradicts once, by its observable."""
+    assert judged(tmp_path / "right", claim([ROW], [4.0]), the_truth).contradictions == []
+    (said,) = judged(tmp_path / "wrong", claim([ROW], [4.0]), off).contradictions
+    assert said.startswith("alpha at speed=4 differs, expected: agrees (z differs, error 0.001 m")
+
+
+@pytest.mark.parametrize(
+    ("row", "bounds"),
+    [
+        (ROW, TIGHT | {"first_slip": Tolerance(1e-3, False, "s")}),
+        (dataclasses.replace(ROW, bound={"first_slip": Tolerance(1e-3, False, "s")}), TIGHT),
+        (dataclasses.replace(ROW, limit={"first_slip": Tolerance(1e-3, False, "s")}), TIGHT),
+        (dataclasses.replace(ROW, order={"first_slip": (1.0, 2.0)}), TIGHT),
+        (dataclasses.replace(ROW, expect_for={"first_slip": [Verdict.AGREES]}), TIGHT),
+    ],
+    ids=["tolerance", "bound", "limit", "order", "expect_for"],
+)
+def test_a_claim_about_what_is_not_reported(tmp_path: Path, row: Row, bounds: Mapping[str, Tolerance]) -> None:
+    """A claim about an observable that the run does not give is a contradiction, wherever the claim stands."""
+    (said,) = judged(tmp_path, claim([row], [4.0], bounds), the_truth).contradictions
+    assert said == "alpha at speed=4: first_slip is not reported, though claim makes a claim about it"
+
+
+def test_exceptions_decide(tmp_path: Path) -> None:
+    """At the point of an exception its verdict is expected and no other, elsewhere the row's."""
+    differs = ExceptAt({"speed": [4.0]}, [Verdict.DIFFERS])
+    row = dataclasses.replace(ROW, except_at=[differs])
+    right = judged(tmp_path / "right", claim([row], [3.0, 4.0]), the_truth)
+    wrong = judged(tmp_path / "wrong", claim([row], [3.0, 4.0]), off)
+    assert [said.partition(" (")[0] for said in right.contradictions] == ["alpha at speed=4 agrees, expected: differs"]
+    assert [said.partition(" (")[0] for said in wrong.contradictions] == ["alpha at speed=3 differs, expected: agrees"]
+
+
+def test_an_exception_may_expect_a_failure(tmp_path: Path) -> None:
+    """A run that is expected to fail is neither lost nor a contradiction; the same elsewhere is both."""
+
+    def crash(*_: object) -> Result:
+        return Result(Status.CRASHED, "no licence")
+
+    row = dataclasses.replace(ROW, except_at=[ExceptAt({"speed": [4.0]}, [Verdict.FAILED])])
+    outcome = judged(tmp_path, claim([row], [3.0, 4.0]), crash)
+    assert outcome.contradictions == ["alpha at speed=3 crashed: no licence"]
+    assert [run.parameters for run in outcome.lost] == [{"speed": 3.0}]
+    assert [run.verdict for run in outcome.runs] == [Verdict.FAILED] * 2
+
+
+def test_a_failure_that_was_expected_and_does_not_come(tmp_path: Path) -> None:
+    """An engine that runs where a failure is expected contradicts the claim."""
+    row = dataclasses.replace(ROW, expect=[Verdict.FAILED])
+    (said,) = judged(tmp_path, claim([row], [4.0]), the_truth).contradictions
+    assert said.startswith("alpha at speed=4 agrees, expected: failed")
+
+
+def test_at_a_stair_edge_nobody_is_judged_by_the_time_of_slip(tmp_path: Path) -> None:
+    """At a stair edge what hangs on the time of slip is ill-posed, agreement included; energy and gap are judged."""
+    bounds = {
+        "z": Tolerance(0.005, True),
+        "first_slip": Tolerance(2e-3, False, "s"),
+        "event_times": Tolerance(5e-3, False, "s"),
+        "event_order": Tolerance(0.5, False, "events"),
+        "energy_balance": Tolerance(0.01, True),
+        "gap": Tolerance(1e-6, False, "m"),
+    }
+    edge = {"speed": 4.0, "rolling_resistance": 5e-4, "mu_static": 0.391459}
+    engine = "projection[formulation=rotating_frame]"
+    base = claim([dataclasses.replace(ROW, engine="projection")], [], bounds)
+    comparison = dataclasses.replace(base, vary={}, points=[edge], until=2.0)
+
+    def projection(scene: Scene, _: xr.Dataset) -> xr.Dataset:
+        return simulate(scene, engine, until=2.0, every=0.02)
+
+    (run,) = judged(tmp_path / "right", comparison, projection).runs
+    verdicts = {judgement.observable: judgement.verdict for judgement in run.judgements}
+    events = dict.fromkeys(("first_slip", "event_order", "event_times"), Verdict.ILL_POSED)
+    assert verdicts == events | dict.fromkeys(("z", "energy_balance", "gap"), Verdict.AGREES)
+    assert (run.verdict, run.contradictions) == (Verdict.ILL_POSED, [])
+
+
+def test_what_holds_on_every_path_is_judged_at_a_stair_edge(tmp_path: Path) -> None:
+    """At a stair edge a wrong path is not judged, but energy from nowhere and a ball off the wall are."""
+    bounds = {"z": Tolerance(1e-9, False, "m"), "energy_balance": Tolerance(1e-3, True)}
+    edge = {"speed": 4.0, "rolling_resistance": 5e-4, "mu_static": 0.391459}
+    base = claim([ROW], [], bounds | {"gap": Tolerance(1e-6, False, "m")})
+    comparison = dataclasses.replace(base, vary={}, points=[edge], until=2.0)
+
+    def wrong(_: Scene, dataset: xr.Dataset) -> xr.Dataset:
+        late = (dataset["time"] > 1.0) * 1e-2
+        return dataset.assign(
+            z=dataset["z"] + late, energy=dataset["energy"] * (1 + late), gap=dataset["gap"] + 1e-2 * late
+        )
+
+    (run,) = judged(tmp_path, comparison, wrong).runs
+    verdicts = {judgement.observable: judgement.verdict for judgement in run.judgements}
+    assert verdicts == {"z": Verdict.ILL_POSED, "energy_balance": Verdict.DIFFERS, "gap": Verdict.DIFFERS}
+    (said,) = run.contradictions
+    assert "differs, expected: agrees" in said
+
+
+def test_neighbouring_points_have_truths_of_their_own(
+    tmp_path: Path, install_engines: Callable[[Mapping[str, str]], None]
+) -> None:
+    """Points that differ in the seventh digit are judged each against its own truth."""
+    install_engines(ENTRY_POINTS)
+    speeds = [4.0, 4.000001]
+    comparison = claim([dataclasses.replace(ROW, engine="oracle")], speeds)
+    outcome = compare(comparison, Runner(Store(tmp_path), jobs=1))
+    assert [run.parameters["speed"] for run in outcome.runs] == speeds
+    assert len({case.key for case in outcome.truths.values()}) == 2
+    assert [run.verdict for run in outcome.runs] == [Verdict.AGREES] * 2
+    # The other point's truth is further away than the tolerance.
+    assert 1e-6 / 0.2 * comparison.until > TIGHT["gamma"].absolute(1.0)
+
+
+@pytest.mark.parametrize("status", [Status.REFUSED, Status.TIMEOUT])
+def test_a_point_without_a_truth(tmp_path: Path, status: Status) -> None:
+    """Where the truth cannot be had every row fails and says so; the other points are judged as ever."""
+    rows = [ROW, dataclasses.replace(ROW, engine="beta")]
+    none = {4.0: Result(status, "the ball is back on the wall")}
+    outcome = judged(tmp_path, claim(rows, [3.0, 4.0, 5.0]), the_truth, none)
+    verdicts = {(run.row.engine, run.parameters["speed"]): run.verdict for run in outcome.runs}
+    assert verdicts == {
+        (engine, speed): Verdict.FAILED if speed == 4.0 else Verdict.AGREES
+        for engine in ("alpha", "beta")
+        for speed in (3.0, 4.0, 5.0)
+    }
+    assert len(outcome.contradictions) == 2
+    for said in outcome.contradictions:
+        assert "at speed=4" in said
+        assert said.endswith("there is no truth here: the ball is back on the wall")
