@@ -121,6 +121,8 @@ def certify(engine: Any, scene: Scene) -> list[Line]:
 def first_difference(lines: list[Line]) -> str | None:
     """One sentence about the first quantity that differs, or None if the certificate holds."""
     for line in lines:
+        if not line.holds and all(np.isnan(line.found)):
+            return f"the engine's model does not say its {line.quantity}, which the scene requires"
         if not line.holds:
             return (
                 f"the engine's model differs from the scene: {line.quantity} is {_shown(line.found)} instead of "

@@ -111,7 +111,8 @@ def _prepared(where: str, content: object) -> dict[str, Any]:
             row[key] = {name: Tolerance.parse(f"{where}.{key}.{name}", text) for name, text in bounds.items()}
     if isinstance(row.get("expect"), str):
         row["expect"] = [row["expect"]]
-    for exception in row.get("except_at", []):
+    exceptions = row.get("except_at", [])
+    for exception in exceptions if isinstance(exceptions, list) else []:
         if isinstance(exception, dict) and isinstance(exception.get("expect"), str):
             exception["expect"] = [exception["expect"]]
     if "expect_for" in row:
@@ -133,6 +134,8 @@ def _check(where: str, row: Row, comparison: Comparison) -> None:
     _check_points(f"{where}.only", comparison, row.only)
     for exception in row.except_at:
         _check_points(f"{where}.except_at", comparison, exception.where)
+        if not exception.where or not comparison.combinations(exception.where):
+            raise InputError(f"{where}.except_at", exception.where, "name values that some point of the comparison has")
     if not comparison.combinations(row.only):
         raise InputError(f"{where}.only", row.only, "no point of the comparison fits, so the row would never be run")
 

@@ -47,7 +47,7 @@ class Worker:
         reader, writer = os.pipe()
         self._log = tempfile.TemporaryFile("w+b")  # noqa: SIM115 -- lives as long as the process
         self._process = subprocess.Popen(
-            [sys.executable, "-m", "proofroll.worker", str(writer)],
+            [sys.executable, "-m", "proofroll.worker", str(writer), str(os.getpid())],
             stdin=subprocess.PIPE,
             stdout=self._log,
             stderr=self._log,

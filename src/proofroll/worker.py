@@ -1,6 +1,6 @@
 """The process in which engines run: one request a line on standard input, one answer a line on a private pipe.
 
-``python -m proofroll.worker FD`` serves requests until its input ends. What an engine prints cannot reach the
+``python -m proofroll.worker FD PARENT`` serves requests until its input ends. What an engine prints cannot reach the
 answers, and what an engine breaks costs only this process.
 """
 
@@ -47,9 +47,9 @@ _TIMED_RUNS = 5
 _ENOUGH_SECONDS = 1.0
 
 
-def main(answers: int) -> None:
-    """Serves requests; ``answers`` is the file descriptor for the answers."""
-    threading.Thread(target=_end_with, args=(os.getppid(),), daemon=True).start()
+def main(answers: int, parent: int) -> None:
+    """Serves requests; ``answers`` is the file descriptor for the answers, ``parent`` the process that asks."""
+    threading.Thread(target=_end_with, args=(parent,), daemon=True).start()
     with os.fdopen(answers, "w", encoding="utf-8") as pipe:
         for line in sys.stdin:
             pipe.write(json.dumps(_answer(json.loads(line))) + "\n")
@@ -249,4 +249,4 @@ def one_line(error: BaseException) -> str:
 
 
 if __name__ == "__main__":
-    main(int(sys.argv[1]))
+    main(int(sys.argv[1]), int(sys.argv[2]))
