@@ -165,6 +165,7 @@ class Comparison:
         bands: tolerances by name.
         rows: engines with settings.
         time_limit: wall seconds a case may take [s].
+        timed: whether the speed of every run is measured, in clean runs of its own.
         regimes: a map that goes with the comparison, or None.
     """
 
@@ -179,6 +180,7 @@ class Comparison:
     bands: dict[str, Band] = field(default_factory=dict)
     rows: list[Row] = field(default_factory=list)
     time_limit: float = 120.0
+    timed: bool = True
     regimes: Regimes | None = None
 
     def combinations(self, only: Mapping[str, list[float]] | None = None) -> list[dict[str, float | Edge]]:

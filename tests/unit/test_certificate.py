@@ -163,7 +163,7 @@ def test_friction_and_resistance_are_watched(quantity: str, built: dict[str, Any
     assert [line.quantity for line in lines if not line.holds] == [quantity]
     sentence = first_difference(lines)
     assert sentence is not None
-    silent = None in built.values()
+    silent = any(value is None for value in built.values())
     expected = f"does not say its {quantity}" if silent else f"differs from the scene: {quantity} is "
     assert sentence.startswith(f"the engine's model {expected}")
     assert "\n" not in sentence

@@ -155,7 +155,7 @@ def plan(comparison: Comparison, engines: Iterable[str] = ()) -> Plan:
                 runs.append(Planned(row, point, facts))
                 continue
             ladder = {
-                factor: _case(comparison, scene, point, rung, timed=factor == 1)
+                factor: _case(comparison, scene, point, rung, timed=comparison.timed and factor == 1)
                 for factor, rung in ladder_facts.items()
             }
             runs.append(Planned(row, point, facts, ladder))
