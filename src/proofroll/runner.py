@@ -14,6 +14,7 @@ import sys
 import tempfile
 import threading
 import time
+from collections import deque
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from concurrent.futures import ThreadPoolExecutor
 from pathlib import Path
@@ -163,6 +164,22 @@ def resolve(engines: Sequence[tuple[str, Mapping[str, Any]]]) -> list[EngineFact
     return found
 
 
+class _Waiting:
+    """Cases that wait. A worker goes on with its engine while it can: starting another costs more than many a case."""
+
+    def __init__(self, cases: Iterable[Case]) -> None:
+        self._lock = threading.Lock()
+        self._by_engine: dict[str, deque[Case]] = {}
+        for case in cases:
+            self._by_engine.setdefault(case.engine.name, deque()).append(case)
+
+    def take(self, engine: str | None) -> Case | None:
+        """The next case, of this engine if there is one, else of the one with the most; None: there is none."""
+        with self._lock:
+            group = self._by_engine.get(engine or "") or max(self._by_engine.values(), key=len, default=None)
+            return group.popleft() if group else None
+
+
 class Runner:
     """Runs cases side by side, reuses stored results, and always returns one result per case.
 
@@ -197,8 +214,9 @@ class Runner:
         arrived: queue.SimpleQueue[tuple[Case, Result] | Exception] = queue.SimpleQueue()
         pool = ThreadPoolExecutor(self.jobs)
         try:
-            for batch in self._batches(waiting):
-                pool.submit(self._serve, batch, arrived)
+            shared = _Waiting(waiting)
+            for _ in range(self.jobs):
+                pool.submit(self._serve, shared, arrived)
             for _ in waiting:
                 item = arrived.get()
                 if isinstance(item, Exception):
@@ -215,24 +233,16 @@ class Runner:
             self._stopping.clear()
         return results
 
-    def _batches(self, cases: list[Case]) -> list[list[Case]]:
-        """Cases of one engine that one process serves in turn: start-up costs more than many a case."""
-        by_engine: dict[str, list[Case]] = {}
-        for case in cases:
-            by_engine.setdefault(case.engine.name, []).append(case)
-        batches: list[list[Case]] = []
-        for group in by_engine.values():
-            size = max(1, min(16, -(-len(group) // (2 * self.jobs))))
-            batches += [group[i : i + size] for i in range(0, len(group), size)]
-        return sorted(batches, key=len, reverse=True)
-
-    def _serve(self, batch: list[Case], arrived: queue.SimpleQueue[tuple[Case, Result] | Exception]) -> None:
-        """Serves the cases of a batch in one worker, with a new one after each crash."""
+    def _serve(self, waiting: _Waiting, arrived: queue.SimpleQueue[tuple[Case, Result] | Exception]) -> None:
+        """Serves cases one after another, in a new worker for another engine and after each crash."""
         worker: Worker | None = None
+        engine: str | None = None
         try:
-            for case in batch:
-                if self._stopping.is_set():
-                    break
+            while not self._stopping.is_set() and (case := waiting.take(engine)) is not None:
+                if worker is not None and case.engine.name != engine:
+                    self._drop(worker)
+                    worker = None
+                engine = case.engine.name
                 if worker is None:
                     worker = Worker()
                     self._workers.add(worker)

@@ -44,7 +44,7 @@ _FOUNDATION = (
 # A clean run shorter than this is repeated, up to five times, so that its median means something.
 _TIMED_SECONDS = 0.3
 _TIMED_RUNS = 5
-_ENOUGH_SECONDS = 0.5
+_ENOUGH_SECONDS = 0.3
 
 
 def main(answers: int, parent: int) -> None:
@@ -225,7 +225,7 @@ def _clean_runs(kind: Any, scene: Any, settings: Any, times: Any) -> list[float]
     """Wall seconds per simulated second of runs that only advance, each on an engine built for it.
 
     They stop where the sampled run stopped, for an adaptive step that may run past a sample is another, cheaper one;
-    and they end after half a second of wall time, which measures a rate as well as ten seconds do.
+    and they end after some tenths of a second of wall time, which measure a rate as well as ten seconds do.
     """
     rates: list[float] = []
     spent = 0.0
