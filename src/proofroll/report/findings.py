@@ -35,7 +35,7 @@ def _answer(content: dict[str, Any], found: list[Score]) -> str:
         "agrees": ("agrees", "agree", "with the truth in every observable and every case"),
         "converges": ("needs", "need", "a finer step"),
         "ill-posed": ("is", "are", "beyond judgement somewhere, where the question is ill-posed"),
-        "differs": ("differs", "differ", "somewhere however small the step"),
+        "differs": ("differs", "differ", "somewhere, with no limit of small steps at the truth"),
         "failed": ("gives", "give", "no result somewhere"),
     }
     parts = []

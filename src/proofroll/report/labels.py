@@ -10,7 +10,7 @@ MEANINGS = {
     "agrees": "within tolerance at this step",
     "converges": "not within tolerance yet, but the limit of small steps is the truth: right physics, step too coarse",
     "ill-posed": "here the answer hangs on less than the parameters are known to: nobody is judged by it",
-    "differs": "the limit of small steps is something else: the model's form differs",
+    "differs": "the limit of small steps is something else, or no limit shows",
     "failed": "there is no result; the row says why",
 }
 
