@@ -8,6 +8,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
+from enum import StrEnum
 from typing import Any, ClassVar, Protocol, Self, runtime_checkable
 
 from proofroll.errors import InputError
@@ -65,6 +66,7 @@ class Built:
         gap: distance of the ball from the engine's own wall at time 0 [m].
         acceleration: of the ball's centre at time 0 [m/s²], shape (3,).
         angular_acceleration: of the ball at time 0 in the world [rad/s²], shape (3,).
+        terms: the optional parts that are in the built model: rolling resistance, bounded friction, orientation.
         regularised: names of certificate quantities (``gap``, ``slip``, ``spin``, ``acceleration``, ``N``, ``F2``, …)
             that the model softens, with tolerance and reason. Tolerances of acceleration, N, F2 and F3 are relative
             to :func:`proofroll.mechanics.natural_acceleration`; one of ``1 / static friction``, where the scene has no
@@ -81,6 +83,7 @@ class Built:
     gap: float | None = None
     acceleration: FloatArray | None = None
     angular_acceleration: FloatArray | None = None
+    terms: frozenset[Capability] | None = None
     regularised: Mapping[str, Regularised] = field(default_factory=dict)
 
 
@@ -151,6 +154,48 @@ class LocatesEvents(Protocol):
 
     def events(self) -> Sequence[Event]:
         """The events so far, in order, each with its bracket (one step wide for a fixed step)."""
+
+
+class Level(StrEnum):
+    """How much of the scene a formulation models, from the least to the most: the rungs of the ladder."""
+
+    CLOSED_FORM = "closed form"
+    REDUCED = "reduced equations"
+    PROJECTION = "projection DAE"
+    CONSTRAINT = "engine constraint"
+    CONTACT = "engine contact"
+    FACETS = "faceted wall"
+
+
+@dataclass(frozen=True)
+class Term:
+    """A part of a model that can be switched on and off by a setting.
+
+    Attributes:
+        name: for a person, e.g. ``elimination of violations``.
+        formulations: those that have it.
+        on, off: settings with and without it, put over a preset.
+        because: what it is for.
+    """
+
+    name: str
+    formulations: tuple[str, ...]
+    on: Mapping[str, Any]
+    off: Mapping[str, Any]
+    because: str
+
+
+@runtime_checkable
+class TellsLevels(Protocol):
+    """What an engine has besides, to be put on the ladder of models.
+
+    Attributes:
+        levels: formulation -> its rung.
+        terms: what can be switched on and off.
+    """
+
+    levels: ClassVar[Mapping[str, Level]]
+    terms: ClassVar[Sequence[Term]]
 
 
 def whole_steps(start: float, end: float, dt: float) -> int:

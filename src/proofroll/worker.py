@@ -45,6 +45,8 @@ _FOUNDATION = (
 _TIMED_SECONDS = 0.2
 _TIMED_RUNS = 3
 _ENOUGH_SECONDS = 0.3
+# A measurement builds a short case again and again, so that its clock has something to show.
+_MOST_BUILDS = 20
 
 
 def main(answers: int, parent: int) -> None:
@@ -64,7 +66,12 @@ def _end_with(parent: int) -> None:
 
 
 def _answer(request: dict[str, Any]) -> dict[str, Any]:
-    actions: dict[str, Callable[..., dict[str, Any]]] = {"describe": describe, "resolve": resolve, "run": run}
+    actions: dict[str, Callable[..., dict[str, Any]]] = {
+        "describe": describe,
+        "resolve": resolve,
+        "run": run,
+        "time": time_once,
+    }
     action = actions[request.pop("do")]
     try:
         return action(**request)
@@ -222,25 +229,53 @@ def _run_truth(scene: Any, times: Any, out: Path, versions: dict[str, str]) -> R
     return Result(Status.DONE, message, wall_seconds=wall, versions=versions, trajectory=out.name)
 
 
-def _clean_runs(kind: Any, scene: Any, settings: Any, times: Any) -> list[float]:
-    """Wall seconds per simulated second of runs that only advance, each on an engine built for it.
+def time_once(case: dict[str, Any], seconds: float) -> dict[str, Any]:
+    """One measurement of a case's speed: clean runs for about this many wall seconds, one after another."""
+    from proofroll.recording import time_grid
+    from proofroll.registry import load_engine, resolve_settings
+    from proofroll.scene_file import load_scene
 
-    They stop where the sampled run stopped, for an adaptive step that may run past a sample is another, cheaper one;
-    and they end after some tenths of a second of wall time, which measure a rate as well as ten seconds do.
-    """
+    wanted = Case.from_dict(case)
+    kind = load_engine(wanted.engine.name)
+    settings = resolve_settings(kind, wanted.engine.settings)
+    scene = load_scene(wanted.scene, **wanted.parameters)
+    times = time_grid(wanted.until, wanted.every)
+    elapsed = simulated = 0.0
+    for _ in range(_MOST_BUILDS):
+        try:
+            wall, t = _clean_run(kind.build(scene, settings), times, seconds - elapsed)
+        except (Refused, Diverged) as error:
+            return {"seconds_per_second": None, "message": str(error)}
+        elapsed, simulated = elapsed + wall, simulated + t
+        if elapsed >= seconds:
+            break
+    return {"seconds_per_second": elapsed / simulated, "message": f"{simulated:g} s simulated"}
+
+
+def _clean_runs(kind: Any, scene: Any, settings: Any, times: Any) -> list[float]:
+    """Wall seconds per simulated second of runs that only advance, each on an engine built for it."""
     rates: list[float] = []
     spent = 0.0
     while len(rates) < _TIMED_RUNS and spent < _TIMED_SECONDS:
-        engine = kind.build(scene, settings)
-        start = time.perf_counter()
-        for t in times[1:].tolist():
-            engine.advance(t)
-            elapsed = time.perf_counter() - start
-            if elapsed > _ENOUGH_SECONDS:
-                break
-        rates.append(elapsed / t)
-        spent += elapsed
+        wall, t = _clean_run(kind.build(scene, settings), times, _ENOUGH_SECONDS)
+        rates.append(wall / t)
+        spent += wall
     return rates
+
+
+def _clean_run(engine: Any, times: Any, enough: float) -> tuple[float, float]:
+    """Wall seconds and simulated seconds of a run that only advances.
+
+    It stops where the sampled run stopped, for an adaptive step that may run past a sample is another, cheaper one;
+    and it ends when ``enough`` wall seconds are over, which measure a rate as well as ten times as many do.
+    """
+    clock = time.perf_counter
+    start = clock()
+    for t in times[1:].tolist():
+        engine.advance(t)
+        if clock() - start > enough:
+            break
+    return clock() - start, t
 
 
 def one_line(error: BaseException) -> str:

@@ -1,0 +1,5 @@
+"""``python -m proofroll.cli``."""
+
+from proofroll.cli import main
+
+main()
