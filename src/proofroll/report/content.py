@@ -11,7 +11,8 @@ import proofroll
 from proofroll.agreement import Judgement, Verdict
 from proofroll.case import Status
 from proofroll.registry import parse_engine
-from proofroll.studies.compare import Outcome, Run, point_name
+from proofroll.studies.compare import Outcome, Run
+from proofroll.studies.planning import point_name
 
 
 def plain(value: Any) -> Any:
