@@ -80,8 +80,17 @@ def record(engine: Any, scene: Scene, times: FloatArray) -> Recording:
     return Recording(dataset, failure, wall)
 
 
+_SAMPLED = ("p_WB", "v_WB", "w_WB", "q_WB", "force")
+_NOT_FINITE = "is not finite (NaN or overflow)"
+
+
+def noticed(message: str) -> bool:
+    """Whether a failure's sentence says that a sample was not finite: noticed here, not said by the engine."""
+    return any(message.startswith(f"{name} {_NOT_FINITE}") for name in _SAMPLED)
+
+
 def _finite(sample: Sample, t: float) -> Sample:
-    for name in ("p_WB", "v_WB", "w_WB", "q_WB", "force"):
+    for name in _SAMPLED:
         values = getattr(sample, name)
         if values is None:
             continue
@@ -89,5 +98,5 @@ def _finite(sample: Sample, t: float) -> Sample:
         if np.shape(values) != shape:
             raise Diverged(f"the engine gave {name} with shape {np.shape(values)} instead of {shape} at {t:g} s")
         if not np.all(np.isfinite(values)):
-            raise Diverged(f"{name} is not finite (NaN or overflow) at {t:g} s")
+            raise Diverged(f"{name} {_NOT_FINITE} at {t:g} s")
     return sample

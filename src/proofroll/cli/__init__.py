@@ -13,6 +13,7 @@ from proofroll.cli.common import ENGINE, INTERRUPTED, OK, USAGE, complain
 from proofroll.cli.comparing import compare, regimes, report
 from proofroll.cli.listing import engines, scenes
 from proofroll.cli.single import onset, run
+from proofroll.cli.stability import stability
 from proofroll.cli.tradeoff import recommend, tradeoff
 from proofroll.errors import InputError, Missing, ProofrollError
 
@@ -22,7 +23,7 @@ app = typer.Typer(
     pretty_exceptions_enable=False,
     rich_markup_mode=None,
 )
-for _command in (scenes, engines, run, compare, report, onset, regimes, tradeoff, recommend):
+for _command in (scenes, engines, run, compare, report, onset, regimes, tradeoff, recommend, stability):
     app.command()(_command)
 
 

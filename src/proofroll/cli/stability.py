@@ -1,0 +1,94 @@
+"""Where engines stop being right: the stability map."""
+
+from __future__ import annotations
+
+import json
+from pathlib import Path
+from typing import Annotated
+
+import typer
+
+from proofroll.cli.common import (
+    CONTRADICTED,
+    ENGINE,
+    OK,
+    Engines,
+    Fresh,
+    Jobs,
+    Json,
+    Out,
+    complain,
+    new_runner,
+    progress_bar,
+    write_json,
+)
+
+_SceneOrFile = Annotated[
+    str, typer.Argument(help="A scene, or a file that asks for a map of it, e.g. comparisons/stability.toml.")
+]
+
+
+def stability(
+    scene: _SceneOrFile,
+    engine: Engines = None,
+    axis: Annotated[list[str] | None, typer.Option(help="Axis of the map, e.g. V0; repeat. All by default.")] = None,
+    quick: Annotated[bool, typer.Option("--quick", help="Three values per axis, and less patience per run.")] = False,
+    out: Out = Path("out"),
+    fresh: Fresh = False,
+    jobs: Jobs = None,
+    as_json: Json = False,
+) -> None:
+    """Map up to which step or tolerance each engine is stable, and right, along axes of extremes."""
+    from proofroll.plain import plain
+    from proofroll.report.stability_map import draw
+    from proofroll.store import write_text
+    from proofroll.studies.axes import chosen
+    from proofroll.studies.stability import QUICK, Effort
+    from proofroll.studies.stability import stability as mapped
+    from proofroll.studies.stability_claims import file_for
+    from proofroll.studies.stability_content import content
+    from proofroll.studies.stability_reproducers import write_reproducers
+
+    asked = file_for(scene)
+    axes = chosen(asked.axes, axis or [])
+    runner = new_runner(out, fresh, jobs)
+    effort = QUICK if quick else Effort()
+    with progress_bar("stability", None) as advance:
+        found = mapped(asked.scene, axes, runner, engines=engine or [], effort=effort, progress=advance)
+    study = content(found)
+    folder = out / "stability"
+    write_reproducers(found, study, folder / "reproducers")
+    contradictions = asked.contradictions(study)
+    study["claims"] = {"file": asked.name, "contradictions": contradictions}
+    path = folder / f"{found.scene}.json"
+    write_text(path, json.dumps(plain(study)))
+    draw(study, path.with_suffix(".svg"))
+    if as_json:
+        write_json(study)
+    else:
+        from proofroll.report.stability_tables import boundary_table, headline, silent_lines
+        from proofroll.report.terminal import console
+
+        terminal = console()
+        terminal.print(headline(study), markup=False)
+        terminal.print()
+        terminal.print(boundary_table(study))
+        terminal.print()
+        worst = list(silent_lines(study))
+        if worst:
+            terminal.print("The worst that nobody is told of:", markup=False)
+        for line in worst:
+            terminal.print(f"  {line}", markup=False)
+        for place in study["places"]:
+            if place["problem"]:
+                terminal.print(f"{place['axis']} = {place['value']:g}: {place['problem']}", markup=False)
+        for name, reason in study["absent"].items():
+            terminal.print(f"{name}: {reason}", markup=False)
+        for line in contradictions:
+            terminal.print(f"!! {line}", markup=False)
+        terminal.print(f"The map is in {path.with_suffix('.svg')}, everything in {path}.", markup=False)
+    if study["absent"] and not study["points"]:
+        for name, reason in study["absent"].items():
+            complain(f"{name}: {reason}")
+        raise typer.Exit(ENGINE)
+    raise typer.Exit(CONTRADICTED if contradictions else OK)

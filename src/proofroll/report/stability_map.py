@@ -1,0 +1,122 @@
+"""The heat maps: engine against the value of an axis, with colour and text that says the same."""
+
+from __future__ import annotations
+
+import io
+import math
+from collections.abc import Mapping
+from pathlib import Path
+from typing import Any
+
+from proofroll.errors import Missing
+from proofroll.files import replacing
+from proofroll.report.labels import number
+from proofroll.report.stability_tables import label
+
+# Letters for what is beyond the boundary; a capital with "!" where the engine was silent.
+LETTERS = {
+    "diverged": "d",
+    "energy gain": "e",
+    "left the surface": "l",
+    "sank in": "s",
+    "creep": "c",
+    "lost phase": "p",
+    "solver gave up": "g",
+    "crashed": "x",
+    "too slow": "t",
+    "refused": "r",
+}
+# Steps per natural time at which a colour is darkest and lightest; tolerances are put between by their decades.
+_FEWEST, _MOST = 8.0, 1e5
+_TOLERANCE_DECADES = 13
+
+
+def draw(study: Mapping[str, Any], path: Path) -> None:
+    """Writes the heat maps as one SVG file, a panel per axis.
+
+    Raises:
+        Missing: matplotlib is not installed.
+    """
+    text = svg(study)
+    with replacing(path) as temporary:
+        temporary.write_text(text, encoding="utf-8")
+
+
+def svg(study: Mapping[str, Any]) -> str:
+    """The heat maps as SVG text.
+
+    Raises:
+        Missing: matplotlib is not installed.
+    """
+    try:
+        import matplotlib as mpl
+        from matplotlib.figure import Figure
+    except ModuleNotFoundError:
+        raise Missing("matplotlib is not installed: pip install 'proofroll[report]'") from None
+    curves = list(dict.fromkeys(point["curve"] for point in study["points"]))
+    axes = [axis for axis in study["axes"] if any(point["axis"] == axis["name"] for point in study["points"])]
+    columns = min(2, len(axes)) or 1
+    rows = math.ceil(len(axes) / columns) or 1
+    with mpl.rc_context({"svg.hashsalt": "proofroll", "font.size": 8}):
+        figure = Figure(figsize=(7.2 * columns, rows * (0.9 + 0.24 * len(curves)) + 0.8), layout="constrained")
+        panels = figure.subplots(rows, columns, squeeze=False).ravel()
+        for panel, axis in zip(panels, axes, strict=False):
+            _panel(panel, study, axis, curves, mpl.colormaps["cividis_r"])
+        for panel in panels[len(axes) :]:
+            panel.set_visible(False)
+        figure.suptitle(_legend(), fontsize=8, x=0.01, ha="left")
+        out = io.StringIO()
+        figure.savefig(out, format="svg", metadata={"Date": None})
+    return out.getvalue()
+
+
+def _legend() -> str:
+    kinds = ", ".join(f"{letter} {kind}" for kind, letter in LETTERS.items())
+    return (
+        "Steps per natural time (or tolerance) that 1 % of the range needs; – no affordable one does; ? no truth.\n"
+        f"Letter: what is beyond the boundary of stability ({kinds}); ! the engine did not say so."
+    )
+
+
+def _panel(panel: Any, study: Mapping[str, Any], axis: Mapping[str, Any], curves: list[str], colours: Any) -> None:
+    points = [point for point in study["points"] if point["axis"] == axis["name"]]
+    values = list(dict.fromkeys(point["value"] for point in points))
+    names = {point["curve"]: label(point) for point in study["points"]}
+    for point in points:
+        x, y = values.index(point["value"]), curves.index(point["curve"])
+        text, shade = _cell(point)
+        face = "#ffffff" if shade is None else colours(shade)
+        hatch = "////" if text.startswith("–") else None
+        panel.add_patch(_rectangle(x, y, face, hatch))
+        dark = shade is not None and shade > 0.5
+        panel.text(x, y, text, ha="center", va="center", fontsize=6.5, color="white" if dark else "black")
+    panel.set(
+        xlim=(-0.5, len(values) - 0.5),
+        ylim=(len(curves) - 0.5, -0.5),
+        xlabel=f"{axis['name']}" + (f" [{axis['unit']}]" if axis["unit"] != "1" else ""),
+    )
+    panel.set_xticks(range(len(values)), [number(value) for value in values])
+    panel.set_yticks(range(len(curves)), [names[curve] for curve in curves])
+    panel.tick_params(length=0)
+
+
+def _rectangle(x: int, y: int, face: Any, hatch: str | None) -> Any:
+    from matplotlib.patches import Rectangle
+
+    return Rectangle((x - 0.5, y - 0.5), 1, 1, facecolor=face, hatch=hatch, edgecolor="0.8", lw=0.5)
+
+
+def _cell(point: Mapping[str, Any]) -> tuple[str, float | None]:
+    """Text of a cell and its place between the lightest (0, cheap) and the darkest colour; None: no colour."""
+    largest, failure = point["largest_accurate"], point["failure"]
+    beyond = (LETTERS[failure] + ("!" if point["silent"] else "")) if failure else ""
+    if point["problem"]:
+        return f"? {beyond}".strip(), None
+    if largest is None:
+        return f"– {beyond}".strip(), None
+    if point["resolution"] != "dt":
+        shade = -math.log10(largest) / _TOLERANCE_DECADES
+        return f"{number(largest)} {beyond}".strip(), shade
+    steps = point["period"] / largest
+    shade = math.log(max(steps, _FEWEST) / _FEWEST) / math.log(_MOST / _FEWEST)
+    return f"{steps:.0f} {beyond}".strip(), min(shade, 1.0)

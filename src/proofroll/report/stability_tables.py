@@ -1,0 +1,114 @@
+"""A stability map on the terminal, within 100 columns."""
+
+from __future__ import annotations
+
+from collections import Counter
+from collections.abc import Iterator, Mapping, Sequence
+from typing import Any
+
+from rich.table import Table
+from rich.text import Text
+
+from proofroll.report.labels import number
+from proofroll.studies.numbers import SYMBOLS
+from proofroll.studies.stability_content import silent_ranking
+
+
+def headline(study: Mapping[str, Any]) -> str:
+    """How many points, boundaries, and silent ones among them."""
+    counts = ", ".join(f"{count} {kind}" for kind, count in sorted(study["failures"].items(), key=lambda i: -i[1]))
+    said = (
+        f"{len(study['points'])} points, {study['boundaries']} boundaries of which {study['silent']} are silent "
+        f"({study['runs']} runs). Beyond: {counts}."
+    )
+    if study["never_accurate"]:
+        said += f" At {study['never_accurate']} points no step or tolerance that was affordable holds 1 %."
+    return said
+
+
+def boundary_table(study: Mapping[str, Any]) -> Table:
+    """One line per engine, formulation, setting and axis: its boundaries from the least to the largest."""
+    title = "Boundaries along each axis: largest Ωh (or tolerance) that is stable, and that holds 1 %"
+    table = Table(title=Text(title), title_justify="left", box=None, padding=(0, 1, 0, 0))
+    table.add_column("engine formulation setting", no_wrap=True)
+    table.add_column("axis", no_wrap=True)
+    for column in ("stable", "holds 1 %"):
+        table.add_column(column, justify="right", no_wrap=True)
+    table.add_column("1 % explained by", no_wrap=True)
+    table.add_column("beyond", no_wrap=True, max_width=21)
+    explained = {(e["curve"], e["axis"]): e for e in study["explanations"] if e["boundary"] == "accurate"}
+    before = ""
+    for (curve, axis), points in grouped(study).items():
+        name = label(points[0])
+        kinds = Counter(point["failure"] for point in points if point["failure"])
+        silent = sum(point["silent"] for point in points)
+        common = kinds.most_common(1)
+        beyond = f"{common[0][0]}, {silent} silent" if common else "none"
+        table.add_row(
+            Text(name if name != before else ""),
+            axis,
+            _range(points, "stable"),
+            _range(points, "accurate"),
+            Text(_explained(explained.get((curve, axis)))),
+            Text(beyond),
+        )
+        before = name
+    return table
+
+
+def grouped(study: Mapping[str, Any]) -> dict[tuple[str, str], list[Mapping[str, Any]]]:
+    """The points by curve and axis."""
+    found: dict[tuple[str, str], list[Mapping[str, Any]]] = {}
+    for point in study["points"]:
+        found.setdefault((point["curve"], point["axis"]), []).append(point)
+    return found
+
+
+def label(point: Mapping[str, Any]) -> str:
+    """Engine, formulation and preset."""
+    settings = point["settings"]
+    return " ".join(filter(None, (point["engine"], settings.get("formulation"), settings.get("preset"))))
+
+
+def size(point: Mapping[str, Any], side: str) -> float | None:
+    """A boundary as Ωh where the path turns, else as the spin per step; a tolerance as it is."""
+    found = point["sides"][side]
+    if point["resolution"] != "dt":
+        return found["largest"]  # type: ignore[no-any-return]  # JSON
+    return found["numbers"].get("turn", found["numbers"].get("spin"))  # type: ignore[no-any-return]  # JSON
+
+
+def _range(points: Sequence[Mapping[str, Any]], side: str) -> str:
+    known = [point for point in points if not (point["problem"] and side == "accurate")]
+    if not known:
+        return "no truth"
+    values = [size(point, side) for point in known]
+    held = [value for value in values if value is not None]
+    if not held:
+        return "none"
+    low = "none" if len(held) < len(values) else number(min(held))
+    high = number(max(held)) + ("" if any(p["sides"][side]["reached"] for p in known) else "+")
+    return low if low == high else f"{low} … {high}"
+
+
+def _explained(found: Mapping[str, Any] | None) -> str:
+    if found is None:
+        return "–"
+    words = f"{SYMBOLS[found['number']]} {number(found['low'])}…{number(found['high'])}"
+    return words if found["explains"] else f"({words})"
+
+
+def silent_lines(study: Mapping[str, Any], count: int = 8) -> Iterator[str]:
+    """The worst silent cases as sentences, one for each engine, formulation, setting and axis."""
+    seen: set[tuple[str, str]] = set()
+    for point in silent_ranking(study):
+        if (point["curve"], point["axis"]) in seen or len(seen) >= count:
+            continue
+        seen.add((point["curve"], point["axis"]))
+        side = point["sides"][point["boundary"]]
+        wrong = "" if side["error"] is None else f", off by {100 * side['error']:.3g} % of the range"
+        if side["largest"] is None:
+            step = "at every step tried"
+        else:
+            step = f"just beyond {point['resolution']} {number(side['largest'])}"
+        yield f"{label(point)} at {point['axis']} = {number(point['value'])}: {point['failure']} {step}{wrong}"

@@ -1,0 +1,86 @@
+"""Axes of a stability map: how one number changes a scene, as data."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, field
+
+from proofroll.errors import InputError
+from proofroll.scene import Scene
+
+
+@dataclass(frozen=True)
+class Term:
+    """A parameter as a function of the axis's value x: ``times`` · x^``power``.
+
+    Attributes:
+        times: a number, or the name of a parameter, which stands for its default.
+        power: of the value.
+    """
+
+    times: float | str = 1.0
+    power: float = 1.0
+
+
+@dataclass(frozen=True)
+class Axis:
+    """One direction in which a scene is taken to its extremes.
+
+    Attributes:
+        name: as the user writes it.
+        unit: of its values.
+        meaning: what it does, for a person.
+        values: log-spaced as a rule.
+        parameters: parameter -> its dependence on the value; the others keep their defaults.
+        horizon: the value is the length of the run in natural times.
+        scale_free: the dimensionless problem is the same at every value, so that every dependence is a finding.
+    """
+
+    name: str
+    unit: str
+    meaning: str
+    values: list[float]
+    parameters: dict[str, Term] = field(default_factory=dict)
+    horizon: bool = False
+    scale_free: bool = False
+
+    def at(self, scene: Scene, value: float) -> dict[str, float]:
+        """The parameters at a value of the axis.
+
+        Args:
+            scene: with its default parameters.
+            value: of the axis.
+
+        Raises:
+            InputError: the axis names a parameter that the scene does not have.
+        """
+        found = {}
+        for name, term in self.parameters.items():
+            for known in (name, *([term.times] if isinstance(term.times, str) else ())):
+                if known not in scene.parameters:
+                    advice = f"{scene.name} has no such parameter; choose from {', '.join(scene.parameters)}"
+                    raise InputError(f"axes: {self.name}", known, advice)
+            factor = scene.parameters[term.times] if isinstance(term.times, str) else term.times
+            found[name] = factor * value**term.power
+        return found
+
+
+def chosen(axes: Sequence[Axis], names: Sequence[str]) -> list[Axis]:
+    """The axes of these names; all if there are none.
+
+    Raises:
+        InputError: there is no such axis.
+    """
+    known = {axis.name: axis for axis in axes}
+    for name in names:
+        if name not in known:
+            raise InputError("axis", name, f"there is no such axis; choose from {', '.join(known)}")
+    return [known[name] for name in dict.fromkeys(names)] if names else list(axes)
+
+
+def thinned(values: Sequence[float], count: int) -> list[float]:
+    """``count`` of the values, with both ends, evenly spread."""
+    if len(values) <= count:
+        return list(values)
+    last = len(values) - 1
+    return [values[round(index * last / (count - 1))] for index in range(count)]

@@ -1,0 +1,101 @@
+"""Finds the coarsest rung of a ladder from which on everything passes, with few and cheap runs."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Generator
+from dataclasses import dataclass, field
+from typing import Generic, Protocol, TypeVar
+
+
+class Verdict(Protocol):
+    """What a run on a rung gave."""
+
+    @property
+    def stable(self) -> bool:
+        """Whether it held together."""
+
+    @property
+    def accurate(self) -> bool:
+        """Whether it was right as well; never without being stable."""
+
+
+V = TypeVar("V", bound=Verdict)
+
+
+@dataclass
+class Found(Generic[V]):
+    """What a search found; rungs are numbered from the coarsest.
+
+    Attributes:
+        seen: rung -> what a run on it gave.
+        limit: the first rung that takes too long, or the number of rungs.
+    """
+
+    seen: dict[int, V] = field(default_factory=dict)
+    limit: int = 0
+
+    def boundary(self, passes: Callable[[V], bool]) -> tuple[int | None, int | None]:
+        """The coarsest rung from which on all that ran passed, and the failing rung next to it; None: no such rung.
+
+        A rung that passes above one that fails does not count: a user who refines the step would get worse.
+        """
+        failing = max((rung for rung, verdict in self.seen.items() if not passes(verdict)), default=None)
+        holding = [rung for rung in self.seen if failing is None or rung > failing]
+        return min(holding, default=None), failing
+
+
+def search(size: int, stride: int) -> Generator[int, V | None, Found[V]]:
+    """Asks for rungs and is sent what a run on each gave; returns what it found.
+
+    It goes down by ``stride`` until two runs in a row are accurate, then bisects for either boundary, and last makes
+    sure that the rung below each passes too, for right beside a boundary a pass may be luck. What is known is never
+    asked again. A rung for which None is sent, and all finer ones, are left out as too slow.
+    """
+    found: Found[V] = Found(limit=size)
+    seen = found.seen
+    rung, in_a_row = 0, 0
+    while rung < found.limit:
+        verdict = yield rung
+        if verdict is None:
+            found.limit = rung
+            rung = (max(seen, default=-1) + rung) // 2
+            if rung < 0 or rung in seen:
+                break
+            continue
+        seen[rung] = verdict
+        in_a_row = in_a_row + 1 if verdict.accurate else 0
+        if in_a_row == 2:
+            break
+        following = rung + stride
+        if following >= found.limit:
+            following = (rung + found.limit) // 2
+            if following == rung:
+                break
+        rung = following
+    for passes in (_stable, _accurate):
+        while (wanted := _next(found, passes)) is not None:
+            verdict = yield wanted
+            if verdict is None:
+                found.limit = min(found.limit, wanted)
+            else:
+                seen[wanted] = verdict
+    return found
+
+
+def _stable(verdict: Verdict) -> bool:
+    return verdict.stable
+
+
+def _accurate(verdict: Verdict) -> bool:
+    return verdict.accurate
+
+
+def _next(found: Found[V], passes: Callable[[V], bool]) -> int | None:
+    """The rung to be looked at next for a boundary, or None if it is found."""
+    holding, failing = found.boundary(passes)
+    if holding is None:
+        return None
+    coarser = -1 if failing is None else failing
+    middle = (coarser + holding) // 2
+    wanted = middle if middle > coarser else holding + 1
+    return wanted if wanted < found.limit and wanted not in found.seen else None

@@ -1,0 +1,175 @@
+"""Reads the files that ask for a stability map and claim something of it: ``study = "stability"``."""
+
+from __future__ import annotations
+
+import tomllib
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import Any, Literal
+
+from pydantic import ConfigDict, TypeAdapter, ValidationError
+
+from proofroll.errors import InputError
+from proofroll.folders import data_folder
+from proofroll.registry import parse_engine
+from proofroll.scene_file import first_problem, load_scene
+from proofroll.studies.axes import Axis, Term
+from proofroll.studies.failure import Failure
+from proofroll.studies.numbers import MEANINGS
+
+STUDY = "stability"
+
+
+@dataclass(frozen=True)
+class Claim:
+    """What is claimed of an engine's boundaries.
+
+    Attributes:
+        engine: name, or ``name[key=value,…]``; every curve with these settings.
+        boundary: of which.
+        because: why.
+        axes: along which; all if empty.
+        values: lowest and highest value of the axis; all if empty.
+        never: no step holds; then nothing else is claimed but ``failure`` and ``silent``.
+        number: dimensionless number of the boundary that is claimed to lie in ``between``.
+        between: lowest and highest.
+        failure: what is beyond is one of these.
+        silent: whether the engine is silent about it.
+    """
+
+    engine: str
+    boundary: Literal["stable", "accurate"]
+    because: str
+    axes: list[str] = field(default_factory=list)
+    values: list[float] = field(default_factory=list)
+    never: bool = False
+    number: str | None = None
+    between: list[float] = field(default_factory=list)
+    failure: list[Failure] = field(default_factory=list)
+    silent: bool | None = None
+
+    def contradictions(self, points: Sequence[Mapping[str, Any]]) -> list[str]:
+        """What the points of a map do not confirm, as sentences."""
+        found = []
+        for point in points:
+            if not self._about(point) or point["problem"]:
+                continue
+            side = point["sides"][self.boundary]
+            where = f"{point['curve']} at {point['axis']} = {point['value']:g}"
+            found += [f"{where}: {sentence}" for sentence in self._wrong(side)]
+        return found
+
+    def _about(self, point: Mapping[str, Any]) -> bool:
+        spec = parse_engine(self.engine)
+        settings = point["settings"]
+        if point["engine"] != spec.name or any(str(settings.get(k)) != str(v) for k, v in spec.options.items()):
+            return False
+        if self.axes and point["axis"] not in self.axes:
+            return False
+        return not self.values or self.values[0] <= point["value"] <= self.values[1]
+
+    def _wrong(self, side: Mapping[str, Any]) -> list[str]:
+        found = []
+        largest = side["largest"]
+        if self.never and largest is not None:
+            found.append(f"{self.boundary} at a step or tolerance of {largest:g}, expected at none")
+        if self.number is not None:
+            value = side["numbers"].get(self.number)
+            low, high = self.between
+            if value is None or not low <= value <= high:
+                said = "no step is" if value is None else f"{value:.3g} is the largest"
+                found.append(f"{self.boundary}: {self.number}: {said}, expected between {low:g} and {high:g}")
+        if self.failure and side["failure"] and side["failure"] not in self.failure:
+            found.append(f"beyond {self.boundary}: {side['failure']}, expected: {' or '.join(self.failure)}")
+        if self.silent is not None and side["failure"] and side["silent"] != self.silent:
+            words = {True: "silent", False: "said so"}
+            found.append(f"beyond {self.boundary}: {words[side['silent']]}, expected: {words[self.silent]}")
+        return found
+
+
+@dataclass(frozen=True)
+class StabilityFile:
+    """What a file asks and claims.
+
+    Attributes:
+        name: of the file, without ending.
+        title, question: for a person.
+        scene: which scene.
+        axes: along which it is taken to its extremes.
+        claims: what is expected.
+    """
+
+    name: str
+    title: str
+    question: str
+    scene: str
+    axes: list[Axis]
+    claims: list[Claim] = field(default_factory=list)
+
+    def contradictions(self, study: Mapping[str, Any]) -> list[str]:
+        """What a map does not confirm, as sentences."""
+        return [sentence for claim in self.claims for sentence in claim.contradictions(study["points"])]
+
+
+def file_for(scene: str) -> StabilityFile:
+    """The file about a scene, or the file at a path that ends in ``.toml``.
+
+    Raises:
+        InputError: there is none, or it is broken.
+    """
+    if scene.endswith(".toml"):
+        return _load(Path(scene))
+    for path in sorted(data_folder("comparisons").glob("*.toml")):
+        content = tomllib.loads(path.read_text(encoding="utf-8"))
+        if content.get("study") == STUDY and content.get("scene") == scene:
+            return _load(path)
+    load_scene(scene)
+    advice = f'no file under comparisons/ has study = "{STUDY}" and this scene; write one, or give the path of yours'
+    raise InputError("scene", scene, advice)
+
+
+def _load(path: Path) -> StabilityFile:
+    where = path.name
+    try:
+        content = tomllib.loads(path.read_text(encoding="utf-8"))
+    except (tomllib.TOMLDecodeError, UnicodeDecodeError) as error:
+        raise InputError(str(path), "TOML", f"the file is broken: {error}") from None
+    except OSError as error:
+        raise InputError(str(path), "TOML", f"the file cannot be read: {error.strerror}") from None
+    if content.pop("study", None) != STUDY:
+        raise InputError(str(path), "study", f'only a file with study = "{STUDY}" asks for a stability map')
+    try:
+        found = TypeAdapter(StabilityFile).validate_python({**content, "name": path.stem})
+    except ValidationError as error:
+        raise first_problem(error, where) from None
+    _check(where, found)
+    return found
+
+
+def _check(where: str, found: StabilityFile) -> None:
+    scene = load_scene(found.scene)
+    for index, axis in enumerate(found.axes):
+        if not axis.values:
+            raise InputError(f"{where}: axes.{index}.values", "nothing", "an axis needs its values; add them")
+        axis.at(scene, axis.values[0])
+    known = [axis.name for axis in found.axes]
+    for index, claim in enumerate(found.claims):
+        at = f"{where}: claims.{index}"
+        if not claim.because:
+            raise InputError(f"{at}.because", "nothing", "every claim needs its reason; add it")
+        for name in claim.axes:
+            if name not in known:
+                raise InputError(f"{at}.axes", name, f"there is no such axis; choose from {', '.join(known)}")
+        if claim.number is not None and claim.number not in MEANINGS:
+            raise InputError(f"{at}.number", claim.number, f"choose one of {', '.join(MEANINGS)}")
+        if (claim.number is None) != (not claim.between):
+            raise InputError(f"{at}.between", claim.between, "number and between = [low, high] go together")
+        for name in ("between", "values"):
+            pair = getattr(claim, name)
+            if pair and (len(pair) != 2 or pair[0] > pair[1]):
+                raise InputError(f"{at}.{name}", pair, "write [low, high]")
+
+
+for _typed in (StabilityFile, Claim, Axis, Term):
+    setattr(_typed, "__pydantic_config__", ConfigDict(extra="forbid"))  # noqa: B010 -- the name is pydantic's, not the class's

@@ -1,0 +1,133 @@
+"""A stability map as plain data: what ``proofroll stability --json`` prints and what the reports are made from."""
+
+from __future__ import annotations
+
+from collections import Counter
+from collections.abc import Callable, Mapping
+from dataclasses import asdict
+from typing import Any
+
+from proofroll.studies.failure import ACCURATE, MEANINGS, Failure, Outcome
+from proofroll.studies.numbers import explanation, numbers
+from proofroll.studies.stability import MapPoint, StabilityMap, failure_beyond
+
+BOUNDARIES = ("stable", "accurate")
+_PASSES: Mapping[str, Callable[[Outcome], bool]] = {
+    "stable": lambda outcome: outcome.stable,
+    "accurate": lambda outcome: outcome.accurate,
+}
+
+
+def content(found: StabilityMap) -> dict[str, Any]:
+    """Everything, with counts on top."""
+    points = [_point(point) for point in found.points]
+    failing = [point for point in points if point["failure"]]
+    return {
+        "study": "stability",
+        "scene": found.scene,
+        "axes": [asdict(axis) for axis in found.axes],
+        "periods": found.effort.periods,
+        "accurate": ACCURATE,
+        "runs": found.runs,
+        "boundaries": len(failing),
+        "silent": sum(point["silent"] for point in failing),
+        "failures": dict(Counter(point["failure"] for point in failing)),
+        "never_accurate": sum(point["largest_accurate"] is None and not point["problem"] for point in points),
+        "meanings": {str(failure): meaning for failure, meaning in MEANINGS.items()},
+        "points": points,
+        "explanations": _explanations(points),
+        "places": [
+            {"axis": place.axis.name, "value": place.value, "parameters": place.parameters, "problem": place.problem}
+            for place in found.places
+        ],
+        "absent": found.absent,
+    }
+
+
+def _point(point: MapPoint) -> dict[str, Any]:
+    place, facts = point.place, point.curve.facts
+    sides = {name: _side(point, name) for name in BOUNDARIES}
+    if place.yardstick is None or place.yardstick.true is None:
+        sides["accurate"] = {**sides["accurate"], "largest": None, "numbers": {}}  # without truth nobody is right
+    # Where nothing breaks on the ladder, what is to be shown is where it stops being right.
+    first = sides["stable"] if sides["stable"]["failure"] else sides["accurate"]
+    errors = [outcome.error for outcome in point.found.seen.values() if outcome.error is not None]
+    return {
+        "engine": facts.name,
+        "settings": {key: value for key, value in facts.settings.items() if key != facts.resolution},
+        "curve": point.curve.engine,
+        "level": point.curve.level,
+        "resolution": facts.resolution,
+        "axis": place.axis.name,
+        "value": place.value,
+        "parameters": place.parameters,
+        "until": place.until,
+        "period": place.period,
+        "largest_stable": sides["stable"]["largest"],
+        "largest_accurate": sides["accurate"]["largest"],
+        "boundary": "stable" if first is sides["stable"] else "accurate",
+        "failure": first["failure"],
+        "silent": first["silent"],
+        "message": first["message"],
+        "sides": sides,
+        "least_error": min(errors, default=None),
+        "finest": None if not point.found.seen else point.ladder[max(point.found.seen)],
+        "too_slow": None if point.found.limit >= len(point.ladder) else point.ladder[point.found.limit],
+        "runs": len(point.results),
+        "problem": place.problem,
+        "reproducer": None,
+        "reproducer_note": None,
+    }
+
+
+def _side(point: MapPoint, name: str) -> dict[str, Any]:
+    """One boundary: the largest step or tolerance that holds, and what is beyond."""
+    holding, failing = point.found.boundary(_PASSES[name])
+    beyond = failure_beyond(point, failing)
+    assert point.place.scene is not None  # points have one
+    largest = None if holding is None else point.ladder[holding]
+    steps = point.curve.fixed_step and largest is not None
+    return {
+        "largest": largest,
+        "reached": beyond is not None and holding is not None,
+        "numbers": numbers(point.place.scene.rolling, largest) if steps and largest is not None else {},
+        "beyond": None if failing is None else point.ladder[failing],
+        "failure": None if beyond is None or beyond.failure is None else str(beyond.failure),
+        "silent": beyond is not None and beyond.silent,
+        "error": None if beyond is None else beyond.error,
+        "time": None if beyond is None else beyond.time,
+        "message": None if beyond is None else beyond.message,
+    }
+
+
+def _explanations(points: list[dict[str, Any]]) -> list[dict[str, Any]]:
+    """For every curve, axis and boundary, the number that is the most constant along the axis."""
+    found = []
+    for curve in dict.fromkeys(point["curve"] for point in points):
+        for axis in dict.fromkeys(point["axis"] for point in points):
+            of_both = [point for point in points if point["curve"] == curve and point["axis"] == axis]
+            for name in BOUNDARIES:
+                sides = [point["sides"][name] for point in of_both]
+                best = explanation([side["numbers"] for side in sides if side["reached"] and side["numbers"]])
+                if best is not None:
+                    entry = {"curve": curve, "axis": axis, "boundary": name, "number": best.number}
+                    entry |= {"low": best.low, "high": best.high, "spread": best.spread, "explains": best.explains}
+                    found.append(entry)
+    return found
+
+
+def silent_ranking(study: Mapping[str, Any]) -> list[dict[str, Any]]:
+    """The silent failures, the worst first: wrong at any step, then by how wrong the run beyond the boundary was."""
+    silent = [point for point in study["points"] if point["silent"]]
+
+    def badness(point: Mapping[str, Any]) -> tuple[bool, bool, float]:
+        error = point["sides"][point["boundary"]]["error"]
+        never = point["sides"][point["boundary"]]["largest"] is None
+        return never, point["boundary"] == "stable", error if error is not None else 0.0
+
+    return sorted(silent, key=badness, reverse=True)
+
+
+def failure_kinds() -> list[str]:
+    """Names of all kinds of failure."""
+    return [str(failure) for failure in Failure]
