@@ -198,6 +198,24 @@ class TellsLevels(Protocol):
     terms: ClassVar[Sequence[Term]]
 
 
+@runtime_checkable
+class Reproduces(Protocol):
+    """What an engine has besides, if it can write a program that shows its behaviour without proofroll."""
+
+    @classmethod
+    def reproducer(cls, scene: Scene, settings: Any) -> str:
+        """Source of a program with numpy and the engine's own interface alone.
+
+        It assigns RADIUS [m], MASS [kg], INERTIA [kg m²], GRAVITY [m/s²] and the start, and defines ``frame(p)``,
+        ``gap(p)`` (:func:`proofroll.reproducing.wall_source`) and ``run(times)``, a generator of the ball's centre,
+        velocity and angular velocity in the world at each of the times [s]; where the engine says that it has failed,
+        ``run`` raises RuntimeError with its words.
+
+        Raises:
+            Refused: there is no program for this; the text says why.
+        """
+
+
 def whole_steps(start: float, end: float, dt: float) -> int:
     """Number of steps of size ``dt`` [s] from ``start`` to ``end`` [s].
 

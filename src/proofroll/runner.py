@@ -164,6 +164,27 @@ def resolve(engines: Sequence[tuple[str, Mapping[str, Any]]]) -> list[EngineFact
     return found
 
 
+def programs(cases: Sequence[Case]) -> list[tuple[str | None, str]]:
+    """The engines' own programs for cases (:class:`proofroll.engine.Reproduces`), each or None and why not."""
+    found: list[tuple[str | None, str]] = [(None, "not asked")] * len(cases)
+    for name in dict.fromkeys(case.engine.name for case in cases):
+        worker = Worker()
+        for index, case in enumerate(cases):
+            if case.engine.name != name:
+                continue
+            try:
+                answer = _checked(worker.ask({"do": "reproduce", "case": dataclasses.asdict(case)}, _START_UP_SECONDS))
+                found[index] = answer["program"], answer["message"]
+            except WorkerDied as error:
+                found[index] = None, str(error)
+                worker.close()
+                worker = Worker()
+            except ProofrollError as error:
+                found[index] = None, str(error)
+        worker.close()
+    return found
+
+
 class _Waiting:
     """Cases that wait. A worker goes on with its engine while it can: starting another costs more than many a case."""
 

@@ -71,6 +71,7 @@ def _answer(request: dict[str, Any]) -> dict[str, Any]:
         "resolve": resolve,
         "run": run,
         "time": time_once,
+        "reproduce": reproduce,
     }
     action = actions[request.pop("do")]
     try:
@@ -251,6 +252,24 @@ def time_once(case: dict[str, Any], seconds: float) -> dict[str, Any]:
         if elapsed >= seconds:
             break
     return {"seconds_per_second": elapsed / simulated, "message": f"{simulated:g} s simulated"}
+
+
+def reproduce(case: dict[str, Any]) -> dict[str, Any]:
+    """The engine's own program for a case, or why there is none."""
+    from proofroll.engine import Reproduces
+    from proofroll.registry import load_engine, resolve_settings
+    from proofroll.scene_file import load_scene
+
+    wanted = Case.from_dict(case)
+    kind = load_engine(wanted.engine.name)
+    if not isinstance(kind, Reproduces):
+        return {"program": None, "message": f"{wanted.engine.name} writes no programs"}
+    try:
+        settings = resolve_settings(kind, wanted.engine.settings)
+        program = kind.reproducer(load_scene(wanted.scene, **wanted.parameters), settings)
+    except Refused as error:
+        return {"program": None, "message": str(error)}
+    return {"program": program, "message": ""}
 
 
 def _clean_runs(kind: Any, scene: Any, settings: Any, times: Any) -> list[float]:

@@ -109,6 +109,19 @@ class Mujoco:
         _FORMULATIONS[settings.formulation].write(spec, body)
         return cls(spec.compile(), body, settings)
 
+    @classmethod
+    def reproducer(cls, scene: Scene, settings: MujocoSettings) -> str:
+        """See :class:`proofroll.engine.Reproduces`."""
+        from proofroll.engines.mujoco.reproducer import source
+
+        body = scene.rolling
+        built = cls.build(scene, settings)
+        spec = read_spec(scene, settings.formulation)
+        write_physics(spec, body, settings)
+        _FORMULATIONS[settings.formulation].write(spec, body)
+        spec.compile()
+        return source(spec.to_xml(), built._model, built._data, body, settings)
+
     def advance(self, t: float) -> None:
         """See :class:`proofroll.engine.Engine`."""
         dt = self._settings.dt
