@@ -263,7 +263,10 @@ def reproduce(case: dict[str, Any]) -> dict[str, Any]:
     wanted = Case.from_dict(case)
     kind = load_engine(wanted.engine.name)
     if not isinstance(kind, Reproduces):
-        return {"program": None, "message": f"{wanted.engine.name} writes no programs"}
+        return {
+            "program": None,
+            "message": f"{wanted.engine.name} offers no program of its own; proofroll run shows the case",
+        }
     try:
         settings = resolve_settings(kind, wanted.engine.settings)
         program = kind.reproducer(load_scene(wanted.scene, **wanted.parameters), settings)

@@ -57,8 +57,8 @@ class Effort:
 
     periods: float = 3.0
     values: int | None = None
-    patience: float = 2.0
-    limit: float = 10.0
+    patience: float = 1.0
+    limit: float = 8.0
 
 
 QUICK = Effort(values=3, patience=0.5, limit=5.0)

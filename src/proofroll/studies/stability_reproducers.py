@@ -55,7 +55,7 @@ def main():
         "diverged": bool(stopped),
         "solver gave up": bool(stopped),
         "crashed": bool(stopped),
-        "left the surface": gaps.max() > OFF,
+        "left the surface": gaps.max() > OFF or bool(stopped),
         "sank in": gaps.min() < -OFF,
         "energy gain": gain > GAIN,
         "creep": error > ALLOWED * RANGE and slipped >= SLIPPED * ALLOWED * RANGE,

@@ -56,6 +56,14 @@ class Exudyn:
         """See :class:`proofroll.engine.Engine`."""
         return cls(MODELS[settings.formulation](scene.rolling, settings))
 
+    @classmethod
+    def reproducer(cls, scene: Scene, settings: ExudynSettings) -> str:
+        """See :class:`proofroll.engine.Reproduces`."""
+        from proofroll.engines.exudyn.reproducer import source
+
+        body = scene.rolling
+        return source(MODELS[settings.formulation](body, settings), body, settings)
+
     def advance(self, t: float) -> None:
         """See :class:`proofroll.engine.Engine`."""
         self._model.integration.advance(t)

@@ -95,6 +95,28 @@ class Carrier:
             bodyNumbers=[self.carrier, self.ball.body], axis0=axis, localPosition0=self.centre
         )
 
+    def numbers(self, body: RollingBall) -> list[str]:
+        """Assignments for the program of :mod:`reproducer`: the carrier's start, its joint and the rolling."""
+        rates = {kind: np.zeros(3) for kind in ("rotation", "translation")}
+        generators = local_geometry(body.surface, body.u0).generators
+        for generator, rate in zip(generators, body.udot0, strict=True):
+            rates[generator.kind] += rate * np.asarray(generator.axis)
+        axes, constrained = _joint_axes(generators)
+        frame = body.surface.frame(body.u0)
+        local, rolling = local_geometry(body.surface, body.u0), []
+        for (item, _), along, about, sign in zip(self.rolling, (1, 2), (2, 1), (1.0, -1.0), strict=True):
+            row = local.tangents[along] + sign * body.ball.radius * local.turn[about]
+            generator = local.generators[int(np.argmax(np.abs(row)))]
+            factor = float(self.system.GetObject(item)["factor1"])
+            rolling.append((generator.kind.capitalize(), list(generator.axis), frame[:, about].tolist(), factor))
+        return [
+            f"CARRIER_VELOCITY = {rates['translation'].tolist()!r}",
+            f"CARRIER_SPIN = {rates['rotation'].tolist()!r}",
+            f"JOINT_AXES = {axes.tolist()!r}",
+            f"JOINT_CONSTRAINED = {constrained!r}",
+            f"ROLLING = {rolling!r}",
+        ]
+
     def sample(self) -> Sample:
         """See :class:`proofroll.engine.Engine`. The pivot transmits the whole force of the wall."""
         turn = self.system.GetNodeOutput(self.node, Output.RotationMatrix).reshape(3, 3)

@@ -44,6 +44,13 @@ class Pinocchio:
         """See :class:`proofroll.engine.Engine`."""
         return cls((ContactRun if settings.formulation == "contact" else RowsRun)(scene.rolling, settings))
 
+    @classmethod
+    def reproducer(cls, scene: Scene, settings: PinocchioSettings) -> str:
+        """See :class:`proofroll.engine.Reproduces`."""
+        from proofroll.engines.pinocchio.reproducer import source
+
+        return source(scene.rolling, settings)
+
     def advance(self, t: float) -> None:
         """See :class:`proofroll.engine.Engine`."""
         self._run.advance(self._t, t)

@@ -24,7 +24,7 @@ from proofroll.scene import RollingBall
 from proofroll.surfaces import FloatArray
 
 # Pinocchio's cone needs a number where friction is unbounded. PGS takes any; the iterations of ADMM grow with it.
-_UNBOUNDED_FRICTION = {"pgs": 1e6, "admm": 1e2}
+UNBOUNDED_FRICTION = {"pgs": 1e6, "admm": 1e2}
 # Pinocchio's limit of 1000 is met at tight tolerances where the normal force is small.
 _ADMM_ITERATIONS = 10_000
 # An impulse nearer to the cone than this is on it [-].
@@ -89,7 +89,7 @@ class ContactRun:
         self._datas.append(self._models[0].createData())
         self._point = self._models[0].extract()  # refers to the model in the vector
         self._bounded = math.isfinite(body.contact.mu_static)
-        unbounded = _UNBOUNDED_FRICTION[self._solver_kind]
+        unbounded = UNBOUNDED_FRICTION[self._solver_kind]
         self._mu_static = body.contact.mu_static if self._bounded else unbounded
         self._mu_kinetic = body.contact.mu_kinetic if self._bounded else unbounded
         self._solver, self._options, self._result = _solver(self._solver_kind, self._tolerance)
@@ -269,7 +269,7 @@ class ContactRun:
                 bends=self._leapfrog,
                 dt=self._dt,
                 impulse=0.0 if self._solver_kind == "pgs" else self._tolerance,
-                unbounded=None if self._bounded else _UNBOUNDED_FRICTION[self._solver_kind],
+                unbounded=None if self._bounded else UNBOUNDED_FRICTION[self._solver_kind],
             ),
         )
 

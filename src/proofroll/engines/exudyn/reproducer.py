@@ -1,0 +1,251 @@
+"""Writes the program that shows what Exudyn does with a ball on a wall, without proofroll."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+
+from proofroll.engines.exudyn.carrier import Carrier
+from proofroll.engines.exudyn.contact import SURELY, Contact
+from proofroll.engines.exudyn.generic import Generic
+from proofroll.engines.exudyn.native import exu
+from proofroll.engines.exudyn.rolling_disc import RollingDisc
+from proofroll.engines.exudyn.settings import ExudynSettings
+from proofroll.errors import Refused
+from proofroll.reproducing import assigned, ball_numbers, refuse_terms, wall_source
+from proofroll.scene import RollingBall
+
+_BALL = """
+node = mbs.AddNode(items.NodeRigidBodyEP(
+    referenceCoordinates=[*POSITION, 1.0, 0.0, 0.0, 0.0],
+    initialVelocities=[*VELOCITY, 0.0, *(np.array(START_SPIN) / 2)],
+))
+body = mbs.AddObject(items.ObjectRigidBody(mass=MASS, inertia=[INERTIA] * 3 + [0.0] * 3, nodeNumber=node))
+centre = mbs.AddMarker(items.MarkerBodyRigid(bodyNumber=body))
+weight = mbs.AddMarker(items.MarkerBodyMass(bodyNumber=body))
+mbs.AddLoad(items.LoadMassProportional(markerNumber=weight, loadVector=GRAVITY))
+"""
+
+_CARRIER = """
+ground = mbs.AddObject(items.ObjectGround())
+carrier_node = mbs.AddNode(items.NodeRigidBodyEP(
+    referenceCoordinates=[0.0, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0],
+    initialVelocities=[*CARRIER_VELOCITY, 0.0, *(np.array(CARRIER_SPIN) / 2)],
+))
+carrier = mbs.AddObject(items.ObjectRigidBody(mass=0.0, inertia=[0.0] * 6, nodeNumber=carrier_node))
+turned = np.eye(4)
+turned[:3, :3] = JOINT_AXES
+ends = [mbs.AddMarker(items.MarkerBodyRigid(bodyNumber=end, localHT=turned)) for end in (ground, carrier)]
+mbs.AddObject(items.GenericJoint(markerNumbers=ends, constrainedAxes=JOINT_CONSTRAINED))
+pivot = mbs.AddMarker(items.MarkerBodyRigid(bodyNumber=carrier, localPosition=POSITION))
+mbs.AddObject(items.GenericJoint(markerNumbers=[pivot, centre], constrainedAxes=[1, 1, 1, 0, 0, 0]))
+# Rolling: the rate of the carrier's coordinate, and the spin of the ball relative to the carrier.
+for kind, axis, about, factor in ROLLING:
+    coordinate = getattr(items, f"MarkerBodiesRelative{kind}Coordinate")
+    one = mbs.AddMarker(coordinate(bodyNumbers=[ground, carrier], axis0=axis))
+    other = mbs.AddMarker(items.MarkerBodiesRelativeRotationCoordinate(
+        bodyNumbers=[carrier, body], axis0=about, localPosition0=POSITION
+    ))
+    mbs.AddObject(items.CoordinateConstraint(markerNumbers=[one, other], factor1=factor, velocityLevel=True))
+"""
+
+_ROLLING_DISC = """
+ground = mbs.AddObject(items.ObjectGround())
+plane = mbs.AddMarker(items.MarkerBodyRigid(bodyNumber=ground))
+e1, e2, _ = frame(np.array(POSITION))
+joint = mbs.AddObject(items.ObjectJointRollingDisc(
+    markerNumbers=[plane, centre], discRadius=RADIUS, discAxis=e2, planeNormal=-e1
+))
+
+
+def aim(mbs, t, newton_iteration, discontinuous_iteration):
+    \"\"\"Before each residual: the disc stands upright on the plane that touches the wall where the ball does.\"\"\"
+    e1, e2, _ = frame(mbs.GetNodeOutput(node, exu.OutputVariableType.Position))
+    rotation = mbs.GetNodeOutput(node, exu.OutputVariableType.RotationMatrix).reshape(3, 3)
+    mbs.SetObjectParameter(joint, "planeNormal", (-e1).tolist())
+    mbs.SetObjectParameter(joint, "discAxis", (e2 @ rotation).tolist())
+
+
+mbs.SetPreNewtonResidualUserFunction(aim)
+"""
+
+_CONTACT = """
+
+def hollow_centre(p):
+    \"\"\"Centre of a hollow sphere that touches the wall where the ball at p does.\"\"\"
+    return p + (gap(p) - (HOLLOW - RADIUS)) * frame(p)[0]
+
+
+ground = mbs.AddObject(items.ObjectGround())
+follower = mbs.AddMarker(items.MarkerBodyRigid(
+    bodyNumber=ground, localPosition=hollow_centre(np.array(POSITION)).tolist()
+))
+state = mbs.AddNode(items.NodeGenericData(initialCoordinates=CONTACT_STATE, numberOfDataCoordinates=4))
+mbs.AddObject(items.ObjectContactSphereSphere(
+    markerNumbers=[centre, follower], nodeNumber=state, spheresRadii=RADII, isHollowSphere1=True,
+    dynamicFriction=FRICTION, frictionProportionalZone=ZONE, contactStiffness=STIFFNESS,
+))
+
+
+def follow(mbs, t, newton_iteration, discontinuous_iteration):
+    \"\"\"Before each residual: moves the hollow sphere along.\"\"\"
+    p = mbs.GetNodeOutput(node, exu.OutputVariableType.Position)
+    mbs.SetMarkerParameter(follower, "localPosition", hollow_centre(p).tolist())
+
+
+mbs.SetPreNewtonResidualUserFunction(follow)
+complaint = ""
+
+
+def watch(mbs, t):
+    \"\"\"After each step: ends the run where the contact opens, or slips though its friction stands for any.\"\"\"
+    global complaint
+    distance, slip = mbs.GetNodeOutput(state, exu.OutputVariableType.Coordinates)[:2]
+    if t > 0 and distance > 0:
+        complaint = f"the contact is open at {t:g} s"
+    elif t > 0 and not BOUNDED and slip > SURELY * ZONE:
+        complaint = f"the ball slips at {t:g} s with a coefficient of friction of {FRICTION:g}"
+    return not complaint
+
+
+mbs.SetPostStepUserFunction(watch)
+"""
+
+_SOLVER = """
+mbs.Assemble()
+
+settings = exu.SimulationSettings()
+settings.solution.file.write = False
+settings.solution.sensors.active = False
+settings.parallel.numberOfThreads = 1
+integration = settings.timeIntegration
+integration.verboseMode = 0
+integration.numberOfSteps, integration.endTime = 1, STEP_SIZE
+integration.adaptiveStep = HALVINGS > 0
+if HALVINGS:
+    integration.minimumStepSize = STEP_SIZE / 2**HALVINGS
+integration.newton.relativeTolerance = NEWTON_TOLERANCE
+integration.newton.absoluteTolerance = NEWTON_TOLERANCE / 100
+integration.newton.modifiedNewtonJacUpdatePerStep = NEW_JACOBIAN
+alpha = integration.generalizedAlpha
+alpha.useNewmark = alpha.useIndex2Constraints = TRAPEZOIDAL
+if not TRAPEZOIDAL:
+    alpha.spectralRadius = SPECTRAL_RADIUS
+solver = exu.MainSolverImplicitSecondOrder()
+if ACCELERATIONS:
+    # Consistent with constraints that turn with the ball, of which Exudyn cannot know.
+    alpha.computeInitialAccelerations = False
+    mbs.systemData.SetODE2Coordinates_tt(ACCELERATIONS, exu.ConfigurationType.Initial)
+if not solver.InitializeSolver(mbs, settings):
+    raise SystemExit("Exudyn does not accept the model")
+if ACCELERATIONS:
+    mbs.systemData.SetAECoordinates(MULTIPLIERS, exu.ConfigurationType.Current)
+
+
+def run(times):
+    \"\"\"Centre, velocity and angular velocity of the ball in the world at each time.\"\"\"
+    now = 0.0
+    for t in times:
+        steps = round((t - now) / STEP_SIZE)
+        if steps:
+            solver.it.startTime = solver.it.currentTime = now
+            solver.it.endTime, solver.it.numberOfSteps = t, steps
+            try:
+                done = solver.SolveSteps(mbs, settings)
+            except Exception as error:
+                raise RuntimeError(" ".join(str(error).split())) from None
+            if solver.output.simulationStoppedByUserFunction:
+                raise RuntimeError(complaint)
+            if not done or abs(solver.it.currentTime - t) > STEP_SIZE / 2:
+                words = " ".join(str(solver.GetErrorString()).split()) or "it gives no reason"
+                raise RuntimeError(f"at {solver.it.currentTime:g} s: {words}")
+            now = t
+        yield state_of_ball()
+"""
+
+_BALL_STATE = """
+
+def state_of_ball():
+    \"\"\"Centre, velocity and angular velocity in the world.\"\"\"
+    kinds = (exu.OutputVariableType.Position, exu.OutputVariableType.Velocity, exu.OutputVariableType.AngularVelocity)
+    return tuple(np.array(mbs.GetNodeOutput(node, kind)) for kind in kinds)
+"""
+
+
+def source(model: Any, body: RollingBall, settings: ExudynSettings) -> str:
+    """See :class:`proofroll.engine.Reproduces`.
+
+    Args:
+        model: of the formulation, at time 0.
+        body: the scene's.
+        settings: of the adapter.
+
+    Raises:
+        Refused: the scene has a term that the program has not.
+    """
+    if isinstance(model, Generic):
+        raise Refused("this formulation's equations are the adapter's own; only Exudyn's integration is Exudyn's")
+    refuse_terms(body, friction=isinstance(model, Contact))
+    numbers = ball_numbers(body) | {"START_SPIN": _start_spin(model)}
+    numbers |= {"STEP_SIZE": settings.dt, "NEWTON_TOLERANCE": settings.newton_tolerance}
+    start = _start(model)
+    lines = [
+        f"HALVINGS = {settings.halvings or 0}",
+        f"NEW_JACOBIAN = {settings.jacobian == 'step'}",
+        f"TRAPEZOIDAL = {settings.integrator == 'trapezoidal_index2'}",
+        f"SPECTRAL_RADIUS = {settings.spectral_radius!r}",
+        f"ACCELERATIONS = {start[0]!r}",
+        f"MULTIPLIERS = {start[1]!r}",
+        *_numbers(model, body),
+    ]
+    parts = {Carrier: _CARRIER, RollingDisc: _ROLLING_DISC, Contact: _CONTACT}
+    return (
+        "import exudyn as exu\nimport exudyn.itemInterface as items\nimport numpy as np\n\n"
+        + assigned(**numbers)
+        + "\n".join(lines)
+        + "\n"
+        + wall_source(body)
+        + "\nexu.config.printToConsole = False\nmbs = exu.SystemContainer().AddSystem()\n"
+        + _BALL
+        + parts[type(model)]
+        + _SOLVER
+        + _BALL_STATE
+    )
+
+
+def _start_spin(model: Any) -> Any:
+    """Angular velocity of the ball in the model [rad/s]; a contact starts with the creep that holds the ball."""
+    data, initial = model.system.systemData, exu.ConfigurationType.Initial
+    # Rates of the Euler parameters of the first node, a body that is not turned, are half of it.
+    return 2 * np.array(data.GetODE2Coordinates_t(initial)[4:7])
+
+
+def _start(model: Any) -> tuple[list[float], list[float]]:
+    """Accelerations and multipliers at time 0, where the adapter gives them; else nothing."""
+    if isinstance(model, Contact):
+        return [], []
+    data = model.system.systemData
+    initial = data.GetODE2Coordinates_tt(exu.ConfigurationType.Initial)
+    return np.array(initial).tolist(), np.array(data.GetAECoordinates()).tolist()
+
+
+def _numbers(model: Any, body: RollingBall) -> list[str]:
+    """Assignments that only one formulation needs."""
+    if isinstance(model, Carrier):
+        return model.numbers(body)
+    if isinstance(model, Contact):
+        contact = model.system.GetObject(model.contact)
+        state = model.system.GetNode(model.data)["initialCoordinates"]
+        radii = [float(radius) for radius in contact["spheresRadii"]]
+        return [
+            f"HOLLOW = {sum(radii) - body.ball.radius!r}",
+            f"RADII = {radii!r}",
+            f"CONTACT_STATE = {np.array(state).tolist()!r}",
+            f"FRICTION = {float(contact['dynamicFriction'])!r}",
+            f"ZONE = {float(contact['frictionProportionalZone'])!r}",
+            f"BOUNDED = {model.bounded}",
+            f"SURELY = {SURELY!r}",
+            f"STIFFNESS = {float(contact['contactStiffness'])!r}",
+        ]
+    return []
