@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import contextlib
 import dataclasses
+import itertools
 import json
 import os
 import queue
@@ -15,7 +16,7 @@ import tempfile
 import threading
 import time
 from collections import deque
-from collections.abc import Callable, Iterable, Mapping, Sequence
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from concurrent.futures import ThreadPoolExecutor
 from pathlib import Path
 from types import TracebackType
@@ -216,7 +217,19 @@ class Runner:
         self.fresh = fresh
         self.reused = 0
         self._workers: set[Worker] = set()
+        self._kept: dict[str, list[Worker]] | None = None
         self._stopping = threading.Event()
+
+    @contextlib.contextmanager
+    def keeping_workers(self) -> Iterator[None]:
+        """Meanwhile workers live on from one :meth:`run` to the next: for many short rounds, starts cost most."""
+        self._kept = {}
+        try:
+            yield
+        finally:
+            kept, self._kept = self._kept, None
+            for worker in itertools.chain.from_iterable(kept.values()):
+                worker.close()
 
     def run(self, cases: Iterable[Case], progress: Callable[[Case, Result], None] | None = None) -> dict[str, Result]:
         """Results by key of the case. ``progress`` is called in this thread as each arrives."""
@@ -246,6 +259,7 @@ class Runner:
                 results[case.key] = result
                 if progress:
                     progress(case, result)
+            pool.shutdown(wait=True)  # so that no worker that is kept is taken for one that still runs
         finally:
             self._stopping.set()
             for worker in list(self._workers):
@@ -261,12 +275,11 @@ class Runner:
         try:
             while not self._stopping.is_set() and (case := waiting.take(engine)) is not None:
                 if worker is not None and case.engine.name != engine:
-                    self._drop(worker)
+                    self._put_away(worker, str(engine))
                     worker = None
                 engine = case.engine.name
                 if worker is None:
-                    worker = Worker()
-                    self._workers.add(worker)
+                    worker = self._taken(engine)
                 try:
                     result = _ask(worker, case, self.store.trajectory(case))
                 except InputError as error:  # a step that does not divide the grid, say: this case's own affair
@@ -282,7 +295,22 @@ class Runner:
             arrived.put(error)
         finally:
             if worker is not None:
-                self._drop(worker)
+                self._put_away(worker, str(engine))
+
+    def _taken(self, engine: str) -> Worker:
+        """A worker that has served this engine, or a new one."""
+        idle = (self._kept or {}).get(engine)
+        worker = idle.pop() if idle else Worker()
+        self._workers.add(worker)
+        return worker
+
+    def _put_away(self, worker: Worker, engine: str) -> None:
+        """Keeps a worker for the next round, if workers are kept; else ends it."""
+        if self._kept is None or self._stopping.is_set():
+            self._drop(worker)
+            return
+        self._workers.discard(worker)
+        self._kept.setdefault(engine, []).append(worker)
 
     def _drop(self, worker: Worker) -> None:
         self._workers.discard(worker)

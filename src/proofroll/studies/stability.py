@@ -187,7 +187,8 @@ def stability(
     points = [
         MapPoint(curve, place, _ladder(curve, place)) for curve in curves for place in places if place.scene is not None
     ]
-    _search(scene, points, effort, runner, tell)
+    with runner.keeping_workers():
+        _search(scene, points, effort, runner, tell)
     return StabilityMap(scene, list(axes), effort, places, points, absent)
 
 

@@ -1,0 +1,120 @@
+"""Kinds of failure, by trajectories that were made to show each."""
+
+from __future__ import annotations
+
+import math
+from typing import Any
+
+import numpy as np
+import pytest
+
+from proofroll.case import Result, Status
+from proofroll.events import Event, with_events
+from proofroll.scene_file import load_scene
+from proofroll.studies.failure import MEANINGS, Failure, Yardstick, judge
+from proofroll.trajectory import trajectory
+from proofroll.truth import truth
+from proofroll.truth.natural import natural_time
+
+SCENE = load_scene("sphere_in_cylinder")
+TIMES = np.linspace(0.0, 3 * natural_time(SCENE.rolling), 25)
+TRUE = truth(SCENE, TIMES)
+YARDSTICK = Yardstick.of(SCENE.rolling, TIMES, TRUE)
+DONE = Result(Status.DONE, "reached the end")
+P, V, W = (TRUE[name].to_numpy() for name in ("p_WB", "v_WB", "w_WB"))
+LATE = (np.arange(len(TIMES)) >= 12)[:, None]
+
+
+def run(p: Any = P, v: Any = V, w: Any = W, upto: int = 25) -> Any:
+    """A trajectory of these states."""
+    return trajectory(SCENE, TIMES[:upto], p[:upto], v[:upto], w[:upto])
+
+
+def drifting(speed: float) -> Any:
+    """The truth with a slip along the wall on top."""
+    slip = np.array([0.0, 0.0, speed])
+    return run(P + TIMES[:, None] * slip, V + slip)
+
+
+def slower(factor: float) -> Any:
+    """The truth with its clock going slower."""
+    other = truth(SCENE, TIMES * factor)
+    return run(*(other[name].to_numpy() for name in ("p_WB", "v_WB", "w_WB")))
+
+
+def test_the_truth_is_accurate() -> None:
+    """A run that is right is stable, accurate and has no failure."""
+    outcome = judge(DONE, run(), YARDSTICK)
+    assert (outcome.stable, outcome.accurate, outcome.failure, outcome.silent) == (True, True, None, False)
+
+
+@pytest.mark.parametrize(
+    ("dataset", "failure", "stable"),
+    [
+        (run(P + LATE * 0.005 * SCENE.rolling.surface.normal(P)), Failure.SANK, False),
+        (run(P - LATE * 0.005 * SCENE.rolling.surface.normal(P)), Failure.LEFT, False),
+        (run(v=V * (1 + 0.2 * LATE)), Failure.ENERGY_GAIN, False),
+        (drifting(-0.01), Failure.CREEP, True),
+        (drifting(-0.2), Failure.CREEP, False),
+        (slower(0.97), Failure.LOST_PHASE, True),
+    ],
+    ids=["sank", "left", "gain", "creeps a little", "creeps far", "phase"],
+)
+def test_a_bad_run_that_says_it_is_done(dataset: Any, failure: Failure, stable: bool) -> None:
+    """A run that reached the end and is wrong is a silent failure of the kind that was put into it."""
+    outcome = judge(DONE, dataset, YARDSTICK)
+    assert (outcome.failure, outcome.stable, outcome.accurate, outcome.silent) == (failure, stable, False, True)
+
+
+def test_what_came_first() -> None:
+    """Of two failures the earlier one counts, for the later may be its consequence."""
+    later = (np.arange(len(TIMES)) >= 18)[:, None]
+    normal = SCENE.rolling.surface.normal(P)
+    outcome = judge(DONE, run(P + later * 0.005 * normal, V * (1 + 0.2 * LATE)), YARDSTICK)
+    assert outcome.failure == Failure.ENERGY_GAIN
+    assert outcome.time == pytest.approx(TIMES[12])
+
+
+@pytest.mark.parametrize(
+    ("status", "message", "failure", "silent"),
+    [
+        (Status.DIVERGED, "p_WB is not finite (NaN or overflow) at 0.3 s", Failure.DIVERGED, True),
+        (Status.DIVERGED, "the engine gave up: velocities are not finite or huge", Failure.DIVERGED, False),
+        (Status.DIVERGED, "Newton's method did not converge", Failure.GAVE_UP, False),
+        (Status.CRASHED, "was killed by SIGSEGV", Failure.CRASHED, False),
+        (Status.TIMEOUT, "no result within 8 s", Failure.TOO_SLOW, False),
+        (Status.REFUSED, "needs rolling resistance", Failure.REFUSED, False),
+    ],
+)
+def test_runs_that_ended_early(status: Status, message: str, failure: Failure, silent: bool) -> None:
+    """A run that ended early is never stable; only a NaN that the engine did not mention is silent."""
+    dataset = run(upto=6) if status == Status.DIVERGED else None
+    outcome = judge(Result(status, message), dataset, YARDSTICK)
+    assert (outcome.failure, outcome.silent, outcome.stable, outcome.accurate) == (failure, silent, False, False)
+
+
+def test_a_liftoff_that_ends_a_run() -> None:
+    """An engine that stops because the ball leaves the wall has said so, and that is what happened."""
+    dataset = with_events(run(upto=6), [Event("liftoff", 0.3, 0.2, 0.3)])
+    outcome = judge(Result(Status.DIVERGED, "the ball leaves the wall"), dataset, YARDSTICK)
+    assert (outcome.failure, outcome.silent) == (Failure.LEFT, False)
+
+
+def test_without_a_truth() -> None:
+    """Without a truth a run is judged by what needs none: surface and energy."""
+    alone = Yardstick.of(SCENE.rolling, TIMES, None)
+    assert judge(DONE, slower(0.5), alone).stable
+    assert judge(DONE, run(v=V * (1 + 0.2 * LATE)), alone).failure == Failure.ENERGY_GAIN
+    assert judge(DONE, slower(0.5), alone).error is None
+
+
+def test_every_kind_has_a_meaning() -> None:
+    """A person finds the definition of every kind."""
+    assert set(MEANINGS) == set(Failure)
+
+
+def test_the_natural_time() -> None:
+    """In a cylinder it is the period 2π/(√(2/7) V0/c) of z; on a plane it is a turn of the ball or longer."""
+    assert natural_time(SCENE.rolling) == pytest.approx(2 * math.pi / (math.sqrt(2 / 7) * 20.0))
+    plane = load_scene("inclined_plane").rolling
+    assert natural_time(plane) >= 2 * math.pi * plane.ball.radius / float(np.linalg.norm(plane.v0)) * (1 - 1e-12)

@@ -1,0 +1,255 @@
+"""Small real maps: what they hold, that they resume, and that their programs show what they say."""
+
+from __future__ import annotations
+
+import json
+import subprocess
+import sys
+from pathlib import Path
+from typing import Any
+
+import pytest
+
+from proofroll.errors import InputError
+from proofroll.plain import plain
+from proofroll.report.stability_map import LETTERS, svg
+from proofroll.report.stability_tables import boundary_table, headline, silent_lines
+from proofroll.runner import Runner
+from proofroll.scene_file import load_scene
+from proofroll.store import Store
+from proofroll.studies.axes import Axis, Term, chosen, thinned
+from proofroll.studies.failure import Failure
+from proofroll.studies.numbers import explanation, numbers
+from proofroll.studies.stability import Effort, stability
+from proofroll.studies.stability_claims import Claim, file_for
+from proofroll.studies.stability_content import content
+from proofroll.studies.stability_reproducers import write_reproducers
+
+SPEED = Axis("V0", "m/s", "initial speed", [2.0, 8.0], {"speed": Term()})
+ENGINE = "projection[formulation=rotating_frame,preset=default]"
+SHORT = Effort(periods=1.0, patience=0.05, limit=30.0)
+
+
+def mapped(folder: Path, engines: list[str], axes: list[Axis], **more: Any) -> Any:
+    """A map with its own store."""
+    return stability("sphere_in_cylinder", axes, Runner(Store(folder), jobs=1), engines=engines, effort=SHORT, **more)
+
+
+@pytest.fixture(scope="module")
+def small(tmp_path_factory: pytest.TempPathFactory) -> Any:
+    """The map of one formulation along one axis."""
+    return mapped(tmp_path_factory.mktemp("map"), [ENGINE], [SPEED])
+
+
+def test_a_map(small: Any) -> None:
+    """RK4 has a boundary at either speed, and as nothing but Ωh matters here, it is the same Ωh."""
+    study = plain(content(small))
+    assert [point["value"] for point in study["points"]] == [2.0, 8.0]
+    turns = [point["sides"]["accurate"]["numbers"]["turn"] for point in study["points"]]
+    assert turns[0] == pytest.approx(turns[1])
+    assert 0.1 < turns[0] < 1.5
+    assert all(point["largest_accurate"] <= point["largest_stable"] for point in study["points"])
+    assert study["boundaries"] == sum(study["failures"].values())
+    json.dumps(study, allow_nan=False)
+
+
+def test_a_map_resumes(tmp_path: Path) -> None:
+    """A map that was interrupted takes up what it had, and finds the same."""
+    calls = 0
+
+    def interrupt(_text: str, _count: int) -> None:
+        nonlocal calls
+        calls += 1
+        if calls == 8:
+            raise KeyboardInterrupt
+
+    with pytest.raises(KeyboardInterrupt):
+        mapped(tmp_path, [ENGINE], [SPEED], progress=interrupt)
+    before = len(list(tmp_path.glob("*.json")))
+    runner = Runner(Store(tmp_path), jobs=1)
+    found = stability("sphere_in_cylinder", [SPEED], runner, engines=[ENGINE], effort=SHORT)
+    assert before >= 4
+    assert runner.reused == before
+    again = Runner(Store(tmp_path), jobs=1)
+    assert content(stability("sphere_in_cylinder", [SPEED], again, engines=[ENGINE], effort=SHORT)) == content(found)
+    assert again.reused == found.runs + 2  # and the truth of both places
+
+
+def test_reports_of_a_map(small: Any) -> None:
+    """Terminal and heat map say of every point what it is, within 100 columns."""
+    from rich.console import Console
+
+    study = plain(content(small))
+    assert headline(study).startswith("2 points, ")
+    console = Console(width=100, record=True, file=open("/dev/null", "w"))  # noqa: SIM115 -- nobody reads it
+    console.print(boundary_table(study))
+    assert "projection rotating_frame default" in console.export_text()
+    assert len(list(silent_lines(study))) <= 8
+    picture = svg(study)
+    assert picture.startswith("<?xml")
+    assert set(LETTERS) == {str(failure) for failure in Failure}
+
+
+@pytest.fixture(scope="module")
+def programs(tmp_path_factory: pytest.TempPathFactory) -> dict[str, dict[str, Any]]:
+    """Points of three engines, with the programs that show their boundaries."""
+    pytest.importorskip("mujoco")
+    pytest.importorskip("exudyn")
+    pytest.importorskip("pinocchio")
+    folder = tmp_path_factory.mktemp("programs")
+    engines = [
+        "mujoco[formulation=free,preset=default]",
+        "exudyn[formulation=carrier,preset=default]",
+        "pinocchio[formulation=contact,preset=default]",
+    ]
+    axis = Axis("V0", "m/s", "initial speed", [4.0], {"speed": Term()})
+    found = mapped(folder, engines, [axis])
+    study = plain(content(found))
+    write_reproducers(found, study, folder / "reproducers")
+    return {point["engine"]: point for point in study["points"]}
+
+
+@pytest.mark.parametrize("engine", ["mujoco", "exudyn", "pinocchio"])
+def test_a_program_shows_the_failure_without_us(programs: dict[str, dict[str, Any]], engine: str) -> None:
+    """The program of a boundary runs where proofroll and the other engines cannot be imported, and exits with 1."""
+    path = programs[engine]["reproducer"]
+    assert path is not None, programs[engine]["reproducer_note"]
+    hidden = [name for name in ("proofroll", "mujoco", "exudyn", "pinocchio", "xarray") if name != engine]
+    hide = f"import sys, runpy; sys.modules.update(dict.fromkeys({hidden!r}))"
+    code = f"{hide}; runpy.run_path({path!r}, run_name='__main__')"
+    run = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, timeout=120, check=False)
+    assert run.returncode == 1, run.stdout + run.stderr
+    assert ": shown" in run.stdout
+
+
+def test_a_program_does_not_cry_wolf(programs: dict[str, dict[str, Any]]) -> None:
+    """The same program with a far smaller step says that nothing is shown."""
+    point = programs["exudyn"]
+    text = Path(point["reproducer"]).read_text()
+    beyond = point["sides"][point["boundary"]]["beyond"]
+    line = f"STEP_SIZE = {beyond!r}"
+    assert line in text
+    run = subprocess.run(
+        [sys.executable, "-"], input=text.replace(line, f"STEP_SIZE = {beyond / 40!r}"), capture_output=True, text=True,
+        timeout=120, check=False,
+    )  # fmt: skip
+    assert run.returncode == 0, run.stdout + run.stderr
+    assert "not shown" in run.stdout
+
+
+def test_axes_as_data() -> None:
+    """A parameter follows the value of its axis by the factor and the power that the file gives."""
+    scene = load_scene("sphere_in_cylinder")
+    size = Axis("size", "1", "", [4.0], {"radius": Term("radius"), "speed": Term("speed", 0.5)})
+    assert size.at(scene, 4.0) == {"radius": 0.1, "speed": 8.0}
+    with pytest.raises(InputError, match="no such parameter"):
+        Axis("x", "1", "", [1.0], {"nothing": Term()}).at(scene, 1.0)
+    with pytest.raises(InputError, match="no such axis"):
+        chosen([size], ["mass"])
+    assert thinned([1, 2, 3, 4, 5, 6, 7], 3) == [1, 4, 7]
+    assert thinned([1, 2], 3) == [1, 2]
+
+
+def test_scale_free_axes() -> None:
+    """Mass and size leave the dimensionless problem as it is: the numbers of a step in natural times stay the same."""
+    axes = {axis.name: axis for axis in file_for("sphere_in_cylinder").axes}
+    scene = load_scene("sphere_in_cylinder")
+    for name in ("mass", "size"):
+        assert axes[name].scale_free
+        found = [load_scene("sphere_in_cylinder", **axes[name].at(scene, value)).rolling for value in (1e-6, 1e6)]
+        periods = [1 / numbers(body, 1.0)["oscillation"] for body in found]
+        first, second = (numbers(body, 0.01 * period) for body, period in zip(found, periods, strict=True))
+        assert first == pytest.approx(second)
+
+
+def test_what_explains_a_boundary() -> None:
+    """The number that stays constant while the others move explains it; if all stay, none does."""
+    moving = [{"turn": 0.05 * k, "spin": 0.2, "fall": 0.01 / k} for k in (1, 2, 8)]
+    best = explanation(moving)
+    assert best is not None
+    assert (best.number, best.explains, best.spread) == ("spin", True, pytest.approx(1.0))
+    still = explanation([{"turn": 0.1, "spin": 0.2}] * 3)
+    assert still is not None
+    assert not still.explains
+    assert explanation(moving[:2]) is None
+
+
+def claim(**more: Any) -> Claim:
+    """A claim about the made-up point."""
+    return Claim("made[formulation=only]", more.pop("boundary", "stable"), "a reason", **more)
+
+
+POINT = {
+    "engine": "made", "settings": {"formulation": "only"}, "curve": "made[formulation=only]",
+    "axis": "V0", "value": 4.0, "problem": None,
+    "sides": {
+        "stable": {"largest": 0.1, "numbers": {"spin": 0.3}, "failure": "energy gain", "silent": True},
+        "accurate": {"largest": None, "numbers": {}, "failure": "creep", "silent": True},
+    },
+}  # fmt: skip
+
+
+@pytest.mark.parametrize(
+    ("made", "contradictions"),
+    [
+        (claim(never=True), 1),
+        (claim(boundary="accurate", never=True), 0),
+        (claim(number="spin", between=[0.2, 0.4]), 0),
+        (claim(number="spin", between=[0.4, 0.5]), 1),
+        (claim(boundary="accurate", number="spin", between=[0.2, 0.4]), 1),
+        (claim(failure=[Failure.ENERGY_GAIN], silent=True), 0),
+        (claim(failure=[Failure.CREEP], silent=False), 2),
+        (claim(axes=["mass"], never=True), 0),
+        (claim(values=[5.0, 9.0], never=True), 0),
+    ],
+)
+def test_claims(made: Claim, contradictions: int) -> None:
+    """A claim is contradicted by what it says otherwise, and only where it applies."""
+    assert len(made.contradictions([POINT])) == contradictions
+
+
+BROKEN = [
+    ('because = "it is so"', 'because = ""', "every claim needs its reason"),
+    ('axes = ["V0"]', 'axes = ["speed"]', "no such axis"),
+    ('number = "spin"', 'number = "spine"', "choose one of"),
+    ("between = [0, 1]", "between = [1, 0]", r"\[low, high\]"),
+    ("values = [1, 2]", "values = []", "needs its values"),
+    ('study = "stability"', 'study = "tradeoff"', "asks for a stability map"),
+    ("parameters.speed = {}", "parameters.spee = {}", "no such parameter"),
+]
+FILE = """
+study = "stability"
+title = "t"
+question = "q"
+scene = "sphere_in_cylinder"
+[[axes]]
+name = "V0"
+unit = "m/s"
+meaning = "initial speed"
+values = [1, 2]
+parameters.speed = {}
+[[claims]]
+engine = "mujoco"
+boundary = "stable"
+axes = ["V0"]
+number = "spin"
+between = [0, 1]
+because = "it is so"
+"""
+
+
+@pytest.mark.parametrize(("old", "new", "words"), BROKEN)
+def test_broken_files(tmp_path: Path, old: str, new: str, words: str) -> None:
+    """A mistake in a file is named, with what to write instead."""
+    path = tmp_path / "made.toml"
+    path.write_text(FILE)
+    assert file_for(str(path)).axes[0].values == [1, 2]
+    path.write_text(FILE.replace(old, new))
+    with pytest.raises(InputError, match=words):
+        file_for(str(path))
+
+
+def test_a_scene_without_a_file() -> None:
+    """A scene for which nobody wrote axes gives advice instead of an empty map."""
+    with pytest.raises(InputError, match="comparisons"):
+        file_for("inclined_plane")
