@@ -7,6 +7,7 @@ from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
+import pyperf
 import pytest
 
 from proofroll.studies import installed
@@ -152,8 +153,8 @@ def test_curves_of_another_version_are_not_answered_from(
     assert "--measure" in err
 
 
-def test_tradeoff(proofroll: Proofroll, tmp_path: Path) -> None:
-    """The command draws the diagram, prints tables within 100 columns, and does not store a part of the engines."""
+def test_tradeoff_and_then_recommend(proofroll: Proofroll, tmp_path: Path) -> None:
+    """Tables fit 100 columns, the diagram and pyperf's file are written, and an answer comes from what was measured."""
     given = ["--set", "speed=3", "--until", "0.2", "--engine", ENGINE, "--out", str(tmp_path)]
     code, out, err = proofroll("tradeoff", "sphere_in_cylinder", *given)
     assert (code, err) == (0, "")
@@ -162,7 +163,15 @@ def test_tradeoff(proofroll: Proofroll, tmp_path: Path) -> None:
     assert "order (declared)" in out
     (drawn,) = (tmp_path / "tradeoff").glob("*.svg")
     assert "exudyn generic matched" in drawn.read_text()
-    assert not list((tmp_path / "tradeoff").glob("*.json"))
+    (timings,) = (tmp_path / "tradeoff").glob("*.pyperf.json")
+    assert len(pyperf.BenchmarkSuite.load(str(timings)).get_benchmarks()) >= 6
+
+    code, out, err = proofroll("recommend", "sphere_in_cylinder", "--tolerance", "1 %", *given)
+    assert (code, err) == (0, "")
+    assert "use exudyn generic matched" in out
+    code, _, err = proofroll("recommend", "sphere_in_cylinder", "--tolerance", "1 %", *given[:4], *given[-2:])
+    assert code == 2
+    assert "no curves are stored" in err
 
 
 @pytest.mark.parametrize(

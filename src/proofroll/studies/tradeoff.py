@@ -210,13 +210,14 @@ def pareto_entries(
     return entries
 
 
-def key(question: Question) -> str:
-    """Name of the file in which the study of a question is stored."""
+def stored(folder: Path, question: Question, engines: Iterable[str] = ()) -> Path:
+    """Where the study of a question is stored under the folder of results.
+
+    Args:
+        folder: of all results.
+        question: what was swept.
+        engines: those to which it was restricted; such a study has a file of its own.
+    """
     scene = question.loaded()
-    identity = json.dumps([scene.digest, question.until], sort_keys=True)
-    return f"{scene.name}-{hashlib.sha256(identity.encode()).hexdigest()[:10]}"
-
-
-def stored(folder: Path, question: Question) -> Path:
-    """Where the study of a question is stored under the folder of results."""
-    return folder / "tradeoff" / f"{key(question)}.json"
+    identity = json.dumps([scene.digest, question.until, *sorted(engines)])
+    return folder / "tradeoff" / f"{scene.name}-{hashlib.sha256(identity.encode()).hexdigest()[:10]}.json"
