@@ -1,4 +1,4 @@
-"""The command ``proofroll``, also as ``python -m proofroll``: so small that Ctrl-C finds it ready while the rest loads."""
+"""The command ``proofroll``; small, so that Ctrl-C finds it ready while the rest loads."""
 
 import sys
 

@@ -99,6 +99,8 @@ class Runner:
         self.jobs = jobs or os.cpu_count() or 1
         self.fresh = fresh
         self.reused = 0
+        self.damaged: set[str] = set()
+        """Keys of the cases that were run again because what was stored is not what had been put there."""
         self._workers: set[Worker] = set()
         self._stopping = threading.Event()
 
@@ -111,6 +113,8 @@ class Runner:
             stored = None if self.fresh else self.store.get(case)
             if stored is None:
                 waiting.append(case)
+                if not self.fresh and self.store.has(case):
+                    self.damaged.add(case.key)
                 continue
             self.reused += 1
             results[case.key] = stored
@@ -127,6 +131,8 @@ class Runner:
                 if isinstance(item, Exception):
                     raise item
                 case, result = item
+                if case.key in self.damaged:
+                    result = dataclasses.replace(result, message=f"{result.message}; what was stored was damaged")
                 results[case.key] = result
                 if progress:
                     progress(case, result)

@@ -77,6 +77,10 @@ class Store:
         finally:
             shutil.rmtree(place, ignore_errors=True)  # a process that ended while it wrote leaves a half
 
+    def has(self, case: Case) -> bool:
+        """Whether there is a record of the case, sound or not."""
+        return (self.folder / f"{case.key}.json").exists()
+
     def put(self, case: Case, result: Result, written: Path | None = None) -> Result:
         """Keeps a result, with its trajectory, if any, from the file ``written``; None: it is in place already.
 

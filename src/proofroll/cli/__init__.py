@@ -13,6 +13,7 @@ import typer
 import proofroll
 from proofroll.cli.common import ENGINE, INTERRUPTED, OK, USAGE, complain
 from proofroll.cli.comparing import compare, regimes, report
+from proofroll.cli.drill import drill
 from proofroll.cli.listing import engines, scenes
 from proofroll.cli.single import onset, run
 from proofroll.errors import InputError, Missing, ProofrollError
@@ -25,6 +26,7 @@ app = typer.Typer(
 )
 for _command in (scenes, engines, run, compare, report, onset, regimes):
     app.command()(_command)
+app.add_typer(drill, name="drill")
 
 
 @app.callback(invoke_without_command=True)
