@@ -183,6 +183,9 @@ class Runner:
                 result = _ask(worker, case, written)
             except InputError as error:  # a step that does not divide the grid, say: this case's own affair
                 result = Result(Status.REFUSED, str(error), versions={case.engine.name: case.engine.version})
+            except WorkerDied as error:  # where the disk is full the name for a while means nothing to a person
+                said = str(error).replace(str(written.absolute()), str(self.store.trajectory(case)))
+                raise WorkerDied(error.status, said) from None
             return self.store.put(case, result, written)
 
     def _drop(self, worker: Worker) -> None:

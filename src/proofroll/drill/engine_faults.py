@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import dataclasses
 import json
 import shutil
 from collections.abc import Callable, Mapping
@@ -68,21 +69,22 @@ def drill_engine(site: Site, sound: Path, fault: EngineFault) -> Drilled:
     folder = site.folder / fault.formulation
     shutil.copytree(sound, folder)
     before = contents(folder)
-    limit = HANG if fault.status is Status.TIMEOUT else site.case("well", BEFORE).time_limit
-    faulty = site.case(fault.formulation, BEFORE, limit)
-    beside = [site.case("well", speed) for speed in BESIDE]
-    results = Runner(Store(folder), jobs=1, memory=_MEMORY).run([beside[0], faulty, *beside[1:], *_sound_cases(site)])
+    faulty = site.case(fault.formulation, BEFORE[0])
+    if fault.status is Status.TIMEOUT:
+        faulty = dataclasses.replace(faulty, time_limit=HANG)
+    beside, there = [site.case("well", speed) for speed in BESIDE], _sound_cases(site)
+    results = Runner(Store(folder), jobs=1, memory=_MEMORY).run([beside[0], faulty, *beside[1:], *there])
     found = results[faulty.key]
     after, left, alive = contents(folder), scraps(folder), site.alive(fault.formulation)
     site.cure(fault.formulation)
-    cases = [*_sound_cases(site), *beside, site.case(fault.formulation, BEFORE)]
+    cases = [*there, *beside, site.case(fault.formulation, BEFORE[0])]
     rerun = Runner(Store(folder), jobs=1, memory=_MEMORY).run(cases)
     lasting = fault.status in LASTING
     return drilled(
         fault.name,
         found.message,
         expected=fault.words,
-        others=[results[case.key].status is Status.DONE for case in (*_sound_cases(site), *beside)],
+        others=[results[case.key].status is Status.DONE for case in (*there, *beside)],
         before=before,
         after=after,
         again=contents(folder),
@@ -104,7 +106,7 @@ def prepare(site: Site) -> Path:
 
 
 def _sound_cases(site: Site) -> list[Case]:
-    return [site.case("well", BEFORE)]
+    return [site.case("well", speed) for speed in BEFORE]
 
 
 def _cut(path: Path) -> None:
@@ -136,8 +138,8 @@ def drill_damage(site: Site, sound: Path, name: str) -> Drilled:
     """Damages one stored result of two, and runs both again."""
     folder = site.folder / name.replace(" ", "_")
     shutil.copytree(sound, folder)
-    damaged, cases = site.case("well", BESIDE[0]), [*_sound_cases(site), site.case("well", BESIDE[0])]
-    Runner(Store(folder), jobs=1).run(cases)
+    cases = _sound_cases(site)
+    damaged = cases[0]
     suffix, damage = DAMAGES[name]
     damage(folder / f"{damaged.key}{suffix}")
     sound_ones = {key: content for key, content in contents(folder).items() if key != damaged.key}
@@ -148,7 +150,7 @@ def drill_damage(site: Site, sound: Path, name: str) -> Drilled:
         name,
         found.message,
         expected="what was stored was damaged",
-        others=[results[case.key].status is Status.DONE for case in _sound_cases(site)],
+        others=[results[case.key].status is Status.DONE for case in cases[1:]],
         before=sound_ones,
         after=sound_ones,
         again=contents(folder),

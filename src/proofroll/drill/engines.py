@@ -106,6 +106,7 @@ DEEDS: Mapping[str, tuple[str, Callable[[], None]]] = {
     "nan": ("nan", lambda: None),
     "wrong_shape": ("shape", lambda: None),
     "hangs": ("advance", _hangs),
+    "waits_for_ctrl_c": ("advance", _hangs),
     "allocates": ("advance", _allocates),
     "segfaults": ("advance", _segfaults),
     "aborts": ("advance", _aborts),

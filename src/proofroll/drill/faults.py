@@ -24,7 +24,7 @@ def fault_drill(progress: Callable[[str], None] | None = None) -> list[Drilled]:
         first = pool.submit(command_faults.prepare, here)
         sound = engine_faults.prepare(here)
         compared = first.result()
-        # The longest first. A comparison hangs on purpose only before the engine's own hang, which is cured at its end.
+        # The longest first.
         drills: list[Callable[[], Drilled]] = [
             partial(command_faults.drill_interrupt, here, compared),
             partial(command_faults.drill_full_disk, here, compared),

@@ -19,8 +19,8 @@ from proofroll.runner import resolve
 from proofroll.scene_file import load_scene
 
 SCENE = "sphere_in_cylinder"
-# The speed of the result that is there before anything goes wrong, and those of the cases beside the fault [m/s].
-BEFORE = 3.0
+# Speeds of the results that are there before anything goes wrong, and of the cases beside the fault [m/s].
+BEFORE = (2.0, 3.0)
 BESIDE = (4.0, 5.0)
 _UNTIL, _EVERY = 0.1, 0.05
 # A hang is ended after this [s]; elsewhere the limit must only be longer than any machine takes to start a worker.
@@ -64,11 +64,14 @@ class Site:
         digest = load_scene(SCENE, speed=speed).digest
         return Case(SCENE, {"speed": speed}, digest, self.facts[formulation], _UNTIL, _EVERY, time_limit=time_limit)
 
-    def claim(self, name: str, formulations: Sequence[str], speeds: Sequence[float]) -> Path:
-        """A comparison file with these rows and points."""
+    def claim(self, name: str, speeds: Sequence[float], faulty: str = "") -> Path:
+        """A comparison file of the sound engine at these speeds, and of a fault at the last."""
         text = _CLAIM.format(scene=SCENE, until=_UNTIL, every=_EVERY, speeds=list(speeds))
         path = self.folder / f"{name}.toml"
-        path.write_text(text + "".join(_ROW.format(formulation=item) for item in formulations), encoding="utf-8")
+        text += _ROW.format(formulation="well")
+        if faulty:
+            text += _ROW.format(formulation=faulty) + f"only = {{ speed = [{speeds[-1]}] }}\n"
+        path.write_text(text, encoding="utf-8")
         return path
 
     def cure(self, formulation: str) -> None:
