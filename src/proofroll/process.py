@@ -33,7 +33,7 @@ _KEPT = 4096
 # Reads that empty the pipe, which holds 64 kB, even where each finds only a line.
 _DRAUGHTS = 64
 # An answer is a record of a few kB; what is longer without an end is none [bytes].
-_LONGEST_ANSWER = 1 << 24
+_LONGEST_ANSWER = 1 << 22
 
 _living: set[Worker] = set()
 
