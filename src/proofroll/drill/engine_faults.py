@@ -142,7 +142,8 @@ def drill_damage(site: Site, sound: Path, name: str) -> Drilled:
     damaged = cases[0]
     suffix, damage = DAMAGES[name]
     damage(folder / f"{damaged.key}{suffix}")
-    sound_ones = {key: content for key, content in contents(folder).items() if key != damaged.key}
+    sound_ones = contents(folder)
+    spoilt = sound_ones.pop(damaged.key)
     runner = Runner(Store(folder), jobs=1)
     results = runner.run(cases)
     found = results[damaged.key]
@@ -153,7 +154,7 @@ def drill_damage(site: Site, sound: Path, name: str) -> Drilled:
         others=[results[case.key].status is Status.DONE for case in cases[1:]],
         before=sound_ones,
         after=sound_ones,
-        again=contents(folder),
+        again={key: content for key, content in contents(folder).items() if content != spoilt},
         missing=1,
         problems={
             f"the case ended as {found.status.value}": found.status is not Status.DONE,
