@@ -16,7 +16,7 @@ from pathlib import Path
 from proofroll.errors import InputError
 
 VARIABLE = "PROOFROLL_MEMORY"
-# Ten times what the hungriest of our own engines needs, start-up included.
+# More than ten times what the hungriest of our own engines needs: the truth with slip has 0.23 GB at most.
 _USUAL_GB = 4.0
 # One engine must leave a small machine to the others.
 _SHARE = 0.5

@@ -17,14 +17,14 @@ from typing import Any, Self
 
 from proofroll.case import Status
 from proofroll.errors import ProofrollError
-from proofroll.memory import descendants, memory_limit, resident_gb
+from proofroll.memory import VARIABLE, descendants, memory_limit, resident_gb
 
 # One thread per worker, set before anything is imported there: workers run side by side.
 _ONE_THREAD = dict.fromkeys(
     ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS", "NUMEXPR_NUM_THREADS", "VECLIB_MAXIMUM_THREADS"),
     "1",
 )
-# How often memory and life are looked at [s]: a look costs some 20 µs, and memory fills at some GB/s.
+# How often memory and life are looked at [s]: a look costs less than 0.1 ms, and memory fills at some GB/s.
 _TICK = 0.1
 # How long a process that has closed its answers may take to end, with threads and exit handlers of its own [s].
 _GRACE = 5.0
@@ -138,7 +138,8 @@ class Worker:
     def _watch_memory(self) -> None:
         if resident_gb(self._process.pid) > self._memory:
             self.kill()
-            raise WorkerDied(Status.CRASHED, f"needed more than {self._memory:g} GB of memory; it was ended")
+            said = f"needed more than {self._memory:g} GB of memory and was ended; {VARIABLE} allows more"
+            raise WorkerDied(Status.CRASHED, said)
 
     def _listen(self, seconds: float) -> list[int]:
         """Waits for answers or words, keeps the end of the words, and gives what there was."""

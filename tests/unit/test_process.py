@@ -141,7 +141,7 @@ def test_a_flood_does_not_outlast_the_limit(pretend: Pretend) -> None:
 def test_too_much_memory(pretend: Pretend) -> None:
     """A worker whose memory grows is ended, and the sentence says how much it was allowed."""
     pretend("hoard = []\nwhile True:\n    hoard.append(b'x' * 10_000_000)\n    time.sleep(0.01)")
-    assert str(died(memory=0.2)) == "needed more than 0.2 GB of memory; it was ended"
+    assert str(died(memory=0.2)) == "needed more than 0.2 GB of memory and was ended; PROOFROLL_MEMORY allows more"
 
 
 def test_address_space_is_not_memory(pretend: Pretend) -> None:

@@ -6,7 +6,7 @@ import typer
 
 from proofroll.cli.common import CONTRADICTED, OK, Json, progress_bar, write_json
 
-drill = typer.Typer(help="Do on purpose what must not break anything.", no_args_is_help=True, rich_markup_mode=None)
+drill = typer.Typer(help="Do on purpose what must not break anything.", rich_markup_mode=None)
 
 
 @drill.callback()
