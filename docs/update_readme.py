@@ -17,7 +17,8 @@ from proofroll.report.markdown import verdict_table
 from proofroll.report.regime_map import draw as draw_regimes
 from proofroll.runner import Runner
 from proofroll.store import Store
-from proofroll.studies.compare import Outcome, compare, point_name
+from proofroll.studies.compare import Outcome, compare
+from proofroll.studies.planning import point_name
 from proofroll.studies.regimes import regime_maps
 from proofroll.trajectory import read
 

@@ -6,14 +6,11 @@ import json
 import os
 import subprocess
 import sys
-from collections.abc import Callable, Mapping
+from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
 import pytest
-from hostile import ENTRY_POINTS
-
-from proofroll import cli
 
 RUN = ["run", "sphere_in_cylinder", "--engine", "oracle", "--until", "0.1", "--every", "0.05"]
 KEYS = {
@@ -25,29 +22,6 @@ FINAL = {
 }  # fmt: skip
 
 Proofroll = Callable[..., tuple[int, str, str]]
-
-
-@pytest.fixture
-def proofroll(
-    monkeypatch: pytest.MonkeyPatch,
-    capfd: pytest.CaptureFixture[str],
-    install_engines: Callable[[Mapping[str, str]], None],
-) -> Proofroll:
-    """Runs the command line in this process; exit code, standard output, standard error."""
-    install_engines(ENTRY_POINTS | {"broken": "broken:Broken"})
-    monkeypatch.setenv("COLUMNS", "100")
-
-    def run(*arguments: str) -> tuple[int, str, str]:
-        monkeypatch.setattr(sys, "argv", ["proofroll", *arguments])
-        capfd.readouterr()
-        with pytest.raises(SystemExit) as ended:
-            cli.main()
-        captured = capfd.readouterr()
-        code = ended.value.code
-        assert isinstance(code, int)
-        return code, captured.out, captured.err
-
-    return run
 
 
 def with_option(name: str, value: str) -> list[str]:

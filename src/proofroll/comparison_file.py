@@ -23,8 +23,17 @@ _LADDER_RUNGS = 3
 
 
 def comparison_names() -> list[str]:
-    """Names of all comparisons, sorted."""
-    return sorted(path.stem for path in data_folder("comparisons").glob("*.toml"))
+    """Names of all comparisons, sorted; files of other studies say which with ``study = "…"``."""
+    return sorted(path.stem for path in data_folder("comparisons").glob("*.toml") if not _other_study(path))
+
+
+def _other_study(path: Path) -> str | None:
+    """Name of the study that a file is for, if it is no comparison; a broken file is reported when it is read."""
+    try:
+        study = tomllib.loads(path.read_text(encoding="utf-8")).get("study")
+    except (OSError, ValueError):
+        return None
+    return None if study is None else str(study)
 
 
 def load_comparison(name: str) -> Comparison:
@@ -51,6 +60,9 @@ def load_comparison(name: str) -> Comparison:
         raise InputError(str(path), "TOML", f"the file is broken: {error}") from None
     except OSError as error:
         raise InputError(str(path), "TOML", f"the file cannot be read: {error.strerror}") from None
+    if "study" in content:
+        advice = f"this file is for another command: proofroll {content['study']} {content.get('scene', '')}".strip()
+        raise InputError(str(path), f"study = {content['study']!r}", advice)
     return _comparison(path, content)
 
 

@@ -9,11 +9,10 @@ import numpy as np
 
 from proofroll.surfaces import FloatArray
 
-# An observed order this near to an integer is that integer.
-_NEAR = 0.25
-
 # A ladder is asymptotic if its observed order is the scheme's to this much.
 _ASYMPTOTIC = 0.1
+# Orders among which the observed one is looked for
+_ORDERS = (1e-3, 20.0)
 # Differences that shrink more slowly than this say nothing about a limit.
 _NO_CONVERGENCE = 0.25
 
@@ -34,8 +33,8 @@ class Limit:
     order: float
 
 
-def richardson(curves: Sequence[FloatArray], ratio: float, declared: int | None = None) -> Limit:
-    """Extrapolates three curves computed with steps h ratio², h ratio and h (coarse first).
+def richardson(curves: Sequence[FloatArray], steps: Sequence[float], declared: int | None = None) -> Limit:
+    """Extrapolates three curves computed with three steps, coarse first.
 
     The observed order p follows from the size of the two differences (Roache 1998, section 5.9). Where it is that of
     the scheme the ladder is asymptotic: the extrapolation removes the term h^p, then h^(p+1), and is trusted to twice
@@ -44,30 +43,60 @@ def richardson(curves: Sequence[FloatArray], ratio: float, declared: int | None 
 
     Args:
         curves: three arrays of one shape.
-        ratio: of neighbouring steps, above 1.
+        steps: their steps, falling; only the ratios matter.
         declared: order of the scheme; None: the nearest integer to the observed one.
     """
     coarse, middle, fine = curves
-    first, last = _size(middle - coarse), _size(fine - middle)
+    h = np.asarray(steps, dtype=np.float64) / steps[-1]
+    first, last = size(middle - coarse), size(fine - middle)
     if last == 0:
         return Limit(fine, 0.0, float("nan"))
-    order = float(np.log(first / last) / np.log(ratio)) if first > 0 else float("nan")
+    order = observed_order(first, last, h)
     if not np.isfinite(order) or order < _NO_CONVERGENCE:
         # The finest curve, as uncertain as the largest change seen.
         return Limit(fine, max(first, last), float("nan"))
     power = declared or max(1, round(order))
     if abs(order - power) > _ASYMPTOTIC:
-        return Limit(fine, 2 * last * max(1.0, 1 / (ratio**order - 1)), order)
-    gain = ratio**power - 1
-    before, after = middle + (middle - coarse) / gain, fine + (fine - middle) / gain
-    values = after + (after - before) / (ratio ** (power + 1) - 1)
-    return Limit(values, 2 * _size(values - after), order)
+        return Limit(fine, 2 * last * max(1.0, 1 / (h[1] ** order - 1)), order)
+    before = middle + (middle - coarse) / ((h[0] / h[1]) ** power - 1)
+    after = fine + (fine - middle) / (h[1] ** power - 1)
+    # What the two extrapolations keep of the term h^(p+1)
+    kept = [_kept(h[0], h[1], power), _kept(h[1], h[2], power)]
+    values = after + (after - before) * kept[1] / (kept[0] - kept[1])
+    return Limit(values, 2 * size(values - after), order)
+
+
+def observed_order(first: float, last: float, steps: Sequence[float] | FloatArray) -> float:
+    """The p with which h1^p - h2^p stands to h2^p - h3^p as the two differences do; NaN if there is none in (0, 20].
+
+    Args:
+        first: size of the difference between the coarse and the middle curve.
+        last: of that between the middle and the fine one.
+        steps: the three steps h1 > h2 > h3.
+    """
+    from scipy.optimize import brentq
+
+    if not (first > 0 and last > 0):
+        return float("nan")
+    h1, h2, h3 = (float(step) / float(steps[-1]) for step in steps)
+
+    def excess(p: float) -> float:
+        return float(np.log((h1**p - h2**p) / (h2**p - h3**p)) - np.log(first / last))
+
+    low, high = _ORDERS
+    return float(brentq(excess, low, high)) if excess(low) < 0 < excess(high) else float("nan")
+
+
+def _kept(coarse: float, fine: float, power: int) -> float:
+    """What extrapolating from two steps leaves of a term h^(p+1), as its factor."""
+    return float(fine ** (power + 1) - (coarse ** (power + 1) - fine ** (power + 1)) / ((coarse / fine) ** power - 1))
 
 
 def tightest(curves: Sequence[FloatArray]) -> Limit:
     """Limit of an adaptive method: its tightest curve, as uncertain as the last tightening changed it."""
-    return Limit(curves[-1], _size(curves[-1] - curves[-2]), float("nan"))
+    return Limit(curves[-1], size(curves[-1] - curves[-2]), float("nan"))
 
 
-def _size(values: FloatArray) -> float:
+def size(values: FloatArray) -> float:
+    """Largest magnitude of a curve."""
     return float(np.max(np.abs(values)))

@@ -107,6 +107,7 @@ def describe(engine: str) -> dict[str, Any]:
         "version": kind.version(),
         "provides": sorted(kind.provides),
         "presets": presets,
+        "levels": {formulation: str(level) for formulation, level in getattr(kind, "levels", {}).items()},
         "summary": (inspect.getdoc(kind) or "").split("\n", 1)[0],
     }
 

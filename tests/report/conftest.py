@@ -18,7 +18,8 @@ from proofroll.metrics import observables, scales
 from proofroll.report.html import write_report
 from proofroll.scene_file import load_scene
 from proofroll.store import Store
-from proofroll.studies.compare import Outcome, Run, point_name
+from proofroll.studies.compare import Outcome, Run
+from proofroll.studies.planning import point_name
 from proofroll.trajectory import write
 from proofroll.truth import truth
 

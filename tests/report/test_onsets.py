@@ -27,7 +27,8 @@ from proofroll.report.scores import scores
 from proofroll.report.terminal import closing_lines, console, verdict_table
 from proofroll.scene_file import load_scene
 from proofroll.store import Store
-from proofroll.studies.compare import Outcome, Run, point_name
+from proofroll.studies.compare import Outcome, Run
+from proofroll.studies.planning import point_name
 from proofroll.trajectory import write
 from proofroll.truth import truth
 from proofroll.truth.onset import onset

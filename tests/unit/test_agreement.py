@@ -19,7 +19,7 @@ def verdict_of(error: float, limit: Limit | None = None, *, bar: float = 1e-12, 
 
 def ladder(power: float, offset: float = 0.0) -> Limit:
     """The limit of curves of some order, the finest off by 0.01."""
-    return richardson([TRUE + offset + 0.01 * h**power * (1 + 0.01 * h) for h in (4, 2, 1)], 2.0)
+    return richardson([TRUE + offset + 0.01 * h**power * (1 + 0.01 * h) for h in (4, 2, 1)], (4, 2, 1))
 
 
 def test_agrees_within_tolerance() -> None:

@@ -16,6 +16,7 @@ from proofroll.cli.comparing import compare, regimes, report
 from proofroll.cli.drill import drill
 from proofroll.cli.listing import engines, scenes
 from proofroll.cli.single import onset, run
+from proofroll.cli.tradeoff import recommend, tradeoff
 from proofroll.errors import InputError, Missing, ProofrollError
 
 app = typer.Typer(
@@ -24,7 +25,7 @@ app = typer.Typer(
     pretty_exceptions_enable=False,
     rich_markup_mode=None,
 )
-for _command in (scenes, engines, run, compare, report, onset, regimes):
+for _command in (scenes, engines, run, compare, report, onset, regimes, tradeoff, recommend):
     app.command()(_command)
 app.add_typer(drill, name="drill")
 

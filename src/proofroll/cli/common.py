@@ -79,7 +79,7 @@ def spinner(text: str) -> Any:
 
 def write_json(content: object) -> None:
     """One JSON document on standard output."""
-    from proofroll.report.content import plain
+    from proofroll.plain import plain
 
     sys.stdout.write(json.dumps(plain(content), indent=1, ensure_ascii=False) + "\n")
 

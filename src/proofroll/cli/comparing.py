@@ -111,7 +111,8 @@ def regimes(
 
 def _outcomes(comparisons: list[Any], engines: list[str], runner: Runner) -> list[Outcome]:
     """Runs all comparisons with one progress bar."""
-    from proofroll.studies.compare import evaluate, plan
+    from proofroll.studies.compare import evaluate
+    from proofroll.studies.planning import plan
 
     plans = [plan(comparison, engines) for comparison in comparisons]
     cases = {case.key: case for item in plans for case in item.cases}

@@ -3,28 +3,17 @@
 from __future__ import annotations
 
 import dataclasses
-import math
 import platform
 from typing import Any
 
 import proofroll
 from proofroll.agreement import Judgement, Verdict
 from proofroll.case import Status
+from proofroll.plain import plain
 from proofroll.registry import parse_engine
-from proofroll.studies.compare import Outcome, Run, point_name
-
-
-def plain(value: Any) -> Any:
-    """The value with everything that JSON cannot hold replaced: numbers that are not finite become None."""
-    if isinstance(value, dict):
-        return {str(key): plain(item) for key, item in value.items()}
-    if isinstance(value, (list, tuple)):
-        return [plain(item) for item in value]
-    if isinstance(value, float):
-        return value if math.isfinite(value) else None
-    if hasattr(value, "item"):  # a numpy number
-        return plain(value.item())
-    return value
+from proofroll.studies.compare import Outcome, Run
+from proofroll.studies.planning import point_name
+from proofroll.timing import machine
 
 
 def outcome_content(outcome: Outcome) -> dict[str, Any]:
@@ -69,19 +58,12 @@ def by_row(outcome: Outcome) -> dict[int, list[Run]]:
 
 def environment(command: str, versions: dict[str, str]) -> dict[str, Any]:
     """Where and with what the report was made."""
+    facts = machine()
     return {
         "command": command,
-        "machine": f"{platform.machine()} {platform.system()}, {_processor()}",
+        "machine": f"{facts['system']}, {facts['processor']}",
         "versions": {"proofroll": proofroll.__version__, "python": platform.python_version(), **versions},
     }
-
-
-def _processor() -> str:
-    try:
-        with open("/proc/cpuinfo", encoding="utf-8") as lines:
-            return next(line.split(":", 1)[1].strip() for line in lines if line.startswith("model name"))
-    except (OSError, StopIteration):
-        return platform.processor() or "unknown processor"
 
 
 def _tolerance(value: float, relative: bool) -> str:

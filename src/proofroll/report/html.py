@@ -8,8 +8,9 @@ from datetime import UTC, datetime
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
+from proofroll.plain import plain
 from proofroll.report import labels, onset_tables, tables
-from proofroll.report.content import environment, outcome_content, plain
+from proofroll.report.content import environment, outcome_content
 from proofroll.report.findings import findings
 from proofroll.report.onsets import add_events, mark, truth_facts
 from proofroll.report.plots import point_curves, styles

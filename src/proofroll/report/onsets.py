@@ -7,7 +7,7 @@ import json
 from typing import TYPE_CHECKING, Any
 
 from proofroll.events import Event, events_of
-from proofroll.report.content import plain
+from proofroll.plain import plain
 from proofroll.report.plots import stored
 from proofroll.studies.onset import onset_verdict as judged_onset
 from proofroll.truth.onset import Onset

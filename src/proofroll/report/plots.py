@@ -11,7 +11,8 @@ import numpy.typing
 from proofroll.metrics import scales
 from proofroll.report.labels import symbol, unit
 from proofroll.scene_file import load_scene
-from proofroll.studies.compare import Outcome, Run, point_name
+from proofroll.studies.compare import Outcome, Run
+from proofroll.studies.planning import point_name
 from proofroll.surfaces import FloatArray
 from proofroll.trajectory import read
 

@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from proofroll.files import replacing
-from proofroll.report.content import plain
+from proofroll.plain import plain
 from proofroll.truth.regimes import Regime
 
 if TYPE_CHECKING:

@@ -3,8 +3,6 @@
 from __future__ import annotations
 
 import dataclasses
-import itertools
-import json
 from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass, field
 from typing import TYPE_CHECKING
@@ -15,15 +13,12 @@ from proofroll.agreement import Judgement, Verdict, judge
 from proofroll.case import LASTING, Case, EngineFacts, Result, Status
 from proofroll.comparison import Band, Comparison, Row
 from proofroll.convergence import Limit, richardson, tightest
-from proofroll.errors import InputError, Missing, ProofrollError
-from proofroll.events import events_of
-from proofroll.metrics import Observable, observables, scales
-from proofroll.registry import parse_engine
-from proofroll.runner import Runner, WorkerDied, resolve
-from proofroll.scene import Scene
+from proofroll.errors import Missing, ProofrollError
+from proofroll.metrics import Observable
+from proofroll.runner import Runner, WorkerDied
 from proofroll.scene_file import load_scene
-from proofroll.studies.points import settled
-from proofroll.surfaces import FloatArray
+from proofroll.studies.planning import Plan, Planned, plan, point_name
+from proofroll.studies.reference import OF_EVENTS, Reference
 from proofroll.trajectory import read
 
 if TYPE_CHECKING:
@@ -86,125 +81,15 @@ class Outcome:
         return [run for run in lost if Verdict.FAILED not in run.row.expected(run.parameters)]
 
 
-def point_name(parameters: dict[str, float]) -> str:
-    """A point of the parameters as text, e.g. ``speed=4, rolling_resistance=0.0005``."""
-    return ", ".join(f"{key}={value:.12g}" for key, value in parameters.items())
-
-
-# Observables that hang on when slip begins.
-_OF_EVENTS = frozenset({"first_slip", "event_order", "event_times"})
 # Observables that are judged even where the time of slip is ill-posed: they hold on every path.
 _EVERYWHERE = frozenset({"energy_balance", "force_audit", "gap", "creep"})
-
-
-@dataclass(frozen=True)
-class Planned:
-    """A run with the cases of its ladder by their factor on the step; the run's own case has the factor 1."""
-
-    row: Row
-    parameters: dict[str, float]
-    facts: EngineFacts | ProofrollError
-    ladder: dict[float, Case] = field(default_factory=dict)
-
-
-@dataclass(frozen=True)
-class Plan:
-    """The cases of a comparison: to be run together with those of others, then judged."""
-
-    comparison: Comparison
-    truths: dict[str, Case]
-    runs: list[Planned]
-
-    @property
-    def cases(self) -> list[Case]:
-        """Every case once or more; the runner runs equal ones once."""
-        return [*self.truths.values(), *(case for run in self.runs for case in run.ladder.values())]
-
-
-def plan(comparison: Comparison, engines: Iterable[str] = ()) -> Plan:
-    """The cases of a comparison.
-
-    Args:
-        comparison: from :func:`proofroll.comparison_file.load_comparison`.
-        engines: names of engines to which it is restricted; all if empty.
-
-    Raises:
-        InputError: an engine or setting that does not exist.
-    """
-    comparison = settled(comparison)
-    chosen = set(engines)
-    rows = [row for row in comparison.rows if not chosen or parse_engine(row.engine).name in chosen]
-    if not rows:
-        known = ", ".join(dict.fromkeys(parse_engine(row.engine).name for row in comparison.rows))
-        raise InputError("engine", ", ".join(chosen), f"{comparison.name} compares {known}")
-    specs = [parse_engine(row.engine) for row in rows]
-    resolved = resolve([(spec.name, spec.options) for spec in specs] + [("truth", {})])
-    truth_facts = resolved.pop()
-    if not isinstance(truth_facts, EngineFacts):
-        raise truth_facts
-    rungs = _rungs(rows, resolved)
-    truths: dict[str, Case] = {}
-    runs: list[Planned] = []
-    for row, facts, ladder_facts in zip(rows, resolved, rungs, strict=True):
-        if isinstance(facts, InputError):
-            raise facts
-        for point in comparison.variations(row):
-            scene = load_scene(comparison.scene, **point)
-            truths.setdefault(point_name(point), _case(comparison, scene, point, truth_facts))
-            if not isinstance(facts, EngineFacts):
-                runs.append(Planned(row, point, facts))
-                continue
-            ladder = {
-                factor: _case(comparison, scene, point, rung, timed=comparison.timed and factor == 1)
-                for factor, rung in ladder_facts.items()
-            }
-            runs.append(Planned(row, point, facts, ladder))
-    return Plan(comparison, truths, runs)
-
-
-def _rungs(rows: list[Row], resolved: list[EngineFacts | ProofrollError]) -> list[dict[float, EngineFacts]]:
-    """For every row the facts of its ladder: its own settings with the resolution scaled, where that is allowed."""
-    wanted: list[tuple[int, float, EngineFacts]] = []
-    for index, (row, facts) in enumerate(zip(rows, resolved, strict=True)):
-        if isinstance(facts, EngineFacts) and facts.resolution is not None:
-            wanted += [(index, factor, facts) for factor in row.ladder if factor != 1]
-    scaled = [
-        (facts.name, {**facts.settings, facts.resolution: facts.settings[facts.resolution] * _scaled(facts, factor)})
-        for _, factor, facts in wanted
-        if facts.resolution is not None
-    ]
-    ladders = [{1.0: facts} if isinstance(facts, EngineFacts) else {} for facts in resolved]
-    for (index, factor, _), found in zip(wanted, resolve(scaled), strict=True):
-        if isinstance(found, EngineFacts):
-            ladders[index][factor] = found
-    return ladders
-
-
-def _scaled(facts: EngineFacts, factor: float) -> float:
-    """Factor on the resolution: a tolerance is loosened by decades where a step is doubled."""
-    return factor if facts.resolution == "dt" else float(10 ** np.log2(factor))
-
-
-def _case(
-    comparison: Comparison, scene: Scene, point: dict[str, float], facts: EngineFacts, timed: bool = False
-) -> Case:
-    return Case(
-        scene=comparison.scene,
-        parameters=point,
-        scene_digest=scene.digest,
-        engine=facts,
-        until=comparison.until,
-        every=comparison.every,
-        timed=timed,
-        time_limit=comparison.time_limit,
-    )
 
 
 def evaluate(planned: Plan, results: dict[str, Result], runner: Runner) -> Outcome:
     """Judges the results of a plan's cases."""
     comparison = planned.comparison
     judged: list[Run] = []
-    references: dict[str, _Reference] = {}
+    references: dict[str, Reference] = {}
     for run in planned.runs:
         if isinstance(run.facts, ProofrollError):
             judged.append(_absent(run))
@@ -222,7 +107,8 @@ def evaluate(planned: Plan, results: dict[str, Result], runner: Runner) -> Outco
             judged.append(_failed(run, run.facts, nothing))
             continue
         if name not in references:
-            references[name] = _reference(comparison, run.parameters, planned.truths[name], runner)
+            scene = load_scene(comparison.scene, **run.parameters)
+            references[name] = Reference.read(scene, runner.store.trajectory(planned.truths[name]))
         trajectories = {
             factor: read(runner.store.trajectory(case))
             for factor, case in run.ladder.items()
@@ -245,43 +131,6 @@ def compare(
     return evaluate(planned, runner.run(planned.cases, progress), runner)
 
 
-@dataclass(frozen=True)
-class _Reference:
-    """The truth at one point of the parameters, with everything derived from it."""
-
-    scene: Scene
-    dataset: xr.Dataset
-    curves: dict[str, Observable]
-    sizes: dict[str, float]
-
-    @property
-    def ill_posed(self) -> bool:
-        """Whether the time of the first slip hangs on less than the parameters are known to."""
-        onset = json.loads(self.dataset.attrs.get("onset", "{}"))
-        return bool(onset.get("verdict") == "ill-posed")
-
-    def true(self, name: str, curve: Observable) -> tuple[FloatArray, float]:
-        """The true values of an observable, and their error bar."""
-        if name == "event_order":
-            return np.zeros(1), 0.0
-        values = self.curves[name].values
-        if name in _OF_EVENTS:
-            events = events_of(self.dataset)
-            return values, max((event.time_high - event.time_low for event in events), default=0.0)
-        if name == "slip" and "sticking" in self.dataset:
-            return values, float(np.hypot(*(self.dataset[f"slip{i}"].attrs["error_bar"] for i in (2, 3))))
-        if name not in self.dataset or name == "gap":
-            # Zero for a perfect run: what is left on the truth is what the measurement itself cannot resolve.
-            return np.zeros_like(curve.values), float(np.max(np.abs(values), initial=0.0))
-        return values, float(self.dataset[name].attrs["error_bar"])
-
-
-def _reference(comparison: Comparison, point: dict[str, float], case: Case, runner: Runner) -> _Reference:
-    scene = load_scene(comparison.scene, **point)
-    dataset = read(runner.store.trajectory(case))
-    return _Reference(scene, dataset, observables(scene.rolling, dataset), scales(scene.rolling, dataset))
-
-
 def _absent(run: Planned) -> Run:
     """A row whose engine could not even be asked."""
     assert isinstance(run.facts, ProofrollError)  # the caller looked
@@ -300,13 +149,10 @@ def _failed(run: Planned, facts: EngineFacts, result: Result) -> Run:
 
 
 def _judgements(
-    run: Planned, band: Band, reference: _Reference, trajectories: dict[float, xr.Dataset]
+    run: Planned, band: Band, reference: Reference, trajectories: dict[float, xr.Dataset]
 ) -> list[Judgement]:
-    body = reference.scene.rolling
-    curves = {factor: observables(body, dataset) for factor, dataset in trajectories.items()}
+    curves = {factor: reference.observed(dataset) for factor, dataset in trajectories.items()}
     main = curves[1.0]
-    if "sticking" in trajectories[1.0]:
-        main["event_order"] = _event_order(trajectories[1.0], reference.dataset)
     judgements = []
     for name, curve in main.items():
         tolerance = run.row.bound.get(name) or band.bounds.get(name)
@@ -324,16 +170,10 @@ def _judgements(
             limit=_limit(run, name, curves),
             ill_posed=reference.ill_posed and name not in _EVERYWHERE,
         )
-        if reference.ill_posed and name in _OF_EVENTS:
+        if reference.ill_posed and name in OF_EVENTS:
             judgement = dataclasses.replace(judgement, verdict=Verdict.ILL_POSED)  # agreement would be luck
         judgements.append(judgement)
     return judgements
-
-
-def _event_order(dataset: xr.Dataset, truth: xr.Dataset) -> Observable:
-    """How many of the events are of another kind than the truth's, or missing, or too many."""
-    kinds = itertools.zip_longest(*([event.kind for event in events_of(item)] for item in (dataset, truth)))
-    return Observable("event_order", "events", np.array([float(sum(a != b for a, b in kinds))]))
 
 
 def _limit(run: Planned, name: str, curves: dict[float, dict[str, Observable]]) -> Limit | None:
@@ -347,7 +187,7 @@ def _limit(run: Planned, name: str, curves: dict[float, dict[str, Observable]]) 
     assert isinstance(run.facts, EngineFacts)  # there are curves
     if run.facts.resolution != "dt":
         return tightest(values)
-    return richardson(values, run.row.ladder[0] / run.row.ladder[1], run.facts.order)
+    return richardson(values, run.row.ladder, run.facts.order)
 
 
 def _contradictions(comparison: Comparison, run: Planned, judgements: list[Judgement]) -> list[str]:

@@ -20,7 +20,8 @@ from proofroll.scene import Capability, Scene
 from proofroll.scene_file import load_scene
 from proofroll.simulation import simulate
 from proofroll.store import Store
-from proofroll.studies.compare import Outcome, Plan, Planned, compare, evaluate, point_name
+from proofroll.studies.compare import Outcome, compare, evaluate
+from proofroll.studies.planning import Plan, Planned, point_name
 from proofroll.trajectory import write
 from proofroll.truth import truth
 from proofroll.truth.onset import onset

@@ -1,0 +1,252 @@
+"""Speed against accuracy: the curves, and the recommendation made from them."""
+
+from __future__ import annotations
+
+import json
+import sys
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated, Any
+
+import typer
+
+from proofroll.cli.common import (
+    CONTRADICTED,
+    OK,
+    Fresh,
+    Jobs,
+    Json,
+    Out,
+    Set,
+    assignments,
+    complain,
+    new_runner,
+    progress_bar,
+    write_json,
+)
+from proofroll.errors import InputError
+
+if TYPE_CHECKING:
+    from proofroll.studies.claims import TradeoffClaims
+    from proofroll.studies.sweep import Question
+
+_SceneOrFile = Annotated[
+    str, typer.Argument(help="A scene, or a comparison file for it, e.g. comparisons/tradeoff.toml.")
+]
+_Until = Annotated[float | None, typer.Option("--until", help="Length of every run [s].")]
+_DEFAULT_UNTIL = 2.0
+
+
+def tradeoff(
+    scene: _SceneOrFile,
+    quantity: Annotated[
+        list[str] | None, typer.Option(help="Observable to show; repeat. The first decides how far curves go.")
+    ] = None,
+    settings: Set = None,
+    engine: Annotated[
+        list[str] | None, typer.Option(help="Engine, or name[key=value,…]; repeat. All by default.")
+    ] = None,
+    over: Annotated[
+        list[str] | None, typer.Option(help="parameter=low:high over which the best points are checked; repeat.")
+    ] = None,
+    until: _Until = None,
+    every_point: Annotated[bool, typer.Option("--all", help="List every point, not only the best.")] = False,
+    out: Out = Path("out"),
+    fresh: Fresh = False,
+    jobs: Jobs = None,
+    as_json: Json = False,
+) -> None:
+    """Measure error against cost for every engine, formulation and setting, from coarse to fine."""
+    from proofroll.report.tradeoff_tables import budget_lines, budget_table, point_table
+    from proofroll.report.work_precision import draw
+    from proofroll.studies.tradeoff import stored
+
+    claims, question = _question(scene, settings, quantity, until)
+    ranges = _ranges(over) if over is not None else (claims.over if claims else {})
+    study = _measure(question, engine or [], ranges, out, fresh=fresh, jobs=jobs)
+    contradictions = claims.contradictions(study) if claims and not engine else []
+    study["claims"] = {"file": claims.name if claims else None, "contradictions": contradictions}
+    path = stored(out, question)
+    shown = [name for name in quantity or [] if name in study["quantities"]] or default_quantities(study)
+    draw(study, shown, path.with_suffix(".svg"))
+    if as_json:
+        write_json(study)
+    else:
+        from proofroll.report.terminal import console
+
+        terminal = console()
+        by_id = {point["id"]: point for point in study["points"]}
+        points = study["points"] if every_point else [by_id[number] for number in study["pareto"][shown[0]]]
+        title = (
+            "Every point" if every_point else f"The Pareto front for {shown[0]}: nothing is cheaper and more accurate"
+        )
+        terminal.print(point_table(study, points, shown, title))
+        terminal.print()
+        terminal.print(budget_table(study, shown[0]))
+        terminal.print()
+        for line in [*(budget_lines(study, shown[0]) if every_point else ()), *study["findings"]]:
+            terminal.print(line, markup=False)
+        for name, reason in study["absent"].items():
+            terminal.print(f"{name}: {reason}", markup=False)
+        for line in contradictions:
+            terminal.print(f"!! {line}", markup=False)
+        terminal.print(f"The diagram is in {path.with_suffix('.svg')}, everything in {path}.", markup=False)
+    raise typer.Exit(CONTRADICTED if contradictions else OK)
+
+
+def recommend(
+    scene: _SceneOrFile,
+    quantity: Annotated[str, typer.Option(help="Observable that matters.")] = "",
+    tolerance: Annotated[
+        str, typer.Option(help="Largest error: 1e-3 in its unit, '1e-3 m', or '1 %' of its scale.")
+    ] = "",
+    budget: Annotated[float | None, typer.Option(help="Wall seconds per simulated second that you can afford.")] = None,
+    settings: Set = None,
+    engine: Annotated[
+        list[str] | None, typer.Option(help="Choose among these engines, name[key=value,…]; repeat.")
+    ] = None,
+    until: _Until = None,
+    measure: Annotated[bool, typer.Option("--measure", help="Measure first if no curves are stored.")] = False,
+    out: Out = Path("out"),
+    jobs: Jobs = None,
+    as_json: Json = False,
+) -> None:
+    """Name the cheapest engine, formulation and step that holds a tolerance here, and why."""
+    from proofroll.report.tradeoff_tables import answer_lines
+    from proofroll.studies.recommend import Wish
+    from proofroll.studies.recommend import recommend as answered
+
+    claims, question = _question(scene, settings, [quantity] if quantity else None, until)
+    study = _stored_study(question, claims, out, jobs, measure=measure)
+    asked = quantity or study["quantity"]
+    unit = study["quantities"].get(asked, {}).get("unit", "1")
+    wish = Wish(asked, _tolerance(tolerance, unit), _positive("budget", budget), tuple(engine or ()))
+    answer = answered(study, wish)
+    if as_json:
+        write_json(answer)
+    else:
+        from proofroll.report.terminal import console
+
+        for line in answer_lines(answer):
+            console().print(line, markup=False)
+    raise typer.Exit(OK if answer["choice"] and answer["affordable"] else CONTRADICTED)
+
+
+def default_quantities(study: dict[str, Any]) -> list[str]:
+    """Path, reaction, onset and energy, as far as the scene has them."""
+    wanted = [study["quantity"], "N", "F3", "first_slip", "energy_balance"]
+    return [name for name in dict.fromkeys(wanted) if name in study["quantities"]][:4]
+
+
+def _question(
+    scene: str, settings: list[str] | None, quantities: list[str] | None, until: float | None
+) -> tuple[TradeoffClaims | None, Question]:
+    """What is asked: the file's own question, or another about its scene, for which the file then claims nothing."""
+    from proofroll.recording import time_grid
+    from proofroll.scene_file import load_scene
+    from proofroll.studies.claims import claims_for, load_claims
+    from proofroll.studies.sweep import Question
+
+    path = Path(scene)
+    claims = load_claims(path) if path.suffix == ".toml" else claims_for(scene)
+    name = claims.scene if claims else scene
+    given = dict(assignments(settings or []))
+    if claims and not given and until is None:
+        quantity = quantities[0] if quantities else claims.quantity
+        return claims, Question(name, claims.parameters, claims.until, quantity)
+    loaded = load_scene(name, **given)  # type: ignore[arg-type]  # text is checked and converted there
+    length = _DEFAULT_UNTIL if until is None else until
+    time_grid(length, length or 1.0)
+    if length <= 0:
+        raise InputError("until", length, "give a positive time in s")
+    quantity = quantities[0] if quantities else loaded.rolling.surface.coordinates[-1]
+    return None, Question(name, {key: loaded.parameters[key] for key in given}, length, quantity)
+
+
+def _ranges(texts: list[str]) -> dict[str, list[float]]:
+    """Reads ``parameter=low:high``."""
+    found = {}
+    for name, text in assignments(texts).items():
+        try:
+            found[name] = [float(part) for part in text.split(":")]
+        except ValueError:
+            raise InputError(f"over: {name}", text, "write parameter=low:high in SI units") from None
+    return found
+
+
+def _tolerance(text: str, unit: str) -> Any:
+    from proofroll.comparison import Tolerance
+
+    if not text:
+        raise InputError("tolerance", text, "give the largest error that you can bear, e.g. --tolerance 1e-3")
+    words = text.replace("%", " %").split()
+    tolerance = Tolerance.parse("tolerance", " ".join(words if len(words) > 1 else [*words, unit]))
+    if not tolerance.relative and tolerance.unit != unit:
+        raise InputError("tolerance", text, f"the unit of this quantity is {unit}")
+    return tolerance
+
+
+def _positive(name: str, value: float | None) -> float | None:
+    if value is not None and not 0 < value < float("inf"):
+        raise InputError(name, value, "give a positive number of seconds")
+    return value
+
+
+def _stored_study(
+    question: Question, claims: TradeoffClaims | None, out: Path, jobs: int | None, *, measure: bool
+) -> dict[str, Any]:
+    """The stored curves, or new ones if the user agrees.
+
+    Raises:
+        InputError: there are none that hold here, and nobody agreed to measure them.
+    """
+    from proofroll.studies import installed
+    from proofroll.studies.tradeoff import stored
+
+    path = stored(out, question)
+    reasons = ["no curves are stored for this question"]
+    try:
+        study: dict[str, Any] = json.loads(path.read_text(encoding="utf-8"))
+        reasons = installed.changes(study["measured"])
+    except (OSError, ValueError, KeyError, TypeError):
+        pass
+    if not reasons:
+        return study
+    why = "; ".join(reasons[:3]) + (f"; and {len(reasons) - 3} more" if len(reasons) > 3 else "")
+    if not measure and sys.stdin.isatty() and sys.stderr.isatty():
+        measure = typer.confirm(f"{why}. Measure now (some minutes)?", err=True)
+    if not measure:
+        raise InputError(
+            "stored curves", why, "add --measure, which takes some minutes, or run proofroll tradeoff first"
+        )
+    complain(f"measuring first: {why}")
+    return _measure(question, [], claims.over if claims else {}, out, fresh=False, jobs=jobs)
+
+
+def _measure(
+    question: Question,
+    engines: list[str],
+    over: dict[str, list[float]],
+    out: Path,
+    *,
+    fresh: bool,
+    jobs: int | None,
+) -> dict[str, Any]:
+    """Measures, and stores what a recommendation can be made from: the curves of all engines."""
+    from proofroll.store import write_text
+    from proofroll.studies.tradeoff import stored
+    from proofroll.studies.tradeoff import tradeoff as measured
+    from proofroll.studies.tradeoff_content import content
+    from proofroll.timing import write_benchmarks
+
+    runner = new_runner(out, fresh, jobs)
+    with progress_bar("runs and timings") as advance:
+        found = measured(question, runner, engines=engines, over=over, progress=advance)
+    study = content(found)
+    path = stored(out, question)
+    if not engines:
+        write_text(path, json.dumps(study))
+        names = {point.case.key: f"{curve.engine} {point.step:g}" for curve in found.curves for point in curve.points}
+        write_benchmarks(
+            {names[key]: timing for key, timing in found.timings.items()}, path.with_suffix(".pyperf.json")
+        )
+    return study

@@ -1,0 +1,149 @@
+"""A trade-off and a recommendation on the terminal, within 100 columns."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Mapping, Sequence
+from typing import Any
+
+from rich.table import Table
+from rich.text import Text
+
+from proofroll.report.labels import error, number
+
+
+def name_of(point: Mapping[str, Any]) -> str:
+    """Engine, formulation and preset of a point."""
+    settings = point["settings"]
+    return " ".join(filter(None, (point["engine"], settings.get("formulation"), settings.get("preset"))))
+
+
+def step_of(point: Mapping[str, Any]) -> str:
+    """Its step or tolerance."""
+    if point["step"] is None:
+        return ""
+    return f"{point['resolution']} {number(point['step'])}" + (" s" if point["resolution"] == "dt" else "")
+
+
+def cost_of(point: Mapping[str, Any]) -> str:
+    """Seconds per second, and how far the interval of 95 % goes to either side at most."""
+    if point["interval"] is None:
+        return "–"
+    cost = point["seconds_per_second"]
+    spread = max(point["interval"][1] - cost, cost - point["interval"][0]) / cost
+    return f"{number(cost)} ±{100 * spread:.0f}%"
+
+
+def point_table(
+    study: Mapping[str, Any], points: Sequence[Mapping[str, Any]], quantities: Sequence[str], title: str
+) -> Table:
+    """One line per point: what it costs, and its error in each quantity."""
+    table = Table(title=Text(title), title_justify="left", box=None, padding=(0, 1, 0, 0))
+    for column in ("engine formulation setting", "step", "cost s/s"):
+        table.add_column(column, no_wrap=True)
+    for name in quantities:
+        unit = study["quantities"][name]["unit"]
+        table.add_column(Text(f"{_SHORT.get(name, name)} [{unit}]"), justify="right", no_wrap=True)
+    for point in points:
+        shown = [error(point["error"].get(name)) if name in point["error"] else "–" for name in quantities]
+        if point["status"] != "done":
+            shown = [str(point["status"]), *[""] * (len(quantities) - 1)]
+        table.add_row(Text(name_of(point)), step_of(point), cost_of(point), *shown)
+    return table
+
+
+def budget_table(study: Mapping[str, Any], quantity: str) -> Table:
+    """For every curve, what its error consists of and what dominates at either end."""
+    unit = study["quantities"][quantity]["unit"]
+    title = f"What the error of {quantity} consists of [{unit}]: the coarse end, then the fine end"
+    table = Table(title=Text(title), title_justify="left", box=None, padding=(0, 1, 0, 0))
+    table.add_column("engine formulation setting", no_wrap=True)
+    table.add_column("order (declared)", no_wrap=True)
+    for column in ("limit off", "known to", "floor"):
+        table.add_column(column, justify="right", no_wrap=True)
+    table.add_column("dominated by", no_wrap=True)
+    first = {point["curve"]: point for point in study["points"]}
+    for item in study["budgets"]:
+        if item["quantity"] != quantity:
+            continue
+        limit = (item["model_form"], item["model_form_bar"], item["floor"])
+        ends = [_DOMINANT.get(item[end], item[end]) for end in ("coarse", "fine")]
+        table.add_row(
+            Text(name_of(first[item["curve"]])),
+            Text(_order(item), style="yellow" if item["contradicts_declaration"] else ""),
+            *(number(value) for value in limit),
+            " → ".join(dict.fromkeys(ends)),
+        )
+    return table
+
+
+# Names that fit a column.
+_SHORT = {"energy_balance": "energy", "needed_friction": "needed", "force_audit": "audit"}
+_DOMINANT = {
+    "time step": "step",
+    "model form": "model",
+    "round-off or solver tolerance": "floor",
+    "truth's own error bar": "truth",
+    "too few runs reached the end": "too few runs",
+}
+
+
+def _order(item: Mapping[str, Any]) -> str:
+    declared = "" if item["declared"] is None else f" ({item['declared']})"
+    if item["order"] is None:
+        return f"–{declared}"
+    if item["order_low"] is None:
+        return f"{item['order']:.2f}{declared}"
+    return f"{item['order']:.2f} ±{(item['order_high'] - item['order_low']) / 2:.2f}{declared}"
+
+
+def budget_lines(study: Mapping[str, Any], quantity: str) -> Iterator[str]:
+    """The same as sentences."""
+    for item in study["budgets"]:
+        if item["quantity"] == quantity:
+            yield f"{item['curve']}: {item['sentence']}"
+
+
+def answer_lines(answer: Mapping[str, Any]) -> Iterator[str]:
+    """A recommendation, line by line."""
+    asked = f"{answer['quantity']} to {number(answer['tolerance'])} {answer['unit']}"
+    choice = answer["choice"]
+    if choice is None:
+        yield f"Nothing that was measured holds {asked} with margin."
+        if answer.get("closest"):
+            yield f"Closest: {_line(answer['closest'], answer)}"
+    else:
+        yield f"For {asked}, use {_line(choice, answer)}"
+        if not answer["affordable"]:
+            yield f"That is more than the budget of {number(answer['budget'])} s per simulated second."
+    for key, words in (
+        ("best_within_budget", "Within the budget"),
+        ("runner_up", "Runner-up"),
+        ("first_failure", "Cheaper ones fail; the most accurate of them"),
+        ("least_model", "If this scene is all you need, its own equations do"),
+    ):
+        if answer[key]:
+            yield f"{words}: {_line(answer[key], answer)}"
+    yield _checked(answer)
+    yield _measured(answer["measured"])
+
+
+def _line(point: Mapping[str, Any], answer: Mapping[str, Any]) -> str:
+    return (
+        f"{name_of(point)}, {step_of(point)}: error {error(point['error'])} {answer['unit']}, "
+        f"cost {cost_of(point)} s/s; {point['reason']}."
+    )
+
+
+def _checked(answer: Mapping[str, Any]) -> str:
+    checked = answer["checked"]
+    at = ", ".join(f"{name} = {value:g}" for name, value in answer["parameters"].items()) or "the default parameters"
+    over = [f"{name} {low:g} to {high:g}" for name, (low, high) in checked["parameters"].items()]
+    said = f"Checked over {checked['until']:g} s at {at}"
+    if over:
+        said += f", and at {checked['corners']} corners of {', '.join(over)}"
+    return said + "; nothing is known beyond."
+
+
+def _measured(measured: Mapping[str, Any]) -> str:
+    machine = measured["machine"]
+    return f"Measured {measured['when']} on {machine['processor']} ({machine['cores']} cores, {machine['system']})."

@@ -1,0 +1,120 @@
+"""The work–precision diagram: error against cost, with the Pareto front and the truth as the limit."""
+
+from __future__ import annotations
+
+import io
+import math
+from collections.abc import Mapping, Sequence
+from pathlib import Path
+from typing import Any
+
+from proofroll.errors import Missing
+from proofroll.files import replacing
+from proofroll.report.labels import symbol
+from proofroll.report.labels import unit as shown_unit
+
+# One colour per engine, one dash and marker per formulation: a curve is told apart without colour too.
+_COLOURS = ("#3b6fb6", "#c9622f", "#3f8f5b", "#8b5fa8", "#b08a1e", "#5b6770", "#b8476b", "#2a8f9c")
+_DASHES = ("-", "--", "-.", ":")
+_MARKERS = "osD^vPX*"
+# Errors below this are round-off of every double; a logarithm needs a number.
+_SMALLEST = 1e-17
+
+
+def draw(study: Mapping[str, Any], quantities: Sequence[str], path: Path) -> None:
+    """Writes the diagram as an SVG file, one panel per quantity.
+
+    Raises:
+        Missing: matplotlib is not installed.
+    """
+    text = svg(study, quantities)
+    with replacing(path) as temporary:
+        temporary.write_text(text, encoding="utf-8")
+
+
+def svg(study: Mapping[str, Any], quantities: Sequence[str]) -> str:
+    """The diagram as SVG text.
+
+    Raises:
+        Missing: matplotlib is not installed.
+    """
+    try:
+        import matplotlib as mpl
+        from matplotlib.figure import Figure
+    except ModuleNotFoundError:
+        raise Missing("matplotlib is not installed: pip install 'proofroll[report]'") from None
+    columns = min(2, len(quantities))
+    rows = math.ceil(len(quantities) / columns)
+    with mpl.rc_context({"svg.hashsalt": "proofroll", "font.size": 9}):
+        figure = Figure(figsize=(5.2 * columns + 2.6, 3.9 * rows + 0.4), layout="constrained")
+        panels = figure.subplots(rows, columns, squeeze=False).ravel()
+        for panel, quantity in zip(panels, quantities, strict=False):
+            _panel(panel, study, quantity)
+        for panel in panels[len(quantities) :]:
+            panel.set_visible(False)
+        handles, labels = panels[0].get_legend_handles_labels()
+        figure.legend(handles, labels, loc="outside right upper", frameon=False, fontsize=7)
+        out = io.StringIO()
+        figure.savefig(out, format="svg", metadata={"Date": None})
+    return out.getvalue()
+
+
+def _panel(panel: Any, study: Mapping[str, Any], quantity: str) -> None:
+    facts = study["quantities"][quantity]
+    curves: dict[str, list[Mapping[str, Any]]] = {}
+    for point in study["points"]:
+        if point["seconds_per_second"] is not None and point["error"].get(quantity) is not None:
+            curves.setdefault(point["curve"], []).append(point)
+    engines = list(dict.fromkeys(point["engine"] for point in study["points"]))
+    seen: dict[str, list[str]] = {}
+    for name, points in curves.items():
+        engine, formulation = points[0]["engine"], str(points[0]["settings"].get("formulation", ""))
+        preset = str(points[0]["settings"].get("preset", ""))
+        styles = seen.setdefault(engine, [])
+        if formulation not in styles:
+            styles.append(formulation)
+        index = styles.index(formulation)
+        panel.plot(
+            [point["seconds_per_second"] for point in points],
+            [max(point["error"][quantity], _SMALLEST) for point in points],
+            color=_COLOURS[engines.index(engine) % len(_COLOURS)],
+            linestyle=_DASHES[index % len(_DASHES)],
+            marker=_MARKERS[index % len(_MARKERS)],
+            markersize=3,
+            markerfacecolor="none" if preset == "default" else None,
+            linewidth=1.6 if preset == "tuned" else 1.0,
+            alpha=0.9,
+            label=" ".join(filter(None, (engine, formulation, preset))) or name,
+        )
+    _front(panel, study, quantity)
+    bar = facts["truth_error_bar"]
+    if bar:
+        panel.axhspan(_SMALLEST, bar, color="0.88", lw=0, zorder=0)
+    cost = study["truth"]["seconds_per_second"]
+    if cost and bar:
+        panel.plot([cost], [bar], marker="*", color="black", markersize=9, linestyle="", label="truth (its error bar)")
+    unit = shown_unit(facts["unit"])
+    panel.set(
+        xscale="log",
+        yscale="log",
+        xlabel="cost [wall seconds per simulated second]",
+        ylabel=f"largest error of {symbol(quantity)}" + (f" [{unit}]" if unit else ""),
+    )
+    panel.grid(which="major", color="0.9", lw=0.6)
+
+
+def _front(panel: Any, study: Mapping[str, Any], quantity: str) -> None:
+    """The Pareto front as a staircase: what is left of it and below it nobody has."""
+    by_id = {point["id"]: point for point in study["points"]}
+    chosen = [by_id[number] for number in study["pareto"].get(quantity, [])]
+    if chosen:
+        panel.step(
+            [point["seconds_per_second"] for point in chosen],
+            [max(point["envelope"][quantity], _SMALLEST) for point in chosen],
+            where="post",
+            color="black",
+            lw=3,
+            alpha=0.25,
+            zorder=0.5,
+            label="Pareto front",
+        )

@@ -1,0 +1,125 @@
+"""The cases of a comparison: every row at every point of its parameters, with its ladder of steps."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+from dataclasses import dataclass, field
+
+import numpy as np
+
+from proofroll.case import Case, EngineFacts
+from proofroll.comparison import Comparison, Row
+from proofroll.errors import InputError, ProofrollError
+from proofroll.registry import parse_engine
+from proofroll.runner import resolve
+from proofroll.scene import Scene
+from proofroll.scene_file import load_scene
+from proofroll.studies.points import settled
+
+
+def point_name(parameters: dict[str, float]) -> str:
+    """A point of the parameters as text, e.g. ``speed=4, rolling_resistance=0.0005``."""
+    return ", ".join(f"{key}={value:.12g}" for key, value in parameters.items())
+
+
+@dataclass(frozen=True)
+class Planned:
+    """A run with the cases of its ladder by their factor on the step; the run's own case has the factor 1."""
+
+    row: Row
+    parameters: dict[str, float]
+    facts: EngineFacts | ProofrollError
+    ladder: dict[float, Case] = field(default_factory=dict)
+
+
+@dataclass(frozen=True)
+class Plan:
+    """The cases of a comparison: to be run together with those of others, then judged."""
+
+    comparison: Comparison
+    truths: dict[str, Case]
+    runs: list[Planned]
+
+    @property
+    def cases(self) -> list[Case]:
+        """Every case once or more; the runner runs equal ones once."""
+        return [*self.truths.values(), *(case for run in self.runs for case in run.ladder.values())]
+
+
+def plan(comparison: Comparison, engines: Iterable[str] = ()) -> Plan:
+    """The cases of a comparison.
+
+    Args:
+        comparison: from :func:`proofroll.comparison_file.load_comparison`.
+        engines: names of engines to which it is restricted; all if empty.
+
+    Raises:
+        InputError: an engine or setting that does not exist.
+    """
+    comparison = settled(comparison)
+    chosen = set(engines)
+    rows = [row for row in comparison.rows if not chosen or parse_engine(row.engine).name in chosen]
+    if not rows:
+        known = ", ".join(dict.fromkeys(parse_engine(row.engine).name for row in comparison.rows))
+        raise InputError("engine", ", ".join(chosen), f"{comparison.name} compares {known}")
+    specs = [parse_engine(row.engine) for row in rows]
+    resolved = resolve([(spec.name, spec.options) for spec in specs] + [("truth", {})])
+    truth_facts = resolved.pop()
+    if not isinstance(truth_facts, EngineFacts):
+        raise truth_facts
+    rungs = _rungs(rows, resolved)
+    truths: dict[str, Case] = {}
+    runs: list[Planned] = []
+    for row, facts, ladder_facts in zip(rows, resolved, rungs, strict=True):
+        if isinstance(facts, InputError):
+            raise facts
+        for point in comparison.variations(row):
+            scene = load_scene(comparison.scene, **point)
+            truths.setdefault(point_name(point), _case(comparison, scene, point, truth_facts))
+            if not isinstance(facts, EngineFacts):
+                runs.append(Planned(row, point, facts))
+                continue
+            ladder = {
+                factor: _case(comparison, scene, point, rung, timed=comparison.timed and factor == 1)
+                for factor, rung in ladder_facts.items()
+            }
+            runs.append(Planned(row, point, facts, ladder))
+    return Plan(comparison, truths, runs)
+
+
+def _rungs(rows: list[Row], resolved: list[EngineFacts | ProofrollError]) -> list[dict[float, EngineFacts]]:
+    """For every row the facts of its ladder: its own settings with the resolution scaled, where that is allowed."""
+    wanted: list[tuple[int, float, EngineFacts]] = []
+    for index, (row, facts) in enumerate(zip(rows, resolved, strict=True)):
+        if isinstance(facts, EngineFacts) and facts.resolution is not None:
+            wanted += [(index, factor, facts) for factor in row.ladder if factor != 1]
+    scaled = [
+        (facts.name, {**facts.settings, facts.resolution: facts.settings[facts.resolution] * _scaled(facts, factor)})
+        for _, factor, facts in wanted
+        if facts.resolution is not None
+    ]
+    ladders = [{1.0: facts} if isinstance(facts, EngineFacts) else {} for facts in resolved]
+    for (index, factor, _), found in zip(wanted, resolve(scaled), strict=True):
+        if isinstance(found, EngineFacts):
+            ladders[index][factor] = found
+    return ladders
+
+
+def _scaled(facts: EngineFacts, factor: float) -> float:
+    """Factor on the resolution: a tolerance is loosened by decades where a step is doubled."""
+    return factor if facts.resolution == "dt" else float(10 ** np.log2(factor))
+
+
+def _case(
+    comparison: Comparison, scene: Scene, point: dict[str, float], facts: EngineFacts, timed: bool = False
+) -> Case:
+    return Case(
+        scene=comparison.scene,
+        parameters=point,
+        scene_digest=scene.digest,
+        engine=facts,
+        until=comparison.until,
+        every=comparison.every,
+        timed=timed,
+        time_limit=comparison.time_limit,
+    )

@@ -1,0 +1,277 @@
+"""Every engine, formulation and preset over its usable range of steps or tolerances, on one scene."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterable, Mapping
+from dataclasses import dataclass, field, replace
+from typing import Any
+
+import numpy as np
+
+from proofroll.case import Case, EngineFacts, Result, Status
+from proofroll.engine import whole_steps
+from proofroll.errors import InputError, ProofrollError
+from proofroll.metrics import Observable
+from proofroll.registry import engine_names, parse_engine
+from proofroll.runner import Runner, describe, resolve
+from proofroll.scene import Scene
+from proofroll.scene_file import load_scene
+from proofroll.studies.reference import Reference
+from proofroll.trajectory import read
+
+# Samples per run. An oscillation of the founding scene's z has a dozen of them, and an adaptive step, which ends at
+# each, is still as long as it likes to be.
+SAMPLES = 40
+# Steps in sampling intervals: those that every curve starts with, and those by which it may be extended.
+_STEPS = (1.0, 1 / 2, 1 / 5, 1 / 10, 1 / 25, 1 / 50, 1 / 100, 1 / 250)
+_COARSER = (2.0, 4.0, 8.0)
+_FINER = (1 / 500, 1 / 1000, 1 / 2500)
+_TOLERANCES = (1e-1, 1e-2, 1e-3, 1e-4, 1e-6, 1e-8, 1e-10, 1e-12)
+# A run is broken where its error is this part of the quantity's scale; a curve starts in the broken range.
+BROKEN = 0.1
+# A curve is refined while that still takes off this part of the error …
+_GAIN = 0.4
+# … and the run is not expected to take longer than this [s].
+_PATIENCE = 4.0
+
+
+@dataclass(frozen=True)
+class Question:
+    """What is swept.
+
+    Attributes:
+        scene: name of the scene.
+        parameters: its parameters that differ from the defaults.
+        until: length of every run [s].
+        quantity: the observable that decides how far the sweep goes.
+    """
+
+    scene: str
+    parameters: dict[str, float]
+    until: float
+    quantity: str
+
+    @property
+    def every(self) -> float:
+        """Sampling interval [s]."""
+        return self.until / SAMPLES
+
+    def loaded(self) -> Scene:
+        """The scene with these parameters."""
+        return load_scene(self.scene, **self.parameters)
+
+
+@dataclass
+class Point:
+    """One engine with complete settings on the scene.
+
+    Attributes:
+        case, result: the run.
+        curves: observables of its trajectory; empty if there is none.
+        errors: largest distance of each from the truth.
+        bars: error bars of the truth, by observable.
+    """
+
+    case: Case
+    result: Result
+    curves: dict[str, Observable] = field(default_factory=dict)
+    errors: dict[str, float] = field(default_factory=dict)
+    bars: dict[str, float] = field(default_factory=dict)
+
+    @property
+    def step(self) -> float:
+        """Value of the setting that trades speed for accuracy."""
+        facts = self.case.engine
+        assert facts.resolution is not None  # see points()
+        return float(facts.settings[facts.resolution])
+
+
+@dataclass
+class Curve:
+    """One engine, formulation and preset over its range.
+
+    Attributes:
+        engine: ``name[formulation=…,preset=…]``.
+        facts: with the preset's own step or tolerance.
+        level: its rung on the ladder of models, or None if the engine does not tell.
+        points: coarse first.
+        dropped: step -> why there is no run with it.
+    """
+
+    engine: str
+    facts: EngineFacts
+    level: str | None
+    points: list[Point] = field(default_factory=list)
+    dropped: dict[float, str] = field(default_factory=dict)
+
+    @property
+    def fixed_step(self) -> bool:
+        """Whether it is swept over steps rather than over tolerances."""
+        return self.facts.resolution == "dt"
+
+
+def curves_of(engines: Iterable[str]) -> tuple[list[Curve], dict[str, str]]:
+    """A curve without points for every formulation and preset of the engines, and why some engine has none.
+
+    Args:
+        engines: names, or ``name[key=value,…]`` for one formulation or setting; all that are installed if empty.
+    """
+    wanted: list[tuple[str, str | None]] = []
+    absent: dict[str, str] = {}
+    for text in list(engines) or engine_names():
+        spec = parse_engine(text)
+        try:
+            described = describe(spec.name)
+        except InputError:
+            raise
+        except ProofrollError as error:
+            absent[spec.name] = str(error)
+            continue
+        levels: Mapping[str, str] = described.get("levels", {})
+        for formulation, presets in described["presets"].items():
+            if spec.options.get("formulation", formulation) != formulation:
+                continue
+            for preset in presets:
+                if spec.options.get("preset", preset) != preset:
+                    continue
+                options = {"formulation": formulation, "preset": preset, **spec.options}
+                inner = ",".join(f"{key}={value}" for key, value in options.items())
+                wanted.append((f"{spec.name}[{inner}]", levels.get(formulation)))
+        if not any(parse_engine(name).name == spec.name for name, _ in wanted):
+            raise InputError("engine", text, f"{spec.name} has {', '.join(described['presets'])}")
+    specs = [parse_engine(name) for name, _ in wanted]
+    curves = []
+    for (name, level), facts in zip(wanted, resolve([(spec.name, spec.options) for spec in specs]), strict=True):
+        if isinstance(facts, InputError):
+            raise facts
+        if isinstance(facts, EngineFacts) and facts.resolution is not None:
+            curves.append(Curve(name, facts, level))
+        else:
+            absent[name] = str(facts) if isinstance(facts, ProofrollError) else "it has no step to vary"
+    return curves, absent
+
+
+Progress = Callable[[Case, Result], None]
+
+
+def sweep(
+    question: Question, curves: list[Curve], runner: Runner, progress: Progress | None = None
+) -> dict[float, Reference]:
+    """Fills the curves with points, and returns the truth by sampling interval.
+
+    Every curve begins with the same steps. It is then extended to coarser ones until it breaks, and to finer ones
+    while they pay.
+    """
+    references: dict[float, Reference] = {}
+    asked: list[set[float]] = [set() for _ in curves]
+    for first in (True, False, False, False):
+        wanted = [
+            (index, value)
+            for index, curve in enumerate(curves)
+            for value in (_first(question, curve) if first else _further(question, curve, references, asked[index]))
+            if value not in asked[index]
+        ]
+        if not wanted:
+            break
+        for index, value in wanted:
+            asked[index].add(value)
+        _run(question, curves, wanted, runner, references, progress)
+    return references
+
+
+def _first(question: Question, curve: Curve) -> list[float]:
+    own = float(curve.facts.settings[str(curve.facts.resolution)])
+    if curve.fixed_step:
+        return [question.every * factor for factor in _STEPS]
+    return [*_TOLERANCES, own]
+
+
+def _further(question: Question, curve: Curve, references: Mapping[float, Reference], asked: set[float]) -> list[float]:
+    """One coarser step if the coarsest is not broken yet, and one finer if that pays."""
+    if not curve.fixed_step or not curve.points:
+        return []
+    found = []
+    scale = references[question.every].sizes.get(question.quantity, 1.0)
+    coarsest, finest = curve.points[0], curve.points[-1]
+    coarser = next((f for f in _COARSER if question.every * f not in asked), None)
+    if coarser is not None and coarsest.errors.get(question.quantity, np.inf) < BROKEN * scale:
+        found.append(question.every * coarser)
+    finer = next((f for f in _FINER if question.every * f not in asked), None)
+    if finer is not None and len(curve.points) > 1:
+        ratio = finest.step / (question.every * finer)
+        now, before = (point.errors.get(question.quantity, np.inf) for point in (finest, curve.points[-2]))
+        if now < (1 - _GAIN) * before and finest.result.wall_seconds * ratio < _PATIENCE:
+            found.append(question.every * finer)
+    return found
+
+
+def _run(
+    question: Question,
+    curves: list[Curve],
+    wanted: list[tuple[int, float]],
+    runner: Runner,
+    references: dict[float, Reference],
+    progress: Progress | None,
+) -> None:
+    scene = question.loaded()
+    options: list[tuple[str, dict[str, Any]]] = []
+    for index, value in wanted:
+        facts = curves[index].facts
+        options.append((facts.name, {**facts.settings, str(facts.resolution): value}))
+    resolved = resolve([*options, ("truth", {})])
+    truth_facts = resolved.pop()
+    if not isinstance(truth_facts, EngineFacts):
+        raise truth_facts
+    cases: list[tuple[int, Case]] = []
+    for (index, value), found in zip(wanted, resolved, strict=True):
+        if not isinstance(found, EngineFacts):
+            curves[index].dropped[value] = str(found)
+            continue
+        facts = found
+        every = max(question.every, value) if facts.resolution == "dt" else question.every
+        try:
+            if facts.resolution == "dt":
+                whole_steps(0.0, question.until, value)
+        except InputError as error:
+            curves[index].dropped[value] = str(error)
+            continue
+        cases.append((index, case_of(question, scene, facts, every)))
+    intervals = {question.every, *(case.every for _, case in cases)} - references.keys()
+    truths = {every: case_of(question, scene, truth_facts, every) for every in intervals}
+    results = runner.run([*truths.values(), *(case for _, case in cases)], progress)
+    for every, case in truths.items():
+        if results[case.key].status != Status.DONE:
+            raise ProofrollError(f"there is no truth here: {results[case.key].message}")
+        references[every] = Reference.read(scene, runner.store.trajectory(case))
+    for index, case in cases:
+        point = judged(Point(case, results[case.key]), references[case.every], runner)
+        curves[index].points.append(point)
+    for curve in curves:
+        curve.points.sort(key=lambda point: -point.step)
+
+
+def case_of(question: Question, scene: Scene, facts: EngineFacts, every: float) -> Case:
+    """One run of the question."""
+    return Case(
+        scene=question.scene,
+        parameters={name: scene.parameters[name] for name in question.parameters},
+        scene_digest=scene.digest,
+        engine=facts,
+        until=question.until,
+        every=every,
+        time_limit=60.0,
+    )
+
+
+def judged(point: Point, reference: Reference, runner: Runner) -> Point:
+    """The point with its observables and their errors, if it has a trajectory that reached the end."""
+    if point.result.status != Status.DONE:
+        return point
+    curves = reference.observed(read(runner.store.trajectory(point.case)))
+    errors, bars = {}, {}
+    for name, curve in curves.items():
+        true, bar = reference.true(name, curve)
+        same = curve.values.shape == true.shape
+        error = float(np.max(np.abs(curve.values - true), initial=0.0)) if same else np.inf
+        errors[name], bars[name] = error if np.isfinite(error) else np.inf, bar
+    return replace(point, curves=curves, errors=errors, bars=bars)

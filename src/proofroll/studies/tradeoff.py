@@ -1,0 +1,222 @@
+"""Speed against accuracy: the curves of all engines, what their errors consist of, and the Pareto front.
+
+Three phases: the sweep, whose runs may go side by side; the check of the best points over a range of the scene's
+parameters; and the timing, in which one process at a time advances an engine while everything else is idle.
+"""
+
+from __future__ import annotations
+
+import dataclasses
+import hashlib
+import itertools
+import json
+from collections.abc import Callable, Iterable, Mapping, Sequence
+from dataclasses import dataclass, field
+from pathlib import Path
+
+import numpy as np
+
+from proofroll.case import Case, Result, Status
+from proofroll.errors import InputError
+from proofroll.metrics import units
+from proofroll.runner import Runner
+from proofroll.stopwatch import Stopwatch
+from proofroll.studies.pareto import envelope, front
+from proofroll.studies.reference import Reference
+from proofroll.studies.sweep import Curve, Point, Question, case_of, curves_of, judged, sweep
+from proofroll.timing import ROUNDS, Timing, interleaved
+
+
+@dataclass(frozen=True)
+class Corner:
+    """One run of a point at other parameters.
+
+    Attributes:
+        parameters: where.
+        errors: largest distance from the truth, by observable; empty if the run did not reach the end.
+        relative: the same in parts of the observable's scale there.
+        message: how the run ended.
+    """
+
+    parameters: dict[str, float]
+    errors: dict[str, float]
+    relative: dict[str, float]
+    message: str
+
+
+@dataclass
+class Tradeoff:
+    """What the study found.
+
+    Attributes:
+        question: what was swept.
+        curves: with their points.
+        absent: engine -> why it has no curve.
+        references: the truth by sampling interval.
+        truth_seconds: wall seconds per simulated second of the truth itself.
+        timings: by the key of a case.
+        corners: by the key of a case: its runs over the range.
+        over: parameter -> values; the range over which the best points were checked.
+    """
+
+    question: Question
+    curves: list[Curve]
+    absent: dict[str, str]
+    references: dict[float, Reference]
+    truth_seconds: float
+    timings: dict[str, Timing] = field(default_factory=dict)
+    corners: dict[str, list[Corner]] = field(default_factory=dict)
+    over: dict[str, list[float]] = field(default_factory=dict)
+
+    @property
+    def reference(self) -> Reference:
+        """The truth at the sampling interval of the question."""
+        return self.references[self.question.every]
+
+    @property
+    def points(self) -> list[Point]:
+        """Every point of every curve."""
+        return [point for curve in self.curves for point in curve.points]
+
+    @property
+    def quantities(self) -> list[str]:
+        """The observables of the truth."""
+        return list(self.reference.curves)
+
+
+Progress = Callable[[str], None]
+
+
+def tradeoff(
+    question: Question,
+    runner: Runner,
+    *,
+    engines: Iterable[str] = (),
+    over: Mapping[str, Sequence[float]] | None = None,
+    rounds: int = ROUNDS,
+    progress: Progress | None = None,
+) -> Tradeoff:
+    """Runs the study.
+
+    Args:
+        question: the scene, how long, and the quantity that decides how far each curve goes.
+        runner: where the cases run.
+        engines: names or ``name[key=value,…]``; all that are installed if empty.
+        over: parameter -> values; every combination is a corner of the range.
+        rounds: how often every speed is measured.
+        progress: called with a short text after every run and every measurement.
+
+    Raises:
+        InputError: something that does not exist, or a quantity that the scene does not have.
+    """
+    scene = question.loaded()
+    known = units(scene.rolling)
+    if question.quantity not in known:
+        raise InputError("quantity", question.quantity, f"there is no such observable; choose from {', '.join(known)}")
+    if question.quantity == "first_slip" and not np.isfinite(scene.rolling.contact.mu_static):
+        raise InputError("quantity", "first_slip", "without bounded friction the ball never slips; --set mu_static=…")
+    curves, absent = curves_of(engines)
+
+    def told(case: Case, _: Result) -> None:
+        if progress:
+            progress(case.engine.name)
+
+    references = sweep(question, curves, runner, told)
+    truth = next(iter(runner.run([_truth_case(question, references)]).values()))
+    found = Tradeoff(question, curves, absent, references, truth.wall_seconds / question.until)
+    found.timings = _timed(found, rounds, progress)
+    if over:
+        found.over = {name: [float(value) for value in values] for name, values in over.items()}
+        found.corners = _checked(found, runner, told)
+    return found
+
+
+def _truth_case(question: Question, references: Mapping[float, Reference]) -> Case:
+    from proofroll.case import EngineFacts
+    from proofroll.runner import resolve
+
+    (facts,) = resolve([("truth", {})])
+    assert isinstance(facts, EngineFacts)  # the sweep has run with it
+    return case_of(question, references[question.every].scene, facts, question.every)
+
+
+def _timed(found: Tradeoff, rounds: int, progress: Progress | None) -> dict[str, Timing]:
+    cases = {point.case.key: point.case for point in found.points if point.result.status == Status.DONE}
+    with Stopwatch() as stopwatch:
+        return interleaved(
+            {key: lambda case=case: stopwatch(case) for key, case in cases.items()},  # type: ignore[misc]
+            rounds,
+            progress=(lambda key: progress(f"timing {cases[key].engine.name}")) if progress else None,
+        )
+
+
+def _checked(found: Tradeoff, runner: Runner, told: Callable[[Case, Result], None]) -> dict[str, list[Corner]]:
+    """Runs the points on any engine's own Pareto front, for any quantity, at every corner of the range."""
+    chosen = {
+        point.case.key: point
+        for name in dict.fromkeys(curve.facts.name for curve in found.curves)
+        for quantity in judged_quantities(found)
+        for point in front(pareto_entries([c for c in found.curves if c.facts.name == name], quantity, found.timings))
+    }
+    base, truth_facts = found.question, _truth_case(found.question, found.references).engine
+    intervals = {point.case.every for point in chosen.values()}
+    places = [dict(zip(found.over, values, strict=True)) for values in itertools.product(*found.over.values())]
+    asked = []
+    for place in places:
+        question = dataclasses.replace(base, parameters={**base.parameters, **place})
+        scene = question.loaded()
+        truths = {every: case_of(question, scene, truth_facts, every) for every in intervals}
+        runs = {key: case_of(question, scene, point.case.engine, point.case.every) for key, point in chosen.items()}
+        asked.append((place, scene, truths, runs))
+    results = runner.run([case for _, _, truths, runs in asked for case in (*truths.values(), *runs.values())], told)
+    corners: dict[str, list[Corner]] = {key: [] for key in chosen}
+    for place, scene, truths, runs in asked:
+        references = {
+            every: Reference.read(scene, runner.store.trajectory(case))
+            for every, case in truths.items()
+            if results[case.key].status == Status.DONE
+        }
+        for key, case in runs.items():
+            if case.every in references:
+                corners[key].append(_corner(place, Point(case, results[case.key]), references[case.every], runner))
+            else:
+                said = results[truths[case.every].key].message
+                corners[key].append(Corner(place, {}, {}, f"there is no truth: {said}"))
+    return corners
+
+
+def _corner(place: dict[str, float], point: Point, reference: Reference, runner: Runner) -> Corner:
+    errors = judged(point, reference, runner).errors
+    relative = {name: error / reference.sizes.get(name, 1.0) for name, error in errors.items()}
+    return Corner(place, errors, relative, point.result.message)
+
+
+def judged_quantities(found: Tradeoff) -> list[str]:
+    """The observables that a recommendation may be asked for."""
+    return [name for name in found.quantities if name not in {"event_times", "event_order", "force_audit"}]
+
+
+def pareto_entries(
+    curves: Iterable[Curve], quantity: str, timings: Mapping[str, Timing]
+) -> list[tuple[Point, float, float]]:
+    """Every timed point with its cost and the envelope of its error, of which the truth shows no more than its bar."""
+    entries = []
+    for curve in curves:
+        held = envelope([point.errors.get(quantity, np.inf) for point in curve.points])
+        for point, error in zip(curve.points, held, strict=True):
+            if point.case.key in timings and np.isfinite(error):
+                seen = max(error, point.bars.get(quantity, 0.0))
+                entries.append((point, timings[point.case.key].interval.value, seen))
+    return entries
+
+
+def key(question: Question) -> str:
+    """Name of the file in which the study of a question is stored."""
+    scene = question.loaded()
+    identity = json.dumps([scene.digest, question.until], sort_keys=True)
+    return f"{scene.name}-{hashlib.sha256(identity.encode()).hexdigest()[:10]}"
+
+
+def stored(folder: Path, question: Question) -> Path:
+    """Where the study of a question is stored under the folder of results."""
+    return folder / "tradeoff" / f"{key(question)}.json"

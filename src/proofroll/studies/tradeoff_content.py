@@ -1,0 +1,146 @@
+"""What a trade-off study found, as plain data: printed by ``--json``, stored, and answered from."""
+
+from __future__ import annotations
+
+import dataclasses
+import datetime
+from collections.abc import Iterable, Sequence
+from typing import Any
+
+import numpy as np
+
+from proofroll.case import Status
+from proofroll.metrics import units
+from proofroll.plain import plain
+from proofroll.studies import installed
+from proofroll.studies.budget import Budget, budget, sentence
+from proofroll.studies.pareto import envelope, front
+from proofroll.studies.sweep import BROKEN, Curve, Point
+from proofroll.studies.tradeoff import Tradeoff, judged_quantities, pareto_entries
+from proofroll.surfaces import FloatArray
+from proofroll.timing import machine
+
+
+def budgets(found: Tradeoff) -> list[tuple[Curve, Budget]]:
+    """The error budget of every curve for every quantity that it has."""
+    every = found.question.every
+    made = []
+    for curve in found.curves:
+        for quantity in found.quantities:
+            shown = [point.curves[quantity] for point in curve.points if quantity in point.curves]
+            if not shown or quantity in {"event_times", "event_order"}:
+                continue
+            true: FloatArray = found.reference.true(quantity, shown[-1])[0]
+            if all(item.values.shape == true.shape for p in curve.points if p.case.every == every
+                   for item in [p.curves.get(quantity)] if item is not None):  # fmt: skip
+                made.append((curve, budget(curve, quantity, every, true)))
+    return made
+
+
+def content(found: Tradeoff) -> dict[str, Any]:
+    """Everything as plain data: what ``--json`` prints, what is stored, and what a recommendation is made from."""
+    reference, known = found.reference, units(found.reference.scene.rolling)
+    numbers = {point.case.key: number for number, point in enumerate(found.points)}
+    made = budgets(found)
+    quantities = {
+        name: {
+            "unit": known.get(name, "1"),
+            "scale": reference.sizes.get(name),
+            "truth_error_bar": reference.true(name, curve)[1],
+        }
+        for name, curve in reference.curves.items()
+    }
+    document = {
+        "study": "tradeoff",
+        "scene": found.question.scene,
+        "parameters": found.question.parameters,
+        "until": found.question.until,
+        "every": found.question.every,
+        "quantity": found.question.quantity,
+        "quantities": quantities,
+        "points": [
+            _point(curve, point, numbers[point.case.key], held, found)
+            for curve in found.curves
+            for point, held in zip(curve.points, _envelopes(curve, quantities), strict=True)
+        ],
+        "dropped": [
+            {"engine": curve.engine, "step": step, "reason": reason}
+            for curve in found.curves
+            for step, reason in curve.dropped.items()
+        ],
+        "absent": found.absent,
+        "budgets": [_budget(curve, item, known.get(item.quantity, "1")) for curve, item in made],
+        "pareto": {
+            name: [numbers[point.case.key] for point in front(pareto_entries(found.curves, name, found.timings))]
+            for name in judged_quantities(found)
+        },
+        "truth": {"seconds_per_second": found.truth_seconds, "route": reference.dataset.attrs.get("route", "")},
+        "over": found.over,
+        "findings": findings(found, made),
+        "measured": {
+            "when": datetime.datetime.now(datetime.UTC).isoformat(timespec="seconds"),
+            "machine": machine(),
+            "versions": installed.versions(),
+            "code": installed.code(),
+        },
+    }
+    return dict(plain(document))
+
+
+def _envelopes(curve: Curve, quantities: Iterable[str]) -> list[dict[str, float]]:
+    by_name = {name: envelope([p.errors.get(name, np.inf) for p in curve.points]) for name in quantities}
+    return [{name: held[index] for name, held in by_name.items()} for index in range(len(curve.points))]
+
+
+def _point(curve: Curve, point: Point, number: int, held: dict[str, float], found: Tradeoff) -> dict[str, Any]:
+    timing = found.timings.get(point.case.key)
+    corners = found.corners.get(point.case.key)
+    facts = point.case.engine
+    return {
+        "id": number,
+        "engine": facts.name,
+        "curve": curve.engine,
+        "level": curve.level,
+        "settings": facts.settings,
+        "resolution": facts.resolution,
+        "step": point.step,
+        "order": facts.order,
+        "status": point.result.status,
+        "message": point.result.message,
+        "error": point.errors,
+        "envelope": {name: value for name, value in held.items() if name in point.errors},
+        "seconds_per_second": timing.interval.value if timing else None,
+        "interval": [timing.interval.low, timing.interval.high] if timing else None,
+        "corners": [dataclasses.asdict(corner) for corner in corners] if corners is not None else None,
+    }
+
+
+def _budget(curve: Curve, found: Budget, unit: str) -> dict[str, Any]:
+    return {
+        "engine": curve.facts.name,
+        "curve": curve.engine,
+        **dataclasses.asdict(found),
+        "contradicts_declaration": found.contradicts_declaration,
+        "sentence": sentence(found, unit, str(curve.facts.resolution)),
+    }
+
+
+def findings(found: Tradeoff, made: Sequence[tuple[Curve, Budget]]) -> list[str]:
+    """What stands out, as sentences."""
+    said = []
+    quantity = found.question.quantity
+    scale = found.reference.sizes.get(quantity, 1.0)
+    for curve, item in made:
+        if item.quantity == quantity and item.contradicts_declaration:
+            said.append(
+                f"{curve.engine} declares order {item.declared}, but {quantity} shows "
+                f"{item.order:.2f} ({item.order_low:.2f} to {item.order_high:.2f})."
+            )
+    done = [point for point in found.points if point.result.status == Status.DONE]
+    broken = [point for point in done if not point.errors.get(quantity, np.inf) < BROKEN * scale]
+    ended = len(found.points) - len(done)
+    said.append(
+        f"{len(found.points)} runs: {ended} did not reach the end and said why; {len(broken)} reached it silently with "
+        f"{quantity} off by more than {BROKEN:.0%} of its range."
+    )
+    return said

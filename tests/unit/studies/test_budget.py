@@ -1,0 +1,109 @@
+"""Error budgets of curves whose parts are known."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from proofroll.case import Case, EngineFacts, Result, Status
+from proofroll.metrics import Observable
+from proofroll.studies.budget import FLOOR, MODEL_FORM, TIME_STEP, TRUTH, Budget, budget, order_of, sentence
+from proofroll.studies.sweep import Curve, Point
+
+T = np.linspace(0, 2, 41)
+TRUE = np.sin(3 * T)
+STEPS = (0.05, 0.025, 0.01, 0.005, 0.002, 0.001)
+
+
+def made(
+    *, order: int, model: float = 0.0, floor: float = 0.0, declared: int = 2, resolution: str = "dt", bar: float = 1e-13
+) -> Budget:
+    """The budget of runs with errors of known parts."""
+    facts = EngineFacts(
+        "made", "1", "0", {"dt": 0.1, "rtol": 0.1}, resolution, declared if resolution == "dt" else None
+    )
+    scatter = np.random.default_rng(1)
+    curve = Curve("made", facts, None)
+    for step in STEPS:
+        own = EngineFacts(facts.name, "1", "0", {resolution: step}, resolution, facts.order)
+        values = TRUE + step**order * np.cos(T) + model * T + floor * scatter.uniform(-1, 1, T.size)
+        error = float(np.max(np.abs(values - TRUE)))
+        case = Case("scene", {}, "0", own, 2.0, 0.05)
+        observed = {"z": Observable("z", "m", values)}
+        curve.points.append(Point(case, Result(Status.DONE, "done"), observed, {"z": error}, {"z": bar}))
+    return budget(curve, "z", 0.05, TRUE)
+
+
+@pytest.mark.parametrize("order", [1, 2, 4])
+def test_order_with_its_interval(order: int) -> None:
+    """The order of the time step is found, its interval holds it, and the declared one is held against it."""
+    found = made(order=order, declared=order)
+    assert found.order == pytest.approx(order, abs=0.02)
+    assert found.order_low is not None
+    assert found.order_high is not None
+    assert found.order_low <= order <= found.order_high
+    assert not found.contradicts_declaration
+    assert made(order=order, declared=order + 1).contradicts_declaration
+    assert found.coarse == found.fine == TIME_STEP
+    assert found.floor is None
+
+
+def test_model_form_is_what_small_steps_leave() -> None:
+    """An error that no step removes is found to its digits, with the uncertainty it is known to, and named."""
+    found = made(order=2, model=3e-3)
+    assert found.model_form == pytest.approx(6e-3, rel=1e-3)
+    assert found.model_form_bar is not None
+    assert found.model_form_bar < 1e-5
+    assert (found.coarse, found.fine) == (MODEL_FORM, MODEL_FORM)
+    assert made(order=1, model=3e-3).coarse == TIME_STEP
+
+
+def test_no_model_form_where_there_is_none() -> None:
+    """Without such an error what is left is below its own uncertainty, and the sentence says so."""
+    found = made(order=2)
+    assert found.model_form is not None
+    assert found.model_form_bar is not None
+    assert found.model_form <= found.model_form_bar + found.truth
+    assert "No error of the model itself is seen" in sentence(found, "m", "dt")
+
+
+def test_floor_where_refining_no_longer_helps() -> None:
+    """Scatter between fine runs is the floor, of its size; an order that shows above it is still found."""
+    found = made(order=4, declared=4, floor=1e-8)
+    assert found.floor is not None
+    assert 3e-9 < found.floor < 1e-7
+    assert found.fine == FLOOR
+    assert found.order == pytest.approx(4, abs=0.1)
+
+
+def test_the_truth_limits_what_can_be_said() -> None:
+    """A fine run that is nearer to the truth than the truth is known is limited by the truth."""
+    assert made(order=2, bar=1e-4).fine == TRUTH
+
+
+def test_an_adaptive_curve_has_no_order() -> None:
+    """Over tolerances no order is claimed, and the sentence speaks of step control."""
+    found = made(order=2, resolution="rtol")
+    assert (found.order, found.order_low, found.declared) == (None, None, None)
+    assert "step control" in sentence(found, "m", "rtol")
+
+
+def test_too_few_runs() -> None:
+    """From fewer than three runs nothing is concluded."""
+    facts = EngineFacts("made", "1", "0", {"dt": 0.1}, "dt", 2)
+    found = budget(Curve("made", facts, None), "z", 0.05, TRUE)
+    assert found.model_form is None
+    assert "oo few runs" in sentence(found, "m", "dt")
+
+
+def test_order_from_two_differences_has_no_interval() -> None:
+    """Two differences fix an order but say nothing about its uncertainty."""
+    order, low, high = order_of([4, 2, 1], [12.0, 3.0])
+    assert order == pytest.approx(2)
+    assert low is None
+    assert high is None
+
+
+def test_differences_that_do_not_shrink_have_no_order() -> None:
+    """Scatter of one size shows no power law."""
+    assert order_of([8, 4, 2, 1], [1.0, 1.1, 1.0]) == (None, None, None)

@@ -1,0 +1,147 @@
+"""Recommendations from measured points."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import pytest
+
+from proofroll.comparison import Tolerance
+from proofroll.errors import InputError
+from proofroll.studies.recommend import Wish, recommend
+
+
+def point(  # noqa: D103 -- one measured point
+    number: int, engine: str, cost: float, error: float | None, *, level: str = "engine constraint", **more: Any
+) -> dict[str, Any]:
+    formulation = more.pop("formulation", "only")
+    return {
+        "id": number,
+        "engine": engine,
+        "curve": f"{engine}[formulation={formulation}]",
+        "level": level,
+        "settings": {"formulation": formulation, "preset": "matched", "dt": 10.0**-number},
+        "resolution": "dt",
+        "step": 10.0**-number,
+        "status": "done",
+        "message": "reached 2 s",
+        "error": {"z": error},
+        "envelope": {"z": error},
+        "seconds_per_second": cost,
+        "interval": [0.9 * cost, 1.1 * cost],
+        "corners": [corner(error)],
+    } | more
+
+
+def corner(error: float | None) -> dict[str, Any]:
+    """One run at other parameters."""
+    errors = {} if error is None else {"z": error}
+    relative = {} if error is None else {"z": error / 0.1}
+    return {"parameters": {"speed": 6.0}, "errors": errors, "relative": relative, "message": "ended at 1 s"}
+
+
+def study(*points: dict[str, Any], **more: Any) -> dict[str, Any]:
+    """What a trade-off study stores."""
+    return {
+        "scene": "made",
+        "parameters": {},
+        "until": 2.0,
+        "quantity": "z",
+        "quantities": {"z": {"unit": "m", "scale": 0.1, "truth_error_bar": 1e-13}},
+        "points": list(points),
+        "budgets": [],
+        "absent": {},
+        "over": {"speed": [2.0, 6.0]},
+        "measured": {"when": "now", "machine": {}, "versions": {}},
+    } | more
+
+
+def wish(value: float, *, relative: bool = False, **more: Any) -> Wish:
+    """An error of z."""
+    return Wish("z", Tolerance(value, relative, "%" if relative else "m"), **more)
+
+
+FAST, MIDDLE, SLOW = point(1, "fast", 1e-3, 1e-2), point(2, "middle", 1e-2, 1e-4), point(3, "slow", 1e-1, 1e-7)
+
+
+def test_the_cheapest_that_holds_with_margin() -> None:
+    """The cheapest whose error is half the tolerance or less is chosen, between a runner-up and a failure."""
+    answer = recommend(study(SLOW, FAST, MIDDLE), wish(1e-3))
+    assert answer["choice"]["engine"] == "middle"
+    assert answer["runner_up"]["engine"] == "slow"
+    assert answer["first_failure"]["engine"] == "fast"
+    assert "off by 0.01 m" in answer["first_failure"]["reason"]
+    assert answer["choice"]["error"] == 1e-4
+    assert answer["choice"]["seconds_per_second"] == 1e-2
+    assert recommend(study(FAST, MIDDLE, SLOW), wish(1.5e-4))["choice"]["engine"] == "slow"
+
+
+def test_a_percentage_is_of_the_scale() -> None:
+    """One percent of a range of 0.1 m is 1 mm."""
+    assert recommend(study(FAST, MIDDLE), wish(0.01, relative=True))["tolerance"] == pytest.approx(1e-3)
+
+
+def test_luck_is_not_believed() -> None:
+    """A coarse run with a small error does not pass while finer runs of the same curve are worse."""
+    lucky = point(1, "fast", 1e-3, 1e-6, envelope={"z": 1e-2})
+    answer = recommend(study(lucky, MIDDLE), wish(1e-3))
+    assert answer["choice"]["engine"] == "middle"
+    assert "luck" in answer["first_failure"]["reason"]
+
+
+@pytest.mark.parametrize(
+    ("corners", "said"),
+    [([corner(2e-3)], "at speed = 6"), ([corner(None)], "ended at 1 s"), (None, "not checked")],
+)
+def test_what_fails_elsewhere_in_the_range_is_not_chosen(corners: Any, said: str) -> None:
+    """A point that is off, or ends, or was never run at a corner of the range is not recommended, and it says why."""
+    answer = recommend(study(point(1, "fast", 1e-3, 1e-4, corners=corners), SLOW), wish(1e-3))
+    assert answer["choice"]["engine"] == "slow"
+    assert said in answer["first_failure"]["reason"]
+    assert answer["checked"]["parameters"] == {"speed": [2.0, 6.0]}
+
+
+def test_nothing_beyond_what_was_measured() -> None:
+    """Where nothing holds the tolerance there is no choice, and the closest point is named as such."""
+    answer = recommend(study(FAST, MIDDLE), wish(1e-9))
+    assert answer["choice"] is None
+    assert answer["closest"]["engine"] == "middle"
+    assert "nothing beyond is guessed" in answer["closest"]["reason"]
+
+
+def test_a_budget_that_is_too_small() -> None:
+    """A choice dearer than the budget is named as such, with the most accurate that the budget allows."""
+    answer = recommend(study(FAST, MIDDLE, SLOW), wish(1e-5, budget=0.02))
+    assert answer["choice"]["engine"] == "slow"
+    assert not answer["affordable"]
+    assert answer["best_within_budget"]["engine"] == "middle"
+    assert recommend(study(FAST, MIDDLE, SLOW), wish(1e-5, budget=0.2))["affordable"]
+
+
+def test_equations_worked_out_by_hand_are_named_apart() -> None:
+    """A closed form is not an engine: it is told as the least model, unless it is asked for."""
+    closed = point(0, "least", 1e-6, 1e-14, level="closed form")
+    answer = recommend(study(closed, MIDDLE), wish(1e-3))
+    assert answer["choice"]["engine"] == "middle"
+    assert answer["least_model"]["engine"] == "least"
+    assert recommend(study(closed, MIDDLE), wish(1e-3, engines=("least",)))["choice"]["engine"] == "least"
+
+
+def test_restricted_to_engines_settings_and_levels() -> None:
+    """Only what is asked for is chosen from; an engine that was not measured is an error that says what was."""
+    soft = point(4, "soft", 1e-2, 1e-5, level="engine contact", formulation="free")
+    measured = study(MIDDLE, SLOW, soft)
+    assert recommend(measured, wish(1e-3, levels=("engine contact",)))["choice"]["engine"] == "soft"
+    assert recommend(measured, wish(1e-3, engines=("soft[formulation=free]",)))["choice"]["engine"] == "soft"
+    assert recommend(measured, wish(1e-3, engines=("soft[formulation=chart]",)))["choice"] is None
+    with pytest.raises(InputError, match="measured are middle, slow, soft"):
+        recommend(measured, wish(1e-3, engines=("other",)))
+    with pytest.raises(InputError, match="measured are z"):
+        recommend(measured, Wish("y", Tolerance(1e-3, False, "m")))
+
+
+def test_why_a_finer_step_would_not_do() -> None:
+    """Where the limit of small steps is off by more than the tolerance, the reason says that no step would do."""
+    budgets = [{"curve": FAST["curve"], "quantity": "z", "model_form": 5e-3, "model_form_bar": 1e-5}]
+    answer = recommend(study(FAST, MIDDLE, budgets=budgets), wish(1e-3))
+    assert "no step would do" in answer["first_failure"]["reason"]
