@@ -32,6 +32,7 @@ TRIED = {
 
 
 @pytest.mark.slow
+@pytest.mark.timeout(900)  # 75 s of processor time, on a machine that may have much else to do
 def test_every_fault_is_contained() -> None:
     """Each fault costs its own case alone and says so in a sentence; the next run makes only what is missing."""
     command = [sys.executable, "-m", "proofroll", "drill", "faults", "--json"]
