@@ -242,6 +242,18 @@ def test_compare_reuses_what_is_there(proofroll: Proofroll, tmp_path: Path) -> N
     assert written() == before
 
 
+def test_compare_says_what_was_damaged(proofroll: Proofroll, tmp_path: Path) -> None:
+    """A stored result that was changed is made again, and one line on standard error says so."""
+    (tmp_path / "claim.toml").write_text(COMPARISON.replace("ENGINE", "oracle"))
+    arguments = ["compare", str(tmp_path / "claim.toml"), "--out", str(tmp_path / "out"), "--json"]
+    code, out, _ = proofroll(*arguments)
+    for trajectory in (tmp_path / "out" / "cases").glob("*.nc"):
+        trajectory.write_bytes(trajectory.read_bytes()[:-1])
+    found = proofroll(*arguments)
+    assert (found[0], json.loads(found[1])["runs"][0]["verdict"]) == (code, json.loads(out)["runs"][0]["verdict"])
+    assert found[2] == "proofroll: 4 stored results were damaged and have been run again\n"
+
+
 def test_compare_restricted_to_an_engine(proofroll: Proofroll, tmp_path: Path) -> None:
     """An engine that the comparison does not know is a usage error that names those it does."""
     (tmp_path / "claim.toml").write_text(COMPARISON.replace("ENGINE", "oracle"))

@@ -25,7 +25,8 @@ from typing import Any
 
 import proofroll
 from proofroll.case import Case, EngineFacts, Result, Status
-from proofroll.errors import Diverged, InputError, Missing, Refused
+from proofroll.errors import Diverged, InputError, Missing, ProofrollError, Refused
+from proofroll.memory import volunteer
 
 # Everything whose change may change a result; reports and command line are not among it.
 _FOUNDATION = (
@@ -52,9 +53,15 @@ _MOST_BUILDS = 20
 def main(answers: int, parent: int) -> None:
     """Serves requests; ``answers`` is the file descriptor for the answers, ``parent`` the process that asks."""
     threading.Thread(target=_end_with, args=(parent,), daemon=True).start()
-    with os.fdopen(answers, "w", encoding="utf-8") as pipe:
-        for line in sys.stdin:
-            pipe.write(json.dumps(_answer(json.loads(line))) + "\n")
+    volunteer()
+    requests = os.fdopen(os.dup(0), encoding="utf-8")
+    with open(os.devnull, "rb") as nothing:
+        os.dup2(nothing.fileno(), 0)  # an engine that asks its user something must not read the next request
+    with os.fdopen(answers, "w", encoding="utf-8") as pipe, requests:
+        for line in requests:
+            request = json.loads(line)
+            number = request.pop("number")
+            pipe.write(json.dumps({**_answer(request), "number": number}) + "\n")
             pipe.flush()
 
 
@@ -80,6 +87,8 @@ def _answer(request: dict[str, Any]) -> dict[str, Any]:
         return {"error": "input", "field": error.field, "value": value, "advice": error.advice}
     except Missing as error:
         return {"error": "missing", "message": str(error)}
+    except ProofrollError as error:  # a full disk, say
+        return {"error": "crashed", "message": str(error)}
     except Exception as error:
         return {"error": "crashed", "message": one_line(error)}
 
