@@ -88,6 +88,14 @@ class Worker:
         answer: dict[str, Any] = json.loads(line)
         return answer
 
+    def request(self, request: Mapping[str, Any], time_limit: float) -> dict[str, Any]:
+        """As :meth:`ask`, with the errors that the worker met raised here.
+
+        Raises:
+            InputError, Missing, WorkerDied: the worker says so, or it ended.
+        """
+        return _checked(self.ask(request, time_limit))
+
     def _last_words(self) -> str:
         """How the process ended, and the last line it wrote."""
         code = self._process.wait()

@@ -71,6 +71,7 @@ def _answer(request: dict[str, Any]) -> dict[str, Any]:
         "resolve": resolve,
         "run": run,
         "time": time_once,
+        "bench": bench,
     }
     action = actions[request.pop("do")]
     try:
@@ -250,6 +251,17 @@ def time_once(case: dict[str, Any], seconds: float) -> dict[str, Any]:
         if elapsed >= seconds:
             break
     return {"seconds_per_second": elapsed / simulated, "message": f"{simulated:g} s simulated"}
+
+
+def bench(**what: Any) -> dict[str, Any]:
+    """An adapter against a bare loop; see :func:`proofroll.bench.adapters.measure_adapter`."""
+    from proofroll.bench.adapters import measure_adapter
+
+    gc.freeze()  # modules need not be looked at again in every collection
+    try:
+        return measure_adapter(**what)
+    except (Refused, Diverged) as error:
+        return {"message": str(error)}
 
 
 def _clean_runs(kind: Any, scene: Any, settings: Any, times: Any) -> list[float]:

@@ -1,0 +1,64 @@
+"""What things cost: commands under ``proofroll bench``."""
+
+from __future__ import annotations
+
+from typing import Annotated, Any
+
+import typer
+
+from proofroll.cli.common import CONTRADICTED, ENGINE, Engines, Json, progress_bar, write_json
+
+bench = typer.Typer(help="Measure what proofroll itself costs.", no_args_is_help=True, rich_markup_mode=None)
+
+Rounds = Annotated[int, typer.Option("--rounds", min=1, help="Measurements of each, in turns.")]
+
+
+@bench.command()
+def adapters(
+    engine: Engines = None,
+    preset: Annotated[str, typer.Option(help="Preset of each formulation that has it.")] = "matched",
+    rounds: Rounds = 7,
+    as_json: Json = False,
+) -> None:
+    """Compare each adapter with the bare loop that a careful user of its engine would write."""
+    from proofroll.bench.adapters import bench_adapters, content
+    from proofroll.registry import engine_names, require_engine
+
+    for name in engine or ():
+        require_engine(name)
+    with progress_bar("adapters") as advance:
+        found = content(bench_adapters(engine or engine_names(), preset, rounds, progress=advance))
+    if as_json:
+        write_json(found)
+    else:
+        _print_adapters(found)
+    measured = [item for item in found["engines"].values() if item["ratio"] is not None]
+    if engine and not measured:
+        raise typer.Exit(ENGINE)
+    if not all(item["within_goal"] for item in measured):
+        raise typer.Exit(CONTRADICTED)
+
+
+def _print_adapters(found: dict[str, Any]) -> None:
+    from rich.table import Table
+    from rich.text import Text
+
+    from proofroll.report.terminal import console
+
+    table = Table(box=None, padding=(0, 1, 0, 0), title=Text("advance over bare loop"), title_justify="left")
+    for column in ("engine formulation", "variant", "ratio", "95 %"):
+        table.add_column(column, no_wrap=True)
+    table.add_column("")
+    for name, item in found["engines"].items():
+        for row in item["rows"]:
+            ratio = row["ratio"]
+            interval = "" if ratio is None else f"{ratio['low']:.3f}–{ratio['high']:.3f}"
+            table.add_row(
+                Text(f"{name} {row['formulation']}"),
+                Text(row["variant"]),
+                Text("–" if ratio is None else f"{ratio['value']:.3f}", style="" if row["within_goal"] else "yellow"),
+                Text(interval),
+                Text(row["message"]),
+            )
+    console().print(table)
+    console().print(f"goal: at most {found['goal']:g}")
