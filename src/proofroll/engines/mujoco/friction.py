@@ -112,7 +112,7 @@ class BoundedFriction:
         if not self._presses(data):
             self._miss(data)
         else:
-            if self.holds(data) != self.sticking:
+            if self._inside() != self.sticking:
                 # A ball that comes back slipping has slipped since it was lost.
                 began = self._steps if self._lost is None or self._flies else self._lost
                 self._change(not self.sticking, self._event(began if self.sticking else self._steps))
@@ -136,8 +136,10 @@ class BoundedFriction:
 
     def holds(self, data: Any) -> bool:
         """Whether there is a contact force in ``data`` and it is inside the cone of the present coefficient."""
-        if not self._presses(data):
-            return False
+        return self._presses(data) and self._inside()
+
+    def _inside(self) -> bool:
+        """Whether the force in ``self._wrench`` is inside the cone of the present coefficient."""
         N, F1, F2 = self._wrench[:3].tolist()
         # MuJoCo's pyramid lies inside the true cone: along its own tangents it allows |F1| + |F2| = mu N.
         friction = abs(F1) + abs(F2) if self._pyramidal else math.hypot(F1, F2)
