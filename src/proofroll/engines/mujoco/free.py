@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Callable
 from typing import Any
 
 import mujoco
@@ -207,8 +208,9 @@ class Facets:
         if not self.resistance.f:
             mujoco.mj_step(self._model, data, nstep=steps)
         else:
+            resist = self._resister(data)
             for _ in range(steps):
-                self._resist(data)
+                resist()
                 mujoco.mj_step(self._model, data)
         # Rolling resistance, and the kicks, take away what holds the ball up: it may fall further than at first.
         if abs(float(self._axis @ data.qpos[:3])) > self._half_length:
@@ -217,14 +219,21 @@ class Facets:
     def evaluate(self, data: Any) -> None:
         """Computes forces and accelerations of the present state, as a step would."""
         if self.resistance.f:
-            self._resist(data)
+            self._resister(data)()
         mujoco.mj_forward(self._model, data)
 
-    def _resist(self, data: Any) -> None:
-        e1 = self._surface.nearby(*data.qpos[:3].tolist())[1:]
-        Fx, Fy, Fz = data.qfrc_constraint[:3].tolist()
-        N = -(Fx * e1[0] + Fy * e1[1] + Fz * e1[2])
-        self.resistance.apply(data.xfrc_applied[self._ball, 3:], N, e1, data.qvel[:3].tolist())
+    def _resister(self, data: Any) -> Callable[[], None]:
+        nearby, apply = self._surface.nearby, self.resistance.apply
+        position, rates, pushed = data.qpos[:3], data.qvel[:3], data.qfrc_constraint[:3]
+        torque = data.xfrc_applied[self._ball, 3:]
+
+        def resist() -> None:
+            x, y, z = position.tolist()
+            _, e1x, e1y, e1z = nearby(x, y, z)
+            Fx, Fy, Fz = pushed.tolist()
+            apply(torque, -(Fx * e1x + Fy * e1y + Fz * e1z), (e1x, e1y, e1z), rates.tolist())
+
+        return resist
 
 
 def _reach(body: RollingBall, axis: FloatArray) -> float:

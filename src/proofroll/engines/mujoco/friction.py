@@ -111,11 +111,12 @@ class BoundedFriction:
         """Takes the forces at the start of a step; once per step."""
         if not self._presses(data):
             self._miss(data)
-        else:
-            if self._inside() != self.sticking:
-                # A ball that comes back slipping has slipped since it was lost.
-                began = self._steps if self._lost is None or self._flies else self._lost
-                self._change(not self.sticking, self._event(began if self.sticking else self._steps))
+        elif self._inside() != self.sticking:
+            # A ball that comes back slipping has slipped since it was lost.
+            began = self._steps if self._lost is None or self._flies else self._lost
+            self._change(not self.sticking, self._event(began if self.sticking else self._steps))
+            self._lost, self._flies = None, False
+        elif self._lost is not None:
             self._lost, self._flies = None, False
         self._steps += 1
 

@@ -17,6 +17,7 @@ import pinocchio as pin
 
 from proofroll.engine import Built, Sample, whole_steps
 from proofroll.engines.pinocchio.contact_tolerances import softened
+from proofroll.engines.pinocchio.rows import cross
 from proofroll.engines.pinocchio.settings import PinocchioSettings
 from proofroll.errors import Diverged, Refused
 from proofroll.events import Event, EventKind
@@ -31,6 +32,9 @@ _ADMM_ITERATIONS = 10_000
 _ON_CONE = 1e-9
 # A normal impulse smaller than this part of gravity's is round-off of the gap: the wall does not press.
 _FAINT = 1e-9
+_UPPER = np.triu(np.ones((6, 6), dtype=bool))
+# Axes of the plane in the local frame: e2, -e3 and -e1.
+_PLANE = np.array([[0.0, 0.0, -1.0], [1.0, 0.0, 0.0], [0.0, -1.0, 0.0]])
 # The moment of rolling resistance follows the normal force, and is found by repetition.
 _REPEATS, _SETTLED = 10, 1e-13
 
@@ -135,12 +139,13 @@ class ContactRun:
         axes = self._pose(p, turned)
         self._point.calc(model, data, self._datas[0].extract())
         jacobian = self._point.jacobian(model, data, self._datas[0].extract())
-        inverse = np.triu(pin.computeMinverse(model, data, q))
-        inverse += np.triu(inverse, 1).T
-        delassus = pin.DelassusOperatorDense(jacobian @ inverse @ jacobian.T)
-        shift = np.array([0.0, 0.0, float(self._body.surface.gap(p)) / self._dt])
+        inverse = pin.computeMinverse(model, data, q)  # its upper triangle
+        inverse = np.where(_UPPER, inverse, inverse.T)
+        to_joints = inverse.dot(jacobian.T)
+        delassus = pin.DelassusOperatorDense(jacobian.dot(to_joints))
+        shift = np.array([0.0, 0.0, self._body.surface.nearby(*p.tolist())[0] / self._dt])
         if self._leapfrog:
-            shift += 0.5 * self._dt * (axes.T @ self._turning(p, velocity))
+            shift += 0.5 * self._dt * axes.T.dot(self._turning(p, velocity))
 
         f, torque, normal_force = self._body.contact.rolling_resistance, np.zeros(6), self._normal_force
         after, velocity_now = v, velocity.linear
@@ -148,8 +153,8 @@ class ContactRun:
             if f:
                 torque = self._resistance(p, turned, velocity_now) * normal_force
             free = v + span * pin.aba(model, data, q, v, torque)
-            impulse, status = self._solve(delassus, jacobian @ free + shift)
-            after = free + inverse @ (jacobian.T @ impulse)
+            impulse, status = self._solve(delassus, jacobian.dot(free) + shift)
+            after = free + to_joints.dot(impulse)
             found = float(impulse[2]) / span
             if not f or abs(found - normal_force) <= _SETTLED * abs(found):
                 break
@@ -165,25 +170,27 @@ class ContactRun:
         """Poses the plane, and returns its axes as columns, the last one from the wall into the ball."""
         surface = self._body.surface
         frame = surface.frame(surface.locate(p))
-        axes = frame[:, [1, 2, 0]] * (1.0, -1.0, -1.0)
+        axes = frame.dot(_PLANE)
         arm = self._body.ball.radius * frame[:, 0]
         self._point.joint1_placement = pin.SE3(axes, p + arm)
-        self._point.joint2_placement = pin.SE3(turned.T @ axes, turned.T @ arm)
+        self._point.joint2_placement = pin.SE3(turned.T.dot(axes), turned.T.dot(arm))
         return np.asarray(axes)
 
     def _turning(self, p: FloatArray, velocity: Any) -> FloatArray:
         """Rate of the velocity of the contact point that comes from the turning of the normal [m/s²], shape (3,)."""
         surface, radius = self._body.surface, self._body.ball.radius
-        e1, e1_rate = surface.normal(p), surface.normal_gradient(p) @ velocity.linear
-        slip_rate = radius * (pin.skew(velocity.angular) @ e1_rate)
-        return np.asarray(slip_rate - (e1 @ slip_rate) * e1 + (e1_rate @ velocity.linear) * e1)
+        v = velocity.linear
+        e1, e1_rate = surface.normal(p), surface.normal_gradient(p).dot(v)
+        slip_rate = radius * np.array(cross(velocity.angular, e1_rate))
+        return np.asarray(slip_rate + (e1_rate.dot(v) - e1.dot(slip_rate)) * e1)
 
     def _resistance(self, p: FloatArray, turned: FloatArray, v_WB: FloatArray) -> FloatArray:
         """Rolling resistance on the joints per unit of normal force [m], shape (6,); zero where the ball rests."""
         torque, speed = np.zeros(6), math.sqrt(v_WB @ v_WB)
         if speed > 0:
             e1 = self._body.surface.normal(p)
-            torque[3:] = turned.T @ (pin.skew(e1) @ v_WB) * (self._body.contact.rolling_resistance / speed)
+            lever = np.array(cross(e1, v_WB)) * (self._body.contact.rolling_resistance / speed)
+            torque[3:] = turned.T.dot(lever)
         return torque
 
     def _solve(self, delassus: Any, free: FloatArray) -> tuple[FloatArray, EventKind]:

@@ -156,7 +156,7 @@ class Adaptive:
         # The rates must not depend on the length to which the quaternion has drifted.
         q, v = pin.normalize(self._model, y[:nq]), y[nq:]
         rates = np.empty_like(y)
-        rates[:nq] = pin.tangentMap(self._model, q) @ (self._moving * v)
+        rates[:nq] = pin.tangentMap(self._model, q).dot(self._moving * v)
         rates[nq:] = self._mechanism.respond(self._data, q, v)[0]
         return rates
 
