@@ -42,9 +42,14 @@ class WorkerDied(ProofrollError):  # noqa: N818 -- a fact about the worker, turn
 
 
 class Worker:
-    """A worker process; restarted by making a new one."""
+    """A worker process; restarted by making a new one.
+
+    Attributes:
+        waited: wall seconds for the last answer; for the first one from the start of the process [s].
+    """
 
     def __init__(self) -> None:
+        began = time.perf_counter()
         reader, writer = os.pipe()
         self._log = tempfile.TemporaryFile("w+b")  # noqa: SIM115 -- lives as long as the process
         self._process = subprocess.Popen(
@@ -60,6 +65,7 @@ class Worker:
         os.close(writer)
         self._answers = os.fdopen(reader, "rb", buffering=0)
         self._pending = b""
+        self._began, self.waited = began, 0.0
 
     def ask(self, request: Mapping[str, Any], time_limit: float) -> dict[str, Any]:
         """One request, one answer.
@@ -73,6 +79,7 @@ class Worker:
             self._process.stdin.flush()
         except (BrokenPipeError, OSError):
             raise WorkerDied(Status.CRASHED, self._last_words()) from None
+        asked = time.perf_counter()
         deadline = time.monotonic() + time_limit
         while b"\n" not in self._pending:
             remaining = deadline - time.monotonic()
@@ -85,6 +92,8 @@ class Worker:
                 raise WorkerDied(Status.CRASHED, self._last_words())
             self._pending += chunk
         line, _, self._pending = self._pending.partition(b"\n")
+        self.waited = time.perf_counter() - (self._began or asked)
+        self._began = 0.0
         answer: dict[str, Any] = json.loads(line)
         return answer
 
@@ -264,7 +273,10 @@ class Runner:
                     worker = None
                     if self._stopping.is_set():
                         break
-                arrived.put((case, self.store.put(case, result)))
+                started = time.perf_counter()
+                result = self.store.put(case, result)
+                spent = result.spent | {"storing": time.perf_counter() - started}
+                arrived.put((case, dataclasses.replace(result, spent=spent)))
         except Exception as error:
             arrived.put(error)
         finally:
@@ -279,7 +291,9 @@ class Runner:
 def _ask(worker: Worker, case: Case, out: Path) -> Result:
     request = {"do": "run", "case": dataclasses.asdict(case), "out": str(out)}
     try:
-        return Result.from_dict(_checked(worker.ask(request, case.time_limit)))
+        found = Result.from_dict(_checked(worker.ask(request, case.time_limit)))
+        waited = worker.waited - sum(found.spent.values())  # a new process starts, and messages go to and fro
+        return dataclasses.replace(found, spent=found.spent | {"process start": waited})
     except Missing as error:
         return Result(Status.MISSING, str(error))
 
