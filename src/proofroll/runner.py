@@ -163,7 +163,8 @@ def describe(engine: str) -> dict[str, Any]:
 def resolve(engines: Sequence[tuple[str, Mapping[str, Any]]]) -> list[EngineFacts | ProofrollError]:
     """Complete settings for engines with options, each or the reason why not, in the order given."""
     found: list[EngineFacts | ProofrollError] = [ProofrollError("not asked")] * len(engines)
-    for name in dict.fromkeys(name for name, _ in engines):
+
+    def ask(name: str) -> None:
         worker = Worker()
         for index, (other, options) in enumerate(engines):
             if other != name:
@@ -178,6 +179,10 @@ def resolve(engines: Sequence[tuple[str, Mapping[str, Any]]]) -> list[EngineFact
             except ProofrollError as error:
                 found[index] = error
         worker.close()
+
+    # Most of it is the start of the processes and the import of the engines.
+    with ThreadPoolExecutor(os.cpu_count() or 1) as pool:
+        list(pool.map(ask, dict.fromkeys(name for name, _ in engines)))
     return found
 
 

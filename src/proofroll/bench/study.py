@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import dataclasses
+import math
 import tempfile
 import time
 from collections.abc import Callable, Mapping, Sequence
@@ -24,31 +26,33 @@ GOAL = 0.25
 INSIDE = ("advance", "clean runs")
 # Longer runs would go on for minutes at the speed of the slowest model [s].
 _LONGEST = 200.0
+POINTS: Sequence[Mapping[str, float]] = ({}, {"rolling_resistance": 5e-4})
 
 
 def study_cases(engines: Sequence[str], seconds: float = LEAST_SECONDS) -> list[Case]:
-    """One case per formulation of each engine, as long as it takes to last ``seconds``, with timed clean runs.
+    """Two cases per formulation of each engine, as long as it takes to last ``seconds``, with timed clean runs.
+
+    One is without rolling resistance and one with; what a process costs is shared by an engine's cases, and a study with
+    one case for each would be no usual one.
 
     Raises:
         ProofrollError: an engine cannot be asked.
     """
     wanted = [(name, {"formulation": formulation}) for name in engines for formulation in describe(name)["presets"]]
-    digest = load_scene(SCENE).digest
     cases = []
     with Stopwatch() as stopwatch:
         for facts in resolve(wanted):
             if not isinstance(facts, EngineFacts):
                 raise facts
-            case = _case(facts, digest, 1.0)
-            rate = stopwatch(case)
-            if rate:
-                # What the stopwatch sees is a short stretch; a little more than asked for makes up for that.
-                cases.append(_case(facts, digest, min(max(1.0, round(1.3 * seconds / rate)), _LONGEST)))
+            for parameters in POINTS:
+                digest = load_scene(SCENE, **parameters).digest
+                short = Case(SCENE, dict(parameters), digest, facts, until=EVERY * 10, every=EVERY, timed=True)
+                rate = stopwatch(short)
+                if rate:
+                    # What the stopwatch sees is a short stretch; a little more than asked for makes up for that.
+                    steps = max(10, math.ceil(1.2 * seconds / rate / EVERY))
+                    cases.append(dataclasses.replace(short, until=min(steps * EVERY, _LONGEST)))
     return cases
-
-
-def _case(facts: EngineFacts, digest: str, until: float) -> Case:
-    return Case(SCENE, {}, digest, facts, until=until, every=EVERY, timed=True)
 
 
 def bench_study(
@@ -107,6 +111,7 @@ def _row(case: Case, result: Result) -> dict[str, Any]:
     return {
         "engine": case.engine.name,
         "formulation": case.engine.settings["formulation"],
+        "parameters": case.parameters,
         "status": result.status.value,
         "until": case.until,
         "seconds": total,

@@ -39,6 +39,62 @@ def adapters(
         raise typer.Exit(CONTRADICTED)
 
 
+@bench.command()
+def study(
+    engine: Engines = None,
+    jobs: Annotated[int, typer.Option("--jobs", min=1, help="Workers at once.")] = 2,
+    seconds: Annotated[float, typer.Option(min=0.01, help="How long each case lasts inside its engine [s].")] = 1.0,
+    as_json: Json = False,
+) -> None:
+    """Say what part of a study's wall time × workers is spent outside the engines, and on what."""
+    from proofroll.bench.study import bench_study
+    from proofroll.registry import engine_names, require_engine
+
+    for name in engine or ():
+        require_engine(name)
+    with progress_bar("cases") as advance:
+        found = bench_study(engine or engine_names(), jobs, seconds, progress=advance)
+    if as_json:
+        write_json(found)
+    else:
+        _print_study(found)
+    if not found["within_goal"]:
+        raise typer.Exit(CONTRADICTED)
+
+
+def _print_study(found: dict[str, Any]) -> None:
+    from rich.table import Table
+    from rich.text import Text
+
+    from proofroll.report.terminal import console, number
+
+    title = f"{found['wall_seconds']:.1f} s with {found['jobs']} workers: {found['outside']:.0%} outside the engines"
+    shares = Table(box=None, padding=(0, 2, 0, 0), title=Text(title), title_justify="left")
+    shares.add_column("wall time × workers")
+    shares.add_column("part", justify="right")
+    for cause, share in found["shares"].items():
+        shares.add_row(Text(cause), f"{share:.1%}")
+    cases = Table(box=None, padding=(0, 2, 0, 0))
+    for column in ("case", "f", "simulated", "wall", "outside"):
+        cases.add_column(column, justify="left" if column == "case" else "right")
+    for case in found["cases"]:
+        outside = "–" if case["outside"] is None else f"{case['outside']:.0%}"
+        resistance = "> 0" if case["parameters"] else "0"
+        cases.add_row(
+            Text(f"{case['engine']} {case['formulation']} ({case['status']})"),
+            resistance,
+            f"{case['until']:.4g} s",
+            f"{case['seconds']:.2f} s",
+            outside,
+        )
+    for table in (shares, cases):
+        console().print(table)
+        console().print()
+    starts = ", ".join(f"{name} {number(seconds)} s" for name, seconds in found["first_answer"].items())
+    console().print(f"from the start of a process to its first answer: {starts}")
+    console().print(f"goal: at most {found['goal']:.0%} outside")
+
+
 def _print_adapters(found: dict[str, Any]) -> None:
     from rich.table import Table
     from rich.text import Text
