@@ -20,7 +20,8 @@ def contact_force(model: Any, data: Any, geom: int) -> FloatArray:
     """Sum of the contact forces on a geom in the world [N], shape (3,); zero without contact."""
     total = np.zeros(3)
     wrench = np.zeros(6)
-    for index, contact in enumerate(data.contact[: data.ncon]):
+    for index in range(data.ncon):
+        contact = data.contact[index]  # a slice of the list would copy all of MuJoCo's contacts
         mujoco.mj_contactForce(model, data, index, wrench)
         # The frame's first axis points from geom[0] to geom[1], and the force is the one on geom[1].
         sign = 1.0 if contact.geom[1] == geom else -1.0
