@@ -56,15 +56,39 @@ class _Translation:
         )
         self.column = geometry.column
         # A frame turned by α about k is F0 + sin α F1 + (1 - cos α) F2, and so is gravity along its axes.
-        self.frames = [tuple(part.T.ravel().tolist()) for part in geometry.parts]
-        self.gravity = [tuple((body.gravity @ part).tolist()) for part in geometry.parts]
+        zero = np.zeros((3, 3))
+        frames = [*geometry.parts, zero, zero][:3]
+        self.frames = [tuple(part.T.ravel().tolist()) for part in frames]
+        self.gravity = [tuple((body.gravity @ part).tolist()) for part in frames]
+        size = 1e-15 * float(np.linalg.norm(body.gravity))
+        self.steady = all(abs(x) <= size for part in self.gravity[1:] for x in part)
 
-    def turned(self, parts: list[tuple[float, ...]], sin: float, cos: float) -> tuple[float, ...]:
-        """The parts put together at an angle."""
-        if self.column is None:
-            return parts[0]
+    def frame(self, sin: float, cos: float) -> tuple[float, ...]:
+        """Components of e1, e2, e3 in the world, one after the other."""
+        start, once, twice = self.frames
+        x1, y1, z1, x2, y2, z2, x3, y3, z3 = start
+        a1, b1, c1, a2, b2, c2, a3, b3, c3 = once
+        d1, e1, f1, d2, e2, f2, d3, e3, f3 = twice
         back = 1.0 - cos
-        return tuple([x + sin * y + back * z for x, y, z in zip(*parts, strict=True)])
+        return (
+            x1 + sin * a1 + back * d1,
+            y1 + sin * b1 + back * e1,
+            z1 + sin * c1 + back * f1,
+            x2 + sin * a2 + back * d2,
+            y2 + sin * b2 + back * e2,
+            z2 + sin * c2 + back * f2,
+            x3 + sin * a3 + back * d3,
+            y3 + sin * b3 + back * e3,
+            z3 + sin * c3 + back * f3,
+        )
+
+    def weight(self, sin: float, cos: float) -> tuple[float, ...]:
+        """Gravity along e1, e2, e3 [m/s²]."""
+        start, once, twice = self.gravity
+        if self.steady:
+            return start
+        back = 1.0 - cos
+        return tuple([x + sin * y + back * z for x, y, z in zip(start, once, twice, strict=True)])
 
     def angle(self, x: list[float]) -> tuple[float, float]:
         """Sine and cosine of the angle by which the frame is turned."""
@@ -111,8 +135,7 @@ class _AlongAxes(_Translation):
         """See :class:`Closed`."""
         state = x.tolist()
         _, _, u, v, w1, w2, w3 = state
-        sin, cos = self.angle(state)
-        g1, g2, g3 = self.turned(self.gravity, sin, cos)
+        g1, g2, g3 = self.gravity[0] if self.steady else self.weight(*self.angle(state))
         d1, d2, d3 = self.drift(u, v)
         o1, o2, o3 = self.frame_rate(u, v)
         v2, v3 = self.t2u * u + self.t2v * v, self.t3u * u + self.t3v * v
@@ -171,10 +194,10 @@ class _Euler(_Translation):
             raise FloatingPointError("the Euler angles overflow inside a step")
         sin, cos, sin_psi, cos_psi = math.sin(theta), math.cos(theta), math.sin(psi), math.cos(psi)
         sin_a, cos_a = self.angle(state)
-        frame = self.turned(self.frames, sin_a, cos_a)
+        frame = self.frame(sin_a, cos_a)
         self._fill(frame, sin, cos, sin_psi, cos_psi)
         x1, y1, z1, x2, y2, z2, x3, y3, z3 = frame
-        g1, g2, g3 = self.turned(self.gravity, sin_a, cos_a)
+        g1, g2, g3 = self.weight(sin_a, cos_a)
         d1, d2, d3 = self.drift(u, v)
         o1, o2, o3 = self.frame_rate(u, v)
         v2, v3 = self.t2u * u + self.t2v * v, self.t3u * u + self.t3v * v
@@ -185,21 +208,21 @@ class _Euler(_Translation):
         rx = tilted * cos * sin_psi + turned * cos_psi - node * sin_psi
         ry = -tilted * cos * cos_psi + turned * sin_psi + node * cos_psi
         rz = -tilted * sin
-        wx = phi_rate * sin * sin_psi + theta_rate * cos_psi
-        wy = theta_rate * sin_psi - phi_rate * sin * cos_psi
+        nx, ny = sin * sin_psi, -sin * cos_psi
+        wx, wy = phi_rate * nx + theta_rate * cos_psi, phi_rate * ny + theta_rate * sin_psi
         wz = psi_rate + phi_rate * cos
         w1 = x1 * wx + y1 * wy + z1 * wz
         w2 = x2 * wx + y2 * wy + z2 * wz
         w3 = x3 * wx + y3 * wy + z3 * wz
         # Aᵀ (M - J Ȧ r): along the three axes, M about e2 and e3 by the rows of the matrix.
         p2, p3 = m * (g2 - d2), m * (g3 - d3)
-        on_phi = -J * (sin * sin_psi * rx - sin * cos_psi * ry + cos * rz)
+        on_phi = -J * (nx * rx + ny * ry + cos * rz)
         on_theta = -J * (cos_psi * rx + sin_psi * ry)
         on_psi = -J * rz
         if self.f:
             M2, M3 = self.moment(N, v2, v3)
             mx, my, mz = M2 * x2 + M3 * x3, M2 * y2 + M3 * y3, M2 * z2 + M3 * z3
-            on_phi += sin * sin_psi * mx - sin * cos_psi * my + cos * mz
+            on_phi += nx * mx + ny * my + cos * mz
             on_theta += cos_psi * mx + sin_psi * my
             on_psi += mz
         slip2 = d2 + o1 * v3 + a * (x3 * rx + y3 * ry + z3 * rz - (o1 * w2 - o2 * w1))
@@ -219,7 +242,7 @@ class _Euler(_Translation):
         """See :class:`Closed`."""
         state = x.tolist()
         theta, psi = state[3:5]
-        frame = self.turned(self.frames, *self.angle(state))
+        frame = self.frame(*self.angle(state))
         self._fill(frame, math.sin(theta), math.cos(theta), math.sin(psi), math.cos(psi))
         self._upper[5:] = self._matrix[5:, :5].dot(x[5:])
         result = x.copy()
