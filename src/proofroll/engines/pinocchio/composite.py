@@ -56,7 +56,7 @@ class Composite(Mechanism):
         terms = ball_terms(self.model, data, self.ball, q, v, self._rest)
         frame = data.oMi[self._carriage].rotation.dot(self._frame0)
         turning = pin.getVelocity(self.model, data, self._carriage, pin.LOCAL_WORLD_ALIGNED).angular
-        e1_rate = np.array(cross(turning, frame[:, 0]))
+        e1_rate = cross(turning.tolist(), frame[:, 0].tolist())
         return terms, frame, *rolling_rows(terms, self._radius, frame, e1_rate)
 
     def _transmitted(self, data: Any, e1: FloatArray) -> float:

@@ -9,8 +9,7 @@ Euler multiplies it by the square root of 1 + (ω dt)², so that a fast ball blo
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 import pinocchio as pin
@@ -32,15 +31,13 @@ _ADMM_ITERATIONS = 10_000
 _ON_CONE = 1e-9
 # A normal impulse smaller than this part of gravity's is round-off of the gap: the wall does not press.
 _FAINT = 1e-9
-_UPPER = np.triu(np.ones((6, 6), dtype=bool))
 # Axes of the plane in the local frame: e2, -e3 and -e1.
 _PLANE = np.array([[0.0, 0.0, -1.0], [1.0, 0.0, 0.0], [0.0, -1.0, 0.0]])
 # The moment of rolling resistance follows the normal force, and is found by repetition.
 _REPEATS, _SETTLED = 10, 1e-13
 
 
-@dataclass(frozen=True, slots=True)
-class Kick:
+class Kick(NamedTuple):
     """What the contact does to the ball around the present time.
 
     Attributes:
@@ -86,12 +83,17 @@ class ContactRun:
         self._q = np.concatenate([body.p0, [0.0, 0.0, 0.0, 1.0]])
         self._v = np.concatenate([body.v0, body.w0])
         self._started = False
+        # A ball in these joints has the same mass matrix in every configuration. Pinocchio fills the upper triangle.
+        inverse = np.triu(pin.computeMinverse(self.model, self._data, self._q))
+        self._inverse = inverse + np.triu(inverse, 1).T
+        self._faint = _FAINT * body.ball.mass * float(np.linalg.norm(body.gravity)) * self._dt
 
         point = pin.PointContactConstraintModel(self.model, 0, pin.SE3.Identity(), self._ball, pin.SE3.Identity())
         self._models, self._datas = pin.StdVec_ConstraintModel(), pin.StdVec_ConstraintData()
         self._models.append(pin.ConstraintModel(point))
         self._datas.append(self._models[0].createData())
-        self._point = self._models[0].extract()  # refers to the model in the vector
+        # Both refer to what is in the vectors; to extract them again takes longer than to solve for the impulse.
+        self._point, self._point_data = self._models[0].extract(), self._datas[0].extract()
         self._bounded = math.isfinite(body.contact.mu_static)
         unbounded = _UNBOUNDED_FRICTION[self._solver_kind]
         self._mu_static = body.contact.mu_static if self._bounded else unbounded
@@ -137,15 +139,14 @@ class ContactRun:
         velocity = pin.getVelocity(model, data, self._ball, pin.LOCAL_WORLD_ALIGNED)
         p, turned = data.oMi[self._ball].translation, data.oMi[self._ball].rotation
         axes = self._pose(p, turned)
-        self._point.calc(model, data, self._datas[0].extract())
-        jacobian = self._point.jacobian(model, data, self._datas[0].extract())
-        inverse = pin.computeMinverse(model, data, q)  # its upper triangle
-        inverse = np.where(_UPPER, inverse, inverse.T)
+        self._point.calc(model, data, self._point_data)
+        jacobian = self._point.jacobian(model, data, self._point_data)
+        inverse = self._inverse
         to_joints = inverse.dot(jacobian.T)
         delassus = pin.DelassusOperatorDense(jacobian.dot(to_joints))
         shift = np.array([0.0, 0.0, self._body.surface.nearby(*p.tolist())[0] / self._dt])
         if self._leapfrog:
-            shift += 0.5 * self._dt * axes.T.dot(self._turning(p, velocity))
+            shift += 0.5 * self._dt * axes.T.dot(self._turning(p, velocity, -axes[:, 2]))
 
         f, torque, normal_force = self._body.contact.rolling_resistance, np.zeros(6), self._normal_force
         after, velocity_now = v, velocity.linear
@@ -176,12 +177,12 @@ class ContactRun:
         self._point.joint2_placement = pin.SE3(turned.T.dot(axes), turned.T.dot(arm))
         return np.asarray(axes)
 
-    def _turning(self, p: FloatArray, velocity: Any) -> FloatArray:
+    def _turning(self, p: FloatArray, velocity: Any, e1: FloatArray) -> FloatArray:
         """Rate of the velocity of the contact point that comes from the turning of the normal [m/s²], shape (3,)."""
         surface, radius = self._body.surface, self._body.ball.radius
         v = velocity.linear
-        e1, e1_rate = surface.normal(p), surface.normal_gradient(p).dot(v)
-        slip_rate = radius * np.array(cross(velocity.angular, e1_rate))
+        e1_rate = surface.normal_gradient(p).dot(v)
+        slip_rate = radius * np.array(cross(velocity.angular.tolist(), e1_rate.tolist()))
         return np.asarray(slip_rate + (e1_rate.dot(v) - e1.dot(slip_rate)) * e1)
 
     def _resistance(self, p: FloatArray, turned: FloatArray, v_WB: FloatArray) -> FloatArray:
@@ -189,7 +190,7 @@ class ContactRun:
         torque, speed = np.zeros(6), math.sqrt(v_WB @ v_WB)
         if speed > 0:
             e1 = self._body.surface.normal(p)
-            lever = np.array(cross(e1, v_WB)) * (self._body.contact.rolling_resistance / speed)
+            lever = np.array(cross(e1.tolist(), v_WB.tolist())) * (self._body.contact.rolling_resistance / speed)
             torque[3:] = turned.T.dot(lever)
         return torque
 
@@ -205,10 +206,10 @@ class ContactRun:
         return impulse, status
 
     def _judged(self, impulse: FloatArray, mu: float) -> EventKind:
-        weight = self._body.ball.mass * float(np.linalg.norm(self._body.gravity))
-        if impulse[2] <= _FAINT * weight * self._dt:
+        F2, F3, N = impulse.tolist()
+        if N <= self._faint:
             return "liftoff"
-        on_cone = math.hypot(impulse[0], impulse[1]) >= mu * float(impulse[2]) * (1 - _ON_CONE)
+        on_cone = math.hypot(F2, F3) >= mu * N * (1 - _ON_CONE)
         return "slip" if on_cone else "stick"
 
     def _impulse(self, delassus: Any, free: FloatArray, mu: float) -> FloatArray:
@@ -252,7 +253,7 @@ class ContactRun:
         kick = self._kick()
         self._normal_force = kept
         inertia = self.model.inertias[self._ball]
-        pose, point = self._data.oMi[self._ball], self._datas[0].extract()
+        pose, point = self._data.oMi[self._ball], self._point_data
         f = 0.0
         if self._body.contact.rolling_resistance:
             # At rest it has no direction, so it is looked at in motion: along the first axis of the plane.

@@ -39,7 +39,7 @@ class FreeFlyer(Mechanism):
         frame = self._surface.frame(self._surface.locate(p))
         e1 = frame[:, 0]
         e1_rate = self._surface.normal_gradient(p).dot(terms.v)
-        slip_rows, slip_drift = rolling_rows(terms, self._radius, frame, e1_rate)
+        slip_rows, slip_drift = rolling_rows(terms, self._radius, frame, e1_rate.tolist())
         rows, drift = np.empty((3, 6)), np.empty(3)
         rows[0], rows[1:] = e1.dot(terms.jacobian[:3]), slip_rows
         drift[0], drift[1:] = e1.dot(terms.bias[:3]) + e1_rate.dot(terms.v), slip_drift

@@ -11,6 +11,9 @@ import pinocchio as pin
 from proofroll.surfaces import FloatArray
 
 
+Triple = list[float] | tuple[float, float, float]
+
+
 class BallTerms(NamedTuple):
     """Kinematics of the ball's joint now, in world axes, at the ball's centre.
 
@@ -45,7 +48,7 @@ def ball_terms(model: Any, data: Any, ball: int, q: FloatArray, v: FloatArray, r
 
 
 def rolling_rows(
-    terms: BallTerms, radius: float, frame: FloatArray, e1_rate: FloatArray
+    terms: BallTerms, radius: float, frame: FloatArray, e1_rate: Triple
 ) -> tuple[FloatArray, FloatArray]:
     """Slip velocity along e2 and e3 as J q̇, and its rate at zero joint acceleration; shapes (2, nv) and (2,).
 
@@ -56,17 +59,17 @@ def rolling_rows(
     (_, x2, x3), (_, y2, y3), (_, z2, z3) = frame.tolist()
     a = radius
     directions = np.array([[x2, y2, z2, a * x3, a * y3, a * z3], [x3, y3, z3, -a * x2, -a * y2, -a * z2]])
-    x, y, z = cross(terms.w, e1_rate)
+    x, y, z = cross(terms.w.tolist(), e1_rate)
     drift = directions.dot(terms.bias)
     drift[0] += a * (x2 * x + y2 * y + z2 * z)
     drift[1] += a * (x3 * x + y3 * y + z3 * z)
     return directions.dot(terms.jacobian), drift
 
 
-def cross(x: FloatArray, y: FloatArray) -> tuple[float, float, float]:
+def cross(x: Triple, y: Triple) -> tuple[float, float, float]:
     """Vector product of two vectors of three components."""
-    x0, x1, x2 = x.tolist()
-    y0, y1, y2 = y.tolist()
+    x0, x1, x2 = x
+    y0, y1, y2 = y
     return x1 * y2 - x2 * y1, x2 * y0 - x0 * y2, x0 * y1 - x1 * y0
 
 
@@ -76,5 +79,5 @@ def resistance(terms: BallTerms, f: float, e1: FloatArray) -> FloatArray:
     The moment f e1 × v/V about the centre (Blajer 2006, section 2.4); at V = 0 it has no direction and is zero.
     """
     speed = math.hypot(*terms.v.tolist())
-    lever = np.array(cross(e1, terms.v)) * (f / speed) if speed > 0 else np.zeros(3)
+    lever = np.array(cross(e1.tolist(), terms.v.tolist())) * (f / speed) if speed > 0 else np.zeros(3)
     return np.asarray(terms.jacobian[3:].T.dot(lever))
