@@ -95,6 +95,14 @@ class Surface(Protocol):
     def nearby(self, x: float, y: float, z: float) -> tuple[float, float, float, float]:
         """Gap [m] and the components of e1 at one point, for loops that call it at every step."""
 
+    def triad(self, x: float, y: float, z: float) -> tuple[float, ...]:
+        """Components of e1, e2, e3 where the surface is nearest to one point, one after the other; as :meth:`nearby`."""
+
+    def normal_rate(
+        self, p: tuple[float, float, float], v: tuple[float, float, float]
+    ) -> tuple[float, float, float]:
+        """(∂e1/∂p) v at one point p [m], for its velocity v [m/s]; as :meth:`nearby`."""
+
 
 @lru_cache
 def _tilt(angle: float) -> FloatArray:
@@ -197,6 +205,22 @@ class Cylinder:
         distance, cos, sin = self._around(x, y, z)
         return self.radius - distance, across * cos, sin, -down * cos
 
+    def triad(self, x: float, y: float, z: float) -> tuple[float, ...]:
+        """See :class:`Surface`."""
+        across, down = self._tilted
+        _, cos, sin = self._around(x, y, z)
+        return across * cos, sin, -down * cos, -across * sin, cos, down * sin, down, 0.0, across
+
+    def normal_rate(
+        self, p: tuple[float, float, float], v: tuple[float, float, float]
+    ) -> tuple[float, float, float]:
+        """See :class:`Surface`."""
+        across, down = self._tilted
+        distance, cos, sin = self._around(*p)
+        x, z = -across * sin, down * sin  # with cos, e2: along it alone the normal turns
+        rate = (x * v[0] + cos * v[1] + z * v[2]) / (distance or math.nan)
+        return rate * x, rate * cos, rate * z
+
     def _local(self, p_WB: npt.ArrayLike) -> FloatArray:
         return np.asarray(np.asarray(p_WB, dtype=np.float64) @ _tilt(self.tilt), dtype=np.float64)
 
@@ -273,6 +297,22 @@ class Plane:
     @cached_property
     def _e1(self) -> tuple[float, float, float]:
         return _axis(self._axes[:, 0])
+
+    @cached_property
+    def _triad(self) -> tuple[float, ...]:
+        return tuple(self._axes.T.ravel().tolist())
+
+    def triad(self, x: float, y: float, z: float) -> tuple[float, ...]:  # noqa: ARG002 -- the same everywhere
+        """See :class:`Surface`."""
+        return self._triad
+
+    def normal_rate(
+        self,
+        p: tuple[float, float, float],  # noqa: ARG002 -- the same everywhere
+        v: tuple[float, float, float],  # noqa: ARG002 -- whatever the velocity
+    ) -> tuple[float, float, float]:
+        """See :class:`Surface`."""
+        return 0.0, 0.0, 0.0
 
     def nearby(self, x: float, y: float, z: float) -> tuple[float, float, float, float]:
         """See :class:`Surface`."""

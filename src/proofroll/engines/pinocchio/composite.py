@@ -57,7 +57,7 @@ class Composite(Mechanism):
         frame = data.oMi[self._carriage].rotation.dot(self._frame0)
         turning = pin.getVelocity(self.model, data, self._carriage, pin.LOCAL_WORLD_ALIGNED).angular
         e1_rate = cross(turning.tolist(), frame[:, 0].tolist())
-        return terms, frame, *rolling_rows(terms, self._radius, frame, e1_rate)
+        return terms, frame, *rolling_rows(terms, self._radius, frame.T.ravel().tolist(), e1_rate)
 
     def _transmitted(self, data: Any, e1: FloatArray) -> float:
         """N [N] from the wrench in the spherical joint that the last pass of Pinocchio left in ``data``."""

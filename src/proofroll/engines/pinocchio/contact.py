@@ -9,6 +9,7 @@ Euler multiplies it by the square root of 1 + (ω dt)², so that a fast ball blo
 from __future__ import annotations
 
 import math
+from collections.abc import Sequence
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -31,8 +32,6 @@ _ADMM_ITERATIONS = 10_000
 _ON_CONE = 1e-9
 # A normal impulse smaller than this part of gravity's is round-off of the gap: the wall does not press.
 _FAINT = 1e-9
-# Axes of the plane in the local frame: e2, -e3 and -e1.
-_PLANE = np.array([[0.0, 0.0, -1.0], [1.0, 0.0, 0.0], [0.0, -1.0, 0.0]])
 # The moment of rolling resistance follows the normal force, and is found by repetition.
 _REPEATS, _SETTLED = 10, 1e-13
 
@@ -138,15 +137,17 @@ class ContactRun:
         pin.computeAllTerms(model, data, q, v)
         velocity = pin.getVelocity(model, data, self._ball, pin.LOCAL_WORLD_ALIGNED)
         p, turned = data.oMi[self._ball].translation, data.oMi[self._ball].rotation
-        axes = self._pose(p, turned)
+        place = p.tolist()
+        triad = self._body.surface.triad(*place)
+        axes = self._pose(p, turned, triad)
         self._point.calc(model, data, self._point_data)
         jacobian = self._point.jacobian(model, data, self._point_data)
         inverse = self._inverse
         to_joints = inverse.dot(jacobian.T)
         delassus = pin.DelassusOperatorDense(jacobian.dot(to_joints))
-        shift = np.array([0.0, 0.0, self._body.surface.nearby(*p.tolist())[0] / self._dt])
+        shift = np.array([0.0, 0.0, self._body.surface.nearby(*place)[0] / self._dt])
         if self._leapfrog:
-            shift += 0.5 * self._dt * axes.T.dot(self._turning(p, velocity, -axes[:, 2]))
+            shift += self._turning(place, velocity, triad)
 
         f, torque, normal_force = self._body.contact.rolling_resistance, np.zeros(6), self._normal_force
         after, velocity_now = v, velocity.linear
@@ -167,23 +168,29 @@ class ContactRun:
             status = self._status  # a plane does not press before the ball has moved into it
         return Kick(v, after, span, axes @ impulse / span, status)
 
-    def _pose(self, p: FloatArray, turned: FloatArray) -> FloatArray:
+    def _pose(self, p: FloatArray, turned: FloatArray, triad: Sequence[float]) -> FloatArray:
         """Poses the plane, and returns its axes as columns, the last one from the wall into the ball."""
-        surface = self._body.surface
-        frame = surface.frame(surface.locate(p))
-        axes = frame.dot(_PLANE)
-        arm = self._body.ball.radius * frame[:, 0]
+        x1, y1, z1, x2, y2, z2, x3, y3, z3 = triad
+        axes = np.array([[x2, -x3, -x1], [y2, -y3, -y1], [z2, -z3, -z1]])
+        arm = -self._body.ball.radius * axes[:, 2]
         self._point.joint1_placement = pin.SE3(axes, p + arm)
         self._point.joint2_placement = pin.SE3(turned.T.dot(axes), turned.T.dot(arm))
-        return np.asarray(axes)
+        return axes
 
-    def _turning(self, p: FloatArray, velocity: Any, e1: FloatArray) -> FloatArray:
-        """Rate of the velocity of the contact point that comes from the turning of the normal [m/s²], shape (3,)."""
-        surface, radius = self._body.surface, self._body.ball.radius
-        v = velocity.linear
-        e1_rate = surface.normal_gradient(p).dot(v)
-        slip_rate = radius * np.array(cross(velocity.angular.tolist(), e1_rate.tolist()))
-        return np.asarray(slip_rate + (e1_rate.dot(v) - e1.dot(slip_rate)) * e1)
+    def _turning(
+        self, p: tuple[float, float, float], velocity: Any, triad: Sequence[float]
+    ) -> tuple[float, float, float]:
+        """What the turning of the normal adds to the velocity of the contact point in half a step [m/s].
+
+        Along the axes of the plane, e2, -e3 and -e1: a ω × ė1, and the bend of the path.
+        """
+        _, _, _, x2, y2, z2, x3, y3, z3 = triad
+        v = velocity.linear.tolist()
+        rate = self._body.surface.normal_rate(p, v)
+        x, y, z = cross(velocity.angular.tolist(), rate)
+        half, lever = 0.5 * self._dt, 0.5 * self._dt * self._body.ball.radius
+        bend = rate[0] * v[0] + rate[1] * v[1] + rate[2] * v[2]
+        return lever * (x2 * x + y2 * y + z2 * z), -lever * (x3 * x + y3 * y + z3 * z), -half * bend
 
     def _resistance(self, p: FloatArray, turned: FloatArray, v_WB: FloatArray) -> FloatArray:
         """Rolling resistance on the joints per unit of normal force [m], shape (6,); zero where the ball rests."""

@@ -35,14 +35,15 @@ class FreeFlyer(Mechanism):
     def _rows(self, data: Any, q: FloatArray, v: FloatArray) -> tuple[BallTerms, FloatArray, FloatArray, FloatArray]:
         """Terms of the ball, local frame, rows and drift: first the surface, then the two of rolling."""
         terms = ball_terms(self.model, data, self.ball, q, v, self._rest)
-        p = q[:3]
-        frame = self._surface.frame(self._surface.locate(p))
+        p, v_WB = q[:3].tolist(), terms.v.tolist()
+        triad, e1_rate = self._surface.triad(*p), self._surface.normal_rate(p, v_WB)
+        frame = np.array(triad).reshape(3, 3).T
         e1 = frame[:, 0]
-        e1_rate = self._surface.normal_gradient(p).dot(terms.v)
-        slip_rows, slip_drift = rolling_rows(terms, self._radius, frame, e1_rate.tolist())
+        slip_rows, slip_drift = rolling_rows(terms, self._radius, triad, e1_rate)
         rows, drift = np.empty((3, 6)), np.empty(3)
         rows[0], rows[1:] = e1.dot(terms.jacobian[:3]), slip_rows
-        drift[0], drift[1:] = e1.dot(terms.bias[:3]) + e1_rate.dot(terms.v), slip_drift
+        bend = e1_rate[0] * v_WB[0] + e1_rate[1] * v_WB[1] + e1_rate[2] * v_WB[2]
+        drift[0], drift[1:] = e1.dot(terms.bias[:3]) + bend, slip_drift
         return terms, frame, rows, drift
 
     def _solve(self, data: Any, q: FloatArray, v: FloatArray) -> tuple[FloatArray, FloatArray, FloatArray]:

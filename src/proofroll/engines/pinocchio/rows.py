@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Sequence
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -48,15 +49,21 @@ def ball_terms(model: Any, data: Any, ball: int, q: FloatArray, v: FloatArray, r
 
 
 def rolling_rows(
-    terms: BallTerms, radius: float, frame: FloatArray, e1_rate: Triple
+    terms: BallTerms, radius: float, triad: Sequence[float], e1_rate: Triple
 ) -> tuple[FloatArray, FloatArray]:
     """Slip velocity along e2 and e3 as J q̇, and its rate at zero joint acceleration; shapes (2, nv) and (2,).
 
     Slip is v + a ω × e1, so its components are e2·v + a e3·ω and e3·v - a e2·ω. Its rate has the term a ω × ė1, which
     a row re-posed at each instant would lack.
+
+    Args:
+        terms: of the ball.
+        radius: a [m].
+        triad: components of e1, e2, e3, one after the other.
+        e1_rate: ė1 [1/s].
     """
     # Plain floats: numpy's overhead on three numbers is that of all that Pinocchio computes here.
-    (_, x2, x3), (_, y2, y3), (_, z2, z3) = frame.tolist()
+    _, _, _, x2, y2, z2, x3, y3, z3 = triad
     a = radius
     directions = np.array([[x2, y2, z2, a * x3, a * y3, a * z3], [x3, y3, z3, -a * x2, -a * y2, -a * z2]])
     x, y, z = cross(terms.w.tolist(), e1_rate)
