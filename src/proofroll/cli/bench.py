@@ -18,6 +18,7 @@ def adapters(
     engine: Engines = None,
     preset: Annotated[str, typer.Option(help="Preset of each formulation that has it.")] = "matched",
     rounds: Rounds = 7,
+    seconds: Annotated[float, typer.Option(min=1e-3, help="Least length of one measurement [s].")] = 0.1,
     as_json: Json = False,
 ) -> None:
     """Compare each adapter with the bare loop that a careful user of its engine would write."""
@@ -27,7 +28,7 @@ def adapters(
     for name in engine or ():
         require_engine(name)
     with progress_bar("adapters") as advance:
-        found = content(bench_adapters(engine or engine_names(), preset, rounds, progress=advance))
+        found = content(bench_adapters(engine or engine_names(), preset, rounds, seconds, progress=advance))
     if as_json:
         write_json(found)
     else:
