@@ -96,11 +96,9 @@ class Surface(Protocol):
         """Gap [m] and the components of e1 at one point, for loops that call it at every step."""
 
     def triad(self, x: float, y: float, z: float) -> tuple[float, ...]:
-        """Components of e1, e2, e3 where the surface is nearest to one point, one after the other; as :meth:`nearby`."""
+        """Components of e1, e2, e3 at one point, one after the other; as :meth:`nearby`."""
 
-    def normal_rate(
-        self, p: tuple[float, float, float], v: tuple[float, float, float]
-    ) -> tuple[float, float, float]:
+    def normal_rate(self, p: tuple[float, float, float], v: tuple[float, float, float]) -> tuple[float, float, float]:
         """(∂e1/∂p) v at one point p [m], for its velocity v [m/s]; as :meth:`nearby`."""
 
 
@@ -202,18 +200,20 @@ class Cylinder:
     def nearby(self, x: float, y: float, z: float) -> tuple[float, float, float, float]:
         """See :class:`Surface`."""
         across, down = self._tilted
-        distance, cos, sin = self._around(x, y, z)
-        return self.radius - distance, across * cos, sin, -down * cos
+        x = across * x - down * z  # as in _around, which would be a third of the cost here
+        distance = math.sqrt(x * x + y * y)
+        cos = x / (distance or math.nan)
+        return self.radius - distance, across * cos, y / (distance or math.nan), -down * cos
 
     def triad(self, x: float, y: float, z: float) -> tuple[float, ...]:
         """See :class:`Surface`."""
         across, down = self._tilted
-        _, cos, sin = self._around(x, y, z)
+        x = across * x - down * z
+        distance = math.sqrt(x * x + y * y) or math.nan
+        cos, sin = x / distance, y / distance
         return across * cos, sin, -down * cos, -across * sin, cos, down * sin, down, 0.0, across
 
-    def normal_rate(
-        self, p: tuple[float, float, float], v: tuple[float, float, float]
-    ) -> tuple[float, float, float]:
+    def normal_rate(self, p: tuple[float, float, float], v: tuple[float, float, float]) -> tuple[float, float, float]:
         """See :class:`Surface`."""
         across, down = self._tilted
         distance, cos, sin = self._around(*p)
@@ -252,9 +252,9 @@ class Cylinder:
         """See :class:`Surface`."""
         if np.ndim(p_WB) == 1:
             distance, cos, sin = self._around(*np.asarray(p_WB).tolist())
-            across, down = self._tilted
-            x, y, z = -across * sin, cos, down * sin  # e2, along which alone the normal turns
-            rows = [[x * x, x * y, x * z], [y * x, y * y, y * z], [z * x, z * y, z * z]]
+            upright, down = self._tilted
+            ex, ey, ez = -upright * sin, cos, down * sin  # e2, along which alone the normal turns
+            rows = [[ex * ex, ex * ey, ex * ez], [ey * ex, ey * ey, ey * ez], [ez * ex, ez * ey, ez * ez]]
             return np.array(rows) / distance
         p = self._local(p_WB)
         e1 = self.normal(p_WB)

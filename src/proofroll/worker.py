@@ -174,7 +174,9 @@ class Spent:
     def on(self, cause: str, **parts: float) -> None:
         """What has passed since the last call went to ``cause``, but for ``parts`` of it [s] that had another."""
         now = time.perf_counter()
-        found = {cause: now - self._since - sum(parts.values())} | {key.replace("_", " "): value for key, value in parts.items()}
+        found = {cause: now - self._since - sum(parts.values())} | {
+            key.replace("_", " "): value for key, value in parts.items()
+        }
         for key, value in found.items():
             self.seconds[key] = self.seconds.get(key, 0.0) + value
         self._since = now

@@ -182,7 +182,9 @@ def _row(answer: dict[str, Any]) -> dict[str, Any]:
         return {"ratio": None, "message": answer["message"]}
     facts = {key: answer[key] for key in ("distance", "tolerance", "because", "until")}
     if "adapter" not in answer:
-        apart = f"the two end {answer['distance']:.2g} m apart, more than {answer['tolerance']:.2g} m: not the same model"
+        apart = (
+            f"the two end {answer['distance']:.2g} m apart, more than {answer['tolerance']:.2g} m: not the same model"
+        )
         return facts | {"ratio": None, "message": apart}
     adapter, bare = (Timing(tuple(answer[name])) for name in ("adapter", "bare"))
     return facts | {

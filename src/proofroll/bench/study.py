@@ -30,10 +30,10 @@ POINTS: Sequence[Mapping[str, float]] = ({}, {"rolling_resistance": 5e-4})
 
 
 def study_cases(engines: Sequence[str], seconds: float = LEAST_SECONDS) -> list[Case]:
-    """Two cases per formulation that has the preset ``matched``, as long as it takes to last ``seconds``, with timed clean runs.
+    """Two cases per formulation that has the preset ``matched``, each as long as it takes to last ``seconds``.
 
-    One is without rolling resistance and one with; what a process costs is shared by an engine's cases, and a study with
-    one case for each would be no usual one.
+    One is without rolling resistance and one with, both with timed clean runs. What a process costs is shared by an
+    engine's cases, and a study with one case for each would be no usual one.
 
     Raises:
         ProofrollError: an engine cannot be asked.

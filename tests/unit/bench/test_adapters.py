@@ -50,7 +50,7 @@ def measured(monkeypatch: pytest.MonkeyPatch, centre: Callable[[np.ndarray[Any, 
 def test_no_ratio_for_another_motion(monkeypatch: pytest.MonkeyPatch) -> None:
     """A bare loop that ends elsewhere is measured against nothing; nor is one whose end is not finite."""
     for wrong in (0.0, np.nan):
-        answer = measured(monkeypatch, lambda times, wrong=wrong: np.full(3, wrong))  # type: ignore[misc]
+        answer = measured(monkeypatch, lambda times, wrong=wrong: times[0] + np.full(3, wrong))  # type: ignore[misc]
         assert "adapter" not in answer
         assert not answer["distance"] <= answer["tolerance"]
 

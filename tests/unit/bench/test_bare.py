@@ -52,7 +52,7 @@ def centres(
 @pytest.mark.parametrize("variant", [name for name in VARIANTS if "slips" not in name])
 @pytest.mark.parametrize(("engine", "formulation"), FORMULATIONS)
 def test_the_bare_loop_ends_where_the_adapter_does(engine: str, formulation: str, variant: str) -> None:
-    """Each engine's bare loop gives the adapter's centre to its tolerance, for every formulation that has the variant."""
+    """Each engine's bare loop gives the adapter's centre to its tolerance, wherever there is the variant."""
     if "bounded" in variant and (engine, formulation) in NO_SLIP:
         with pytest.raises(Refused):
             centres(engine, formulation, VARIANTS[variant])

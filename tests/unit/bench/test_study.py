@@ -22,7 +22,9 @@ def test_shares_add_up() -> None:
     assert found["within_goal"] is False
 
 
-def test_a_case_says_where_its_time_went(tmp_path: Path, make_case: Callable[..., Case], install_engines: Callable[[Mapping[str, str]], None]) -> None:
+def test_a_case_says_where_its_time_went(
+    tmp_path: Path, make_case: Callable[..., Case], install_engines: Callable[[Mapping[str, str]], None]
+) -> None:
     """Every result of a run names its causes, none negative, and the time inside the engine is the stopwatch's."""
     install_engines({"tiny": "tiny:Tiny"})
     case = make_case("tiny", timed=True)

@@ -32,7 +32,10 @@ def prepare(scene: Scene, settings: Any) -> Bare:
     loop = {"generic": _generic, "carrier": _carrier, "rolling_disc": _rolling_disc, "contact": _contact}
     tolerances = {
         # Newton's method is restarted at every sample by the adapter, and stops anywhere within its tolerance.
-        "contact": (1e-8, "Newton's method is restarted at every sample, and the stiff contact magnifies what it leaves"),
+        "contact": (
+            1e-8,
+            "Newton's method is restarted at every sample, and the stiff contact magnifies what it leaves",
+        ),
     }
     tolerance, because = tolerances.get(
         settings.formulation, (1e-9, "Newton's method is restarted at every sample, and ends within its tolerance")
@@ -74,7 +77,7 @@ def _sensors(system: Any, node: Any, forces: Sequence[tuple[Any, Any]], state: S
 
 
 def _generic(body: RollingBall, settings: Any) -> Callable[[FloatArray], FloatArray]:
-    """q = (distance towards the wall, γ, z, and three coordinates whose rates are ω1, ω2, ω3)."""
+    """Coordinates q = (distance towards the wall, γ, z, and three coordinates whose rates are ω1, ω2, ω3)."""
     m, J, a, c = body.ball.mass, body.ball.inertia, body.ball.radius, body.surface.length_scales[0]
     f, g, mu = body.contact.rolling_resistance, -float(body.gravity[2]), body.contact.mu_static
     beta, mc = 1 / m + a * a / J, m * c
@@ -149,9 +152,7 @@ def _rigid(
     system, ball, stopped = model.system, model.ball, list[str]()
     data = system.systemData
     consistent = not isinstance(model, Contact)
-    start = (
-        (data.GetODE2Coordinates_tt(exu.ConfigurationType.Initial), data.GetAECoordinates()) if consistent else None
-    )
+    start = (data.GetODE2Coordinates_tt(exu.ConfigurationType.Initial), data.GetAECoordinates()) if consistent else None
     if ball.resistance is not None:
         system.SetLoadParameter(ball.resistance, "loadVectorUserFunction", _resistance(body, ball.node))
     _sensors(
@@ -215,9 +216,7 @@ def _contact(body: RollingBall, settings: Any) -> Callable[[FloatArray], FloatAr
 
     def follow(system: Any, t: float, newton_iteration: int, discontinuous_iteration: int) -> None:  # noqa: ARG001 -- Exudyn's signature
         # A hollow sphere as wide as the cylinder, with its centre on the axis at the ball's height.
-        system.SetMarkerParameter(
-            follower, "localPosition", [0.0, 0.0, float(system.GetNodeOutput(node, position)[2])]
-        )
+        system.SetMarkerParameter(follower, "localPosition", [0.0, 0.0, float(system.GetNodeOutput(node, position)[2])])
 
     model.system.SetPreNewtonResidualUserFunction(follow)
     return _rigid(model, body, settings, [(model.contact, Output.Force)])

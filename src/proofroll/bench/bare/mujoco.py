@@ -93,7 +93,11 @@ class _Resistance:
         e1x, e1y = e1
         vx, vy, vz = v
         scale = -self.f * max(ahead, 0.0) / (math.sqrt(vx * vx + vy * vy + vz * vz) or 1.0)
-        self.torque[0], self.torque[1], self.torque[2] = -scale * vz * e1y, scale * vz * e1x, scale * (vx * e1y - vy * e1x)
+        self.torque[0], self.torque[1], self.torque[2] = (
+            -scale * vz * e1y,
+            scale * vz * e1x,
+            scale * (vx * e1y - vy * e1x),
+        )
 
 
 def _chart(model: Any, data: Any, body: RollingBall, settings: Any) -> Callable[[FloatArray], FloatArray]:

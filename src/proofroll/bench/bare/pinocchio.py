@@ -214,47 +214,61 @@ def _rows_run(
     return run
 
 
-def _contact(body: RollingBall, settings: Any) -> Callable[[FloatArray], FloatArray]:
-    """Translation and spherical joint, and Pinocchio's solver of contact with friction; the plane posed anew."""
-    a, c, dt, f = body.ball.radius, body.surface.length_scales[0], settings.dt, body.contact.rolling_resistance
-    leapfrog, bounded = settings.integrator == "leapfrog", math.isfinite(body.contact.mu_static)
-    model = pin.Model()
-    model.gravity.linear = body.gravity
-    carriage = model.addJoint(0, pin.JointModelTranslation(), pin.SE3.Identity(), "centre")
-    ball = model.addJoint(carriage, pin.JointModelSpherical(), pin.SE3.Identity(), "ball")
-    model.appendBodyToJoint(ball, _ball(body), pin.SE3.Identity())
-    data = model.createData()
-    point = pin.PointContactConstraintModel(model, 0, pin.SE3.Identity(), ball, pin.SE3.Identity())
-    models, datas = pin.StdVec_ConstraintModel(), pin.StdVec_ConstraintData()
-    models.append(pin.ConstraintModel(point))
-    datas.append(models[0].createData())
-    point, point_data = models[0].extract(), datas[0].extract()
-    solver, options, result = pin.PGSConstraintSolver(3), pin.PGSSolverSettings(), pin.PGSSolverResult()
-    for name in ("feasibility", "complementarity"):
-        for bound in ("absolute", "relative"):
-            setattr(options, f"{bound}_{name}_tol", settings.solver_tolerance)
-    mu_s = body.contact.mu_static if bounded else _UNBOUNDED
-    mu_k = body.contact.mu_kinetic if bounded else _UNBOUNDED
-    q0, v0 = np.array([*body.p0, 0.0, 0.0, 0.0, 1.0]), np.concatenate([body.v0, body.w0])
-    # The masses of a ball are the same in every configuration, and off the diagonal there is nothing.
-    inverse = np.array(pin.computeMinverse(model, data, q0))
-    axes, torque, shift = np.zeros((3, 3)), np.zeros(6), np.zeros(3)
-    axes[2, 1] = -1.0
-    events: list[tuple[float, bool]] = []
+class _PlaneContact:
+    """Translation and spherical joint, a plane that is posed anew, and Pinocchio's solver of contact with friction."""
 
-    def solve(delassus: Any, free: FloatArray, mu: float) -> tuple[FloatArray, bool]:
-        point.setFriction(mu)
-        result.reset()
-        if not solver.solve(delassus, free, models, datas, options, result):
+    def __init__(self, body: RollingBall, settings: Any) -> None:
+        model = self.model = pin.Model()
+        model.gravity.linear = body.gravity
+        carriage = model.addJoint(0, pin.JointModelTranslation(), pin.SE3.Identity(), "centre")
+        self.ball = model.addJoint(carriage, pin.JointModelSpherical(), pin.SE3.Identity(), "ball")
+        model.appendBodyToJoint(self.ball, _ball(body), pin.SE3.Identity())
+        self.data = model.createData()
+        point = pin.PointContactConstraintModel(model, 0, pin.SE3.Identity(), self.ball, pin.SE3.Identity())
+        self.models, self.datas = pin.StdVec_ConstraintModel(), pin.StdVec_ConstraintData()
+        self.models.append(pin.ConstraintModel(point))
+        self.datas.append(self.models[0].createData())
+        self.point, self.point_data = self.models[0].extract(), self.datas[0].extract()
+        self.solver, self.options, self.result = (
+            pin.PGSConstraintSolver(3),
+            pin.PGSSolverSettings(),
+            pin.PGSSolverResult(),
+        )
+        for name in ("feasibility", "complementarity"):
+            for bound in ("absolute", "relative"):
+                setattr(self.options, f"{bound}_{name}_tol", settings.solver_tolerance)
+        self.q, self.v = np.array([*body.p0, 0.0, 0.0, 0.0, 1.0]), np.concatenate([body.v0, body.w0])
+        # The masses of a ball are the same in every configuration, and off the diagonal there is nothing.
+        self.inverse = np.array(pin.computeMinverse(model, self.data, self.q))
+
+    def solve(self, delassus: Any, free: FloatArray, mu: float) -> tuple[FloatArray, bool]:
+        """Impulse [N s], and whether it is inside the cone."""
+        self.point.setFriction(mu)
+        self.result.reset()
+        if not self.solver.solve(delassus, free, self.models, self.datas, self.options, self.result):
             raise Diverged("Pinocchio's solver did not converge")
-        impulse = np.array(result.retrieveConstraintImpulses())
+        impulse = np.array(self.result.retrieveConstraintImpulses())
         F1, F2, N = impulse.tolist()
         if N <= 0:
             raise Diverged("the ball leaves the wall, for which there is no bare loop")
         return impulse, math.hypot(F1, F2) < mu * N * (1 - 1e-9)
 
+
+def _contact(body: RollingBall, settings: Any) -> Callable[[FloatArray], FloatArray]:  # noqa: PLR0915 -- one loop, as a user writes it down
+    """Velocity-level steps, each with the plane tangent to the cylinder at the ball."""
+    a, c, dt, f = body.ball.radius, body.surface.length_scales[0], settings.dt, body.contact.rolling_resistance
+    leapfrog, bounded = settings.integrator == "leapfrog", math.isfinite(body.contact.mu_static)
+    mu_s = body.contact.mu_static if bounded else _UNBOUNDED
+    mu_k = body.contact.mu_kinetic if bounded else _UNBOUNDED
+    known = _PlaneContact(body, settings)
+    model, data, ball, solve, inverse = known.model, known.data, known.ball, known.solve, known.inverse
+    point, point_data = known.point, known.point_data
+    axes, torque, shift = np.zeros((3, 3)), np.zeros(6), np.zeros(3)
+    axes[2, 1] = -1.0
+    events: list[tuple[float, bool]] = []
+
     def run(times: FloatArray) -> FloatArray:
-        q, v, span, sticks, normal_force = q0, v0, 0.5 * dt if leapfrog else dt, True, 0.0
+        q, v, span, sticks, normal_force = known.q, known.v, 0.5 * dt if leapfrog else dt, True, 0.0
         count = round(float(times[-1]) / dt)
         for number in range(count):
             pin.computeAllTerms(model, data, q, v)

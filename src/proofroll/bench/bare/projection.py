@@ -92,7 +92,7 @@ def _scales(body: RollingBall, angles: int) -> FloatArray:
 
 
 def _euler(body: RollingBall) -> Equations:
-    """q = [γ z φ θ ψ] with the velocities q̇: state, ẋ, elimination of violations, and the present multipliers."""
+    """Coordinates q = [γ z φ θ ψ] with velocities q̇: state, ẋ, elimination of violations, present multipliers."""
     m, J, a, c = body.ball.mass, body.ball.inertia, body.ball.radius, body.surface.length_scales[0]
     g, f, mc = -float(body.gravity[2]), body.contact.rolling_resistance, m * c
     w1, w2, w3 = body.w0.tolist()
@@ -143,7 +143,7 @@ def _euler(body: RollingBall) -> Equations:
 
 
 def _rotating_frame(body: RollingBall) -> Equations:
-    """q = [γ z] with the velocities [γ̇ ż ω1 ω2 ω3]; as :func:`_euler`."""
+    """Coordinates q = [γ z] with the velocities [γ̇ ż ω1 ω2 ω3]; as :func:`_euler`."""
     m, J, a, c = body.ball.mass, body.ball.inertia, body.ball.radius, body.surface.length_scales[0]
     g, f, mc = -float(body.gravity[2]), body.contact.rolling_resistance, m * c
     x = np.array([0.0, 0.0, *body.udot0, *body.w0])

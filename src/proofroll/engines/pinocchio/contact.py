@@ -214,7 +214,7 @@ class ContactRun:
 
     def _judged(self, impulse: FloatArray, mu: float) -> EventKind:
         F2, F3, N = impulse.tolist()
-        if N <= self._faint:
+        if not self._faint < N:
             return "liftoff"
         on_cone = math.hypot(F2, F3) >= mu * N * (1 - _ON_CONE)
         return "slip" if on_cone else "stick"

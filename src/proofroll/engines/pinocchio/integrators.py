@@ -156,7 +156,9 @@ class Adaptive:
         # The rates must not depend on the length to which the quaternion has drifted.
         q, v = pin.normalize(self._model, y[:nq]), y[nq:]
         moving = v if self._settings.orientation else self._moving * v
-        return np.concatenate([pin.tangentMap(self._model, q).dot(moving), self._mechanism.respond(self._data, q, v)[0]])
+        return np.concatenate(
+            [pin.tangentMap(self._model, q).dot(moving), self._mechanism.respond(self._data, q, v)[0]]
+        )
 
     def advance(self, start: float, end: float) -> None:
         """See :class:`Integrator`. The last step ends at ``end``: the dense output of DOP853 has a lower order."""

@@ -11,7 +11,6 @@ import pinocchio as pin
 
 from proofroll.surfaces import FloatArray
 
-
 Triple = list[float] | tuple[float, float, float]
 
 

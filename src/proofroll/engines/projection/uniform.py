@@ -1,8 +1,8 @@
 """The equations of motion on a surface that looks the same from every point of it, written out.
 
-There all geometry along the local axes is constant, and what is left of the projections of :mod:`method` are a few dozen
-products. As plain floats they cost a fifth of the same in arrays of three to seven numbers. Nothing is modelled here:
-the results are those of :class:`~proofroll.engines.projection.method.ProjectedBall` with both rows of rolling active.
+There all geometry along the local axes is constant, and what is left of the projections of :mod:`method` are a few
+dozen products. As plain floats they cost a fifth of the same in arrays of three to seven numbers. Nothing is modelled
+here: the results are those of :class:`~proofroll.engines.projection.method.ProjectedBall` with both rows of rolling active.
 """
 
 from __future__ import annotations
