@@ -278,10 +278,7 @@ class Runner:
                     worker = None
                     if self._stopping.is_set():
                         break
-                started = time.perf_counter()
-                result = self.store.put(case, result)
-                spent = result.spent | {"storing": time.perf_counter() - started}
-                arrived.put((case, dataclasses.replace(result, spent=spent)))
+                arrived.put((case, self.store.put(case, result)))
         except Exception as error:
             arrived.put(error)
         finally:

@@ -32,7 +32,7 @@ def test_a_case_says_where_its_time_went(
     result = Runner(store, jobs=1).run([case])[case.key]
     assert result.status is Status.DONE
     causes = {"process start", "loading", "building", "certificate", "advance", "sampling", "trajectory", "writing"}
-    assert causes | {"clean runs", "clean-up", "storing"} == set(result.spent)
+    assert causes | {"clean runs", "clean-up"} == set(result.spent)
     assert min(result.spent.values()) >= 0
     assert result.spent["advance"] == result.wall_seconds
     assert result.spent["process start"] > 0.01

@@ -2,7 +2,8 @@
 
 There all geometry along the local axes is constant, and what is left of the projections of :mod:`method` are a few
 dozen products. As plain floats they cost a fifth of the same in arrays of three to seven numbers. Nothing is modelled
-here: the results are those of :class:`~proofroll.engines.projection.method.ProjectedBall` with both rows of rolling active.
+here: the results are those of :class:`~proofroll.engines.projection.method.ProjectedBall` with both rows of rolling
+active.
 """
 
 from __future__ import annotations
