@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import dataclasses
 import math
+import os
 import tempfile
 import time
 from collections.abc import Callable, Mapping, Sequence
@@ -69,8 +70,10 @@ def bench_study(
     """Runs the cases in a store of its own, and says where wall time × workers went.
 
     The settings are resolved within the measured time, as in every study, and cases that did not last are shown but
-    judged with the others: what a study costs is judged as a whole.
+    judged with the others: what a study costs is judged as a whole. Wall time is what others on the machine make of it:
+    the load average of the minute before is told with it.
     """
+    load = os.getloadavg()[0] if hasattr(os, "getloadavg") else None  # before anything of ours runs
     cases = study_cases(engines, seconds)
     with tempfile.TemporaryDirectory() as folder:
         start = time.perf_counter()
@@ -83,6 +86,7 @@ def bench_study(
     return {
         "goal": GOAL,
         "jobs": jobs,
+        "load_before": load,
         "wall_seconds": wall,
         **account([result.spent for _, result in found], wall * jobs, resolved),
         "cases": [_row(case, result) for case, result in found],

@@ -93,6 +93,8 @@ def _print_study(found: dict[str, Any]) -> None:
         console().print()
     starts = ", ".join(f"{name} {number(seconds)} s" for name, seconds in found["first_answer"].items())
     console().print(f"from the start of a process to its first answer: {starts}")
+    if found["load_before"] is not None:
+        console().print(f"load average of the machine before: {found['load_before']:.1f}")
     console().print(f"goal: at most {found['goal']:.0%} outside")
 
 

@@ -76,6 +76,7 @@ class Free:
         position, rates, pushed = data.qpos[:3], data.qvel[:3], data.qfrc_constraint[:3]
         place, quaternion, facing = data.mocap_pos[0], data.mocap_quat[0], np.zeros(3)
         normal, torque = data.geom_xmat[self._wall, 2::3], data.xfrc_applied[self._ball, 3:]
+        resists, step = self.resistance.f > 0, None if friction is None else friction.step
         for _ in range(steps):
             x, y, z = position.tolist()
             gap, e1x, e1y, e1z = nearby(x, y, z)
@@ -83,13 +84,13 @@ class Free:
             place[0], place[1], place[2] = x + reach * e1x, y + reach * e1y, z + reach * e1z
             facing[0], facing[1], facing[2] = -e1x, -e1y, -e1z
             mujoco.mju_quatZ2Vec(quaternion, facing)
-            if self.resistance.f:
+            if resists:
                 N = foreseen_normal_force(data, float(pushed.dot(normal)))
                 self.resistance.apply(torque, N, (e1x, e1y, e1z), rates.tolist())
-            if friction is not None:
-                friction.step(data)
-            else:
+            if step is None:
                 mujoco.mj_step(model, data)
+            else:
+                step(data)
 
     def evaluate(self, data: Any) -> None:
         """Computes forces and accelerations of the present state, as a step would."""
