@@ -16,7 +16,7 @@ from types import TracebackType
 from typing import Any, Self
 
 from proofroll.case import Status
-from proofroll.errors import ProofrollError
+from proofroll.errors import InputError, Missing, ProofrollError
 from proofroll.memory import VARIABLE, descendants, memory_limit, resident_gb
 
 # One thread per worker, set before anything is imported there: workers run side by side.
@@ -57,9 +57,13 @@ class Worker:
 
     Args:
         memory: how much it may have, its children included [GB]; by default :func:`proofroll.memory.memory_limit`.
+
+    Attributes:
+        waited: wall seconds for the last answer; for the first one from the start of the process [s].
     """
 
     def __init__(self, memory: float | None = None) -> None:
+        self._began, self.waited = time.perf_counter(), 0.0
         self._memory = memory or memory_limit()
         self._ending = threading.Lock()
         self._answers, writer = os.pipe()
@@ -103,13 +107,32 @@ class Worker:
             self._process.stdin.flush()
         except (OSError, ValueError):  # a broken pipe, or one that is closed already
             raise WorkerDied(Status.CRASHED, self._last_words()) from None
+        asked = time.perf_counter()
         line = self._line(time_limit)
+        self.waited = time.perf_counter() - (self._began or asked)
+        self._began = 0.0
         with contextlib.suppress(ValueError):
             answer = json.loads(line)
             if isinstance(answer, dict) and answer.pop("number", None) == self._asked:
                 return answer
         self.kill()
         raise WorkerDied(Status.CRASHED, "the engine wrote into the answers of its process, which was ended")
+
+    def request(self, request: Mapping[str, Any], time_limit: float) -> dict[str, Any]:
+        """As :meth:`ask`, with the errors that the worker met raised here.
+
+        Raises:
+            InputError, Missing, WorkerDied: the worker says so, or it ended.
+        """
+        answer = self.ask(request, time_limit)
+        match answer.get("error"):
+            case "input":
+                raise InputError(answer["field"], answer["value"], answer["advice"])
+            case "missing":
+                raise Missing(answer["message"])
+            case "crashed":
+                raise WorkerDied(Status.CRASHED, answer["message"])
+        return answer
 
     def _line(self, time_limit: float) -> bytes:
         """The next line of the answers."""

@@ -22,18 +22,6 @@ __all__ = ["Runner", "Worker", "WorkerDied", "describe", "resolve", "run_one"]
 _START_UP_SECONDS = 60.0
 
 
-def _checked(answer: dict[str, Any]) -> dict[str, Any]:
-    """The answer, or the error that the worker met."""
-    match answer.get("error"):
-        case "input":
-            raise InputError(answer["field"], answer["value"], answer["advice"])
-        case "missing":
-            raise Missing(answer["message"])
-        case "crashed":
-            raise WorkerDied(Status.CRASHED, answer["message"])
-    return answer
-
-
 def describe(engine: str) -> dict[str, Any]:
     """What an engine is, provides and has as presets; asked in a process of its own.
 
@@ -41,13 +29,14 @@ def describe(engine: str) -> dict[str, Any]:
         InputError, Missing, WorkerDied: it cannot be asked.
     """
     with Worker() as worker:
-        return _checked(worker.ask({"do": "describe", "engine": engine}, _START_UP_SECONDS))
+        return worker.request({"do": "describe", "engine": engine}, _START_UP_SECONDS)
 
 
 def resolve(engines: Sequence[tuple[str, Mapping[str, Any]]]) -> list[EngineFacts | ProofrollError]:
     """Complete settings for engines with options, each or the reason why not, in the order given."""
     found: list[EngineFacts | ProofrollError] = [ProofrollError("not asked")] * len(engines)
-    for name in dict.fromkeys(name for name, _ in engines):
+
+    def ask(name: str) -> None:
         worker = Worker()
         try:
             for index, (other, options) in enumerate(engines):
@@ -55,7 +44,7 @@ def resolve(engines: Sequence[tuple[str, Mapping[str, Any]]]) -> list[EngineFact
                     continue
                 request = {"do": "resolve", "engine": name, "options": dict(options)}
                 try:
-                    found[index] = EngineFacts(**_checked(worker.ask(request, _START_UP_SECONDS)))
+                    found[index] = EngineFacts(**worker.request(request, _START_UP_SECONDS))
                 except WorkerDied as error:
                     found[index] = error
                     worker.close()
@@ -64,6 +53,10 @@ def resolve(engines: Sequence[tuple[str, Mapping[str, Any]]]) -> list[EngineFact
                     found[index] = error
         finally:
             worker.close()
+
+    # Most of it is the start of the processes and the import of the engines.
+    with ThreadPoolExecutor(os.cpu_count() or 1) as pool:
+        list(pool.map(ask, dict.fromkeys(name for name, _ in engines)))
     return found
 
 
@@ -196,7 +189,9 @@ class Runner:
 def _ask(worker: Worker, case: Case, out: Path) -> Result:
     request = {"do": "run", "case": dataclasses.asdict(case), "out": str(out.absolute())}  # an engine may change folder
     try:
-        return Result.from_dict(_checked(worker.ask(request, case.time_limit)))
+        found = Result.from_dict(worker.request(request, case.time_limit))
+        waited = worker.waited - sum(found.spent.values())  # a new process starts, and messages go to and fro
+        return dataclasses.replace(found, spent=found.spent | {"process start": waited})
     except Missing as error:
         return Result(Status.MISSING, str(error))
 

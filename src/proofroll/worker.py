@@ -78,6 +78,7 @@ def _answer(request: dict[str, Any]) -> dict[str, Any]:
         "resolve": resolve,
         "run": run,
         "time": time_once,
+        "bench": bench,
     }
     action = actions[request.pop("do")]
     try:
@@ -159,14 +160,39 @@ def _digest(sources: list[Path]) -> str:
 
 def run(case: dict[str, Any], out: str) -> dict[str, Any]:
     """Runs a case and writes its trajectory to ``out``; everything the case says comes back as a result."""
+    spent = Spent()
     try:
-        return dataclasses.asdict(_run(Case.from_dict(case), Path(out)))
+        answer = dataclasses.asdict(_run(Case.from_dict(case), Path(out), spent))
     finally:
         gc.collect()  # the next case of this process starts clean,
         gc.freeze()  # and need not look again at what stays: the modules
+    spent.on("clean-up")
+    return answer | {"spent": spent.seconds}
 
 
-def _run(case: Case, out: Path) -> Result:
+class Spent:
+    """Where the wall time of a case goes.
+
+    Attributes:
+        seconds: by cause [s].
+    """
+
+    def __init__(self) -> None:
+        self.seconds: dict[str, float] = {}
+        self._since = time.perf_counter()
+
+    def on(self, cause: str, **parts: float) -> None:
+        """What has passed since the last call went to ``cause``, but for ``parts`` of it [s] that had another."""
+        now = time.perf_counter()
+        found = {cause: now - self._since - sum(parts.values())} | {
+            key.replace("_", " "): value for key, value in parts.items()
+        }
+        for key, value in found.items():
+            self.seconds[key] = self.seconds.get(key, 0.0) + value
+        self._since = now
+
+
+def _run(case: Case, out: Path, spent: Spent) -> Result:
     from proofroll.certificate import certify, first_difference
     from proofroll.recording import record, time_grid
     from proofroll.registry import load_engine, resolve_settings
@@ -178,20 +204,25 @@ def _run(case: Case, out: Path) -> Result:
     scene = load_scene(case.scene, **case.parameters)
     times = time_grid(case.until, case.every)
     if case.engine.name == "truth":
+        spent.on("loading")
         return _run_truth(scene, times, out, versions)
     kind = load_engine(case.engine.name)
     settings = resolve_settings(kind, case.engine.settings)
+    spent.on("loading")
     lacking = scene.requires - kind.provides
     if lacking:
         return Result(Status.REFUSED, "needs " + ", ".join(sorted(lacking)), versions=versions)
     try:
         engine = kind.build(scene, settings)
+        spent.on("building")
         certificate = certify(engine, scene)
         difference = first_difference(certificate)
+        spent.on("certificate")
         lines = [{**dataclasses.asdict(line), "holds": line.holds} for line in certificate]
         if difference is not None:
             return Result(Status.REFUSED, difference, certificate=lines, versions=versions)
         recording = record(engine, scene, times)
+        spent.on("trajectory", advance=recording.wall_seconds, sampling=recording.sampling_seconds)
         del engine
     except Refused as error:
         return Result(Status.REFUSED, str(error), versions=versions)
@@ -199,7 +230,8 @@ def _run(case: Case, out: Path) -> Result:
         return Result(Status.DIVERGED, str(error), versions=versions)
     timings: list[float] = []
     if recording.failure is None and case.timed and case.until > 0:
-        timings = _clean_runs(kind, scene, settings, times)
+        timings, inside = _clean_runs(kind, scene, settings, times)
+        spent.on("building", clean_runs=inside)
     result = Result(
         status=Status.DONE if recording.failure is None else Status.DIVERGED,
         message=recording.failure or f"reached {case.until:g} s",
@@ -215,6 +247,7 @@ def _run(case: Case, out: Path) -> Result:
     manifest |= {"parameters": json.dumps(dict(scene.parameters)), "versions": json.dumps(versions)}
     manifest |= {"machine": f"{platform.machine()} {platform.system()}"}
     write(recording.dataset.assign_attrs(manifest), out)
+    spent.on("writing")
     return result
 
 
@@ -262,15 +295,26 @@ def time_once(case: dict[str, Any], seconds: float) -> dict[str, Any]:
     return {"seconds_per_second": elapsed / simulated, "message": f"{simulated:g} s simulated"}
 
 
-def _clean_runs(kind: Any, scene: Any, settings: Any, times: Any) -> list[float]:
-    """Wall seconds per simulated second of runs that only advance, each on an engine built for it."""
+def bench(**what: Any) -> dict[str, Any]:
+    """An adapter against a bare loop; see :func:`proofroll.bench.adapters.measure_adapter`."""
+    from proofroll.bench.adapters import measure_adapter
+
+    gc.freeze()  # modules need not be looked at again in every collection
+    try:
+        return measure_adapter(**what)
+    except (Refused, Diverged) as error:
+        return {"message": str(error)}
+
+
+def _clean_runs(kind: Any, scene: Any, settings: Any, times: Any) -> tuple[list[float], float]:
+    """Wall seconds per simulated second of runs that only advance, each on an engine built for it; seconds of all."""
     rates: list[float] = []
     spent = 0.0
     while len(rates) < _TIMED_RUNS and spent < _TIMED_SECONDS:
         wall, t = _clean_run(kind.build(scene, settings), times, _ENOUGH_SECONDS)
         rates.append(wall / t)
         spent += wall
-    return rates
+    return rates, spent
 
 
 def _clean_run(engine: Any, times: Any, enough: float) -> tuple[float, float]:

@@ -11,6 +11,7 @@ from typing import Annotated, Any
 import typer
 
 import proofroll
+from proofroll.cli.bench import bench
 from proofroll.cli.common import ENGINE, INTERRUPTED, OK, USAGE, complain
 from proofroll.cli.comparing import compare, regimes, report
 from proofroll.cli.drill import drill
@@ -27,6 +28,7 @@ app = typer.Typer(
 )
 for _command in (scenes, engines, run, compare, report, onset, regimes, tradeoff, recommend):
     app.command()(_command)
+app.add_typer(bench, name="bench")
 app.add_typer(drill, name="drill")
 
 
