@@ -3,14 +3,17 @@
 from __future__ import annotations
 
 import os
+import sys
 from collections.abc import Callable, Mapping
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 import pytest
+from hostile import ENTRY_POINTS
 from hypothesis import HealthCheck, settings
 
+from proofroll import cli
 from proofroll.case import Case, EngineFacts
 from proofroll.scene import Scene
 from proofroll.scene_file import load_scene
@@ -91,3 +94,29 @@ def make_case() -> Callable[..., Case]:
 def times() -> np.ndarray:
     """A time grid of two seconds, as the comparisons use it."""
     return np.linspace(0.0, 2.0, 101)
+
+
+Proofroll = Callable[..., tuple[int, str, str]]
+
+
+@pytest.fixture
+def proofroll(
+    monkeypatch: pytest.MonkeyPatch,
+    capfd: pytest.CaptureFixture[str],
+    install_engines: Callable[[Mapping[str, str]], None],
+) -> Proofroll:
+    """Runs the command line in this process; exit code, standard output, standard error."""
+    install_engines(ENTRY_POINTS | {"broken": "broken:Broken"})
+    monkeypatch.setenv("COLUMNS", "100")
+
+    def run(*arguments: str) -> tuple[int, str, str]:
+        monkeypatch.setattr(sys, "argv", ["proofroll", *arguments])
+        capfd.readouterr()
+        with pytest.raises(SystemExit) as ended:
+            cli.main()
+        captured = capfd.readouterr()
+        code = ended.value.code
+        assert isinstance(code, int)
+        return code, captured.out, captured.err
+
+    return run

@@ -6,14 +6,11 @@ import json
 import os
 import subprocess
 import sys
-from collections.abc import Callable, Mapping
+from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
 import pytest
-from hostile import ENTRY_POINTS
-
-from proofroll import cli
 
 RUN = ["run", "sphere_in_cylinder", "--engine", "oracle", "--until", "0.1", "--every", "0.05"]
 KEYS = {
@@ -25,29 +22,6 @@ FINAL = {
 }  # fmt: skip
 
 Proofroll = Callable[..., tuple[int, str, str]]
-
-
-@pytest.fixture
-def proofroll(
-    monkeypatch: pytest.MonkeyPatch,
-    capfd: pytest.CaptureFixture[str],
-    install_engines: Callable[[Mapping[str, str]], None],
-) -> Proofroll:
-    """Runs the command line in this process; exit code, standard output, standard error."""
-    install_engines(ENTRY_POINTS | {"broken": "broken:Broken"})
-    monkeypatch.setenv("COLUMNS", "100")
-
-    def run(*arguments: str) -> tuple[int, str, str]:
-        monkeypatch.setattr(sys, "argv", ["proofroll", *arguments])
-        capfd.readouterr()
-        with pytest.raises(SystemExit) as ended:
-            cli.main()
-        captured = capfd.readouterr()
-        code = ended.value.code
-        assert isinstance(code, int)
-        return code, captured.out, captured.err
-
-    return run
 
 
 def with_option(name: str, value: str) -> list[str]:
@@ -266,6 +240,18 @@ def test_compare_reuses_what_is_there(proofroll: Proofroll, tmp_path: Path) -> N
     before = written()
     assert proofroll(*arguments) == first
     assert written() == before
+
+
+def test_compare_says_what_was_damaged(proofroll: Proofroll, tmp_path: Path) -> None:
+    """A stored result that was changed is made again, and one line on standard error says so."""
+    (tmp_path / "claim.toml").write_text(COMPARISON.replace("ENGINE", "oracle"))
+    arguments = ["compare", str(tmp_path / "claim.toml"), "--out", str(tmp_path / "out"), "--json"]
+    code, out, _ = proofroll(*arguments)
+    for trajectory in (tmp_path / "out" / "cases").glob("*.nc"):
+        trajectory.write_bytes(trajectory.read_bytes()[:-1])
+    found = proofroll(*arguments)
+    assert (found[0], json.loads(found[1])["runs"][0]["verdict"]) == (code, json.loads(out)["runs"][0]["verdict"])
+    assert found[2] == "proofroll: 4 stored results were damaged and have been run again\n"
 
 
 def test_compare_restricted_to_an_engine(proofroll: Proofroll, tmp_path: Path) -> None:

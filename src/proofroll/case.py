@@ -94,6 +94,8 @@ class Result:
         versions: of the engine, of proofroll and of Python.
         trajectory: file of the trajectory in the store, or None if there is none.
         checksum: sha256 of that file.
+        spent: where the wall time of the case went, by cause [s]; ``advance`` and ``clean runs`` are the engine's.
+            Empty in records from before it was measured.
     """
 
     status: Status
@@ -105,6 +107,7 @@ class Result:
     versions: dict[str, str] = field(default_factory=dict)
     trajectory: str | None = None
     checksum: str | None = None
+    spent: dict[str, float] = field(default_factory=dict)
 
     @classmethod
     def from_dict(cls, content: dict[str, Any]) -> Result:

@@ -34,6 +34,11 @@ def load_engine(name: str) -> Any:
         raise Missing(f"{name} is not installed here ({module} is missing): {how}") from None
 
 
+def require_engine(name: str) -> None:
+    """Raises InputError if no installed package announces such an engine; nothing is loaded."""
+    _entry_point(name)
+
+
 def _entry_point(name: str) -> EntryPoint:
     for point in entry_points(group=GROUP):
         if point.name == name:

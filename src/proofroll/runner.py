@@ -5,133 +5,23 @@ from __future__ import annotations
 import contextlib
 import dataclasses
 import itertools
-import json
 import os
 import queue
-import select
-import signal
-import subprocess
-import sys
-import tempfile
 import threading
-import time
 from collections import deque
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from concurrent.futures import ThreadPoolExecutor
 from pathlib import Path
-from types import TracebackType
-from typing import Any, Self
+from typing import Any
 
 from proofroll.case import Case, EngineFacts, Result, Status
 from proofroll.errors import InputError, Missing, ProofrollError
+from proofroll.process import Worker, WorkerDied
 from proofroll.store import Store
 
-# One thread per worker, set before anything is imported there: workers run side by side.
-_ONE_THREAD = dict.fromkeys(
-    ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS", "NUMEXPR_NUM_THREADS", "VECLIB_MAXIMUM_THREADS"),
-    "1",
-)
+__all__ = ["Runner", "Worker", "WorkerDied", "describe", "resolve", "run_one"]
+
 _START_UP_SECONDS = 60.0
-
-
-class WorkerDied(ProofrollError):  # noqa: N818 -- a fact about the worker, turned into a row of the report
-    """The worker process ended without an answer."""
-
-    def __init__(self, status: Status, message: str) -> None:
-        self.status = status
-        super().__init__(message)
-
-
-class Worker:
-    """A worker process; restarted by making a new one."""
-
-    def __init__(self) -> None:
-        reader, writer = os.pipe()
-        self._log = tempfile.TemporaryFile("w+b")  # noqa: SIM115 -- lives as long as the process
-        self._process = subprocess.Popen(
-            [sys.executable, "-m", "proofroll.worker", str(writer), str(os.getpid())],
-            stdin=subprocess.PIPE,
-            stdout=self._log,
-            stderr=self._log,
-            pass_fds=(writer,),
-            env=os.environ | _ONE_THREAD,
-            text=True,
-            start_new_session=True,  # Ctrl-C reaches the parent alone, which then ends its workers
-        )
-        os.close(writer)
-        self._answers = os.fdopen(reader, "rb", buffering=0)
-        self._pending = b""
-
-    def ask(self, request: Mapping[str, Any], time_limit: float) -> dict[str, Any]:
-        """One request, one answer.
-
-        Raises:
-            WorkerDied: the process crashed or took longer than ``time_limit`` [s].
-        """
-        try:
-            assert self._process.stdin is not None  # it was opened with a pipe
-            self._process.stdin.write(json.dumps(request) + "\n")
-            self._process.stdin.flush()
-        except (BrokenPipeError, OSError):
-            raise WorkerDied(Status.CRASHED, self._last_words()) from None
-        deadline = time.monotonic() + time_limit
-        while b"\n" not in self._pending:
-            remaining = deadline - time.monotonic()
-            ready = select.select([self._answers], [], [], max(0.0, remaining))[0]
-            if not ready:
-                self.kill()
-                raise WorkerDied(Status.TIMEOUT, f"no result within {time_limit:g} s; it was ended")
-            chunk = self._answers.read(65536)
-            if not chunk:
-                raise WorkerDied(Status.CRASHED, self._last_words())
-            self._pending += chunk
-        line, _, self._pending = self._pending.partition(b"\n")
-        answer: dict[str, Any] = json.loads(line)
-        return answer
-
-    def _last_words(self) -> str:
-        """How the process ended, and the last line it wrote."""
-        code = self._process.wait()
-        how = f"ended with exit code {code}" if code >= 0 else f"was killed by {signal.Signals(-code).name}"
-        self._log.seek(0)
-        lines = self._log.read().decode(errors="replace").strip().splitlines()
-        last = next((line.strip() for line in reversed(lines) if line.strip()), "")
-        return f"the engine's process {how}" + (f": {last[:200]}" if last else "")
-
-    def kill(self) -> None:
-        """Ends the process at once."""
-        self._process.kill()
-        self._process.wait()
-
-    def close(self) -> None:
-        """Ends the process."""
-        if self._process.poll() is None:
-            self.kill()
-        if self._process.stdin is not None:
-            with contextlib.suppress(BrokenPipeError):
-                self._process.stdin.close()
-        self._answers.close()
-        self._log.close()
-
-    def __enter__(self) -> Self:
-        return self
-
-    def __exit__(
-        self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
-    ) -> None:
-        self.close()
-
-
-def _checked(answer: dict[str, Any]) -> dict[str, Any]:
-    """The answer, or the error that the worker met."""
-    match answer.get("error"):
-        case "input":
-            raise InputError(answer["field"], answer["value"], answer["advice"])
-        case "missing":
-            raise Missing(answer["message"])
-        case "crashed":
-            raise WorkerDied(Status.CRASHED, answer["message"])
-    return answer
 
 
 def describe(engine: str) -> dict[str, Any]:
@@ -141,27 +31,34 @@ def describe(engine: str) -> dict[str, Any]:
         InputError, Missing, WorkerDied: it cannot be asked.
     """
     with Worker() as worker:
-        return _checked(worker.ask({"do": "describe", "engine": engine}, _START_UP_SECONDS))
+        return worker.request({"do": "describe", "engine": engine}, _START_UP_SECONDS)
 
 
 def resolve(engines: Sequence[tuple[str, Mapping[str, Any]]]) -> list[EngineFacts | ProofrollError]:
     """Complete settings for engines with options, each or the reason why not, in the order given."""
     found: list[EngineFacts | ProofrollError] = [ProofrollError("not asked")] * len(engines)
-    for name in dict.fromkeys(name for name, _ in engines):
+
+    def ask(name: str) -> None:
         worker = Worker()
-        for index, (other, options) in enumerate(engines):
-            if other != name:
-                continue
-            request = {"do": "resolve", "engine": name, "options": dict(options)}
-            try:
-                found[index] = EngineFacts(**_checked(worker.ask(request, _START_UP_SECONDS)))
-            except WorkerDied as error:
-                found[index] = error
-                worker.close()
-                worker = Worker()
-            except ProofrollError as error:
-                found[index] = error
-        worker.close()
+        try:
+            for index, (other, options) in enumerate(engines):
+                if other != name:
+                    continue
+                request = {"do": "resolve", "engine": name, "options": dict(options)}
+                try:
+                    found[index] = EngineFacts(**worker.request(request, _START_UP_SECONDS))
+                except WorkerDied as error:
+                    found[index] = error
+                    worker.close()
+                    worker = Worker()
+                except ProofrollError as error:
+                    found[index] = error
+        finally:
+            worker.close()
+
+    # Most of it is the start of the processes and the import of the engines.
+    with ThreadPoolExecutor(os.cpu_count() or 1) as pool:
+        list(pool.map(ask, dict.fromkeys(name for name, _ in engines)))
     return found
 
 
@@ -174,7 +71,7 @@ def programs(cases: Sequence[Case]) -> list[tuple[str | None, str]]:
             if case.engine.name != name:
                 continue
             try:
-                answer = _checked(worker.ask({"do": "reproduce", "case": dataclasses.asdict(case)}, _START_UP_SECONDS))
+                answer = worker.request({"do": "reproduce", "case": dataclasses.asdict(case)}, _START_UP_SECONDS)
                 found[index] = answer["program"], answer["message"]
             except WorkerDied as error:
                 found[index] = None, str(error)
@@ -209,13 +106,17 @@ class Runner:
         store: where results are kept.
         jobs: how many workers run at once.
         fresh: run every case again, whatever is stored.
+        memory: how much each worker may have [GB]; by default :func:`proofroll.memory.memory_limit`.
     """
 
-    def __init__(self, store: Store, jobs: int | None = None, fresh: bool = False) -> None:
+    def __init__(self, store: Store, jobs: int | None = None, fresh: bool = False, memory: float | None = None) -> None:
         self.store = store
+        self.memory = memory
         self.jobs = jobs or os.cpu_count() or 1
         self.fresh = fresh
         self.reused = 0
+        self.damaged: set[str] = set()
+        """Keys of the cases that were run again because what was stored is not what had been put there."""
         self._workers: set[Worker] = set()
         self._kept: dict[str, list[Worker]] | None = None
         self._stopping = threading.Event()
@@ -240,6 +141,8 @@ class Runner:
             stored = None if self.fresh else self.store.get(case)
             if stored is None:
                 waiting.append(case)
+                if not self.fresh and self.store.has(case):
+                    self.damaged.add(case.key)
                 continue
             self.reused += 1
             results[case.key] = stored
@@ -256,6 +159,8 @@ class Runner:
                 if isinstance(item, Exception):
                     raise item
                 case, result = item
+                if case.key in self.damaged:
+                    result = dataclasses.replace(result, message=f"{result.message}; what was stored was damaged")
                 results[case.key] = result
                 if progress:
                     progress(case, result)
@@ -280,17 +185,19 @@ class Runner:
                 engine = case.engine.name
                 if worker is None:
                     worker = self._taken(engine)
+                    if self._stopping.is_set():  # whoever stops us may not have seen this worker
+                        break
                 try:
-                    result = _ask(worker, case, self.store.trajectory(case))
-                except InputError as error:  # a step that does not divide the grid, say: this case's own affair
-                    result = Result(Status.REFUSED, str(error), versions={case.engine.name: case.engine.version})
+                    result = self._result(worker, case)
                 except WorkerDied as error:
                     result = _lost(case, error)
                     self._drop(worker)
                     worker = None
                     if self._stopping.is_set():
                         break
-                arrived.put((case, self.store.put(case, result)))
+                except ProofrollError as error:  # a full disk, say, which costs this case alone
+                    result = _lost(case, WorkerDied(Status.CRASHED, str(error)))
+                arrived.put((case, result))
         except Exception as error:
             arrived.put(error)
         finally:
@@ -300,7 +207,7 @@ class Runner:
     def _taken(self, engine: str) -> Worker:
         """A worker that has served this engine, or a new one."""
         idle = (self._kept or {}).get(engine)
-        worker = idle.pop() if idle else Worker()
+        worker = idle.pop() if idle else Worker(self.memory)
         self._workers.add(worker)
         return worker
 
@@ -312,15 +219,29 @@ class Runner:
         self._workers.discard(worker)
         self._kept.setdefault(engine, []).append(worker)
 
+    def _result(self, worker: Worker, case: Case) -> Result:
+        """The result of a case, stored."""
+        with self.store.incoming(case) as written:
+            try:
+                result = _ask(worker, case, written)
+            except InputError as error:  # a step that does not divide the grid, say: this case's own affair
+                result = Result(Status.REFUSED, str(error), versions={case.engine.name: case.engine.version})
+            except WorkerDied as error:  # where the disk is full the name for a while means nothing to a person
+                said = str(error).replace(str(written.absolute()), str(self.store.trajectory(case)))
+                raise WorkerDied(error.status, said) from None
+            return self.store.put(case, result, written)
+
     def _drop(self, worker: Worker) -> None:
         self._workers.discard(worker)
         worker.close()
 
 
 def _ask(worker: Worker, case: Case, out: Path) -> Result:
-    request = {"do": "run", "case": dataclasses.asdict(case), "out": str(out)}
+    request = {"do": "run", "case": dataclasses.asdict(case), "out": str(out.absolute())}  # an engine may change folder
     try:
-        return Result.from_dict(_checked(worker.ask(request, case.time_limit)))
+        found = Result.from_dict(worker.request(request, case.time_limit))
+        waited = worker.waited - sum(found.spent.values())  # a new process starts, and messages go to and fro
+        return dataclasses.replace(found, spent=found.spent | {"process start": waited})
     except Missing as error:
         return Result(Status.MISSING, str(error))
 

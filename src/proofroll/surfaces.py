@@ -13,8 +13,9 @@ Array arguments may carry leading dimensions (``...``), e.g. time.
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass
-from functools import lru_cache
+from functools import cached_property, lru_cache
 from typing import Literal, Protocol
 
 import numpy as np
@@ -91,6 +92,15 @@ class Surface(Protocol):
     def normal_gradient(self, p_WB: npt.ArrayLike) -> FloatArray:
         """∂e1/∂p = -∇∇gap [1/m], shape (..., 3, 3)."""
 
+    def nearby(self, x: float, y: float, z: float) -> tuple[float, float, float, float]:
+        """Gap [m] and the components of e1 at one point, for loops that call it at every step."""
+
+    def triad(self, x: float, y: float, z: float) -> tuple[float, ...]:
+        """Components of e1, e2, e3 at one point, one after the other; as :meth:`nearby`."""
+
+    def normal_rate(self, p: tuple[float, float, float], v: tuple[float, float, float]) -> tuple[float, float, float]:
+        """(∂e1/∂p) v at one point p [m], for its velocity v [m/s]; as :meth:`nearby`."""
+
 
 @lru_cache
 def _tilt(angle: float) -> FloatArray:
@@ -158,6 +168,8 @@ class Cylinder:
     def frame(self, u: npt.ArrayLike) -> FloatArray:
         """See :class:`Surface`."""
         gamma = np.asarray(u, dtype=np.float64)[..., 0]
+        if gamma.ndim == 0 and math.isfinite(gamma):
+            return self._frame(math.cos(gamma), math.sin(gamma))
         cos, sin, zero, one = np.cos(gamma), np.sin(gamma), np.zeros_like(gamma), np.ones_like(gamma)
         columns = [
             np.stack([cos, sin, zero], axis=-1),
@@ -166,27 +178,84 @@ class Cylinder:
         ]
         return np.asarray(_tilt(self.tilt) @ np.stack(columns, axis=-1), dtype=np.float64)
 
+    @cached_property
+    def _tilted(self) -> tuple[float, float]:
+        """Cosine and sine of the tilt."""
+        rotation = _tilt(self.tilt)
+        return float(rotation[0, 0]), float(rotation[0, 2])
+
+    def _frame(self, cos: float, sin: float) -> FloatArray:
+        """The local frame at one angle, without the overhead of arrays."""
+        across, down = self._tilted
+        return np.array([[across * cos, -across * sin, down], [sin, cos, 0.0], [-down * cos, down * sin, across]])
+
+    def _around(self, x: float, y: float, z: float) -> tuple[float, float, float]:
+        """Distance from the axis [m], and cosine and sine of the angle about it, of one point."""
+        across, down = self._tilted
+        x = across * x - down * z
+        distance = math.sqrt(x * x + y * y)
+        size = distance or math.nan  # on the axis there is no direction
+        return distance, x / size, y / size
+
+    def nearby(self, x: float, y: float, z: float) -> tuple[float, float, float, float]:
+        """See :class:`Surface`."""
+        across, down = self._tilted
+        x = across * x - down * z  # as in _around, which would be a third of the cost here
+        distance = math.sqrt(x * x + y * y)
+        cos = x / (distance or math.nan)
+        return self.radius - distance, across * cos, y / (distance or math.nan), -down * cos
+
+    def triad(self, x: float, y: float, z: float) -> tuple[float, ...]:
+        """See :class:`Surface`."""
+        across, down = self._tilted
+        x = across * x - down * z
+        distance = math.sqrt(x * x + y * y) or math.nan
+        cos, sin = x / distance, y / distance
+        return across * cos, sin, -down * cos, -across * sin, cos, down * sin, down, 0.0, across
+
+    def normal_rate(self, p: tuple[float, float, float], v: tuple[float, float, float]) -> tuple[float, float, float]:
+        """See :class:`Surface`."""
+        across, down = self._tilted
+        distance, cos, sin = self._around(*p)
+        x, z = -across * sin, down * sin  # with cos, e2: along it alone the normal turns
+        rate = (x * v[0] + cos * v[1] + z * v[2]) / (distance or math.nan)
+        return rate * x, rate * cos, rate * z
+
     def _local(self, p_WB: npt.ArrayLike) -> FloatArray:
         return np.asarray(np.asarray(p_WB, dtype=np.float64) @ _tilt(self.tilt), dtype=np.float64)
 
     def locate(self, p_WB: npt.ArrayLike) -> FloatArray:
         """See :class:`Surface`."""
+        if np.ndim(p_WB) == 1:
+            x, y, z = np.asarray(p_WB, dtype=np.float64).tolist()
+            across, down = self._tilted
+            return np.array([math.atan2(y, across * x - down * z), down * x + across * z])
         p = self._local(p_WB)
         return np.stack([np.arctan2(p[..., 1], p[..., 0]), p[..., 2]], axis=-1)
 
     def gap(self, p_WB: npt.ArrayLike) -> FloatArray:
         """See :class:`Surface`."""
+        if np.ndim(p_WB) == 1:
+            return np.asarray(self.nearby(*np.asarray(p_WB).tolist())[0])
         p = self._local(p_WB)
         return np.asarray(self.radius - np.hypot(p[..., 0], p[..., 1]), dtype=np.float64)
 
     def normal(self, p_WB: npt.ArrayLike) -> FloatArray:
         """See :class:`Surface`."""
+        if np.ndim(p_WB) == 1:
+            return np.array(self.nearby(*np.asarray(p_WB).tolist())[1:])
         p = self._local(p_WB)
         radial = np.stack([p[..., 0], p[..., 1], np.zeros_like(p[..., 0])], axis=-1)
         return np.asarray(radial / np.linalg.norm(radial, axis=-1, keepdims=True) @ _tilt(self.tilt).T)
 
     def normal_gradient(self, p_WB: npt.ArrayLike) -> FloatArray:
         """See :class:`Surface`."""
+        if np.ndim(p_WB) == 1:
+            distance, cos, sin = self._around(*np.asarray(p_WB).tolist())
+            upright, down = self._tilted
+            ex, ey, ez = -upright * sin, cos, down * sin  # e2, along which alone the normal turns
+            rows = [[ex * ex, ex * ey, ex * ez], [ey * ex, ey * ey, ey * ez], [ez * ex, ez * ey, ez * ez]]
+            return np.array(rows) / distance
         p = self._local(p_WB)
         e1 = self.normal(p_WB)
         axis = _tilt(self.tilt)[:, 2]
@@ -216,13 +285,39 @@ class Plane:
     @property
     def generators(self) -> tuple[Generator, Generator]:
         """See :class:`Surface`."""
-        frame = self._axes()
+        frame = self._axes
         return (Generator("translation", _axis(frame[:, 1])), Generator("translation", _axis(frame[:, 2])))
 
+    @cached_property
     def _axes(self) -> FloatArray:
         """Columns e1 (into the plane), e2 (down the slope), e3 = e1 × e2."""
         rotation = _tilt(self.tilt)
         return np.stack([-rotation[:, 2], rotation[:, 0], -rotation[:, 1]], axis=-1)
+
+    @cached_property
+    def _e1(self) -> tuple[float, float, float]:
+        return _axis(self._axes[:, 0])
+
+    @cached_property
+    def _triad(self) -> tuple[float, ...]:
+        return tuple(self._axes.T.ravel().tolist())
+
+    def triad(self, x: float, y: float, z: float) -> tuple[float, ...]:  # noqa: ARG002 -- the same everywhere
+        """See :class:`Surface`."""
+        return self._triad
+
+    def normal_rate(
+        self,
+        p: tuple[float, float, float],  # noqa: ARG002 -- the same everywhere
+        v: tuple[float, float, float],  # noqa: ARG002 -- whatever the velocity
+    ) -> tuple[float, float, float]:
+        """See :class:`Surface`."""
+        return 0.0, 0.0, 0.0
+
+    def nearby(self, x: float, y: float, z: float) -> tuple[float, float, float, float]:
+        """See :class:`Surface`."""
+        x1, y1, z1 = self._e1
+        return -(x * x1 + y * y1 + z * z1) - self.height, x1, y1, z1
 
     def offset(self, ball_radius: float) -> Plane:
         """See :class:`Surface`."""
@@ -230,7 +325,7 @@ class Plane:
 
     def position(self, u: npt.ArrayLike) -> FloatArray:
         """See :class:`Surface`."""
-        axes = self._axes()
+        axes = self._axes
         return np.asarray(np.asarray(u, dtype=np.float64) @ axes[:, 1:].T - self.height * axes[:, 0])
 
     def tangents(self, u: npt.ArrayLike) -> FloatArray:
@@ -243,19 +338,19 @@ class Plane:
 
     def frame(self, u: npt.ArrayLike) -> FloatArray:
         """See :class:`Surface`."""
-        return np.broadcast_to(self._axes(), (*np.shape(u)[:-1], 3, 3)).copy()
+        return np.broadcast_to(self._axes, (*np.shape(u)[:-1], 3, 3)).copy()
 
     def locate(self, p_WB: npt.ArrayLike) -> FloatArray:
         """See :class:`Surface`."""
-        return np.asarray(np.asarray(p_WB, dtype=np.float64) @ self._axes()[:, 1:])
+        return np.asarray(np.asarray(p_WB, dtype=np.float64) @ self._axes[:, 1:])
 
     def gap(self, p_WB: npt.ArrayLike) -> FloatArray:
         """See :class:`Surface`."""
-        return np.asarray(-np.asarray(p_WB, dtype=np.float64) @ self._axes()[:, 0] - self.height)
+        return np.asarray(-np.asarray(p_WB, dtype=np.float64) @ self._axes[:, 0] - self.height)
 
     def normal(self, p_WB: npt.ArrayLike) -> FloatArray:
         """See :class:`Surface`."""
-        return np.broadcast_to(self._axes()[:, 0], np.shape(p_WB)).copy()
+        return np.broadcast_to(self._axes[:, 0], np.shape(p_WB)).copy()
 
     def normal_gradient(self, p_WB: npt.ArrayLike) -> FloatArray:
         """See :class:`Surface`."""

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import io
 from collections.abc import Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING
@@ -135,8 +136,15 @@ def write(dataset: xr.Dataset, path: Path) -> None:
     Raises:
         ProofrollError: the place cannot be written.
     """
+    import h5netcdf
+    from xarray.backends import H5NetCDFStore
+
+    # Made in memory first: HDF5 does not survive a disk that fills while it writes, and the error would name no reason.
+    content = io.BytesIO()
+    with h5netcdf.File(content, "w") as file:
+        dataset.dump_to_store(H5NetCDFStore(file))
     with replacing(path) as temporary:
-        dataset.to_netcdf(temporary, engine="h5netcdf")
+        temporary.write_bytes(content.getbuffer())
 
 
 def read(path: Path) -> xr.Dataset:

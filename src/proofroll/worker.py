@@ -25,7 +25,8 @@ from typing import Any
 
 import proofroll
 from proofroll.case import Case, EngineFacts, Result, Status
-from proofroll.errors import Diverged, InputError, Missing, Refused
+from proofroll.errors import Diverged, InputError, Missing, ProofrollError, Refused
+from proofroll.memory import volunteer
 
 # Everything whose change may change a result; reports and command line are not among it.
 _FOUNDATION = (
@@ -52,9 +53,15 @@ _MOST_BUILDS = 20
 def main(answers: int, parent: int) -> None:
     """Serves requests; ``answers`` is the file descriptor for the answers, ``parent`` the process that asks."""
     threading.Thread(target=_end_with, args=(parent,), daemon=True).start()
-    with os.fdopen(answers, "w", encoding="utf-8") as pipe:
-        for line in sys.stdin:
-            pipe.write(json.dumps(_answer(json.loads(line))) + "\n")
+    volunteer()
+    requests = os.fdopen(os.dup(0), encoding="utf-8")
+    with open(os.devnull, "rb") as nothing:
+        os.dup2(nothing.fileno(), 0)  # an engine that asks its user something must not read the next request
+    with os.fdopen(answers, "w", encoding="utf-8") as pipe, requests:
+        for line in requests:
+            request = json.loads(line)
+            number = request.pop("number")
+            pipe.write(json.dumps({**_answer(request), "number": number}) + "\n")
             pipe.flush()
 
 
@@ -72,6 +79,7 @@ def _answer(request: dict[str, Any]) -> dict[str, Any]:
         "run": run,
         "time": time_once,
         "reproduce": reproduce,
+        "bench": bench,
     }
     action = actions[request.pop("do")]
     try:
@@ -81,6 +89,8 @@ def _answer(request: dict[str, Any]) -> dict[str, Any]:
         return {"error": "input", "field": error.field, "value": value, "advice": error.advice}
     except Missing as error:
         return {"error": "missing", "message": str(error)}
+    except ProofrollError as error:  # a full disk, say
+        return {"error": "crashed", "message": str(error)}
     except Exception as error:
         return {"error": "crashed", "message": one_line(error)}
 
@@ -151,14 +161,39 @@ def _digest(sources: list[Path]) -> str:
 
 def run(case: dict[str, Any], out: str) -> dict[str, Any]:
     """Runs a case and writes its trajectory to ``out``; everything the case says comes back as a result."""
+    spent = Spent()
     try:
-        return dataclasses.asdict(_run(Case.from_dict(case), Path(out)))
+        answer = dataclasses.asdict(_run(Case.from_dict(case), Path(out), spent))
     finally:
         gc.collect()  # the next case of this process starts clean,
         gc.freeze()  # and need not look again at what stays: the modules
+    spent.on("clean-up")
+    return answer | {"spent": spent.seconds}
 
 
-def _run(case: Case, out: Path) -> Result:
+class Spent:
+    """Where the wall time of a case goes.
+
+    Attributes:
+        seconds: by cause [s].
+    """
+
+    def __init__(self) -> None:
+        self.seconds: dict[str, float] = {}
+        self._since = time.perf_counter()
+
+    def on(self, cause: str, **parts: float) -> None:
+        """What has passed since the last call went to ``cause``, but for ``parts`` of it [s] that had another."""
+        now = time.perf_counter()
+        found = {cause: now - self._since - sum(parts.values())} | {
+            key.replace("_", " "): value for key, value in parts.items()
+        }
+        for key, value in found.items():
+            self.seconds[key] = self.seconds.get(key, 0.0) + value
+        self._since = now
+
+
+def _run(case: Case, out: Path, spent: Spent) -> Result:
     from proofroll.certificate import certify, first_difference
     from proofroll.recording import record, time_grid
     from proofroll.registry import load_engine, resolve_settings
@@ -170,20 +205,25 @@ def _run(case: Case, out: Path) -> Result:
     scene = load_scene(case.scene, **case.parameters)
     times = time_grid(case.until, case.every)
     if case.engine.name == "truth":
+        spent.on("loading")
         return _run_truth(scene, times, out, versions)
     kind = load_engine(case.engine.name)
     settings = resolve_settings(kind, case.engine.settings)
+    spent.on("loading")
     lacking = scene.requires - kind.provides
     if lacking:
         return Result(Status.REFUSED, "needs " + ", ".join(sorted(lacking)), versions=versions)
     try:
         engine = kind.build(scene, settings)
+        spent.on("building")
         certificate = certify(engine, scene)
         difference = first_difference(certificate)
+        spent.on("certificate")
         lines = [{**dataclasses.asdict(line), "holds": line.holds} for line in certificate]
         if difference is not None:
             return Result(Status.REFUSED, difference, certificate=lines, versions=versions)
         recording = record(engine, scene, times)
+        spent.on("trajectory", advance=recording.wall_seconds, sampling=recording.sampling_seconds)
         del engine
     except Refused as error:
         return Result(Status.REFUSED, str(error), versions=versions)
@@ -191,7 +231,8 @@ def _run(case: Case, out: Path) -> Result:
         return Result(Status.DIVERGED, str(error), versions=versions)
     timings: list[float] = []
     if recording.failure is None and case.timed and case.until > 0:
-        timings = _clean_runs(kind, scene, settings, times)
+        timings, inside = _clean_runs(kind, scene, settings, times)
+        spent.on("building", clean_runs=inside)
     result = Result(
         status=Status.DONE if recording.failure is None else Status.DIVERGED,
         message=recording.failure or f"reached {case.until:g} s",
@@ -207,6 +248,7 @@ def _run(case: Case, out: Path) -> Result:
     manifest |= {"parameters": json.dumps(dict(scene.parameters)), "versions": json.dumps(versions)}
     manifest |= {"machine": f"{platform.machine()} {platform.system()}"}
     write(recording.dataset.assign_attrs(manifest), out)
+    spent.on("writing")
     return result
 
 
@@ -275,15 +317,26 @@ def reproduce(case: dict[str, Any]) -> dict[str, Any]:
     return {"program": program, "message": ""}
 
 
-def _clean_runs(kind: Any, scene: Any, settings: Any, times: Any) -> list[float]:
-    """Wall seconds per simulated second of runs that only advance, each on an engine built for it."""
+def bench(**what: Any) -> dict[str, Any]:
+    """An adapter against a bare loop; see :func:`proofroll.bench.adapters.measure_adapter`."""
+    from proofroll.bench.adapters import measure_adapter
+
+    gc.freeze()  # modules need not be looked at again in every collection
+    try:
+        return measure_adapter(**what)
+    except (Refused, Diverged) as error:
+        return {"message": str(error)}
+
+
+def _clean_runs(kind: Any, scene: Any, settings: Any, times: Any) -> tuple[list[float], float]:
+    """Wall seconds per simulated second of runs that only advance, each on an engine built for it; seconds of all."""
     rates: list[float] = []
     spent = 0.0
     while len(rates) < _TIMED_RUNS and spent < _TIMED_SECONDS:
         wall, t = _clean_run(kind.build(scene, settings), times, _ENOUGH_SECONDS)
         rates.append(wall / t)
         spent += wall
-    return rates
+    return rates, spent
 
 
 def _clean_run(engine: Any, times: Any, enough: float) -> tuple[float, float]:

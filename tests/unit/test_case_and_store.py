@@ -3,6 +3,8 @@ from __future__ import annotations
 import dataclasses
 import json
 import os
+import subprocess
+import sys
 from collections.abc import Callable
 from pathlib import Path
 
@@ -158,3 +160,99 @@ def test_a_folder_that_is_a_file(tmp_path: Path) -> None:
     (tmp_path / "cases").write_text("")
     with pytest.raises(ProofrollError, match="choose another place with --out"):
         Store(tmp_path / "cases")
+
+
+def made(store: Store, case: Case, content: bytes) -> Result:
+    """A trajectory that was made in a folder of its own, and put in place."""
+    with store.incoming(case) as written:
+        written.write_bytes(content)
+        result = Result(Status.DONE, content.decode(), trajectory=written.name)
+        return store.put(case, result, written)
+
+
+def test_a_trajectory_is_put_in_place_with_its_record(tmp_path: Path, make_case: MakeCase) -> None:
+    """What was made elsewhere is found again under the case's name, and nothing else is left in the folder."""
+    store, case = Store(tmp_path), make_case("oracle")
+    result = made(store, case, b"motion")
+    assert store.get(case) == result
+    assert store.trajectory(case).read_bytes() == b"motion"
+    assert sorted(path.name for path in tmp_path.iterdir()) == [f"{case.key}.json", f"{case.key}.nc"]
+
+
+def test_what_is_left_of_a_case_is_removed(tmp_path: Path, make_case: MakeCase) -> None:
+    """A case that fails in the middle leaves neither its trajectory nor what a process wrote beside it."""
+    store = Store(tmp_path)
+
+    def fail() -> None:
+        with store.incoming(make_case("oracle")) as written:
+            written.write_bytes(b"half")
+            written.with_name(".scrap").write_bytes(b"half of a half")
+            raise KeyboardInterrupt
+
+    with pytest.raises(KeyboardInterrupt):
+        fail()
+    assert list(tmp_path.iterdir()) == []
+
+
+@pytest.mark.parametrize("failing", ["write_text", "replace"])
+def test_a_result_that_cannot_be_stored_costs_no_other(
+    tmp_path: Path, make_case: MakeCase, monkeypatch: pytest.MonkeyPatch, failing: str
+) -> None:
+    """Where the disk is full when a case is run again, the result that was there before is still whole."""
+    store, case = Store(tmp_path), make_case("oracle")
+    before = made(store, case, b"old")
+
+    def refuse(self: Path, *_: object, **__: object) -> None:  # noqa: ARG001 -- stands in for a method
+        raise OSError(28, "No space left on device")
+
+    with monkeypatch.context() as patch:
+        patch.setattr(Path, failing, refuse)
+        with pytest.raises(ProofrollError, match="No space left on device"):
+            made(store, case, b"new")
+    assert store.get(case) == before
+    assert len(list(tmp_path.iterdir())) == 2
+
+
+def test_a_trajectory_that_is_not_there(tmp_path: Path, make_case: MakeCase) -> None:
+    """A result whose trajectory was promised and not written is refused with one line."""
+    store, case = Store(tmp_path), make_case("oracle")
+    with store.incoming(case) as written, pytest.raises(ProofrollError, match="cannot be read"):
+        store.put(case, Result(Status.DONE, "done", trajectory=written.name), written)
+    assert not store.has(case)
+
+
+def test_two_writers_and_a_reader(tmp_path: Path, make_case: MakeCase) -> None:
+    """Whoever looks while two runs replace the same result finds one of both, whole, and never none."""
+    case = make_case("oracle")
+    made(Store(tmp_path), case, b"0")
+    script = (
+        "import json, sys\nfrom pathlib import Path\nfrom proofroll.case import Case, Result, Status\n"
+        "from proofroll.store import Store\n"
+        "store, case = Store(Path(sys.argv[1])), Case.from_dict(json.loads(sys.argv[2]))\n"
+        "for number in range(150):\n"
+        "    with store.incoming(case) as written:\n"
+        "        written.write_text(f'{sys.argv[3]} {number}' * 1000)\n"
+        "        store.put(case, Result(Status.DONE, f'{sys.argv[3]} {number}', trajectory=written.name), written)\n"
+    )
+    content = json.dumps(dataclasses.asdict(case))
+    writers = [subprocess.Popen([sys.executable, "-c", script, str(tmp_path), content, name]) for name in "ab"]
+    store, seen = Store(tmp_path), set()
+    while any(writer.poll() is None for writer in writers):
+        result = store.get(case)
+        assert result is not None
+        seen.add(result.message)
+    assert [writer.returncode for writer in writers] == [0, 0]
+    assert len(seen) > 2
+    last = store.get(case)
+    assert last is not None
+    assert store.trajectory(case).read_text() == last.message * 1000
+
+
+def test_old_scraps_are_swept(tmp_path: Path) -> None:
+    """What a killed process left is removed after a week; what may be in use, and what is not ours, stays."""
+    for name in (".incoming-old", ".incoming-new", ".other"):
+        (tmp_path / name).mkdir()
+    for name in (".incoming-old", ".other"):
+        os.utime(tmp_path / name, (0, 0))
+    Store(tmp_path)
+    assert sorted(path.name for path in tmp_path.iterdir()) == [".incoming-new", ".other"]

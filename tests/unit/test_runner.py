@@ -1,7 +1,11 @@
 from __future__ import annotations
 
+import dataclasses
 import json
+import shutil
 import statistics
+import subprocess
+import sys
 import threading
 from collections.abc import Callable, Mapping
 from pathlib import Path
@@ -116,6 +120,54 @@ def test_an_error_in_progress_ends_the_run(tmp_path: Path, make_case: MakeCase) 
     with pytest.raises(KeyboardInterrupt):
         runner.run([make_case("hangs"), make_case("oracle")], interrupt)
     assert not runner._workers
+
+
+def test_a_damaged_result_says_so_once(tmp_path: Path, make_case: MakeCase) -> None:
+    """A result that is not what was stored is made again, its row says why, and the next run finds it sound."""
+    case, store = make_case("oracle"), Store(tmp_path)
+    Runner(store, jobs=1).run([case])
+    store.trajectory(case).write_bytes(b"half")
+    runner = Runner(store, jobs=1)
+    assert runner.run([case])[case.key].message == "reached 0.1 s; what was stored was damaged"
+    assert runner.damaged == {case.key}
+    again = Runner(store, jobs=1)
+    assert again.run([case])[case.key].message == "reached 0.1 s"
+    assert (again.reused, again.damaged) == (1, set())
+
+
+FILL = """
+import json, sys
+from pathlib import Path
+from proofroll.case import Case
+from proofroll.runner import Runner
+from proofroll.store import Store
+
+store, cases = Store(Path(sys.argv[1])), [Case.from_dict(content) for content in json.loads(sys.argv[2])]
+first = Runner(store, jobs=1).run(cases)
+kept = [store.get(case) is not None for case in cases]
+second = Runner(store, jobs=1, fresh=True).run(cases)
+still = [store.get(case) is not None for case in cases]
+print(json.dumps([[(r[c.key].status, r[c.key].message) for c in cases] for r in (first, second)] + [kept, still]))
+"""
+
+
+def test_a_disk_that_is_really_full(tmp_path: Path, make_case: MakeCase) -> None:
+    """On a full disk what fits is stored, each other row says why not, and running all again loses nothing."""
+    cases = [dataclasses.asdict(make_case("oracle", parameters={"speed": speed})) for speed in (3.0, 4.0, 5.0)]
+    (tmp_path / "disk").mkdir()
+    mount = 'mount -t tmpfs -o size=64k tmpfs "$1" && shift && exec "$@"'
+    command = ["unshare", "--user", "--map-root-user", "--mount", "sh", "-c", mount, "sh", str(tmp_path / "disk")]
+    if not shutil.which("unshare") or subprocess.run([*command, "true"], check=False, capture_output=True).returncode:
+        pytest.skip("this system lets nobody mount a small disk")
+    fill = [sys.executable, "-c", FILL, str(tmp_path / "disk"), json.dumps(cases)]
+    done = subprocess.run([*command, *fill], check=True, capture_output=True, text=True)
+    first, second, kept, still = json.loads(done.stdout)
+    assert kept == [status == "done" for status, _ in first]
+    assert 0 < sum(kept) < len(cases)
+    assert still == kept
+    for status, message in first + second:
+        assert status == "done" or (status == "crashed" and "No space left on device" in message)
+        assert "incoming" not in message
 
 
 def test_timed_runs(tmp_path: Path, make_case: MakeCase) -> None:

@@ -153,3 +153,26 @@ def test_tilted_plane_descends_along_x() -> None:
 def test_cylinder_coordinates() -> None:
     """γ grows from x to y and z is the height."""
     assert Cylinder("wall", 0.2).position([np.pi / 2, 0.3]) == pytest.approx([0.0, 0.2, 0.3], abs=1e-16)
+
+
+@pytest.mark.parametrize(
+    "surface",
+    [Cylinder("wall", 0.2), Cylinder("wall", 0.2, 0.4), Plane("wall", 0.35, 0.025)],
+    ids=["cylinder", "tilted", "plane"],
+)
+def test_one_point_is_as_many(surface: Cylinder | Plane) -> None:
+    """Geometry at a single point, which takes another way for speed, is that of arrays of points."""
+    rng = np.random.default_rng(0)
+    for _ in range(20):
+        p, v, u = rng.normal(size=3), rng.normal(size=3), rng.normal(size=2)
+        for name in ("normal", "gap", "normal_gradient", "locate"):
+            one, many = getattr(surface, name)(p), getattr(surface, name)(p[None])[0]
+            assert np.shape(one) == np.shape(many)
+            np.testing.assert_allclose(one, many, rtol=1e-13, atol=1e-14)
+        np.testing.assert_allclose(surface.frame(u), surface.frame(u[None])[0], rtol=1e-13, atol=1e-15)
+        gap, *e1 = surface.nearby(*p.tolist())
+        np.testing.assert_allclose([gap, *e1], [surface.gap(p[None])[0], *surface.normal(p[None])[0]], rtol=1e-12)
+        triad = np.reshape(surface.triad(*p.tolist()), (3, 3)).T
+        np.testing.assert_allclose(triad, surface.frame(surface.locate(p[None]))[0], rtol=1e-12, atol=1e-14)
+        rate = surface.normal_rate(tuple(p.tolist()), tuple(v.tolist()))
+        np.testing.assert_allclose(rate, surface.normal_gradient(p[None])[0] @ v, rtol=1e-12, atol=1e-13)

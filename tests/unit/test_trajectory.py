@@ -121,11 +121,12 @@ def test_a_write_that_fails_leaves_the_old_file(tmp_path: Path, monkeypatch: pyt
     write(dataset, path)
     before = path.read_bytes()
 
-    def half(self: xr.Dataset, target: str, **_: object) -> None:  # noqa: ARG001 -- stands in for a method
-        Path(target).write_bytes(b"half a file")
+    def half(self: Path, content: bytes) -> None:
+        with self.open("wb") as file:
+            file.write(content[:100])
         raise OSError(28, "No space left on device")
 
-    monkeypatch.setattr(xr.Dataset, "to_netcdf", half)
+    monkeypatch.setattr(Path, "write_bytes", half)
     with pytest.raises(ProofrollError, match="No space left on device"):
         write(dataset, path)
     assert path.read_bytes() == before

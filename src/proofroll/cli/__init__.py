@@ -2,15 +2,19 @@
 
 from __future__ import annotations
 
+import os
 import signal
 import sys
+from types import FrameType
 from typing import Annotated, Any
 
 import typer
 
 import proofroll
+from proofroll.cli.bench import bench
 from proofroll.cli.common import ENGINE, INTERRUPTED, OK, USAGE, complain
 from proofroll.cli.comparing import compare, regimes, report
+from proofroll.cli.drill import drill
 from proofroll.cli.listing import engines, scenes
 from proofroll.cli.single import onset, run
 from proofroll.cli.stability import stability
@@ -25,6 +29,8 @@ app = typer.Typer(
 )
 for _command in (scenes, engines, run, compare, report, onset, regimes, tradeoff, recommend, stability):
     app.command()(_command)
+app.add_typer(bench, name="bench")
+app.add_typer(drill, name="drill")
 
 
 @app.callback(invoke_without_command=True)
@@ -47,11 +53,24 @@ def _given(error: typer.TyperException) -> str:
     return f" (given: {problems[0]['input']!r})" if problems else ""
 
 
+def _interrupt(number: int, _: FrameType | None) -> None:
+    """Ends all workers, so that whatever waits for one goes on, and then this process; at once when asked again."""
+    if "proofroll.process" in sys.modules:
+        from proofroll.process import end_all
+
+        end_all()
+    signal.signal(number, lambda *_: os._exit(INTERRUPTED))
+    raise KeyboardInterrupt
+
+
 def main() -> None:
     """Entry point: every problem is one line on standard error and an exit code."""
-    signal.signal(signal.SIGTERM, signal.default_int_handler)  # a time limit from outside also ends the workers
+    signal.signal(signal.SIGTERM, _interrupt)  # a time limit from outside also ends the workers
+    if signal.getsignal(signal.SIGINT) is signal.default_int_handler:  # a shell may have told us to ignore it
+        signal.signal(signal.SIGINT, _interrupt)
     try:
         code = app(standalone_mode=False)
+        sys.stdout.flush()  # a full disk shows here, or nowhere
     except typer.TyperException as error:
         complain(f"{error.format_message()}{_given(error)}")
         code = USAGE
@@ -68,6 +87,11 @@ def main() -> None:
         code = INTERRUPTED
     except BrokenPipeError:
         code = OK  # the reader of our output has seen enough
+    except OSError as error:
+        place = f"{error.filename} cannot be used" if error.filename else "the output cannot be written"
+        complain(f"{place} ({error.strerror or error})")
+        os.dup2(os.open(os.devnull, os.O_WRONLY), 1)  # what is left in the buffers would be tried again at the end
+        code = USAGE
     if code == INTERRUPTED:
         complain("interrupted; cases of a comparison that were finished are stored and will be reused")
     sys.exit(code or OK)

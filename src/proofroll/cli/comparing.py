@@ -17,6 +17,7 @@ from proofroll.cli.common import (
     Jobs,
     Json,
     Out,
+    complain,
     new_runner,
     progress_bar,
     write_json,
@@ -117,6 +118,8 @@ def _outcomes(comparisons: list[Any], engines: list[str], runner: Runner) -> lis
     cases = {case.key: case for item in plans for case in item.cases}
     with progress_bar("cases", total=len(cases)) as advance:
         results = runner.run(cases.values(), lambda case, _: advance(case.engine.name))
+    if runner.damaged:
+        complain(f"{len(runner.damaged)} stored results were damaged and have been run again")
     return [evaluate(item, results, runner) for item in plans]
 
 

@@ -18,7 +18,6 @@ from proofroll.cli.common import (
     Out,
     Set,
     assignments,
-    complain,
     new_runner,
     progress_bar,
     write_json,
@@ -65,7 +64,7 @@ def tradeoff(
     study = _measure(question, engine or [], ranges, out, fresh=fresh, jobs=jobs)
     contradictions = claims.contradictions(study) if claims and not engine else []
     study["claims"] = {"file": claims.name if claims else None, "contradictions": contradictions}
-    path = stored(out, question)
+    path = stored(out, question, engine or ())
     shown = [name for name in quantity or [] if name in study["quantities"]] or default_quantities(study)
     draw(study, shown, path.with_suffix(".svg"))
     if as_json:
@@ -116,7 +115,7 @@ def recommend(
     from proofroll.studies.recommend import recommend as answered
 
     claims, question = _question(scene, settings, [quantity] if quantity else None, until)
-    study = _stored_study(question, claims, out, jobs, measure=measure)
+    study = _stored_study(question, engine or [], claims, out, jobs, measure=measure)
     asked = quantity or study["quantity"]
     unit = study["quantities"].get(asked, {}).get("unit", "1")
     wish = Wish(asked, _tolerance(tolerance, unit), _positive("budget", budget), tuple(engine or ()))
@@ -192,9 +191,15 @@ def _positive(name: str, value: float | None) -> float | None:
 
 
 def _stored_study(
-    question: Question, claims: TradeoffClaims | None, out: Path, jobs: int | None, *, measure: bool
+    question: Question,
+    engines: list[str],
+    claims: TradeoffClaims | None,
+    out: Path,
+    jobs: int | None,
+    *,
+    measure: bool,
 ) -> dict[str, Any]:
-    """The stored curves, or new ones if the user agrees.
+    """The stored curves, of all engines or of those that are asked for, or new ones if the user agrees.
 
     Raises:
         InputError: there are none that hold here, and nobody agreed to measure them.
@@ -202,24 +207,22 @@ def _stored_study(
     from proofroll.studies import installed
     from proofroll.studies.tradeoff import stored
 
-    path = stored(out, question)
     reasons = ["no curves are stored for this question"]
-    try:
-        study: dict[str, Any] = json.loads(path.read_text(encoding="utf-8"))
-        reasons = installed.changes(study["measured"])
-    except (OSError, ValueError, KeyError, TypeError):
-        pass
-    if not reasons:
-        return study
+    for path in (stored(out, question), stored(out, question, engines)):
+        try:
+            study: dict[str, Any] = json.loads(path.read_text(encoding="utf-8"))
+            reasons = installed.changes(study["measured"])
+        except (OSError, ValueError, KeyError, TypeError):
+            continue
+        if not reasons:
+            return study
     why = "; ".join(reasons[:3]) + (f"; and {len(reasons) - 3} more" if len(reasons) > 3 else "")
     if not measure and sys.stdin.isatty() and sys.stderr.isatty():
         measure = typer.confirm(f"{why}. Measure now (some minutes)?", err=True)
     if not measure:
-        raise InputError(
-            "stored curves", why, "add --measure, which takes some minutes, or run proofroll tradeoff first"
-        )
-    complain(f"measuring first: {why}")
-    return _measure(question, [], claims.over if claims else {}, out, fresh=False, jobs=jobs)
+        advice = f"{why}; add --measure, which takes some minutes, or run proofroll tradeoff first"
+        raise InputError("stored curves", "none that hold here", advice)
+    return _measure(question, engines, claims.over if claims else {}, out, fresh=False, jobs=jobs)
 
 
 def _measure(
@@ -231,7 +234,7 @@ def _measure(
     fresh: bool,
     jobs: int | None,
 ) -> dict[str, Any]:
-    """Measures, and stores what a recommendation can be made from: the curves of all engines."""
+    """Measures, and stores what a recommendation can be made from."""
     from proofroll.store import write_text
     from proofroll.studies.tradeoff import stored
     from proofroll.studies.tradeoff import tradeoff as measured
@@ -242,11 +245,8 @@ def _measure(
     with progress_bar("runs and timings") as advance:
         found = measured(question, runner, engines=engines, over=over, progress=advance)
     study = content(found)
-    path = stored(out, question)
-    if not engines:
-        write_text(path, json.dumps(study))
-        names = {point.case.key: f"{curve.engine} {point.step:g}" for curve in found.curves for point in curve.points}
-        write_benchmarks(
-            {names[key]: timing for key, timing in found.timings.items()}, path.with_suffix(".pyperf.json")
-        )
+    path = stored(out, question, engines)
+    write_text(path, json.dumps(study))
+    names = {point.case.key: f"{curve.engine} {point.step:g}" for curve in found.curves for point in curve.points}
+    write_benchmarks({names[key]: timing for key, timing in found.timings.items()}, path.with_suffix(".pyperf.json"))
     return study

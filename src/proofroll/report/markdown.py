@@ -1,11 +1,17 @@
-"""The verdict table in Markdown."""
+"""Tables in Markdown."""
 
 from __future__ import annotations
 
+from collections.abc import Mapping, Sequence
 from typing import Any
 
+from proofroll.comparison import Tolerance
+from proofroll.engine import Level
 from proofroll.report.labels import SYMBOLS
+from proofroll.report.labels import number as short
 from proofroll.report.terminal import columns, number, step
+from proofroll.report.tradeoff_tables import name_of, step_of
+from proofroll.studies.recommend import Wish, recommend
 
 
 def verdict_table(content: dict[str, Any]) -> str:
@@ -21,3 +27,29 @@ def verdict_table(content: dict[str, Any]) -> str:
         cells.append(number(row["seconds_per_second"]))
         lines.append("| " + " | ".join(cells) + " |")
     return "\n".join(lines) + "\n"
+
+
+# Among what the cheapest is named: everything that is an engine's model, contact models, and the scene's own equations.
+_AMONG: tuple[tuple[str, tuple[str, ...]], ...] = (
+    ("cheapest engine", ()),
+    ("cheapest contact model", (Level.CONTACT, Level.FACETS)),
+    ("the scene's own equations", (Level.CLOSED_FORM, Level.REDUCED, Level.PROJECTION)),
+)
+
+
+def cheapest_table(study: Mapping[str, Any], tolerances: Sequence[float]) -> str:
+    """One line per tolerance of the study's quantity: the cheapest that holds it, with step and cost."""
+    name = study["quantity"]
+    unit = study["quantities"][name]["unit"]
+    lines = [f"| {name} to | " + " | ".join(words for words, _ in _AMONG) + " |", "|---" * (1 + len(_AMONG)) + "|"]
+    for tolerance in tolerances:
+        cells = [f"{short(tolerance)} {unit}"]
+        for _, levels in _AMONG:
+            choice = recommend(study, Wish(name, Tolerance(tolerance, False, unit), levels=levels))["choice"]
+            cells.append(_cell(choice) if choice else "none")
+        lines.append("| " + " | ".join(cells) + " |")
+    return "\n".join(lines) + "\n"
+
+
+def _cell(choice: Mapping[str, Any]) -> str:
+    return f"{name_of(choice)}, {step_of(choice)}: {short(choice['seconds_per_second'])} s/s"

@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from typing import Any
+from collections.abc import Sequence
+from typing import TYPE_CHECKING, Any
 
 from rich.console import Console
 from rich.table import Table
@@ -10,6 +11,9 @@ from rich.text import Text
 
 from proofroll.metrics import OBSERVABLES
 from proofroll.report.labels import SYMBOLS
+
+if TYPE_CHECKING:
+    from proofroll.drill.row import Drilled
 
 WIDTH = 100
 _STYLES = {"agrees": "green", "converges": "yellow", "ill-posed": "cyan", "differs": "red", "failed": "bold red"}
@@ -78,6 +82,26 @@ def onset_table(content: dict[str, Any]) -> Table:
             bracket,
             number(item["difference"]),
             Text(verdict),
+        )
+    return table
+
+
+def drill_table(rows: Sequence[Drilled]) -> Table:
+    """One line per fault: whether it was contained, what it cost, and what was said about it."""
+    table = Table(box=None, padding=(0, 1, 0, 0))
+    table.add_column("fault", no_wrap=True)
+    table.add_column("contained", no_wrap=True)
+    for name in ("others arrived", "kept", "recomputed"):
+        table.add_column(name, justify="right")
+    table.add_column("said")
+    for row in rows:
+        table.add_row(
+            row.fault,
+            Text("yes", style="green") if row.contained else Text("NO", style="bold red"),
+            f"{row.others_arrived}/{row.others}",
+            f"{row.kept}/{row.stored}",
+            f"{row.recomputed}/{row.missing}",
+            Text(row.said if row.contained else f"{row.said} ({row.problem})", overflow="fold"),
         )
     return table
 

@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from proofroll.agreement import Judgement, Verdict, judge
-from proofroll.case import Case, EngineFacts, Result, Status
+from proofroll.case import LASTING, Case, EngineFacts, Result, Status
 from proofroll.comparison import Band, Comparison, Row
 from proofroll.convergence import Limit, richardson, tightest
 from proofroll.errors import Missing, ProofrollError
@@ -102,7 +102,8 @@ def evaluate(planned: Plan, results: dict[str, Result], runner: Runner) -> Outco
         name = point_name(run.parameters)
         truth = results[planned.truths[name].key]
         if truth.status != Status.DONE:
-            nothing = Result(Status.REFUSED, f"there is no truth here: {truth.message}", versions=result.versions)
+            status = Status.REFUSED if truth.status in LASTING else truth.status
+            nothing = Result(status, f"there is no truth here: {truth.message}", versions=result.versions)
             judged.append(_failed(run, run.facts, nothing))
             continue
         if name not in references:

@@ -24,7 +24,7 @@ from proofroll.stopwatch import Stopwatch
 from proofroll.studies.pareto import envelope, front
 from proofroll.studies.reference import Reference
 from proofroll.studies.sweep import Curve, Point, Question, case_of, curves_of, judged, sweep
-from proofroll.timing import Timing, interleaved
+from proofroll.timing import ROUNDS, Timing, interleaved
 
 
 @dataclass(frozen=True)
@@ -93,6 +93,7 @@ def tradeoff(
     *,
     engines: Iterable[str] = (),
     over: Mapping[str, Sequence[float]] | None = None,
+    rounds: int = ROUNDS,
     progress: Progress | None = None,
 ) -> Tradeoff:
     """Runs the study.
@@ -102,6 +103,7 @@ def tradeoff(
         runner: where the cases run.
         engines: names or ``name[key=value,…]``; all that are installed if empty.
         over: parameter -> values; every combination is a corner of the range.
+        rounds: how often every speed is measured.
         progress: called with a short text after every run and every measurement.
 
     Raises:
@@ -122,7 +124,7 @@ def tradeoff(
     references = sweep(question, curves, runner, told)
     truth = next(iter(runner.run([_truth_case(question, references)]).values()))
     found = Tradeoff(question, curves, absent, references, truth.wall_seconds / question.until)
-    found.timings = _timed(found, progress)
+    found.timings = _timed(found, rounds, progress)
     if over:
         found.over = {name: [float(value) for value in values] for name, values in over.items()}
         found.corners = _checked(found, runner, told)
@@ -138,11 +140,12 @@ def _truth_case(question: Question, references: Mapping[float, Reference]) -> Ca
     return case_of(question, references[question.every].scene, facts, question.every)
 
 
-def _timed(found: Tradeoff, progress: Progress | None) -> dict[str, Timing]:
+def _timed(found: Tradeoff, rounds: int, progress: Progress | None) -> dict[str, Timing]:
     cases = {point.case.key: point.case for point in found.points if point.result.status == Status.DONE}
     with Stopwatch() as stopwatch:
         return interleaved(
             {key: lambda case=case: stopwatch(case) for key, case in cases.items()},  # type: ignore[misc]
+            rounds,
             progress=(lambda key: progress(f"timing {cases[key].engine.name}")) if progress else None,
         )
 
@@ -155,34 +158,37 @@ def _checked(found: Tradeoff, runner: Runner, told: Callable[[Case, Result], Non
         for quantity in judged_quantities(found)
         for point in front(pareto_entries([c for c in found.curves if c.facts.name == name], quantity, found.timings))
     }
-    results: dict[str, list[Corner]] = {key: [] for key in chosen}
-    base = found.question
-    for values in itertools.product(*found.over.values()):
-        place = dict(zip(found.over, values, strict=True))
+    base, truth_facts = found.question, _truth_case(found.question, found.references).engine
+    intervals = {point.case.every for point in chosen.values()}
+    places = [dict(zip(found.over, values, strict=True)) for values in itertools.product(*found.over.values())]
+    asked = []
+    for place in places:
         question = dataclasses.replace(base, parameters={**base.parameters, **place})
         scene = question.loaded()
-        intervals = {point.case.every for point in chosen.values()}
-        truth_facts = _truth_case(base, found.references).engine
         truths = {every: case_of(question, scene, truth_facts, every) for every in intervals}
-        cases = {key: case_of(question, scene, point.case.engine, point.case.every) for key, point in chosen.items()}
-        outcome = runner.run([*truths.values(), *cases.values()], told)
+        runs = {key: case_of(question, scene, point.case.engine, point.case.every) for key, point in chosen.items()}
+        asked.append((place, scene, truths, runs))
+    results = runner.run([case for _, _, truths, runs in asked for case in (*truths.values(), *runs.values())], told)
+    corners: dict[str, list[Corner]] = {key: [] for key in chosen}
+    for place, scene, truths, runs in asked:
         references = {
             every: Reference.read(scene, runner.store.trajectory(case))
             for every, case in truths.items()
-            if outcome[case.key].status == Status.DONE
+            if results[case.key].status == Status.DONE
         }
-        for key, case in cases.items():
-            result = outcome[case.key]
-            if case.every not in references:
-                results[key].append(
-                    Corner(place, {}, {}, f"there is no truth: {outcome[truths[case.every].key].message}")
-                )
-                continue
-            reference = references[case.every]
-            errors = judged(Point(case, result), reference, runner).errors
-            relative = {name: error / reference.sizes.get(name, 1.0) for name, error in errors.items()}
-            results[key].append(Corner(place, errors, relative, result.message))
-    return results
+        for key, case in runs.items():
+            if case.every in references:
+                corners[key].append(_corner(place, Point(case, results[case.key]), references[case.every], runner))
+            else:
+                said = results[truths[case.every].key].message
+                corners[key].append(Corner(place, {}, {}, f"there is no truth: {said}"))
+    return corners
+
+
+def _corner(place: dict[str, float], point: Point, reference: Reference, runner: Runner) -> Corner:
+    errors = judged(point, reference, runner).errors
+    relative = {name: error / reference.sizes.get(name, 1.0) for name, error in errors.items()}
+    return Corner(place, errors, relative, point.result.message)
 
 
 def judged_quantities(found: Tradeoff) -> list[str]:
@@ -204,13 +210,14 @@ def pareto_entries(
     return entries
 
 
-def key(question: Question) -> str:
-    """Name of the file in which the study of a question is stored."""
+def stored(folder: Path, question: Question, engines: Iterable[str] = ()) -> Path:
+    """Where the study of a question is stored under the folder of results.
+
+    Args:
+        folder: of all results.
+        question: what was swept.
+        engines: those to which it was restricted; such a study has a file of its own.
+    """
     scene = question.loaded()
-    identity = json.dumps([scene.digest, question.until], sort_keys=True)
-    return f"{scene.name}-{hashlib.sha256(identity.encode()).hexdigest()[:10]}"
-
-
-def stored(folder: Path, question: Question) -> Path:
-    """Where the study of a question is stored under the folder of results."""
-    return folder / "tradeoff" / f"{key(question)}.json"
+    identity = json.dumps([scene.digest, question.until, *sorted(engines)])
+    return folder / "tradeoff" / f"{scene.name}-{hashlib.sha256(identity.encode()).hexdigest()[:10]}.json"

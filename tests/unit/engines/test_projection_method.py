@@ -8,6 +8,7 @@ import numpy as np
 import pytest
 
 import proofroll
+from proofroll.engines.projection import uniform
 from proofroll.engines.projection.geometry import General, Uniform, geometry_of, local_geometry
 from proofroll.engines.projection.method import ProjectedBall
 from proofroll.engines.projection.orientation import EulerAngles, RotatingFrame
@@ -134,11 +135,15 @@ def test_rows_can_be_switched_off(seed):
 def test_without_resistance_no_moment_is_modelled(monkeypatch):
     """With f = 0 the model does not contain the moment of rolling resistance at all."""
     monkeypatch.delattr(ProjectedBall, "resistance")
+    monkeypatch.delattr(uniform._Translation, "moment")
     x = random_state(0)
     free = euler_ball(proofroll.load_scene("sphere_in_cylinder").rolling)
     assert np.all(np.isfinite(free.rates(x)))
+    assert np.all(np.isfinite(free.response(free.kinematics(x)).acceleration))
     with pytest.raises(AttributeError):
         euler_ball().rates(x)
+    with pytest.raises(AttributeError):
+        euler_ball().response(euler_ball().kinematics(x))
 
 
 @dataclass(frozen=True)

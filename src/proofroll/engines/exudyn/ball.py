@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 
 from proofroll.engine import Built, Sample
-from proofroll.engines.exudyn.local_frame import FrameAt, curvature, frame_at
+from proofroll.engines.exudyn.local_frame import curvature
 from proofroll.engines.exudyn.native import Output, items
 from proofroll.engines.exudyn.resistance import resistance_moment
 from proofroll.scene import RollingBall
@@ -106,7 +106,7 @@ def _resistance(rolling: RollingBall, node: Any) -> Any:
     N follows from the state: along e1 the centre accelerates by -v·(∂e1/∂p)v, so that
     N = m (v·(∂e1/∂p)v + e1·g). The last multiplier instead would lag by an iterate and make the moment ring with it.
     """
-    frame: FrameAt = frame_at(rolling.surface, rolling.u0)
+    frame = rolling.surface.triad
     bend = _bend(rolling)
     m = rolling.ball.mass
     gx, gy, gz = rolling.gravity.tolist()
@@ -115,11 +115,11 @@ def _resistance(rolling: RollingBall, node: Any) -> Any:
     def moment(system: Any, t: float, load: Any) -> list[float]:  # noqa: ARG001 -- Exudyn's signature
         x, y, z = system.GetNodeOutput(node, position).tolist()
         vx, vy, vz = system.GetNodeOutput(node, velocity).tolist()
-        e = frame(x, y, z)
-        v2, v3 = vx * e[3] + vy * e[4] + vz * e[5], vx * e[6] + vy * e[7] + vz * e[8]
-        N = m * (bend(x, y, z, v2, v3) + e[0] * gx + e[1] * gy + e[2] * gz)
+        x1, y1, z1, x2, y2, z2, x3, y3, z3 = frame(x, y, z)
+        v2, v3 = vx * x2 + vy * y2 + vz * z2, vx * x3 + vy * y3 + vz * z3
+        N = m * (bend(x, y, z, v2, v3) + x1 * gx + y1 * gy + z1 * gz)
         M2, M3 = resistance_moment(load[0], N, v2, v3)
-        return [M2 * e[3] + M3 * e[6], M2 * e[4] + M3 * e[7], M2 * e[5] + M3 * e[8]]
+        return [M2 * x2 + M3 * x3, M2 * y2 + M3 * y3, M2 * z2 + M3 * z3]
 
     return moment
 

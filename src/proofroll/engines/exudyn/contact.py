@@ -18,7 +18,7 @@ import numpy as np
 from proofroll.engine import Built, Regularised, Sample
 from proofroll.engines.exudyn.ball import add_ball
 from proofroll.engines.exudyn.integration import Integration, new_system
-from proofroll.engines.exudyn.local_frame import curvature, frame_at, gap_at
+from proofroll.engines.exudyn.local_frame import curvature
 from proofroll.engines.exudyn.native import Output, items
 from proofroll.engines.exudyn.settings import ExudynSettings
 from proofroll.errors import Refused
@@ -33,6 +33,8 @@ ON_A_PLANE = 10.0
 # The ball slips once it has left the friction zone and is this many times as fast as its edge: at a grazing onset the
 # time steps throw the slip velocity to and fro across the edge itself.
 SURELY = 2.0
+# Looked up once: the functions that Exudyn calls ask for them at every iterate and step.
+POSITION, COORDINATES = Output.Position, Output.Coordinates
 # What double precision leaves of any quantity, relative to its scale.
 ROUND_OFF = 1e-12
 
@@ -87,7 +89,7 @@ class Contact:
                 contactStiffness=stiffness,
             )
         )
-        self.system.SetPreNewtonResidualUserFunction(self._follow)
+        self.system.SetPreNewtonResidualUserFunction(_follower(self.ball.node, self.follower, self._centre))
         self.system.Assemble()
         self._softened = _softened(body, settings, creep, N, mu, hollow)
         self._t, self._events = 0.0, []
@@ -98,16 +100,11 @@ class Contact:
         self.system.SetPostStepUserFunction(self._watch)
         self.integration = Integration(self.system, settings)
 
-    def _follow(self, system: Any, t: float, newton_iteration: int, discontinuous_iteration: int) -> None:  # noqa: ARG002 -- Exudyn's signature
-        """Moves the hollow sphere to where the ball touches the wall."""
-        x, y, z = system.GetNodeOutput(self.ball.node, Output.Position).tolist()
-        system.SetMarkerParameter(self.follower, "localPosition", self._centre(x, y, z))
-
     def _watch(self, system: Any, t: float) -> bool:
         """Called by Exudyn after each step, and once where it starts."""
         if t <= self._t:
             return True
-        gap, speed = system.GetNodeOutput(self.data, Output.Coordinates)[:2].tolist()
+        gap, speed, _, _ = system.GetNodeOutput(self.data, COORDINATES).tolist()
         if gap > 0:
             self._events.append(Event("liftoff", 0.5 * (self._t + t), self._t, t))
             self.integration.complaint = "the ball leaves the wall"
@@ -148,6 +145,16 @@ class Contact:
         built = self.ball.built(float(contact["spheresRadii"][0] + gap / 2), gap)
         mu = float(contact["dynamicFriction"])
         return dataclasses.replace(built, mu_static=mu, mu_kinetic=mu, regularised=self._softened)
+
+
+def _follower(node: Any, marker: Any, centre: Callable[[float, float, float], list[float]]) -> Callable[..., None]:
+    """Moves the hollow sphere to where the ball touches the wall."""
+
+    def follow(system: Any, t: float, newton_iteration: int, discontinuous_iteration: int) -> None:  # noqa: ARG001 -- Exudyn's signature
+        x, y, z = system.GetNodeOutput(node, POSITION).tolist()
+        system.SetMarkerParameter(marker, "localPosition", centre(x, y, z))
+
+    return follow
 
 
 def _hollow_radius(body: RollingBall) -> float:
@@ -200,11 +207,11 @@ def _softened(
 
 def _centre_function(body: RollingBall, distance: float) -> Callable[[float, float, float], list[float]]:
     """Centre of the hollow sphere for a ball at x, y, z [m]: a touching ball's centre is ``distance`` away from it."""
-    frame, gap = frame_at(body.surface, body.u0), gap_at(body.surface, body.u0)
+    nearby = body.surface.nearby
 
     def centre(x: float, y: float, z: float) -> list[float]:
-        e = frame(x, y, z)
-        back = gap(x, y, z) - distance
-        return [x + back * e[0], y + back * e[1], z + back * e[2]]
+        gap, e1x, e1y, e1z = nearby(x, y, z)
+        back = gap - distance
+        return [x + back * e1x, y + back * e1y, z + back * e1z]
 
     return centre

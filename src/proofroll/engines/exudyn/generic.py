@@ -137,7 +137,7 @@ class Generic:
         """See :class:`Switched`."""
         _, rate1, rate2, w1, w2, w3 = q_t.tolist()
         t2u, t2v, t3u, t3v = self._tangents
-        g1, g2, g3 = self._local_gravity(q)[:3]
+        g1, g2, g3, *_ = self._local_gravity(q)
         return self._touch(t2u * rate1 + t2v * rate2, t3u * rate1 + t3v * rate2, w1, w2, w3, g1, g2, g3)
 
     def hold(self, direction: tuple[float, float] | None) -> None:
@@ -243,8 +243,8 @@ def _weight(body: RollingBall, local: LocalGeometry, scaled: FloatArray) -> Any:
     cosine, sine = body.gravity - along, np.cross(axis, body.gravity)
     zero = [0.0, 0.0, 0.0]
     if not rotations or not np.any(np.abs(sine) > 1e-14 * np.linalg.norm(body.gravity)):
-        constant = (scaled.T @ to_local @ body.gravity).tolist()
-        return lambda q: constant + zero  # noqa: ARG005 -- the place does not matter here
+        constant = [*(scaled.T @ to_local @ body.gravity).tolist(), *zero]
+        return lambda q: constant[:]  # noqa: ARG005 -- the place does not matter here
     if len(rotations) > 1:
         raise Refused("gravity along a wall with two rotations is not built")
     steady, with_cosine, with_sine = (scaled.T @ to_local @ part for part in (along, cosine, sine))

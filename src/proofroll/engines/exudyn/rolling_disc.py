@@ -14,7 +14,6 @@ from proofroll.engine import Built, Sample
 from proofroll.engines.exudyn.ball import add_ball
 from proofroll.engines.exudyn.friction import refuse_slip
 from proofroll.engines.exudyn.integration import Integration, consistent_start, new_system
-from proofroll.engines.exudyn.local_frame import frame_at
 from proofroll.engines.exudyn.native import Output, items
 from proofroll.engines.exudyn.settings import ExudynSettings
 from proofroll.events import Event
@@ -51,16 +50,15 @@ class RollingDisc:
 
     def _aiming(self, body: RollingBall) -> Any:
         """Turns the joint to the tangent plane below the present iterate; plain floats, it runs at every iterate."""
-        frame = frame_at(body.surface, body.u0)
+        frame = body.surface.triad
         node, joint = self.ball.node, self.joint
         position, rotation = Output.Position, Output.RotationMatrix
 
         def aim(system: Any, t: float, newton_iteration: int, discontinuous_iteration: int) -> None:  # noqa: ARG001 -- Exudyn's signature
-            e = frame(*system.GetNodeOutput(node, position).tolist())
+            e1x, e1y, e1z, x, y, z, *_ = frame(*system.GetNodeOutput(node, position).tolist())
             r = system.GetNodeOutput(node, rotation).tolist()
-            x, y, z = e[3], e[4], e[5]
             axis = [x * r[k] + y * r[k + 3] + z * r[k + 6] for k in (0, 1, 2)]  # e2 in the ball's frame
-            system.SetObjectParameter(joint, "planeNormal", [-e[0], -e[1], -e[2]])
+            system.SetObjectParameter(joint, "planeNormal", [-e1x, -e1y, -e1z])
             system.SetObjectParameter(joint, "discAxis", axis)
 
         return aim

@@ -8,6 +8,7 @@ keeps the integrator's order, and a fresh solver starts on either side with cons
 from __future__ import annotations
 
 import dataclasses
+import math
 from typing import Any, NamedTuple, Protocol
 
 from scipy.optimize import brentq
@@ -67,6 +68,8 @@ class StickSlip:
     def __init__(self, model: Switched, body: RollingBall, settings: ExudynSettings) -> None:
         """At time 0, in the state of the system's initial configuration."""
         self.model, self.system, self.settings = model, model.system, settings
+        data = self.system.systemData
+        self._q, self._q_t = data.GetODE2Coordinates, data.GetODE2Coordinates_t  # looked up once: asked at every step
         self.mu_static, self.mu_kinetic = body.contact.mu_static, body.contact.mu_kinetic
         self.beta = mobility(body)
         self.t = 0.0
@@ -74,7 +77,7 @@ class StickSlip:
         self.sticking, self.direction = True, (1.0, 0.0)
         self.state = self._state(exu.ConfigurationType.Initial)
         self._before, self._before_t = self.state, 0.0
-        self._need_rate = (0.0, 0.0)  # of the needed friction [N/s]
+        self._last_step: tuple[Touch, Touch, float] | None = None  # its end, its start and its length [s]
         self._watching, self._stopped = False, False
         self.system.SetPostStepUserFunction(self._watch)
         if self._margin(self.state.touch) < 0:
@@ -106,11 +109,11 @@ class StickSlip:
             self._before, self._before_t = self.state, self.t
             self.state, self.t = self._state(exu.ConfigurationType.Current), t
             self.model.reached()
-            touch, old = self.state.touch, self._before.touch
+            touch = self.state.touch
             if self._margin(touch) <= 0 or touch.N <= 0:
                 self._stopped = True
                 return False
-            self._need_rate = (touch.need2 - old.need2) / elapsed, (touch.need3 - old.need3) / elapsed
+            self._last_step = touch, self._before.touch, elapsed
         if not self.sticking:
             self._aim(self.settings.dt)
         return True
@@ -118,7 +121,7 @@ class StickSlip:
     def _margin(self, touch: Touch) -> float:
         """Positive while the contact stays as it is: friction left in the cone [N], or slip still forward [m/s]."""
         if self.sticking:
-            return self.mu_static * touch.N - touch.needed
+            return self.mu_static * touch.N - math.hypot(touch.need2, touch.need3)
         return touch.u2 * self.direction[0] + touch.u3 * self.direction[1]
 
     def _aim(self, dt: float, *, inside: bool = False) -> None:
@@ -127,8 +130,15 @@ class StickSlip:
         A step of a fresh solver has one direction throughout, the mean one ``inside``.
         """
         friction = self.mu_kinetic * self.state.touch.N
-        self.direction = slip_direction(self.state.touch, self._need_rate, friction, self.beta, dt, inside=inside)
+        self.direction = slip_direction(self.state.touch, self._need_rate(), friction, self.beta, dt, inside=inside)
         self.model.hold(self.direction)
+
+    def _need_rate(self) -> tuple[float, float]:
+        """Rate of the needed friction in the last step that was whole [N/s]; only a slip asks for it."""
+        if self._last_step is None:
+            return 0.0, 0.0
+        touch, old, elapsed = self._last_step
+        return (touch.need2 - old.need2) / elapsed, (touch.need3 - old.need3) / elapsed
 
     def _divide(self) -> None:
         """Takes the last step again, in parts that end where the contact changes."""
@@ -204,8 +214,7 @@ class StickSlip:
         data.SetODE2Coordinates_t(self.state.q_t, initial)
 
     def _state(self, configuration: Any) -> State:
-        data = self.system.systemData
-        q, q_t = data.GetODE2Coordinates(configuration), data.GetODE2Coordinates_t(configuration)
+        q, q_t = self._q(configuration), self._q_t(configuration)
         return State(q, q_t, self.model.touch(q, q_t))
 
     def _restart(self) -> None:

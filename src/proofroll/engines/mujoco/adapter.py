@@ -137,6 +137,11 @@ class Mujoco:
             if warnings[kind].number:
                 raise Diverged(f"MuJoCo gave up before {t:g} s: {meaning}")
 
+    @property
+    def native(self) -> tuple[Any, Any]:
+        """MuJoCo's own model and data, for whoever goes on with MuJoCo itself."""
+        return self._model, self._data
+
     def sample(self) -> Sample:
         """See :class:`proofroll.engine.Engine`."""
         data = self._evaluated()

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from typing import Any
 
@@ -68,7 +68,7 @@ class Chart:
 
     def run(self, data: Any, steps: int) -> None:
         """Makes ``steps`` steps."""
-        with self._callbacks():
+        with self._callbacks(data):
             if self._friction is None:
                 mujoco.mj_step(self._model, data, nstep=steps)
                 return
@@ -77,14 +77,14 @@ class Chart:
 
     def evaluate(self, data: Any) -> None:
         """Computes forces and accelerations of the present state, as a step would."""
-        with self._callbacks():
+        with self._callbacks(data):
             mujoco.mj_forward(self._model, data)
 
     @contextmanager
-    def _callbacks(self) -> Iterator[None]:
-        """MuJoCo's callbacks belong to the process: they are ours only while we compute."""
-        mujoco.set_mjcb_contactfilter(self._pose_wall)
-        mujoco.set_mjcb_passive(self._resist if self.resistance.f else None)
+    def _callbacks(self, data: Any) -> Iterator[None]:
+        """MuJoCo's callbacks belong to the process: they are ours only while we compute with ``data``."""
+        mujoco.set_mjcb_contactfilter(self._wall_poser(data))
+        mujoco.set_mjcb_passive(self._resister(data) if self.resistance.f else None)
         mujoco.set_mjcb_control(self._correct if self._corrects else None)
         try:
             yield
@@ -93,18 +93,30 @@ class Chart:
             mujoco.set_mjcb_passive(None)
             mujoco.set_mjcb_control(None)
 
-    def _pose_wall(self, model: Any, data: Any, geom1: int, geom2: int) -> int:  # noqa: ARG002 -- MuJoCo's signature
+    def _wall_poser(self, data: Any) -> Callable[[Any, Any, int, int], int]:
         """Called between kinematics and collision at each stage of RK4; 0 lets the pair collide."""
-        data.geom_xpos[self._wall] = data.site_xpos[self._touch]
-        data.geom_xmat[self._wall] = data.site_xmat[self._touch]
-        return 0
+        # Views of MjData's memory: to look them up at every stage would cost half as much as the stage.
+        position, axes = data.geom_xpos[self._wall], data.geom_xmat[self._wall]
+        touch, touch_axes = data.site_xpos[self._touch], data.site_xmat[self._touch]
 
-    def _resist(self, model: Any, data: Any) -> None:  # noqa: ARG002 -- MuJoCo's signature
+        def pose_wall(model: Any, data: Any, geom1: int, geom2: int) -> int:  # noqa: ARG001 -- MuJoCo's signature
+            position[:] = touch
+            axes[:] = touch_axes
+            return 0
+
+        return pose_wall
+
+    def _resister(self, data: Any) -> Callable[[Any, Any], None]:
         """Called between velocities and accelerations."""
-        N = foreseen_normal_force(data, -float(data.qfrc_constraint[self._depth]))
-        e1 = (-data.site_xmat[self._touch][2::3]).tolist()
-        v = data.cvel[self._ball, 3:].tolist()
-        self.resistance.apply(data.xfrc_applied[self._ball, 3:], N, e1, v)
+        reaction, axes, velocity = data.qfrc_constraint, data.site_xmat[self._touch], data.cvel[self._ball, 3:]
+        torque, depth, apply = data.xfrc_applied[self._ball, 3:], self._depth, self.resistance.apply
+
+        def resist(model: Any, data: Any) -> None:  # noqa: ARG001 -- MuJoCo's signature
+            N = foreseen_normal_force(data, -float(reaction[depth]))
+            _, _, e1x, _, _, e1y, _, _, e1z = axes.tolist()
+            apply(torque, N, (-e1x, -e1y, -e1z), velocity.tolist())
+
+        return resist
 
     def _correct(self, model: Any, data: Any) -> None:  # noqa: ARG002 -- MuJoCo's signature
         """Called between the contact's reference accelerations and its forces."""

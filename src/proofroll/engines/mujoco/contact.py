@@ -20,7 +20,8 @@ def contact_force(model: Any, data: Any, geom: int) -> FloatArray:
     """Sum of the contact forces on a geom in the world [N], shape (3,); zero without contact."""
     total = np.zeros(3)
     wrench = np.zeros(6)
-    for index, contact in enumerate(data.contact[: data.ncon]):
+    for index in range(data.ncon):
+        contact = data.contact[index]  # a slice of the list would copy all of MuJoCo's contacts
         mujoco.mj_contactForce(model, data, index, wrench)
         # The frame's first axis points from geom[0] to geom[1], and the force is the one on geom[1].
         sign = 1.0 if contact.geom[1] == geom else -1.0
@@ -40,11 +41,12 @@ def foreseen_normal_force(data: Any, N: float) -> float:
         N: normal force of the evaluation before [N].
     """
     t = float(data.time)
-    last, before, N_before, slope = (float(number) for number in data.userdata[:MEMORY])
+    memory = data.userdata
+    last, before, N_before, slope = memory[:MEMORY].tolist()
     if last > before:
         slope = (N - N_before) / (last - before)
-    data.userdata[:MEMORY] = (t, last, N, slope)
-    return max(N + slope * (t - last), 0.0)
+    memory[0], memory[1], memory[2], memory[3] = t, last, N, slope  # faster than a slice
+    return max(float(N + slope * (t - last)), 0.0)
 
 
 def contact_coefficient(model: Any, data: Any, geoms: tuple[int, int]) -> float:
@@ -80,13 +82,16 @@ class Resistance:
             e1: unit normal from the ball to the wall.
             v: velocity of the centre in the world [m/s].
         """
-        speed = math.hypot(v[0], v[1], v[2])
+        v0, v1, v2 = v
+        e0, e1_, e2 = e1
+        speed = math.hypot(v0, v1, v2)
         if speed == 0:
             torque[:] = 0.0
             return
         scale = -self.f * N / speed
-        c0, c1, c2 = cross(v, e1)
-        torque[0], torque[1], torque[2] = scale * c0, scale * c1, scale * c2
+        torque[0] = scale * (v1 * e2 - v2 * e1_)
+        torque[1] = scale * (v2 * e0 - v0 * e2)
+        torque[2] = scale * (v0 * e1_ - v1 * e0)
 
     def lever(self) -> float:
         """The lever that the torque has at a normal force of 1 N and a speed of 1 m/s [m]."""

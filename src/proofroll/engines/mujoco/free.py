@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Callable
 from typing import Any
 
 import mujoco
@@ -55,18 +56,41 @@ class Free:
 
     def run(self, data: Any, steps: int) -> None:
         """Makes ``steps`` steps."""
+        if not self._edits:
+            self._run_plainly(data, steps)
+            return
         for _ in range(steps):
             motion = self._prepare(data)
-            if self._edits:
-                mujoco.mj_step1(self._model, data)
-                self._edit(data, *motion)
-                mujoco.mj_step2(self._model, data)
-                if self._friction is not None:
-                    self._friction.observe(data)
-            elif self._friction is not None:
-                self._friction.step(data)
+            mujoco.mj_step1(self._model, data)
+            self._edit(data, *motion)
+            mujoco.mj_step2(self._model, data)
+            if self._friction is not None:
+                self._friction.observe(data)
+
+    def _run_plainly(self, data: Any, steps: int) -> None:
+        """The same where nothing is edited, so that nothing lags: :meth:`_prepare` as plain floats.
+
+        MuJoCo takes some microseconds for a step of this model, and numpy as many for three numbers.
+        """
+        model, friction, nearby, radius = self._model, self._friction, self._surface.nearby, self._radius
+        position, rates, pushed = data.qpos[:3], data.qvel[:3], data.qfrc_constraint[:3]
+        place, quaternion, facing = data.mocap_pos[0], data.mocap_quat[0], np.zeros(3)
+        normal, torque = data.geom_xmat[self._wall, 2::3], data.xfrc_applied[self._ball, 3:]
+        resists, step = self.resistance.f > 0, None if friction is None else friction.step
+        for _ in range(steps):
+            x, y, z = position.tolist()
+            gap, e1x, e1y, e1z = nearby(x, y, z)
+            reach = radius + gap
+            place[0], place[1], place[2] = x + reach * e1x, y + reach * e1y, z + reach * e1z
+            facing[0], facing[1], facing[2] = -e1x, -e1y, -e1z
+            mujoco.mju_quatZ2Vec(quaternion, facing)
+            if resists:
+                N = foreseen_normal_force(data, float(pushed.dot(normal)))
+                self.resistance.apply(torque, N, (e1x, e1y, e1z), rates.tolist())
+            if step is None:
+                mujoco.mj_step(model, data)
             else:
-                mujoco.mj_step(self._model, data)
+                step(data)
 
     def evaluate(self, data: Any) -> None:
         """Computes forces and accelerations of the present state, as a step would."""
@@ -185,8 +209,9 @@ class Facets:
         if not self.resistance.f:
             mujoco.mj_step(self._model, data, nstep=steps)
         else:
+            resist = self._resister(data)
             for _ in range(steps):
-                self._resist(data)
+                resist()
                 mujoco.mj_step(self._model, data)
         # Rolling resistance, and the kicks, take away what holds the ball up: it may fall further than at first.
         if abs(float(self._axis @ data.qpos[:3])) > self._half_length:
@@ -195,13 +220,21 @@ class Facets:
     def evaluate(self, data: Any) -> None:
         """Computes forces and accelerations of the present state, as a step would."""
         if self.resistance.f:
-            self._resist(data)
+            self._resister(data)()
         mujoco.mj_forward(self._model, data)
 
-    def _resist(self, data: Any) -> None:
-        e1: FloatArray = self._surface.normal(data.qpos[:3])
-        N = -float(data.qfrc_constraint[:3] @ e1)
-        self.resistance.apply(data.xfrc_applied[self._ball, 3:], N, e1.tolist(), data.qvel[:3].tolist())
+    def _resister(self, data: Any) -> Callable[[], None]:
+        nearby, apply = self._surface.nearby, self.resistance.apply
+        position, rates, pushed = data.qpos[:3], data.qvel[:3], data.qfrc_constraint[:3]
+        torque = data.xfrc_applied[self._ball, 3:]
+
+        def resist() -> None:
+            x, y, z = position.tolist()
+            _, e1x, e1y, e1z = nearby(x, y, z)
+            Fx, Fy, Fz = pushed.tolist()
+            apply(torque, -(Fx * e1x + Fy * e1y + Fz * e1z), (e1x, e1y, e1z), rates.tolist())
+
+        return resist
 
 
 def _reach(body: RollingBall, axis: FloatArray) -> float:

@@ -100,22 +100,24 @@ class BoundedFriction:
 
     def step(self, data: Any) -> None:
         """One mj_step, with a look at the forces before RK4's further stages replace them."""
-        mujoco.mj_checkPos(self._model, data)
-        mujoco.mj_checkVel(self._model, data)
-        mujoco.mj_forward(self._model, data)
-        mujoco.mj_checkAcc(self._model, data)
+        model = self._model
+        mujoco.mj_checkPos(model, data)
+        mujoco.mj_checkVel(model, data)
+        mujoco.mj_forward(model, data)
+        mujoco.mj_checkAcc(model, data)
         self.observe(data)
-        self._integrate(self._model, data)
+        self._integrate(model, data)
 
     def observe(self, data: Any) -> None:
         """Takes the forces at the start of a step; once per step."""
         if not self._presses(data):
             self._miss(data)
-        else:
-            if self.holds(data) != self.sticking:
-                # A ball that comes back slipping has slipped since it was lost.
-                began = self._steps if self._lost is None or self._flies else self._lost
-                self._change(not self.sticking, self._event(began if self.sticking else self._steps))
+        elif self._inside() != self.sticking:
+            # A ball that comes back slipping has slipped since it was lost.
+            began = self._steps if self._lost is None or self._flies else self._lost
+            self._change(not self.sticking, self._event(began if self.sticking else self._steps))
+            self._lost, self._flies = None, False
+        elif self._lost is not None:
             self._lost, self._flies = None, False
         self._steps += 1
 
@@ -132,16 +134,18 @@ class BoundedFriction:
         if data.ncon == 0:
             return False
         mujoco.mj_contactForce(self._model, data, 0, self._wrench)
-        return bool(self._wrench[0] > 0)
+        return self._wrench.item(0) > 0
 
     def holds(self, data: Any) -> bool:
         """Whether there is a contact force in ``data`` and it is inside the cone of the present coefficient."""
-        if not self._presses(data):
-            return False
-        N, F1, F2 = self._wrench[:3].tolist()
+        return self._presses(data) and self._inside()
+
+    def _inside(self) -> bool:
+        """Whether the force in ``self._wrench`` is inside the cone of the present coefficient."""
+        N, F1, F2, *_ = self._wrench.tolist()
         # MuJoCo's pyramid lies inside the true cone: along its own tangents it allows |F1| + |F2| = mu N.
         friction = abs(F1) + abs(F2) if self._pyramidal else math.hypot(F1, F2)
-        return bool(friction < _ON_CONE * self._mu * N)
+        return friction < _ON_CONE * self._mu * N
 
     def events(self, data: Any) -> list[Event]:
         """The events so far, each with a bracket of one step.

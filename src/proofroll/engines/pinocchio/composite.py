@@ -9,7 +9,7 @@ import numpy as np
 import pinocchio as pin
 
 from proofroll.engines.pinocchio.mechanism import Mechanism, Sliding
-from proofroll.engines.pinocchio.rows import BallTerms, ball_terms, resistance, rolling_rows
+from proofroll.engines.pinocchio.rows import BallTerms, ball_terms, cross, resistance, rolling_rows
 from proofroll.errors import Refused
 from proofroll.scene import RollingBall
 from proofroll.surfaces import FloatArray, Generator
@@ -45,7 +45,7 @@ class Composite(Mechanism):
         if orientation:  # q_WB is the identity at time 0
             pin.forwardKinematics(self.model, data, self.q0)
             self.q0[2:] = pin.Quaternion(data.oMi[self.ball].rotation.T.copy()).coeffs()
-        jacobian = ball_terms(self.model, data, self.ball, self.q0, self._rest).jacobian
+        jacobian = ball_terms(self.model, data, self.ball, self.q0, self._rest, self._rest).jacobian
         self.v0 = np.linalg.lstsq(jacobian, np.concatenate([body.v0, body.w0]), rcond=None)[0]
         metres = np.asarray(body.surface.length_scales)
         self.q_scale = np.concatenate([self._radius / metres, np.ones(4)])
@@ -53,14 +53,15 @@ class Composite(Mechanism):
 
     def _rows(self, data: Any, q: FloatArray, v: FloatArray) -> tuple[BallTerms, FloatArray, FloatArray, FloatArray]:
         """Terms of the ball, local frame, rows and drift of rolling."""
-        terms = ball_terms(self.model, data, self.ball, q, v)
-        frame = data.oMi[self._carriage].rotation @ self._frame0
+        terms = ball_terms(self.model, data, self.ball, q, v, self._rest)
+        frame = data.oMi[self._carriage].rotation.dot(self._frame0)
         turning = pin.getVelocity(self.model, data, self._carriage, pin.LOCAL_WORLD_ALIGNED).angular
-        return terms, frame, *rolling_rows(terms, self._radius, frame, pin.skew(turning) @ frame[:, 0])
+        e1_rate = cross(turning.tolist(), frame[:, 0].tolist())
+        return terms, frame, *rolling_rows(terms, self._radius, frame.T.ravel().tolist(), e1_rate)
 
     def _transmitted(self, data: Any, e1: FloatArray) -> float:
         """N [N] from the wrench in the spherical joint that the last pass of Pinocchio left in ``data``."""
-        return -float(e1 @ (data.oMi[self.ball].rotation @ data.f[self.ball].linear))
+        return -float(e1.dot(data.oMi[self.ball].rotation.dot(data.f[self.ball].linear)))
 
     def respond(self, data: Any, q: FloatArray, v: FloatArray) -> tuple[FloatArray, FloatArray]:
         """Joint acceleration, and F2, F3 [N]."""
@@ -74,7 +75,7 @@ class Composite(Mechanism):
 
     def normal_force(self, data: Any) -> float:
         """See :class:`~proofroll.engines.pinocchio.mechanism.Mechanism`; forwardDynamics leaves the bias pass alone."""
-        return self._transmitted(data, data.oMi[self._carriage].rotation @ self._frame0[:, 0])
+        return self._transmitted(data, data.oMi[self._carriage].rotation.dot(self._frame0[:, 0]))
 
     def reaction(self, data: Any, q: FloatArray, v: FloatArray) -> tuple[FloatArray, FloatArray]:
         """Joint acceleration, and the wall's force: N from the joint's wrench, F2 and F3 from the multipliers."""

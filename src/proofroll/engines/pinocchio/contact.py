@@ -9,14 +9,15 @@ Euler multiplies it by the square root of 1 + (ω dt)², so that a fast ball blo
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass
-from typing import Any
+from collections.abc import Sequence
+from typing import Any, NamedTuple
 
 import numpy as np
 import pinocchio as pin
 
 from proofroll.engine import Built, Sample, whole_steps
 from proofroll.engines.pinocchio.contact_tolerances import softened
+from proofroll.engines.pinocchio.rows import cross
 from proofroll.engines.pinocchio.settings import PinocchioSettings
 from proofroll.errors import Diverged, Refused
 from proofroll.events import Event, EventKind
@@ -35,8 +36,7 @@ _FAINT = 1e-9
 _REPEATS, _SETTLED = 10, 1e-13
 
 
-@dataclass(frozen=True, slots=True)
-class Kick:
+class Kick(NamedTuple):
     """What the contact does to the ball around the present time.
 
     Attributes:
@@ -82,12 +82,17 @@ class ContactRun:
         self._q = np.concatenate([body.p0, [0.0, 0.0, 0.0, 1.0]])
         self._v = np.concatenate([body.v0, body.w0])
         self._started = False
+        # A ball in these joints has the same mass matrix in every configuration. Pinocchio fills the upper triangle.
+        inverse = np.triu(pin.computeMinverse(self.model, self._data, self._q))
+        self._inverse = inverse + np.triu(inverse, 1).T
+        self._faint = _FAINT * body.ball.mass * float(np.linalg.norm(body.gravity)) * self._dt
 
         point = pin.PointContactConstraintModel(self.model, 0, pin.SE3.Identity(), self._ball, pin.SE3.Identity())
         self._models, self._datas = pin.StdVec_ConstraintModel(), pin.StdVec_ConstraintData()
         self._models.append(pin.ConstraintModel(point))
         self._datas.append(self._models[0].createData())
-        self._point = self._models[0].extract()  # refers to the model in the vector
+        # Both refer to what is in the vectors; to extract them again takes longer than to solve for the impulse.
+        self._point, self._point_data = self._models[0].extract(), self._datas[0].extract()
         self._bounded = math.isfinite(body.contact.mu_static)
         unbounded = UNBOUNDED_FRICTION[self._solver_kind]
         self._mu_static = body.contact.mu_static if self._bounded else unbounded
@@ -132,15 +137,17 @@ class ContactRun:
         pin.computeAllTerms(model, data, q, v)
         velocity = pin.getVelocity(model, data, self._ball, pin.LOCAL_WORLD_ALIGNED)
         p, turned = data.oMi[self._ball].translation, data.oMi[self._ball].rotation
-        axes = self._pose(p, turned)
-        self._point.calc(model, data, self._datas[0].extract())
-        jacobian = self._point.jacobian(model, data, self._datas[0].extract())
-        inverse = np.triu(pin.computeMinverse(model, data, q))
-        inverse += np.triu(inverse, 1).T
-        delassus = pin.DelassusOperatorDense(jacobian @ inverse @ jacobian.T)
-        shift = np.array([0.0, 0.0, float(self._body.surface.gap(p)) / self._dt])
+        place = p.tolist()
+        triad = self._body.surface.triad(*place)
+        axes = self._pose(p, turned, triad)
+        self._point.calc(model, data, self._point_data)
+        jacobian = self._point.jacobian(model, data, self._point_data)
+        inverse = self._inverse
+        to_joints = inverse.dot(jacobian.T)
+        delassus = pin.DelassusOperatorDense(jacobian.dot(to_joints))
+        shift = np.array([0.0, 0.0, self._body.surface.nearby(*place)[0] / self._dt])
         if self._leapfrog:
-            shift += 0.5 * self._dt * (axes.T @ self._turning(p, velocity))
+            shift += self._turning(place, velocity, triad)
 
         f, torque, normal_force = self._body.contact.rolling_resistance, np.zeros(6), self._normal_force
         after, velocity_now = v, velocity.linear
@@ -148,8 +155,8 @@ class ContactRun:
             if f:
                 torque = self._resistance(p, turned, velocity_now) * normal_force
             free = v + span * pin.aba(model, data, q, v, torque)
-            impulse, status = self._solve(delassus, jacobian @ free + shift)
-            after = free + inverse @ (jacobian.T @ impulse)
+            impulse, status = self._solve(delassus, jacobian.dot(free) + shift)
+            after = free + to_joints.dot(impulse)
             found = float(impulse[2]) / span
             if not f or abs(found - normal_force) <= _SETTLED * abs(found):
                 break
@@ -161,29 +168,37 @@ class ContactRun:
             status = self._status  # a plane does not press before the ball has moved into it
         return Kick(v, after, span, axes @ impulse / span, status)
 
-    def _pose(self, p: FloatArray, turned: FloatArray) -> FloatArray:
+    def _pose(self, p: FloatArray, turned: FloatArray, triad: Sequence[float]) -> FloatArray:
         """Poses the plane, and returns its axes as columns, the last one from the wall into the ball."""
-        surface = self._body.surface
-        frame = surface.frame(surface.locate(p))
-        axes = frame[:, [1, 2, 0]] * (1.0, -1.0, -1.0)
-        arm = self._body.ball.radius * frame[:, 0]
+        x1, y1, z1, x2, y2, z2, x3, y3, z3 = triad
+        axes = np.array([[x2, -x3, -x1], [y2, -y3, -y1], [z2, -z3, -z1]])
+        arm = -self._body.ball.radius * axes[:, 2]
         self._point.joint1_placement = pin.SE3(axes, p + arm)
-        self._point.joint2_placement = pin.SE3(turned.T @ axes, turned.T @ arm)
-        return np.asarray(axes)
+        self._point.joint2_placement = pin.SE3(turned.T.dot(axes), turned.T.dot(arm))
+        return axes
 
-    def _turning(self, p: FloatArray, velocity: Any) -> FloatArray:
-        """Rate of the velocity of the contact point that comes from the turning of the normal [m/s²], shape (3,)."""
-        surface, radius = self._body.surface, self._body.ball.radius
-        e1, e1_rate = surface.normal(p), surface.normal_gradient(p) @ velocity.linear
-        slip_rate = radius * (pin.skew(velocity.angular) @ e1_rate)
-        return np.asarray(slip_rate - (e1 @ slip_rate) * e1 + (e1_rate @ velocity.linear) * e1)
+    def _turning(
+        self, p: tuple[float, float, float], velocity: Any, triad: Sequence[float]
+    ) -> tuple[float, float, float]:
+        """What the turning of the normal adds to the velocity of the contact point in half a step [m/s].
+
+        Along the axes of the plane, e2, -e3 and -e1: a ω × ė1, and the bend of the path.
+        """
+        _, _, _, x2, y2, z2, x3, y3, z3 = triad
+        v = velocity.linear.tolist()
+        rate = self._body.surface.normal_rate(p, v)
+        x, y, z = cross(velocity.angular.tolist(), rate)
+        half, lever = 0.5 * self._dt, 0.5 * self._dt * self._body.ball.radius
+        bend = rate[0] * v[0] + rate[1] * v[1] + rate[2] * v[2]
+        return lever * (x2 * x + y2 * y + z2 * z), -lever * (x3 * x + y3 * y + z3 * z), -half * bend
 
     def _resistance(self, p: FloatArray, turned: FloatArray, v_WB: FloatArray) -> FloatArray:
         """Rolling resistance on the joints per unit of normal force [m], shape (6,); zero where the ball rests."""
         torque, speed = np.zeros(6), math.sqrt(v_WB @ v_WB)
         if speed > 0:
             e1 = self._body.surface.normal(p)
-            torque[3:] = turned.T @ (pin.skew(e1) @ v_WB) * (self._body.contact.rolling_resistance / speed)
+            lever = np.array(cross(e1.tolist(), v_WB.tolist())) * (self._body.contact.rolling_resistance / speed)
+            torque[3:] = turned.T.dot(lever)
         return torque
 
     def _solve(self, delassus: Any, free: FloatArray) -> tuple[FloatArray, EventKind]:
@@ -198,10 +213,10 @@ class ContactRun:
         return impulse, status
 
     def _judged(self, impulse: FloatArray, mu: float) -> EventKind:
-        weight = self._body.ball.mass * float(np.linalg.norm(self._body.gravity))
-        if impulse[2] <= _FAINT * weight * self._dt:
+        F2, F3, N = impulse.tolist()
+        if not self._faint < N:
             return "liftoff"
-        on_cone = math.hypot(impulse[0], impulse[1]) >= mu * float(impulse[2]) * (1 - _ON_CONE)
+        on_cone = math.hypot(F2, F3) >= mu * N * (1 - _ON_CONE)
         return "slip" if on_cone else "stick"
 
     def _impulse(self, delassus: Any, free: FloatArray, mu: float) -> FloatArray:
@@ -245,7 +260,7 @@ class ContactRun:
         kick = self._kick()
         self._normal_force = kept
         inertia = self.model.inertias[self._ball]
-        pose, point = self._data.oMi[self._ball], self._datas[0].extract()
+        pose, point = self._data.oMi[self._ball], self._point_data
         f = 0.0
         if self._body.contact.rolling_resistance:
             # At rest it has no direction, so it is looked at in motion: along the first axis of the plane.

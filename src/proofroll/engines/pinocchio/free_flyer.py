@@ -34,14 +34,16 @@ class FreeFlyer(Mechanism):
 
     def _rows(self, data: Any, q: FloatArray, v: FloatArray) -> tuple[BallTerms, FloatArray, FloatArray, FloatArray]:
         """Terms of the ball, local frame, rows and drift: first the surface, then the two of rolling."""
-        terms = ball_terms(self.model, data, self.ball, q, v)
-        p = q[:3]
-        frame = self._surface.frame(self._surface.locate(p))
-        e1_rate = self._surface.normal_gradient(p) @ terms.v
-        slip_rows, slip_drift = rolling_rows(terms, self._radius, frame, e1_rate)
+        terms = ball_terms(self.model, data, self.ball, q, v, self._rest)
+        p, v_WB = q[:3].tolist(), terms.v.tolist()
+        triad, e1_rate = self._surface.triad(*p), self._surface.normal_rate(p, v_WB)
+        frame = np.array(triad).reshape(3, 3).T
+        e1 = frame[:, 0]
+        slip_rows, slip_drift = rolling_rows(terms, self._radius, triad, e1_rate)
         rows, drift = np.empty((3, 6)), np.empty(3)
-        rows[0], rows[1:] = frame[:, 0] @ terms.jacobian[:3], slip_rows
-        drift[0], drift[1:] = frame[:, 0] @ terms.bias[:3] + e1_rate @ terms.v, slip_drift
+        rows[0], rows[1:] = e1.dot(terms.jacobian[:3]), slip_rows
+        bend = e1_rate[0] * v_WB[0] + e1_rate[1] * v_WB[1] + e1_rate[2] * v_WB[2]
+        drift[0], drift[1:] = e1.dot(terms.bias[:3]) + bend, slip_drift
         return terms, frame, rows, drift
 
     def _solve(self, data: Any, q: FloatArray, v: FloatArray) -> tuple[FloatArray, FloatArray, FloatArray]:
@@ -82,7 +84,8 @@ class FreeFlyer(Mechanism):
     def on_surface(self, q: FloatArray) -> FloatArray:
         """The configuration with the centre moved onto the surface along its normal."""
         q = q.copy()
-        q[:3] += self._surface.gap(q[:3]) * self._surface.normal(q[:3])
+        gap, *e1 = self._surface.nearby(*q[:3].tolist())
+        q[:3] += gap * np.array(e1)
         return q
 
     def gap(self, q: FloatArray) -> float:

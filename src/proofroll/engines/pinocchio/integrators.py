@@ -155,10 +155,10 @@ class Adaptive:
         nq = self._model.nq
         # The rates must not depend on the length to which the quaternion has drifted.
         q, v = pin.normalize(self._model, y[:nq]), y[nq:]
-        rates = np.empty_like(y)
-        rates[:nq] = pin.tangentMap(self._model, q) @ (self._moving * v)
-        rates[nq:] = self._mechanism.respond(self._data, q, v)[0]
-        return rates
+        moving = v if self._settings.orientation else self._moving * v
+        return np.concatenate(
+            [pin.tangentMap(self._model, q).dot(moving), self._mechanism.respond(self._data, q, v)[0]]
+        )
 
     def advance(self, start: float, end: float) -> None:
         """See :class:`Integrator`. The last step ends at ``end``: the dense output of DOP853 has a lower order."""

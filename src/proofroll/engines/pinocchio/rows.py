@@ -2,17 +2,19 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
-from typing import Any
+import math
+from collections.abc import Sequence
+from typing import Any, NamedTuple
 
 import numpy as np
 import pinocchio as pin
 
 from proofroll.surfaces import FloatArray
 
+Triple = list[float] | tuple[float, float, float]
 
-@dataclass(frozen=True, slots=True)
-class BallTerms:
+
+class BallTerms(NamedTuple):
     """Kinematics of the ball's joint now, in world axes, at the ball's centre.
 
     Attributes:
@@ -28,12 +30,13 @@ class BallTerms:
     w: FloatArray
 
 
-def ball_terms(model: Any, data: Any, ball: int, q: FloatArray, v: FloatArray) -> BallTerms:
+def ball_terms(model: Any, data: Any, ball: int, q: FloatArray, v: FloatArray, rest: FloatArray) -> BallTerms:
     """Mass matrix and bias forces into ``data``, and the kinematics of the ball.
 
-    computeAllTerms does not touch ``data.a``, so the drift needs forwardKinematics with a joint acceleration of zero.
+    computeAllTerms does not touch ``data.a``, so the drift needs forwardKinematics with a joint acceleration of zero,
+    which is ``rest``.
     """
-    pin.forwardKinematics(model, data, q, v, np.zeros(model.nv))
+    pin.forwardKinematics(model, data, q, v, rest)
     pin.computeAllTerms(model, data, q, v)
     velocity = pin.getVelocity(model, data, ball, pin.LOCAL_WORLD_ALIGNED)
     return BallTerms(
@@ -45,19 +48,35 @@ def ball_terms(model: Any, data: Any, ball: int, q: FloatArray, v: FloatArray) -
 
 
 def rolling_rows(
-    terms: BallTerms, radius: float, frame: FloatArray, e1_rate: FloatArray
+    terms: BallTerms, radius: float, triad: Sequence[float], e1_rate: Triple
 ) -> tuple[FloatArray, FloatArray]:
     """Slip velocity along e2 and e3 as J q̇, and its rate at zero joint acceleration; shapes (2, nv) and (2,).
 
     Slip is v + a ω × e1, so its components are e2·v + a e3·ω and e3·v - a e2·ω. Its rate has the term a ω × ė1, which
     a row re-posed at each instant would lack.
+
+    Args:
+        terms: of the ball.
+        radius: a [m].
+        triad: components of e1, e2, e3, one after the other.
+        e1_rate: ė1 [1/s].
     """
-    e2, e3 = frame[:, 1], frame[:, 2]
-    directions = np.empty((2, 6))
-    directions[0, :3], directions[0, 3:] = e2, radius * e3
-    directions[1, :3], directions[1, 3:] = e3, -radius * e2
-    turning = radius * (pin.skew(terms.w) @ e1_rate)
-    return directions @ terms.jacobian, directions @ terms.bias + frame[:, 1:].T @ turning
+    # Plain floats: numpy's overhead on three numbers is that of all that Pinocchio computes here.
+    _, _, _, x2, y2, z2, x3, y3, z3 = triad
+    a = radius
+    directions = np.array([[x2, y2, z2, a * x3, a * y3, a * z3], [x3, y3, z3, -a * x2, -a * y2, -a * z2]])
+    x, y, z = cross(terms.w.tolist(), e1_rate)
+    drift = directions.dot(terms.bias)
+    drift[0] += a * (x2 * x + y2 * y + z2 * z)
+    drift[1] += a * (x3 * x + y3 * y + z3 * z)
+    return directions.dot(terms.jacobian), drift
+
+
+def cross(x: Triple, y: Triple) -> tuple[float, float, float]:
+    """Vector product of two vectors of three components."""
+    x0, x1, x2 = x
+    y0, y1, y2 = y
+    return x1 * y2 - x2 * y1, x2 * y0 - x0 * y2, x0 * y1 - x1 * y0
 
 
 def resistance(terms: BallTerms, f: float, e1: FloatArray) -> FloatArray:
@@ -65,6 +84,6 @@ def resistance(terms: BallTerms, f: float, e1: FloatArray) -> FloatArray:
 
     The moment f e1 × v/V about the centre (Blajer 2006, section 2.4); at V = 0 it has no direction and is zero.
     """
-    speed = float(np.linalg.norm(terms.v))
-    lever = pin.skew(e1) @ terms.v * (f / speed) if speed > 0 else np.zeros(3)
-    return np.asarray(terms.jacobian[3:].T @ lever)
+    speed = math.hypot(*terms.v.tolist())
+    lever = np.array(cross(e1.tolist(), terms.v.tolist())) * (f / speed) if speed > 0 else np.zeros(3)
+    return np.asarray(terms.jacobian[3:].T.dot(lever))

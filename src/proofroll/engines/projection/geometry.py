@@ -68,6 +68,18 @@ class Uniform:
     Then everything along the local axes is constant, and the frame at u is the one at u = 0 turned by the motions.
     """
 
+    @property
+    def column(self) -> int | None:
+        """Which coordinate turns the frame, if one does."""
+        return self._column
+
+    @property
+    def parts(self) -> list[FloatArray]:
+        """F0, F1, F2 of the frame F0 + sin α F1 + (1 - cos α) F2 at the coordinate α; F0 alone if none turns it."""
+        if self._column is None:
+            return [self._start.frame]
+        return [self._start.frame, self._once, self._twice]
+
     def __init__(self, surface: Surface, generators: tuple[Generator, Generator]) -> None:
         self._start = local_geometry(surface, np.zeros(2))
         # Only one of two commuting motions of a surface turns: a rotation by angle α about the unit axis k takes F

@@ -21,6 +21,7 @@ from scipy.linalg.lapack import dgesv
 
 from proofroll.engines.projection.geometry import Geometry, Local
 from proofroll.engines.projection.orientation import Orientation
+from proofroll.engines.projection.uniform import closed_form
 from proofroll.scene import RollingBall
 from proofroll.surfaces import FloatArray
 
@@ -82,6 +83,7 @@ class ProjectedBall:
         self._geometry = geometry
         self._orientation = orientation
         self._coordinates = 2 + orientation.size
+        self._closed = closed_form(body, geometry, orientation)
 
     def kinematics(self, x: FloatArray) -> Kinematics:
         """The explicit form of the holonomic constraint at the state x."""
@@ -138,6 +140,13 @@ class ProjectedBall:
         solution = self._solve(kin, kin.D.T @ force - self.bias(kin), -self.slip_drift(kin))
         return Response(solution[:5], N, solution[5:])
 
+    def response_at(self, x: FloatArray) -> Response:
+        """What :meth:`response` gives at the state x, where the equations are written out by those."""
+        if self._closed is None:
+            return self.response(self.kinematics(x))
+        solution, N = self._closed.solve(x)
+        return Response(solution[:5], N, solution[5:])
+
     def slip_drift(self, kin: Kinematics) -> FloatArray:
         """Ċ_nh s = -ξ [m/s²]: rate of the slip of the active rows when ṡ = 0.
 
@@ -154,7 +163,10 @@ class ProjectedBall:
 
     def rates(self, x: FloatArray) -> FloatArray:
         """ẋ: the angles, if there are any, change at the rates s."""
-        return self.derivative(x, self.response(self.kinematics(x)))
+        if self._closed is None:
+            return self.derivative(x, self.response(self.kinematics(x)))
+        n = self._coordinates
+        return np.concatenate([x[n : 2 * n], self._closed.solve(x)[0][:5]])
 
     def derivative(self, x: FloatArray, response: Response) -> FloatArray:
         """ẋ with the accelerations of ``response``."""
@@ -164,7 +176,7 @@ class ProjectedBall:
     def with_rows(self, rows: FloatArray) -> ProjectedBall:
         """The same ball with other active rows of the non-holonomic constraints."""
         other = copy.copy(self)
-        other.rows = rows
+        other.rows, other._closed = rows, None
         return other
 
     def slip(self, x: FloatArray) -> FloatArray:
@@ -181,6 +193,8 @@ class ProjectedBall:
             x: the state.
             slip: what C v shall be instead of zero [m/s], one per active row.
         """
+        if self._closed is not None and slip is None:
+            return self._closed.eliminated(x)
         kin = self.kinematics(x)
         violation = self.rows @ kin.v if slip is None else self.rows @ kin.v - slip
         result = x.copy()

@@ -48,13 +48,13 @@ class Stick(_Held):
 
     def survey(self, y: FloatArray) -> Survey:
         """See :class:`Mode`. With rolling resistance steps shorten towards the place where the centre stands still."""
-        kin = self._ball.kinematics(y)
-        response = self._ball.response(kin)
+        response = self._ball.response_at(y)
         reserve, span = self._friction.reserve(response), DIFFERENCE * self._pace.time
-        ahead = self._ball.kinematics(y + span * self._ball.derivative(y, response))
-        trend = (self._friction.reserve(self._ball.response(ahead)) - reserve) / span
+        ahead = self._ball.response_at(y + span * self._ball.derivative(y, response))
+        trend = (self._friction.reserve(ahead) - reserve) / span
         if not self.halts:
             return Survey((reserve,), trend)
+        kin = self._ball.kinematics(y)
         speed, acceleration = self.speed(y), kin.D @ response.acceleration + kin.drift
         slowing = float(kin.v[1:3] @ acceleration[1:3]) / speed if speed else 0.0
         longest = self._pace.reach * time_left(speed, slowing)

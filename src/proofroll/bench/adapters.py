@@ -1,0 +1,214 @@
+"""What an adapter costs: its ``advance`` against a bare loop, in turns in one process, over the same time grid."""
+
+from __future__ import annotations
+
+import dataclasses
+import gc
+import time
+from collections.abc import Callable, Mapping, Sequence
+from typing import Any
+
+import numpy as np
+
+from proofroll.errors import ProofrollError
+from proofroll.timing import Interval, Timing, interleaved, ratio
+
+SCENE = "sphere_in_cylinder"
+# The study's usual sampling interval, and the longest run [s].
+EVERY, UNTIL = 0.02, 2.0
+# A measurement is repeated within a round until it has lasted this long [s], so that a ratio means something.
+LEAST_SECONDS = 0.1
+ROUNDS = 7
+# The goal for a ratio.
+GOAL = 1.15
+# What is measured: the paper's motion without and with rolling resistance, with friction that holds, and that slips.
+VARIANTS: Mapping[str, Mapping[str, float]] = {
+    "f = 0": {},
+    "f > 0": {"rolling_resistance": 5e-4},
+    "bounded, holds": {"mu_static": 0.35},
+    "bounded, slips": {"mu_static": 0.15},
+}
+_LIMIT = 300.0
+
+
+@dataclasses.dataclass(frozen=True)
+class Row:
+    """One engine with one model.
+
+    Attributes:
+        engine, formulation, preset, variant: what was run.
+        ratio: adapter over bare loop, with its interval; None if there is none.
+        message: why there is none, else how far apart the two ended.
+        adapter, bare: median seconds of the process per simulated second, if measured.
+        distance: between the ball's centres at the end [m].
+        tolerance, because: what it may be [m], and why it is not zero.
+        until: simulated seconds of one run [s].
+        within_goal: whether the ratio is at most :data:`GOAL`.
+    """
+
+    engine: str
+    formulation: str
+    preset: str
+    variant: str
+    ratio: Interval | None
+    message: str
+    adapter: float | None = None
+    bare: float | None = None
+    distance: float | None = None
+    tolerance: float | None = None
+    because: str | None = None
+    until: float | None = None
+
+    @property
+    def within_goal(self) -> bool | None:
+        """Whether the ratio is at most the goal; None if there is none."""
+        return None if self.ratio is None else self.ratio.value <= GOAL
+
+
+def measure_adapter(
+    engine: str, options: Mapping[str, Any], parameters: Mapping[str, float], rounds: int, seconds: float
+) -> dict[str, Any]:
+    """Runs in a worker: centres of both loops, and their timings per simulated second, in turns.
+
+    Raises:
+        Refused, Diverged: one of the two cannot be run.
+    """
+    from proofroll.bench.loops import load_bare_loop
+    from proofroll.registry import load_engine, resolve_settings
+    from proofroll.scene_file import load_scene
+
+    prepare = load_bare_loop(engine)
+    kind = load_engine(engine)
+    settings, scene = resolve_settings(kind, options), load_scene(SCENE, **parameters)
+    # Both loops compute without a pause in this process, so its own time is what they take, whoever else computes here.
+    clock = time.process_time
+
+    def adapter(times: np.ndarray[Any, Any]) -> tuple[float, Any]:
+        built = kind.build(scene, settings)
+        instants = times[1:].tolist()
+        gc.collect()
+        start = clock()
+        for t in instants:
+            built.advance(t)
+        return clock() - start, built
+
+    def bare(times: np.ndarray[Any, Any]) -> tuple[float, Any]:
+        prepared = prepare(scene, settings)
+        gc.collect()
+        start = clock()
+        centre = prepared.run(times)
+        return clock() - start, (centre, prepared)
+
+    # As long as the two together take several times the least, but no longer than the usual study.
+    first = _grid(10 * EVERY)
+    probe = (adapter(first)[0] + bare(first)[0]) / first[-1]
+    times = _grid(min(UNTIL, max(2 * seconds / probe, 10 * EVERY)))
+    p_adapter = adapter(times)[1].sample().p_WB
+    p_bare, prepared = bare(times)[1]
+
+    def repeated(once: Callable[[Any], tuple[float, Any]]) -> float:
+        spent, runs = 0.0, 0
+        while spent < seconds:
+            spent, runs = spent + once(times)[0], runs + 1
+        return float(spent / runs / times[-1])
+
+    distance = float(np.linalg.norm(np.asarray(p_adapter) - p_bare))
+    answer = {
+        "distance": distance,
+        "tolerance": prepared.tolerance,
+        "because": prepared.because,
+        "until": float(times[-1]),
+    }
+    if not distance <= prepared.tolerance:
+        return answer
+    timings = interleaved({"adapter": lambda: repeated(adapter), "bare": lambda: repeated(bare)}, rounds)
+    return answer | {name: list(timing.values) for name, timing in timings.items()}
+
+
+def _grid(until: float) -> np.ndarray[Any, Any]:
+    return np.arange(round(until / EVERY) + 1) * EVERY
+
+
+def bench_adapters(
+    engines: Sequence[str],
+    preset: str = "matched",
+    rounds: int = ROUNDS,
+    seconds: float = LEAST_SECONDS,
+    progress: Callable[[str], None] | None = None,
+) -> list[Row]:
+    """All formulations of some engines, each with every variant, one worker process per engine."""
+    from proofroll.runner import Worker, WorkerDied
+
+    rows: list[Row] = []
+    for engine in engines:
+        worker = Worker()
+        try:
+            try:
+                formulations = [
+                    (name, preset if preset in presets else next(iter(presets)))
+                    for name, presets in worker.request({"do": "describe", "engine": engine}, _LIMIT)["presets"].items()
+                ]
+            except ProofrollError as error:
+                rows.append(Row(engine, "", preset, "", None, str(error)))
+                continue
+            for formulation, found in formulations:
+                for variant, parameters in VARIANTS.items():
+                    if progress:
+                        progress(f"{engine} {formulation} {variant}")
+                    request = {
+                        "do": "bench",
+                        "engine": engine,
+                        "options": {"formulation": formulation, "preset": found},
+                        "parameters": dict(parameters),
+                        "rounds": rounds,
+                        "seconds": seconds,
+                    }
+                    try:
+                        row = _row(worker.request(request, _LIMIT))
+                    except WorkerDied as error:
+                        row = {"ratio": None, "message": str(error)}
+                        worker.close()
+                        worker = Worker()
+                    except ProofrollError as error:
+                        row = {"ratio": None, "message": str(error)}
+                    rows.append(Row(engine, formulation, found, variant, **row))
+        finally:
+            worker.close()
+    return rows
+
+
+def _row(answer: dict[str, Any]) -> dict[str, Any]:
+    if "message" in answer:
+        return {"ratio": None, "message": answer["message"]}
+    facts = {key: answer[key] for key in ("distance", "tolerance", "because", "until")}
+    if "adapter" not in answer:
+        apart = (
+            f"the two end {answer['distance']:.2g} m apart, more than {answer['tolerance']:.2g} m: not the same model"
+        )
+        return facts | {"ratio": None, "message": apart}
+    adapter, bare = (Timing(tuple(answer[name])) for name in ("adapter", "bare"))
+    return facts | {
+        "ratio": ratio(adapter, bare),
+        "message": f"same centre to {answer['distance']:.1g} m",
+        "adapter": adapter.interval.value,
+        "bare": bare.interval.value,
+    }
+
+
+def content(rows: Sequence[Row]) -> dict[str, Any]:
+    """The rows as plain data: per engine the worst ratio, and all of its rows."""
+    from proofroll.timing import machine
+
+    engines: dict[str, Any] = {}
+    for name in dict.fromkeys(row.engine for row in rows):
+        own = [row for row in rows if row.engine == name]
+        measured = [row for row in own if row.ratio is not None]
+        worst = max(measured, key=lambda row: row.ratio.value if row.ratio else 0.0, default=None)
+        engines[name] = {
+            "ratio": dataclasses.asdict(worst.ratio) if worst and worst.ratio else None,
+            "worst": f"{worst.formulation}, {worst.variant}" if worst else None,
+            "within_goal": all(row.within_goal for row in measured) if measured else None,
+            "message": None if measured else own[0].message,
+            "rows": [dataclasses.asdict(row) | {"within_goal": row.within_goal} for row in own],
+        }
+    return {"goal": GOAL, "scene": SCENE, "every": EVERY, "machine": machine(), "engines": engines}

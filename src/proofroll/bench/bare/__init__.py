@@ -1,0 +1,47 @@
+"""Bare loops: what a careful user of one engine would write for a scene without proofroll, to measure adapters by.
+
+A bare loop is announced as an entry point of the group ``proofroll.bare_loops``, under the name of its engine. It is a
+function of a scene and of the engine's settings that prepares a run, untimed, and gives a :class:`Bare`. It may know
+the scene (these here know the vertical cylinder), steps with the same method and step as the adapter, passes the same
+times, and at each of them has what ``sample`` would tell at hand. It raises Refused for what it is not written for.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+
+from proofroll.errors import Refused
+from proofroll.scene import RollingBall, Scene
+from proofroll.surfaces import Cylinder, FloatArray
+
+GROUP = "proofroll.bare_loops"
+
+
+@dataclass(frozen=True)
+class Bare:
+    """A run that is ready to start.
+
+    Attributes:
+        run: goes from time 0 over these times [s], the first of which is 0, to the last; gives the ball's centre there
+            [m], shape (3,). Called once, and timed.
+        tolerance: largest distance [m] from the adapter's centre that the two loops explain.
+        because: why it is not zero.
+    """
+
+    run: Callable[[FloatArray], FloatArray]
+    tolerance: float
+    because: str
+
+
+def in_vertical_cylinder(scene: Scene) -> RollingBall:
+    """The scene's ball, for a loop that is written for a vertical cylinder and a start at γ = 0, z = 0.
+
+    Raises:
+        Refused: the scene is another one.
+    """
+    body = scene.rolling
+    vertical = isinstance(body.surface, Cylinder) and body.surface.tilt == 0 and not body.gravity[:2].any()
+    if not vertical or body.u0.any():
+        raise Refused("the bare loop is written for a vertical cylinder and a start at its zero of angle and height")
+    return body

@@ -1,0 +1,198 @@
+"""MuJoCo without the adapter: ``mj_step`` and the callbacks that the model needs.
+
+The compiled model and the settled start come from the adapter's builder, which reads and writes the scene's MJCF file:
+a user would write the same file and set the same depth once. Nothing of the adapter runs in the loops.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable
+from typing import Any
+
+import mujoco
+import numpy as np
+
+from proofroll.bench.bare import Bare, in_vertical_cylinder
+from proofroll.engines.mujoco import Mujoco
+from proofroll.errors import Diverged, Refused
+from proofroll.scene import RollingBall, Scene
+from proofroll.surfaces import FloatArray
+
+_ON_CONE = 1 - 1e-9
+_FATAL = (mujoco.mjtWarning.mjWARN_BADQPOS, mujoco.mjtWarning.mjWARN_BADQVEL, mujoco.mjtWarning.mjWARN_BADQACC)
+
+
+def prepare(scene: Scene, settings: Any) -> Bare:
+    """See :mod:`proofroll.bench.bare`; all formulations without edits of the contact's reference acceleration."""
+    body = in_vertical_cylinder(scene)
+    if settings.curvature or settings.cone_correction:
+        raise Refused("there is no bare loop with edits of the contact's reference acceleration")
+    if math.isfinite(body.contact.mu_static) and body.contact.mu_static != body.contact.mu_kinetic:
+        raise Refused("there is no bare loop that switches between static and kinetic friction")
+    model, data = Mujoco.build(scene, settings).native
+    loop = {"chart": _chart, "free": _free, "facets": _facets}[settings.formulation]
+    run = loop(model, data, body, settings)
+    if settings.formulation == "facets":
+        return Bare(run, 1e-5, "the geometry is rounded otherwise, and each kick of an edge magnifies that")
+    return Bare(run, 1e-9, "the geometry is rounded otherwise, which a stiff contact magnifies")
+
+
+def _step(model: Any, data: Any, body: RollingBall, settings: Any) -> Callable[[], None]:
+    """One step; where friction is bounded, with a look whether the contact slips before RK4's stages replace forces."""
+    if math.isinf(body.contact.mu_static):
+        return lambda: mujoco.mj_step(model, data)
+    wrench, mu, events, sticks = np.zeros(6), body.contact.mu_static, [], True
+    pyramidal = settings.cone == "pyramidal"
+
+    def step() -> None:
+        nonlocal sticks
+        mujoco.mj_forward(model, data)
+        if data.ncon:
+            mujoco.mj_contactForce(model, data, 0, wrench)
+            N, F1, F2 = wrench[:3].tolist()
+            friction = abs(F1) + abs(F2) if pyramidal else math.hypot(F1, F2)
+            if N > 0 and (friction < _ON_CONE * mu * N) != sticks:
+                sticks = not sticks
+                events.append((data.time, sticks))
+        if settings.integrator == "RK4":
+            mujoco.mj_RungeKutta(model, data, 4)
+        else:
+            mujoco.mj_Euler(model, data)
+
+    return step
+
+
+def _counted(times: FloatArray, dt: float) -> list[int]:
+    return [round(interval / dt) for interval in np.diff(times).tolist()]
+
+
+def _check(data: Any) -> None:
+    for kind in _FATAL:
+        if data.warning[kind].number:
+            raise Diverged("MuJoCo's state is not finite or huge")
+
+
+class _Resistance:
+    """Torque f N e1 × v/V with the normal force extrapolated from the last two evaluations at other times."""
+
+    def __init__(self, f: float, torque: FloatArray) -> None:
+        self.f, self.torque = f, torque
+        self.last, self.before, self.N_before, self.slope = 0.0, 0.0, 0.0, 0.0
+
+    def start(self, memory: Any) -> None:
+        """As the evaluations at time 0 left it."""
+        self.last, self.before, self.N_before, self.slope = memory[:4].tolist()
+
+    def apply(self, t: float, N: float, e1: tuple[float, float], v: list[float]) -> None:
+        """Sets the torque for the time t [s] from the normal force of the evaluation before [N]."""
+        if self.last > self.before:
+            self.slope = (N - self.N_before) / (self.last - self.before)
+        ahead = N + self.slope * (t - self.last)
+        self.before, self.N_before, self.last = self.last, N, t
+        e1x, e1y = e1
+        vx, vy, vz = v
+        scale = -self.f * max(ahead, 0.0) / (math.sqrt(vx * vx + vy * vy + vz * vz) or 1.0)
+        self.torque[0], self.torque[1], self.torque[2] = (
+            -scale * vz * e1y,
+            scale * vz * e1x,
+            scale * (vx * e1y - vy * e1x),
+        )
+
+
+def _chart(model: Any, data: Any, body: RollingBall, settings: Any) -> Callable[[FloatArray], FloatArray]:
+    ball, wall, touch = model.body("ball").id, model.geom("wall").id, model.site("touch").id
+    depth = int(model.joint("normal").dofadr[0])
+    # Views of MjData's memory, taken once.
+    wall_p, wall_R = data.geom_xpos[wall], data.geom_xmat[wall]
+    touch_p, touch_R = data.site_xpos[touch], data.site_xmat[touch]
+    reaction, velocity = data.qfrc_constraint, data.cvel[ball, 3:]
+
+    def follow(model: Any, data: Any, geom1: int, geom2: int) -> int:  # noqa: ARG001 -- MuJoCo's signature
+        wall_p[:] = touch_p
+        wall_R[:] = touch_R
+        return 0
+
+    f = body.contact.rolling_resistance
+    resistance = _Resistance(f, data.xfrc_applied[ball, 3:])
+
+    def resist(model: Any, data: Any) -> None:  # noqa: ARG001 -- MuJoCo's signature
+        e1 = -float(touch_R[2]), -float(touch_R[5])
+        resistance.apply(data.time, -float(reaction[depth]), e1, velocity.tolist())
+
+    step = _step(model, data, body, settings)
+    bounded = math.isfinite(body.contact.mu_static)
+
+    def run(times: FloatArray) -> FloatArray:
+        if f:
+            resistance.start(data.userdata)
+        mujoco.set_mjcb_contactfilter(follow)
+        mujoco.set_mjcb_passive(resist if f else None)
+        try:
+            for steps in _counted(times, settings.dt):
+                if bounded:
+                    for _ in range(steps):
+                        step()
+                else:
+                    mujoco.mj_step(model, data, nstep=steps)
+                _check(data)
+        finally:
+            mujoco.set_mjcb_contactfilter(None)
+            mujoco.set_mjcb_passive(None)
+        mujoco.mj_kinematics(model, data)
+        return np.array(data.xpos[ball])
+
+    return run
+
+
+def _free(model: Any, data: Any, body: RollingBall, settings: Any) -> Callable[[FloatArray], FloatArray]:
+    ball, wall = model.body("ball").id, model.geom("wall").id
+    b, f = body.surface.length_scales[0] + body.ball.radius, body.contact.rolling_resistance
+    qpos, qvel, reaction = data.qpos, data.qvel, data.qfrc_constraint
+    plane, quaternion, facing, last = data.mocap_pos[0], data.mocap_quat[0], np.zeros(3), data.geom_xmat[wall]
+    resistance = _Resistance(f, data.xfrc_applied[ball, 3:])
+    step = _step(model, data, body, settings)
+
+    def run(times: FloatArray) -> FloatArray:
+        if f:
+            resistance.start(data.userdata)
+        for steps in _counted(times, settings.dt):
+            for _ in range(steps):
+                x, y, z = qpos[:3].tolist()
+                r = math.sqrt(x * x + y * y)
+                ex, ey = x / r, y / r
+                plane[0], plane[1], plane[2] = b * ex, b * ey, z
+                facing[0], facing[1] = -ex, -ey
+                mujoco.mju_quatZ2Vec(quaternion, facing)
+                if f:
+                    N = float(reaction[:3].dot(last[2::3]))  # along the plane of the step before
+                    resistance.apply(data.time, N, (ex, ey), qvel[:3].tolist())
+                step()
+            _check(data)
+        return np.array(qpos[:3])
+
+    return run
+
+
+def _facets(model: Any, data: Any, body: RollingBall, settings: Any) -> Callable[[FloatArray], FloatArray]:
+    ball, f = model.body("ball").id, body.contact.rolling_resistance
+    qpos, qvel, reaction, torque = data.qpos, data.qvel, data.qfrc_constraint, data.xfrc_applied[ball, 3:]
+
+    def run(times: FloatArray) -> FloatArray:
+        for steps in _counted(times, settings.dt):
+            if not f:
+                mujoco.mj_step(model, data, nstep=steps)
+            else:
+                for _ in range(steps):
+                    x, y = qpos[:2].tolist()
+                    r = math.sqrt(x * x + y * y)
+                    ex, ey = x / r, y / r
+                    vx, vy, vz = qvel[:3].tolist()
+                    Nx, Ny = reaction[:2].tolist()
+                    scale = f * (Nx * ex + Ny * ey) / (math.sqrt(vx * vx + vy * vy + vz * vz) or 1.0)
+                    torque[0], torque[1], torque[2] = -scale * vz * ey, scale * vz * ex, scale * (vx * ey - vy * ex)
+                    mujoco.mj_step(model, data)
+            _check(data)
+        return np.array(qpos[:3])
+
+    return run

@@ -1,0 +1,323 @@
+"""Pinocchio without the adapter: its kinematics, dynamics and contact solver, with the cylinder's directions by hand.
+
+The models are built here. Rows with rolling run under scipy's DOP853, as the adapter's preset ``matched`` does.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable
+from typing import Any
+
+import numpy as np
+import pinocchio as pin
+from scipy.integrate import DOP853
+
+from proofroll.bench.bare import Bare, in_vertical_cylinder
+from proofroll.errors import Diverged, Refused
+from proofroll.scene import RollingBall, Scene
+from proofroll.surfaces import FloatArray
+
+_WORLD = pin.LOCAL_WORLD_ALIGNED
+# What the adapter gives Pinocchio's cone where friction is unbounded.
+_UNBOUNDED = 1e6
+
+
+def prepare(scene: Scene, settings: Any) -> Bare:
+    """See :mod:`proofroll.bench.bare`; with bounded friction the rows watch for slip, and end there."""
+    body = in_vertical_cylinder(scene)
+    if settings.formulation == "contact":
+        if settings.solver != "pgs":
+            raise Refused("there is no bare loop with the ADMM solver")
+        return Bare(_contact(body, settings), 1e-9, "the geometry is rounded otherwise, and the solver stops at 1e-12")
+    if settings.integrator != "dop853" or not settings.orientation or not settings.projection:
+        raise Refused("there is a bare loop only with dop853, orientation and projection")
+    rows = (_Composite if settings.formulation == "composite" else _FreeFlyer)(body)
+    return Bare(
+        _rows_run(rows, body, settings),
+        1e-9,
+        "the solver restarts at every sample in the adapter only, so the steps differ within their tolerance",
+    )
+
+
+def _ball(body: RollingBall) -> Any:
+    return pin.Inertia(body.ball.mass, np.zeros(3), body.ball.inertia * np.eye(3))
+
+
+class _Composite:
+    """Revolute and prismatic joint of a massless carriage, and a spherical joint in it: two rows of rolling."""
+
+    def __init__(self, body: RollingBall) -> None:
+        self.c, self.a = body.surface.length_scales[0], body.ball.radius
+        self.f, self.m = body.contact.rolling_resistance, body.ball.mass
+        self.model = pin.Model()
+        self.model.gravity.linear = body.gravity
+        turn = self.model.addJoint(0, pin.JointModelRZ(), pin.SE3.Identity(), "gamma")
+        rise = self.model.addJoint(turn, pin.JointModelPZ(), pin.SE3.Identity(), "z")
+        centre = pin.SE3(np.eye(3), np.array([self.c, 0.0, 0.0]))
+        self.ball = self.model.addJoint(rise, pin.JointModelSpherical(), centre, "ball")
+        self.model.appendBodyToJoint(self.ball, _ball(body), pin.SE3.Identity())
+        self.data = self.model.createData()
+        self.rest = np.zeros(5)
+        self.directions = np.zeros((2, 6))
+        self.directions[0, 5], self.directions[1, 2] = self.a, 1.0
+        self.q = np.array([0.0, 0.0, 0.0, 0.0, 0.0, 1.0])
+        self.v = np.array([*body.udot0, *(body.w0 - [0.0, 0.0, body.udot0[0]])])
+        a, speed = self.a, float(np.linalg.norm(body.v0))
+        self.sizes = np.array([a / self.c, a, 1, 1, 1, 1, speed / self.c, speed, *[speed / a] * 3])
+
+    def rows(self, q: FloatArray, v: FloatArray) -> tuple[FloatArray, FloatArray, FloatArray]:
+        """Rows, their drift, and the ball's Jacobian."""
+        model, data, D = self.model, self.data, self.directions
+        pin.forwardKinematics(model, data, q, v, self.rest)
+        pin.computeAllTerms(model, data, q, v)
+        jacobian = pin.getJointJacobian(model, data, self.ball, _WORLD)
+        sin, cos = math.sin(q[0]), math.cos(q[0])
+        D[0, 0], D[0, 1], D[1, 3], D[1, 4] = -sin, cos, self.a * sin, -self.a * cos
+        drift = D.dot(pin.getClassicalAcceleration(model, data, self.ball, _WORLD).vector)
+        w = pin.getVelocity(model, data, self.ball, _WORLD).angular
+        drift[1] += self.a * v[0] * (w[0] * cos + w[1] * sin)
+        return D.dot(jacobian), drift, jacobian
+
+    def respond(self, q: FloatArray, v: FloatArray) -> FloatArray:
+        """Joint acceleration; multipliers in ``data.lambda_c``."""
+        rows, drift, jacobian = self.rows(q, v)
+        torque = self.rest
+        if self.f:
+            turn, rise = float(v[0]), float(v[1])
+            scale = self.f * self.m * self.c * turn * turn / math.hypot(self.c * turn, rise)
+            # M2 e2 + M3 e3 with e2 = (-sin γ, cos γ, 0)
+            moment = np.array([scale * rise * math.sin(q[0]), -scale * rise * math.cos(q[0]), scale * self.c * turn])
+            torque = jacobian[3:].T.dot(moment)
+        return np.array(pin.forwardDynamics(self.model, self.data, torque, rows, drift))
+
+    def project(self, q: FloatArray, v: FloatArray) -> tuple[FloatArray, FloatArray]:
+        """The velocities without slip."""
+        return q, np.array(pin.impulseDynamics(self.model, self.data, v, self.rows(q, v)[0]))
+
+    def contact(self, v: FloatArray) -> tuple[float, float]:
+        """Needed friction and normal force of the last response [N]."""
+        return math.hypot(*self.data.lambda_c.tolist()), self.m * self.c * float(v[0]) ** 2
+
+    def centre(self, q: FloatArray) -> FloatArray:
+        """Of the ball [m]."""
+        return np.array([self.c * math.cos(q[0]), self.c * math.sin(q[0]), q[1]])
+
+
+class _FreeFlyer:
+    """Six freedoms and three rows, that of the wall first."""
+
+    def __init__(self, body: RollingBall) -> None:
+        self.c, self.a, self.f = body.surface.length_scales[0], body.ball.radius, body.contact.rolling_resistance
+        self.model = pin.Model()
+        self.model.gravity.linear = body.gravity
+        self.ball = self.model.addJoint(0, pin.JointModelFreeFlyer(), pin.SE3.Identity(), "ball")
+        self.model.appendBodyToJoint(self.ball, _ball(body), pin.SE3.Identity())
+        self.data = self.model.createData()
+        self.rest = np.zeros(6)
+        self.directions = np.zeros((3, 6))
+        self.directions[1, 5], self.directions[2, 2] = self.a, 1.0
+        self.matrix = np.zeros((9, 9))
+        self.q = np.array([*body.p0, 0.0, 0.0, 0.0, 1.0])
+        self.v = np.concatenate([body.v0, body.w0])
+        a, speed = self.a, float(np.linalg.norm(body.v0))
+        self.sizes = np.array([a, a, a, 1, 1, 1, 1, *[speed] * 3, *[speed / a] * 3])
+        self.multipliers = np.zeros(3)
+
+    def rows(self, q: FloatArray, v: FloatArray) -> tuple[FloatArray, FloatArray, FloatArray]:
+        """Rows, their drift, and the moment of rolling resistance on the joint per newton of normal force."""
+        model, data, D, a = self.model, self.data, self.directions, self.a
+        pin.forwardKinematics(model, data, q, v, self.rest)
+        pin.computeAllTerms(model, data, q, v)
+        jacobian = pin.getJointJacobian(model, data, self.ball, _WORLD)
+        x, y = q[:2].tolist()
+        r = math.sqrt(x * x + y * y)
+        ex, ey = x / r, y / r
+        D[0, 0], D[0, 1] = ex, ey
+        D[1, 0], D[1, 1] = -ey, ex
+        D[2, 3], D[2, 4] = a * ey, -a * ex
+        velocity = pin.getVelocity(model, data, self.ball, _WORLD)
+        vx, vy, vz = velocity.linear.tolist()
+        wx, wy, _ = velocity.angular.tolist()
+        turning = (vy * ex - vx * ey) / r
+        drift = D.dot(pin.getClassicalAcceleration(model, data, self.ball, _WORLD).vector)
+        drift[0] += turning * turning * r
+        drift[2] += a * turning * (wx * ex + wy * ey)
+        if not self.f:
+            return D.dot(jacobian), drift, self.rest
+        scale = self.f / math.sqrt(vx * vx + vy * vy + vz * vz)
+        # e1 × v
+        moment = np.array([scale * ey * vz, -scale * ex * vz, scale * (ex * vy - ey * vx)])
+        return D.dot(jacobian), drift, jacobian[3:].T.dot(moment)
+
+    def respond(self, q: FloatArray, v: FloatArray) -> FloatArray:
+        """Joint acceleration; the multipliers (-N, F2, F3) are kept."""
+        rows, drift, moment = self.rows(q, v)
+        if not self.f:
+            acceleration = pin.forwardDynamics(self.model, self.data, self.rest, rows, drift)
+            self.multipliers = self.data.lambda_c
+            return np.array(acceleration)
+        matrix = self.matrix
+        matrix[:6, :6], matrix[6:, :6], matrix[:6, 6:] = self.data.M, rows, -rows.T
+        matrix[:6, 6] += moment
+        solution = np.linalg.solve(matrix, np.concatenate([-self.data.nle, -drift]))
+        self.multipliers = solution[6:]
+        return solution[:6]
+
+    def project(self, q: FloatArray, v: FloatArray) -> tuple[FloatArray, FloatArray]:
+        """The centre put back on the wall, and the velocities without slip."""
+        q = q.copy()
+        x, y = q[:2].tolist()
+        q[:2] *= self.c / math.sqrt(x * x + y * y)
+        return q, np.array(pin.impulseDynamics(self.model, self.data, v, self.rows(q, v)[0]))
+
+    def contact(self, v: FloatArray) -> tuple[float, float]:  # noqa: ARG002 -- the other mechanism's signature
+        """Needed friction and normal force of the last response [N]."""
+        minus_N, F2, F3 = self.multipliers.tolist()
+        return math.hypot(F2, F3), -minus_N
+
+    def centre(self, q: FloatArray) -> FloatArray:
+        """Of the ball [m]."""
+        return np.array(q[:3])
+
+
+def _rows_run(
+    mechanism: _Composite | _FreeFlyer, body: RollingBall, settings: Any
+) -> Callable[[FloatArray], FloatArray]:
+    model, nq, mu = mechanism.model, mechanism.model.nq, body.contact.mu_static
+
+    def rates(_: float, y: FloatArray) -> FloatArray:
+        q, v = pin.normalize(model, y[:nq]), y[nq:]
+        return np.concatenate([pin.tangentMap(model, q).dot(v), mechanism.respond(q, v)])
+
+    def run(times: FloatArray) -> FloatArray:
+        start = np.concatenate([mechanism.q, mechanism.v])
+        # A hundredth of the natural sizes, for components in turning axes pass through zero all the time.
+        atol = 1e-2 * settings.rtol * mechanism.sizes
+        solver = DOP853(rates, 0.0, start, np.inf, rtol=settings.rtol, atol=atol)
+        for t in times[1:].tolist():
+            solver.t_bound, solver.status = t, "running"
+            while solver.status == "running":
+                wanted = solver.h_abs
+                if solver.step() is not None:
+                    raise Diverged("the step size fell to nothing")
+                if solver.t == t:
+                    solver.h_abs = max(wanted, solver.h_abs)
+                q, v = mechanism.project(pin.normalize(model, solver.y[:nq]), solver.y[nq:])
+                solver.y = np.concatenate([q, v])
+                solver.f = rates(solver.t, solver.y)
+                friction, press = mechanism.contact(v)
+                if press < 0 or friction > mu * press:
+                    raise Diverged(f"the ball slips or leaves the wall at {t:g} s, for which there is no bare loop")
+        return mechanism.centre(solver.y)
+
+    return run
+
+
+class _PlaneContact:
+    """Translation and spherical joint, a plane that is posed anew, and Pinocchio's solver of contact with friction."""
+
+    def __init__(self, body: RollingBall, settings: Any) -> None:
+        model = self.model = pin.Model()
+        model.gravity.linear = body.gravity
+        carriage = model.addJoint(0, pin.JointModelTranslation(), pin.SE3.Identity(), "centre")
+        self.ball = model.addJoint(carriage, pin.JointModelSpherical(), pin.SE3.Identity(), "ball")
+        model.appendBodyToJoint(self.ball, _ball(body), pin.SE3.Identity())
+        self.data = model.createData()
+        point = pin.PointContactConstraintModel(model, 0, pin.SE3.Identity(), self.ball, pin.SE3.Identity())
+        self.models, self.datas = pin.StdVec_ConstraintModel(), pin.StdVec_ConstraintData()
+        self.models.append(pin.ConstraintModel(point))
+        self.datas.append(self.models[0].createData())
+        self.point, self.point_data = self.models[0].extract(), self.datas[0].extract()
+        self.solver, self.options, self.result = (
+            pin.PGSConstraintSolver(3),
+            pin.PGSSolverSettings(),
+            pin.PGSSolverResult(),
+        )
+        for name in ("feasibility", "complementarity"):
+            for bound in ("absolute", "relative"):
+                setattr(self.options, f"{bound}_{name}_tol", settings.solver_tolerance)
+        self.q, self.v = np.array([*body.p0, 0.0, 0.0, 0.0, 1.0]), np.concatenate([body.v0, body.w0])
+        # The masses of a ball are the same in every configuration, and off the diagonal there is nothing.
+        self.inverse = np.array(pin.computeMinverse(model, self.data, self.q))
+
+    def solve(self, delassus: Any, free: FloatArray, mu: float) -> tuple[FloatArray, bool]:
+        """Impulse [N s], and whether it is inside the cone."""
+        self.point.setFriction(mu)
+        self.result.reset()
+        if not self.solver.solve(delassus, free, self.models, self.datas, self.options, self.result):
+            raise Diverged("Pinocchio's solver did not converge")
+        impulse = np.array(self.result.retrieveConstraintImpulses())
+        F1, F2, N = impulse.tolist()
+        if N <= 0:
+            raise Diverged("the ball leaves the wall, for which there is no bare loop")
+        return impulse, math.hypot(F1, F2) < mu * N * (1 - 1e-9)
+
+
+def _contact(body: RollingBall, settings: Any) -> Callable[[FloatArray], FloatArray]:  # noqa: PLR0915 -- one loop, as a user writes it down
+    """Velocity-level steps, each with the plane tangent to the cylinder at the ball."""
+    a, c, dt, f = body.ball.radius, body.surface.length_scales[0], settings.dt, body.contact.rolling_resistance
+    leapfrog, bounded = settings.integrator == "leapfrog", math.isfinite(body.contact.mu_static)
+    mu_s = body.contact.mu_static if bounded else _UNBOUNDED
+    mu_k = body.contact.mu_kinetic if bounded else _UNBOUNDED
+    known = _PlaneContact(body, settings)
+    model, data, ball, solve, inverse = known.model, known.data, known.ball, known.solve, known.inverse
+    point, point_data = known.point, known.point_data
+    axes, torque, shift = np.zeros((3, 3)), np.zeros(6), np.zeros(3)
+    axes[2, 1] = -1.0
+    events: list[tuple[float, bool]] = []
+
+    def run(times: FloatArray) -> FloatArray:
+        q, v, span, sticks, normal_force = known.q, known.v, 0.5 * dt if leapfrog else dt, True, 0.0
+        count = round(float(times[-1]) / dt)
+        for number in range(count):
+            pin.computeAllTerms(model, data, q, v)
+            turned, velocity = data.oMi[ball].rotation, pin.getVelocity(model, data, ball, _WORLD)
+            x, y, z = q[:3].tolist()
+            r = math.sqrt(x * x + y * y)
+            ex, ey = x / r, y / r
+            axes[0, 0], axes[1, 0], axes[0, 2], axes[1, 2] = -ey, ex, -ex, -ey
+            arm = np.array([a * ex, a * ey, 0.0])
+            point.joint1_placement = pin.SE3(axes, np.array([x + a * ex, y + a * ey, z]))
+            point.joint2_placement = pin.SE3(turned.T.dot(axes), turned.T.dot(arm))
+            point.calc(model, data, point_data)
+            jacobian = point.jacobian(model, data, point_data)
+            to_joints = inverse.dot(jacobian.T)
+            delassus = pin.DelassusOperatorDense(jacobian.dot(to_joints))
+            vx, vy, vz = velocity.linear.tolist()
+            shift[1], shift[2] = 0.0, (c - r) / dt
+            if leapfrog:
+                wx, wy, _ = velocity.angular.tolist()
+                turning = (vy * ex - vx * ey) / r
+                # Along -e3 the term a ω × ė1, along -e1 the bend of the path.
+                shift[1] = -0.5 * dt * a * turning * (wx * ex + wy * ey)
+                shift[2] -= 0.5 * dt * turning * turning * r
+            along = (vx, vy, vz)
+            for _ in range(10):
+                if f:
+                    ux, uy, uz = along
+                    scale = f * normal_force / math.sqrt(ux * ux + uy * uy + uz * uz)
+                    moment = np.array([scale * ey * uz, -scale * ex * uz, scale * (ex * uy - ey * ux)])
+                    torque[3:] = turned.T.dot(moment)
+                free = v + span * pin.aba(model, data, q, v, torque)
+                impulse, holds = solve(delassus, jacobian.dot(free) + shift, mu_s if sticks else mu_k)
+                if not holds and sticks and mu_k != mu_s:
+                    impulse, holds = solve(delassus, jacobian.dot(free) + shift, mu_k)
+                after = free + to_joints.dot(impulse)
+                found = float(impulse[2]) / span
+                if not f or abs(found - normal_force) <= 1e-13 * abs(found):
+                    break
+                normal_force = found
+                along = tuple((0.5 * (v + after)[:3]).tolist()) if leapfrog and number else (vx, vy, vz)
+            normal_force = found
+            if holds != sticks:
+                sticks = holds
+                events.append((number * dt, sticks))
+                if not bounded:
+                    raise Diverged("more friction is needed than the cone has")
+            v = after
+            q = pin.integrate(model, q, dt * v)
+            span = dt
+        return np.array(q[:3])
+
+    return run

@@ -1,0 +1,21 @@
+"""Bare loops are plug-ins, as engines are: entry points of their own group, under the engine's name."""
+
+from __future__ import annotations
+
+from importlib.metadata import entry_points
+from typing import Any
+
+from proofroll.bench.bare import GROUP
+from proofroll.errors import Refused
+
+
+def load_bare_loop(engine: str) -> Any:
+    """The function that prepares bare loops of an engine; see :mod:`proofroll.bench.bare`.
+
+    Raises:
+        Refused: no installed package announces one.
+    """
+    for point in entry_points(group=GROUP):
+        if point.name == engine:
+            return point.load()
+    raise Refused(f"no bare loop is announced for {engine} (entry-point group {GROUP})")

@@ -1,0 +1,43 @@
+"""The drill as a whole."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from concurrent.futures import ThreadPoolExecutor
+from functools import partial
+
+from proofroll.drill import command_faults, engine_faults
+from proofroll.drill.row import Drilled
+from proofroll.drill.site import site
+
+# Faults wait rather than compute, so that two at once are no burden.
+_AT_ONCE = 2
+
+
+def fault_drill(progress: Callable[[str], None] | None = None) -> list[Drilled]:
+    """Makes every fault happen, each in a folder of its own, and says what it cost.
+
+    Args:
+        progress: called with the name of each fault when it is over.
+    """
+    with site() as here, ThreadPoolExecutor(_AT_ONCE) as pool:
+        first = pool.submit(command_faults.prepare, here)
+        sound = engine_faults.prepare(here)
+        compared = first.result()
+        # The longest first.
+        drills: list[Callable[[], Drilled]] = [
+            partial(command_faults.drill_interrupt, here, compared),
+            partial(command_faults.drill_full_disk, here, compared),
+            partial(command_faults.drill_two_runs, here, compared),
+            *(partial(engine_faults.drill_engine, here, sound, fault) for fault in engine_faults.ENGINE_FAULTS),
+            *(partial(engine_faults.drill_damage, here, sound, name) for name in engine_faults.DAMAGES),
+        ]
+
+        def run(drill: Callable[[], Drilled]) -> Drilled:
+            row = drill()
+            if progress:
+                progress(row.fault)
+            return row
+
+        rows = list(pool.map(run, drills))
+    return rows[3:] + rows[:3]

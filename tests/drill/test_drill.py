@@ -1,0 +1,150 @@
+"""The fault drill: once as a whole, as a person runs it; and that it notices what it is for."""
+
+from __future__ import annotations
+
+import io
+import json
+import os
+import subprocess
+import sys
+from collections.abc import Iterator
+from pathlib import Path
+
+import pytest
+
+from proofroll.case import Case, Result
+from proofroll.drill import engine_faults
+from proofroll.drill.engine_faults import ENGINE_FAULTS, drill_damage, drill_engine, prepare
+from proofroll.drill.row import Drilled, drilled
+from proofroll.drill.site import Site, site
+from proofroll.registry import engine_names
+from proofroll.report.terminal import drill_table
+from proofroll.store import Store
+
+# What must have happened in every drill.
+TRIED = {
+    "raises in build", "raises in built", "raises in advance", "raises in sample", "returns NaN",
+    "returns wrong shapes", "hangs", "allocates without end", "segfaults", "aborts", "exits by sys.exit",
+    "exits by os._exit", "writes half a result", "prints garbage", "floods its output", "writes into every file",
+    "reads standard input", "leaves a process behind", "truncated record", "tampered record", "truncated trajectory",
+    "tampered trajectory", "interrupt (Ctrl-C)", "full disk", "two runs in one folder",
+}  # fmt: skip
+
+
+@pytest.mark.slow
+@pytest.mark.timeout(900)  # 75 s of processor time, on a machine that may have much else to do
+def test_every_fault_is_contained() -> None:
+    """Each fault costs its own case alone and says so in a sentence; the next run makes only what is missing."""
+    command = [sys.executable, "-m", "proofroll", "drill", "faults", "--json"]
+    done = subprocess.run(command, capture_output=True, text=True, check=False)
+    found = json.loads(done.stdout)
+    rows = {row["fault"]: row for row in found["faults"]}
+    assert rows.keys() == TRIED
+    assert {name: row["problem"] for name, row in rows.items() if not row["contained"]} == {}
+    assert (done.returncode, done.stderr, found["tried"], found["contained"]) == (0, "", len(TRIED), len(TRIED))
+    for row in found["faults"]:
+        assert row["said"]
+        assert row["others_arrived"] == row["others"] > 0
+        assert row["kept"] == row["stored"] > 0
+        assert row["recomputed"] == row["missing"]
+    assert sum(row["recomputed"] for row in found["faults"]) >= 18
+    assert "drill" not in engine_names()
+
+
+@pytest.fixture(scope="module")
+def place() -> Iterator[tuple[Site, Path]]:
+    """A site, with results that are there before."""
+    with site() as here:
+        yield here, prepare(here)
+
+
+def test_a_damage_that_is_not_noticed(place: tuple[Site, Path], monkeypatch: pytest.MonkeyPatch) -> None:
+    """A store that believes whatever it finds does not pass."""
+
+    def believe(self: Store, case: Case) -> Result:
+        record = json.loads((self.folder / f"{case.key}.json").read_text())
+        return Result.from_dict(record["result"])
+
+    monkeypatch.setattr(Store, "get", believe)
+    row = drill_damage(*place, "tampered record")
+    assert not row.contained
+    assert "the next run made 0 results instead of 1" in row.problem
+
+
+def test_a_half_result_that_is_left(place: tuple[Site, Path], monkeypatch: pytest.MonkeyPatch) -> None:
+    """A store that leaves half a file behind does not pass, nor does a row that says something else."""
+    fault = next(fault for fault in ENGINE_FAULTS if fault.formulation == "half")
+    other = engine_faults.EngineFault(fault.name, fault.formulation, fault.status, "ended well")
+    monkeypatch.setattr("proofroll.store.shutil.rmtree", lambda *_, **__: None)
+    row = drill_engine(*place, other)
+    assert not row.contained
+    assert "what was said is not one sentence with 'ended well'" in row.problem
+    assert "was left in the folder" in row.problem
+
+
+SOUND = {
+    "said": "it ended",
+    "expected": "ended",
+    "others": [True, True],
+    "before": {"a": "1"},
+    "after": {"a": "1", "b": "2"},
+    "again": {"a": "1", "b": "2", "c": "3"},
+    "missing": 1,
+    "problems": {"the house burnt down": False},
+}
+
+
+def judged(**changes: object) -> Drilled:
+    """The verdict on what was sound but for some changes."""
+    return drilled("fault", **{**SOUND, **changes})  # type: ignore[arg-type]  # of one type each
+
+
+def test_a_sound_row() -> None:
+    """Where nothing is wrong the fault is contained and everything is counted."""
+    assert judged() == Drilled("fault", True, "it ended", 2, 2, 2, 2, 1, 1, "")
+
+
+@pytest.mark.parametrize(
+    ("changes", "problem"),
+    [
+        ({"said": "it ended\nbadly"}, "not one sentence"),
+        ({"said": ""}, "not one sentence"),
+        ({"expected": "crashed"}, "not one sentence with 'crashed'"),
+        ({"others": [True, False]}, "did not arrive"),
+        ({"before": {"a": "0"}}, "lost or changed"),
+        ({"before": {"z": "1"}}, "lost or changed"),
+        ({"again": {"a": "1", "b": "4", "c": "3"}}, "the next run lost or changed a result; the next run made 2"),
+        ({"again": {"a": "1", "c": "3"}}, "the next run lost"),
+        ({"missing": 0}, "made 1 results instead of 0"),
+        ({"problems": {"the house burnt down": True}}, "the house burnt down"),
+    ],
+)
+def test_what_is_not_contained(changes: dict[str, object], problem: str) -> None:
+    """Each thing that may go wrong is a problem, and the row says which."""
+    row = judged(**changes)
+    assert not row.contained
+    assert problem in row.problem
+
+
+def test_table_for_a_person() -> None:
+    """On the terminal each fault is a row with what was said, and one that is not contained says why."""
+    from rich.console import Console
+
+    out = io.StringIO()
+    Console(file=out, width=100).print(drill_table([judged(), judged(missing=3)]))
+    lines = out.getvalue().splitlines()
+    assert max(map(len, lines)) <= 100
+    assert lines[1].split()[:5] == ["fault", "yes", "2/2", "2/2", "1/1"]
+    assert "the next run made 1 results instead of 3" in " ".join(" ".join(lines).split())
+
+
+def test_a_site_leaves_nothing(monkeypatch: pytest.MonkeyPatch) -> None:
+    """After a drill its folder is gone, the path is as it was and its engine is unheard of."""
+    monkeypatch.setenv("PYTHONPATH", "somewhere")
+    before = dict(os.environ)
+    with site() as here:
+        assert here.folder.is_dir()
+        assert here.facts["hangs"].settings["formulation"] == "hangs"
+        assert dict(os.environ) != before
+    assert not here.folder.exists()
+    assert dict(os.environ) == before

@@ -1,0 +1,99 @@
+"""``proofroll bench`` as a user meets it. Speed itself is not asserted: both exit codes of a finished bench will do."""
+
+from __future__ import annotations
+
+import json
+import sys
+from collections.abc import Callable, Mapping
+
+import pytest
+
+from proofroll import cli
+from proofroll.cli.bench import _print_study
+
+Proofroll = Callable[..., tuple[int, str, str]]
+QUICK = ("--rounds", "1", "--seconds", "0.005")
+INTERVAL = {"value", "low", "high"}
+
+
+@pytest.fixture
+def proofroll(
+    monkeypatch: pytest.MonkeyPatch,
+    capfd: pytest.CaptureFixture[str],
+    install_engines: Callable[[Mapping[str, str]], None],
+) -> Proofroll:
+    """Runs the command line in this process; exit code, standard output, standard error."""
+    install_engines({"tiny": "tiny:Tiny"})
+    monkeypatch.setenv("COLUMNS", "100")
+
+    def run(*arguments: str) -> tuple[int, str, str]:
+        monkeypatch.setattr(sys, "argv", ["proofroll", "bench", *arguments])
+        capfd.readouterr()
+        with pytest.raises(SystemExit) as ended:
+            cli.main()
+        captured = capfd.readouterr()
+        assert isinstance(ended.value.code, int)
+        return ended.value.code, captured.out, captured.err
+
+    return run
+
+
+def test_adapters_json(proofroll: Proofroll) -> None:
+    """``--json`` has a ratio with its interval for the engine that was asked for, and says of each row what it is."""
+    code, out, err = proofroll("adapters", "--engine", "projection", *QUICK, "--json")
+    assert code in (0, 1), err
+    found = json.loads(out)
+    assert set(found) == {"goal", "scene", "every", "machine", "engines"}
+    assert set(found["engines"]) == {"projection"}
+    engine = found["engines"]["projection"]
+    assert set(engine["ratio"]) == INTERVAL
+    assert engine["ratio"]["value"] > 0
+    assert code == (0 if engine["within_goal"] else 1)
+    assert {row["formulation"] for row in engine["rows"]} == {"euler", "rotating_frame"}
+    for row in engine["rows"]:
+        if "slips" in row["variant"]:
+            assert row["ratio"] is None
+            assert "slips" in row["message"]
+        else:
+            assert set(row["ratio"]) == INTERVAL
+            assert row["distance"] <= row["tolerance"]
+            assert row["adapter"] > 0
+            assert row["because"]
+
+
+def test_an_engine_without_a_bare_loop(proofroll: Proofroll) -> None:
+    """Alone, such an engine has a table that says so, within 100 columns, and the exit code of an engine missing."""
+    code, out, _ = proofroll("adapters", "--engine", "tiny", *QUICK)
+    assert code == 3
+    assert "no bare loop is announced for tiny" in " ".join(out.split())
+    assert max(map(len, out.splitlines())) <= 100
+
+
+@pytest.mark.parametrize("command", ["adapters", "study"])
+def test_an_engine_that_does_not_exist(proofroll: Proofroll, command: str) -> None:
+    """It is wrong usage: one line, and nothing on standard output."""
+    code, out, err = proofroll(command, "--engine", "nothing", "--json")
+    assert (code, out) == (2, "")
+    assert err.count("\n") == 1
+
+
+def test_study(proofroll: Proofroll, capfd: pytest.CaptureFixture[str]) -> None:
+    """``--json`` has the part outside the engines, shares that add up, all cases, and what a first answer costs.
+
+    For a person the same is tables within 100 columns.
+    """
+    code, out, err = proofroll("study", "--engine", "tiny", "--seconds", "0.05", "--json")
+    assert code in (0, 1), err
+    found = json.loads(out)
+    assert set(found) == {
+        "goal", "jobs", "load_before", "wall_seconds", "outside", "within_goal", "shares", "cases", "first_answer",
+    }  # fmt: skip
+    assert 0 < found["outside"] < 1
+    assert sum(found["shares"].values()) == pytest.approx(1)
+    assert len(found["cases"]) == 2
+    assert all(case["status"] == "done" and case["spent"]["advance"] > 0 for case in found["cases"])
+    assert found["first_answer"]["tiny"] > 0
+    _print_study(found)
+    table = capfd.readouterr().out
+    assert "outside the engines" in " ".join(table.split())
+    assert max(map(len, table.splitlines())) <= 100

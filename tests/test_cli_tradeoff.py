@@ -1,0 +1,195 @@
+"""``proofroll tradeoff`` and ``proofroll recommend`` as a user meets them."""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any
+
+import pyperf
+import pytest
+
+from proofroll.studies import installed
+from proofroll.studies.sweep import Question
+from proofroll.studies.tradeoff import stored
+
+Proofroll = Callable[..., tuple[int, str, str]]
+ENGINE = "exudyn[formulation=generic,preset=matched]"
+
+
+@pytest.fixture(scope="session")
+def measured(tmp_path_factory: pytest.TempPathFactory) -> dict[str, Any]:
+    """A real trade-off of two curves over half a second, and of a range of two speeds."""
+    from proofroll.runner import Runner
+    from proofroll.store import Store
+    from proofroll.studies.tradeoff import tradeoff
+    from proofroll.studies.tradeoff_content import content
+
+    question = Question("sphere_in_cylinder", {"rolling_resistance": 5e-4}, 0.5, "z")
+    engines = [ENGINE, "mujoco[formulation=free,preset=default]"]
+    found = tradeoff(
+        question, Runner(Store(tmp_path_factory.mktemp("cases"))), engines=engines, over={"speed": [3, 5]}, rounds=2
+    )
+    return content(found)
+
+
+@pytest.fixture
+def folder(measured: dict[str, Any], tmp_path: Path) -> Path:
+    """A folder with that study in it, as if it had just been made with this code."""
+    path = stored(tmp_path, Question("sphere_in_cylinder", {"rolling_resistance": 5e-4}, 0.5, "z"))
+    path.parent.mkdir()
+    now = measured["measured"] | {"versions": installed.versions(), "code": installed.code()}
+    path.write_text(json.dumps(measured | {"measured": now}))
+    return tmp_path
+
+
+def asked(folder: Path, *more: str, tolerance: str = "1e-3") -> list[str]:
+    """A recommendation from that folder."""
+    given = ["--set", "rolling_resistance=5e-4", "--until", "0.5", "--out", str(folder)]
+    return ["recommend", "sphere_in_cylinder", "--quantity", "z", "--tolerance", tolerance, *given, *more]
+
+
+def test_curves_reach_from_broken_to_fine(measured: dict[str, Any]) -> None:
+    """Each curve has six points or more, coarse first; the good one begins broken and ends a thousandfold better."""
+    curves: dict[str, list[dict[str, Any]]] = {}
+    for point in measured["points"]:
+        curves.setdefault(point["engine"], []).append(point)
+    assert {name: len(points) >= 6 for name, points in curves.items()} == {"exudyn": True, "mujoco": True}
+    steps = [point["step"] for point in curves["exudyn"]]
+    assert steps == sorted(steps, reverse=True)
+    errors = [point["error"]["z"] for point in curves["exudyn"] if point["status"] == "done"]
+    assert errors[-1] < 1e-3 * errors[0]
+    assert min(point["error"]["z"] for point in curves["mujoco"] if point["status"] == "done") > 0.01
+
+
+def test_every_point_has_a_cost_with_its_interval(measured: dict[str, Any]) -> None:
+    """A run that reached the end has a cost within its interval, and a finer step costs more."""
+    done = [point for point in measured["points"] if point["status"] == "done"]
+    for point in done:
+        assert point["interval"][0] <= point["seconds_per_second"] <= point["interval"][1]
+    costs = [point["seconds_per_second"] for point in done if point["engine"] == "exudyn"]
+    assert costs[-1] > 10 * costs[0]
+
+
+def test_budget_of_a_good_and_of_a_soft_model(measured: dict[str, Any]) -> None:
+    """The trapezoidal rule shows its order 2 and no error of the model; MuJoCo's default contact shows one of cm."""
+    budgets = {item["engine"]: item for item in measured["budgets"] if item["quantity"] == "z"}
+    good, soft = budgets["exudyn"], budgets["mujoco"]
+    assert good["order_low"] - 0.1 < 2 < good["order_high"] + 0.1
+    assert good["model_form"] < 1e-8
+    assert soft["model_form"] > 0.01
+    assert soft["fine"] == "model form"
+
+
+def test_the_front_is_within_the_points(measured: dict[str, Any]) -> None:
+    """Every point of the Pareto front is one of the points, and was run over the range."""
+    by_id = {point["id"]: point for point in measured["points"]}
+    assert measured["pareto"]["z"]
+    for number in measured["pareto"]["z"]:
+        corners = by_id[number]["corners"]
+        assert [corner["parameters"] for corner in corners] == [{"speed": 3.0}, {"speed": 5.0}]
+
+
+def test_recommend_from_stored_curves(proofroll: Proofroll, folder: Path) -> None:
+    """The answer comes from the stored curves, with choice, failure, range, and when and where it was measured."""
+    code, out, err = proofroll(*asked(folder, "--json"))
+    answer = json.loads(out)
+    assert (code, err) == (0, "")
+    assert answer["choice"]["engine"] == "exudyn"
+    assert answer["choice"]["error"] <= 5e-4
+    assert answer["choice"]["seconds_per_second"] > 0
+    assert {"engine", "settings", "error", "seconds_per_second", "reason"} <= answer["first_failure"].keys()
+    assert answer["checked"]["parameters"] == {"speed": [3.0, 5.0]}
+    assert {"when", "machine", "versions"} <= answer["measured"].keys()
+
+
+def test_recommend_for_a_person(proofroll: Proofroll, folder: Path) -> None:
+    """The lines name engine, step, error, cost and range, within 100 columns."""
+    code, out, _ = proofroll(*asked(folder))
+    assert code == 0
+    assert all(len(line) <= 100 for line in out.splitlines())
+    for words in ("use exudyn generic matched, dt", "Cheaper ones fail", "speed 3 to 5", "nothing is known beyond"):
+        assert words in " ".join(out.split())
+
+
+def test_a_tolerance_that_nothing_holds(proofroll: Proofroll, folder: Path) -> None:
+    """Beyond what was measured there is no choice: exit code 1, and the closest is named."""
+    code, out, _ = proofroll(*asked(folder, tolerance="1e-15 m"))
+    assert code == 1
+    assert "Nothing that was measured holds z" in out
+    assert "Closest: exudyn generic" in out
+
+
+@pytest.mark.parametrize(
+    ("more", "words"),
+    [
+        (["--tolerance", "soon"], "tolerance = 'soon m'"),
+        (["--tolerance", "1e-3 N"], "the unit of this quantity is m"),
+        (["--tolerance", "-1"], "positive number"),
+        (["--quantity", "speed"], "measured are gamma, z"),
+        (["--engine", "pinocchio"], "measured are exudyn, mujoco"),
+        (["--budget", "0"], "positive number of seconds"),
+        (["--set", "speed=3.21"], "no curves are stored for this question"),
+    ],
+)
+def test_a_recommendation_that_cannot_be_given(proofroll: Proofroll, folder: Path, more: list[str], words: str) -> None:
+    """What makes no sense, and what was not measured, is one line on standard error and exit code 2."""
+    code, out, err = proofroll(*asked(folder), *more)
+    assert (code, out, err.count("\n")) == (2, "", 1)
+    assert words in err
+
+
+def test_curves_of_another_version_are_not_answered_from(
+    proofroll: Proofroll, folder: Path, measured: dict[str, Any]
+) -> None:
+    """Curves measured with another version of an engine, or on another machine, are named stale, and why."""
+    (path,) = (folder / "tradeoff").iterdir()
+    old = measured["measured"] | {"versions": installed.versions() | {"mujoco": "1.0"}, "code": installed.code()}
+    path.write_text(json.dumps(measured | {"measured": old}))
+    code, _, err = proofroll(*asked(folder))
+    assert code == 2
+    assert "mujoco 1.0 then" in err
+    assert "--measure" in err
+
+
+def test_tradeoff_and_then_recommend(proofroll: Proofroll, tmp_path: Path) -> None:
+    """Tables fit 100 columns, the diagram and pyperf's file are written, and an answer comes from what was measured."""
+    given = ["--set", "speed=3", "--until", "0.2", "--engine", ENGINE, "--out", str(tmp_path)]
+    code, out, err = proofroll("tradeoff", "sphere_in_cylinder", *given)
+    assert (code, err) == (0, "")
+    assert all(len(line) <= 100 for line in out.splitlines())
+    assert "The Pareto front for z" in out
+    assert "order (declared)" in out
+    (drawn,) = (tmp_path / "tradeoff").glob("*.svg")
+    assert "exudyn generic matched" in drawn.read_text()
+    (timings,) = (tmp_path / "tradeoff").glob("*.pyperf.json")
+    assert len(pyperf.BenchmarkSuite.load(str(timings)).get_benchmarks()) >= 6
+
+    code, out, err = proofroll("recommend", "sphere_in_cylinder", "--tolerance", "1 %", *given)
+    assert (code, err) == (0, "")
+    assert "use exudyn generic matched" in out
+    code, _, err = proofroll("recommend", "sphere_in_cylinder", "--tolerance", "1 %", *given[:4], *given[-2:])
+    assert code == 2
+    assert "no curves are stored" in err
+
+
+@pytest.mark.parametrize(
+    ("more", "words"),
+    [
+        (["--quantity", "colour"], "quantity = 'colour'"),
+        (["--quantity", "first_slip"], "--set mu_static="),
+        (["--engine", "adams"], "engine = 'adams'"),
+        (["--engine", "exudyn[formulation=none]"], "exudyn has generic"),
+        (["--over", "speed"], "--set = 'speed'"),
+        (["--over", "speed=fast:faster"], "parameter=low:high"),
+        (["--until", "0"], "positive time"),
+        (["--set", "speed=0"], "speed = '0'"),
+    ],
+)
+def test_a_trade_off_that_makes_no_sense(proofroll: Proofroll, tmp_path: Path, more: list[str], words: str) -> None:
+    """Bad input is one line that names the field, before anything runs, and exit code 2."""
+    code, out, err = proofroll("tradeoff", "sphere_in_cylinder", "--out", str(tmp_path), *more)
+    assert (code, out, err.count("\n")) == (2, "", 1)
+    assert words in err
+    assert not list(tmp_path.glob("**/*.nc"))

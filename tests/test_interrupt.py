@@ -1,0 +1,107 @@
+"""Ctrl-C, as a terminal sends it to the whole group of processes, and an output that cannot be written."""
+
+from __future__ import annotations
+
+import os
+import signal
+import subprocess
+import sys
+import time
+from collections.abc import Callable, Mapping
+from pathlib import Path
+
+import pytest
+
+# A shell's job may have been told to ignore Ctrl-C.
+START = """
+import signal
+signal.signal(signal.SIGINT, signal.default_int_handler)
+from proofroll.__main__ import main
+main()
+"""
+SLEEPER = """
+import pathlib, time
+pathlib.Path(__file__).with_name("begun").touch()
+time.sleep(600)
+"""
+
+
+def interrupted(arguments: list[str], ready: Callable[[], bool], times: int = 1) -> tuple[int, str, str]:
+    """Exit code, standard output and standard error of a command that gets Ctrl-C when it is ready for it."""
+    process = subprocess.Popen(
+        [sys.executable, "-c", START, *arguments],
+        stdout=subprocess.PIPE,
+        stderr=subprocess.PIPE,
+        text=True,
+        start_new_session=True,
+    )
+    try:
+        deadline = time.monotonic() + 60
+        while not ready():
+            assert process.poll() is None, "it ended too early"
+            assert time.monotonic() < deadline, "it did not begin"
+            time.sleep(0.05)
+        for _ in range(times):
+            os.killpg(process.pid, signal.SIGINT)
+        out, err = process.communicate(timeout=30)  # an engine that hangs would take 60 s
+    finally:
+        process.kill()
+    return process.returncode, out, err
+
+
+@pytest.mark.parametrize("command", [["engines"], ["run", "inclined_plane", "--engine", "sleeper"]])
+def test_while_an_engine_is_asked(
+    tmp_path: Path,
+    monkeypatch: pytest.MonkeyPatch,
+    install_engines: Callable[[Mapping[str, str]], None],
+    command: list[str],
+) -> None:
+    """Where an engine hangs while it is loaded Ctrl-C ends the command at once, with one line."""
+    install_engines({"sleeper": "sleeper:Engine"})
+    (tmp_path / "sleeper.py").write_text(SLEEPER)
+    monkeypatch.setenv("PYTHONPATH", f"{tmp_path}{os.pathsep}{os.environ['PYTHONPATH']}")
+    code, out, err = interrupted(command, (tmp_path / "begun").exists)
+    assert (code, out) == (130, "")
+    assert err.startswith("proofroll: interrupted")
+    assert err.count("\n") == 1
+
+
+def test_while_the_map_is_drawn(tmp_path: Path) -> None:
+    """Processes that compute for the truth end with Ctrl-C as well, and none of them says anything."""
+    begun = time.monotonic()
+
+    def computing() -> bool:
+        return time.monotonic() > begun + 3
+
+    code, out, err = interrupted(["regimes", "--jobs", "2", "--out", str(tmp_path)], computing)
+    assert (code, out) == (130, "")
+    assert err.startswith("proofroll: interrupted")
+    assert err.count("\n") == 1
+
+
+def test_while_the_command_is_loaded() -> None:
+    """Ctrl-C before anything is run is one line too."""
+    script = (
+        "import sys\n"
+        "class Impatient:\n"
+        "    def find_spec(self, name, *_):\n"
+        "        if name == 'typer':\n"
+        "            raise KeyboardInterrupt\n"
+        "sys.meta_path.insert(0, Impatient())\n"
+        "from proofroll.__main__ import main\n"
+        "main()\n"
+    )
+    done = subprocess.run([sys.executable, "-c", script], capture_output=True, text=True, check=False)
+    assert (done.returncode, done.stdout) == (130, "")
+    assert done.stderr == "proofroll: interrupted before anything was run\n"
+
+
+@pytest.mark.skipif(not os.path.exists("/dev/full"), reason="the system has no /dev/full")
+@pytest.mark.parametrize("arguments", [["scenes"], ["scenes", "--json"], ["--help"]])
+def test_an_output_that_is_full(arguments: list[str]) -> None:
+    """Standard output on a full disk gives one line, and not the exit code of success."""
+    with open("/dev/full", "w") as full:
+        command = [sys.executable, "-m", "proofroll", *arguments]
+        done = subprocess.run(command, stdout=full, stderr=subprocess.PIPE, text=True, check=False)
+    assert done.returncode == 2
+    assert done.stderr == "proofroll: the output cannot be written (No space left on device)\n"

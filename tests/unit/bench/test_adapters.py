@@ -1,0 +1,80 @@
+"""Ratios of adapters to bare loops."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping
+from typing import Any
+
+import numpy as np
+import pytest
+
+from proofroll.bench import loops
+from proofroll.bench.adapters import GOAL, VARIANTS, Row, bench_adapters, content, measure_adapter
+from proofroll.bench.bare import Bare
+from proofroll.timing import Interval
+
+
+def test_a_third_party_engine_without_a_bare_loop(
+    install_engines: Callable[[Mapping[str, str]], None],
+) -> None:
+    """Such an engine has rows, without a ratio, that say what is missing."""
+    install_engines({"tiny": "tiny:Tiny"})
+    rows = bench_adapters(["tiny"], rounds=1, seconds=0.01)
+    assert [row.variant for row in rows] == list(VARIANTS)
+    assert all(row.ratio is None for row in rows)
+    assert all("no bare loop" in row.message for row in rows)
+    found = content(rows)["engines"]["tiny"]
+    assert found["ratio"] is None
+    assert found["within_goal"] is None
+    assert "no bare loop" in found["message"]
+
+
+def test_an_engine_that_cannot_be_loaded(install_engines: Callable[[Mapping[str, str]], None]) -> None:
+    """It has one row with the reason."""
+    install_engines({"absent": "no_such_module:Engine"})
+    (row,) = bench_adapters(["absent"], rounds=1, seconds=0.01)
+    assert row.ratio is None
+    assert "no_such_module" in row.message
+
+
+def measured(monkeypatch: pytest.MonkeyPatch, centre: Callable[[np.ndarray[Any, Any]], Any]) -> dict[str, Any]:
+    """What is measured of the projection method with a bare loop that gives this centre."""
+    monkeypatch.setattr(
+        loops,
+        "load_bare_loop",
+        lambda engine: lambda scene, settings: Bare(centre, 1e-9, "none"),  # noqa: ARG005 -- the same for all
+    )
+    return measure_adapter("projection", {"formulation": "rotating_frame"}, {}, 2, 0.002)
+
+
+def test_no_ratio_for_another_motion(monkeypatch: pytest.MonkeyPatch) -> None:
+    """A bare loop that ends elsewhere is measured against nothing; nor is one whose end is not finite."""
+    for wrong in (0.0, np.nan):
+        answer = measured(monkeypatch, lambda times, wrong=wrong: times[0] + np.full(3, wrong))  # type: ignore[misc]
+        assert "adapter" not in answer
+        assert not answer["distance"] <= answer["tolerance"]
+
+
+def test_the_bare_loop_runs_over_the_same_times(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Both loops pass the same instants, 0.02 s apart, from 0 to the end that is reported."""
+    seen = []
+    answer = measured(monkeypatch, lambda times: (seen.append(times), np.zeros(3))[1])
+    assert seen[-1][0] == 0.0
+    assert seen[-1][-1] == pytest.approx(answer["until"])
+    np.testing.assert_allclose(np.diff(seen[-1]), 0.02)
+
+
+def test_the_worst_row_speaks_for_an_engine() -> None:
+    """An engine's ratio is that of its slowest row, and the goal holds only if it does for each."""
+    rows = [
+        Row("e", "one", "matched", "f = 0", Interval(1.05, 1.0, 1.1), ""),
+        Row("e", "two", "matched", "f > 0", Interval(1.4, 1.3, 1.5), ""),
+        Row("e", "two", "matched", "bounded, slips", None, "refused"),
+        Row("good", "one", "matched", "f = 0", Interval(GOAL, 1.0, 1.2), ""),
+    ]
+    found = content(rows)
+    assert found["engines"]["e"]["ratio"] == {"value": 1.4, "low": 1.3, "high": 1.5}
+    assert found["engines"]["e"]["worst"] == "two, f > 0"
+    assert found["engines"]["e"]["within_goal"] is False
+    assert found["engines"]["good"]["within_goal"] is True
+    assert [row["within_goal"] for row in found["engines"]["e"]["rows"]] == [True, False, None]

@@ -1,0 +1,89 @@
+"""Bare loops reach what the adapters reach."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+
+import numpy as np
+import pytest
+
+from proofroll.bench.adapters import VARIANTS
+from proofroll.bench.loops import load_bare_loop
+from proofroll.errors import Diverged, Refused
+from proofroll.registry import load_engine, resolve_settings
+from proofroll.scene_file import load_scene
+
+FORMULATIONS = [
+    (engine, formulation)
+    for engine, formulations in {
+        "projection": ("euler", "rotating_frame"),
+        "exudyn": ("generic", "carrier", "rolling_disc", "contact"),
+        "pinocchio": ("composite", "free_flyer", "contact"),
+        "mujoco": ("chart", "free", "facets"),
+    }.items()
+    for formulation in formulations
+]
+# Rolls without slip, so nothing about friction is to be asked; slips after 0.18 s.
+NO_SLIP = {("exudyn", "carrier"), ("exudyn", "rolling_disc"), ("mujoco", "facets")}
+LOCATES_SLIP = {
+    ("projection", "euler"),
+    ("projection", "rotating_frame"),
+    ("exudyn", "generic"),
+    ("pinocchio", "composite"),
+    ("pinocchio", "free_flyer"),
+}
+TIMES = np.arange(7) * 0.02
+
+
+def centres(
+    engine: str, formulation: str, parameters: Mapping[str, float], times: np.ndarray = TIMES, **other: float
+) -> tuple[np.ndarray, np.ndarray, float]:
+    """Of the adapter and of the bare loop, ``other`` changing the latter's scene; and how far they may be apart."""
+    kind = load_engine(engine)
+    settings = resolve_settings(kind, {"formulation": formulation})
+    adapter = kind.build(load_scene("sphere_in_cylinder", **parameters), settings)
+    for t in times[1:].tolist():
+        adapter.advance(t)
+    bare = load_bare_loop(engine)(load_scene("sphere_in_cylinder", **{**parameters, **other}), settings)
+    assert bare.because
+    return adapter.sample().p_WB, bare.run(times), bare.tolerance
+
+
+@pytest.mark.parametrize("variant", [name for name in VARIANTS if "slips" not in name])
+@pytest.mark.parametrize(("engine", "formulation"), FORMULATIONS)
+def test_the_bare_loop_ends_where_the_adapter_does(engine: str, formulation: str, variant: str) -> None:
+    """Each engine's bare loop gives the adapter's centre to its tolerance, wherever there is the variant."""
+    if "bounded" in variant and (engine, formulation) in NO_SLIP:
+        with pytest.raises(Refused):
+            centres(engine, formulation, VARIANTS[variant])
+        return
+    adapter, bare, tolerance = centres(engine, formulation, VARIANTS[variant])
+    assert tolerance <= 1e-5
+    assert np.linalg.norm(adapter - bare) <= tolerance
+
+
+@pytest.mark.parametrize(("engine", "formulation"), [item for item in FORMULATIONS if item not in NO_SLIP])
+def test_slip(engine: str, formulation: str) -> None:
+    """Where the engine's own contact slips, so does the bare loop; where slip is located, it says that it cannot."""
+    times = np.arange(13) * 0.02
+    if (engine, formulation) in LOCATES_SLIP:
+        with pytest.raises(Diverged, match="slips"):
+            centres(engine, formulation, VARIANTS["bounded, slips"], times)
+        return
+    adapter, bare, tolerance = centres(engine, formulation, VARIANTS["bounded, slips"], times)
+    assert np.linalg.norm(adapter - bare) <= tolerance
+
+
+@pytest.mark.parametrize(("engine", "formulation"), FORMULATIONS)
+def test_another_model_is_noticed(engine: str, formulation: str) -> None:
+    """A bare loop of a ball with a hundredth more gravity ends further away than any tolerance allows."""
+    adapter, bare, tolerance = centres(engine, formulation, {}, gravity=9.9)
+    assert np.linalg.norm(adapter - bare) > tolerance
+
+
+@pytest.mark.parametrize("engine", ["projection", "exudyn", "pinocchio", "mujoco"])
+def test_another_scene_is_refused(engine: str) -> None:
+    """Bare loops are written for the vertical cylinder, and say so of a plane."""
+    kind = load_engine(engine)
+    with pytest.raises(Refused, match="cylinder"):
+        load_bare_loop(engine)(load_scene("inclined_plane"), resolve_settings(kind, {}))
