@@ -79,6 +79,8 @@ def stability(
             terminal.print("The worst that nobody is told of:", markup=False)
         for line in worst:
             terminal.print(f"  {line}", markup=False)
+        for line in study["findings"]:
+            terminal.print(line, markup=False)
         for place in study["places"]:
             if place["problem"]:
                 terminal.print(f"{place['axis']} = {place['value']:g}: {place['problem']}", markup=False)

@@ -94,6 +94,7 @@ class Yardstick:
         true: its values; None where there is no truth.
         scale: its range.
         kinetic: largest kinetic energy [J].
+        fastest: largest angular velocity [rad/s]; None where there is no truth.
         off_surface: allowed distance from the wall, and depth in it [m].
     """
 
@@ -103,6 +104,7 @@ class Yardstick:
     true: FloatArray | None
     scale: float
     kinetic: float
+    fastest: float | None
     off_surface: float
 
     @classmethod
@@ -112,15 +114,16 @@ class Yardstick:
         bend = float(np.linalg.norm(body.surface.normal_gradient(body.p0), 2))
         length = min(ball.radius, 1 / bend) if bend else ball.radius
         kinetic = 0.5 * ball.mass * float(body.v0 @ body.v0) + 0.5 * ball.inertia * float(body.w0 @ body.w0)
-        true, scale = None, 1.0
+        true, scale, fastest = None, 1.0, None
         if truth is not None:
             true = truth[name].to_numpy()
             scale = float(np.ptp(true)) or 1.0
             v, w = truth["v_WB"].to_numpy(), truth["w_WB"].to_numpy()
+            fastest = float(np.max(np.linalg.norm(w, axis=-1)))
             kinetic = max(
                 kinetic, float(np.max(0.5 * ball.mass * (v**2).sum(-1) + 0.5 * ball.inertia * (w**2).sum(-1)))
             )
-        return cls(body, times, name, true, scale, kinetic, OFF_SURFACE * length)
+        return cls(body, times, name, true, scale, kinetic, fastest, OFF_SURFACE * length)
 
 
 def judge(result: Result, dataset: xr.Dataset | None, yardstick: Yardstick) -> Outcome:

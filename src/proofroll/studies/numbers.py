@@ -14,22 +14,33 @@ from proofroll.truth.natural import natural_time, turning_rate
 MEANINGS = {
     "turn": "Ωh: angle [rad] by which the wall's normal turns in a step",
     "spin": "(V0/a)h: angle [rad] by which the ball turns in a step",
+    "rotation": "h·max|ω|: angle [rad] by which the ball turns in a step where it turns fastest",
     "fall": "h√(g/a): step in parts of the time of a fall by the radius",
 }
-SYMBOLS = {"turn": "Ωh", "spin": "(V0/a)h", "fall": "h√(g/a)"}
+SYMBOLS = {"turn": "Ωh", "spin": "(V0/a)h", "rotation": "h|ω|", "fall": "h√(g/a)"}
 # A number explains a boundary that it keeps within this factor along an axis.
 _EXPLAINS = 2.0
 # Fewer boundaries than these say nothing about an axis.
 _ENOUGH = 3
 
 
-def numbers(body: RollingBall, h: float) -> dict[str, float]:
-    """The numbers of a step h [s]; those that are zero at every step are left out.
+def numbers(body: RollingBall, h: float, fastest: float | None = None) -> dict[str, float]:
+    """The numbers of a step; those that are zero at every step, or not known, are left out.
 
     ``oscillation`` is the step in parts of the natural time.
+
+    Args:
+        body: the scene's.
+        h: step [s].
+        fastest: largest angular velocity of the ball during the run [rad/s], where the truth is known.
     """
     speed, gravity, a = float(np.linalg.norm(body.v0)), float(np.linalg.norm(body.gravity)), body.ball.radius
-    found = {"turn": turning_rate(body) * h, "spin": speed / a * h, "fall": math.sqrt(gravity / a) * h}
+    found = {
+        "turn": turning_rate(body) * h,
+        "spin": speed / a * h,
+        "rotation": (fastest or 0.0) * h,
+        "fall": math.sqrt(gravity / a) * h,
+    }
     return {name: value for name, value in found.items() if value} | {"oscillation": h / natural_time(body)}
 
 

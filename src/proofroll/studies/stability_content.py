@@ -12,6 +12,8 @@ from proofroll.studies.numbers import explanation, numbers
 from proofroll.studies.stability import MapPoint, StabilityMap, failure_beyond
 
 BOUNDARIES = ("stable", "accurate")
+# Boundaries this factor apart count as the same: two rungs of the ladder of steps, one of that of tolerances.
+_SAME = {True: 2.3, False: 15.0}
 _PASSES: Mapping[str, Callable[[Outcome], bool]] = {
     "stable": lambda outcome: outcome.stable,
     "accurate": lambda outcome: outcome.accurate,
@@ -36,6 +38,7 @@ def content(found: StabilityMap) -> dict[str, Any]:
         "meanings": {str(failure): meaning for failure, meaning in MEANINGS.items()},
         "points": points,
         "explanations": _explanations(points),
+        "findings": _scale_findings(found, points),
         "places": [
             {"axis": place.axis.name, "value": place.value, "parameters": place.parameters, "problem": place.problem}
             for place in found.places
@@ -51,7 +54,7 @@ def _point(point: MapPoint) -> dict[str, Any]:
         sides["accurate"] = {**sides["accurate"], "largest": None, "numbers": {}}  # without truth nobody is right
     # Where nothing breaks on the ladder, what is to be shown is where it stops being right.
     first = sides["stable"] if sides["stable"]["failure"] else sides["accurate"]
-    errors = [outcome.error for outcome in point.found.seen.values() if outcome.error is not None]
+    errors = [item.error for item in point.found.seen.values() if item.stable and item.error is not None]
     return {
         "engine": facts.name,
         "settings": {key: value for key, value in facts.settings.items() if key != facts.resolution},
@@ -84,13 +87,15 @@ def _side(point: MapPoint, name: str) -> dict[str, Any]:
     """One boundary: the largest step or tolerance that holds, and what is beyond."""
     holding, failing = point.found.boundary(_PASSES[name])
     beyond = failure_beyond(point, failing)
-    assert point.place.scene is not None  # points have one
+    scene, yardstick = point.place.scene, point.place.yardstick
+    assert scene is not None  # points have both
+    assert yardstick is not None
     largest = None if holding is None else point.ladder[holding]
     steps = point.curve.fixed_step and largest is not None
     return {
         "largest": largest,
         "reached": beyond is not None and holding is not None,
-        "numbers": numbers(point.place.scene.rolling, largest) if steps and largest is not None else {},
+        "numbers": numbers(scene.rolling, largest, yardstick.fastest) if steps and largest is not None else {},
         "beyond": None if failing is None else point.ladder[failing],
         "failure": None if beyond is None or beyond.failure is None else str(beyond.failure),
         "silent": beyond is not None and beyond.silent,
@@ -114,6 +119,39 @@ def _explanations(points: list[dict[str, Any]]) -> list[dict[str, Any]]:
                     entry |= {"low": best.low, "high": best.high, "spread": best.spread, "explains": best.explains}
                     found.append(entry)
     return found
+
+
+def _scale_findings(found: StabilityMap, points: list[dict[str, Any]]) -> list[str]:
+    """What depends on an axis along which the dimensionless problem is the same, as sentences."""
+    sentences = []
+    for axis in (axis for axis in found.axes if axis.scale_free):
+        for curve in dict.fromkeys(point["curve"] for point in points):
+            for name in BOUNDARIES:
+                of_both = [p for p in points if p["curve"] == curve and p["axis"] == axis.name]
+                sizes = {p["value"]: _relative(p, name) for p in of_both if not (p["problem"] and name == "accurate")}
+                said = _dependence(sizes, fixed_step=bool(of_both) and of_both[0]["resolution"] == "dt")
+                if said:
+                    sentences.append(f"{curve} depends on {axis.name}, which it should not: {name} up to {said}")
+    return sentences
+
+
+def _relative(point: Mapping[str, Any], name: str) -> float | None:
+    """A boundary in parts of the natural time, or a tolerance as it is."""
+    largest: float | None = point["sides"][name]["largest"]
+    return largest / point["period"] if largest is not None and point["resolution"] == "dt" else largest
+
+
+def _dependence(sizes: Mapping[float, float | None], *, fixed_step: bool) -> str:
+    """How a boundary changes along an axis, if it does; else nothing."""
+    known = [size for size in sizes.values() if size is not None]
+    if not known or (len(known) == len(sizes) and max(known) <= _SAME[fixed_step] * min(known)):
+        return ""
+    largest = max(sizes, key=lambda value: sizes[value] or 0.0)
+    least = min(sizes, key=lambda value: sizes[value] or 0.0)
+    low = sizes[least]
+    what = " of the natural time" if fixed_step else ""
+    said = "none that was affordable" if low is None else f"{low:.2g}{what}"
+    return f"{sizes[largest]:.2g}{what} at {largest:g}, but {said} at {least:g}"
 
 
 def silent_ranking(study: Mapping[str, Any]) -> list[dict[str, Any]]:

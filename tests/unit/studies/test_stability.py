@@ -181,7 +181,7 @@ def claim(**more: Any) -> Claim:
 
 POINT = {
     "engine": "made", "settings": {"formulation": "only"}, "curve": "made[formulation=only]",
-    "axis": "V0", "value": 4.0, "problem": None,
+    "axis": "V0", "value": 4.0, "problem": None, "too_slow": None,
     "sides": {
         "stable": {"largest": 0.1, "numbers": {"spin": 0.3}, "failure": "energy gain", "silent": True},
         "accurate": {"largest": None, "numbers": {}, "failure": "creep", "silent": True},
