@@ -81,6 +81,9 @@ BAD = {
     "capability that is lacking": (with_option("--set", "rolling_resistance=1e-4"), 3, ["needs rolling resistance"]),
     "unknown comparison": (["compare", "no_such_claim"], 2, ["comparison = 'no_such_claim'"]),
     "unknown comparison to report": (["report", "no_such_claim"], 2, ["comparison = 'no_such_claim'"]),
+    "unknown axis of a map": (["stability", "sphere_in_cylinder", "--axis", "speed"], 2, ["axis = 'speed'", "V0"]),
+    "unknown scene of a map": (["stability", "sphere_in_cone"], 2, ["scene = 'sphere_in_cone'"]),
+    "a file that asks for no map": (["stability", "comparisons/paper.toml"], 2, ["asks for a stability map"]),
     "no jobs": (["compare", "x", "--jobs", "0"], 2, ["--jobs"]),
 }  # fmt: skip
 
@@ -417,10 +420,40 @@ def test_help_and_version(proofroll: Proofroll) -> None:
     """Help names every command; the version is that of the package; no command at all is wrong usage with help."""
     code, out, _ = proofroll("--help")
     assert code == 0
-    for command in ("scenes", "engines", "run", "compare", "report", "onset", "regimes"):
+    for command in ("scenes", "engines", "run", "compare", "report", "onset", "regimes", "stability"):
         assert command in out
     assert proofroll("--version") == (0, "proofroll 0.1.0\n", "")
     assert proofroll()[0] == 2
+
+
+def test_a_map_of_stability(proofroll: Proofroll, tmp_path: Path) -> None:
+    """One JSON document with the boundaries of every point; the map and the programs lie beside the cases."""
+    file = tmp_path / "made.toml"
+    file.write_text(
+        'study = "stability"\ntitle = "t"\nquestion = "q"\nscene = "sphere_in_cylinder"\n'
+        '[[axes]]\nname = "V0"\nunit = "m/s"\nmeaning = "speed"\nvalues = [4]\nparameters.speed = {}\n'
+        '[[claims]]\nengine = "projection"\nboundary = "stable"\nnever = true\nbecause = "to be contradicted"\n'
+    )
+    engine = "projection[formulation=rotating_frame,preset=default]"
+    arguments = ["stability", str(file), "--engine", engine, "--quick", "--jobs", "1", "--out", str(tmp_path / "out")]
+    code, out, err = proofroll(*arguments, "--json")
+    found = json.loads(out)
+    assert code == 1, err
+    assert {"points", "silent", "failures", "boundaries", "runs"} <= found.keys()
+    (point,) = found["points"]
+    assert {
+        "engine",
+        "settings",
+        "axis",
+        "value",
+        "largest_stable",
+        "largest_accurate",
+        "failure",
+        "silent",
+    } <= point.keys()
+    assert 0 < point["largest_accurate"] <= point["largest_stable"]
+    assert found["claims"]["contradictions"]
+    assert {path.suffix for path in (tmp_path / "out" / "stability").glob("sphere*")} == {".json", ".svg"}
 
 
 def test_a_reader_that_stops_reading() -> None:

@@ -27,15 +27,19 @@ def headline(study: Mapping[str, Any]) -> str:
 
 
 def boundary_table(study: Mapping[str, Any]) -> Table:
-    """One line per engine, formulation, setting and axis: its boundaries from the least to the largest."""
-    title = "Boundaries along each axis: largest Ωh (or tolerance) that is stable, and that holds 1 %"
+    """One line per engine, formulation, setting and axis: its boundaries from the least to the largest.
+
+    A ``+`` stands where nothing broke on the ladder, ``n!`` for n silent failures beyond the boundaries.
+    """
+    turns = any("turn" in point["sides"]["stable"]["numbers"] for point in study["points"])
+    title = f"Largest {SYMBOLS['turn' if turns else 'spin']} (or tolerance) along each axis; n!: n times silent"
     table = Table(title=Text(title), title_justify="left", box=None, padding=(0, 1, 0, 0))
     table.add_column("engine formulation setting", no_wrap=True)
-    table.add_column("axis", no_wrap=True)
+    table.add_column("axis", no_wrap=True, min_width=7)
     for column in ("stable", "holds 1 %"):
         table.add_column(column, justify="right", no_wrap=True)
-    table.add_column("1 % explained by", no_wrap=True)
-    table.add_column("beyond", no_wrap=True, max_width=21)
+    table.add_column("which is", no_wrap=True)
+    table.add_column("beyond", no_wrap=True)
     explained = {(e["curve"], e["axis"]): e for e in study["explanations"] if e["boundary"] == "accurate"}
     before = ""
     for (curve, axis), points in grouped(study).items():
@@ -43,7 +47,7 @@ def boundary_table(study: Mapping[str, Any]) -> Table:
         kinds = Counter(point["failure"] for point in points if point["failure"])
         silent = sum(point["silent"] for point in points)
         common = kinds.most_common(1)
-        beyond = f"{common[0][0]}, {silent} silent" if common else "none"
+        beyond = f"{common[0][0]} {silent}!" if common and silent else common[0][0] if common else ""
         table.add_row(
             Text(name if name != before else ""),
             axis,
@@ -88,14 +92,14 @@ def _range(points: Sequence[Mapping[str, Any]], side: str) -> str:
         return "none"
     low = "none" if len(held) < len(values) else number(min(held))
     high = number(max(held)) + ("" if any(p["sides"][side]["reached"] for p in known) else "+")
-    return low if low == high else f"{low} … {high}"
+    return low if low == high else f"{low}…{high}"
 
 
 def _explained(found: Mapping[str, Any] | None) -> str:
-    if found is None:
-        return "–"
-    words = f"{SYMBOLS[found['number']]} {number(found['low'])}…{number(found['high'])}"
-    return words if found["explains"] else f"({words})"
+    """The number that stays the same while the axis moves the others."""
+    if found is None or not found["explains"]:
+        return ""
+    return f"{SYMBOLS[found['number']]} {number(found['low'])}…{number(found['high'])}"
 
 
 def silent_lines(study: Mapping[str, Any], count: int = 8) -> Iterator[str]:

@@ -495,3 +495,10 @@ def test_blow_up_is_reported_and_not_reset(value: float, tmp_path, monkeypatch, 
 def test_version_is_the_engines() -> None:
     """The version reported is MuJoCo's."""
     assert Mujoco.version() == mujoco.__version__
+
+
+def test_a_ball_below_the_least_inertia_is_refused() -> None:
+    """MuJoCo takes no inertia below 1e-15 kg m²; a grain of dust is refused with its words, not with a crash."""
+    dust = load_scene("sphere_in_cylinder", radius=2.5e-8, cylinder_radius=2.25e-7, speed=4e-3)
+    with pytest.raises(Refused, match="mass and inertia"):
+        Mujoco.build(dust, Mujoco.presets["chart"]["matched"])

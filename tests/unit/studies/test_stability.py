@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import shutil
 import subprocess
 import sys
 from pathlib import Path
@@ -249,7 +250,17 @@ def test_broken_files(tmp_path: Path, old: str, new: str, words: str) -> None:
         file_for(str(path))
 
 
-def test_a_scene_without_a_file() -> None:
+def test_a_scene_without_a_file(tmp_path: Path) -> None:
     """A scene for which nobody wrote axes gives advice instead of an empty map."""
+    folder = tmp_path / "my_scene"
+    shutil.copytree(load_scene("inclined_plane").folder, folder)
     with pytest.raises(InputError, match="comparisons"):
-        file_for("inclined_plane")
+        file_for(str(folder))
+
+
+@pytest.mark.parametrize("scene", ["sphere_in_cylinder", "inclined_plane"])
+def test_our_files_can_be_read(scene: str) -> None:
+    """Every axis of our own files gives scenes that exist."""
+    for axis in file_for(scene).axes:
+        for value in axis.values:
+            load_scene(scene, **axis.at(load_scene(scene), value))

@@ -19,7 +19,7 @@ from proofroll.engines.mujoco.model import read_spec, write_physics
 from proofroll.engines.mujoco.settings import PRESETS, MujocoSettings, check, velocity_lag
 from proofroll.engines.mujoco.softness import softness
 from proofroll.engines.mujoco.start import EVALUATIONS, accelerations, start
-from proofroll.errors import Diverged
+from proofroll.errors import Diverged, Refused
 from proofroll.events import Event
 from proofroll.mechanics import natural_acceleration
 from proofroll.scene import Capability, RollingBall, Scene
@@ -107,7 +107,7 @@ class Mujoco:
         spec = read_spec(scene, settings.formulation)
         write_physics(spec, body, settings)
         _FORMULATIONS[settings.formulation].write(spec, body)
-        return cls(spec.compile(), body, settings)
+        return cls(_compiled(spec), body, settings)
 
     @classmethod
     def reproducer(cls, scene: Scene, settings: MujocoSettings) -> str:
@@ -119,7 +119,7 @@ class Mujoco:
         spec = read_spec(scene, settings.formulation)
         write_physics(spec, body, settings)
         _FORMULATIONS[settings.formulation].write(spec, body)
-        spec.compile()
+        _compiled(spec)
         return source(spec.to_xml(), built._model, built._data, body, settings)
 
     def advance(self, t: float) -> None:
@@ -215,6 +215,18 @@ class Mujoco:
             for _ in range(EVALUATIONS if self._body.contact.rolling_resistance else 1):
                 self._formulation.evaluate(self._scratch)
         return self._scratch
+
+
+def _compiled(spec: Any) -> Any:
+    """The model; MuJoCo takes no mass or inertia below 1e-15, for example, in whatever units.
+
+    Raises:
+        Refused: MuJoCo does not accept the numbers.
+    """
+    try:
+        return spec.compile()
+    except ValueError as error:
+        raise Refused(f"MuJoCo does not accept the model: {' '.join(str(error).split())}") from None
 
 
 def _forget_callbacks() -> None:
