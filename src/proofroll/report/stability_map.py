@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import io
 import math
+import textwrap
 from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
@@ -13,7 +14,7 @@ from proofroll.files import replacing
 from proofroll.report.labels import number
 from proofroll.report.stability_tables import label
 
-# Letters for what is beyond the boundary; a capital with "!" where the engine was silent.
+# Letters for what is beyond the boundary; with "!" where the engine was silent.
 LETTERS = {
     "diverged": "d",
     "energy gain": "e",
@@ -29,6 +30,8 @@ LETTERS = {
 # Steps per natural time at which a colour is darkest and lightest; tolerances are put between by their decades.
 _FEWEST, _MOST = 8.0, 1e5
 _TOLERANCE_DECADES = 13
+# As many letters of the legend stand above a panel.
+_LETTERS_PER_PANEL = 118
 
 
 def draw(study: Mapping[str, Any], path: Path) -> None:
@@ -58,24 +61,26 @@ def svg(study: Mapping[str, Any]) -> str:
     columns = min(2, len(axes)) or 1
     rows = math.ceil(len(axes) / columns) or 1
     with mpl.rc_context({"svg.hashsalt": "proofroll", "font.size": 8}):
-        figure = Figure(figsize=(7.2 * columns, rows * (0.9 + 0.24 * len(curves)) + 0.8), layout="constrained")
+        figure = Figure(figsize=(7.2 * columns, rows * (0.9 + 0.24 * len(curves)) + 1.0), layout="constrained")
         panels = figure.subplots(rows, columns, squeeze=False).ravel()
         for panel, axis in zip(panels, axes, strict=False):
             _panel(panel, study, axis, curves, mpl.colormaps["cividis_r"])
         for panel in panels[len(axes) :]:
             panel.set_visible(False)
-        figure.suptitle(_legend(), fontsize=8, x=0.01, ha="left")
+        figure.suptitle(_legend(study, _LETTERS_PER_PANEL * columns), fontsize=8, x=0.01, ha="left")
         out = io.StringIO()
         figure.savefig(out, format="svg", metadata={"Date": None})
     return out.getvalue()
 
 
-def _legend() -> str:
+def _legend(study: Mapping[str, Any], width: int) -> str:
     kinds = ", ".join(f"{letter} {kind}" for kind, letter in LETTERS.items())
-    return (
-        "Steps per natural time (or tolerance) that 1 % of the range needs; – no affordable one does; ? no truth.\n"
-        f"Letter: what is beyond the boundary of stability ({kinds}); ! the engine did not say so."
+    lines = (
+        f"{study['scene']}: {len(study['points'])} points, {study['boundaries']} boundaries, {study['silent']} silent.",
+        "Steps per natural time (or tolerance) that 1 % of the range needs; – no affordable one does; ? no truth.",
+        f"Letter: what is beyond the boundary of stability, or else of 1 % ({kinds}); ! the engine did not say so.",
     )
+    return "\n".join(textwrap.fill(line, width) for line in lines)
 
 
 def _panel(panel: Any, study: Mapping[str, Any], axis: Mapping[str, Any], curves: list[str], colours: Any) -> None:
@@ -89,13 +94,15 @@ def _panel(panel: Any, study: Mapping[str, Any], axis: Mapping[str, Any], curves
         hatch = "////" if text.startswith("–") else None
         panel.add_patch(_rectangle(x, y, face, hatch))
         dark = shade is not None and shade > 0.5
-        panel.text(x, y, text, ha="center", va="center", fontsize=6.5, color="white" if dark else "black")
+        behind = {"facecolor": "white", "edgecolor": "none", "pad": 1.0} if hatch else None
+        colour = "white" if dark else "black"
+        panel.text(x, y, text, ha="center", va="center", fontsize=6.5, color=colour, bbox=behind)
     panel.set(
         xlim=(-0.5, len(values) - 0.5),
         ylim=(len(curves) - 0.5, -0.5),
         xlabel=f"{axis['name']}" + (f" [{axis['unit']}]" if axis["unit"] != "1" else ""),
     )
-    panel.set_xticks(range(len(values)), [number(value) for value in values])
+    panel.set_xticks(range(len(values)), [f"{value:g}" for value in values])
     panel.set_yticks(range(len(curves)), [names[curve] for curve in curves])
     panel.tick_params(length=0)
 

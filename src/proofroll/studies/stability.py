@@ -36,8 +36,8 @@ _PARTS = [1, *(part for power in range(_FINEST) for part in (2 << power, 3 << po
 _TOLERANCES = [10.0**-power for power in range(1, 14)]
 # Rungs skipped on the way down: a factor of four in the step, three decades of tolerance.
 _STRIDE = {"dt": 4, "rtol": 3}
-# By how much a run with an eighth-order method gets longer per decade of tolerance.
-_PER_DECADE = 10 ** (1 / 8)
+# A run with an eighth-order method gets longer as this power of its tolerance.
+_PER_DECADE = 1 / 8
 # The truth is computed by two routes at the tightest tolerance, once per place.
 _TRUTH_LIMIT = 60.0
 # After so many runs that met the limit of time a search goes no further: each finer one would too.
@@ -112,15 +112,22 @@ class MapPoint:
         return dataclasses.replace(facts, settings={**facts.settings, str(facts.resolution): self.ladder[rung]})
 
     def expected(self, rung: int) -> float:
-        """Wall seconds that a run is expected to take, by the nearest coarser run that got somewhere; 0: unknown."""
-        for other in sorted((item for item in self.results if item < rung), reverse=True):
-            result, case = self.results[other], self.cases[other]
-            if result.wall_seconds:
-                ratio = self.ladder[other] / self.ladder[rung]
-                return result.wall_seconds * (ratio if self.curve.fixed_step else _PER_DECADE ** np.log10(ratio))
-            if result.status == Status.TIMEOUT:
-                return case.time_limit / 2
-        return 0.0
+        """Wall seconds that a run is expected to take, from the coarser runs that got somewhere; 0: unknown.
+
+        Their trend counts, for an engine that halves its own steps takes as long with a coarse one; a single run says
+        only that it will not be longer than in proportion to the steps.
+        """
+        known = sorted((item, result.wall_seconds) for item, result in self.results.items() if result.wall_seconds)
+        known = [item for item in known if item[0] < rung]
+        if not known:
+            return 0.0
+        last, seconds = known[-1]
+        power = 1.0 if self.curve.fixed_step else _PER_DECADE
+        if len(known) > 1 and self.curve.fixed_step:
+            before, earlier = known[-2]
+            steps = np.log(self.ladder[before] / self.ladder[last])
+            power = float(np.clip(np.log(seconds / earlier) / steps, 0.0, 1.0))
+        return float(seconds * (self.ladder[last] / self.ladder[rung]) ** power)
 
     @property
     def timeouts(self) -> int:
@@ -280,7 +287,8 @@ def _search(name: str, points: Sequence[MapPoint], effort: Effort, runner: Runne
 
 
 def _too_slow(point: MapPoint, rung: int, effort: Effort) -> bool:
-    return point.timeouts >= _TIMEOUTS or point.expected(rung) > effort.patience
+    allowed = effort.patience if len(point.results) > 1 else effort.limit
+    return point.timeouts >= _TIMEOUTS or point.expected(rung) > allowed
 
 
 def _send(point: MapPoint, searching: Searching, outcome: Outcome | None) -> int | None:

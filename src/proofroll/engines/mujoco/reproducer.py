@@ -31,6 +31,8 @@ def step():
 def step():
     """One step."""
     mujoco.mj_step(model, data)
+    if abs(frame(np.array(POSITION))[2] @ data.qpos[:3]) > model.geom_size[model.body("wall").geomadr[0], 2]:
+        raise RuntimeError("the ball has left the ring of boxes")
 ''',
     "chart": '''
 
