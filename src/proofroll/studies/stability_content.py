@@ -126,32 +126,31 @@ def _scale_findings(found: StabilityMap, points: list[dict[str, Any]]) -> list[s
     sentences = []
     for axis in (axis for axis in found.axes if axis.scale_free):
         for curve in dict.fromkeys(point["curve"] for point in points):
+            along = [point for point in points if point["curve"] == curve and point["axis"] == axis.name]
             for name in BOUNDARIES:
-                of_both = [p for p in points if p["curve"] == curve and p["axis"] == axis.name]
-                sizes = {p["value"]: _relative(p, name) for p in of_both if not (p["problem"] and name == "accurate")}
-                said = _dependence(sizes, fixed_step=bool(of_both) and of_both[0]["resolution"] == "dt")
+                said = _dependence([p for p in along if not (p["problem"] and name == "accurate")], name)
                 if said:
-                    sentences.append(f"{curve} depends on {axis.name}, which it should not: {name} up to {said}")
+                    sentences.append(f"{curve} depends on {axis.name}, as it should not: {name} up to {said}")
     return sentences
 
 
-def _relative(point: Mapping[str, Any], name: str) -> float | None:
-    """A boundary in parts of the natural time, or a tolerance as it is."""
-    largest: float | None = point["sides"][name]["largest"]
-    return largest / point["period"] if largest is not None and point["resolution"] == "dt" else largest
-
-
-def _dependence(sizes: Mapping[float, float | None], *, fixed_step: bool) -> str:
-    """How a boundary changes along an axis, if it does; else nothing."""
-    known = [size for size in sizes.values() if size is not None]
-    if not known or (len(known) == len(sizes) and max(known) <= _SAME[fixed_step] * min(known)):
+def _dependence(points: list[dict[str, Any]], name: str) -> str:
+    """How a boundary, in parts of the natural time, changes along an axis, if it does; else nothing."""
+    sizes: list[tuple[float, float]] = []
+    for point in points:
+        largest = point["sides"][name]["largest"]
+        if largest is not None:
+            fixed_step = point["resolution"] == "dt"
+            sizes.append((largest / point["period"] if fixed_step else largest, point["value"]))
+    without = [point for point in points if point["sides"][name]["largest"] is None]
+    if not sizes or (not without and max(sizes)[0] <= _SAME[fixed_step] * min(sizes)[0]):
         return ""
-    largest = max(sizes, key=lambda value: sizes[value] or 0.0)
-    least = min(sizes, key=lambda value: sizes[value] or 0.0)
-    low = sizes[least]
     what = " of the natural time" if fixed_step else ""
-    said = "none that was affordable" if low is None else f"{low:.2g}{what}"
-    return f"{sizes[largest]:.2g}{what} at {largest:g}, but {said} at {least:g}"
+    said = f"{max(sizes)[0]:.2g}{what} at {max(sizes)[1]:g}"
+    if without:
+        places = ", ".join(f"{point['value']:g} ({point['sides'][name]['failure']})" for point in without)
+        return f"{said}, but nowhere at {places}"
+    return f"{said}, but {min(sizes)[0]:.2g}{what} at {min(sizes)[1]:g}"
 
 
 def silent_ranking(study: Mapping[str, Any]) -> list[dict[str, Any]]:

@@ -23,7 +23,7 @@ from proofroll.studies.failure import Failure
 from proofroll.studies.numbers import explanation, numbers
 from proofroll.studies.stability import Effort, stability
 from proofroll.studies.stability_claims import Claim, file_for
-from proofroll.studies.stability_content import content
+from proofroll.studies.stability_content import _dependence, content
 from proofroll.studies.stability_reproducers import write_reproducers
 
 SPEED = Axis("V0", "m/s", "initial speed", [2.0, 8.0], {"speed": Term()})
@@ -161,6 +161,28 @@ def test_scale_free_axes() -> None:
         periods = [1 / numbers(body, 1.0)["oscillation"] for body in found]
         first, second = (numbers(body, 0.01 * period) for body, period in zip(found, periods, strict=True))
         assert first == pytest.approx(second)
+
+
+def test_a_dependence_on_scale() -> None:
+    """A boundary that moves along a scale-free axis by more than the rungs are apart is a finding."""
+
+    def points(*largest: float | None) -> list[dict[str, Any]]:
+        return [
+            {
+                "value": 10.0**k,
+                "period": 2.0,
+                "resolution": "dt",
+                "sides": {"stable": {"largest": x, "failure": "refused"}},
+            }
+            for k, x in enumerate(largest)
+        ]
+
+    assert _dependence(points(0.1, 0.1, 0.15), "stable") == ""
+    assert _dependence(points(None, None), "stable") == ""
+    assert "0.05 of the natural time at 1, but 0.02 of the natural time at 10" in _dependence(
+        points(0.1, 0.04), "stable"
+    )
+    assert "nowhere at 10 (refused)" in _dependence(points(0.1, None), "stable")
 
 
 def test_what_explains_a_boundary() -> None:

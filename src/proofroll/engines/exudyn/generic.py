@@ -109,6 +109,30 @@ class Generic:
             items.CoordinateVectorConstraint(markerNumbers=all_of, scalingMarker1=rows, velocityLevel=True)
         )
 
+    def numbers(self, body: RollingBall) -> list[str]:
+        """Assignments for the program of :mod:`reproducer`.
+
+        Raises:
+            Refused: the weight turns with the coordinates.
+        """
+        weight = _weight(body, self.local, body.ball.mass * _base(self.local))
+        forces = [weight([0.0, *(body.u0 + turned), 0.0, 0.0, 0.0]) for turned in (np.zeros(2), np.ones(2))]
+        if forces[0] != forces[1]:
+            raise Refused("the program for this formulation has no gravity across the wall's axis")
+        generators = [(generator.kind, list(generator.axis)) for generator in self.local.generators]
+        mass = self.system.GetObject(self.object)["massMatrix"].Convert2DenseMatrix()
+        frame = body.surface.frame(body.u0)
+        return [
+            f"MASS_MATRIX = {np.array(mass).tolist()!r}",
+            f"QUADRATIC = {quadratic_terms(body, self.local)!r}",
+            f"WEIGHT = {forces[0]!r}",
+            f"ROWS = {np.array(self.system.GetObject(self.rolling)['scalingMarker1']).tolist()!r}",
+            f"COORDINATES = {body.u0.tolist()!r}",
+            f"RATES = {[0.0, *body.udot0.tolist(), *(frame.T @ body.w0).tolist()]!r}",
+            f"TANGENTS = {self.local.tangents.tolist()!r}",
+            f"GENERATORS = {generators!r}",
+        ]
+
     def sample(self) -> Sample:
         """See :class:`proofroll.engine.Engine`. The spin is a quasi-velocity, so there is no orientation to report.
 
@@ -188,12 +212,12 @@ def _base(local: LocalGeometry) -> FloatArray:
     return np.concatenate([np.eye(3)[:, :1], local.tangents], axis=1)
 
 
-def _force_function(body: RollingBall, local: LocalGeometry, friction: Sliding | None) -> Any:
-    """Right-hand side of M q̈ + Cᵀλ = Q as plain floats: Exudyn calls it for every residual."""
-    m, J, f = body.ball.mass, body.ball.inertia, body.contact.rolling_resistance
-    tangents = local.tangents
-    # All inertial terms are quadratic in the velocities: Q_r = Σ c_rij q̇_i q̇_j. Terms with the distance itself as a
-    # factor are left out: the constraint keeps it at zero.
+def quadratic_terms(body: RollingBall, local: LocalGeometry) -> list[tuple[int, int, int, float]]:
+    """All inertial terms Q_r = Σ c_rij q̇_i q̇_j as (r, i, j, c).
+
+    Terms with the distance itself as a factor are left out: the constraint keeps it at zero.
+    """
+    m, J = body.ball.mass, body.ball.inertia
     c = np.zeros((SIZE, SIZE, SIZE))
     base = _base(local)
     c[:3, 1:3, 1:3] = -m * np.einsum("ir,ijk->rjk", base, local.second)
@@ -201,9 +225,16 @@ def _force_function(body: RollingBall, local: LocalGeometry, friction: Sliding |
         turn = local.turn[:, k]
         c[:3, 0, 1 + k] -= 2 * m * base.T @ np.cross(turn, [1.0, 0.0, 0.0])
         c[3:, 1 + k, 3:] -= J * np.cross(turn, np.eye(3)).T
-    quadratic = [(int(r), int(i), int(j), float(c[r, i, j])) for r, i, j in np.argwhere(np.abs(c) > 0)]
+    return [(int(r), int(i), int(j), float(c[r, i, j])) for r, i, j in np.argwhere(np.abs(c) > 0)]
+
+
+def _force_function(body: RollingBall, local: LocalGeometry, friction: Sliding | None) -> Any:
+    """Right-hand side of M q̈ + Cᵀλ = Q as plain floats: Exudyn calls it for every residual."""
+    f = body.contact.rolling_resistance
+    tangents = local.tangents
+    quadratic = quadratic_terms(body, local)
     (t2u, t2v), (t3u, t3v) = tangents[1:].tolist()
-    weight = _weight(body, local, m * base)
+    weight = _weight(body, local, body.ball.mass * _base(local))
 
     def force(system: Any, t: float, item: int, q: list[float], rates: list[float]) -> list[float]:  # noqa: ARG001 -- Exudyn's signature
         result: list[float] = weight(q)

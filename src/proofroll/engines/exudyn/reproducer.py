@@ -12,7 +12,6 @@ from proofroll.engines.exudyn.generic import Generic
 from proofroll.engines.exudyn.native import exu
 from proofroll.engines.exudyn.rolling_disc import RollingDisc
 from proofroll.engines.exudyn.settings import ExudynSettings
-from proofroll.errors import Refused
 from proofroll.reproducing import assigned, ball_numbers, refuse_terms, wall_source
 from proofroll.scene import RollingBall
 
@@ -112,6 +111,50 @@ def watch(mbs, t):
 mbs.SetPostStepUserFunction(watch)
 """
 
+_GENERIC = """
+# q = (distance towards the wall, the wall's two coordinates, and three whose rates are the spin along e1, e2, e3)
+ode = mbs.AddNode(items.NodeGenericODE2(
+    referenceCoordinates=[0.0] * 6, initialCoordinates=[0.0, *COORDINATES, 0.0, 0.0, 0.0],
+    initialCoordinates_t=RATES, numberOfODE2Coordinates=6,
+))
+
+
+def force(mbs, t, item, q, rates):
+    \"\"\"Right-hand side: weight and the inertial terms, which are quadratic in the rates.\"\"\"
+    result = list(WEIGHT)
+    for row, i, j, factor in QUADRATIC:
+        result[row] += factor * rates[i] * rates[j]
+    return result
+
+
+mbs.AddObject(items.ObjectGenericODE2(nodeNumbers=[ode], massMatrix=np.array(MASS_MATRIX), forceUserFunction=force))
+ground = mbs.AddNode(items.NodePointGround())
+distance = [mbs.AddMarker(items.MarkerNodeCoordinate(nodeNumber=number, coordinate=0)) for number in (ground, ode)]
+whole = [mbs.AddMarker(items.MarkerNodeCoordinates(nodeNumber=number)) for number in (ground, ode)]
+mbs.AddObject(items.CoordinateConstraint(markerNumbers=distance))
+mbs.AddObject(items.CoordinateVectorConstraint(
+    markerNumbers=whole, scalingMarker1=np.array(ROWS), velocityLevel=True
+))
+"""
+
+_GENERIC_STATE = """
+
+def state_of_ball():
+    \"\"\"Centre, velocity and angular velocity in the world.\"\"\"
+    q, rates = mbs.systemData.GetODE2Coordinates(), mbs.systemData.GetODE2Coordinates_t()
+    p = np.array(POSITION)
+    for (kind, axis), u, start in reversed(list(zip(GENERATORS, q[1:3], COORDINATES))):
+        n, angle = np.array(axis), u - start
+        if kind == "translation":
+            p = p + angle * n
+        else:
+            along = np.dot(n, p) * n
+            p = along + np.cos(angle) * (p - along) + np.sin(angle) * np.cross(n, p)
+    e = frame(p)
+    v = np.array(TANGENTS) @ rates[1:3] + np.array([rates[0], 0.0, 0.0])
+    return p + q[0] * e[0], v @ e, np.array(rates[3:]) @ e
+"""
+
 _SOLVER = """
 mbs.Assemble()
 
@@ -184,10 +227,9 @@ def source(model: Any, body: RollingBall, settings: ExudynSettings) -> str:
     Raises:
         Refused: the scene has a term that the program has not.
     """
-    if isinstance(model, Generic):
-        raise Refused("this formulation's equations are the adapter's own; only Exudyn's integration is Exudyn's")
     refuse_terms(body, friction=isinstance(model, Contact))
-    numbers = ball_numbers(body) | {"START_SPIN": _start_spin(model)}
+    generic = isinstance(model, Generic)
+    numbers = ball_numbers(body) | ({} if generic else {"START_SPIN": _start_spin(model)})
     numbers |= {"STEP_SIZE": settings.dt, "NEWTON_TOLERANCE": settings.newton_tolerance}
     start = _start(model)
     lines = [
@@ -199,7 +241,7 @@ def source(model: Any, body: RollingBall, settings: ExudynSettings) -> str:
         f"MULTIPLIERS = {start[1]!r}",
         *_numbers(model, body),
     ]
-    parts = {Carrier: _CARRIER, RollingDisc: _ROLLING_DISC, Contact: _CONTACT}
+    parts = {Generic: _GENERIC, Carrier: _CARRIER, RollingDisc: _ROLLING_DISC, Contact: _CONTACT}
     return (
         "import exudyn as exu\nimport exudyn.itemInterface as items\nimport numpy as np\n\n"
         + assigned(**numbers)
@@ -207,10 +249,10 @@ def source(model: Any, body: RollingBall, settings: ExudynSettings) -> str:
         + "\n"
         + wall_source(body)
         + "\nexu.config.printToConsole = False\nmbs = exu.SystemContainer().AddSystem()\n"
-        + _BALL
+        + ("" if generic else _BALL)
         + parts[type(model)]
         + _SOLVER
-        + _BALL_STATE
+        + (_GENERIC_STATE if generic else _BALL_STATE)
     )
 
 
@@ -223,8 +265,8 @@ def _start_spin(model: Any) -> Any:
 
 def _start(model: Any) -> tuple[list[float], list[float]]:
     """Accelerations and multipliers at time 0, where the adapter gives them; else nothing."""
-    if isinstance(model, Contact):
-        return [], []
+    if isinstance(model, (Contact, Generic)):
+        return [], []  # Exudyn finds them
     data = model.system.systemData
     initial = data.GetODE2Coordinates_tt(exu.ConfigurationType.Initial)
     return np.array(initial).tolist(), np.array(data.GetAECoordinates()).tolist()
@@ -232,7 +274,7 @@ def _start(model: Any) -> tuple[list[float], list[float]]:
 
 def _numbers(model: Any, body: RollingBall) -> list[str]:
     """Assignments that only one formulation needs."""
-    if isinstance(model, Carrier):
+    if isinstance(model, (Carrier, Generic)):
         return model.numbers(body)
     if isinstance(model, Contact):
         contact = model.system.GetObject(model.contact)
