@@ -307,3 +307,27 @@ def test_silent(capfd: pytest.CaptureFixture[str]) -> None:
         build(cylinder(), "exudyn", formulation=formulation, dt=1e-3).advance(0.01)
     out, err = capfd.readouterr()
     assert out + err == ""
+
+
+@pytest.mark.parametrize("formulation", ["generic", "carrier", "rolling_disc"])
+@pytest.mark.parametrize("size", [1e-6, 1e6])
+def test_size_does_not_matter(formulation: str, size: float) -> None:
+    """With all lengths scaled, and the speed as the root of that, the height scales along: nothing has a size."""
+
+    def height(factor: float) -> float:
+        lengths = {"radius": 0.025 * factor, "cylinder_radius": 0.225 * factor, "speed": 4 * factor**0.5}
+        clock = factor**0.5
+        run = simulate(
+            load_scene("sphere_in_cylinder", **lengths), "exudyn", formulation=formulation, dt=1e-3 * clock,
+            until=0.05 * clock, every=0.05 * clock,
+        )  # fmt: skip
+        return float(run["z"][-1]) / factor
+
+    assert height(size) == pytest.approx(height(1.0), rel=1e-4)
+
+
+def test_a_contact_too_soft_for_its_load() -> None:
+    """A load that would press the ball into the wall by its radius is refused, not left to crash."""
+    heavy = load_scene("sphere_in_cylinder", mass=1e6)
+    with pytest.raises(Refused, match="larger stiffness"):
+        build(heavy, "exudyn", formulation="contact")

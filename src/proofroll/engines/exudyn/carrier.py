@@ -60,7 +60,7 @@ class Carrier:
         result = []
         for along, about, sign in ((1, 2, 1.0), (2, 1, -1.0)):
             row = local.tangents[along] + sign * a * local.turn[about]
-            (columns,) = np.nonzero(np.abs(row) > 1e-12)
+            (columns,) = np.nonzero(np.abs(row) > 1e-12 * np.max(np.abs(row)))
             if len(columns) != 1:
                 raise Refused("rolling along one direction needs both of the carrier's coordinates at once")
             k = int(columns[0])

@@ -62,6 +62,8 @@ class Contact:
             raise Refused("rolling needs more friction than grip at time 0; use a larger grip")
         creep = -self.zone * friction / (max(mu * N, needed) or 1.0)
         sunk = N / stiffness
+        if sunk >= body.ball.radius:
+            raise Refused(f"the load presses the ball {sunk:.3g} m into so soft a wall; use a larger stiffness")
         self.container, self.system = new_system()
         rolling = dataclasses.replace(body, w0=body.w0 + np.cross(e1, creep) / body.ball.radius)
         self.ball = add_ball(self.system, rolling)

@@ -41,7 +41,7 @@ def local_geometry(surface: Surface, u0: FloatArray) -> LocalGeometry:
     for step in ((0.3, 0.0), (0.0, 0.3), (-0.7, 0.4)):
         there = _coefficients(surface, generators, u0 + np.asarray(step))
         for name, one, other in zip(("tangents", "second derivatives", "turn"), here, there, strict=True):
-            if not np.allclose(one, other, rtol=1e-9, atol=1e-12):
+            if not np.allclose(one, other, rtol=1e-9, atol=1e-12 * float(np.max(np.abs(one)))):
                 raise Refused(f"the {name} of the wall change from place to place in the local frame")
     return LocalGeometry(*here, generators)
 
@@ -55,8 +55,10 @@ def _coefficients(
         if generator.kind == "rotation":
             turn[:, column] = to_local @ np.asarray(generator.axis)
     second = np.einsum("ij,jkl->ikl", to_local, surface.second(u))
-    # Projections that vanish on paper are left as round-off by the tilt of the world; they would only cost time.
-    rounded = (np.where(np.abs(x) < 1e-14, 0.0, x) for x in (to_local @ surface.tangents(u), second, turn))
+    # Projections that vanish on paper are left as round-off by the tilt of the world; they would only cost time. How
+    # large round-off is depends on the size of the wall.
+    derivatives = (to_local @ surface.tangents(u), second, turn)
+    rounded = (np.where(np.abs(x) < 1e-14 * np.max(np.abs(x)), 0.0, x) for x in derivatives)
     tangents, second, turn = rounded
     return tangents, second, turn
 
