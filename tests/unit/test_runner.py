@@ -119,7 +119,7 @@ def test_an_error_in_progress_ends_the_run(tmp_path: Path, make_case: MakeCase) 
     runner = Runner(Store(tmp_path), jobs=2)
     with pytest.raises(KeyboardInterrupt):
         runner.run([make_case("hangs"), make_case("oracle")], interrupt)
-    assert not runner._workers
+    assert not runner._busy
 
 
 def test_a_damaged_result_says_so_once(tmp_path: Path, make_case: MakeCase) -> None:

@@ -18,6 +18,7 @@ from proofroll.scene import Scene
 from proofroll.scene_file import load_scene
 from proofroll.studies.reference import Reference
 from proofroll.trajectory import read
+from proofroll.workers import Workers
 
 # Samples per run. An oscillation of the founding scene's z has a dozen of them, and an adaptive step, which ends at
 # each, is still as long as it likes to be.
@@ -110,18 +111,19 @@ class Curve:
         return self.facts.resolution == "dt"
 
 
-def curves_of(engines: Iterable[str]) -> tuple[list[Curve], dict[str, str]]:
+def curves_of(engines: Iterable[str], workers: Workers | None = None) -> tuple[list[Curve], dict[str, str]]:
     """A curve without points for every formulation and preset of the engines, and why some engine has none.
 
     Args:
         engines: names, or ``name[key=value,…]`` for one formulation or setting; all that are installed if empty.
+        workers: processes in which they are asked.
     """
     wanted: list[tuple[str, str | None]] = []
     absent: dict[str, str] = {}
     for text in list(engines) or engine_names():
         spec = parse_engine(text)
         try:
-            described = describe(spec.name)
+            described = describe(spec.name, workers)
         except InputError:
             raise
         except ProofrollError as error:
@@ -141,7 +143,8 @@ def curves_of(engines: Iterable[str]) -> tuple[list[Curve], dict[str, str]]:
             raise InputError("engine", text, f"{spec.name} has {', '.join(described['presets'])}")
     specs = [parse_engine(name) for name, _ in wanted]
     curves = []
-    for (name, level), facts in zip(wanted, resolve([(spec.name, spec.options) for spec in specs]), strict=True):
+    resolved = resolve([(spec.name, spec.options) for spec in specs], workers)
+    for (name, level), facts in zip(wanted, resolved, strict=True):
         if isinstance(facts, InputError):
             raise facts
         if isinstance(facts, EngineFacts) and facts.resolution is not None:
@@ -218,7 +221,7 @@ def _run(
     for index, value in wanted:
         facts = curves[index].facts
         options.append((facts.name, {**facts.settings, str(facts.resolution): value}))
-    resolved = resolve([*options, ("truth", {})])
+    resolved = resolve([*options, ("truth", {})], runner.workers)
     truth_facts = resolved.pop()
     if not isinstance(truth_facts, EngineFacts):
         raise truth_facts
