@@ -165,10 +165,10 @@ def _run(case: Case, out: Path) -> Result:
 
     versions = {case.engine.name: case.engine.version, "proofroll": proofroll.__version__}
     versions["python"] = platform.python_version()
-    scene = load_scene(case.scene, **case.parameters)
+    scene = load_scene(case.scene, asks=case.asks, **case.parameters)
     times = time_grid(case.until, case.every)
     if case.engine.name == "truth":
-        return _run_truth(scene, times, out, versions)
+        return _run_truth(case, scene, times, out, versions)
     kind = load_engine(case.engine.name)
     settings = resolve_settings(kind, case.engine.settings)
     lacking = scene.requires - kind.provides
@@ -208,12 +208,14 @@ def _run(case: Case, out: Path) -> Result:
     return result
 
 
-def _run_truth(scene: Any, times: Any, out: Path, versions: dict[str, str]) -> Result:
+def _run_truth(case: Case, scene: Any, times: Any, out: Path, versions: dict[str, str]) -> Result:
     from proofroll.trajectory import write
     from proofroll.truth import truth
 
     start = time.perf_counter()
     try:
+        if case.asks:
+            raise Refused(f"the truth is that of the motion and gives no {', '.join(case.asks)}; ask an engine for it")
         dataset = truth(scene, times)
     except Refused as error:
         return Result(Status.REFUSED, str(error), versions=versions)
@@ -238,7 +240,7 @@ def time_once(case: dict[str, Any], seconds: float) -> dict[str, Any]:
     wanted = Case.from_dict(case)
     kind = load_engine(wanted.engine.name)
     settings = resolve_settings(kind, wanted.engine.settings)
-    scene = load_scene(wanted.scene, **wanted.parameters)
+    scene = load_scene(wanted.scene, asks=wanted.asks, **wanted.parameters)
     times = time_grid(wanted.until, wanted.every)
     elapsed = simulated = 0.0
     for _ in range(_MOST_BUILDS):
