@@ -85,7 +85,8 @@ def _answer(request: dict[str, Any]) -> dict[str, Any]:
 
 
 def describe(engine: str) -> dict[str, Any]:
-    """What an engine is and provides."""
+    """What an engine is and provides, and where its formulations stand on the ladder of models."""
+    from proofroll.engine import CannotLeaveOut, TellsLevels
     from proofroll.registry import load_engine
 
     kind = load_engine(engine)
@@ -99,6 +100,11 @@ def describe(engine: str) -> dict[str, Any]:
         "provides": sorted(kind.provides),
         "presets": presets,
         "summary": (inspect.getdoc(kind) or "").split("\n", 1)[0],
+        "levels": dict(kind.levels) if isinstance(kind, TellsLevels) else {},
+        "terms": [dataclasses.asdict(term) for term in kind.terms] if isinstance(kind, TellsLevels) else [],
+        "inherent": {key: dict(terms) for key, terms in kind.inherent.items()}
+        if isinstance(kind, CannotLeaveOut)
+        else {},
     }
 
 

@@ -11,6 +11,7 @@ import typer
 import proofroll
 from proofroll.cli.common import ENGINE, INTERRUPTED, OK, USAGE, complain
 from proofroll.cli.comparing import compare, regimes, report
+from proofroll.cli.ladder import ladder
 from proofroll.cli.listing import engines, scenes
 from proofroll.cli.single import onset, run
 from proofroll.errors import InputError, Missing, ProofrollError
@@ -21,7 +22,7 @@ app = typer.Typer(
     pretty_exceptions_enable=False,
     rich_markup_mode=None,
 )
-for _command in (scenes, engines, run, compare, report, onset, regimes):
+for _command in (scenes, engines, run, compare, report, onset, regimes, ladder):
     app.command()(_command)
 
 
