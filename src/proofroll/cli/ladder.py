@@ -31,6 +31,7 @@ def ladder(
     tolerance: Annotated[float | None, typer.Option(help="Error of it that is allowed, in its unit.")] = None,
     until: Annotated[float, typer.Option(help="Last time [s].")] = 2.0,
     engine: Engines = None,
+    rounds: Annotated[int | None, typer.Option(min=1, help="Rounds of timing; fewer say less. By default 5.")] = None,
     out: Out = Path("out"),
     fresh: Fresh = False,
     jobs: Jobs = None,
@@ -48,6 +49,7 @@ def ladder(
         until=until,
         tolerance=tolerance,
         engines=list(dict.fromkeys(engine or [])),
+        rounds=rounds,
     )
     with progress_bar("runs") as advance:
         study.run(advance)

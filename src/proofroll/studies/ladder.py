@@ -75,7 +75,7 @@ class Ladder:
         tolerance: error of the quantity that is allowed, in its unit; None: a term counts if it moves the quantity by
             more than the smaller of the errors with and without it.
         engines: names; all if empty.
-        rounds: of the timing that count.
+        rounds: of the timing that count; as many as a timing has by default if None.
 
     Raises:
         InputError: something that was given does not exist or makes no sense.
@@ -92,7 +92,7 @@ class Ladder:
         until: float = 2.0,
         tolerance: float | None = None,
         engines: Sequence[str] = (),
-        rounds: int = ROUNDS,
+        rounds: int | None = None,
     ) -> None:
         self._grid = time_grid(until, _EVERY)
         if until <= 0:
@@ -100,7 +100,7 @@ class Ladder:
         if tolerance is not None and not (math.isfinite(tolerance) and tolerance > 0):
             raise InputError("tolerance", tolerance, "give a positive number in the unit of the quantity")
         self._name, self._runner, self.until = scene, runner, until
-        self.tolerance, self._rounds = tolerance, rounds
+        self.tolerance, self._rounds = tolerance, rounds or ROUNDS
         self.scene = load_scene(scene, **parameters)
         self._given = {name: self.scene.parameters[name] for name in parameters}
         known = units(self.scene.rolling)
@@ -157,6 +157,7 @@ class Ladder:
         )
 
     def _run_truths(self, wanted: Sequence[dict[str, float]], progress: Callable[[str], None]) -> None:
+        wanted = [point for point in wanted if str(point) not in self.truths]
         cases = {str(point): self._case(self._truth_facts, Model("truth", {}, point)) for point in wanted}
         results = self._runner.run(cases.values(), lambda *_: progress("truth"))
         for point in wanted:
@@ -164,8 +165,7 @@ class Ladder:
             result = results[case.key]
             if result.status != Status.DONE:
                 raise Refused(f"there is no truth of this scene: {result.message}")
-            if str(point) not in self.truths:
-                self.truths[str(point)] = self._truth(read(self._runner.store.trajectory(case)), point)
+            self.truths[str(point)] = self._truth(read(self._runner.store.trajectory(case)), point)
 
     def _truth(self, dataset: xr.Dataset, point: dict[str, float]) -> Truth:
         values = self._curve(point, dataset)
