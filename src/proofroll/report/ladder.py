@@ -114,6 +114,7 @@ def _term(study: Ladder, switch: Switch) -> dict[str, Any]:
         cost,
         tolerance=study.tolerance,
         bar=study.truths[str(point)].error_bar,
+        scale=scales(study.scene.rolling, study.truths[str({})].dataset).get(study.quantity, 1.0),
     )
     return content | {
         **{
@@ -137,7 +138,7 @@ def _findings(content: dict[str, Any]) -> Iterator[str]:
     name, unit = content["quantity"], content["unit"]
     empty = [rung["level"] for rung in content["rungs"] if rung["status"] == "empty"]
     if empty:
-        yield f"No engine that was asked has a model of the level {' or '.join(empty)}."
+        yield f"No engine that was asked has a model of the level {', '.join(empty)}."
     # A rung that is off by the whole size of the quantity has no answer, however cheap.
     useful = [
         rung
@@ -151,7 +152,7 @@ def _findings(content: dict[str, Any]) -> Iterator[str]:
         yield _cheapest(useful, content["tolerance"], f"{content['tolerance']:g} {unit}")
     yield from _of_terms(content)
     for rung in content["rungs"]:
-        if rung["status"] not in {"done", "empty"}:
+        if rung["status"] not in {"done", "empty"} and not rung["variant"]:  # those are among the terms
             yield f"{_label(rung)} {rung['status']}: {rung['message']}."
     for engine, told in content["absent"].items():
         yield f"{engine} is {told['status']}: {told['message']}."

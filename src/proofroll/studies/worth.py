@@ -9,6 +9,8 @@ from proofroll.timing import Interval
 
 # A ratio of costs below this is nothing to be saved.
 _FELT = 1.02
+# A change by this part of the quantity's size is round-off that has grown: nobody's answer hangs on it.
+_ROUND_OFF = 1e-9
 
 
 class Worth(StrEnum):
@@ -36,12 +38,20 @@ class Side:
 
 
 def worth(
-    on: Side, off: Side, change: float | None, cost: Interval | None, *, tolerance: float | None, bar: float
+    on: Side,
+    off: Side,
+    change: float | None,
+    cost: Interval | None,
+    *,
+    tolerance: float | None,
+    bar: float,
+    scale: float,
 ) -> tuple[Worth, str]:
     """The verdict, and why.
 
     A term moves the answer if leaving it out changes the quantity by more than is allowed: by the tolerance, or where
-    none is given by the smaller of the two errors; never by less than the truth's error bar.
+    none is given by the smaller of the two errors, and by more than round-off; never by less than the truth's error
+    bar.
 
     Args:
         on: with the term.
@@ -50,12 +60,13 @@ def worth(
         cost: how many times longer it takes with the term; None if that is not known.
         tolerance: error that is allowed; None: whatever is left anyway.
         bar: error bar of the truth.
+        scale: size of the quantity.
     """
     if on.error is None:
         return Worth.NO_ANSWER, f"with it: {on.said}"
     if off.error is None or change is None:
         return Worth.NEEDED, f"without it: {off.said}"
-    limit = max(min(on.error, off.error) if tolerance is None else tolerance, bar)
+    limit = max(bar, max(min(on.error, off.error), _ROUND_OFF * scale) if tolerance is None else tolerance)
     allowed = f"the tolerance, {limit:.2g}" if tolerance is not None else f"the error that is left anyway, {limit:.2g}"
     if change > limit:
         if off.error > on.error:

@@ -85,7 +85,7 @@ def check_terms(content: dict[str, Any]) -> None:
 def check_findings(content: dict[str, Any]) -> None:
     """What is missing, harmful or not on the ladder is said in words, and all of it is plain JSON."""
     said = " ".join(content["findings"])
-    assert "No engine that was asked has a model of the level closed form or projection DAE" in said
+    assert "No engine that was asked has a model of the level closed form, projection DAE, " in said
     assert "gale moves z away from the truth in laddered heavier" in said
     assert "absent is missing" in said
     assert "Not on the ladder, for they tell no levels: tiny." in said

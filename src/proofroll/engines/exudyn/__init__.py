@@ -30,7 +30,11 @@ MODELS: Mapping[str, type[Model]] = {
 
 
 class Exudyn:
-    """Exudyn's implicit integration of multibody systems with constraints, or with its penalty contact."""
+    """Exudyn's implicit integration of multibody systems with constraints, or with its penalty contact.
+
+    Where the ball is a rigid body its orientation is in the model, asked for or not: the node's Euler parameters are
+    its coordinates. ``generic`` has no orientation at all.
+    """
 
     name: ClassVar[str] = "exudyn"
     provides: ClassVar[frozenset[Capability]] = frozenset(

@@ -67,7 +67,10 @@ _PRESSED = 1e-6
 
 
 class Mujoco:
-    """MuJoCo behind proofroll's protocol."""
+    """MuJoCo behind proofroll's protocol.
+
+    The ball's orientation is in every model, asked for or not: free and ball joints have it in their state.
+    """
 
     name: ClassVar[str] = "mujoco"
     provides: ClassVar[frozenset[Capability]] = frozenset(
