@@ -1,7 +1,9 @@
 """Exudyn (https://github.com/jgerstmayr/EXUDYN), an engine for flexible and rigid multibody systems.
 
 It has no joint for a sphere on a curved wall. Four models of one are built here from what it has; see the modules
-:mod:`generic`, :mod:`carrier`, :mod:`rolling_disc` and :mod:`contact`. The first and the last let the ball slip.
+:mod:`generic`, :mod:`carrier`, :mod:`rolling_disc` and :mod:`contact`. The first and the last let the ball slip. In all
+but the first the ball is a rigid body, whose orientation is in the model, asked for or not: the node's Euler parameters
+are its coordinates.
 """
 
 from __future__ import annotations
@@ -30,11 +32,7 @@ MODELS: Mapping[str, type[Model]] = {
 
 
 class Exudyn:
-    """Exudyn's implicit integration of multibody systems with constraints, or with its penalty contact.
-
-    Where the ball is a rigid body its orientation is in the model, asked for or not: the node's Euler parameters are
-    its coordinates. ``generic`` has no orientation at all.
-    """
+    """Exudyn's implicit integration of multibody systems with constraints, or with its penalty contact."""
 
     name: ClassVar[str] = "exudyn"
     provides: ClassVar[frozenset[Capability]] = frozenset(
