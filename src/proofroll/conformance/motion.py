@@ -63,12 +63,11 @@ def engines_do_not_disturb_each_other(subject: Subject) -> None:
     """Two engines that are alive at once, with different scenes, each move as they do alone."""
     t = subject.span(2)
     parameters = dict(subject.scene.parameters)
+    parameters |= {"mass": 2 * parameters["mass"], "speed": -parameters["speed"]}
     other = Subject(
         subject.engine,
         subject.settings,
-        load_scene(
-            subject.scene.name, **(parameters | {"mass": 2 * parameters["mass"], "speed": -parameters["speed"]})
-        ),
+        load_scene(subject.scene.name, asks=subject.scene.asks, **parameters),
     )
     alone = [bits(each.at(t).sample()) for each in (subject, other)]
     together = [subject.build(), other.build()]

@@ -32,6 +32,7 @@ def scenes() -> dict[str, Scene]:
         "plane-resisting": load_scene("inclined_plane", **plane, rolling_resistance=5e-4),
         "plane": load_scene("inclined_plane", **plane),
         "cylinder-slipping": load_scene("sphere_in_cylinder", **cylinder, mu_static=0.35),
+        "cylinder-oriented": load_scene("sphere_in_cylinder", **cylinder, asks=("orientation",)),
     }
 
 

@@ -143,7 +143,7 @@ def _mapped(
     with ProcessPoolExecutor(workers, mp_context=get_context("spawn")) as pool:
         signal.pthread_sigmask(signal.SIG_BLOCK, {signal.SIGINT})  # inherited: Ctrl-C is the parent's affair
         try:
-            # Not map, which cancels what is left when it is interrupted: a pool whose processes are then ended complains.
+            # Not map, which cancels the rest when interrupted: a pool whose processes are then ended complains.
             rows = [pool.submit(row, speed) for speed in speeds]
         finally:
             signal.pthread_sigmask(signal.SIG_UNBLOCK, {signal.SIGINT})

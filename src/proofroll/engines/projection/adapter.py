@@ -3,19 +3,19 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from typing import ClassVar, Self
 
 import numpy as np
 
 import proofroll
-from proofroll.engine import Built, Sample
+from proofroll.engine import Built, Level, Sample, Term
 from proofroll.engines.projection.friction import Friction
 from proofroll.engines.projection.geometry import geometry_of
 from proofroll.engines.projection.integrators import INTEGRATORS, Integrator
 from proofroll.engines.projection.method import ProjectedBall
 from proofroll.engines.projection.modes import Pace
-from proofroll.engines.projection.orientation import EulerAngles, Orientation, RotatingFrame
+from proofroll.engines.projection.orientation import EulerAngles, FollowedFrame, Orientation, RotatingFrame
 from proofroll.engines.projection.settings import PRESETS, ProjectionSettings
 from proofroll.engines.projection.stepping import STEPPERS
 from proofroll.engines.projection.switching import Switching
@@ -24,7 +24,8 @@ from proofroll.events import Event
 from proofroll.scene import Capability, RollingBall, Scene
 from proofroll.surfaces import FloatArray
 
-_ORIENTATIONS: Mapping[str, type[Orientation]] = {"euler": EulerAngles, "rotating_frame": RotatingFrame}
+# Numbers of the state that are not the ball's orientation: two coordinates and five velocities.
+_WITHOUT_ORIENTATION = 7
 
 
 class Projection:
@@ -37,10 +38,25 @@ class Projection:
             Capability.CURVED_SURFACE,
             Capability.ROLLING_RESISTANCE,
             Capability.BOUNDED_FRICTION,
+            Capability.ORIENTATION,
         }
     )
     settings: ClassVar[type[ProjectionSettings]] = ProjectionSettings
     presets: ClassVar[Mapping[str, Mapping[str, ProjectionSettings]]] = PRESETS
+    levels: ClassVar[Mapping[str, Level]] = {"euler": Level.PROJECTION, "rotating_frame": Level.PROJECTION}
+    terms: ClassVar[Sequence[Term]] = (
+        Term(
+            "elimination of violations",
+            ("euler", "rotating_frame"),
+            {"elimination": True},
+            {"elimination": False},
+            "takes away the slip that a step leaves (Blajer 2002); where rolling is linear with constant coefficients, "
+            "as in the rotating frame, there is none",
+        ),
+    )
+    inherent: ClassVar[Mapping[str, Mapping[Capability, str]]] = {
+        "euler": {Capability.ORIENTATION: "the Euler angles are coordinates of the equations of motion"}
+    }
 
     @staticmethod
     def version() -> str:
@@ -50,13 +66,19 @@ class Projection:
     @classmethod
     def build(cls, scene: Scene, settings: ProjectionSettings) -> Self:
         """See :class:`proofroll.engine.Engine`."""
-        return cls(scene.rolling, settings)
+        return cls(scene.rolling, settings, follow=Capability.ORIENTATION in scene.requires)
 
-    def __init__(self, body: RollingBall, settings: ProjectionSettings) -> None:
+    def __init__(self, body: RollingBall, settings: ProjectionSettings, *, follow: bool = False) -> None:
+        """The ball at time 0; ``follow`` its orientation too where the formulation does not need it."""
         self._surface = body.surface
-        self._orientation = _ORIENTATIONS[settings.formulation]()
+        geometry = geometry_of(body.surface)
+        self._orientation: Orientation
+        if settings.formulation == "euler":
+            self._orientation = EulerAngles()
+        else:
+            self._orientation = FollowedFrame(geometry) if follow else RotatingFrame()
         self._coordinates = 2 + self._orientation.size
-        self._ball = ProjectedBall(body, geometry_of(body.surface), self._orientation)
+        self._ball = ProjectedBall(body, geometry, self._orientation)
         self._eliminate = settings.elimination
         integrator = INTEGRATORS[settings.integrator]
         self._fixed_step = settings.dt if integrator.resolution == "dt" else 0.0
@@ -133,7 +155,17 @@ class Projection:
             mu_kinetic=self._friction.mu_kinetic if self._friction else None,
             acceleration=kin.local.frame @ acceleration[:3],
             angular_acceleration=kin.local.frame @ acceleration[3:],
+            terms=frozenset(self._terms()),
         )
+
+    def _terms(self) -> Iterator[Capability]:
+        """What the equations hold besides rolling."""
+        if self._ball.rolling_resistance:
+            yield Capability.ROLLING_RESISTANCE
+        if isinstance(self._motion, Switching):
+            yield Capability.BOUNDED_FRICTION
+        if len(self._motion.x) > _WITHOUT_ORIENTATION:
+            yield Capability.ORIENTATION
 
 
 def _speed(body: RollingBall) -> float:

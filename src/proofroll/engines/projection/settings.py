@@ -20,7 +20,8 @@ class ProjectionSettings:
 
     Attributes:
         formulation: ``euler``, the paper's angles, with a singularity; or ``rotating_frame``, the angular velocity
-            along the local axes, without.
+            along the local axes, without. The angles are always part of the equations; in the rotating frame the
+            orientation is followed, as a quaternion, only for a scene that asks for it.
         preset: where the other values come from.
         integrator: ``rk4`` with the fixed step ``dt``, or ``dop853`` with the tolerance ``rtol``.
         dt: step of rk4 [s].
