@@ -33,6 +33,7 @@ _FOUNDATION = (
     "certificate.py",
     "closed_form.py",
     "compiled/library.py",
+    "compiled/projection.py",
     "compiled/rolling.py",
     "compiled/series.py",
     "engine.py",
