@@ -22,7 +22,7 @@ import numpy.typing as npt
 
 from proofroll.compiled.rolling import Function
 from proofroll.scene import RollingBall
-from proofroll.surfaces import Cylinder
+from proofroll.surfaces import Cylinder, FloatArray
 
 Formulation = Literal["euler", "rotating_frame"]
 _Symbols = npt.NDArray[np.object_]
@@ -83,6 +83,14 @@ def parameters(body: RollingBall) -> list[float]:
     j = ball.inertia_ratio * ball.radius**2
     per_S = 1 / (1 + ball.radius**2 / j)
     return [j, 1 / j, per_S, ball.radius, body.contact.rolling_resistance, *body.gravity.tolist(), c, 1 / c**2]
+
+
+def start(body: RollingBall, formulation: Formulation) -> FloatArray:
+    """State [q, s] at time 0; the angles start at θ = π/2, as far from the singularity as can be (Blajer 2006)."""
+    if formulation == "rotating_frame":
+        return np.concatenate([body.u0, body.udot0, body.surface.frame(body.u0).T @ body.w0])
+    w_x, w_y, w_z = body.w0  # there φ turns about -y, θ about x and ψ about z
+    return np.concatenate([body.u0, [0.0, np.pi / 2, 0.0], body.udot0, [-w_y, w_x, w_z]])
 
 
 @dataclass(frozen=True)

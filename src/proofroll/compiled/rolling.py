@@ -23,8 +23,9 @@ import numpy as np
 from proofroll.scene import RollingBall
 from proofroll.surfaces import Cylinder, FloatArray, Plane
 
-# Order of the run-time parameters that every expression shares.
-PARAMETERS = ("curvature", "g_x", "g_y", "g_z", "radius", "kappa", "f")
+# Order of the run-time parameters that every expression shares. A product of parameters is one itself, for a series
+# would form it anew in every step.
+PARAMETERS = ("k", "g_x", "g_y", "g_z", "k/a", "k a", "A", "1/A", "f/(kappa a)")
 STATES = ("q", "h", "v2", "v3", "w1")
 
 
@@ -34,17 +35,17 @@ class Expressions:
 
     Attributes:
         state: q, h, v2, v3, ω1.
-        curvature, radius: k [1/m] and a [m].
-        A: (1 + κ)/κ [-].
+        swing: k/a [1/m²].
+        A, per_A: (1 + κ)/κ [-] and its inverse.
         g2, g3: gravity along the surface [m/s²].
         b2, b3: drive [m/s²].
         N: normal force over mass [m/s²].
     """
 
     state: tuple[Any, ...]
-    curvature: Any
-    radius: Any
+    swing: Any
     A: Any
+    per_A: Any
     g2: Any
     g3: Any
     b2: Any
@@ -54,12 +55,12 @@ class Expressions:
     def rates(self, F2: Any, F3: Any, u3: Any = 0.0) -> list[tuple[Any, Any]]:
         """Equations under the friction F [m/s²], where the contact point slips along e3 with ``u3`` [m/s]."""
         q, h, v2, v3, w1 = self.state
-        turning = (v3 - u3) / self.radius * self.curvature * v2
+        turning = self.swing * (v3 - u3) * v2
         return [(q, v2), (h, v3), (v2, self.g2 + F2), (v3, self.g3 + F3), (w1, turning)]
 
     def rolling(self) -> list[tuple[Any, Any]]:
         """Equations of rolling without slip."""
-        return self.rates(-self.b2 / self.A, -self.b3 / self.A)
+        return self.rates(-self.per_A * self.b2, -self.per_A * self.b3)
 
     def excess(self, mu: Any) -> Any:
         """Zero where the needed friction is ``mu`` times the normal force, positive where it is more."""
@@ -83,20 +84,20 @@ def expressions(resistance: bool, uniform: bool) -> Expressions:
     import heyoka as hy
 
     q, h, v2, v3, w1 = hy.make_vars(*STATES)
-    k, gx, gy, gz, a, kappa, f = (hy.par[i] for i in range(len(PARAMETERS)))
+    k, gx, gy, gz, swing, back, A, per_A, lever = (hy.par[i] for i in range(len(PARAMETERS)))
     angle = k * q
     g1, g2 = (gx, gy) if uniform else (gx * hy.cos(angle) + gy * hy.sin(angle), gy * hy.cos(angle) - gx * hy.sin(angle))
     N = g1 + k * v2**2
-    per_speed = f * N / (kappa * a * hy.sqrt(v2**2 + v3**2)) if resistance else hy.expression(0.0)
+    per_speed = lever * N / hy.sqrt(v2**2 + v3**2) if resistance else hy.expression(0.0)
     return Expressions(
         state=(q, h, v2, v3, w1),
-        curvature=k,
-        radius=a,
-        A=(1.0 + kappa) / kappa,
+        swing=swing,
+        A=A,
+        per_A=per_A,
         g2=g2,
         g3=gz,
         b2=g2 + per_speed * v2,
-        b3=gz + a * w1 * k * v2 + per_speed * v3,
+        b3=gz + back * w1 * v2 + per_speed * v3,
         N=N,
     )
 
@@ -139,7 +140,7 @@ def reduced(resistance: bool, uniform: bool, tolerance: float) -> Reduced:
 
     found = expressions(resistance, uniform)
     system = found.rolling()
-    outputs = [*(rate for _, rate in system), found.b2 / found.A, found.b3 / found.A, found.N]
+    outputs = [*(rate for _, rate in system), found.per_A * found.b2, found.per_A * found.b3, found.N]
     return Reduced(
         integrator=hy.taylor_adaptive(system, [1.0] * len(system), tol=tolerance),
         evaluate=Function(outputs, found.state),
@@ -153,15 +154,21 @@ def supports(body: RollingBall) -> bool:
 
 def is_uniform(body: RollingBall) -> bool:
     """Whether gravity's local components do not change along the surface."""
-    return not isinstance(body.surface, Cylinder) or not np.any(_local_gravity(body)[:2])
+    return not isinstance(body.surface, Cylinder) or not np.any(local_gravity(body)[:2])
 
 
 def parameters(body: RollingBall) -> list[float]:
     """Values of :data:`PARAMETERS`."""
-    surface, ball = body.surface, body.ball
+    surface, ball, f = body.surface, body.ball, body.contact.rolling_resistance
     curvature = 1 / surface.radius if isinstance(surface, Cylinder) else 0.0
-    gravity = _local_gravity(body).tolist()
-    return [curvature, *gravity, ball.radius, ball.inertia_ratio, body.contact.rolling_resistance]
+    gravity = local_gravity(body).tolist()
+    return [float(value) for value in parameters_of(curvature, gravity, ball.radius, ball.inertia_ratio, f)]
+
+
+def parameters_of(curvature: Any, gravity: Sequence[Any], radius: Any, kappa: Any, f: Any) -> list[Any]:
+    """Values of :data:`PARAMETERS` from numbers or arrays: k [1/m], g along the axes [m/s²], a [m], κ [-], f [m]."""
+    A = (1 + kappa) / kappa
+    return [curvature, *gravity, curvature / radius, curvature * radius, A, 1 / A, f / (kappa * radius)]
 
 
 def start(body: RollingBall) -> FloatArray:
@@ -171,5 +178,6 @@ def start(body: RollingBall) -> FloatArray:
     return np.concatenate([body.u0 * scales, frame[:, 1:].T @ body.v0, [body.w0 @ frame[:, 0]]])
 
 
-def _local_gravity(body: RollingBall) -> FloatArray:
+def local_gravity(body: RollingBall) -> FloatArray:
+    """Gravity along the local axes at the coordinates (0, 0) [m/s²], shape (3,)."""
     return np.asarray(body.surface.frame(np.zeros(2)).T @ body.gravity)
