@@ -93,6 +93,7 @@ def _answer(request: dict[str, Any]) -> dict[str, Any]:
 
 def describe(engine: str) -> dict[str, Any]:
     """What an engine is and provides."""
+    from proofroll.engine import TellsLevels
     from proofroll.registry import load_engine
 
     kind = load_engine(engine)
@@ -105,6 +106,7 @@ def describe(engine: str) -> dict[str, Any]:
         "version": kind.version(),
         "provides": sorted(kind.provides),
         "presets": presets,
+        "levels": dict(kind.levels) if isinstance(kind, TellsLevels) else {},
         "summary": (inspect.getdoc(kind) or "").split("\n", 1)[0],
     }
 

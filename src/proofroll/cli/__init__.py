@@ -9,6 +9,7 @@ from typing import Annotated, Any
 import typer
 
 import proofroll
+from proofroll.cli.bench import bench
 from proofroll.cli.common import ENGINE, INTERRUPTED, OK, USAGE, complain
 from proofroll.cli.comparing import compare, regimes, report
 from proofroll.cli.listing import engines, scenes
@@ -23,6 +24,7 @@ app = typer.Typer(
 )
 for _command in (scenes, engines, run, compare, report, onset, regimes):
     app.command()(_command)
+app.add_typer(bench, name="bench")
 
 
 @app.callback(invoke_without_command=True)

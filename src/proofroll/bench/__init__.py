@@ -1,0 +1,1 @@
+"""Benchmarks: what speed the project claims for itself, measured here and now."""

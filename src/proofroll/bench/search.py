@@ -1,0 +1,156 @@
+"""The fastest configuration of every engine that holds a bound on z: coarse steps first, finer where they fail."""
+
+from __future__ import annotations
+
+import dataclasses
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from typing import Any
+
+import numpy as np
+
+from proofroll.case import Case, EngineFacts, Result, Status
+from proofroll.engine import Level
+from proofroll.errors import ProofrollError
+from proofroll.registry import engine_names
+from proofroll.runner import Runner, describe, resolve
+from proofroll.scene import Scene
+from proofroll.surfaces import FloatArray
+from proofroll.trajectory import read
+
+# Samples per run: enough that the largest error of an oscillation of about 0.6 s is seen, and hardly a cost.
+SAMPLES = 10
+# Steps between two samples, in rounds: the next is run only for what did not hold the bound in those before. Ten per
+# sample is ten per radian of the path, the coarsest that any engine follows; the last is a minute's run of a slow one.
+_STEPS = ((8, 12, 16, 24, 32, 43, 64, 86, 128, 172, 256, 344), (512, 688, 1024, 1376, 2048), (3440, 6880))
+_TOLERANCES = (tuple(10.0**-digits for digits in range(2, 9)),)
+# Wall seconds of one run, simulating 1.72 s: what takes longer is a thousandfold of the fastest and no candidate.
+_LIMIT = 5.0
+# Settings besides the presets that cost less where they are not needed: engine, formulation, preset -> settings.
+_VARIANTS: Mapping[tuple[str, str, str], Sequence[Mapping[str, Any]]] = {
+    ("projection", "rotating_frame", "default"): [{"elimination": False}],
+    ("projection", "rotating_frame", "matched"): [{"elimination": False}],
+    ("pinocchio", "composite", "default"): [{"orientation": False}],
+    ("pinocchio", "composite", "tuned"): [{"projection": False}],
+    ("pinocchio", "free_flyer", "default"): [{"orientation": False}],
+}
+# Contact models of engines that do not tell their levels.
+_CONTACTS = {"exudyn": ("contact",), "mujoco": ("chart", "free", "facets"), "pinocchio": ("contact",)}
+
+
+@dataclasses.dataclass(frozen=True)
+class Found:
+    """A configuration that holds the bound.
+
+    Attributes:
+        case: engine, settings and samples.
+        error: largest error of z at the samples [m].
+        seconds: of the run that told the error, for a first ranking [s].
+        contact: whether the ball is held by the engine's contact model.
+    """
+
+    case: Case
+    error: float
+    seconds: float
+    contact: bool
+
+    @property
+    def name(self) -> str:
+        """Engine and what was chosen, for a person."""
+        facts = self.case.engine
+        resolution = facts.resolution or ""
+        value = facts.settings.get(resolution)
+        chosen = [str(facts.settings["formulation"]), str(facts.settings["preset"])]
+        return (
+            f"{facts.name} {' '.join(chosen)} {resolution}={value:.4g}" if resolution else f"{facts.name} {chosen[0]}"
+        )
+
+
+def search(
+    scene: Scene, until: float, true_z: FloatArray, bound: float, runner: Runner, progress: Callable[[str], None]
+) -> list[Found]:
+    """For each configuration of each installed engine the cheapest step that holds the bound, the fastest first.
+
+    Compiled models are left out: they are what the engines are compared with.
+
+    Args:
+        scene: with unbounded friction.
+        until: last time [s].
+        true_z: z at the samples [m], shape (SAMPLES + 1,).
+        bound: on the error of z [m].
+        runner: where cases are run.
+        progress: called with a sentence about what is done next.
+    """
+    progress("asking the engines")
+    kinds = list(_kinds())
+    best: dict[int, Found] = {}
+    for rung in range(len(_STEPS)):
+        open_ = [index for index in range(len(kinds)) if index not in best]
+        wanted = [(index, value) for index in open_ for value in _values(kinds[index][0], until / SAMPLES, rung)]
+        if not wanted:
+            break
+        settings = [_with(kinds[index][0], value) for index, value in wanted]
+        cases = {}
+        for (index, _), facts in zip(wanted, resolve(settings), strict=True):
+            if isinstance(facts, EngineFacts):
+                cases[index, len(cases)] = _case(scene, facts, until)
+        progress(f"running {len(cases)} configurations, round {rung + 1}")
+        results = runner.run(cases.values())
+        for (index, _), case in cases.items():
+            found = _judged(case, results[case.key], true_z, kinds[index][1], runner)
+            if found and found.error <= bound and (index not in best or found.seconds < best[index].seconds):
+                best[index] = found
+    return sorted(best.values(), key=lambda found: found.seconds)
+
+
+def _kinds() -> Iterator[tuple[EngineFacts, bool]]:
+    """Every preset and variant of every engine, and whether it is a contact model."""
+    wanted: list[tuple[str, dict[str, Any]]] = []
+    contacts: list[bool] = []
+    for name in engine_names():
+        try:
+            described = describe(name)
+        except ProofrollError:
+            continue
+        levels = described.get("levels") or {}
+        for formulation, presets in described["presets"].items():
+            level = levels.get(formulation)
+            contact = level in {Level.CONTACT, Level.FACETS} if level else formulation in _CONTACTS.get(name, ())
+            for preset, settings in presets.items():
+                if settings.get("integrator") == "taylor":
+                    continue
+                base = {"formulation": formulation, "preset": preset}
+                for variant in ({}, *_VARIANTS.get((name, formulation, preset), ())):
+                    wanted.append((name, base | dict(variant)))
+                    contacts.append(contact)
+    for facts, contact in zip(resolve(wanted), contacts, strict=True):
+        if isinstance(facts, EngineFacts) and facts.resolution is not None:
+            yield facts, contact
+
+
+def _values(facts: EngineFacts, every: float, rung: int) -> list[float]:
+    if facts.resolution == "dt":
+        return [every / steps for steps in _STEPS[rung]]
+    return list(_TOLERANCES[rung]) if rung < len(_TOLERANCES) else []
+
+
+def _with(facts: EngineFacts, value: float) -> tuple[str, dict[str, Any]]:
+    return facts.name, {**facts.settings, str(facts.resolution): value}
+
+
+def _case(scene: Scene, facts: EngineFacts, until: float) -> Case:
+    return Case(
+        scene=scene.name,
+        parameters=dict(scene.parameters),
+        scene_digest=scene.digest,
+        engine=facts,
+        until=until,
+        every=until / SAMPLES,
+        time_limit=_LIMIT,
+    )
+
+
+def _judged(case: Case, result: Result, true_z: FloatArray, contact: bool, runner: Runner) -> Found | None:
+    if result.status is not Status.DONE:
+        return None
+    z = read(runner.store.trajectory(case))["z"].to_numpy()
+    return Found(case, float(np.max(np.abs(z - true_z))), result.wall_seconds, contact)
