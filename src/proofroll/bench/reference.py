@@ -74,9 +74,8 @@ def reference(rounds: int, progress: Callable[[str], None]) -> dict[str, Any]:
     models = _models(scene, free, times, true_p)
     onsets = Onsets(scene, _ONSETS_UNTIL)
     with tempfile.TemporaryDirectory() as folder:
-        found = search(free, until, true_z, ENGINE_BOUND, Runner(Store(Path(folder))), progress)
-    finalists = {item.name: item for item in found[:_FINALISTS]}
-    finalists |= {item.name: item for item in [each for each in found if each.contact][:_FINALISTS]}
+        found = search(free, until, true_z, ENGINE_BOUND, Runner(Store(Path(folder))), _FINALISTS, progress)
+    finalists = {item.name: item for item in found}
     with Stopwatch() as stopwatch:
 
         def timed(item: Found) -> Callable[[], float | None]:

@@ -19,11 +19,12 @@ from proofroll.trajectory import read
 
 # Samples per run: enough that the largest error of an oscillation of about 0.6 s is seen, and hardly a cost.
 SAMPLES = 10
-# Steps between two samples, in rounds: the next is run only for what did not hold the bound in those before. Ten per
-# sample is ten per radian of the path, the coarsest that any engine follows; the last is a minute's run of a slow one.
-_STEPS = ((8, 12, 16, 24, 32, 43, 64, 86, 128, 172, 256, 344), (512, 688, 1024, 1376, 2048), (3440, 6880))
-_TOLERANCES = (tuple(10.0**-digits for digits in range(2, 9)),)
-# Wall seconds of one run, simulating 1.72 s: what takes longer is a thousandfold of the fastest and no candidate.
+# Steps between two samples, in rounds: the next is run only for what did not hold the bound in those before.
+_STEPS = ((8, 16, 32, 64, 128), (256, 512), (1024, 2048))
+_TOLERANCES = ((1e-2, 1e-3, 1e-4, 1e-5, 1e-6), (1e-7, 1e-8))
+# Between two of those, for what is fast: parts of the number of steps.
+_PARTS = (0.55, 0.62, 0.7, 0.8, 0.9)
+# Wall seconds of one run, simulating 1.72 s: what takes longer is some thousandfold of the fastest.
 _LIMIT = 5.0
 # Settings besides the presets that cost less where they are not needed: engine, formulation, preset -> settings.
 _VARIANTS: Mapping[tuple[str, str, str], Sequence[Mapping[str, Any]]] = {
@@ -57,18 +58,20 @@ class Found:
     def name(self) -> str:
         """Engine and what was chosen, for a person."""
         facts = self.case.engine
-        resolution = facts.resolution or ""
-        value = facts.settings.get(resolution)
-        chosen = [str(facts.settings["formulation"]), str(facts.settings["preset"])]
-        return (
-            f"{facts.name} {' '.join(chosen)} {resolution}={value:.4g}" if resolution else f"{facts.name} {chosen[0]}"
-        )
+        formulation, preset = facts.settings["formulation"], facts.settings["preset"]
+        return f"{facts.name} {formulation} {preset} {facts.resolution}={_resolution(facts):.4g}"
 
 
 def search(
-    scene: Scene, until: float, true_z: FloatArray, bound: float, runner: Runner, progress: Callable[[str], None]
+    scene: Scene,
+    until: float,
+    true_z: FloatArray,
+    bound: float,
+    runner: Runner,
+    finalists: int,
+    progress: Callable[[str], None],
 ) -> list[Found]:
-    """For each configuration of each installed engine the cheapest step that holds the bound, the fastest first.
+    """The fastest configurations of all installed engines that hold the bound, and the fastest contact models.
 
     Compiled models are left out: they are what the engines are compared with.
 
@@ -78,28 +81,49 @@ def search(
         true_z: z at the samples [m], shape (SAMPLES + 1,).
         bound: on the error of z [m].
         runner: where cases are run.
+        finalists: how many of either.
         progress: called with a sentence about what is done next.
     """
     progress("asking the engines")
     kinds = list(_kinds())
     best: dict[int, Found] = {}
-    for rung in range(len(_STEPS)):
-        open_ = [index for index in range(len(kinds)) if index not in best]
-        wanted = [(index, value) for index in open_ for value in _values(kinds[index][0], until / SAMPLES, rung)]
-        if not wanted:
-            break
-        settings = [_with(kinds[index][0], value) for index, value in wanted]
-        cases = {}
-        for (index, _), facts in zip(wanted, resolve(settings), strict=True):
-            if isinstance(facts, EngineFacts):
-                cases[index, len(cases)] = _case(scene, facts, until)
-        progress(f"running {len(cases)} configurations, round {rung + 1}")
-        results = runner.run(cases.values())
-        for (index, _), case in cases.items():
+
+    def attempt(wanted: list[tuple[int, float]], what: str) -> None:
+        cases = [(index, _case(scene, _with(kinds[index][0], value), until)) for index, value in wanted]
+        progress(f"running {len(cases)} configurations: {what}")
+        results = runner.run([case for _, case in cases])
+        for index, case in cases:
             found = _judged(case, results[case.key], true_z, kinds[index][1], runner)
-            if found and found.error <= bound and (index not in best or found.seconds < best[index].seconds):
+            if found and found.error <= bound and (index not in best or _coarser(found, best[index])):
                 best[index] = found
-    return sorted(best.values(), key=lambda found: found.seconds)
+
+    for rung in range(len(_STEPS)):
+        missing = [index for index in range(len(kinds)) if index not in best]
+        wanted = [(index, value) for index in missing for value in _values(kinds[index][0], until / SAMPLES, rung)]
+        if wanted:
+            attempt(wanted, f"steps, round {rung + 1}")
+    ranked = sorted(best, key=lambda index: best[index].seconds)
+    chosen = {*ranked[:finalists], *[index for index in ranked if best[index].contact][:finalists]}
+    attempt([(index, value) for index in chosen for value in _between(best[index], until / SAMPLES)], "steps between")
+    return sorted((best[index] for index in chosen), key=lambda found: found.seconds)
+
+
+def _coarser(one: Found, other: Found) -> bool:
+    """Whether the one of two that hold the bound does so with less work; the wall seconds of a run are too noisy."""
+    return _resolution(one.case.engine) > _resolution(other.case.engine)
+
+
+def _resolution(facts: EngineFacts) -> float:
+    return float(facts.settings[str(facts.resolution)])
+
+
+def _between(found: Found, every: float) -> list[float]:
+    """Coarser resolutions than the one that holds the bound, finer than the next that did not."""
+    facts = found.case.engine
+    if facts.resolution == "rtol":
+        return [_resolution(facts) * factor for factor in (2.0, 4.0, 7.0)]
+    steps = round(every / _resolution(facts))
+    return [every / max(1, round(part * steps)) for part in _PARTS]
 
 
 def _kinds() -> Iterator[tuple[EngineFacts, bool]]:
@@ -133,8 +157,8 @@ def _values(facts: EngineFacts, every: float, rung: int) -> list[float]:
     return list(_TOLERANCES[rung]) if rung < len(_TOLERANCES) else []
 
 
-def _with(facts: EngineFacts, value: float) -> tuple[str, dict[str, Any]]:
-    return facts.name, {**facts.settings, str(facts.resolution): value}
+def _with(facts: EngineFacts, value: float) -> EngineFacts:
+    return dataclasses.replace(facts, settings={**facts.settings, str(facts.resolution): value})
 
 
 def _case(scene: Scene, facts: EngineFacts, until: float) -> Case:
