@@ -8,9 +8,7 @@ import typer
 
 from proofroll.cli.common import Json, spinner, write_json
 
-bench = typer.Typer(
-    help="Measure the speed that the project claims for itself.", no_args_is_help=True, rich_markup_mode=None
-)
+bench = typer.Typer(help="Measure the speed that the project claims for itself.", rich_markup_mode=None)
 
 
 @bench.callback()
