@@ -109,6 +109,7 @@ def test_the_whole_without_engines(monkeypatch: pytest.MonkeyPatch) -> None:
         Console(file=text, width=100).print(table)
     assert max(map(len, text.getvalue().splitlines())) <= 100
     assert "✗" in text.getvalue()
+    assert "error [m]" in text.getvalue()
 
 
 def test_without_heyoka(monkeypatch: pytest.MonkeyPatch) -> None:
