@@ -99,8 +99,8 @@ class Settings(Protocol):
         """``default`` (the obvious model), ``matched`` (same physics, documented options) or ``tuned`` (best known)."""
 
     @property
-    def resolution(self) -> str:
-        """Name of the field that trades speed for accuracy: ``dt`` [s] or ``rtol`` [-]."""
+    def resolution(self) -> str | None:
+        """Name of the field that trades speed for accuracy: ``dt`` [s] or ``rtol`` [-]; None: a closed form."""
 
     @property
     def order(self) -> int | None:

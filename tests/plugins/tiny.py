@@ -11,9 +11,9 @@ from annotated_types import Gt
 
 from proofroll.engine import Built, Sample, whole_steps
 from proofroll.mechanics import initial_response
+from proofroll.rolling_equations import reduced_rates
 from proofroll.scene import Capability, Scene
 from proofroll.surfaces import FloatArray
-from proofroll.truth.rolling import reduced_rates
 
 
 @dataclass(frozen=True)

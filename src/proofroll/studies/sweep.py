@@ -80,11 +80,10 @@ class Point:
     bars: dict[str, float] = field(default_factory=dict)
 
     @property
-    def step(self) -> float:
-        """Value of the setting that trades speed for accuracy."""
+    def step(self) -> float | None:
+        """Value of the setting that trades speed for accuracy; None if there is none."""
         facts = self.case.engine
-        assert facts.resolution is not None  # see points()
-        return float(facts.settings[facts.resolution])
+        return None if facts.resolution is None else float(facts.settings[facts.resolution])
 
 
 @dataclass
@@ -147,10 +146,10 @@ def curves_of(engines: Iterable[str], workers: Workers | None = None) -> tuple[l
     for (name, level), facts in zip(wanted, resolved, strict=True):
         if isinstance(facts, InputError):
             raise facts
-        if isinstance(facts, EngineFacts) and facts.resolution is not None:
+        if isinstance(facts, EngineFacts):
             curves.append(Curve(name, facts, level))
         else:
-            absent[name] = str(facts) if isinstance(facts, ProofrollError) else "it has no step to vary"
+            absent[name] = str(facts)
     return curves, absent
 
 
@@ -183,7 +182,9 @@ def sweep(
 
 
 def _first(question: Question, curve: Curve) -> list[float]:
-    own = float(curve.facts.settings[str(curve.facts.resolution)])
+    if curve.facts.resolution is None:
+        return [0.0]  # a closed form has nothing to refine: one point
+    own = float(curve.facts.settings[curve.facts.resolution])
     if curve.fixed_step:
         return [question.every * factor for factor in _STEPS]
     return [*_TOLERANCES, own]
@@ -201,7 +202,7 @@ def _further(question: Question, curve: Curve, references: Mapping[float, Refere
         found.append(question.every * coarser)
     finer = next((f for f in _FINER if question.every * f not in asked), None)
     if finer is not None and len(curve.points) > 1:
-        ratio = finest.step / (question.every * finer)
+        ratio = (finest.step or 0.0) / (question.every * finer)
         now, before = (point.errors.get(question.quantity, np.inf) for point in (finest, curve.points[-2]))
         if now < (1 - _GAIN) * before and finest.result.wall_seconds * ratio < _PATIENCE:
             found.append(question.every * finer)
@@ -220,7 +221,7 @@ def _run(
     options: list[tuple[str, dict[str, Any]]] = []
     for index, value in wanted:
         facts = curves[index].facts
-        options.append((facts.name, {**facts.settings, str(facts.resolution): value}))
+        options.append((facts.name, facts.settings | ({facts.resolution: value} if facts.resolution else {})))
     resolved = resolve([*options, ("truth", {})], runner.workers)
     truth_facts = resolved.pop()
     if not isinstance(truth_facts, EngineFacts):
@@ -250,7 +251,7 @@ def _run(
         point = judged(Point(case, results[case.key]), references[case.every], runner)
         curves[index].points.append(point)
     for curve in curves:
-        curve.points.sort(key=lambda point: -point.step)
+        curve.points.sort(key=lambda point: -(point.step or 0.0))
 
 
 def case_of(question: Question, scene: Scene, facts: EngineFacts, every: float) -> Case:

@@ -9,6 +9,7 @@ from typing import ClassVar, Self
 import numpy as np
 
 import proofroll
+from proofroll.compiled.library import with_heyoka
 from proofroll.engine import Built, Level, Sample, Term
 from proofroll.engines.projection.friction import Friction
 from proofroll.engines.projection.geometry import geometry_of
@@ -19,7 +20,8 @@ from proofroll.engines.projection.orientation import EulerAngles, FollowedFrame,
 from proofroll.engines.projection.settings import PRESETS, ProjectionSettings
 from proofroll.engines.projection.stepping import STEPPERS
 from proofroll.engines.projection.switching import Switching
-from proofroll.errors import Diverged
+from proofroll.engines.projection.taylor import TaylorSeries
+from proofroll.errors import Diverged, Refused
 from proofroll.events import Event
 from proofroll.scene import Capability, RollingBall, Scene
 from proofroll.surfaces import FloatArray
@@ -60,13 +62,16 @@ class Projection:
 
     @staticmethod
     def version() -> str:
-        """The method is part of proofroll."""
-        return proofroll.__version__
+        """The method is part of proofroll; heyoka integrates it where it is installed and asked for."""
+        return with_heyoka(proofroll.__version__)
 
     @classmethod
     def build(cls, scene: Scene, settings: ProjectionSettings) -> Self:
         """See :class:`proofroll.engine.Engine`."""
-        return cls(scene.rolling, settings, follow=Capability.ORIENTATION in scene.requires)
+        follow = Capability.ORIENTATION in scene.requires
+        if follow and settings.integrator == "taylor" and settings.formulation == "rotating_frame":
+            raise Refused("the compiled series do not follow the orientation; use integrator=dop853")
+        return cls(scene.rolling, settings, follow=follow)
 
     def __init__(self, body: RollingBall, settings: ProjectionSettings, *, follow: bool = False) -> None:
         """The ball at time 0; ``follow`` its orientation too where the formulation does not need it."""
@@ -79,23 +84,24 @@ class Projection:
             self._orientation = FollowedFrame(geometry) if follow else RotatingFrame()
         self._coordinates = 2 + self._orientation.size
         self._ball = ProjectedBall(body, geometry, self._orientation)
-        self._eliminate = settings.elimination
-        integrator = INTEGRATORS[settings.integrator]
-        self._fixed_step = settings.dt if integrator.resolution == "dt" else 0.0
+        self._eliminate = settings.eliminates
+        self._fixed_step = settings.dt if settings.resolution == "dt" else 0.0
         frame = body.surface.frame(body.u0)
         angles, r = self._orientation.start(frame, frame.T @ body.w0)
-        x, resolution = np.concatenate([body.u0, angles, body.udot0, r]), getattr(settings, integrator.resolution)
+        x, resolution = np.concatenate([body.u0, angles, body.udot0, r]), getattr(settings, settings.resolution)
         scales = _scales(body, self._orientation.size)
-        self._motion: Integrator | Switching
+        self._motion: Integrator | Switching | TaylorSeries
         self._friction: Friction | None = None
-        if math.isfinite(body.contact.mu_static):
+        if settings.integrator == "taylor":
+            self._motion = TaylorSeries(body, settings.formulation, x, resolution, self._check)
+        elif math.isfinite(body.contact.mu_static):
             stepper = STEPPERS[settings.integrator](resolution)
             speed = _speed(body) or 1.0
             pace = Pace(speed, body.ball.radius / speed, stepper.stability, stepper.reach)
             self._friction = Friction(self._ball, body.contact)
-            self._motion = Switching(self._friction, stepper, x, scales, pace, self._check, settings.elimination)
+            self._motion = Switching(self._friction, stepper, x, scales, pace, self._check, self._eliminate)
         else:
-            self._motion = integrator(self._ball.rates, self._accept, x, scales, resolution)
+            self._motion = INTEGRATORS[settings.integrator](self._ball.rates, self._accept, x, scales, resolution)
 
     def _check(self, t: float, x: FloatArray) -> None:
         n = self._coordinates
@@ -127,6 +133,8 @@ class Projection:
         frame = kin.local.frame
         if isinstance(self._motion, Switching):
             force, sticking = self._motion.force, self._motion.mode.sticking
+        elif isinstance(self._motion, TaylorSeries):
+            force, sticking = self._motion.force, None
         else:
             force, sticking = self._ball.contact_force(self._ball.response(kin)), None
         return Sample(
@@ -143,7 +151,7 @@ class Projection:
         ball = self._ball
         x = self._motion.x
         kin = ball.kinematics(x)
-        rates = self._motion.rates if isinstance(self._motion, Switching) else ball.rates(x)
+        rates = self._motion.rates if isinstance(self._motion, (Switching, TaylorSeries)) else ball.rates(x)
         acceleration = kin.D @ rates[self._coordinates : self._coordinates + 5] + kin.drift
         return Built(
             mass=float(ball.mass[0]),
