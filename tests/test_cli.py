@@ -320,7 +320,7 @@ def test_onset_where_nobody_was_asked_for(
     proofroll: Proofroll, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     """Among engines that were not asked for by name a refusal is an answer; what a person reads fits 100 columns."""
-    monkeypatch.setattr("proofroll.studies.onset.default_engines", lambda: ["refuses"])
+    monkeypatch.setattr("proofroll.studies.onset.default_engines", lambda _: ["refuses"])
     code, out, err = proofroll(*EARLY, "--out", str(tmp_path))
     assert code == 0, err
     assert "first slips at 0.144130" in out
