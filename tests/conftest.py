@@ -106,7 +106,7 @@ def proofroll(
     install_engines: Callable[[Mapping[str, str]], None],
 ) -> Proofroll:
     """Runs the command line in this process; exit code, standard output, standard error."""
-    install_engines(ENTRY_POINTS | {"broken": "broken:Broken"})
+    install_engines(ENTRY_POINTS | {"broken": "broken:Broken", "laddered": "laddered:Laddered"})
     monkeypatch.setenv("COLUMNS", "100")
 
     def run(*arguments: str) -> tuple[int, str, str]:

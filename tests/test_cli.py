@@ -79,6 +79,11 @@ BAD = {
     "engine that diverges": (with_option("--engine", "not_a_number"), 3, ["not_a_number diverged", "not finite"]),
     "engine that refuses": (with_option("--engine", "refuses"), 3, ["refuses refused", "no wheel, no ball"]),
     "capability that is lacking": (with_option("--set", "rolling_resistance=1e-4"), 3, ["needs rolling resistance"]),
+    "something else asked": (with_option("--ask", "colour"), 2, ["asks = 'colour'", "choose orientation"]),
+    "orientation of an engine without": (with_option("--ask", "orientation"), 3, ["needs the ball's orientation"]),
+    "orientation of the truth": ([*with_option("--engine", "truth"), "--ask", "orientation"], 3, ["ask an engine"]),
+    "ladder of nothing": (["ladder", "sphere_in_cylinder", "--quantity", "height"], 2, ["quantity = 'height'"]),
+    "ladder of no length": (["ladder", "sphere_in_cylinder", "--until", "0"], 2, ["until = 0", "positive"]),
     "unknown comparison": (["compare", "no_such_claim"], 2, ["comparison = 'no_such_claim'"]),
     "unknown comparison to report": (["report", "no_such_claim"], 2, ["comparison = 'no_such_claim'"]),
     "unknown axis of a map": (["stability", "sphere_in_cylinder", "--axis", "speed"], 2, ["axis = 'speed'", "V0"]),
@@ -318,7 +323,7 @@ def test_onset_where_nobody_was_asked_for(
     proofroll: Proofroll, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     """Among engines that were not asked for by name a refusal is an answer; what a person reads fits 100 columns."""
-    monkeypatch.setattr("proofroll.studies.onset.default_engines", lambda: ["refuses"])
+    monkeypatch.setattr("proofroll.studies.onset.default_engines", lambda _: ["refuses"])
     code, out, err = proofroll(*EARLY, "--out", str(tmp_path))
     assert code == 0, err
     assert "first slips at 0.144130" in out
@@ -466,3 +471,29 @@ def test_a_reader_that_stops_reading() -> None:
         check=True,
     )
     assert done.stderr == ""
+
+
+def test_run_with_orientation(proofroll: Proofroll, tmp_path: Path) -> None:
+    """``--ask orientation`` makes an engine follow it that otherwise would not."""
+    from proofroll.trajectory import read
+
+    arguments = with_option("--engine", "projection[formulation=rotating_frame]")
+    for asked in ([], ["--ask", "orientation"]):
+        code, _, err = proofroll(*arguments, *asked, "--out", str(tmp_path / "run.nc"))
+        assert (code, err) == (0, "")
+        assert ("q_WB" in read(tmp_path / "run.nc")) == bool(asked)
+
+
+def test_ladder(proofroll: Proofroll, tmp_path: Path) -> None:
+    """The ladder is two tables and sentences within 100 columns, or one JSON document; a missing engine exits 3."""
+    arguments = ["ladder", "sphere_in_cylinder", "--engine", "laddered", "--until", "0.1", "--out", str(tmp_path)]
+    arguments += ["--rounds", "1"]
+    code, out, err = proofroll(*arguments, "--tolerance", "1e-3")
+    assert (code, err) == (0, "")
+    assert max(map(len, out.splitlines())) <= 100
+    assert "The cheapest within 0.001 m is laddered" in " ".join(out.split())
+    code, out, err = proofroll(*arguments, "--engine", "absent", "--json")
+    assert (code, err) == (3, "")
+    found = json.loads(out)
+    assert set(found) >= {"rungs", "terms", "findings", "quantity", "unit", "truth", "machine"}
+    assert found["absent"]["absent"]["status"] == "missing"

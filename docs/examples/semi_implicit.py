@@ -27,7 +27,9 @@ class SemiImplicit:
     """Semi-implicit Euler on the unreduced equations."""
 
     name: ClassVar[str] = "semi_implicit"
-    provides: ClassVar[frozenset[Capability]] = frozenset(Capability) - {Capability.BOUNDED_FRICTION}
+    provides: ClassVar[frozenset[Capability]] = frozenset(
+        {Capability.ROLLING, Capability.CURVED_SURFACE, Capability.ROLLING_RESISTANCE}
+    )
     settings: ClassVar[type[Settings]] = Settings
     presets: ClassVar[Mapping[str, Mapping[str, Settings]]] = {"newton_euler": {"default": Settings()}}
 

@@ -57,6 +57,7 @@ class Case:
         until, every: last time and sampling interval [s].
         timed: whether a second, clean run that only advances is timed.
         time_limit: wall seconds after which the case is ended [s].
+        asks: what is wanted besides the motion; see :class:`proofroll.scene.Scene`.
     """
 
     scene: str
@@ -67,17 +68,20 @@ class Case:
     every: float
     timed: bool = False
     time_limit: float = 120.0
+    asks: tuple[str, ...] = ()
 
     @property
     def key(self) -> str:
         """Hash of all that decides the result."""
-        content = {name: value for name, value in asdict(self).items() if name != "time_limit"}
+        left_out = {"time_limit"} | (set() if self.asks else {"asks"})
+        content = {name: value for name, value in asdict(self).items() if name not in left_out}
         return hashlib.sha256(json.dumps(content, sort_keys=True).encode()).hexdigest()[:24]
 
     @classmethod
     def from_dict(cls, content: dict[str, Any]) -> Case:
         """The case again from ``asdict``."""
-        return cls(**{**content, "engine": EngineFacts(**content["engine"])})
+        asks = tuple(content.get("asks", ()))
+        return cls(**{**content, "engine": EngineFacts(**content["engine"]), "asks": asks})
 
 
 @dataclass(frozen=True)

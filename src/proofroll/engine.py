@@ -99,8 +99,8 @@ class Settings(Protocol):
         """``default`` (the obvious model), ``matched`` (same physics, documented options) or ``tuned`` (best known)."""
 
     @property
-    def resolution(self) -> str:
-        """Name of the field that trades speed for accuracy: ``dt`` [s] or ``rtol`` [-]."""
+    def resolution(self) -> str | None:
+        """Name of the field that trades speed for accuracy: ``dt`` [s] or ``rtol`` [-]; None: a closed form."""
 
     @property
     def order(self) -> int | None:
@@ -176,6 +176,7 @@ class Term:
         formulations: those that have it.
         on, off: settings with and without it, put over a preset.
         because: what it is for.
+        rung: whether a model with it is a rung of the ladder by itself, as a contact of more dimensions is.
     """
 
     name: str
@@ -183,6 +184,7 @@ class Term:
     on: Mapping[str, Any]
     off: Mapping[str, Any]
     because: str
+    rung: bool = False
 
 
 @runtime_checkable
@@ -214,6 +216,17 @@ class Reproduces(Protocol):
         Raises:
             Refused: there is no program for this; the text says why.
         """
+
+
+@runtime_checkable
+class CannotLeaveOut(Protocol):
+    """What an engine has besides, if some of its models hold what no scene asked for and no setting takes away.
+
+    Attributes:
+        inherent: formulation -> what is always in its model -> why.
+    """
+
+    inherent: ClassVar[Mapping[str, Mapping[Capability, str]]]
 
 
 def whole_steps(start: float, end: float, dt: float) -> int:

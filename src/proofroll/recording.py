@@ -76,6 +76,8 @@ def record(engine: Any, scene: Scene, times: FloatArray) -> Recording:
     sampling = time.perf_counter() - began - wall
     if Capability.BOUNDED_FRICTION in scene.requires and any(sample.sticking is None for sample in samples):
         failure = failure or "the engine does not say whether the ball sticks or slips"
+    if Capability.ORIENTATION in scene.requires and any(sample.q_WB is None for sample in samples):
+        failure = failure or "the engine does not give the ball's orientation"
     dataset = from_samples(scene, times, samples)
     if "sticking" in dataset:
         located = isinstance(engine, LocatesEvents)

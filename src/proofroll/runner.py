@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import contextlib
 import dataclasses
-import itertools
 import os
 import queue
 import threading
@@ -18,69 +17,80 @@ from proofroll.case import Case, EngineFacts, Result, Status
 from proofroll.errors import InputError, Missing, ProofrollError
 from proofroll.process import Worker, WorkerDied
 from proofroll.store import Store
+from proofroll.workers import Workers
 
-__all__ = ["Runner", "Worker", "WorkerDied", "describe", "resolve", "run_one"]
+__all__ = ["Runner", "Worker", "WorkerDied", "describe", "programs", "resolve", "run_one"]
 
 _START_UP_SECONDS = 60.0
 
 
-def describe(engine: str) -> dict[str, Any]:
+def describe(engine: str, workers: Workers | None = None) -> dict[str, Any]:
     """What an engine is, provides and has as presets; asked in a process of its own.
 
     Raises:
         InputError, Missing, WorkerDied: it cannot be asked.
     """
-    with Worker() as worker:
+    with _lent(workers) as lent, lent.lend(engine) as worker:
         return worker.request({"do": "describe", "engine": engine}, _START_UP_SECONDS)
 
 
-def resolve(engines: Sequence[tuple[str, Mapping[str, Any]]]) -> list[EngineFacts | ProofrollError]:
+def resolve(
+    engines: Sequence[tuple[str, Mapping[str, Any]]], workers: Workers | None = None
+) -> list[EngineFacts | ProofrollError]:
     """Complete settings for engines with options, each or the reason why not, in the order given."""
     found: list[EngineFacts | ProofrollError] = [ProofrollError("not asked")] * len(engines)
 
-    def ask(name: str) -> None:
-        worker = Worker()
-        try:
-            for index, (other, options) in enumerate(engines):
-                if other != name:
-                    continue
-                request = {"do": "resolve", "engine": name, "options": dict(options)}
-                try:
-                    found[index] = EngineFacts(**worker.request(request, _START_UP_SECONDS))
-                except WorkerDied as error:
-                    found[index] = error
-                    worker.close()
-                    worker = Worker()
-                except ProofrollError as error:
-                    found[index] = error
-        finally:
-            worker.close()
+    def ask(name: str, lent: Workers) -> None:
+        for index, (other, options) in enumerate(engines):
+            if other != name:
+                continue
+            request = {"do": "resolve", "engine": name, "options": dict(options)}
+            worker = lent.take(name)
+            try:
+                found[index] = EngineFacts(**worker.request(request, _START_UP_SECONDS))
+            except WorkerDied as error:
+                found[index] = error
+                worker.close()
+                continue
+            except ProofrollError as error:
+                found[index] = error
+            except BaseException:
+                worker.close()
+                raise
+            lent.keep(name, worker)
 
     # Most of it is the start of the processes and the import of the engines.
-    with ThreadPoolExecutor(os.cpu_count() or 1) as pool:
-        list(pool.map(ask, dict.fromkeys(name for name, _ in engines)))
+    with _lent(workers) as lent, ThreadPoolExecutor(os.cpu_count() or 1) as pool:
+        list(pool.map(lambda name: ask(name, lent), dict.fromkeys(name for name, _ in engines)))
     return found
 
 
-def programs(cases: Sequence[Case]) -> list[tuple[str | None, str]]:
+def programs(cases: Sequence[Case], workers: Workers | None = None) -> list[tuple[str | None, str]]:
     """The engines' own programs for cases (:class:`proofroll.engine.Reproduces`), each or None and why not."""
-    found: list[tuple[str | None, str]] = [(None, "not asked")] * len(cases)
-    for name in dict.fromkeys(case.engine.name for case in cases):
-        worker = Worker()
-        for index, case in enumerate(cases):
-            if case.engine.name != name:
-                continue
+    found: list[tuple[str | None, str]] = []
+    with _lent(workers) as lent:
+        for case in cases:
             try:
-                answer = worker.request({"do": "reproduce", "case": dataclasses.asdict(case)}, _START_UP_SECONDS)
-                found[index] = answer["program"], answer["message"]
-            except WorkerDied as error:
-                found[index] = None, str(error)
-                worker.close()
-                worker = Worker()
+                with lent.lend(case.engine.name) as worker:
+                    request = {"do": "reproduce", "case": dataclasses.asdict(case)}
+                    answer = worker.request(request, _START_UP_SECONDS)
+                found.append((answer["program"], answer["message"]))
             except ProofrollError as error:
-                found[index] = None, str(error)
-        worker.close()
+                found.append((None, str(error)))
     return found
+
+
+@contextlib.contextmanager
+def _lent(workers: Workers | None) -> Iterator[Workers]:
+    """The workers that are given, or some that end with the block."""
+    if workers is not None:
+        yield workers
+        return
+    own = Workers()
+    try:
+        yield own
+    finally:
+        own.close()
 
 
 class _Waiting:
@@ -111,26 +121,15 @@ class Runner:
 
     def __init__(self, store: Store, jobs: int | None = None, fresh: bool = False, memory: float | None = None) -> None:
         self.store = store
-        self.memory = memory
+        self.workers = Workers(memory)
+        """Idle workers, for whoever asks engines something on behalf of the same study."""
         self.jobs = jobs or os.cpu_count() or 1
         self.fresh = fresh
         self.reused = 0
         self.damaged: set[str] = set()
         """Keys of the cases that were run again because what was stored is not what had been put there."""
-        self._workers: set[Worker] = set()
-        self._kept: dict[str, list[Worker]] | None = None
+        self._busy: set[Worker] = set()
         self._stopping = threading.Event()
-
-    @contextlib.contextmanager
-    def keeping_workers(self) -> Iterator[None]:
-        """Meanwhile workers live on from one :meth:`run` to the next: for many short rounds, starts cost most."""
-        self._kept = {}
-        try:
-            yield
-        finally:
-            kept, self._kept = self._kept, None
-            for worker in itertools.chain.from_iterable(kept.values()):
-                worker.close()
 
     def run(self, cases: Iterable[Case], progress: Callable[[Case, Result], None] | None = None) -> dict[str, Result]:
         """Results by key of the case. ``progress`` is called in this thread as each arrives."""
@@ -164,11 +163,12 @@ class Runner:
                 results[case.key] = result
                 if progress:
                     progress(case, result)
-            pool.shutdown(wait=True)  # so that no worker that is kept is taken for one that still runs
-        finally:
+        except BaseException:
             self._stopping.set()
-            for worker in list(self._workers):
+            for worker in list(self._busy):
                 worker.kill()
+            raise
+        finally:
             pool.shutdown(wait=True, cancel_futures=True)
             self._stopping.clear()
         return results
@@ -179,12 +179,14 @@ class Runner:
         engine: str | None = None
         try:
             while not self._stopping.is_set() and (case := waiting.take(engine)) is not None:
-                if worker is not None and case.engine.name != engine:
-                    self._put_away(worker, str(engine))
+                if worker is not None and engine is not None and case.engine.name != engine:
+                    self._busy.discard(worker)
+                    self.workers.keep(engine, worker)
                     worker = None
                 engine = case.engine.name
                 if worker is None:
-                    worker = self._taken(engine)
+                    worker = self.workers.take(engine)
+                    self._busy.add(worker)
                     if self._stopping.is_set():  # whoever stops us may not have seen this worker
                         break
                 try:
@@ -200,24 +202,14 @@ class Runner:
                 arrived.put((case, result))
         except Exception as error:
             arrived.put(error)
-        finally:
-            if worker is not None:
-                self._put_away(worker, str(engine))
-
-    def _taken(self, engine: str) -> Worker:
-        """A worker that has served this engine, or a new one."""
-        idle = (self._kept or {}).get(engine)
-        worker = idle.pop() if idle else Worker(self.memory)
-        self._workers.add(worker)
-        return worker
-
-    def _put_away(self, worker: Worker, engine: str) -> None:
-        """Keeps a worker for the next round, if workers are kept; else ends it."""
-        if self._kept is None or self._stopping.is_set():
-            self._drop(worker)
+            self._stopping.set()
+        if worker is None or engine is None:
             return
-        self._workers.discard(worker)
-        self._kept.setdefault(engine, []).append(worker)
+        if self._stopping.is_set():
+            self._drop(worker)
+        else:
+            self._busy.discard(worker)
+            self.workers.keep(engine, worker)
 
     def _result(self, worker: Worker, case: Case) -> Result:
         """The result of a case, stored."""
@@ -232,7 +224,7 @@ class Runner:
             return self.store.put(case, result, written)
 
     def _drop(self, worker: Worker) -> None:
-        self._workers.discard(worker)
+        self._busy.discard(worker)
         worker.close()
 
 

@@ -29,6 +29,11 @@ class Capability(StrEnum):
     CURVED_SURFACE = "a curved surface"
     ROLLING_RESISTANCE = "rolling resistance"
     BOUNDED_FRICTION = "bounded friction (slip)"
+    ORIENTATION = "the ball's orientation"
+
+
+# What may be asked for besides the motion, and what an engine must then be able to give.
+ASKED: Mapping[str, Capability] = {"orientation": Capability.ORIENTATION}
 
 
 @dataclass(frozen=True)
@@ -134,6 +139,7 @@ class Scene:
         balls, surfaces, contacts, gravity, initial: the mechanics.
         parameters: the numbers a user can set by name, SI units.
         folder: where the scene's file and its engine-native models lie.
+        asks: what is wanted besides the motion, names of :data:`ASKED`; what nobody asks for need not be modelled.
     """
 
     name: str
@@ -145,11 +151,22 @@ class Scene:
     initial: tuple[InitialMotion, ...]
     parameters: Mapping[str, float] = field(default_factory=dict)
     folder: Path = Path()
+    asks: tuple[str, ...] = ()
+
+    def __post_init__(self) -> None:
+        """Refuses what cannot be asked for.
+
+        Raises:
+            InputError: something else than the names of :data:`ASKED`.
+        """
+        for name in self.asks:
+            if name not in ASKED:
+                raise InputError("asks", name, f"there is nothing of that name to ask for; choose {', '.join(ASKED)}")
 
     @property
     def requires(self) -> frozenset[Capability]:
         """What an engine must be able to represent; no more than the scene needs."""
-        needs = {Capability.ROLLING}
+        needs = {Capability.ROLLING, *(ASKED[name] for name in self.asks)}
         for contact in self.contacts:
             if contact.rolling_resistance > 0:
                 needs.add(Capability.ROLLING_RESISTANCE)
@@ -189,8 +206,9 @@ class Scene:
 
     @cached_property
     def digest(self) -> str:
-        """Hash of everything that decides the motion: the mechanics, and the engine-native files beside them."""
-        content = {key: value for key, value in asdict(self).items() if key not in {"title", "folder", "parameters"}}
+        """Hash of everything that decides the result: the mechanics, what is asked, and the engine-native files."""
+        left_out = {"title", "folder", "parameters"} | (set() if self.asks else {"asks"})
+        content = {key: value for key, value in asdict(self).items() if key not in left_out}
         found = hashlib.sha256(json.dumps(content, sort_keys=True, default=str).encode())
         if self.folder != Path():
             for file in sorted(self.folder.iterdir()):

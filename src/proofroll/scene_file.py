@@ -5,8 +5,8 @@ from __future__ import annotations
 import math
 import operator
 import tomllib
-from collections.abc import Callable, Mapping
-from dataclasses import dataclass
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Annotated, Any, TypeVar
 
@@ -55,6 +55,7 @@ class SceneFile:
     gravity: dict[str, Any]
     contacts: list[dict[str, Any]]
     initial: list[dict[str, Any]]
+    asks: list[str] = field(default_factory=list)
 
 
 @dataclass(frozen=True)
@@ -105,15 +106,17 @@ def scene_folder(name: str) -> Path:
     raise InputError("scene", name, f"there is no such scene; choose one of {', '.join(scene_names())}")
 
 
-def load_scene(name: str, /, **parameters: float) -> Scene:
+def load_scene(name: str, /, *, asks: Any = (), **parameters: float) -> Scene:
     """The scene with some of its parameters set, SI units.
 
     Args:
         name: a folder under ``models/``, e.g. ``sphere_in_cylinder``, or the path of such a folder.
+        asks: names of what is wanted besides the motion and what the scene's own file asks for, e.g.
+            ``("orientation",)``. (Typed as Any, for type checkers would not let numbers be unpacked beside it.)
         **parameters: e.g. ``speed=3.3``; see ``proofroll scenes``.
 
     Raises:
-        InputError: unknown scene or parameter, or a value that makes no sense.
+        InputError: unknown scene or parameter, or a value that makes no sense; or nothing of that name can be asked.
     """
     folder = scene_folder(name)
     file = _parse(folder / "scene.toml")
@@ -138,7 +141,17 @@ def load_scene(name: str, /, **parameters: float) -> Scene:
         initial=mechanics.initial,
         parameters=values,
         folder=folder,
+        asks=tuple(dict.fromkeys([*file.asks, *_names(asks)])),
     )
+
+
+def _names(asks: object) -> list[str]:
+    """What is asked for, as a list."""
+    if isinstance(asks, str):
+        return [asks]
+    if not isinstance(asks, Sequence):
+        raise InputError("asks", asks, "give a list of names")
+    return [str(name) for name in asks]
 
 
 def _parse(path: Path) -> SceneFile:

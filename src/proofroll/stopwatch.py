@@ -7,7 +7,8 @@ from types import TracebackType
 from typing import Self
 
 from proofroll.case import Case
-from proofroll.runner import Worker, WorkerDied
+from proofroll.process import Worker, WorkerDied
+from proofroll.workers import Workers
 
 # Long enough for the clock and for caches to settle, short enough for many rounds.
 SECONDS = 0.05
@@ -15,16 +16,21 @@ _LIMIT = 60.0
 
 
 class Stopwatch:
-    """Keeps one worker per engine, which stays warm between the rounds of :func:`proofroll.timing.interleaved`."""
+    """Keeps one worker per engine, which stays warm between the rounds of :func:`proofroll.timing.interleaved`.
 
-    def __init__(self) -> None:
+    Args:
+        workers: where they come from and go back to.
+    """
+
+    def __init__(self, workers: Workers | None = None) -> None:
+        self._lent = workers or Workers()
         self._workers: dict[str, Worker] = {}
 
     def __call__(self, case: Case, seconds: float = SECONDS) -> float | None:
         """Wall seconds per simulated second of a case, from clean runs that only advance; None: it did not run."""
         name = case.engine.name
         if name not in self._workers:
-            self._workers[name] = Worker()
+            self._workers[name] = self._lent.take(name)
         request = {"do": "time", "case": dataclasses.asdict(case), "seconds": seconds}
         try:
             rate = self._workers[name].ask(request, _LIMIT).get("seconds_per_second")
@@ -34,9 +40,9 @@ class Stopwatch:
         return float(rate) if rate is not None else None
 
     def close(self) -> None:
-        """Ends the workers."""
-        for worker in self._workers.values():
-            worker.close()
+        """Gives the workers back to whoever lent them, or ends them."""
+        for name, worker in self._workers.items():
+            self._lent.keep(name, worker)
         self._workers.clear()
 
     def __enter__(self) -> Self:

@@ -32,10 +32,17 @@ from proofroll.memory import volunteer
 _FOUNDATION = (
     "case.py",
     "certificate.py",
+    "closed_form.py",
+    "compiled/library.py",
+    "compiled/projection.py",
+    "compiled/rolling.py",
+    "compiled/series.py",
     "engine.py",
     "events.py",
     "mechanics.py",
+    "motion.py",
     "recording.py",
+    "rolling_equations.py",
     "scene.py",
     "scene_file.py",
     "surfaces.py",
@@ -96,7 +103,8 @@ def _answer(request: dict[str, Any]) -> dict[str, Any]:
 
 
 def describe(engine: str) -> dict[str, Any]:
-    """What an engine is and provides."""
+    """What an engine is and provides, and where its formulations stand on the ladder of models."""
+    from proofroll.engine import CannotLeaveOut, TellsLevels
     from proofroll.registry import load_engine
 
     kind = load_engine(engine)
@@ -109,8 +117,12 @@ def describe(engine: str) -> dict[str, Any]:
         "version": kind.version(),
         "provides": sorted(kind.provides),
         "presets": presets,
-        "levels": {formulation: str(level) for formulation, level in getattr(kind, "levels", {}).items()},
         "summary": (inspect.getdoc(kind) or "").split("\n", 1)[0],
+        "levels": dict(kind.levels) if isinstance(kind, TellsLevels) else {},
+        "terms": [dataclasses.asdict(term) for term in kind.terms] if isinstance(kind, TellsLevels) else [],
+        "inherent": {key: dict(terms) for key, terms in kind.inherent.items()}
+        if isinstance(kind, CannotLeaveOut)
+        else {},
     }
 
 
@@ -202,11 +214,11 @@ def _run(case: Case, out: Path, spent: Spent) -> Result:
 
     versions = {case.engine.name: case.engine.version, "proofroll": proofroll.__version__}
     versions["python"] = platform.python_version()
-    scene = load_scene(case.scene, **case.parameters)
+    scene = load_scene(case.scene, asks=case.asks, **case.parameters)
     times = time_grid(case.until, case.every)
     if case.engine.name == "truth":
         spent.on("loading")
-        return _run_truth(scene, times, out, versions)
+        return _run_truth(case, scene, times, out, versions)
     kind = load_engine(case.engine.name)
     settings = resolve_settings(kind, case.engine.settings)
     spent.on("loading")
@@ -252,12 +264,14 @@ def _run(case: Case, out: Path, spent: Spent) -> Result:
     return result
 
 
-def _run_truth(scene: Any, times: Any, out: Path, versions: dict[str, str]) -> Result:
+def _run_truth(case: Case, scene: Any, times: Any, out: Path, versions: dict[str, str]) -> Result:
     from proofroll.trajectory import write
     from proofroll.truth import truth
 
     start = time.perf_counter()
     try:
+        if case.asks:
+            raise Refused(f"the truth is that of the motion and gives no {', '.join(case.asks)}; ask an engine for it")
         dataset = truth(scene, times)
     except Refused as error:
         return Result(Status.REFUSED, str(error), versions=versions)
@@ -282,7 +296,7 @@ def time_once(case: dict[str, Any], seconds: float) -> dict[str, Any]:
     wanted = Case.from_dict(case)
     kind = load_engine(wanted.engine.name)
     settings = resolve_settings(kind, wanted.engine.settings)
-    scene = load_scene(wanted.scene, **wanted.parameters)
+    scene = load_scene(wanted.scene, asks=wanted.asks, **wanted.parameters)
     times = time_grid(wanted.until, wanted.every)
     elapsed = simulated = 0.0
     for _ in range(_MOST_BUILDS):

@@ -12,11 +12,11 @@ from typing import Any, ClassVar, Self
 
 import numpy as np
 
+from proofroll.closed_form import closed_form
 from proofroll.engine import Built, Sample
 from proofroll.errors import Diverged, Refused
 from proofroll.mechanics import initial_response
 from proofroll.scene import Capability, Scene
-from proofroll.truth.closed_form import closed_form
 
 
 @dataclass(frozen=True)

@@ -10,7 +10,7 @@ from typing import Any, ClassVar, Self
 import numpy as np
 from tiny import Tiny, TinySettings
 
-from proofroll.engine import Sample
+from proofroll.engine import Built, Sample
 from proofroll.errors import Refused
 from proofroll.scene import Capability, Scene
 
@@ -120,6 +120,35 @@ class Heavy(Tiny):
         ball = scene.balls[0]
         heavy = dataclasses.replace(ball, inertia_ratio=2 * ball.inertia_ratio)
         super().__init__(dataclasses.replace(scene, balls=(heavy,)), settings)
+
+
+class Wasteful(Tiny):
+    """Carries rolling resistance along where nobody asked for it."""
+
+    def __init__(self, scene: Scene, settings: Any) -> None:
+        super().__init__(scene, settings)
+        self.resists = True  # a torque of zero is a torque all the same
+
+
+class Thrifty(Tiny):
+    """Leaves out what the scene requires."""
+
+    def built(self) -> Built:
+        """Nothing but rolling."""
+        return dataclasses.replace(super().built(), terms=frozenset())
+
+
+class Turning(Tiny):
+    """Follows the orientation without being asked, and without saying why."""
+
+    def built(self) -> Built:
+        """Among its terms."""
+        right = super().built()
+        return dataclasses.replace(right, terms=(right.terms or frozenset()) | {Capability.ORIENTATION})
+
+    def sample(self) -> Sample:
+        """With an orientation."""
+        return dataclasses.replace(super().sample(), q_WB=np.array([1.0, 0, 0, 0]))
 
 
 class Row(Tiny):
@@ -254,6 +283,9 @@ FAILS: Mapping[type[Tiny], str] = {
     Boastful: "provides_what_it_says",
     Silent: "builds_or_refuses",
     Heavy: "certificate_holds",
+    Wasteful: "builds_only_what_is_required",
+    Thrifty: "builds_only_what_is_required",
+    Turning: "builds_only_what_is_required",
     Row: "samples_are_well_formed",
     Views: "reading_back_changes_nothing",
     Moody: "advance_is_repeatable",

@@ -11,9 +11,9 @@ from annotated_types import Gt
 
 from proofroll.engine import Built, Sample, whole_steps
 from proofroll.mechanics import initial_response
+from proofroll.rolling_equations import reduced_rates
 from proofroll.scene import Capability, Scene
 from proofroll.surfaces import FloatArray
-from proofroll.truth.rolling import reduced_rates
 
 
 @dataclass(frozen=True)
@@ -57,6 +57,7 @@ class Tiny:
 
     def __init__(self, scene: Scene, settings: Any) -> None:
         self.body, self.dt, self.t = scene.rolling, settings.dt, 0.0
+        self.resists = self.body.contact.rolling_resistance > 0
         self.x = np.array([*self.body.u0, *self.body.udot0, scene.initial[0].spin])
 
     def rates(self, x: FloatArray) -> FloatArray:
@@ -86,4 +87,5 @@ class Tiny:
             ball_radius=ball.radius,
             rolling_resistance=self.body.contact.rolling_resistance,
             acceleration=initial_response(self.body)[0],
+            terms=frozenset({Capability.ROLLING_RESISTANCE} if self.resists else ()),
         )

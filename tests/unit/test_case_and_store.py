@@ -1,6 +1,7 @@
 from __future__ import annotations
 
 import dataclasses
+import hashlib
 import json
 import os
 import subprocess
@@ -98,6 +99,7 @@ def test_key_follows_all_that_decides_the_result(make_case: MakeCase) -> None:
         dataclasses.replace(case, engine=dataclasses.replace(case.engine, version="2")),
         dataclasses.replace(case, engine=dataclasses.replace(case.engine, code="other")),
         dataclasses.replace(case, scene_digest="other"),
+        dataclasses.replace(case, asks=("orientation",)),
     ]
     assert len({case.key, *(other.key for other in others)}) == 1 + len(others)
     assert make_case("oracle", time_limit=1.0).key == case.key
@@ -256,3 +258,12 @@ def test_old_scraps_are_swept(tmp_path: Path) -> None:
         os.utime(tmp_path / name, (0, 0))
     Store(tmp_path)
     assert sorted(path.name for path in tmp_path.iterdir()) == [".incoming-new", ".other"]
+
+
+def test_a_case_that_asks_nothing_keeps_its_key(make_case: MakeCase) -> None:
+    """The key is the hash of what it was before a case could ask, so that stored results are found."""
+    case = make_case("oracle")
+    content = {key: value for key, value in dataclasses.asdict(case).items() if key not in {"time_limit", "asks"}}
+    assert case.key == hashlib.sha256(json.dumps(content, sort_keys=True).encode()).hexdigest()[:24]
+    asking = dataclasses.replace(case, asks=("orientation",))
+    assert Case.from_dict(json.loads(json.dumps(dataclasses.asdict(asking)))) == asking

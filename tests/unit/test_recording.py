@@ -122,3 +122,10 @@ def test_every_sample_is_taken_once_per_advance(sphere: Scene) -> None:
     times = time_grid(0.3, 0.1)
     record(Remembers.build(sphere, HostileSettings()), sphere, times)
     assert asked == times[1:].tolist()
+
+
+def test_an_orientation_that_was_asked_for() -> None:
+    """An engine that was asked for the orientation and does not give it has failed, and one sentence says so."""
+    asking = load_scene("sphere_in_cylinder", asks=("orientation",))
+    recording = record(Oracle(asking), asking, time_grid(0.1, 0.05))
+    assert recording.failure == "the engine does not give the ball's orientation"

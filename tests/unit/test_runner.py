@@ -15,7 +15,6 @@ from hostile import ENTRY_POINTS
 
 from proofroll.case import Case, EngineFacts, Result, Status
 from proofroll.errors import InputError, Missing
-from proofroll.process import Worker
 from proofroll.runner import Runner, WorkerDied, describe, resolve, run_one
 from proofroll.store import Store
 from proofroll.trajectory import read
@@ -120,7 +119,7 @@ def test_an_error_in_progress_ends_the_run(tmp_path: Path, make_case: MakeCase) 
     runner = Runner(Store(tmp_path), jobs=2)
     with pytest.raises(KeyboardInterrupt):
         runner.run([make_case("hangs"), make_case("oracle")], interrupt)
-    assert not runner._workers
+    assert not runner._busy
 
 
 def test_a_damaged_result_says_so_once(tmp_path: Path, make_case: MakeCase) -> None:
@@ -241,27 +240,3 @@ def test_code_hash_follows_the_adapter(tmp_path: Path, monkeypatch: pytest.Monke
         assert isinstance(facts, EngineFacts)
         hashes.append(facts.code)
     assert hashes[0] != hashes[1]
-
-
-def test_workers_that_are_kept(tmp_path: Path, make_case: MakeCase, monkeypatch: pytest.MonkeyPatch) -> None:
-    """While workers are kept, the next run of the same engine starts no process; afterwards all have ended."""
-    started: list[Worker] = []
-
-    class Counted(Worker):
-        def __init__(self, *arguments: float | None) -> None:
-            super().__init__(*arguments)
-            started.append(self)
-
-    monkeypatch.setattr("proofroll.runner.Worker", Counted)
-    runner = Runner(Store(tmp_path), jobs=1)
-    with runner.keeping_workers():
-        for speed in (3.0, 4.0):
-            case = make_case("oracle", parameters={"speed": speed})
-            assert runner.run([case])[case.key].status == Status.DONE
-        assert len(started) == 1
-        crashing = make_case("exits")
-        assert runner.run([crashing])[crashing.key].status == Status.CRASHED
-    case = make_case("oracle", parameters={"speed": 5.0})
-    assert runner.run([case])[case.key].status == Status.DONE
-    assert len(started) == 3
-    assert all(worker._process.poll() is not None for worker in started)

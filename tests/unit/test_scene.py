@@ -2,6 +2,7 @@ from __future__ import annotations
 
 import dataclasses
 import math
+from pathlib import Path
 
 import numpy as np
 import pytest
@@ -104,3 +105,21 @@ def test_two_balls_are_refused_by_name() -> None:
     two = dataclasses.replace(scene, balls=scene.balls * 2)
     with pytest.raises(InputError, match="one ball on one surface"):
         _ = two.rolling
+
+
+def test_orientation_is_required_only_if_asked_for() -> None:
+    """Asking adds the orientation to what is required and to the digest; a scene that asks nothing keeps its digest."""
+    plain, asking = load_scene("sphere_in_cylinder"), load_scene("sphere_in_cylinder", asks=("orientation",))
+    assert asking.requires - plain.requires == {Capability.ORIENTATION}
+    assert asking.digest != plain.digest
+    # As it was before scenes could ask: results that were stored then are still those of this scene.
+    assert dataclasses.replace(plain, folder=Path()).digest == "fc2cc22c733e01ac"
+
+
+@pytest.mark.parametrize(("asks", "value"), [(("colour",), "colour"), ("orientations", "orientations"), (3, 3)])
+def test_what_cannot_be_asked(asks: object, value: object) -> None:
+    """Asking for something else gives one line with its name."""
+    with pytest.raises(InputError) as caught:
+        load_scene("sphere_in_cylinder", asks=asks)
+    assert (caught.value.field, caught.value.value) == ("asks", value)
+    assert "\n" not in str(caught.value)

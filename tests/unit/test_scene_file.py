@@ -180,3 +180,10 @@ def test_not_text(tmp_path: Path) -> None:
     """A file that is not UTF-8 is broken, not a traceback."""
     (tmp_path / "scene.toml").write_bytes(b"\xff\xfe\x00title")
     assert "broken" in str(problem(str(tmp_path)))
+
+
+def test_a_scene_file_that_asks(edited: Callable[[str, str], str]) -> None:
+    """What the file asks for is required, together with what the caller asks for, and once."""
+    folder = edited('title = "', 'asks = ["orientation"]\ntitle = "')
+    for asks in ((), ("orientation",)):
+        assert load_scene(folder, asks=asks).asks == ("orientation",)

@@ -7,13 +7,13 @@ import numpy as np
 import pytest
 import xarray as xr
 
+from proofroll.closed_form import closed_form
 from proofroll.engine import Sample
 from proofroll.errors import ProofrollError
 from proofroll.scene import Scene
 from proofroll.scene_file import load_scene
 from proofroll.trajectory import from_samples, read, trajectory, write
 from proofroll.truth import truth
-from proofroll.truth.closed_form import closed_form
 
 
 def exact(scene: Scene, times: np.ndarray) -> xr.Dataset:

@@ -1,1 +1,1 @@
-"""What proofroll itself costs: adapters against bare loops, and studies against the time inside engines."""
+"""Benchmarks: what speed the project claims for itself, and what it costs, measured here and now."""

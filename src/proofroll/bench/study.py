@@ -77,9 +77,9 @@ def bench_study(
     cases = study_cases(engines, seconds)
     with tempfile.TemporaryDirectory() as folder:
         start = time.perf_counter()
-        resolve([(case.engine.name, case.engine.settings) for case in cases])
-        resolved = time.perf_counter() - start
         runner = Runner(Store(Path(folder)), jobs=jobs)
+        resolve([(case.engine.name, case.engine.settings) for case in cases], runner.workers)
+        resolved = time.perf_counter() - start
         results = runner.run(cases, progress=lambda case, _: progress(case.engine.name) if progress else None)
         wall = time.perf_counter() - start
     found = [(case, results[case.key]) for case in cases]

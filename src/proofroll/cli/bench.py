@@ -1,4 +1,4 @@
-"""What things cost: commands under ``proofroll bench``."""
+"""Benchmarks: what speed the project claims for itself, and what it costs, measured on this machine."""
 
 from __future__ import annotations
 
@@ -6,9 +6,9 @@ from typing import Annotated, Any
 
 import typer
 
-from proofroll.cli.common import CONTRADICTED, ENGINE, Engines, Json, progress_bar, write_json
+from proofroll.cli.common import CONTRADICTED, ENGINE, Engines, Json, progress_bar, spinner, write_json
 
-bench = typer.Typer(help="Measure what proofroll itself costs.", no_args_is_help=True, rich_markup_mode=None)
+bench = typer.Typer(help="Measure speed, and what proofroll itself costs.", no_args_is_help=True, rich_markup_mode=None)
 
 Rounds = Annotated[int, typer.Option("--rounds", min=1, help="Measurements of each, in turns.")]
 
@@ -32,7 +32,11 @@ def adapters(
     if as_json:
         write_json(found)
     else:
-        _print_adapters(found)
+        from proofroll.report.bench import adapter_table
+        from proofroll.report.terminal import console
+
+        console().print(adapter_table(found))
+        console().print(f"goal: at most {found['goal']:g}")
     measured = [item for item in found["engines"].values() if item["ratio"] is not None]
     if engine and not measured:
         raise typer.Exit(ENGINE)
@@ -58,66 +62,32 @@ def study(
     if as_json:
         write_json(found)
     else:
-        _print_study(found)
+        from proofroll.report.bench import study_lines, study_tables
+        from proofroll.report.terminal import console
+
+        for part in (*study_tables(found), *study_lines(found)):
+            console().print(part)
     if not found["within_goal"]:
         raise typer.Exit(CONTRADICTED)
 
 
-def _print_study(found: dict[str, Any]) -> None:
-    from rich.table import Table
-    from rich.text import Text
+@bench.command()
+def reference(
+    rounds: Annotated[int, typer.Option("--rounds", min=2, help="Measurements of each, taken in turns.")] = 5,
+    as_json: Json = False,
+) -> None:
+    """The compiled models against the engines: how many times faster, at how large an error."""
+    from proofroll.bench.reference import reference as measured
 
-    from proofroll.report.terminal import console, number
-
-    title = f"{found['wall_seconds']:.1f} s with {found['jobs']} workers: {found['outside']:.0%} outside the engines"
-    shares = Table(box=None, padding=(0, 2, 0, 0), title=Text(title), title_justify="left")
-    shares.add_column("wall time × workers")
-    shares.add_column("part", justify="right")
-    for cause, share in found["shares"].items():
-        shares.add_row(Text(cause), f"{share:.1%}")
-    cases = Table(box=None, padding=(0, 2, 0, 0))
-    for column in ("case", "f", "simulated", "wall", "outside"):
-        cases.add_column(column, justify="left" if column == "case" else "right")
-    for case in found["cases"]:
-        outside = "–" if case["outside"] is None else f"{case['outside']:.0%}"
-        resistance = "> 0" if case["parameters"] else "0"
-        cases.add_row(
-            Text(f"{case['engine']} {case['formulation']} ({case['status']})"),
-            resistance,
-            f"{case['until']:.4g} s",
-            f"{case['seconds']:.2f} s",
-            outside,
-        )
-    for table in (shares, cases):
-        console().print(table)
-        console().print()
-    starts = ", ".join(f"{name} {number(seconds)} s" for name, seconds in found["first_answer"].items())
-    console().print(f"from the start of a process to its first answer: {starts}")
-    if found["load_before"] is not None:
-        console().print(f"load average of the machine before: {found['load_before']:.1f}")
-    console().print(f"goal: at most {found['goal']:.0%} outside")
-
-
-def _print_adapters(found: dict[str, Any]) -> None:
-    from rich.table import Table
-    from rich.text import Text
-
+    with spinner("reference") as sign:
+        content: dict[str, Any] = measured(rounds, sign.update)
+    if as_json:
+        write_json(content)
+        return
+    from proofroll.report.bench import reference_tables
     from proofroll.report.terminal import console
 
-    table = Table(box=None, padding=(0, 1, 0, 0), title=Text("advance over bare loop"), title_justify="left")
-    for column in ("engine formulation", "variant", "ratio", "95 %"):
-        table.add_column(column, no_wrap=True)
-    table.add_column("")
-    for name, item in found["engines"].items():
-        for row in item["rows"]:
-            ratio = row["ratio"]
-            interval = "" if ratio is None else f"{ratio['low']:.3f}–{ratio['high']:.3f}"
-            table.add_row(
-                Text(f"{name} {row['formulation']}"),
-                Text(row["variant"]),
-                Text("–" if ratio is None else f"{ratio['value']:.3f}", style="" if row["within_goal"] else "yellow"),
-                Text(interval),
-                Text(row["message"]),
-            )
-    console().print(table)
-    console().print(f"goal: at most {found['goal']:g}")
+    out = console()
+    for table in reference_tables(content):
+        out.print(table)
+        out.print()

@@ -114,7 +114,7 @@ def _outcomes(comparisons: list[Any], engines: list[str], runner: Runner) -> lis
     from proofroll.studies.compare import evaluate
     from proofroll.studies.planning import plan
 
-    plans = [plan(comparison, engines) for comparison in comparisons]
+    plans = [plan(comparison, engines, runner.workers) for comparison in comparisons]
     cases = {case.key: case for item in plans for case in item.cases}
     with progress_bar("cases", total=len(cases)) as advance:
         results = runner.run(cases.values(), lambda case, _: advance(case.engine.name))

@@ -35,6 +35,7 @@ def run(
     every: Annotated[float, typer.Option(help="Interval between samples [s].")] = 0.01,
     out: Annotated[Path | None, typer.Option(help="Write the trajectory to this netCDF file.")] = None,
     time_limit: Annotated[float, typer.Option(help="Wall seconds after which the run is ended.")] = 600.0,
+    ask: Annotated[list[str] | None, typer.Option(help="What is wanted besides the motion: orientation.")] = None,
     as_json: Json = False,
 ) -> None:
     """Run one scene in one engine."""
@@ -48,7 +49,15 @@ def run(
     time_grid(until, every)
     if out is not None:
         require_writable(out)
-    case = single_case(scene, assignments(settings or []), engine, until=until, every=every, time_limit=time_limit)
+    case = single_case(
+        scene,
+        assignments(settings or []),
+        engine,
+        until=until,
+        every=every,
+        time_limit=time_limit,
+        asks=tuple(dict.fromkeys(ask or [])),
+    )
     with tempfile.TemporaryDirectory() as folder:
         target = Path(folder) / "run.nc"
         with spinner(f"{scene} in {case.engine.name}"):

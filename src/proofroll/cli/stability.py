@@ -57,7 +57,7 @@ def stability(
         found = mapped(asked.scene, axes, runner, engines=engine or [], effort=effort, progress=advance)
     study = content(found)
     folder = out / "stability"
-    write_reproducers(found, study, folder / "reproducers")
+    write_reproducers(found, study, folder / "reproducers", runner.workers)
     contradictions = asked.contradictions(study)
     study["claims"] = {"file": asked.name, "contradictions": contradictions}
     path = folder / f"{found.scene}.json"

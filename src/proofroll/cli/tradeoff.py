@@ -247,6 +247,8 @@ def _measure(
     study = content(found)
     path = stored(out, question, engines)
     write_text(path, json.dumps(study))
-    names = {point.case.key: f"{curve.engine} {point.step:g}" for curve in found.curves for point in curve.points}
+    names = {
+        point.case.key: f"{curve.engine} {point.step or ''}".strip() for curve in found.curves for point in curve.points
+    }
     write_benchmarks({names[key]: timing for key, timing in found.timings.items()}, path.with_suffix(".pyperf.json"))
     return study

@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterable
 from typing import Any
+from unittest import SkipTest
 
 import numpy as np
 
@@ -10,7 +12,7 @@ from proofroll.certificate import certify, first_difference
 from proofroll.conformance.subject import Subject, bits, require, scenes
 from proofroll.engine import Sample
 from proofroll.errors import Refused
-from proofroll.scene import Scene
+from proofroll.scene import Capability, Scene
 
 
 def builds_or_refuses(subject: Subject) -> None:
@@ -57,6 +59,36 @@ def certificate_holds(subject: Subject) -> None:
     """What was built is what the scene says: mass, inertia, gravity, radius, start, first accelerations and forces."""
     difference = first_difference(certify(subject.build(), subject.scene))
     require(difference is None, str(difference))
+
+
+def builds_only_what_is_required(subject: Subject) -> None:
+    """What the scene requires is in the model; what it does not is not, unless a setting or the engine says why.
+
+    The setting is ``orientation=true``; the engine's reasons are :class:`proofroll.engine.CannotLeaveOut`.
+    """
+    engine = subject.build()
+    terms = engine.built().terms
+    if terms is None:
+        raise SkipTest("the engine does not say what is in its model")
+    required = subject.scene.requires & _OPTIONAL
+    lacking = required - terms
+    require(not lacking, f"the scene requires {_listed(lacking)}, of which nothing was built")
+    excused = set(getattr(subject.engine, "inherent", {}).get(subject.settings.formulation, {}))
+    if getattr(subject.settings, "orientation", None) is True:
+        excused.add(Capability.ORIENTATION)
+    wasted = terms - required - excused
+    require(not wasted, f"{_listed(wasted)} is in the model, which the scene does not require")
+    follows = engine.sample().q_WB is not None
+    told = Capability.ORIENTATION in terms
+    require(follows == told, f"the orientation is {'' if told else 'not '}in the model, yet a sample tells otherwise")
+
+
+# What a scene may require besides a ball that rolls on a surface.
+_OPTIONAL = frozenset({Capability.ROLLING_RESISTANCE, Capability.BOUNDED_FRICTION, Capability.ORIENTATION})
+
+
+def _listed(capabilities: Iterable[Capability]) -> str:
+    return ", ".join(sorted(capabilities))
 
 
 def samples_are_well_formed(subject: Subject) -> None:

@@ -26,6 +26,7 @@ _OF_ENGINES: tuple[Callable[[Any], None], ...] = (
 _OF_SCENES: tuple[Callable[[Subject], None], ...] = (
     building.builds_or_refuses,
     building.certificate_holds,
+    building.builds_only_what_is_required,
 )
 # One per formulation and preset, on the first scene that is not refused.
 _OF_PRESETS: tuple[Callable[[Subject], None], ...] = (

@@ -66,10 +66,13 @@ def presets_are_complete(engine: Any) -> None:
 
 
 def resolution_and_order_are_told(engine: Any) -> None:
-    """Each preset names the setting that trades speed for accuracy, and an order exactly if that is a step."""
+    """Each preset names the setting that trades speed for accuracy, if any, and an order exactly if that is a step."""
     for formulation, presets in engine.presets.items():
         for preset, settings in presets.items():
             where = f"presets[{formulation!r}][{preset!r}]"
+            if settings.resolution is None:
+                require(settings.order is None, f"{where}.order is {settings.order!r}; without a step there is none")
+                continue
             require(
                 settings.resolution in {"dt", "rtol"}, f"{where}.resolution is {settings.resolution!r}, not dt or rtol"
             )
@@ -89,7 +92,8 @@ def bad_settings_give_one_line(engine: Any) -> None:
     first = next(iter(engine.presets.values()))
     resolution = next(iter(first.values())).resolution
     bad: list[tuple[str, object]] = [("no_such_setting", 1), ("formulation", "no_such"), ("preset", "no_such")]
-    bad += [(resolution, value) for value in (0, -1.0, math.nan, math.inf, "text", None)]
+    if resolution is not None:
+        bad += [(resolution, value) for value in (0, -1.0, math.nan, math.inf, "text", None)]
     for name, value in bad:
         try:
             found = resolve_settings(engine, {**_as_chosen(first), name: value})

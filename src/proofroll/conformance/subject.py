@@ -32,6 +32,7 @@ def scenes() -> dict[str, Scene]:
         "plane-resisting": load_scene("inclined_plane", **plane, rolling_resistance=5e-4),
         "plane": load_scene("inclined_plane", **plane),
         "cylinder-slipping": load_scene("sphere_in_cylinder", **cylinder, mu_static=0.35),
+        "cylinder-oriented": load_scene("sphere_in_cylinder", **cylinder, asks=("orientation",)),
     }
 
 
@@ -96,6 +97,8 @@ class Subject:
         With a fixed step the steps are the same; what an implicit one is solved to is hardly worse than 1e-8, while a
         step lost or doubled shows as 1e-2. With a tolerance, some hundred steps each contribute about the tolerance.
         """
+        if self.settings.resolution is None:
+            return 1e-9
         return 1e-7 if self.fixed_step else max(1e-9, 1e3 * float(getattr(self.settings, self.settings.resolution)))
 
     def distance(self, one: Sample, other: Sample) -> float:

@@ -84,6 +84,7 @@ _DOMINANT = {
     "round-off or solver tolerance": "floor",
     "truth's own error bar": "truth",
     "too few runs reached the end": "too few runs",
+    "there is no step and no tolerance": "nothing",
 }
 
 

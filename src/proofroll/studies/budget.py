@@ -27,6 +27,7 @@ _ABOVE = 3.0
 _SLACK = 0.25
 _CONFIDENCE = 0.95
 
+NOTHING = "there is no step and no tolerance"
 TIME_STEP, MODEL_FORM, FLOOR, TRUTH = (
     "time step",
     "model form",
@@ -88,10 +89,10 @@ def budget(curve: Curve, quantity: str, every: float, true: FloatArray) -> Budge
     used = [p for p in curve.points if p.case.every == every and np.isfinite(p.errors.get(quantity, np.inf))]
     declared = curve.facts.order
     if len(used) < 3:
-        nothing = "too few runs reached the end"
+        nothing = "too few runs reached the end" if curve.facts.resolution else NOTHING
         return Budget(quantity, None, None, None, None, None, declared, None, _bar(used, quantity), nothing, nothing)
     values = [point.curves[quantity].values for point in used]
-    steps = [point.step for point in used]
+    steps = [point.step or 0.0 for point in used]
     differences = [size(a - b) for a, b in itertools.pairwise(values)]
     if curve.fixed_step:
         limit = richardson(values[-3:], steps[-3:], declared)

@@ -127,7 +127,7 @@ def compare(
     progress: Callable[[Case, Result], None] | None = None,
 ) -> Outcome:
     """Plans, runs and judges a comparison."""
-    planned = plan(comparison, engines)
+    planned = plan(comparison, engines, runner.workers)
     return evaluate(planned, runner.run(planned.cases, progress), runner)
 
 

@@ -15,6 +15,7 @@ from proofroll.runner import Runner, WorkerDied, describe, resolve
 from proofroll.scene import Capability, Scene
 from proofroll.scene_file import load_scene
 from proofroll.trajectory import read
+from proofroll.workers import Workers
 
 if TYPE_CHECKING:
     from proofroll.truth.onset import Onset
@@ -76,12 +77,12 @@ class OnsetStudy:
         return None if item.first is None or self.truth.time is None else item.first.time - self.truth.time
 
 
-def default_engines() -> list[str]:
+def default_engines(workers: Workers | None = None) -> list[str]:
     """Every formulation of every installed engine that provides bounded friction, with its matched settings."""
     found: list[str] = []
     for name in engine_names():
         try:
-            described = describe(name)
+            described = describe(name, workers)
         except ProofrollError:
             found.append(name)  # the row says why it cannot run
             continue
@@ -120,9 +121,9 @@ def onset_study(
     if Capability.BOUNDED_FRICTION not in loaded.requires:
         raise InputError("mu_static", "inf", "without bounded friction the ball never slips; give --set mu_static=…")
     truth = onset(loaded, until, uncertainty)
-    names = list(engines) or default_engines()
+    names = list(engines) or default_engines(runner.workers)
     specs = [parse_engine(name) for name in names]
-    facts = resolve([(spec.name, spec.options) for spec in specs])
+    facts = resolve([(spec.name, spec.options) for spec in specs], runner.workers)
     for found in facts:
         if isinstance(found, InputError):
             raise found

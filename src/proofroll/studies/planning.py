@@ -15,6 +15,7 @@ from proofroll.runner import resolve
 from proofroll.scene import Scene
 from proofroll.scene_file import load_scene
 from proofroll.studies.points import settled
+from proofroll.workers import Workers
 
 
 def point_name(parameters: dict[str, float]) -> str:
@@ -46,12 +47,13 @@ class Plan:
         return [*self.truths.values(), *(case for run in self.runs for case in run.ladder.values())]
 
 
-def plan(comparison: Comparison, engines: Iterable[str] = ()) -> Plan:
+def plan(comparison: Comparison, engines: Iterable[str] = (), workers: Workers | None = None) -> Plan:
     """The cases of a comparison.
 
     Args:
         comparison: from :func:`proofroll.comparison_file.load_comparison`.
         engines: names of engines to which it is restricted; all if empty.
+        workers: processes in which they are asked.
 
     Raises:
         InputError: an engine or setting that does not exist.
@@ -63,11 +65,11 @@ def plan(comparison: Comparison, engines: Iterable[str] = ()) -> Plan:
         known = ", ".join(dict.fromkeys(parse_engine(row.engine).name for row in comparison.rows))
         raise InputError("engine", ", ".join(chosen), f"{comparison.name} compares {known}")
     specs = [parse_engine(row.engine) for row in rows]
-    resolved = resolve([(spec.name, spec.options) for spec in specs] + [("truth", {})])
+    resolved = resolve([(spec.name, spec.options) for spec in specs] + [("truth", {})], workers)
     truth_facts = resolved.pop()
     if not isinstance(truth_facts, EngineFacts):
         raise truth_facts
-    rungs = _rungs(rows, resolved)
+    rungs = _rungs(rows, resolved, workers)
     truths: dict[str, Case] = {}
     runs: list[Planned] = []
     for row, facts, ladder_facts in zip(rows, resolved, rungs, strict=True):
@@ -87,7 +89,9 @@ def plan(comparison: Comparison, engines: Iterable[str] = ()) -> Plan:
     return Plan(comparison, truths, runs)
 
 
-def _rungs(rows: list[Row], resolved: list[EngineFacts | ProofrollError]) -> list[dict[float, EngineFacts]]:
+def _rungs(
+    rows: list[Row], resolved: list[EngineFacts | ProofrollError], workers: Workers | None
+) -> list[dict[float, EngineFacts]]:
     """For every row the facts of its ladder: its own settings with the resolution scaled, where that is allowed."""
     wanted: list[tuple[int, float, EngineFacts]] = []
     for index, (row, facts) in enumerate(zip(rows, resolved, strict=True)):
@@ -99,7 +103,7 @@ def _rungs(rows: list[Row], resolved: list[EngineFacts | ProofrollError]) -> lis
         if facts.resolution is not None
     ]
     ladders = [{1.0: facts} if isinstance(facts, EngineFacts) else {} for facts in resolved]
-    for (index, factor, _), found in zip(wanted, resolve(scaled), strict=True):
+    for (index, factor, _), found in zip(wanted, resolve(scaled, workers), strict=True):
         if isinstance(found, EngineFacts):
             ladders[index][factor] = found
     return ladders

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import threading
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 
 from proofroll.case import Case
 from proofroll.errors import InputError, ProofrollError
@@ -13,7 +13,14 @@ from proofroll.scene_file import load_scene
 
 
 def single_case(
-    scene: str, parameters: Mapping[str, object], engine: str, *, until: float, every: float, time_limit: float
+    scene: str,
+    parameters: Mapping[str, object],
+    engine: str,
+    *,
+    until: float,
+    every: float,
+    time_limit: float,
+    asks: Sequence[str] = (),
 ) -> Case:
     """The case of one run.
 
@@ -23,7 +30,7 @@ def single_case(
     if not 0 < time_limit <= threading.TIMEOUT_MAX:
         raise InputError("time_limit", time_limit, "give a positive, finite time in s")
     spec = parse_engine(engine)
-    loaded = load_scene(scene, **parameters)  # type: ignore[arg-type]  # text is checked and converted there
+    loaded = load_scene(scene, asks=asks, **parameters)  # type: ignore[arg-type]  # text is checked and converted there
     facts = resolve([(spec.name, spec.options)])[0]
     if isinstance(facts, ProofrollError):
         raise facts
@@ -35,4 +42,5 @@ def single_case(
         until=until,
         every=every,
         time_limit=time_limit,
+        asks=tuple(asks),
     )

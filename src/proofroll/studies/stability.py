@@ -188,14 +188,13 @@ def stability(
     """
     effort = effort or Effort()
     tell: Progress = progress or (lambda _text, _count: None)
-    curves, absent = curves_of(engines)
+    curves, absent = curves_of(engines, runner.workers)
     places = _places(scene, axes, effort)
     _measure(scene, places, runner, tell)
     points = [
         MapPoint(curve, place, _ladder(curve, place)) for curve in curves for place in places if place.scene is not None
     ]
-    with runner.keeping_workers():
-        _search(scene, points, effort, runner, tell)
+    _search(scene, points, effort, runner, tell)
     return StabilityMap(scene, list(axes), effort, places, points, absent)
 
 
@@ -221,7 +220,7 @@ def _places(name: str, axes: Sequence[Axis], effort: Effort) -> list[Place]:
 
 def _measure(name: str, places: Sequence[Place], runner: Runner, tell: Progress) -> None:
     """The truth of every place, or why there is none."""
-    (facts,) = resolve([("truth", {})])
+    (facts,) = resolve([("truth", {})], runner.workers)
     if not isinstance(facts, EngineFacts):
         raise facts
     cases = {id(place): _case(name, place, facts, _TRUTH_LIMIT) for place in places if place.scene is not None}

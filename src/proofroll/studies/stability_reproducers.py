@@ -13,6 +13,7 @@ from proofroll.scene import Capability, Scene
 from proofroll.store import write_text
 from proofroll.studies.failure import ACCURATE, GAIN, SLIPPED, WRONG, Failure
 from proofroll.studies.stability import MapPoint, StabilityMap
+from proofroll.workers import Workers
 
 # A run that did not begin, and one that nobody waited for, show nothing.
 _NOTHING_TO_SHOW = {
@@ -70,13 +71,14 @@ if __name__ == "__main__":
 '''
 
 
-def write_reproducers(found: StabilityMap, study: dict[str, Any], folder: Path) -> None:
+def write_reproducers(found: StabilityMap, study: dict[str, Any], folder: Path, workers: Workers | None = None) -> None:
     """Puts the path of each program into its point of the study, or why there is none.
 
     Args:
         found: the map.
         study: the same as :func:`proofroll.studies.stability_content.content` has it; its points are in its order.
         folder: where the programs go.
+        workers: idle ones that may be asked.
     """
     wanted: list[tuple[MapPoint, dict[str, Any], dict[str, Any], Case, str]] = []
     for point, entry in zip(found.points, study["points"], strict=True):
@@ -92,7 +94,7 @@ def write_reproducers(found: StabilityMap, study: dict[str, Any], folder: Path) 
         rung = point.ladder.index(side["beyond"])
         wanted.append((point, entry, side, point.cases[rung], name))
     for (point, entry, side, case, name), (program, reason) in zip(
-        wanted, programs([item[3] for item in wanted]), strict=True
+        wanted, programs([item[3] for item in wanted], workers), strict=True
     ):
         if program is None:
             entry["reproducer_note"] = reason

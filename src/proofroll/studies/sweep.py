@@ -18,6 +18,7 @@ from proofroll.scene import Scene
 from proofroll.scene_file import load_scene
 from proofroll.studies.reference import Reference
 from proofroll.trajectory import read
+from proofroll.workers import Workers
 
 # Samples per run. An oscillation of the founding scene's z has a dozen of them, and an adaptive step, which ends at
 # each, is still as long as it likes to be.
@@ -79,11 +80,10 @@ class Point:
     bars: dict[str, float] = field(default_factory=dict)
 
     @property
-    def step(self) -> float:
-        """Value of the setting that trades speed for accuracy."""
+    def step(self) -> float | None:
+        """Value of the setting that trades speed for accuracy; None if there is none."""
         facts = self.case.engine
-        assert facts.resolution is not None  # see points()
-        return float(facts.settings[facts.resolution])
+        return None if facts.resolution is None else float(facts.settings[facts.resolution])
 
 
 @dataclass
@@ -110,18 +110,19 @@ class Curve:
         return self.facts.resolution == "dt"
 
 
-def curves_of(engines: Iterable[str]) -> tuple[list[Curve], dict[str, str]]:
+def curves_of(engines: Iterable[str], workers: Workers | None = None) -> tuple[list[Curve], dict[str, str]]:
     """A curve without points for every formulation and preset of the engines, and why some engine has none.
 
     Args:
         engines: names, or ``name[key=value,…]`` for one formulation or setting; all that are installed if empty.
+        workers: processes in which they are asked.
     """
     wanted: list[tuple[str, str | None]] = []
     absent: dict[str, str] = {}
     for text in list(engines) or engine_names():
         spec = parse_engine(text)
         try:
-            described = describe(spec.name)
+            described = describe(spec.name, workers)
         except InputError:
             raise
         except ProofrollError as error:
@@ -141,13 +142,14 @@ def curves_of(engines: Iterable[str]) -> tuple[list[Curve], dict[str, str]]:
             raise InputError("engine", text, f"{spec.name} has {', '.join(described['presets'])}")
     specs = [parse_engine(name) for name, _ in wanted]
     curves = []
-    for (name, level), facts in zip(wanted, resolve([(spec.name, spec.options) for spec in specs]), strict=True):
+    resolved = resolve([(spec.name, spec.options) for spec in specs], workers)
+    for (name, level), facts in zip(wanted, resolved, strict=True):
         if isinstance(facts, InputError):
             raise facts
-        if isinstance(facts, EngineFacts) and facts.resolution is not None:
+        if isinstance(facts, EngineFacts):
             curves.append(Curve(name, facts, level))
         else:
-            absent[name] = str(facts) if isinstance(facts, ProofrollError) else "it has no step to vary"
+            absent[name] = str(facts)
     return curves, absent
 
 
@@ -180,7 +182,9 @@ def sweep(
 
 
 def _first(question: Question, curve: Curve) -> list[float]:
-    own = float(curve.facts.settings[str(curve.facts.resolution)])
+    if curve.facts.resolution is None:
+        return [0.0]  # a closed form has nothing to refine: one point
+    own = float(curve.facts.settings[curve.facts.resolution])
     if curve.fixed_step:
         return [question.every * factor for factor in _STEPS]
     return [*_TOLERANCES, own]
@@ -198,7 +202,7 @@ def _further(question: Question, curve: Curve, references: Mapping[float, Refere
         found.append(question.every * coarser)
     finer = next((f for f in _FINER if question.every * f not in asked), None)
     if finer is not None and len(curve.points) > 1:
-        ratio = finest.step / (question.every * finer)
+        ratio = (finest.step or 0.0) / (question.every * finer)
         now, before = (point.errors.get(question.quantity, np.inf) for point in (finest, curve.points[-2]))
         if now < (1 - _GAIN) * before and finest.result.wall_seconds * ratio < _PATIENCE:
             found.append(question.every * finer)
@@ -217,8 +221,8 @@ def _run(
     options: list[tuple[str, dict[str, Any]]] = []
     for index, value in wanted:
         facts = curves[index].facts
-        options.append((facts.name, {**facts.settings, str(facts.resolution): value}))
-    resolved = resolve([*options, ("truth", {})])
+        options.append((facts.name, facts.settings | ({facts.resolution: value} if facts.resolution else {})))
+    resolved = resolve([*options, ("truth", {})], runner.workers)
     truth_facts = resolved.pop()
     if not isinstance(truth_facts, EngineFacts):
         raise truth_facts
@@ -247,7 +251,7 @@ def _run(
         point = judged(Point(case, results[case.key]), references[case.every], runner)
         curves[index].points.append(point)
     for curve in curves:
-        curve.points.sort(key=lambda point: -point.step)
+        curve.points.sort(key=lambda point: -(point.step or 0.0))
 
 
 def case_of(question: Question, scene: Scene, facts: EngineFacts, every: float) -> Case:

@@ -25,6 +25,7 @@ from proofroll.studies.pareto import envelope, front
 from proofroll.studies.reference import Reference
 from proofroll.studies.sweep import Curve, Point, Question, case_of, curves_of, judged, sweep
 from proofroll.timing import ROUNDS, Timing, interleaved
+from proofroll.workers import Workers
 
 
 @dataclass(frozen=True)
@@ -115,34 +116,34 @@ def tradeoff(
         raise InputError("quantity", question.quantity, f"there is no such observable; choose from {', '.join(known)}")
     if question.quantity == "first_slip" and not np.isfinite(scene.rolling.contact.mu_static):
         raise InputError("quantity", "first_slip", "without bounded friction the ball never slips; --set mu_static=…")
-    curves, absent = curves_of(engines)
+    curves, absent = curves_of(engines, runner.workers)
 
     def told(case: Case, _: Result) -> None:
         if progress:
             progress(case.engine.name)
 
     references = sweep(question, curves, runner, told)
-    truth = next(iter(runner.run([_truth_case(question, references)]).values()))
+    truth = next(iter(runner.run([_truth_case(question, references, runner)]).values()))
     found = Tradeoff(question, curves, absent, references, truth.wall_seconds / question.until)
-    found.timings = _timed(found, rounds, progress)
+    found.timings = _timed(found, runner.workers, rounds, progress)
     if over:
         found.over = {name: [float(value) for value in values] for name, values in over.items()}
         found.corners = _checked(found, runner, told)
     return found
 
 
-def _truth_case(question: Question, references: Mapping[float, Reference]) -> Case:
+def _truth_case(question: Question, references: Mapping[float, Reference], runner: Runner) -> Case:
     from proofroll.case import EngineFacts
     from proofroll.runner import resolve
 
-    (facts,) = resolve([("truth", {})])
+    (facts,) = resolve([("truth", {})], runner.workers)
     assert isinstance(facts, EngineFacts)  # the sweep has run with it
     return case_of(question, references[question.every].scene, facts, question.every)
 
 
-def _timed(found: Tradeoff, rounds: int, progress: Progress | None) -> dict[str, Timing]:
+def _timed(found: Tradeoff, workers: Workers, rounds: int, progress: Progress | None) -> dict[str, Timing]:
     cases = {point.case.key: point.case for point in found.points if point.result.status == Status.DONE}
-    with Stopwatch() as stopwatch:
+    with Stopwatch(workers) as stopwatch:
         return interleaved(
             {key: lambda case=case: stopwatch(case) for key, case in cases.items()},  # type: ignore[misc]
             rounds,
@@ -158,7 +159,7 @@ def _checked(found: Tradeoff, runner: Runner, told: Callable[[Case, Result], Non
         for quantity in judged_quantities(found)
         for point in front(pareto_entries([c for c in found.curves if c.facts.name == name], quantity, found.timings))
     }
-    base, truth_facts = found.question, _truth_case(found.question, found.references).engine
+    base, truth_facts = found.question, _truth_case(found.question, found.references, runner).engine
     intervals = {point.case.every for point in chosen.values()}
     places = [dict(zip(found.over, values, strict=True)) for values in itertools.product(*found.over.values())]
     asked = []

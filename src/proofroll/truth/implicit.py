@@ -8,13 +8,13 @@ from functools import partial
 import numpy as np
 
 from proofroll.errors import Diverged
+from proofroll.motion import Motion
 from proofroll.scene import RollingBall
 from proofroll.surfaces import FloatArray
 from proofroll.truth.assemble import classic_step
 from proofroll.truth.collocation import Step, System, next_length, nodes, take
 from proofroll.truth.contact import Contact
 from proofroll.truth.crossing import first_rise
-from proofroll.truth.motion import Motion
 from proofroll.truth.switching import End, Leg
 
 _TOLERANCE = 1e-13  # of a step, relative to the scale of each variable

@@ -13,12 +13,12 @@ from collections.abc import Callable
 import numpy as np
 
 from proofroll.errors import Diverged
+from proofroll.motion import Motion, world_motion
+from proofroll.rolling_equations import reduced_rates
 from proofroll.scene import RollingBall
 from proofroll.surfaces import FloatArray
-from proofroll.truth.assemble import classic_step, joined, world_motion
+from proofroll.truth.assemble import classic_step, joined
 from proofroll.truth.explicit import Piece, Rates, at_clock, read, steps, stop
-from proofroll.truth.motion import Motion
-from proofroll.truth.rolling import reduced_rates
 from proofroll.truth.switching import End, Leg
 
 _FLOOR = 1e-4  # |u| at which the rest of a slip is extrapolated, relative to where it began

@@ -143,11 +143,13 @@ def _mapped(
     with ProcessPoolExecutor(workers, mp_context=get_context("spawn")) as pool:
         signal.pthread_sigmask(signal.SIG_BLOCK, {signal.SIGINT})  # inherited: Ctrl-C is the parent's affair
         try:
-            rows = pool.map(row, speeds)
+            # Not map, which cancels the rest when interrupted: a pool whose processes are then ended complains.
+            rows = [pool.submit(row, speed) for speed in speeds]
         finally:
             signal.pthread_sigmask(signal.SIG_UNBLOCK, {signal.SIGINT})
         try:
-            yield from rows
+            for one in rows:
+                yield one.result()
         except BaseException:
             for process in active_children():
                 process.kill()

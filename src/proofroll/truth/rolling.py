@@ -1,6 +1,7 @@
 """Two independent routes to rolling without slip, both integrated at tight tolerance.
 
-* :func:`reduced`: five states (u, u̇, ω1) on the surface's parametrisation, reactions eliminated by hand.
+* :func:`reduced`: five states (u, u̇, ω1) on the surface's parametrisation, reactions eliminated by hand
+  (:mod:`proofroll.rolling_equations`).
 * :func:`unreduced`: nine states (p, v, ω) in the world, reactions from a linear system, and the surface only through
   its signed distance.
 """
@@ -13,51 +14,22 @@ import numpy as np
 from scipy.integrate import DOP853
 
 from proofroll.errors import Diverged
-from proofroll.mechanics import newton_euler, resistance_moment
+from proofroll.mechanics import newton_euler
+from proofroll.motion import Motion
+from proofroll.rolling_equations import placed, reduced_rates, start
 from proofroll.scene import RollingBall
 from proofroll.surfaces import FloatArray
-from proofroll.truth.motion import Motion
 
 # The tightest relative tolerance that scipy accepts is 100 machine epsilons.
 _RTOL = 100 * np.finfo(float).eps
 
 
-def reduced_rates(body: RollingBall, state: FloatArray) -> tuple[FloatArray, FloatArray, FloatArray]:
-    """Rates of (u, u̇, ω1), shape (5,), and velocity and force in the world, shape (3,).
-
-    With κ = J/ma² the tangential part of Newton-Euler after eliminating the friction reads
-    (1 + κ) v̇ = g - κ a ω1 e1 × ė1 + e1 × M / (m a), and ω̇1 = ω · ė1.
-    """
-    a, m, kappa, f = body.ball.radius, body.ball.mass, body.ball.inertia_ratio, body.contact.rolling_resistance
-    u, udot, spin = state[:2], state[2:4], state[4]
-    surface = body.surface
-    frame, tangents = surface.frame(u), surface.tangents(u)
-    e1, in_plane = frame[:, 0], frame[:, 1:]
-    curving = surface.second(u) @ udot @ udot
-    v = tangents @ udot
-    # ė1 · t = -e1 · ṫ for every tangent t: the shape operator from the second derivatives
-    e1_rate = -np.linalg.pinv(tangents).T @ (e1 @ (surface.second(u) @ udot))
-    N = m * (e1_rate @ v + e1 @ body.gravity)
-    drive = body.gravity - kappa * a * spin * np.cross(e1, e1_rate)
-    if f:
-        drive = drive + np.cross(e1, resistance_moment(f, N, e1, v)) / (m * a)
-    tangential = in_plane @ (in_plane.T @ drive) / (1 + kappa)
-    acceleration = tangential - e1 * (e1_rate @ v)
-    uddot = np.linalg.pinv(tangents) @ (tangential - curving)
-    spin_rate = -np.cross(e1, v) @ e1_rate / a
-    return np.concatenate([udot, uddot, [spin_rate]]), v, m * (acceleration - body.gravity)
-
-
 def reduced(body: RollingBall, times: FloatArray) -> Motion:
     """The reduced equations at tight tolerance."""
-    start = np.concatenate([body.u0, body.udot0, [body.w0 @ body.surface.normal(body.p0)]])
-    states = _integrate(lambda x: reduced_rates(body, x)[0], start, times)
+    states = _integrate(lambda x: reduced_rates(body, x)[0], start(body), times)
     evaluated = [reduced_rates(body, x) for x in states]
-    v = np.array([item[1] for item in evaluated])
-    e1 = body.surface.frame(states[:, :2])[..., 0]
-    w = states[:, 4:] * e1 - np.cross(e1, v) / body.ball.radius
-    force = np.array([item[2] for item in evaluated])
-    return Motion(body.surface.position(states[:, :2]), v, w, force, "reduced equations, DOP853")
+    v, force = (np.array([item[i] for item in evaluated]) for i in (1, 2))
+    return Motion(*placed(body, states, v), force, "reduced equations, DOP853")
 
 
 def unreduced(body: RollingBall, times: FloatArray) -> Motion:

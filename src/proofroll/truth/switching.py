@@ -15,9 +15,9 @@ import numpy as np
 
 from proofroll.errors import Diverged, Refused
 from proofroll.events import EventKind
+from proofroll.motion import Motion
 from proofroll.scene import RollingBall
 from proofroll.surfaces import FloatArray
-from proofroll.truth.motion import Motion
 
 # Relative distance from the friction cone below which round-off decides on which side a state is.
 _ON_CONE = 1e-13

@@ -6,11 +6,13 @@ from typing import Any
 
 import numpy as np
 
+from proofroll.compiled import library
+from proofroll.compiled.rolling import is_uniform, parameters, start
 from proofroll.errors import Diverged
+from proofroll.motion import Motion, world_motion
 from proofroll.scene import RollingBall
 from proofroll.surfaces import Cylinder, FloatArray, Plane
-from proofroll.truth.assemble import classic_step, joined, world_motion
-from proofroll.truth.motion import Motion
+from proofroll.truth.assemble import classic_step, joined
 from proofroll.truth.switching import End, Leg
 from proofroll.truth.taylor_model import Model, model
 
@@ -22,12 +24,8 @@ _FLOOR = 1e-4  # |u| at which the rest of a slip is extrapolated, relative to wh
 
 
 def available() -> bool:
-    """Whether heyoka can be imported."""
-    try:
-        import heyoka  # noqa: F401
-    except ImportError:
-        return False
-    return True
+    """Whether heyoka is installed."""
+    return library.available()
 
 
 def supports(body: RollingBall) -> bool:
@@ -65,20 +63,13 @@ class Taylor:
         self._body = body
         self._handover = handover
         self._scales = np.array(surface.length_scales)
-        curved = isinstance(surface, Cylinder)
-        gravity = surface.frame(np.zeros(2)).T @ body.gravity
         self._A = (1 + body.ball.inertia_ratio) / body.ball.inertia_ratio
-        self._pars = [1 / surface.radius if isinstance(surface, Cylinder) else 0.0, *gravity, body.ball.radius]
-        self._pars += [body.ball.inertia_ratio, contact.rolling_resistance]
-        self._pars += [min(mu, _LARGEST) for mu in (contact.mu_kinetic, contact.mu_static)]
-        uniform = not curved or not np.any(gravity[:2])
-        self._model: Model = model(resistance=contact.rolling_resistance > 0, uniform=uniform)
+        self._pars = [*parameters(body), *(min(mu, _LARGEST) for mu in (contact.mu_kinetic, contact.mu_static))]
+        self._model: Model = model(resistance=contact.rolling_resistance > 0, uniform=is_uniform(body))
 
     def start(self) -> FloatArray:
         """See :class:`Route`."""
-        body = self._body
-        frame = body.surface.frame(body.u0)
-        return np.concatenate([body.u0 * self._scales, frame[:, 1:].T @ body.v0, [body.w0 @ frame[:, 0]]])
+        return start(self._body)
 
     def excess(self, state: FloatArray) -> float:
         """See :class:`Route`."""

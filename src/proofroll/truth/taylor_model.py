@@ -1,47 +1,21 @@
 """Stick and slip of a ball on a cylinder or plane as compiled Taylor integrators (heyoka).
 
-Surfaces are those along which gravity turns with the arc length q and which bend only that way: curvature k = 1/c on
-a cylinder, 0 on a plane. State: arc length q and height h [m], velocities v2, v3 of the centre [m/s], ω1 [rad/s]; all
-forces are divided by the mass. With κ = J/(m a²), A = (1 + κ)/κ and the drive
-
-    b = g_t + a ω1 e1 × ė1 + (f N / (κ a)) v/V
-
-the slip velocity u obeys u̇ = A F + b, whether the ball slips (F = -μk N u/|u|) or sticks (F = -b/A).
+The equations, their state and their symbols are those of :mod:`proofroll.compiled.rolling`.
 """
 
 from __future__ import annotations
 
 import threading
-from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import cache
 from typing import Any
 
-import numpy as np
-
-from proofroll.surfaces import FloatArray
+from proofroll.compiled.rolling import PARAMETERS as SHARED
+from proofroll.compiled.rolling import Function, expressions
 
 # Order of the run-time parameters of every integrator.
 # Functions and integrators take as many of them as they use; those that few use stand last.
-PARAMETERS = ("curvature", "g_x", "g_y", "g_z", "radius", "kappa", "f", "mu_k", "mu_s", "limit", "t_end")
-
-
-class Function:
-    """A compiled function of states, shape (k,) or (k, n), and as many of the parameters as it uses."""
-
-    def __init__(self, outputs: Sequence[Any], variables: Sequence[Any]) -> None:
-        import heyoka as hy
-
-        self._call = hy.cfunc(list(outputs), list(variables))
-        names = [str(par) for output in outputs for par in hy.get_params(output)]
-        self._count = 1 + max(int(name.strip("par[]")) for name in names)
-
-    def __call__(self, states: FloatArray, pars: Sequence[float]) -> FloatArray:
-        """Values, shape (outputs,) or (outputs, n)."""
-        used = np.asarray(pars[: self._count], dtype=np.float64)
-        if states.ndim == 2:
-            used = np.repeat(used[:, None], states.shape[1], axis=1)
-        return np.asarray(self._call(np.ascontiguousarray(states), pars=used), dtype=np.float64)
+PARAMETERS = (*SHARED, "mu_k", "mu_s", "limit", "t_end")
 
 
 @dataclass
@@ -86,25 +60,13 @@ def model(resistance: bool, uniform: bool) -> Model:
 def _compiled(resistance: bool, uniform: bool) -> Model:
     import heyoka as hy
 
-    q, h, v2, v3, w1, size, y, phi, t = hy.make_vars("q", "h", "v2", "v3", "w1", "size", "y", "phi", "t")
-    k, gx, gy, gz, a, kappa, f, mu_k, mu_s, limit, t_end = (hy.par[i] for i in range(len(PARAMETERS)))
-    angle = k * q
-    g1, g2 = (gx, gy) if uniform else (gx * hy.cos(angle) + gy * hy.sin(angle), gy * hy.cos(angle) - gx * hy.sin(angle))
-    N = g1 + k * v2**2
-    A = (1.0 + kappa) / kappa
-    per_speed = f * N / (kappa * a * hy.sqrt(v2**2 + v3**2)) if resistance else hy.expression(0.0)
-    b2 = g2 + per_speed * v2
-    b3 = gz + a * w1 * k * v2 + per_speed * v3
-    available = A * mu_s * N
-    outside = b2**2 + b3**2 - available**2
-
-    def rates(F2: Any, F3: Any, u3: Any) -> list[tuple[Any, Any]]:
-        return [(q, v2), (h, v3), (v2, g2 + F2), (v3, gz + F3), (w1, (v3 - u3) / a * k * v2)]
-
-    def along(expression: Any, flow: list[tuple[Any, Any]]) -> Any:
-        return hy.sum([hy.diff(expression, x) * x_rate for x, x_rate in flow])
-
-    rolling = rates(-b2 / A, -b3 / A, 0.0)
+    size, y, phi, t = hy.make_vars("size", "y", "phi", "t")
+    mu_k, mu_s, limit, t_end = (hy.par[i] for i in range(len(SHARED), len(PARAMETERS)))
+    equations = expressions(resistance, uniform)
+    q, h, v2, v3, w1 = equations.state
+    A, N, b2, b3 = equations.A, equations.N, equations.b2, equations.b3
+    rates, along = equations.rates, equations.along
+    rolling = equations.rolling()
     b_rate = (along(b2, rolling), along(b3, rolling))
 
     up, down = hy.event_direction.positive, hy.event_direction.negative
@@ -133,7 +95,7 @@ def _compiled(resistance: bool, uniform: bool) -> Model:
         (t, speed),
     ]
     return Model(
-        stick=integrator(rolling, [hy.t_event(outside, direction=up)]),
+        stick=integrator(rolling, [hy.t_event(equations.excess(mu_s), direction=up)]),
         creep=integrator(
             creeping, [hy.t_event(size - limit, direction=up), hy.t_event(size + 1e-10 * limit, direction=down)]
         ),

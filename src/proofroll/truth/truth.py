@@ -6,13 +6,13 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from proofroll.closed_form import closed_form
 from proofroll.events import with_events
+from proofroll.motion import Motion
 from proofroll.scene import Capability, Scene
 from proofroll.surfaces import FloatArray
 from proofroll.trajectory import trajectory
-from proofroll.truth.closed_form import closed_form
 from proofroll.truth.error_bars import put_error_bars
-from proofroll.truth.motion import Motion
 from proofroll.truth.rolling import reduced, unreduced
 
 if TYPE_CHECKING:

@@ -82,20 +82,21 @@ def test_certificate(scene: Scene, formulation: str, preset: str) -> None:
     assert all(line.because == "" for line in lines)  # nothing is softened
 
 
-# Bounds: a few times what was measured over 2 s; what remains is round-off and the truth's own error, except with
-# `matched`, where the tolerance of the ball's turning (3e-14 per step, some hundred steps per second) still shows.
+# Bounds: a few times what was measured over 2 s; what remains is round-off and the truth's own error. With the
+# orientation the tolerance of the ball's turning (3e-14 per step, some hundred steps per second) still shows.
 @pytest.mark.parametrize(
-    ("formulation", "preset", "z", "force"),
+    ("formulation", "option", "z", "force"),
     [
-        ("composite", "matched", 1e-12, 5e-11),
-        ("composite", "tuned", 5e-14, 2e-12),
-        ("free_flyer", "tuned", 5e-14, 5e-12),
+        ("composite", "orientation=true", 1e-12, 5e-11),
+        ("composite", "preset=matched", 5e-14, 2e-12),
+        ("composite", "preset=tuned", 5e-14, 2e-12),
+        ("free_flyer", "preset=tuned", 5e-14, 5e-12),
     ],
 )
 @pytest.mark.parametrize("resistance", [0.0, RESISTANCE])
-def test_accuracy_on_the_cylinder(formulation: str, preset: str, z: float, force: float, resistance: float) -> None:
+def test_accuracy_on_the_cylinder(formulation: str, option: str, z: float, force: float, resistance: float) -> None:
     """At tight tolerance path, spin, reactions and energy are the truth's, with and without rolling resistance."""
-    engine = f"pinocchio[formulation={formulation},preset={preset}]"
+    engine = f"pinocchio[formulation={formulation},{option}]"
     errors = largest_errors(cylinder(rolling_resistance=resistance), engine, until=2.0, every=0.1)
     assert errors["z"] < z
     assert errors["gamma"] < 1e-11
@@ -108,7 +109,7 @@ def test_accuracy_on_the_cylinder(formulation: str, preset: str, z: float, force
 
 def test_accuracy_of_the_free_ball_in_its_own_axes() -> None:
     """The free flyer in the ball's turning axes, put back on its rows, is as accurate (0.2 s: it is slow)."""
-    errors = largest_errors(cylinder(), "pinocchio[formulation=free_flyer,preset=matched]", until=0.2, every=0.1)
+    errors = largest_errors(cylinder(), "pinocchio[formulation=free_flyer,orientation=true]", until=0.2, every=0.1)
     assert errors["z"] < 1e-12
     assert max(errors["N"], errors["F2"], errors["F3"]) < 1e-10
     assert errors["gap"] < 1e-15
@@ -204,7 +205,7 @@ def test_model_is_only_what_the_scene_requires() -> None:
 @pytest.mark.parametrize("scene", [cylinder(), plane(speed=4)], ids=["cylinder", "plane"])
 def test_orientation_follows_the_spin(scene: Scene, formulation: str) -> None:
     """The orientation starts at the identity, and turns with the angular velocity that is reported."""
-    run = simulate(scene, "pinocchio", formulation=formulation, rtol=1e-10, until=0.02, every=1e-3)
+    run = simulate(scene, "pinocchio", formulation=formulation, rtol=1e-10, orientation=True, until=0.02, every=1e-3)
     np.testing.assert_allclose(run.q_WB[0], [1, 0, 0, 0], atol=1e-15)
     turned = Rotation.from_quat(np.roll(run.q_WB.to_numpy(), -1, axis=1))
     spin = (turned[2:] * turned[:-2].inv()).as_rotvec() / 2e-3
@@ -214,7 +215,8 @@ def test_orientation_follows_the_spin(scene: Scene, formulation: str) -> None:
 
 def test_orientation_is_absent_where_it_is_not_integrated() -> None:
     """Without the orientation the sample says nothing about it, rather than something wrong."""
-    assert "q_WB" not in simulate(cylinder(), "pinocchio[preset=tuned]", until=0.01)
+    for options in ("preset=matched", "preset=tuned", "preset=default,orientation=false"):
+        assert "q_WB" not in simulate(cylinder(), f"pinocchio[{options}]", until=0.01)
 
 
 @pytest.mark.parametrize("formulation", FORMULATIONS)
@@ -251,7 +253,7 @@ def test_accuracy_does_not_depend_on_sampling() -> None:
 
 def test_tolerance_governs_the_error() -> None:
     """A thousand times tighter tolerance makes the error at least thirty times smaller."""
-    engines = [f"pinocchio[rtol={rtol}]" for rtol in (1e-6, 1e-9, 1e-12)]
+    engines = [f"pinocchio[orientation=true,rtol={rtol}]" for rtol in (1e-6, 1e-9, 1e-12)]
     errors = [largest_errors(cylinder(), engine, until=0.5, every=0.1)["z"] for engine in engines]
     assert errors[1] < errors[0] / 30
     assert errors[2] < errors[1] / 30

@@ -219,7 +219,7 @@ def test_dense_samples_do_not_shrink_the_adaptive_step():
         ({"rtol": "1e-16"}, "double precision allows no less than 2.22e-14"),
         ({"integrator": "rk4", "dt": "0"}, "projection: dt"),
         ({"integrator": "euler"}, "projection: integrator"),
-        ({"preset": "tuned"}, "euler has default, matched"),
+        ({"preset": "best"}, "euler has default, matched, tuned"),
     ],
 )
 def test_wrong_settings_give_one_clear_line(options, message):

@@ -8,13 +8,13 @@ import numpy as np
 import pytest
 import xarray as xr
 
+from proofroll.closed_form import closed_form
+from proofroll.motion import Motion
 from proofroll.scene import Ball, Scene
 from proofroll.scene_file import load_scene
 from proofroll.surfaces import Cylinder
 from proofroll.trajectory import trajectory
 from proofroll.truth import rolling, truth
-from proofroll.truth.closed_form import closed_form
-from proofroll.truth.motion import Motion
 from proofroll.truth.rolling import reduced, unreduced
 
 A, C, G, M = 0.025, 0.2, 9.81, 0.517

@@ -1,7 +1,9 @@
 """Exudyn (https://github.com/jgerstmayr/EXUDYN), an engine for flexible and rigid multibody systems.
 
 It has no joint for a sphere on a curved wall. Four models of one are built here from what it has; see the modules
-:mod:`generic`, :mod:`carrier`, :mod:`rolling_disc` and :mod:`contact`. The first and the last let the ball slip.
+:mod:`generic`, :mod:`carrier`, :mod:`rolling_disc` and :mod:`contact`. The first and the last let the ball slip. In all
+but the first the ball is a rigid body, whose orientation is in the model, asked for or not: the node's Euler parameters
+are its coordinates.
 """
 
 from __future__ import annotations
@@ -10,12 +12,13 @@ from collections.abc import Mapping, Sequence
 from importlib.metadata import version
 from typing import ClassVar, Self
 
-from proofroll.engine import Built, Sample
+from proofroll.engine import Built, Level, Sample, Term
 from proofroll.engines.exudyn.carrier import Carrier
 from proofroll.engines.exudyn.contact import Contact
 from proofroll.engines.exudyn.generic import Generic
 from proofroll.engines.exudyn.rolling_disc import RollingDisc
 from proofroll.engines.exudyn.settings import PRESETS, ExudynSettings
+from proofroll.errors import Refused
 from proofroll.events import Event
 from proofroll.scene import Capability, Scene
 
@@ -38,10 +41,37 @@ class Exudyn:
             Capability.CURVED_SURFACE,
             Capability.ROLLING_RESISTANCE,
             Capability.BOUNDED_FRICTION,
+            Capability.ORIENTATION,
         }
     )
     settings: ClassVar[type[ExudynSettings]] = ExudynSettings
     presets: ClassVar[Mapping[str, Mapping[str, ExudynSettings]]] = PRESETS
+    levels: ClassVar[Mapping[str, Level]] = {
+        "generic": Level.CONSTRAINT,
+        "carrier": Level.CONSTRAINT,
+        "rolling_disc": Level.CONSTRAINT,
+        "contact": Level.CONTACT,
+    }
+    terms: ClassVar[Sequence[Term]] = (
+        Term(
+            "new Jacobian at every step",
+            ("carrier", "rolling_disc", "contact"),
+            {"jacobian": "step"},
+            {"jacobian": "reused"},
+            "lets Newton's method end after two or three iterations where an old Jacobian needs seven",
+        ),
+        Term(
+            "halving of steps",
+            ("contact",),
+            {"halvings": 10},
+            {"halvings": 0},
+            "goes on where Newton's method fails at the edge of the friction zone",
+        ),
+    )
+    inherent: ClassVar[Mapping[str, Mapping[Capability, str]]] = {
+        formulation: {Capability.ORIENTATION: "the rigid body's Euler parameters are coordinates of its node"}
+        for formulation in ("carrier", "rolling_disc", "contact")
+    }
 
     def __init__(self, model: Model) -> None:
         self._model = model
@@ -54,6 +84,11 @@ class Exudyn:
     @classmethod
     def build(cls, scene: Scene, settings: ExudynSettings) -> Self:
         """See :class:`proofroll.engine.Engine`."""
+        if Capability.ORIENTATION in scene.requires and settings.formulation == "generic":
+            raise Refused(
+                f"needs {Capability.ORIENTATION}, and the spin of generic is a quasi-velocity, the rate of no "
+                "orientation; use carrier, rolling_disc or contact"
+            )
         return cls(MODELS[settings.formulation](scene.rolling, settings))
 
     @classmethod

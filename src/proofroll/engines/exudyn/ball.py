@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterator
 from dataclasses import dataclass
 from typing import Any
 
@@ -9,9 +10,9 @@ import numpy as np
 
 from proofroll.engine import Built, Sample
 from proofroll.engines.exudyn.local_frame import curvature
-from proofroll.engines.exudyn.native import Output, items
+from proofroll.engines.exudyn.native import Output, items, loads
 from proofroll.engines.exudyn.resistance import resistance_moment
-from proofroll.scene import RollingBall
+from proofroll.scene import Capability, RollingBall
 from proofroll.surfaces import FloatArray
 
 
@@ -60,7 +61,15 @@ class RigidBall:
             gap=gap,
             acceleration=self.system.GetNodeOutput(self.node, Output.Acceleration),
             angular_acceleration=self.system.GetNodeOutput(self.node, Output.AngularAcceleration),
+            terms=frozenset(self._terms()),
         )
+
+    def _terms(self) -> Iterator[Capability]:
+        """What Exudyn's items hold besides rolling."""
+        if "TorqueVector" in loads(self.system):
+            yield Capability.ROLLING_RESISTANCE
+        if self.system.GetNode(self.node)["nodeType"] == "RigidBodyEP":
+            yield Capability.ORIENTATION
 
 
 def add_body(system: Any, mass: float, inertia: float, p: FloatArray, v: FloatArray, w: FloatArray) -> tuple[Any, Any]:

@@ -24,7 +24,7 @@ from proofroll.engines.exudyn.settings import ExudynSettings
 from proofroll.errors import Refused
 from proofroll.events import Event, EventKind
 from proofroll.mechanics import natural_acceleration, newton_euler
-from proofroll.scene import RollingBall
+from proofroll.scene import Capability, RollingBall
 from proofroll.surfaces import FloatArray
 
 # Radius of the hollow sphere in radii of the ball where the wall is not curved. The larger it is, the less its normal
@@ -48,8 +48,8 @@ class Contact:
         if law.mu_static != law.mu_kinetic:
             raise Refused("its contact has one coefficient of friction; make mu_kinetic equal to mu_static")
         self.bounded = math.isfinite(law.mu_static)
-        stiffness, self.zone, grip = settings.penalty
-        mu = law.mu_kinetic if self.bounded else grip
+        stiffness, self.zone, self._grip = settings.penalty
+        mu = law.mu_kinetic if self.bounded else self._grip
         e1 = body.surface.frame(body.u0)[:, 0]
         force = newton_euler(body, body.p0, body.v0, body.w0)[2]
         N = float(-force @ e1)
@@ -146,7 +146,10 @@ class Contact:
         gap = float(self.system.GetObjectOutput(self.contact, Output.DisplacementLocal))
         built = self.ball.built(float(contact["spheresRadii"][0] + gap / 2), gap)
         mu = float(contact["dynamicFriction"])
-        return dataclasses.replace(built, mu_static=mu, mu_kinetic=mu, regularised=self._softened)
+        terms = built.terms or frozenset()
+        if mu != self._grip:
+            terms |= {Capability.BOUNDED_FRICTION}
+        return dataclasses.replace(built, mu_static=mu, mu_kinetic=mu, terms=terms, regularised=self._softened)
 
 
 def _follower(node: Any, marker: Any, centre: Callable[[float, float, float], list[float]]) -> Callable[..., None]:

@@ -8,6 +8,7 @@ constant coefficients. What is tested is Exudyn's integration of a system with m
 from __future__ import annotations
 
 import math
+from collections.abc import Iterator
 from typing import Any
 
 import numpy as np
@@ -22,7 +23,7 @@ from proofroll.engines.exudyn.settings import ExudynSettings
 from proofroll.engines.exudyn.stick_slip import StickSlip
 from proofroll.errors import Refused
 from proofroll.events import Event
-from proofroll.scene import RollingBall
+from proofroll.scene import Capability, RollingBall
 from proofroll.surfaces import FloatArray
 
 # q = (distance towards the wall, u1, u2, three quasi-coordinates whose rates are ω1, ω2, ω3)
@@ -204,7 +205,15 @@ class Generic:
             gap=-float(q[0]),
             acceleration=frame @ acceleration,
             angular_acceleration=frame @ angular_acceleration,
+            terms=frozenset(self._terms()),
         )
+
+    def _terms(self) -> Iterator[Capability]:
+        """What there is besides rolling; rolling resistance if Exudyn computed its moment."""
+        if self._resistance:
+            yield Capability.ROLLING_RESISTANCE
+        if isinstance(self.integration, StickSlip):
+            yield Capability.BOUNDED_FRICTION
 
 
 def _base(local: LocalGeometry) -> FloatArray:

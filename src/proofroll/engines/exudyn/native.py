@@ -10,3 +10,8 @@ import exudyn.itemInterface
 exu: Any = exudyn
 items: Any = exudyn.itemInterface
 Output: Any = exudyn.OutputVariableType
+
+
+def loads(system: Any) -> list[str]:
+    """Exudyn's names of the types of all loads in a system."""
+    return [str(system.GetLoad(number)["loadType"]) for number in range(system.systemData.NumberOfLoads())]

@@ -10,15 +10,16 @@ from typing import Any, ClassVar, Protocol, Self
 import mujoco
 import numpy as np
 
-from proofroll.engine import Built, Sample, whole_steps
+from proofroll.engine import Built, Level, Sample, Term, whole_steps
 from proofroll.engines.mujoco.chart import Chart
 from proofroll.engines.mujoco.contact import Resistance, contact_coefficient, contact_force
 from proofroll.engines.mujoco.free import Facets, Free
 from proofroll.engines.mujoco.friction import BoundedFriction, check_coefficients
 from proofroll.engines.mujoco.model import read_spec, write_physics
-from proofroll.engines.mujoco.settings import PRESETS, MujocoSettings, check, velocity_lag
+from proofroll.engines.mujoco.settings import PRESETS, ROLLS, MujocoSettings, check, velocity_lag
 from proofroll.engines.mujoco.softness import softness
 from proofroll.engines.mujoco.start import EVALUATIONS, accelerations, start
+from proofroll.engines.mujoco.terms import TERMS
 from proofroll.errors import Diverged, Refused
 from proofroll.events import Event
 from proofroll.mechanics import natural_acceleration
@@ -40,6 +41,10 @@ class Formulation(Protocol):
     def resistance(self) -> Resistance:
         """The torque of rolling resistance that its steps apply."""
 
+    @property
+    def resists(self) -> bool:
+        """Whether its steps do apply it."""
+
     def run(self, data: Any, steps: int) -> None:
         """Makes ``steps`` steps."""
 
@@ -55,19 +60,40 @@ _FATAL = (
     (mujoco.mjtWarning.mjWARN_CONTACTFULL, "there are more contacts than MuJoCo holds"),
     (mujoco.mjtWarning.mjWARN_CNSTRFULL, "there are more constraints than MuJoCo holds"),
 )
+# Joints whose coordinates hold an orientation.
+_TURNING_JOINTS = (int(mujoco.mjtJoint.mjJNT_BALL), int(mujoco.mjtJoint.mjJNT_FREE))
 # Part of the natural force above which a normal force is more than round-off.
 _PRESSED = 1e-6
 
 
 class Mujoco:
-    """MuJoCo behind proofroll's protocol."""
+    """MuJoCo behind proofroll's protocol.
+
+    The ball's orientation is in every model, asked for or not: free and ball joints have it in their state.
+    """
 
     name: ClassVar[str] = "mujoco"
     provides: ClassVar[frozenset[Capability]] = frozenset(
-        {Capability.ROLLING, Capability.CURVED_SURFACE, Capability.ROLLING_RESISTANCE, Capability.BOUNDED_FRICTION}
+        {
+            Capability.ROLLING,
+            Capability.CURVED_SURFACE,
+            Capability.ROLLING_RESISTANCE,
+            Capability.BOUNDED_FRICTION,
+            Capability.ORIENTATION,
+        }
     )
     settings: ClassVar[type[Any]] = MujocoSettings
     presets: ClassVar[Mapping[str, Mapping[str, Any]]] = PRESETS
+    levels: ClassVar[Mapping[str, Level]] = {
+        "chart": Level.CONTACT,
+        "free": Level.CONTACT,
+        "facets": Level.FACETS,
+    }
+    terms: ClassVar[Sequence[Term]] = TERMS
+    inherent: ClassVar[Mapping[str, Mapping[Capability, str]]] = {
+        formulation: {Capability.ORIENTATION: "the ball's joint, a ball or free joint, has it in qpos"}
+        for formulation in ("chart", "free", "facets")
+    }
 
     def __init__(self, model: Any, body: RollingBall, settings: MujocoSettings) -> None:
         self._model = model
@@ -182,8 +208,18 @@ class Mujoco:
             gap=None if gap is None else float(gap),
             acceleration=acceleration,
             angular_acceleration=turning,
+            terms=frozenset(self._terms()),
             regularised=softness(self._body, self._settings),
         )
+
+    def _terms(self) -> Iterator[Capability]:
+        """What the model and the steps hold besides rolling; a contact of six dimensions resists rolling by itself."""
+        if self._formulation.resists or int(self._model.geom_condim[self._geom]) >= ROLLS:
+            yield Capability.ROLLING_RESISTANCE
+        if self._friction is not None:
+            yield Capability.BOUNDED_FRICTION
+        if int(self._model.joint("spin").type[0]) in _TURNING_JOINTS:
+            yield Capability.ORIENTATION
 
     def _coefficients(self) -> tuple[float, float]:
         """Static and kinetic coefficient of friction that MuJoCo's contact has, or will have."""

@@ -66,6 +66,12 @@ class Chart:
         spec.site("touch").pos = [body.ball.radius, 0.0, 0.0]
         pose(spec.geom("wall"), *tangent_plane(body))
 
+    @property
+    def resists(self) -> bool:
+        """See :class:`~proofroll.engines.mujoco.adapter.Formulation`: whether MuJoCo is given the torque's callback."""
+        with self._callbacks(mujoco.MjData(self._model)):
+            return mujoco.get_mjcb_passive() is not None
+
     def run(self, data: Any, steps: int) -> None:
         """Makes ``steps`` steps."""
         with self._callbacks(data):

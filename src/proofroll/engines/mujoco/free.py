@@ -54,6 +54,11 @@ class Free:
         spec.body("ball").pos = body.p0
         pose(spec.body("wall"), *tangent_plane(body))
 
+    @property
+    def resists(self) -> bool:
+        """See :class:`~proofroll.engines.mujoco.adapter.Formulation`: whether a step applies the torque's law."""
+        return self.resistance.f > 0
+
     def run(self, data: Any, steps: int) -> None:
         """Makes ``steps`` steps."""
         if not self._edits:
@@ -203,6 +208,11 @@ class Facets:
             thickness, _, height = box.size
             box.pos = face + np.array([thickness, 0.0, 0.0])
             box.size = [thickness, face[0] * math.tan(math.pi / len(boxes)), height]
+
+    @property
+    def resists(self) -> bool:
+        """See :class:`~proofroll.engines.mujoco.adapter.Formulation`: whether a step applies the torque's law."""
+        return self.resistance.f > 0
 
     def run(self, data: Any, steps: int) -> None:
         """Makes ``steps`` steps."""

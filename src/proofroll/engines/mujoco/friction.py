@@ -29,9 +29,9 @@ _INTEGRATE: Mapping[str, Callable[[Any, Any], None]] = {
 }
 
 
-def condim(mu: float) -> int:
-    """MuJoCo's dimension of a contact: 1 without friction, 3 with sliding friction only."""
-    return 3 if mu > 0 else 1
+def condim(mu: float, settings: MujocoSettings) -> int:
+    """MuJoCo's dimension of a contact: 1 without friction, 3 with sliding friction only, or what the settings say."""
+    return settings.condim if mu > 0 else 1
 
 
 def corrects(contact: Contact, settings: MujocoSettings) -> bool:
@@ -85,6 +85,7 @@ class BoundedFriction:
         self._spin = slice(last - 3, last)
         self._integrate = _INTEGRATE[settings.integrator]
         self._dt = settings.dt
+        self._settings = settings
         self._steps = 0
         self._lost: int | None = None  # first of the steps without a normal force that have not ended
         self._flies = False  # whether these were told as a liftoff
@@ -225,6 +226,6 @@ class BoundedFriction:
         """Sets the coefficient in the model, also in the contact pair if there is one."""
         self._mu = mu
         self._model.geom_friction[:, 0] = mu
-        self._model.geom_condim[:] = condim(mu)
+        self._model.geom_condim[:] = condim(mu, self._settings)
         self._model.pair_friction[:, :2] = mu
-        self._model.pair_dim[:] = condim(mu)
+        self._model.pair_dim[:] = condim(mu, self._settings)

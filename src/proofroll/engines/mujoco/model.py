@@ -11,7 +11,7 @@ import numpy as np
 from proofroll.engines.mujoco.contact import MEMORY
 from proofroll.engines.mujoco.friction import MEMORY as SLIP_MEMORY
 from proofroll.engines.mujoco.friction import condim, corrects
-from proofroll.engines.mujoco.settings import MujocoSettings, impedance, time_constant
+from proofroll.engines.mujoco.settings import MujocoSettings, friction_coefficients, impedance, time_constant
 from proofroll.errors import Refused
 from proofroll.scene import RollingBall, Scene
 from proofroll.surfaces import FloatArray
@@ -58,8 +58,8 @@ def write_physics(spec: Any, body: RollingBall, settings: MujocoSettings) -> Non
     option.disableflags |= int(mujoco.mjtDisableBit.mjDSBL_AUTORESET)
     mu = body.contact.mu_static if math.isfinite(body.contact.mu_static) else settings.friction
     for geom in spec.geoms:
-        geom.condim = condim(mu)
-        geom.friction = [mu, 0.0, 0.0]
+        geom.condim = condim(mu, settings)
+        geom.friction = friction_coefficients(mu, settings)
         # MuJoCo's defaults are written too: the file may hold others.
         geom.solref = [time_constant(settings), 1.0]
         geom.solimp = [*impedance(settings), 0.001, 0.5, 2.0]
@@ -69,8 +69,9 @@ def write_physics(spec: Any, body: RollingBall, settings: MujocoSettings) -> Non
 
 def _write_pair(spec: Any, settings: MujocoSettings, mu: float) -> None:
     """The contact as a pair, in place of the one that MuJoCo finds itself: only a pair has ``solreffriction``."""
-    pair = spec.add_pair(geomname1="wall", geomname2="ball", condim=condim(mu))
-    pair.friction = [mu, mu, 0.0, 0.0, 0.0]
+    pair = spec.add_pair(geomname1="wall", geomname2="ball", condim=condim(mu, settings))
+    sliding, turning, rolling = friction_coefficients(mu, settings)
+    pair.friction = [sliding, sliding, turning, rolling, rolling]
     pair.solref, pair.solimp = spec.geom("ball").solref, spec.geom("ball").solimp
     # Stiffness and damping with the sign that marks the direct format; a slip has no position to be stiff about.
     pair.solreffriction = [-1.0, -(settings.friction_damping or 0.0) / settings.dt]

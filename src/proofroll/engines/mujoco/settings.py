@@ -7,14 +7,19 @@ from dataclasses import dataclass
 from typing import Annotated, Literal
 
 from annotated_types import Ge, Gt, Le, Lt
+from pydantic import BeforeValidator
 
 from proofroll.errors import InputError
 
 # What a MuJoCo model has whose author writes nothing: step, friction, solref [s], solimp (dmin, dmax).
 DEFAULT_STEP = 2e-3
 DEFAULT_FRICTION = 1.0
+# Of turning about the normal and of rolling: lengths [m], which no radius scales.
+DEFAULT_TURNING, DEFAULT_ROLLING = 5e-3, 1e-4
 DEFAULT_TIME_CONSTANT = 0.02
 DEFAULT_IMPEDANCE = (0.9, 0.95)
+# Dimensions of a contact (condim) from which on it resists sliding, turning about the normal, and rolling.
+SLIDES, TURNS, ROLLS = 3, 4, 6
 # MuJoCo clips to these without a word: mjMINIMP, mjMAXIMP, and two steps (refsafe).
 SMALLEST_IMPEDANCE = 1e-4
 LARGEST_IMPEDANCE = 0.9999
@@ -26,6 +31,11 @@ UNBOUNDED_FRICTION = 1e3
 LARGEST_PYRAMIDAL_FRICTION = 1.0
 # Part of the normal force by which a corrected contact is pressed deeper, so that the next slip does not end it.
 PRELOAD = 0.01
+
+
+def _digits_as_number(value: object) -> object:
+    """As pydantic reads every number but those of a Literal."""
+    return int(value) if isinstance(value, str) and value.isdecimal() else value
 
 
 @dataclass(frozen=True)
@@ -56,6 +66,8 @@ class MujocoSettings:
             out (``free`` only).
         cone_correction: whether the adapter takes from the contact's reference acceleration, while the ball slips,
             the lift that MuJoCo's convex cone gives it.
+        condim: dimensions of the contact's friction: 3 slides; 4 also resists turning about the normal, 6 also rolling,
+            with MuJoCo's documented coefficients. No scene asks for either; they are there to be compared.
     """
 
     formulation: Literal["free", "chart", "facets"] = "chart"
@@ -70,6 +82,7 @@ class MujocoSettings:
     start: Literal["touching", "settled"] = "settled"
     curvature: bool = False
     cone_correction: bool = False
+    condim: Annotated[Literal[3, 4, 6], BeforeValidator(_digits_as_number)] = 3
 
     @property
     def resolution(self) -> str:
@@ -147,6 +160,8 @@ def check(settings: MujocoSettings, *, bounded: bool) -> None:
         raise InputError("mujoco: integrator", settings.integrator, "cone_correction=true needs integrator=Euler")
     if settings.friction_damping is not None:
         _check_friction_damping(settings)
+    if settings.condim > SLIDES:
+        _check_condim(settings, bounded)
     if not settings.curvature:
         return
     if settings.formulation != "free":
@@ -161,6 +176,23 @@ def check(settings: MujocoSettings, *, bounded: bool) -> None:
         # MuJoCo's damping would supply all of J̇v or more of it: nothing is left to add.
         advice = f"curvature=true needs impedance times time_constant above 1, not {1 / share:.4g}"
         raise InputError("mujoco: impedance", impedance(settings)[1], advice)
+
+
+def _check_condim(settings: MujocoSettings, bounded: bool) -> None:
+    """What :func:`check` says about friction of more dimensions than sliding."""
+    if bounded:
+        # All of them share one cone: where its bound is, depends on how the ball turns and rolls.
+        advice = "with bounded friction stick and slip could not be told apart; set condim=3"
+        raise InputError("mujoco: condim", settings.condim, advice)
+    for name in ("curvature", "cone_correction"):
+        if getattr(settings, name):
+            raise InputError("mujoco: condim", settings.condim, f"{name}=true is made for sliding alone; set condim=3")
+
+
+def friction_coefficients(mu: float, settings: MujocoSettings) -> tuple[float, float, float]:
+    """MuJoCo's coefficients of sliding [-], of turning about the normal [m] and of rolling [m]; 0 where unused."""
+    turning = DEFAULT_TURNING if settings.condim >= TURNS else 0.0
+    return mu, turning, DEFAULT_ROLLING if settings.condim >= ROLLS else 0.0
 
 
 def _check_friction_damping(settings: MujocoSettings) -> None:

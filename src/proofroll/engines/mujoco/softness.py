@@ -12,6 +12,7 @@ from proofroll.engines.mujoco.friction import corrects
 from proofroll.engines.mujoco.settings import (
     PRELOAD,
     MujocoSettings,
+    friction_coefficients,
     impedance,
     normal_lead,
     time_constant,
@@ -21,6 +22,7 @@ from proofroll.mechanics import initial_response, natural_acceleration, newton_e
 from proofroll.scene import RollingBall
 
 _FORCES = ("acceleration", "N", "F2", "F3")
+_MORE = "friction against turning or rolling, which the scene does not ask for, turns the ball otherwise"
 # The bounds below are asymptotic in depth/a, and MuJoCo's Newton solver stops at a relative 1e-8.
 _MARGIN = 1.1
 _SOLVER = 1e-8
@@ -60,7 +62,7 @@ def softness(body: RollingBall, settings: MujocoSettings) -> Mapping[str, Regula
         soft = _MARGIN * (missing + creep + lost) / scale + _SOLVER
         if soft >= 1:
             why += ": accelerations and forces at time 0 are not checked"
-        return result | _dynamics(body, soft, why)
+        return result | _dynamics(body, settings, soft, why)
     # A settled start has the depth at which the reference acceleration k depth, k = d / (dmax tc)², supplies it as a
     # part d of the acceleration.
     depth = _MARGIN * missing * (most * time_constant(settings) / least) ** 2 / a
@@ -77,16 +79,24 @@ def softness(body: RollingBall, settings: MujocoSettings) -> Mapping[str, Regula
         "gap in the engine": Regularised(depth, sunk),
         "spin": Regularised(depth / 2 + _SOLVER, rolls),
         "slip": Regularised(depth / 2, rolls),
-        **_dynamics(body, soft, why),
+        **_dynamics(body, settings, soft, why),
     }
 
 
-def _dynamics(body: RollingBall, soft: float, why: str) -> dict[str, Regularised]:
+def _dynamics(body: RollingBall, settings: MujocoSettings, soft: float, why: str) -> dict[str, Regularised]:
     """Tolerances of accelerations and forces, where those of the centre are ``soft``.
 
-    What friction is off by per mass, times a, the turning is off by times m a²/J; rolling resistance adds f to a.
+    What friction is off by per mass, times a, the turning is off by times m a²/J; rolling resistance adds f to a, as
+    does a contact's own friction against turning and rolling, of which N times the coefficient is the largest moment.
     """
-    turning = soft * (1 + body.contact.rolling_resistance / body.ball.radius) / body.ball.inertia_ratio
+    a = body.ball.radius
+    turning = soft * (1 + body.contact.rolling_resistance / a) / body.ball.inertia_ratio
+    _, about_normal, rolling = friction_coefficients(1.0, settings)
+    if about_normal or rolling:
+        # Relative to the natural force, which N does not exceed by more than gravity.
+        why += "; " + _MORE
+        soft += 2 * rolling / a
+        turning += 2 * (about_normal + rolling) / a / body.ball.inertia_ratio
     return dict.fromkeys(_FORCES, Regularised(soft, why)) | {"angular acceleration": Regularised(turning, why)}
 
 

@@ -2,15 +2,17 @@
 
 from __future__ import annotations
 
+import dataclasses
 from collections.abc import Mapping, Sequence
 from typing import Any, ClassVar, Self
 
 import pinocchio as pin
 
-from proofroll.engine import Built, Sample
+from proofroll.engine import Built, Level, Sample, Term
 from proofroll.engines.pinocchio.contact import ContactRun
 from proofroll.engines.pinocchio.rows_run import RowsRun
 from proofroll.engines.pinocchio.settings import PRESETS, PinocchioSettings
+from proofroll.errors import Refused
 from proofroll.events import Event
 from proofroll.scene import Capability, Scene
 
@@ -25,10 +27,42 @@ class Pinocchio:
             Capability.CURVED_SURFACE,
             Capability.ROLLING_RESISTANCE,
             Capability.BOUNDED_FRICTION,
+            Capability.ORIENTATION,
         }
     )
     settings: ClassVar[type[Any]] = PinocchioSettings
     presets: ClassVar[Mapping[str, Mapping[str, PinocchioSettings]]] = PRESETS
+    levels: ClassVar[Mapping[str, Level]] = {
+        "composite": Level.CONSTRAINT,
+        "free_flyer": Level.CONSTRAINT,
+        "contact": Level.CONTACT,
+    }
+    terms: ClassVar[Sequence[Term]] = (
+        Term(
+            "orientation",
+            ("composite", "free_flyer"),
+            {"orientation": True},
+            {"orientation": False},
+            "turns the ball's own axes; its inertia is the same about all of them, so the motion does not ask for it",
+        ),
+        Term(
+            "projection",
+            ("composite", "free_flyer"),
+            {"projection": True},
+            {"projection": False},
+            "puts the state back on the constraints after each step",
+        ),
+        Term(
+            "turning of the plane",
+            ("contact",),
+            {"integrator": "leapfrog"},
+            {"integrator": "semi_implicit_euler"},
+            "tells the solver how fast the contact's plane turns during a step",
+        ),
+    )
+    inherent: ClassVar[Mapping[str, Mapping[Capability, str]]] = {
+        "contact": {Capability.ORIENTATION: "the spherical joint's configuration is the ball's orientation"}
+    }
 
     def __init__(self, run: ContactRun | RowsRun) -> None:
         self._run = run
@@ -42,7 +76,14 @@ class Pinocchio:
     @classmethod
     def build(cls, scene: Scene, settings: PinocchioSettings) -> Self:
         """See :class:`proofroll.engine.Engine`."""
-        return cls((ContactRun if settings.formulation == "contact" else RowsRun)(scene.rolling, settings))
+        if settings.formulation == "contact":
+            return cls(ContactRun(scene.rolling, settings))
+        asked = Capability.ORIENTATION in scene.requires
+        if asked and settings.orientation is False:
+            raise Refused(f"needs {Capability.ORIENTATION}, which orientation=false leaves out")
+        if settings.orientation is None:
+            settings = dataclasses.replace(settings, orientation=asked)
+        return cls(RowsRun(scene.rolling, settings))
 
     @classmethod
     def reproducer(cls, scene: Scene, settings: PinocchioSettings) -> str:

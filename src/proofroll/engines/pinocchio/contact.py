@@ -9,7 +9,7 @@ Euler multiplies it by the square root of 1 + (ω dt)², so that a fast ball blo
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -21,11 +21,13 @@ from proofroll.engines.pinocchio.rows import cross
 from proofroll.engines.pinocchio.settings import PinocchioSettings
 from proofroll.errors import Diverged, Refused
 from proofroll.events import Event, EventKind
-from proofroll.scene import RollingBall
+from proofroll.scene import Capability, RollingBall
 from proofroll.surfaces import FloatArray
 
 # Pinocchio's cone needs a number where friction is unbounded. PGS takes any; the iterations of ADMM grow with it.
 UNBOUNDED_FRICTION = {"pgs": 1e6, "admm": 1e2}
+# Numbers of a joint's configuration if it is an orientation.
+_QUATERNION = 4
 # Pinocchio's limit of 1000 is met at tight tolerances where the normal force is small.
 _ADMM_ITERATIONS = 10_000
 # An impulse nearer to the cone than this is on it [-].
@@ -286,7 +288,17 @@ class ContactRun:
                 impulse=0.0 if self._solver_kind == "pgs" else self._tolerance,
                 unbounded=None if self._bounded else UNBOUNDED_FRICTION[self._solver_kind],
             ),
+            terms=frozenset(self._terms(f)),
         )
+
+    def _terms(self, f: float) -> Iterator[Capability]:
+        """What there is besides rolling: the torque's lever f [m], the cone, and a joint that turns the ball."""
+        if f:
+            yield Capability.ROLLING_RESISTANCE
+        if self._friction(self._mu_static) != UNBOUNDED_FRICTION[self._solver_kind]:
+            yield Capability.BOUNDED_FRICTION
+        if self.model.joints[self._ball].nq == _QUATERNION:
+            yield Capability.ORIENTATION
 
     def _friction(self, mu: float) -> float:
         """What the cone of the constraint holds if it is given ``mu``, as before each impulse."""

@@ -25,6 +25,10 @@ class Integrator(Protocol):
     q: FloatArray
     v: FloatArray
 
+    @property
+    def turns(self) -> bool:
+        """Whether the orientation of the ball is integrated."""
+
     def advance(self, start: float, end: float) -> None:
         """From ``start`` to ``end`` [s].
 
@@ -62,6 +66,11 @@ class FixedStep:
         self._dt = float(settings.dt or 0.0)
         self._start: FloatArray | None = None
         self.q, self.v = mechanism.q0.copy(), mechanism.v0.copy()
+
+    @property
+    def turns(self) -> bool:
+        """See :class:`Integrator`."""
+        return bool(np.any(self._moving[-3:]))
 
     def advance(self, start: float, end: float) -> None:
         """See :class:`Integrator`."""
@@ -159,6 +168,11 @@ class Adaptive:
         return np.concatenate(
             [pin.tangentMap(self._model, q).dot(moving), self._mechanism.respond(self._data, q, v)[0]]
         )
+
+    @property
+    def turns(self) -> bool:
+        """See :class:`Integrator`."""
+        return bool(np.any(self._moving[-3:]))
 
     def advance(self, start: float, end: float) -> None:
         """See :class:`Integrator`. The last step ends at ``end``: the dense output of DOP853 has a lower order."""

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Iterator
 from typing import Any
 
 import numpy as np
@@ -16,7 +17,7 @@ from proofroll.engines.pinocchio.integrators import Integrator, integrator
 from proofroll.engines.pinocchio.mechanism import Mechanism
 from proofroll.engines.pinocchio.settings import PinocchioSettings
 from proofroll.events import Event
-from proofroll.scene import RollingBall
+from proofroll.scene import Capability, RollingBall
 from proofroll.surfaces import FloatArray
 
 
@@ -24,14 +25,14 @@ class RowsRun:
     """See :class:`proofroll.engine.Engine` for the methods."""
 
     def __init__(self, body: RollingBall, settings: PinocchioSettings) -> None:
+        """At time 0; the settings say whether the orientation is integrated, no longer the scene."""
         kind = Composite if settings.formulation == "composite" else FreeFlyer
-        self.mechanism: Mechanism = kind(body, settings.orientation)
+        self.mechanism: Mechanism = kind(body, bool(settings.orientation))
         self.motion: Integrator = (
             stick_slip(self.mechanism, settings, body.contact)
             if math.isfinite(body.contact.mu_static)
             else integrator(self.mechanism, settings)
         )
-        self._orientation = settings.orientation
 
     def advance(self, start: float, end: float) -> None:
         """From ``start`` to ``end`` [s]."""
@@ -48,7 +49,7 @@ class RowsRun:
             p_WB=pose.translation.copy(),
             v_WB=velocity.linear.copy(),
             w_WB=velocity.angular.copy(),
-            q_WB=np.roll(pin.Quaternion(pose.rotation).coeffs(), 1) if self._orientation else None,
+            q_WB=np.roll(pin.Quaternion(pose.rotation).coeffs(), 1) if self.motion.turns else None,
             force=force,
             sticking=self.motion.sticking if isinstance(self.motion, StickSlip) else None,
         )
@@ -84,7 +85,17 @@ class RowsRun:
             gap=mechanism.gap(q),
             acceleration=of_ball.linear.copy(),
             angular_acceleration=of_ball.angular.copy(),
+            terms=frozenset(self._terms(torque)),
         )
+
+    def _terms(self, torque: FloatArray | None) -> Iterator[Capability]:
+        """What there is besides rolling, with the torque of rolling resistance as it is put to the joints."""
+        if torque is not None:
+            yield Capability.ROLLING_RESISTANCE
+        if isinstance(self.motion, StickSlip):
+            yield Capability.BOUNDED_FRICTION
+        if self.motion.turns:
+            yield Capability.ORIENTATION
 
     def _reaction(self, data: Any) -> tuple[FloatArray, FloatArray]:
         """Joint acceleration, and force of the wall on the ball in the world [N], now."""

@@ -32,8 +32,9 @@ class PinocchioSettings:
             ``semi_implicit_euler`` and ``leapfrog``, whose velocities are half a step ahead of the positions.
         dt: step [s]; None with ``dop853``.
         rtol: relative tolerance [-] of ``dop853``; None with the others.
-        orientation: integrate the orientation of the ball. Its inertia is the same about every axis, so the motion
-            does not depend on it, and without it the fast turning needs no small steps.
+        orientation: integrate the orientation of the ball; None: if the scene asks for it. Its inertia is the same
+            about every axis, so the motion does not depend on it, and without it the fast turning needs no small steps.
+            ``contact`` always turns the ball: its spherical joint is part of the state.
         projection: put the state back on the constraints after each step; not in ``contact``, where the solver does.
         solver: of ``contact``: projected Gauss-Seidel or alternating directions (ADMM); None with the others.
         solver_tolerance: of ``contact``: feasibility [m/s] and complementarity [J], both also relative [-]; None with
@@ -45,7 +46,7 @@ class PinocchioSettings:
     integrator: Literal["semi_implicit_euler", "leapfrog", "rk4", "rk4_dexpinv", "dop853"] = "dop853"
     dt: Annotated[float, Gt(0)] | None = None
     rtol: Annotated[float, Ge(TIGHTEST_RTOL)] | None = 1e-13
-    orientation: bool = True
+    orientation: bool | None = None
     projection: bool = True
     solver: Literal["pgs", "admm"] | None = None
     solver_tolerance: Annotated[float, Gt(0)] | None = None
@@ -78,7 +79,7 @@ class PinocchioSettings:
             raise InputError(
                 "pinocchio: projection", self.projection, "contact is put back by its solver; leave it out"
             )
-        if self.formulation == "contact" and not self.orientation:
+        if self.formulation == "contact" and self.orientation is False:
             raise InputError("pinocchio: orientation", self.orientation, "contact always turns the ball; leave it out")
 
     def _check_resolution(self) -> None:
@@ -108,7 +109,8 @@ class PinocchioSettings:
         """See :class:`proofroll.engine.Settings`.
 
         rk4 is of order 4 only where configurations form a vector space, that is without the orientation: see
-        :mod:`proofroll.engines.pinocchio.integrators`.
+        :mod:`proofroll.engines.pinocchio.integrators`. Where the scene decides, this is the order for one that does
+        not ask for it.
         """
         if self.integrator == "rk4" and not self.orientation:
             return 4
@@ -117,13 +119,13 @@ class PinocchioSettings:
 
 def _presets(formulation: Literal["composite", "free_flyer"]) -> Mapping[str, PinocchioSettings]:
     return {
-        # what one writes first: a classical scheme with pin.integrate, a fixed step, nothing against drift
-        "default": PinocchioSettings(formulation, "default", "rk4", 1e-3, None, projection=False),
-        # the same model, integrated so that only round-off is left
+        # what one writes first: a classical scheme with pin.integrate, which turns the ball, nothing against drift
+        "default": PinocchioSettings(formulation, "default", "rk4", 1e-3, None, orientation=True, projection=False),
+        # the same model, integrated so that only round-off is left, and no more of it than the scene asks for: without
+        # the orientation goes the fast turning of the ball's own axes that dictates the step
         "matched": PinocchioSettings(formulation, "matched", rtol=3e-14),
-        # what differs in substance: the orientation, on which nothing depends, is not integrated, and with it goes
-        # the fast turning of the ball's own axes that dictates the step
-        "tuned": PinocchioSettings(formulation, "tuned", orientation=False),
+        # the tolerance from which on a tighter one buys a tenth more time and no digit: round-off is what is left
+        "tuned": PinocchioSettings(formulation, "tuned"),
     }
 
 

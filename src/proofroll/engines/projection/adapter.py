@@ -3,28 +3,31 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from typing import ClassVar, Self
 
 import numpy as np
 
 import proofroll
-from proofroll.engine import Built, Sample
+from proofroll.compiled.library import with_heyoka
+from proofroll.engine import Built, Level, Sample, Term
 from proofroll.engines.projection.friction import Friction
 from proofroll.engines.projection.geometry import geometry_of
 from proofroll.engines.projection.integrators import INTEGRATORS, Integrator
 from proofroll.engines.projection.method import ProjectedBall
 from proofroll.engines.projection.modes import Pace
-from proofroll.engines.projection.orientation import EulerAngles, Orientation, RotatingFrame
+from proofroll.engines.projection.orientation import EulerAngles, FollowedFrame, Orientation, RotatingFrame
 from proofroll.engines.projection.settings import PRESETS, ProjectionSettings
 from proofroll.engines.projection.stepping import STEPPERS
 from proofroll.engines.projection.switching import Switching
-from proofroll.errors import Diverged
+from proofroll.engines.projection.taylor import TaylorSeries
+from proofroll.errors import Diverged, Refused
 from proofroll.events import Event
 from proofroll.scene import Capability, RollingBall, Scene
 from proofroll.surfaces import FloatArray
 
-_ORIENTATIONS: Mapping[str, type[Orientation]] = {"euler": EulerAngles, "rotating_frame": RotatingFrame}
+# Numbers of the state that are not the ball's orientation: two coordinates and five velocities.
+_WITHOUT_ORIENTATION = 7
 
 
 class Projection:
@@ -37,43 +40,68 @@ class Projection:
             Capability.CURVED_SURFACE,
             Capability.ROLLING_RESISTANCE,
             Capability.BOUNDED_FRICTION,
+            Capability.ORIENTATION,
         }
     )
     settings: ClassVar[type[ProjectionSettings]] = ProjectionSettings
     presets: ClassVar[Mapping[str, Mapping[str, ProjectionSettings]]] = PRESETS
+    levels: ClassVar[Mapping[str, Level]] = {"euler": Level.PROJECTION, "rotating_frame": Level.PROJECTION}
+    terms: ClassVar[Sequence[Term]] = (
+        Term(
+            "elimination of violations",
+            ("euler", "rotating_frame"),
+            {"elimination": True},
+            {"elimination": False},
+            "takes away the slip that a step leaves (Blajer 2002); where rolling is linear with constant coefficients, "
+            "as in the rotating frame, there is none",
+        ),
+    )
+    inherent: ClassVar[Mapping[str, Mapping[Capability, str]]] = {
+        "euler": {Capability.ORIENTATION: "the Euler angles are coordinates of the equations of motion"}
+    }
 
     @staticmethod
     def version() -> str:
-        """The method is part of proofroll."""
-        return proofroll.__version__
+        """The method is part of proofroll; heyoka integrates it where it is installed and asked for."""
+        return with_heyoka(proofroll.__version__)
 
     @classmethod
     def build(cls, scene: Scene, settings: ProjectionSettings) -> Self:
         """See :class:`proofroll.engine.Engine`."""
-        return cls(scene.rolling, settings)
+        follow = Capability.ORIENTATION in scene.requires
+        if follow and settings.integrator == "taylor" and settings.formulation == "rotating_frame":
+            raise Refused("the compiled series do not follow the orientation; use integrator=dop853")
+        return cls(scene.rolling, settings, follow=follow)
 
-    def __init__(self, body: RollingBall, settings: ProjectionSettings) -> None:
+    def __init__(self, body: RollingBall, settings: ProjectionSettings, *, follow: bool = False) -> None:
+        """The ball at time 0; ``follow`` its orientation too where the formulation does not need it."""
         self._surface = body.surface
-        self._orientation = _ORIENTATIONS[settings.formulation]()
+        geometry = geometry_of(body.surface)
+        self._orientation: Orientation
+        if settings.formulation == "euler":
+            self._orientation = EulerAngles()
+        else:
+            self._orientation = FollowedFrame(geometry) if follow else RotatingFrame()
         self._coordinates = 2 + self._orientation.size
-        self._ball = ProjectedBall(body, geometry_of(body.surface), self._orientation)
-        self._eliminate = settings.elimination
-        integrator = INTEGRATORS[settings.integrator]
-        self._fixed_step = settings.dt if integrator.resolution == "dt" else 0.0
+        self._ball = ProjectedBall(body, geometry, self._orientation)
+        self._eliminate = settings.eliminates
+        self._fixed_step = settings.dt if settings.resolution == "dt" else 0.0
         frame = body.surface.frame(body.u0)
         angles, r = self._orientation.start(frame, frame.T @ body.w0)
-        x, resolution = np.concatenate([body.u0, angles, body.udot0, r]), getattr(settings, integrator.resolution)
+        x, resolution = np.concatenate([body.u0, angles, body.udot0, r]), getattr(settings, settings.resolution)
         scales = _scales(body, self._orientation.size)
-        self._motion: Integrator | Switching
+        self._motion: Integrator | Switching | TaylorSeries
         self._friction: Friction | None = None
-        if math.isfinite(body.contact.mu_static):
+        if settings.integrator == "taylor":
+            self._motion = TaylorSeries(body, settings.formulation, x, resolution, self._check)
+        elif math.isfinite(body.contact.mu_static):
             stepper = STEPPERS[settings.integrator](resolution)
             speed = _speed(body) or 1.0
             pace = Pace(speed, body.ball.radius / speed, stepper.stability, stepper.reach)
             self._friction = Friction(self._ball, body.contact)
-            self._motion = Switching(self._friction, stepper, x, scales, pace, self._check, settings.elimination)
+            self._motion = Switching(self._friction, stepper, x, scales, pace, self._check, self._eliminate)
         else:
-            self._motion = integrator(self._ball.rates, self._accept, x, scales, resolution)
+            self._motion = INTEGRATORS[settings.integrator](self._ball.rates, self._accept, x, scales, resolution)
 
     def _check(self, t: float, x: FloatArray) -> None:
         n = self._coordinates
@@ -105,6 +133,8 @@ class Projection:
         frame = kin.local.frame
         if isinstance(self._motion, Switching):
             force, sticking = self._motion.force, self._motion.mode.sticking
+        elif isinstance(self._motion, TaylorSeries):
+            force, sticking = self._motion.force, None
         else:
             force, sticking = self._ball.contact_force(self._ball.response(kin)), None
         return Sample(
@@ -121,7 +151,7 @@ class Projection:
         ball = self._ball
         x = self._motion.x
         kin = ball.kinematics(x)
-        rates = self._motion.rates if isinstance(self._motion, Switching) else ball.rates(x)
+        rates = self._motion.rates if isinstance(self._motion, (Switching, TaylorSeries)) else ball.rates(x)
         acceleration = kin.D @ rates[self._coordinates : self._coordinates + 5] + kin.drift
         return Built(
             mass=float(ball.mass[0]),
@@ -133,7 +163,17 @@ class Projection:
             mu_kinetic=self._friction.mu_kinetic if self._friction else None,
             acceleration=kin.local.frame @ acceleration[:3],
             angular_acceleration=kin.local.frame @ acceleration[3:],
+            terms=frozenset(self._terms()),
         )
+
+    def _terms(self) -> Iterator[Capability]:
+        """What the equations hold besides rolling."""
+        if self._ball.rolling_resistance:
+            yield Capability.ROLLING_RESISTANCE
+        if isinstance(self._motion, Switching):
+            yield Capability.BOUNDED_FRICTION
+        if len(self._motion.x) > _WITHOUT_ORIENTATION:
+            yield Capability.ORIENTATION
 
 
 def _speed(body: RollingBall) -> float:

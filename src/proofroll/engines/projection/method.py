@@ -162,7 +162,7 @@ class ProjectedBall:
         return force
 
     def rates(self, x: FloatArray) -> FloatArray:
-        """ẋ: the angles, if there are any, change at the rates s."""
+        """ẋ: the angles, if there are any, follow the velocities s."""
         if self._closed is None:
             return self.derivative(x, self.response(self.kinematics(x)))
         n = self._coordinates
@@ -171,7 +171,8 @@ class ProjectedBall:
     def derivative(self, x: FloatArray, response: Response) -> FloatArray:
         """ẋ with the accelerations of ``response``."""
         n = self._coordinates
-        return np.concatenate([x[n : 2 * n], response.acceleration])
+        turning = self._orientation.rates(x[:2], x[2:n], x[n + 2 : n + 5])
+        return np.concatenate([x[n : n + 2], turning, response.acceleration])
 
     def with_rows(self, rows: FloatArray) -> ProjectedBall:
         """The same ball with other active rows of the non-holonomic constraints."""

@@ -1,4 +1,4 @@
-"""How the ball's rotation is described: the paper's Euler angles, or no angles at all.
+"""How the ball's rotation is described: the paper's Euler angles, a quaternion, or nothing but its velocity.
 
 The five velocities are s = [u̇1 u̇2 r1 r2 r3]; here r gives the angular velocity along the local axes,
 ω' = [ω1 ω2 ω3] = A r. A dot on A means its rate seen from the world.
@@ -12,6 +12,7 @@ from typing import ClassVar, Protocol
 import numpy as np
 from scipy.spatial.transform import Rotation
 
+from proofroll.engines.projection.geometry import Geometry
 from proofroll.errors import Diverged
 from proofroll.surfaces import FloatArray
 
@@ -23,10 +24,10 @@ _LARGEST_SINE = 0.5
 
 
 class Orientation(Protocol):
-    """Angles (none, or three) and the three velocities that describe the rotation.
+    """Angles (none, or three, or a quaternion) and the three velocities that describe the rotation.
 
     Attributes:
-        size: number of angles; if there are any, their rates are the velocities r.
+        size: number of angles.
     """
 
     size: ClassVar[int]
@@ -42,6 +43,9 @@ class Orientation(Protocol):
         Raises:
             ArithmeticError: the angles are not finite.
         """
+
+    def rates(self, u: FloatArray, angles: FloatArray, r: FloatArray) -> FloatArray:
+        """Rates of the angles [1/s], shape (size,), where the ball is at ``u``."""
 
     def check(self, t: float, angles: FloatArray, r: FloatArray, step: float) -> None:
         """Raises Diverged if the description fails at time ``t`` [s]; ``step`` [s] is a fixed step's size, else 0."""
@@ -92,6 +96,10 @@ class EulerAngles:
         )
         return frame.T @ axes, frame.T @ drift
 
+    def rates(self, u: FloatArray, angles: FloatArray, r: FloatArray) -> FloatArray:  # noqa: ARG002 -- r is their rate
+        """See :class:`Orientation`."""
+        return r
+
     def check(self, t: float, angles: FloatArray, r: FloatArray, step: float) -> None:
         """See :class:`Orientation`. Looks for the singularity at θ = 0 and π, where φ and ψ turn about one axis.
 
@@ -139,9 +147,37 @@ class RotatingFrame:
         """See :class:`Orientation`. The axes turn with the frame: F ω' has the rate F (ω̇' + FᵀḞ ω')."""
         return self._identity, turning @ r
 
+    def rates(self, u: FloatArray, angles: FloatArray, r: FloatArray) -> FloatArray:  # noqa: ARG002 -- no angles
+        """See :class:`Orientation`."""
+        return angles
+
     def check(self, t: float, angles: FloatArray, r: FloatArray, step: float) -> None:
         """See :class:`Orientation`. Nothing to fail."""
 
     def quaternion(self, angles: FloatArray) -> FloatArray | None:  # noqa: ARG002 -- there are none
         """See :class:`Orientation`. The orientation is not followed: nothing needs it."""
         return None
+
+
+class FollowedFrame(RotatingFrame):
+    """The same, and besides the orientation: a quaternion in the world, a quadrature on which nothing depends."""
+
+    size: ClassVar[int] = 4
+
+    def __init__(self, geometry: Geometry) -> None:
+        super().__init__()
+        self._geometry = geometry
+
+    def start(self, frame: FloatArray, w: FloatArray) -> tuple[FloatArray, FloatArray]:  # noqa: ARG002 -- as above
+        """See :class:`Orientation`."""
+        return np.array([1.0, 0.0, 0.0, 0.0]), w
+
+    def rates(self, u: FloatArray, angles: FloatArray, r: FloatArray) -> FloatArray:
+        """See :class:`Orientation`. q̇ = ½ ω ∘ q with ω in the world."""
+        x, y, z = (self._geometry.at(u).frame @ r).tolist()
+        turning = np.array([[0.0, -x, -y, -z], [x, 0.0, -z, y], [y, z, 0.0, -x], [z, -y, x, 0.0]])
+        return np.asarray(0.5 * turning @ angles)
+
+    def quaternion(self, angles: FloatArray) -> FloatArray:
+        """See :class:`Orientation`."""
+        return np.asarray(angles / np.linalg.norm(angles))

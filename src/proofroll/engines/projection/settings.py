@@ -8,6 +8,7 @@ from typing import Annotated, Literal
 
 from annotated_types import Gt
 
+from proofroll.compiled import library
 from proofroll.engines.projection.integrators import INTEGRATORS, TIGHTEST
 from proofroll.errors import InputError
 
@@ -20,26 +21,30 @@ class ProjectionSettings:
 
     Attributes:
         formulation: ``euler``, the paper's angles, with a singularity; or ``rotating_frame``, the angular velocity
-            along the local axes, without.
+            along the local axes, without. The angles are always part of the equations; in the rotating frame the
+            orientation is followed, as a quaternion, only for a scene that asks for it.
         preset: where the other values come from.
-        integrator: ``rk4`` with the fixed step ``dt``, or ``dop853`` with the tolerance ``rtol``.
+        integrator: ``rk4`` with the fixed step ``dt``, ``dop853`` with the tolerance ``rtol``, or ``taylor`` with it:
+            the same equations in compiled Taylor series (heyoka), on a cylinder or plane, without bounded friction.
         dt: step of rk4 [s].
-        rtol: relative tolerance of dop853 [-].
-        elimination: remove the violation of the rolling constraints after each step. In ``rotating_frame`` on a surface
-            of constant curvature nothing is left to remove: there the constraints are linear with constant
+        rtol: relative tolerance of dop853 and of taylor [-].
+        elimination: remove the violation of the rolling constraints after each step; None: rk4 and dop853 do, and
+            taylor, which keeps the constraints to round-off by itself, has no such step. In ``rotating_frame`` on a
+            surface of constant curvature nothing is left to remove: there the constraints are linear with constant
             coefficients, and every Runge-Kutta method keeps those by itself.
     """
 
     formulation: Literal["euler", "rotating_frame"] = "euler"
-    preset: Literal["default", "matched"] = "matched"
-    integrator: Literal["rk4", "dop853"] = "dop853"
+    preset: Literal["default", "matched", "tuned"] = "matched"
+    integrator: Literal["rk4", "dop853", "taylor"] = "dop853"
     dt: Annotated[float, Gt(0)] = _DT
     rtol: Annotated[float, Gt(0)] = TIGHTEST
-    elimination: bool = True
+    elimination: bool | None = None
 
     def __post_init__(self) -> None:
-        if self.rtol < TIGHTEST:
-            raise InputError("projection: rtol", self.rtol, f"double precision allows no less than {TIGHTEST:.3g}")
+        tightest = library.TIGHTEST if self.integrator == "taylor" else TIGHTEST
+        if self.rtol < tightest:
+            raise InputError("projection: rtol", self.rtol, f"double precision allows no less than {tightest:.3g}")
         # A setting that would be ignored is an error: a user who writes dt=1e-4 believes that it does something.
         if self.resolution == "rtol" and self.dt != _DT:
             raise InputError(
@@ -50,27 +55,38 @@ class ProjectionSettings:
                 "projection: rtol", self.rtol, f"{self.integrator} has a fixed step; set dt, or add integrator=dop853"
             )
 
+        if self.integrator == "taylor" and self.elimination is not None:
+            advice = "taylor keeps the constraints to round-off and has no elimination; leave it out"
+            raise InputError("projection: elimination", self.elimination, advice)
+
+    @property
+    def eliminates(self) -> bool:
+        """Whether violations are removed."""
+        return self.integrator != "taylor" and self.elimination is not False
+
     @property
     def resolution(self) -> Literal["dt", "rtol"]:
         """The setting that trades speed for accuracy."""
-        return INTEGRATORS[self.integrator].resolution
+        return "rtol" if self.integrator == "taylor" else INTEGRATORS[self.integrator].resolution
 
     @property
     def order(self) -> int | None:
         """Declared order of convergence in dt; None with an adaptive step."""
-        return INTEGRATORS[self.integrator].order
+        return None if self.integrator == "taylor" else INTEGRATORS[self.integrator].order
 
 
 # default: what a reader of the paper writes down, a classical fixed-step method with elimination of violations.
 # matched: the same equations with nothing left of the integrator but round-off.
-# There is no tuned: nothing is known to be better than matched.
+# tuned: the same again, compiled.
 PRESETS: Mapping[str, Mapping[str, ProjectionSettings]] = {
     "euler": {
         "default": ProjectionSettings("euler", "default", "rk4"),
         "matched": ProjectionSettings("euler", "matched", "dop853"),
+        "tuned": ProjectionSettings("euler", "tuned", "taylor", rtol=library.TIGHTEST),
     },
     "rotating_frame": {
         "default": ProjectionSettings("rotating_frame", "default", "rk4"),
         "matched": ProjectionSettings("rotating_frame", "matched", "dop853"),
+        "tuned": ProjectionSettings("rotating_frame", "tuned", "taylor", rtol=library.TIGHTEST),
     },
 }

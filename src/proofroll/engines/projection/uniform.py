@@ -263,6 +263,6 @@ def closed_form(body: RollingBall, geometry: object, orientation: Orientation) -
     """The equations written out, or None where they are not known."""
     if not isinstance(geometry, Uniform):
         return None
-    if isinstance(orientation, RotatingFrame):
+    if type(orientation) is RotatingFrame:  # not where the orientation is followed: its state is longer
         return _AlongAxes(body, geometry)
     return _Euler(body, geometry) if isinstance(orientation, EulerAngles) else None

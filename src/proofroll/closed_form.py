@@ -4,9 +4,9 @@ from __future__ import annotations
 
 import numpy as np
 
+from proofroll.motion import Motion
 from proofroll.scene import RollingBall
 from proofroll.surfaces import Cylinder, FloatArray, Plane
-from proofroll.truth.motion import Motion
 
 
 def closed_form(body: RollingBall, times: FloatArray) -> Motion | None:

@@ -1,0 +1,90 @@
+"""The projection method's equations, solved in symbols, as compiled Taylor series (heyoka)."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+
+import numpy as np
+
+from proofroll.compiled.library import require_heyoka
+from proofroll.compiled.projection import Formulation, parameters, projected, structure
+from proofroll.compiled.rolling import supports
+from proofroll.compiled.series import Series, still_moving
+from proofroll.errors import Refused
+from proofroll.scene import RollingBall
+from proofroll.surfaces import FloatArray
+
+
+class TaylorSeries:
+    """A ball that rolls without slip, its state x = [q, s] by steps as long as the tolerance allows.
+
+    The violation of the constraints stays at round-off without being removed (a test shows it): a step is exact to
+    the last digits, and the equations keep C v constant.
+    """
+
+    def __init__(
+        self, body: RollingBall, formulation: Formulation, x: FloatArray, rtol: float, check: Callable[..., None]
+    ) -> None:
+        """Starts at time 0.
+
+        Args:
+            body: the scene's ball.
+            formulation: of the engine.
+            x: initial state.
+            rtol: relative tolerance of a step [-].
+            check: called with the time [s] and state after each step; raises Diverged if it is not to be trusted.
+
+        Raises:
+            Refused: heyoka is missing, or the scene is not one of its equations.
+        """
+        if np.isfinite(body.contact.mu_static):
+            raise Refused(
+                "integrator=taylor rolls without slip only: where slip begins and ends its direction is stiff, which "
+                "takes other equations than these; take integrator=dop853"
+            )
+        if not supports(body):
+            raise Refused("integrator=taylor has equations of cylinders and planes only; take integrator=dop853")
+        require_heyoka("integrator=taylor")
+        model = projected(structure(body, formulation), rtol)
+        self._pars, self._evaluate = parameters(body), model.evaluate
+        self._check, self._resistance = check, body.contact.rolling_resistance > 0
+        self._scales, self._mass = np.array(body.surface.length_scales), body.ball.mass
+        pars = np.array(self._pars[: len(model.integrator.pars)])
+        self._series = Series(model.integrator, pars, x, self._look)
+
+    def _look(self, before: FloatArray, t: float, x: FloatArray) -> None:
+        self._check(t, x)
+        if self._resistance:
+            still_moving(self._along(before), t, self._along(x))
+
+    def _along(self, x: FloatArray) -> FloatArray:
+        """Velocity of the centre along the coordinates [m/s], shape (2,)."""
+        return np.asarray(x[-5:-3] * self._scales)
+
+    @property
+    def t(self) -> float:
+        """Present time [s]."""
+        return self._series.t
+
+    @property
+    def x(self) -> FloatArray:
+        """State now."""
+        return self._series.x
+
+    @property
+    def rates(self) -> FloatArray:
+        """ẋ now."""
+        return self._evaluate(self.x, self._pars)[:-3]
+
+    @property
+    def force(self) -> FloatArray:
+        """Force of the wall on the ball now along the local axes, (-N, -λ1, -λ2) [N], shape (3,)."""
+        return -self._mass * self._evaluate(self.x, self._pars)[-3:]
+
+    def advance(self, t: float) -> None:
+        """Moves to time t [s].
+
+        Raises:
+            Diverged: it gave up.
+        """
+        self._series.advance(t)

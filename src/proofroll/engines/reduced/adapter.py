@@ -1,0 +1,93 @@
+"""The least model behind proofroll's engine protocol."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from typing import ClassVar, Self
+
+import numpy as np
+
+import proofroll
+from proofroll.compiled.library import with_heyoka
+from proofroll.engine import Built, Level, Sample, Term
+from proofroll.engines.reduced.models import ClosedForm, Compiled, Integrated, Model
+from proofroll.engines.reduced.settings import PRESETS, ReducedSettings
+from proofroll.scene import Capability, RollingBall, Scene
+from proofroll.surfaces import FloatArray
+
+
+class Reduced:
+    """The scene's least model: a closed form, or five equations of motion with no constraint left.
+
+    It shares the closed form and the equations with the truth's first route (:mod:`proofroll.rolling_equations`), so
+    agreement with the truth is news only as far as the truth's second route, which shares neither, agrees too.
+    """
+
+    name: ClassVar[str] = "reduced"
+    provides: ClassVar[frozenset[Capability]] = frozenset(
+        {Capability.ROLLING, Capability.CURVED_SURFACE, Capability.ROLLING_RESISTANCE}
+    )
+    settings: ClassVar[type[ReducedSettings]] = ReducedSettings
+    presets: ClassVar[Mapping[str, Mapping[str, ReducedSettings]]] = PRESETS
+    levels: ClassVar[Mapping[str, Level]] = {"equations": Level.REDUCED, "closed_form": Level.CLOSED_FORM}
+    terms: ClassVar[Sequence[Term]] = ()  # the least model has nothing left to switch off
+
+    @staticmethod
+    def version() -> str:
+        """The equations are part of proofroll; heyoka integrates them where it is installed."""
+        return with_heyoka(proofroll.__version__)
+
+    @classmethod
+    def build(cls, scene: Scene, settings: ReducedSettings) -> Self:
+        """See :class:`proofroll.engine.Engine`."""
+        return cls(scene.rolling, settings)
+
+    def __init__(self, body: RollingBall, settings: ReducedSettings) -> None:
+        self._body = body
+        self._model: Model
+        if settings.rtol is None:
+            self._model = ClosedForm(body)
+        elif settings.integrator == "taylor":
+            self._model = Compiled(body, settings.rtol)
+        else:
+            self._model = Integrated(body, settings.rtol)
+
+    def advance(self, t: float) -> None:
+        """See :class:`proofroll.engine.Engine`."""
+        self._model.advance(t)
+
+    def sample(self) -> Sample:
+        """See :class:`proofroll.engine.Engine`. The orientation is not followed: nothing needs it."""
+        motion = self._model.motion()
+        return Sample(
+            p_WB=motion.p_WB[0].copy(),
+            v_WB=motion.v_WB[0].copy(),
+            w_WB=motion.w_WB[0].copy(),
+            force=motion.force[0].copy(),
+        )
+
+    def built(self) -> Built:
+        """See :class:`proofroll.engine.Engine`."""
+        body, motion = self._body, self._model.motion()
+        ball, f = body.ball, body.contact.rolling_resistance
+        acceleration = motion.force[0] / ball.mass + body.gravity
+        return Built(
+            mass=ball.mass,
+            inertia=np.full(3, ball.inertia),
+            gravity=body.gravity.copy(),
+            ball_radius=ball.radius,
+            rolling_resistance=f,
+            acceleration=acceleration,
+            angular_acceleration=self._turning(motion.p_WB[0], motion.v_WB[0], motion.w_WB[0], acceleration),
+            terms=frozenset({Capability.ROLLING_RESISTANCE} if f else ()),
+        )
+
+    def _turning(self, p: FloatArray, v: FloatArray, w: FloatArray, acceleration: FloatArray) -> FloatArray | None:
+        """ω̇ [rad/s²], shape (3,): rate of ω = ω1 e1 - e1 × v / a."""
+        spin_rate, surface = self._model.spin_rate(), self._body.surface
+        if spin_rate is None:
+            return None
+        e1 = surface.normal(p)
+        e1_rate = surface.normal_gradient(p) @ v
+        swung = np.cross(e1_rate, v) + np.cross(e1, acceleration)
+        return np.asarray(spin_rate * e1 + (w @ e1) * e1_rate - swung / self._body.ball.radius)

@@ -1,0 +1,169 @@
+"""The least models behind one face: a time, and the motion at that time.
+
+They share their equations with the truth's first route; only its second route checks them.
+"""
+
+from __future__ import annotations
+
+import math
+from typing import Protocol
+
+import numpy as np
+from scipy.integrate import DOP853
+
+from proofroll.closed_form import closed_form
+from proofroll.compiled.library import require_heyoka
+from proofroll.compiled.rolling import is_uniform, parameters, reduced, supports
+from proofroll.compiled.rolling import start as start_along_arc
+from proofroll.compiled.series import Series, still_moving
+from proofroll.errors import Diverged, Refused
+from proofroll.motion import Motion, world_motion
+from proofroll.rolling_equations import placed, reduced_rates, start
+from proofroll.scene import RollingBall
+from proofroll.surfaces import FloatArray
+
+# A step shorter than this part of the way to the next sample leads nowhere.
+_STUCK = 1e-12
+
+
+class Model(Protocol):
+    """Moves the ball in time."""
+
+    def advance(self, t: float) -> None:
+        """Moves to time t [s].
+
+        Raises:
+            Diverged: it gave up.
+        """
+
+    def motion(self) -> Motion:
+        """State and force now, each shape (1, 3)."""
+
+    def spin_rate(self) -> float | None:
+        """ω̇1 now [rad/s²]; None: the model has no equation for it."""
+
+
+class ClosedForm:
+    """The closed form."""
+
+    def __init__(self, body: RollingBall) -> None:
+        if body.contact.rolling_resistance > 0:
+            raise Refused("there is no closed form with rolling resistance; take formulation=equations")
+        self._body, self._t = body, 0.0
+        found = self._at(0.0)
+        if found is None:
+            raise Refused(
+                "closed forms are known on a plane and in a cylinder along whose axis gravity points, not here; "
+                "take formulation=equations"
+            )
+        self._motion = found
+
+    def _at(self, t: float) -> Motion | None:
+        return closed_form(self._body, np.array([t]))
+
+    def advance(self, t: float) -> None:
+        """See :class:`Model`."""
+        found = self._at(t)
+        assert found is not None  # whether there is one does not depend on time
+        self._motion = found
+
+    def motion(self) -> Motion:
+        """See :class:`Model`."""
+        return self._motion
+
+    def spin_rate(self) -> float | None:
+        """See :class:`Model`."""
+        return None
+
+
+class Integrated:
+    """The reduced equations by Dormand and Prince's method of order 8; a step ends at each sample."""
+
+    def __init__(self, body: RollingBall, rtol: float) -> None:
+        self._body = body
+        speed = _speed(body)
+        self._scales = np.array(body.surface.length_scales)
+        a, per_metre = body.ball.radius, 1 / self._scales
+        scales = np.concatenate([a * per_metre, speed * per_metre, [speed / a]])
+        self._solver = DOP853(
+            lambda _, x: reduced_rates(body, x)[0], 0.0, start(body), np.inf, rtol=rtol, atol=rtol * scales
+        )
+
+    def advance(self, t: float) -> None:
+        """See :class:`Model`."""
+        solver, span = self._solver, t - self._solver.t
+        if span <= 0:
+            return
+        solver.t_bound, solver.status = t, "running"
+        while solver.status == "running":
+            wanted, before, velocity = solver.h_abs, solver.t, self._along(solver.y)
+            if solver.step() is not None or (solver.t < t and solver.t - before < _STUCK * span):
+                raise Diverged(f"the step size fell to nothing at t = {solver.t:.6g} s")
+            if not np.all(np.isfinite(solver.y)):
+                raise Diverged(f"the state is not finite (NaN or overflow) at t = {solver.t:.6g} s")
+            if self._body.contact.rolling_resistance > 0:
+                still_moving(velocity, float(solver.t), self._along(solver.y))
+            if solver.t == t:
+                solver.h_abs = max(wanted, solver.h_abs)  # a step cut short at a sample says nothing about the next
+
+    def _along(self, x: FloatArray) -> FloatArray:
+        """Velocity of the centre along the coordinates [m/s], shape (2,)."""
+        return np.asarray(x[2:4] * self._scales)
+
+    def motion(self) -> Motion:
+        """See :class:`Model`."""
+        _, v, force = reduced_rates(self._body, self._solver.y)
+        return Motion(*placed(self._body, self._solver.y[None, :], v[None, :]), force[None, :], "reduced equations")
+
+    def spin_rate(self) -> float:
+        """See :class:`Model`."""
+        return float(reduced_rates(self._body, self._solver.y)[0][4])
+
+
+class Compiled:
+    """The reduced equations on a cylinder or plane by compiled Taylor series."""
+
+    def __init__(self, body: RollingBall, rtol: float) -> None:
+        if not supports(body):
+            raise Refused("integrator=taylor has equations of cylinders and planes only; take integrator=dop853")
+        require_heyoka("integrator=taylor")
+        self._body, self._pars = body, parameters(body)
+        self._resistance = body.contact.rolling_resistance > 0
+        model = reduced(self._resistance, is_uniform(body), rtol)
+        pars = np.array(self._pars[: len(model.integrator.pars)])
+        self._evaluate = model.evaluate
+        self._series = Series(model.integrator, pars, start_along_arc(body), self._check)
+
+    def _check(self, before: FloatArray, t: float, x: FloatArray) -> None:
+        if self._resistance:
+            still_moving(before[2:4], t, x[2:4])
+
+    def advance(self, t: float) -> None:
+        """See :class:`Model`."""
+        self._series.advance(t)
+
+    def motion(self) -> Motion:
+        """See :class:`Model`."""
+        x, ball = self._series.x, self._body.ball
+        held2, held3, N = self._evaluate(x, self._pars)[5:]
+        return world_motion(
+            self._body,
+            x[None, :2] / np.array(self._body.surface.length_scales),
+            velocity=x[None, 2:4],
+            spin=x[4:],
+            slip=np.zeros((1, 2)),
+            friction=-ball.mass * np.array([[held2, held3]]),
+            press=ball.mass * np.array([N]),
+            route="reduced equations, Taylor series",
+        )
+
+    def spin_rate(self) -> float:
+        """See :class:`Model`."""
+        return float(self._evaluate(self._series.x, self._pars)[4])
+
+
+def _speed(body: RollingBall) -> float:
+    """Natural speed [m/s]: the initial one, or that of a fall by one radius."""
+    a = body.ball.radius
+    parts = np.linalg.norm(body.v0), a * np.linalg.norm(body.w0), math.sqrt(a * float(np.linalg.norm(body.gravity)))
+    return math.hypot(*(float(part) for part in parts)) or 1.0

@@ -1,0 +1,109 @@
+"""Tables of the benchmarks on the terminal."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from typing import Any
+
+from rich.table import Table
+from rich.text import Text
+
+from proofroll.report.terminal import number
+
+_MEANING = {
+    "reduced_over_engine": "reduced, against the fastest engine",
+    "reduced_over_contact": "reduced, against the fastest contact model",
+    "projection_euler": "projection euler, against numpy and scipy",
+    "projection_rotating_frame": "projection rotating_frame, against numpy and scipy",
+}
+
+
+def reference_tables(content: dict[str, Any]) -> Iterator[Table]:
+    """What was run, how many times faster it is, and whether that is what was wanted."""
+    slip = content["first_slip"]["seconds"]
+    runs = _table(f"To the first slip at {slip:.6f} s", "", "error [m]", "time [ms]", "95 %", "built in [s]")
+    for row in [*content["models"], *content["engines"]]:
+        seconds = row["seconds"]
+        runs.add_row(
+            row["name"],
+            f"{row['error']:.1e}",
+            number(1e3 * seconds["value"], 3),
+            f"{number(1e3 * seconds['low'])} … {number(1e3 * seconds['high'])}",
+            number(row.get("build_seconds")),
+        )
+    yield runs
+    ratios = _table("How many times faster", "", "ratio", "95 %", "goal", "")
+    for name, found in content["ratios"].items():
+        ratios.add_row(_MEANING[name], *_measured(found))
+    found = content["onsets_per_second"]
+    ratios.add_row("first slips in bulk, per second of one core", *_measured(found))
+    yield ratios
+
+
+def _table(title: str, *columns: str) -> Table:
+    table = Table(title=title, title_justify="left", box=None, padding=(0, 2, 0, 0))
+    for index, column in enumerate(columns):
+        table.add_column(Text(column), justify="left" if index == 0 else "right", no_wrap=True)
+    return table
+
+
+def _measured(found: dict[str, Any]) -> tuple[str, str, str, str]:
+    mark = "✓" if found["met"] else "✗"
+    if found["value"] is None:
+        return "–", "", f"{found['goal']:,.0f}", mark
+    ends = f"{found['low']:,.0f} … {found['high']:,.0f}"
+    return f"{found['value']:,.0f}", ends, f"{found['goal']:,.0f}", mark
+
+
+def study_tables(found: dict[str, Any]) -> Iterator[Table]:
+    """Where wall time × workers went, and every case."""
+    title = f"{found['wall_seconds']:.1f} s with {found['jobs']} workers: {found['outside']:.0%} outside the engines"
+    shares = Table(box=None, padding=(0, 2, 0, 0), title=Text(title), title_justify="left")
+    shares.add_column("wall time × workers")
+    shares.add_column("part", justify="right")
+    for cause, share in found["shares"].items():
+        shares.add_row(Text(cause), f"{share:.1%}")
+    yield shares
+    cases = Table(box=None, padding=(0, 2, 0, 0))
+    for column in ("case", "f", "simulated", "wall", "outside"):
+        cases.add_column(column, justify="left" if column == "case" else "right")
+    for case in found["cases"]:
+        outside = "–" if case["outside"] is None else f"{case['outside']:.0%}"
+        resistance = "> 0" if case["parameters"] else "0"
+        cases.add_row(
+            Text(f"{case['engine']} {case['formulation']} ({case['status']})"),
+            resistance,
+            f"{case['until']:.4g} s",
+            f"{case['seconds']:.2f} s",
+            outside,
+        )
+    yield cases
+
+
+def study_lines(found: dict[str, Any]) -> Iterator[str]:
+    """What process start costs, how busy the machine was, and the goal."""
+    starts = ", ".join(f"{name} {number(seconds)} s" for name, seconds in found["first_answer"].items())
+    yield f"from the start of a process to its first answer: {starts}"
+    if found["load_before"] is not None:
+        yield f"load average of the machine before: {found['load_before']:.1f}"
+    yield f"goal: at most {found['goal']:.0%} outside"
+
+
+def adapter_table(found: dict[str, Any]) -> Table:
+    """One line per engine, formulation and variant of the scene."""
+    table = Table(box=None, padding=(0, 1, 0, 0), title=Text("advance over bare loop"), title_justify="left")
+    for column in ("engine formulation", "variant", "ratio", "95 %"):
+        table.add_column(column, no_wrap=True)
+    table.add_column("")
+    for name, item in found["engines"].items():
+        for row in item["rows"]:
+            ratio = row["ratio"]
+            interval = "" if ratio is None else f"{ratio['low']:.3f}–{ratio['high']:.3f}"
+            table.add_row(
+                Text(f"{name} {row['formulation']}"),
+                Text(row["variant"]),
+                Text("–" if ratio is None else f"{ratio['value']:.3f}", style="" if row["within_goal"] else "yellow"),
+                Text(interval),
+                Text(row["message"]),
+            )
+    return table

@@ -1,0 +1,231 @@
+"""One quantity up the ladder of models, and every optional term switched on and off."""
+
+from __future__ import annotations
+
+import dataclasses
+import math
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from proofroll.case import Case, EngineFacts, Result, Status
+from proofroll.errors import InputError, ProofrollError, Refused
+from proofroll.metrics import observables, units
+from proofroll.recording import time_grid
+from proofroll.runner import Runner, WorkerDied, resolve
+from proofroll.scene_file import load_scene
+from proofroll.stopwatch import Stopwatch
+from proofroll.studies.models import Model, Rung, Switch, described, rungs, switches
+from proofroll.surfaces import FloatArray
+from proofroll.timing import ROUNDS, Timing, interleaved
+from proofroll.trajectory import read
+
+if TYPE_CHECKING:
+    import xarray as xr
+
+_EVERY = 0.02  # interval between samples [s], as in the comparison files
+_TIME_LIMIT = 60.0  # wall seconds for one case
+# Observables that are not one curve over the samples.
+_NO_CURVES = frozenset({"first_slip", "event_times", "event_order"})
+
+
+@dataclass(frozen=True)
+class Answer:
+    """What one model gave.
+
+    Attributes:
+        case: what was run; None if its settings make no sense or its engine is missing.
+        result: how that ended.
+        values: of the quantity, None if there are none.
+        timing: wall seconds per simulated second, None if it could not be timed.
+    """
+
+    case: Case | None
+    result: Result
+    values: FloatArray | None = None
+    timing: Timing | None = None
+
+
+@dataclass(frozen=True)
+class Truth:
+    """The truth at one point of the parameters: the whole, the quantity of it, and that one's error bar."""
+
+    dataset: xr.Dataset
+    values: FloatArray
+    error_bar: float
+
+
+class Ladder:
+    """Plans, runs and times; :func:`proofroll.report.ladder.ladder_content` says what was found.
+
+    Attributes:
+        ladder, switches: what is asked.
+        answers: what every model gave, by :func:`key_of`.
+        truths: by the parameters that a switch puts over the given ones, as text.
+        engines: what every engine tells of itself, or why it cannot.
+
+    Args:
+        scene: name of the scene.
+        parameters: of it.
+        runner: where cases are run and kept.
+        quantity: what is asked; the scene's ``z``, else its first coordinate, if None.
+        until: last time [s].
+        tolerance: error of the quantity that is allowed, in its unit; None: a term counts if it moves the quantity by
+            more than the smaller of the errors with and without it.
+        engines: names; all if empty.
+        rounds: of the timing that count; as many as a timing has by default if None.
+
+    Raises:
+        InputError: something that was given does not exist or makes no sense.
+        Refused: the scene has no truth.
+    """
+
+    def __init__(
+        self,
+        scene: str,
+        parameters: dict[str, Any],
+        runner: Runner,
+        *,
+        quantity: str | None = None,
+        until: float = 2.0,
+        tolerance: float | None = None,
+        engines: Sequence[str] = (),
+        rounds: int | None = None,
+    ) -> None:
+        self._grid = time_grid(until, _EVERY)
+        if until <= 0:
+            raise InputError("until", until, "give a time in s that is positive")
+        if tolerance is not None and not (math.isfinite(tolerance) and tolerance > 0):
+            raise InputError("tolerance", tolerance, "give a positive number in the unit of the quantity")
+        self._name, self._runner, self.until = scene, runner, until
+        self.tolerance, self._rounds = tolerance, rounds or ROUNDS
+        self.scene = load_scene(scene, **parameters)
+        self._given = {name: self.scene.parameters[name] for name in parameters}
+        known = units(self.scene.rolling)
+        curves = [name for name in known if name not in _NO_CURVES]
+        self.quantity = quantity or ("z" if "z" in known else self.scene.rolling.surface.coordinates[0])
+        if self.quantity not in curves:
+            raise InputError("quantity", self.quantity, f"choose one of {', '.join(curves)}")
+        self.unit = known[self.quantity]
+        self.engines = described(engines)
+        for error in self.engines.values():
+            if isinstance(error, InputError):
+                raise error
+        truth = resolve([("truth", {})])[0]
+        if not isinstance(truth, EngineFacts):
+            raise truth
+        self._truth_facts = truth
+        self.truths: dict[str, Truth] = {}
+        self.answers: dict[str, Answer] = {}
+        self.ladder: list[Rung] = rungs(self.engines)
+        self.switches: list[Switch] = []
+
+    def run(self, progress: Callable[[str], None] = lambda _: None) -> None:
+        """Runs every model once, stored results where there are some, then times all of them in turns."""
+        self._run_truths([{}], progress)
+        needed = float(np.nanmax(self.truths[str({})].dataset["needed_friction"].to_numpy()))
+        self.switches = switches(self.ladder, self.engines, self.scene, needed)
+        wanted = [rung.model for rung in self.ladder] + [m for s in self.switches for m in (s.on, s.off)]
+        models = {key_of(model): model for model in wanted if model is not None}
+        self._run_truths([dict(s.on.parameters) for s in self.switches if s.on is not None], progress)
+        facts = resolve([(model.engine, model.options) for model in models.values()])
+        cases: dict[str, Case] = {}
+        for (key, model), found in zip(models.items(), facts, strict=True):
+            if isinstance(found, EngineFacts):
+                cases[key] = self._case(found, model)
+            else:
+                self.answers[key] = Answer(None, absence(found))
+        results = self._runner.run(cases.values(), lambda case, _: progress(case.engine.name))
+        for key, case in cases.items():
+            self.answers[key] = self._answer(models[key], case, results[case.key])
+        self._time(progress)
+
+    def _case(self, facts: EngineFacts, model: Model) -> Case:
+        parameters = self._given | dict(model.parameters)
+        scene = load_scene(self._name, asks=model.asks, **parameters)
+        return Case(
+            scene=self._name,
+            parameters=parameters,
+            scene_digest=scene.digest,
+            engine=facts,
+            until=self.until,
+            every=_EVERY,
+            time_limit=_TIME_LIMIT,
+            asks=model.asks,
+        )
+
+    def _run_truths(self, wanted: Sequence[dict[str, float]], progress: Callable[[str], None]) -> None:
+        wanted = [point for point in wanted if str(point) not in self.truths]
+        cases = {str(point): self._case(self._truth_facts, Model("truth", {}, point)) for point in wanted}
+        results = self._runner.run(cases.values(), lambda *_: progress("truth"))
+        for point in wanted:
+            case = cases[str(point)]
+            result = results[case.key]
+            if result.status != Status.DONE:
+                raise Refused(f"there is no truth of this scene: {result.message}")
+            self.truths[str(point)] = self._truth(read(self._runner.store.trajectory(case)), point)
+
+    def _truth(self, dataset: xr.Dataset, point: dict[str, float]) -> Truth:
+        values = self._curve(point, dataset)
+        if values is None:
+            raise Refused(f"the truth of this scene has no {self.quantity}")
+        if self.quantity in dataset and self.quantity != "gap":
+            return Truth(dataset, values, float(dataset[self.quantity].attrs["error_bar"]))
+        if self.quantity == "slip" and "sticking" in dataset:
+            bars = (float(dataset[f"slip{index}"].attrs["error_bar"]) for index in (2, 3))
+            return Truth(dataset, values, math.hypot(*bars))
+        # Zero for a perfect run; what is found in the truth is what the measurement cannot resolve.
+        return Truth(dataset, np.zeros_like(values), float(np.max(np.abs(values), initial=0.0)))
+
+    def _curve(self, point: Mapping[str, float], dataset: xr.Dataset) -> FloatArray | None:
+        """The quantity of a run of the scene with these parameters."""
+        body = load_scene(self._name, **(self._given | dict(point))).rolling
+        found = observables(body, dataset).get(self.quantity)
+        return None if found is None else found.values
+
+    def _answer(self, model: Model, case: Case, result: Result) -> Answer:
+        if result.status != Status.DONE:
+            return Answer(case, result)
+        return Answer(case, result, self._curve(model.parameters, read(self._runner.store.trajectory(case))))
+
+    def error(self, model: Model, point: dict[str, float]) -> float | None:
+        """Largest distance from the truth of the scene with these parameters; None: no answer."""
+        values = self.answers[key_of(model)].values
+        return None if values is None else distance(values, self.truths[str(point)].values)
+
+    def _time(self, progress: Callable[[str], None]) -> None:
+        timed = {key: answer.case for key, answer in self.answers.items() if answer.values is not None}
+        with Stopwatch() as stopwatch:
+            timings = interleaved(
+                {key: _task(stopwatch, case) for key, case in timed.items() if case is not None},
+                self._rounds,
+                lambda _: progress("timing"),
+            )
+        for key, timing in timings.items():
+            self.answers[key] = dataclasses.replace(self.answers[key], timing=timing)
+
+
+def key_of(model: Model) -> str:
+    """Distinguishes models."""
+    return repr((model.engine, sorted(model.options.items()), sorted(model.parameters.items()), model.asks))
+
+
+def _task(stopwatch: Stopwatch, case: Case) -> Callable[[], float | None]:
+    return lambda: stopwatch(case)
+
+
+def absence(error: ProofrollError) -> Result:
+    """Why an engine, or its settings, could not be asked."""
+    if isinstance(error, WorkerDied):
+        return Result(error.status, str(error))
+    return Result(Status.REFUSED if isinstance(error, InputError) else Status.MISSING, str(error))
+
+
+def distance(one: FloatArray, other: FloatArray) -> float:
+    """Largest difference of two curves; inf where they cannot be compared."""
+    if one.shape != other.shape:
+        return math.inf
+    distance = float(np.max(np.abs(one - other), initial=0.0))
+    return distance if math.isfinite(distance) else math.inf

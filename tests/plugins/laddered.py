@@ -1,0 +1,64 @@
+"""An engine on the ladder of models: reduced equations, with terms that are needed, useless, harmful and refused."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from typing import Any, ClassVar, Literal, Self
+
+from tiny import Tiny, TinySettings
+
+from proofroll.engine import Level, Term, whole_steps
+from proofroll.errors import Refused
+from proofroll.scene import Capability, Scene
+
+
+@dataclass(frozen=True)
+class LadderedSettings(TinySettings):
+    """A step, and what can be switched."""
+
+    formulation: Literal["midpoint", "heavier"] = "midpoint"  # type: ignore[assignment]  # more than Tiny has
+    second_stage: bool = True
+    idle: bool = False
+    wind: Literal["none", "gale", "storm"] = "none"
+
+
+class Laddered(Tiny):
+    """The midpoint rule, to which things can be added that nobody needs."""
+
+    name: ClassVar[str] = "laddered"
+    settings: ClassVar[type[Any]] = LadderedSettings
+    presets: ClassVar[Mapping[str, Mapping[str, Any]]] = {
+        "midpoint": {"matched": LadderedSettings()},
+        "heavier": {"matched": LadderedSettings("heavier", idle=True)},
+    }
+    levels: ClassVar[Mapping[str, Level]] = {"midpoint": Level.REDUCED, "heavier": Level.CONTACT}
+    terms: ClassVar[Sequence[Term]] = (
+        Term("second stage", ("midpoint",), {"second_stage": True}, {"second_stage": False}, "of second order"),
+        Term("idle work", ("midpoint",), {"idle": True}, {"idle": False}, "keeps warm"),
+        Term("gale", ("heavier",), {"wind": "gale"}, {"wind": "none"}, "blows", rung=True),
+        Term("storm", ("heavier",), {"wind": "storm"}, {"wind": "none"}, "blows it over", rung=True),
+    )
+    inherent: ClassVar[Mapping[str, Mapping[Capability, str]]] = {"heavier": {Capability.ORIENTATION: "so it is"}}
+
+    @classmethod
+    def build(cls, scene: Scene, settings: Any) -> Self:
+        """Not in a storm."""
+        if settings.wind == "storm":
+            raise Refused("no ball rolls in a storm")
+        return super().build(scene, settings)
+
+    def __init__(self, scene: Scene, settings: Any) -> None:
+        super().__init__(scene, settings)
+        self.chosen = settings
+
+    def advance(self, t: float) -> None:
+        """See :class:`proofroll.engine.Engine`."""
+        for _ in range(whole_steps(self.t, t, self.dt)):
+            stage = self.x + self.dt / 2 * self.rates(self.x) if self.chosen.second_stage else self.x
+            for _ in range(5 if self.chosen.idle else 1):
+                rates = self.rates(stage)
+            if self.chosen.wind == "gale":
+                rates[3] += 1.0  # blows upwards by 1 m/s²
+            self.x = self.x + self.dt * rates
+        self.t = t

@@ -1,0 +1,119 @@
+"""The projection method in compiled Taylor series gives what it gives in numpy, and says where it cannot."""
+
+from __future__ import annotations
+
+import dataclasses
+from typing import Any
+
+import numpy as np
+import pytest
+
+from proofroll.compiled import library
+from proofroll.engines.projection import Projection
+from proofroll.errors import InputError, Refused
+from proofroll.registry import resolve_settings
+from proofroll.scene import Gravity, Scene
+from proofroll.scene_file import load_scene
+from proofroll.simulation import build, simulate
+
+needs_heyoka = pytest.mark.skipif(not library.available(), reason="heyoka is not installed")
+
+GENERAL = {"speed": 3.3, "axial_speed": 0.7, "radial_spin": 12.0}
+RESISTING = load_scene("sphere_in_cylinder", **GENERAL, rolling_resistance=5e-4)
+SCENES: dict[str, Scene] = {
+    "cylinder": load_scene("sphere_in_cylinder", **GENERAL),
+    "cylinder-resisting": RESISTING,
+    "plane": load_scene("inclined_plane", normal_spin=12.0),
+    "plane-resisting": load_scene("inclined_plane", normal_spin=12.0, rolling_resistance=5e-4),
+    "oblique": dataclasses.replace(RESISTING, gravity=Gravity(9.81, (0.2, -0.1, -0.9))),
+    # the singularity of the angles stays about the world's vertical, so the axis of the cylinder is turned too
+    "tilted": dataclasses.replace(RESISTING, surfaces=(dataclasses.replace(RESISTING.surfaces[0], tilt=0.3),)),
+}
+
+
+def state(scene: Scene, formulation: str, t: float, **settings: Any) -> tuple[Any, Any]:
+    """State and sample of the engine at time t [s]."""
+    engine = build(scene, "projection", formulation=formulation, **settings)
+    engine.advance(t)
+    return engine._motion.x, engine.sample()
+
+
+@needs_heyoka
+@pytest.mark.parametrize("formulation", ["euler", "rotating_frame"])
+@pytest.mark.parametrize("scene", SCENES.values(), ids=SCENES)
+def test_same_answers_as_numpy(scene: Scene, formulation: str) -> None:
+    """States and multipliers agree with those that numpy and DOP853 give, angles included, to round-off."""
+    x, sample = state(scene, formulation, 0.2, preset="tuned")
+    expected, other = state(scene, formulation, 0.2, preset="matched")
+    assert np.max(np.abs(x - expected) / np.maximum(1.0, np.abs(expected))) < 2e-11
+    assert sample.force is not None
+    assert np.max(np.abs(sample.force - other.force)) < 1e-10
+    assert np.max(np.abs(sample.p_WB - other.p_WB)) < 1e-12
+    assert (sample.q_WB is None) == (formulation == "rotating_frame")
+
+
+@needs_heyoka
+@pytest.mark.parametrize("formulation", ["euler", "rotating_frame"])
+def test_multipliers_of_any_state(formulation: str) -> None:
+    """λ and the accelerations are those of the numeric system also in a state that violates the constraints."""
+    taylor, numeric = (build(RESISTING, "projection", formulation=formulation, preset=p) for p in ("tuned", "matched"))
+    x = numeric._motion.x + np.linspace(0.1, 0.4, len(numeric._motion.x))
+    taylor._motion._series.x = x
+    response = numeric._ball.response(numeric._ball.kinematics(x))
+    assert taylor._motion.rates == pytest.approx(numeric._ball.derivative(x, response), rel=1e-12, abs=1e-11)
+    assert taylor._motion.force == pytest.approx(numeric._ball.contact_force(response), rel=1e-12)
+
+
+@needs_heyoka
+@pytest.mark.parametrize(("formulation", "drift"), [("euler", 1e-11), ("rotating_frame", 1e-13)])
+def test_nothing_is_left_to_eliminate(formulation: str, drift: float) -> None:
+    """After 5 s, 90 turns of the ball, the contact point slips at round-off though nothing removes the violation."""
+    scene = load_scene("sphere_in_cylinder", rolling_resistance=5e-4)
+    run = simulate(scene, "projection", until=5.0, every=0.5, formulation=formulation, preset="tuned")
+    assert run.attrs["status"] == "done"
+    assert float(np.max(np.hypot(run["slip2"], run["slip3"]))) < drift  # of 4 m/s
+
+
+@needs_heyoka
+@pytest.mark.parametrize("preset", ["matched", "tuned"])
+def test_the_singularity_is_reported(preset: str) -> None:
+    """A ball whose spin axis passes the vertical is not carried through the singularity of the Euler angles."""
+    scene = load_scene("inclined_plane", speed=0.3, cross_speed=0.0, normal_spin=40.0)
+    run = simulate(scene, "projection", until=2.0, every=0.05, formulation="euler", preset=preset)
+    assert run.attrs["status"] == "diverged"
+    assert "near the Euler-angle singularity" in run.attrs["message"]
+
+
+@needs_heyoka
+def test_a_sample_before_the_singularity_is_still_given() -> None:
+    """What lies beyond the asked time is no reason to fail, even where a step of the series ends there."""
+    engine = build(RESISTING, "projection[formulation=euler,preset=tuned]")
+    engine.advance(1e-5)
+    series = engine._motion._series._integrator
+    assert series.time > 1e-5
+    series.state[3] = 0.0  # θ at the end of the step
+    engine.advance(2e-5)
+    assert engine._motion.t == 2e-5
+
+
+@pytest.mark.parametrize("value", [True, False])
+def test_elimination_has_no_effect_and_is_refused(value: bool) -> None:
+    """Switching elimination on or off with taylor is an error: it does nothing there."""
+    with pytest.raises(InputError, match=r"projection: elimination = .*keeps the constraints to round-off"):
+        resolve_settings(Projection, {"integrator": "taylor", "elimination": value})
+
+
+def test_elimination_is_on_by_default() -> None:
+    """rk4 and dop853 eliminate unless told otherwise, taylor never does."""
+    assert resolve_settings(Projection, {}).eliminates
+    assert not resolve_settings(Projection, {"elimination": False}).eliminates
+    assert not resolve_settings(Projection, {"integrator": "taylor"}).eliminates
+
+
+def test_what_taylor_cannot_do_is_refused(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Bounded friction and a missing heyoka are each one line that says what to do."""
+    with pytest.raises(Refused, match="rolls without slip only"):
+        build(load_scene("sphere_in_cylinder", mu_static=0.35), "projection[integrator=taylor]")
+    monkeypatch.setattr(library, "available", lambda: False)
+    with pytest.raises(Refused, match=r"needs heyoka.*proofroll\[fast\]"):
+        build(RESISTING, "projection[integrator=taylor]")

@@ -1,0 +1,168 @@
+"""What a scene does not require is not in the model that an engine builds: looked for in the engine's own objects."""
+
+from __future__ import annotations
+
+import mujoco
+import numpy as np
+import pytest
+from scipy.spatial.transform import Rotation
+
+from proofroll.errors import InputError, Refused
+from proofroll.scene import Capability, Scene
+from proofroll.scene_file import load_scene
+from proofroll.simulation import build, simulate
+
+RESISTANCE = 5e-4
+NEEDS = {
+    "nothing": ({}, frozenset()),
+    "resistance": ({"rolling_resistance": RESISTANCE}, {Capability.ROLLING_RESISTANCE}),
+    "friction": ({"mu_static": 0.35}, {Capability.BOUNDED_FRICTION}),
+}
+TURNING = frozenset({Capability.ORIENTATION})
+
+
+def scene(*asks: str, **parameters: float) -> Scene:
+    """The ball in the cylinder."""
+    return load_scene("sphere_in_cylinder", asks=asks, **parameters)
+
+
+@pytest.mark.parametrize(
+    ("engine", "always"),
+    [
+        ("projection[formulation=euler]", TURNING),
+        ("projection[formulation=rotating_frame]", frozenset()),
+        ("pinocchio[formulation=composite]", frozenset()),
+        ("pinocchio[formulation=free_flyer,preset=tuned]", frozenset()),
+        ("pinocchio[formulation=composite,preset=default]", TURNING),
+        ("pinocchio[formulation=contact]", TURNING),
+        ("exudyn[formulation=generic]", frozenset()),
+        ("exudyn[formulation=contact]", TURNING),
+        ("mujoco[formulation=chart]", TURNING),
+        ("mujoco[formulation=free]", TURNING),
+    ],
+)
+@pytest.mark.parametrize("need", NEEDS)
+def test_terms_follow_the_scene(engine: str, always: frozenset[Capability], need: str) -> None:
+    """Each term is told exactly where the scene requires it, but for an orientation that is always there."""
+    parameters, terms = NEEDS[need]
+    assert build(scene(**parameters), engine).built().terms == always | terms
+
+
+@pytest.mark.parametrize("f", [0.0, RESISTANCE])
+def test_projection(f: float) -> None:
+    """The state is as long as the formulation needs, rows are those of rolling, and there is no moment without f."""
+    for formulation, asks, length in (
+        ("rotating_frame", (), 7),  # two coordinates, five velocities
+        ("rotating_frame", ("orientation",), 11),  # a quaternion
+        ("euler", (), 10),  # three angles
+    ):
+        engine = build(scene(*asks, rolling_resistance=f), "projection", formulation=formulation)
+        assert len(engine._motion.x) == length
+        assert engine._ball.rows.shape == (2, 6)
+        kin = engine._ball.kinematics(engine._motion.x)
+        assert bool(np.any(engine._ball.resistance(kin, 1.0))) == (f > 0)
+        assert not hasattr(engine._motion, "events")  # nobody looks for a slip
+
+
+def test_the_orientation_in_the_rotating_frame_is_a_quadrature() -> None:
+    """Asked for, the orientation turns with the spin, is that of the Euler angles, and leaves the motion alone."""
+    with_it, angles, without = (
+        simulate(scene(*asks), "projection", formulation=formulation, until=0.2)
+        for asks, formulation in ((("orientation",), "rotating_frame"), ((), "euler"), ((), "rotating_frame"))
+    )
+    assert "q_WB" not in without
+    turned, expected = (Rotation.from_quat(run.q_WB.to_numpy(), scalar_first=True) for run in (with_it, angles))
+    assert np.max((turned * expected.inv()).magnitude()) < 1e-10
+    np.testing.assert_allclose(with_it.z, without.z, rtol=0, atol=1e-13)
+
+
+@pytest.mark.parametrize(("formulation", "joints", "freedoms"), [("composite", 4, 5), ("free_flyer", 2, 6)])
+def test_pinocchio(formulation: str, joints: int, freedoms: int) -> None:
+    """No joint but those needed, no torque without f, and an orientation that stays where it was unless asked for."""
+    engine = build(scene(), "pinocchio", formulation=formulation)
+    mechanism, motion = engine._run.mechanism, engine._run.motion
+    assert (mechanism.model.njoints, mechanism.model.nv) == (joints, freedoms)
+    assert mechanism.resistance(mechanism.model.createData(), mechanism.q0, mechanism.v0) is None
+    assert not hasattr(motion, "events")
+    engine.advance(0.01)
+    np.testing.assert_array_equal(motion.q[-4:], mechanism.q0[-4:])
+    asked = build(scene("orientation"), "pinocchio", formulation=formulation)
+    asked.advance(0.01)
+    assert np.max(np.abs(asked._run.motion.q[-4:] - asked._run.mechanism.q0[-4:])) > 0.1
+
+
+def test_pinocchio_is_told_to_leave_out_what_is_asked() -> None:
+    """A setting that contradicts what is asked is refused with both."""
+    with pytest.raises(Refused, match="needs the ball's orientation, which orientation=false leaves out"):
+        build(scene("orientation"), "pinocchio[orientation=false]")
+
+
+@pytest.mark.parametrize(("f", "torque"), [(0.0, set()), (RESISTANCE, {"TorqueVector"})])
+@pytest.mark.parametrize("formulation", ["carrier", "rolling_disc", "contact"])
+def test_exudyn(formulation: str, f: float, torque: set[str]) -> None:
+    """Among Exudyn's loads there is a torque, with a user function, only where the scene has rolling resistance."""
+    system = build(scene(rolling_resistance=f), "exudyn", formulation=formulation)._model.system
+    found = [system.GetLoad(number) for number in range(system.systemData.NumberOfLoads())]
+    assert {load["loadType"] for load in found} == {"MassProportional"} | torque
+    assert sum(bool(load.get("loadVectorUserFunction")) for load in found) == (f > 0)
+
+
+def test_exudyn_in_minimal_coordinates() -> None:
+    """With unbounded friction nothing switches generic's constraints, and it has no coordinate of orientation."""
+    model = build(scene(), "exudyn[formulation=generic]")._model
+    system = model.system
+    kinds = [system.GetObject(number)["objectType"] for number in range(system.systemData.NumberOfObjects())]
+    assert kinds == ["GenericODE2", "ConnectorCoordinate", "ConnectorCoordinateVector"]
+    assert (model.friction, model.events()) == (None, [])
+    with pytest.raises(Refused, match="needs the ball's orientation, and the spin of generic is a quasi-velocity"):
+        build(scene("orientation"), "exudyn[formulation=generic]")
+
+
+@pytest.mark.parametrize("f", [0.0, RESISTANCE])
+@pytest.mark.parametrize("formulation", ["chart", "free", "facets"])
+def test_mujoco(formulation: str, f: float, monkeypatch: pytest.MonkeyPatch) -> None:
+    """Contacts have three dimensions; without f there is no torque, no memory for it and no passive callback."""
+    given: list[object] = []
+    install = mujoco.set_mjcb_passive
+    monkeypatch.setattr(mujoco, "set_mjcb_passive", lambda callback: (given.append(callback), install(callback)))
+    engine = build(scene(rolling_resistance=f), "mujoco", formulation=formulation)
+    engine.advance(0.02)
+    model, data = engine._model, engine._data
+    assert set(model.geom_condim) == {3}
+    assert np.all(model.geom_friction[:, 1:] == 0)
+    assert bool(np.any(data.xfrc_applied)) == (f > 0)
+    assert (model.nuserdata > 0) == (f > 0)
+    assert any(callback is not None for callback in given) == (f > 0 and formulation == "chart")
+
+
+@pytest.mark.parametrize(("condim", "coefficients"), [(4, [5e-3]), (6, [5e-3, 1e-4])])
+@pytest.mark.parametrize("formulation", ["chart", "free", "free,friction_damping=1.9"])
+def test_mujoco_contact_of_more_dimensions(formulation: str, condim: int, coefficients: list[float]) -> None:
+    """Friction against turning and rolling is in the contact that MuJoCo makes, is told, and ruins the motion."""
+    options = f"mujoco[formulation={formulation},condim={condim}]"
+    engine = build(scene(), options)
+    contact = engine._evaluated().contact[0]
+    assert contact.dim == condim
+    assert contact.friction[2 : 2 + len(coefficients)].tolist() == coefficients
+    assert (Capability.ROLLING_RESISTANCE in engine.built().terms) == (condim == 6)
+    run, truth = (simulate(scene(), name, until=1.0, every=0.1) for name in (options, "truth"))
+    assert run.status == "done"
+    assert float(np.max(np.abs(run.z - truth.z))) > 0.02  # of a range of 0.12 m
+
+
+@pytest.mark.parametrize(
+    ("options", "parameters", "advice"),
+    [
+        ("condim=4,cone_correction=true", {}, "cone_correction=true is made for sliding alone; set condim=3"),
+        ("formulation=free,preset=tuned,condim=6", {}, "curvature=true is made for sliding alone; set condim=3"),
+        ("condim=6", {"mu_static": 0.35}, "stick and slip could not be told apart; set condim=3"),
+        ("condim=5", {}, "input should be 3, 4 or 6"),
+    ],
+)
+def test_mujoco_dimensions_that_make_no_sense(options: str, parameters: dict[str, float], advice: str) -> None:
+    """A contact of more dimensions where it has no meaning is refused in one line."""
+    with pytest.raises(InputError) as caught:
+        build(scene(**parameters), f"mujoco[{options}]")
+    assert advice in str(caught.value)
+    assert "condim" in str(caught.value)
+    assert "\n" not in str(caught.value)
