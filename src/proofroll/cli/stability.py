@@ -43,7 +43,7 @@ def stability(
     from proofroll.report.stability_map import draw
     from proofroll.store import write_text
     from proofroll.studies.axes import chosen
-    from proofroll.studies.stability import QUICK, Effort
+    from proofroll.studies.places import QUICK, Effort
     from proofroll.studies.stability import stability as mapped
     from proofroll.studies.stability_claims import file_for
     from proofroll.studies.stability_content import content

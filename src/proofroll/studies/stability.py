@@ -13,23 +13,14 @@ from dataclasses import dataclass, field
 import numpy as np
 
 from proofroll.case import Case, EngineFacts, Result, Status
-from proofroll.errors import ProofrollError
-from proofroll.recording import time_grid
-from proofroll.runner import Runner, resolve
-from proofroll.scene import Scene
-from proofroll.scene_file import load_scene
-from proofroll.studies.axes import Axis, thinned
+from proofroll.runner import Runner
+from proofroll.studies.axes import Axis
 from proofroll.studies.bisection import Found, search
-from proofroll.studies.failure import Failure, Outcome, Yardstick, judge
-from proofroll.studies.sweep import Curve, Question, case_of, curves_of
+from proofroll.studies.failure import Failure, Outcome, judge
+from proofroll.studies.places import PER_PERIOD, Effort, Place, case_at, measure, places_of
+from proofroll.studies.sweep import Curve, curves_of
 from proofroll.trajectory import read
-from proofroll.truth.natural import natural_time
 
-# Sampling intervals per natural time; the coarsest step is one of them, the finer ones divide it.
-PER_PERIOD = 8
-# More samples than these are not kept of a long run: the interval becomes an odd number of the above, so that the
-# samples still visit all phases of an oscillation.
-_MOST_SAMPLES = 400
 # Parts into which a sampling interval is divided, about two per octave.
 _FINEST = 17
 _PARTS = [1, *(part for power in range(_FINEST) for part in (2 << power, 3 << power))]
@@ -38,54 +29,10 @@ _TOLERANCES = [10.0**-power for power in range(1, 14)]
 _STRIDE = {"dt": 4, "rtol": 3}
 # A run with an eighth-order method gets longer as this power of its tolerance.
 _PER_DECADE = 1 / 8
-# The truth is computed by two routes at the tightest tolerance, once per place.
-_TRUTH_LIMIT = 60.0
+# A single run foretells so badly that this many times the patience is allowed.
+_DOUBT = 4
 # After so many runs that met the limit of time a search goes no further: each finer one would too.
 _TIMEOUTS = 2
-
-
-@dataclass(frozen=True)
-class Effort:
-    """How much a map may cost.
-
-    Attributes:
-        periods: length of every run in natural times; an axis may say otherwise.
-        values: largest number of values per axis, or None.
-        patience: a run that is expected to take longer is too slow [s].
-        limit: one that does take longer is ended [s]; a worker's start counts.
-    """
-
-    periods: float = 3.0
-    values: int | None = None
-    patience: float = 1.0
-    limit: float = 8.0
-
-
-QUICK = Effort(values=3, patience=0.5, limit=5.0)
-
-
-@dataclass
-class Place:
-    """A value of an axis: the scene there, and the truth.
-
-    Attributes:
-        axis, value: where.
-        parameters: of the scene, those that differ from the defaults.
-        scene: with them, or None if it does not exist; then ``problem`` says why.
-        until, every: length and sampling interval of every run [s].
-        yardstick: what runs are measured by, or None if there is no scene.
-        problem: why there is no truth here.
-    """
-
-    axis: Axis
-    value: float
-    parameters: dict[str, float]
-    scene: Scene | None = None
-    period: float = 0.0
-    until: float = 0.0
-    every: float = 0.0
-    yardstick: Yardstick | None = None
-    problem: str | None = None
 
 
 @dataclass
@@ -189,58 +136,13 @@ def stability(
     effort = effort or Effort()
     tell: Progress = progress or (lambda _text, _count: None)
     curves, absent = curves_of(engines, runner.workers)
-    places = _places(scene, axes, effort)
-    _measure(scene, places, runner, tell)
+    places = places_of(scene, axes, effort)
+    measure(scene, places, runner, lambda: tell("the truth", 0))
     points = [
         MapPoint(curve, place, _ladder(curve, place)) for curve in curves for place in places if place.scene is not None
     ]
     _search(scene, points, effort, runner, tell)
     return StabilityMap(scene, list(axes), effort, places, points, absent)
-
-
-def _places(name: str, axes: Sequence[Axis], effort: Effort) -> list[Place]:
-    default = load_scene(name)
-    found = []
-    for axis in axes:
-        for value in thinned(axis.values, effort.values) if effort.values else axis.values:
-            place = Place(axis, value, axis.at(default, value))
-            found.append(place)
-            try:
-                scene = load_scene(name, **place.parameters)
-            except ProofrollError as error:
-                place.problem = str(error)
-                continue
-            place.scene, place.period = scene, natural_time(scene.rolling)
-            intervals = round(PER_PERIOD * (value if axis.horizon else effort.periods))
-            stride = 1 + 2 * (intervals // (2 * _MOST_SAMPLES))
-            place.every = stride * place.period / PER_PERIOD
-            place.until = place.every * max(1, intervals // stride)
-    return found
-
-
-def _measure(name: str, places: Sequence[Place], runner: Runner, tell: Progress) -> None:
-    """The truth of every place, or why there is none."""
-    (facts,) = resolve([("truth", {})], runner.workers)
-    if not isinstance(facts, EngineFacts):
-        raise facts
-    cases = {id(place): _case(name, place, facts, _TRUTH_LIMIT) for place in places if place.scene is not None}
-    results = runner.run(cases.values(), lambda *_: tell("the truth", 0))
-    for place in places:
-        if place.scene is None:
-            continue
-        case = cases[id(place)]
-        result = results[case.key]
-        truth = read(runner.store.trajectory(case)) if result.status == Status.DONE else None
-        if truth is None:
-            place.problem = f"there is no truth here: {result.message}"
-        times = time_grid(place.until, place.every)
-        place.yardstick = Yardstick.of(place.scene.rolling, times, truth)
-
-
-def _case(name: str, place: Place, facts: EngineFacts, limit: float) -> Case:
-    assert place.scene is not None  # the caller looked
-    question = Question(name, place.parameters, place.until, place.scene.rolling.surface.coordinates[-1])
-    return dataclasses.replace(case_of(question, place.scene, facts, place.every), time_limit=limit)
 
 
 def _ladder(curve: Curve, place: Place) -> list[float]:
@@ -270,7 +172,7 @@ def _search(name: str, points: Sequence[MapPoint], effort: Effort, runner: Runne
             else:
                 wanted.append((point, searching, asked))
         for point, _, rung in wanted:
-            point.cases[rung] = _case(name, point.place, point.facts(rung), effort.limit)
+            point.cases[rung] = case_at(name, point.place, point.facts(rung), effort.limit)
         results = runner.run([point.cases[rung] for point, _, rung in wanted], told)
         waiting = []
         for point, searching, rung in wanted:
@@ -286,7 +188,7 @@ def _search(name: str, points: Sequence[MapPoint], effort: Effort, runner: Runne
 
 
 def _too_slow(point: MapPoint, rung: int, effort: Effort) -> bool:
-    allowed = effort.patience if len(point.results) > 1 else effort.limit
+    allowed = effort.patience * (1 if len(point.results) > 1 else _DOUBT)
     return point.timeouts >= _TIMEOUTS or point.expected(rung) > allowed
 
 

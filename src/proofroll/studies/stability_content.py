@@ -7,7 +7,7 @@ from collections.abc import Callable, Mapping
 from dataclasses import asdict
 from typing import Any
 
-from proofroll.studies.failure import ACCURATE, MEANINGS, Failure, Outcome
+from proofroll.studies.failure import ACCURATE, MEANINGS, Outcome
 from proofroll.studies.numbers import explanation, numbers
 from proofroll.studies.stability import MapPoint, StabilityMap, failure_beyond
 
@@ -163,8 +163,3 @@ def silent_ranking(study: Mapping[str, Any]) -> list[dict[str, Any]]:
         return never, point["boundary"] == "stable", error if error is not None else 0.0
 
     return sorted(silent, key=badness, reverse=True)
-
-
-def failure_kinds() -> list[str]:
-    """Names of all kinds of failure."""
-    return [str(failure) for failure in Failure]

@@ -21,7 +21,8 @@ from proofroll.store import Store
 from proofroll.studies.axes import Axis, Term, chosen, thinned
 from proofroll.studies.failure import Failure
 from proofroll.studies.numbers import explanation, numbers
-from proofroll.studies.stability import Effort, stability
+from proofroll.studies.places import Effort
+from proofroll.studies.stability import stability
 from proofroll.studies.stability_claims import Claim, file_for
 from proofroll.studies.stability_content import _dependence, content
 from proofroll.studies.stability_reproducers import write_reproducers
