@@ -159,7 +159,7 @@ def test_tradeoff_and_then_recommend(proofroll: Proofroll, tmp_path: Path) -> No
     code, out, err = proofroll("tradeoff", "sphere_in_cylinder", *given)
     assert (code, err) == (0, "")
     assert all(len(line) <= 100 for line in out.splitlines())
-    assert "The Pareto front for z" in out
+    assert "The Pareto front of the engines for z" in out
     assert "order (declared)" in out
     (drawn,) = (tmp_path / "tradeoff").glob("*.svg")
     assert "exudyn generic matched" in drawn.read_text()

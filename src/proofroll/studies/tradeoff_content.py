@@ -15,6 +15,7 @@ from proofroll.plain import plain
 from proofroll.studies import installed
 from proofroll.studies.budget import Budget, budget, sentence
 from proofroll.studies.pareto import envelope, front
+from proofroll.studies.recommend import by_hand
 from proofroll.studies.sweep import BROKEN, Curve, Point
 from proofroll.studies.tradeoff import Tradeoff, judged_quantities, pareto_entries
 from proofroll.surfaces import FloatArray
@@ -70,10 +71,8 @@ def content(found: Tradeoff) -> dict[str, Any]:
         ],
         "absent": found.absent,
         "budgets": [_budget(curve, item, known.get(item.quantity, "1")) for curve, item in made],
-        "pareto": {
-            name: [numbers[point.case.key] for point in front(pareto_entries(found.curves, name, found.timings))]
-            for name in judged_quantities(found)
-        },
+        "pareto": _fronts(found.curves, numbers, found),
+        "pareto_engines": _fronts([curve for curve in found.curves if not by_hand(curve.level)], numbers, found),
         "truth": {"seconds_per_second": found.truth_seconds, "route": reference.dataset.attrs.get("route", "")},
         "over": found.over,
         "findings": findings(found, made),
@@ -85,6 +84,14 @@ def content(found: Tradeoff) -> dict[str, Any]:
         },
     }
     return dict(plain(document))
+
+
+def _fronts(curves: Sequence[Curve], numbers: dict[str, int], found: Tradeoff) -> dict[str, list[int]]:
+    """For every observable the points that nothing beats, cheapest first."""
+    return {
+        name: [numbers[point.case.key] for point in front(pareto_entries(curves, name, found.timings))]
+        for name in judged_quantities(found)
+    }
 
 
 def _envelopes(curve: Curve, quantities: Iterable[str]) -> list[dict[str, float]]:
