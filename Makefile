@@ -3,7 +3,7 @@ PYTHON ?= python3
 BIN := .venv/bin
 OUT ?= out
 
-.PHONY: install report test check format readme clean
+.PHONY: install report tradeoff test check format readme clean
 
 install: .venv/.installed
 
@@ -14,6 +14,10 @@ install: .venv/.installed
 
 report: install
 	$(BIN)/proofroll report --out $(OUT)
+
+# Error against cost of every engine; some minutes, on a machine that does nothing else.
+tradeoff: install
+	$(BIN)/proofroll tradeoff sphere_in_cylinder --out $(OUT)
 
 test: install
 	$(BIN)/python -m pytest -n 2

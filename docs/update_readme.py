@@ -1,11 +1,13 @@
-"""Regenerates the verdict table and the picture of README.md from a real run: ``make readme``."""
+"""Regenerates the tables and the pictures of README.md from real runs: ``make readme``."""
 
 from __future__ import annotations
 
 import os
 import re
+import sys
 import tempfile
 from pathlib import Path
+from typing import Any
 
 import matplotlib as mpl
 import matplotlib.pyplot as plt
@@ -13,16 +15,21 @@ import numpy as np
 
 from proofroll.comparison_file import load_comparison
 from proofroll.report.content import outcome_content
-from proofroll.report.markdown import verdict_table
+from proofroll.report.markdown import cheapest_table, verdict_table
 from proofroll.report.regime_map import draw as draw_regimes
+from proofroll.report.work_precision import draw as draw_work_precision
 from proofroll.runner import Runner
 from proofroll.store import Store
+from proofroll.studies.claims import claims_for
 from proofroll.studies.compare import Outcome, compare
 from proofroll.studies.planning import point_name
 from proofroll.studies.regimes import regime_maps
+from proofroll.studies.tradeoff import tradeoff
+from proofroll.studies.tradeoff_content import content
 from proofroll.trajectory import read
 
 ROOT = Path(__file__).resolve().parents[1]
+TOLERANCES = (1e-2, 1e-3, 1e-4, 1e-6)
 POINT = {"speed": 4.0, "rolling_resistance": 0.0}
 SHOWN = (
     "mujoco[formulation=facets,preset=default]",
@@ -67,21 +74,37 @@ def draw(outcome: Outcome, store: Store, path: Path) -> None:
     figure.savefig(path, metadata={"Date": None})
 
 
+def measured(runner: Runner) -> dict[str, Any]:
+    """The trade-off that the comparison file asks for."""
+    claims = claims_for("sphere_in_cylinder")
+    assert claims is not None  # the file is part of this repository
+    study = content(tradeoff(claims.swept, runner, over=claims.over))
+    for sentence in claims.contradictions(study):
+        sys.stderr.write(f"{sentence}\n")
+    return study
+
+
 def main() -> None:
-    """Runs the comparison and rewrites both."""
+    """Runs the studies and rewrites tables and pictures."""
     with tempfile.TemporaryDirectory() as folder:
         runner = Runner(Store(Path(folder)))
         outcome = compare(load_comparison("paper"), runner)
         draw(outcome, runner.store, ROOT / "docs" / "picture.svg")
+        study = measured(runner)
+    draw_work_precision(study, [study["quantity"]], ROOT / "docs" / "work_precision.svg")
     draw_regimes(regime_maps(load_comparison("stick_slip"), workers=os.cpu_count() or 1), ROOT / "docs" / "regimes.svg")
-    table = verdict_table(outcome_content(outcome))
     readme = ROOT / "README.md"
-    text = re.sub(
-        r"(<!-- verdicts:begin -->\n).*?(<!-- verdicts:end -->)",
-        lambda match: match[1] + table + match[2],
-        readme.read_text(encoding="utf-8"),
-        flags=re.DOTALL,
-    )
+    text = readme.read_text(encoding="utf-8")
+    for name, table in (
+        ("verdicts", verdict_table(outcome_content(outcome))),
+        ("cheapest", cheapest_table(study, TOLERANCES)),
+    ):
+        text = re.sub(
+            rf"(<!-- {name}:begin -->\n).*?(<!-- {name}:end -->)",
+            lambda match, table=table: match[1] + table + match[2],
+            text,
+            flags=re.DOTALL,
+        )
     readme.write_text(text, encoding="utf-8")
 
 

@@ -159,7 +159,7 @@ def test_tradeoff_and_then_recommend(proofroll: Proofroll, tmp_path: Path) -> No
     code, out, err = proofroll("tradeoff", "sphere_in_cylinder", *given)
     assert (code, err) == (0, "")
     assert all(len(line) <= 100 for line in out.splitlines())
-    assert "The Pareto front for z" in out
+    assert "The Pareto front of the engines for z" in out
     assert "order (declared)" in out
     (drawn,) = (tmp_path / "tradeoff").glob("*.svg")
     assert "exudyn generic matched" in drawn.read_text()
@@ -172,6 +172,27 @@ def test_tradeoff_and_then_recommend(proofroll: Proofroll, tmp_path: Path) -> No
     code, _, err = proofroll("recommend", "sphere_in_cylinder", "--tolerance", "1 %", *given[:4], *given[-2:])
     assert code == 2
     assert "no curves are stored" in err
+
+
+def test_onset_to_one_percent(proofroll: Proofroll, tmp_path: Path) -> None:
+    """The time of the first slip is a quantity too, and a percentage of it is one of the time until it."""
+    given = [
+        "sphere_in_cylinder",
+        "--set",
+        "speed=2",
+        "--set",
+        "mu_static=0.35",
+        "--until",
+        "0.4",
+        "--out",
+        str(tmp_path),
+    ]
+    given += ["--engine", ENGINE, "--quantity", "first_slip"]
+    code, out, err = proofroll("recommend", *given, "--tolerance", "1 %", "--measure", "--json")
+    assert (code, err) == (0, "")
+    answer = json.loads(out)
+    assert answer["tolerance"] == pytest.approx(0.01 * 0.2166732, rel=1e-5)  # the closed form's first slip
+    assert answer["choice"]["error"] <= 0.5 * answer["tolerance"]
 
 
 @pytest.mark.parametrize(

@@ -13,6 +13,9 @@ import pytest
 
 from proofroll.agreement import Verdict
 from proofroll.comparison_file import load_comparison
+from proofroll.registry import parse_engine
+from proofroll.report.labels import number
+from proofroll.studies.claims import claims_for
 
 ROOT = Path(__file__).resolve().parents[1]
 PROOFROLL = str(Path(sys.executable).with_name("proofroll"))
@@ -69,7 +72,7 @@ def test_an_entry_point_is_valid_toml(name: str) -> None:
         assert tomllib.loads(text)["project"]["entry-points"]["proofroll.engines"]
 
 
-@pytest.mark.parametrize("name", ["docs/picture.svg", "docs/regimes.svg"])
+@pytest.mark.parametrize("name", ["docs/picture.svg", "docs/regimes.svg", "docs/work_precision.svg"])
 def test_a_picture_is_there(name: str) -> None:
     """Every picture that the README shows is there, and is a picture."""
     assert f"]({name})" in (ROOT / "README.md").read_text(encoding="utf-8")
@@ -85,6 +88,22 @@ def test_the_verdict_table_is_whole() -> None:
     lines = table[2:]  # below the head and its rule
     assert len(lines) == len(load_comparison("paper").rows)
     assert [line for line in lines if not any(f" {verdict} |" in line for verdict in Verdict)] == []
+
+
+def test_the_table_of_the_cheapest_is_as_claimed() -> None:
+    """For every claim of tradeoff.toml the README's table has a line, which names the engine and its formulation."""
+    text = (ROOT / "README.md").read_text(encoding="utf-8")
+    table = text.partition("<!-- cheapest:begin -->\n")[2].partition("<!-- cheapest:end -->")[0].splitlines()
+    lines = {line.split("|")[1].strip(): line.split("|") for line in table[2:]}
+    claims = claims_for("sphere_in_cylinder")
+    assert claims is not None
+    assert len(lines) == 4
+    assert {number(claim.tolerance.value) + " m" for claim in claims.cheapest} == lines.keys()
+    for claim in claims.cheapest:
+        cells = lines[number(claim.tolerance.value) + " m"]
+        cell = cells[3] if claim.levels else cells[2]
+        names = [parse_engine(text) for text in claim.engine]
+        assert any(cell.strip().startswith(f"{spec.name} {spec.options['formulation']} ") for spec in names)
 
 
 @pytest.mark.parametrize("name", ["README.md", "CONTRIBUTING.md"])

@@ -49,8 +49,8 @@ def richardson(curves: Sequence[FloatArray], steps: Sequence[float], declared: i
     coarse, middle, fine = curves
     h = np.asarray(steps, dtype=np.float64) / steps[-1]
     first, last = size(middle - coarse), size(fine - middle)
-    if last == 0:
-        return Limit(fine, 0.0, float("nan"))
+    if last == 0:  # exact, or told in steps that are coarser than what the refinement changed
+        return Limit(fine, first, float("nan"))
     order = observed_order(first, last, h)
     if not np.isfinite(order) or order < _NO_CONVERGENCE:
         # The finest curve, as uncertain as the largest change seen.

@@ -90,6 +90,11 @@ def test_equal_curves() -> None:
     assert math.isnan(richardson([LIMIT, LIMIT, LIMIT + 1e-3], (4, 2, 1)).order)
 
 
+def test_a_time_told_in_whole_steps() -> None:
+    """Where the last refinement changes nothing, the limit is as uncertain as the one before changed it."""
+    assert richardson([LIMIT + 0.2, LIMIT, LIMIT], (4, 2, 1)).error_bar == pytest.approx(0.2)
+
+
 def test_tightest() -> None:
     """An adaptive method's limit is its tightest curve, as uncertain as the last tightening."""
     found = tightest([LIMIT + 1e-3, LIMIT + 1e-5, LIMIT])

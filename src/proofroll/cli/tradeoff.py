@@ -55,7 +55,7 @@ def tradeoff(
     as_json: Json = False,
 ) -> None:
     """Measure error against cost for every engine, formulation and setting, from coarse to fine."""
-    from proofroll.report.tradeoff_tables import budget_lines, budget_table, point_table
+    from proofroll.report.tradeoff_tables import budget_lines, budget_table, front_tables, point_table
     from proofroll.report.work_precision import draw
     from proofroll.studies.tradeoff import stored
 
@@ -73,12 +73,11 @@ def tradeoff(
         from proofroll.report.terminal import console
 
         terminal = console()
-        by_id = {point["id"]: point for point in study["points"]}
-        points = study["points"] if every_point else [by_id[number] for number in study["pareto"][shown[0]]]
-        title = (
-            "Every point" if every_point else f"The Pareto front for {shown[0]}: nothing is cheaper and more accurate"
-        )
-        terminal.print(point_table(study, points, shown, title))
+        if every_point:
+            terminal.print(point_table(study, study["points"], shown, "Every point"))
+        else:
+            for table in front_tables(study, shown):
+                terminal.print(table)
         terminal.print()
         terminal.print(budget_table(study, shown[0]))
         terminal.print()

@@ -51,6 +51,18 @@ def point_table(
     return table
 
 
+def front_tables(study: Mapping[str, Any], quantities: Sequence[str]) -> Iterator[Table]:
+    """The Pareto front of the engines, and that of everything where the scene's own equations are better."""
+    by_id = {point["id"]: point for point in study["points"]}
+    fronts = {key: study[key][quantities[0]] for key in ("pareto_engines", "pareto")}
+    title = f"The Pareto front of the engines for {quantities[0]}: nothing is cheaper and more accurate"
+    if fronts["pareto_engines"]:
+        yield point_table(study, [by_id[number] for number in fronts["pareto_engines"]], quantities, title)
+    if fronts["pareto"] != fronts["pareto_engines"]:
+        title = "The front with the scene's own equations, which no engine needs"
+        yield point_table(study, [by_id[number] for number in fronts["pareto"]], quantities, title)
+
+
 def budget_table(study: Mapping[str, Any], quantity: str) -> Table:
     """For every curve, what its error consists of and what dominates at either end."""
     unit = study["quantities"][quantity]["unit"]

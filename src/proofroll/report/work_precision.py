@@ -86,6 +86,7 @@ def _panel(panel: Any, study: Mapping[str, Any], quantity: str) -> None:
             alpha=0.9,
             label=" ".join(filter(None, (engine, formulation, preset))) or name,
         )
+    panel.set(xscale="log", yscale="log")
     _front(panel, study, quantity)
     bar = facts["truth_error_bar"]
     if bar:
@@ -95,8 +96,6 @@ def _panel(panel: Any, study: Mapping[str, Any], quantity: str) -> None:
         panel.plot([cost], [bar], marker="*", color="black", markersize=9, linestyle="", label="truth (its error bar)")
     unit = shown_unit(facts["unit"])
     panel.set(
-        xscale="log",
-        yscale="log",
         xlabel="cost [wall seconds per simulated second]",
         ylabel=f"largest error of {symbol(quantity)}" + (f" [{unit}]" if unit else ""),
     )
@@ -104,17 +103,26 @@ def _panel(panel: Any, study: Mapping[str, Any], quantity: str) -> None:
 
 
 def _front(panel: Any, study: Mapping[str, Any], quantity: str) -> None:
-    """The Pareto front as a staircase: what is left of it and below it nobody has."""
+    """The Pareto fronts as staircases: what is left of one and below it nobody has."""
     by_id = {point["id"]: point for point in study["points"]}
-    chosen = [by_id[number] for number in study["pareto"].get(quantity, [])]
-    if chosen:
+    floor = max(study["quantities"][quantity]["truth_error_bar"] or 0.0, _SMALLEST)
+    right = max((p["seconds_per_second"] for p in study["points"] if p["seconds_per_second"]), default=1.0)
+    for key, colour, words in (
+        ("pareto_engines", "black", "Pareto front of the engines"),
+        ("pareto", "#8f9aa3", "with the scene's own equations"),
+    ):
+        chosen = [by_id[number] for number in study[key].get(quantity, [])]
+        if not chosen:
+            continue
+        costs = [point["seconds_per_second"] for point in chosen]
+        errors = [max(point["envelope"][quantity], floor) for point in chosen]
         panel.step(
-            [point["seconds_per_second"] for point in chosen],
-            [max(point["envelope"][quantity], _SMALLEST) for point in chosen],
+            [costs[0], *costs, right],
+            [panel.get_ylim()[1], *errors, errors[-1]],
             where="post",
-            color="black",
+            color=colour,
             lw=3,
-            alpha=0.25,
+            alpha=0.3,
             zorder=0.5,
-            label="Pareto front",
+            label=words,
         )

@@ -19,9 +19,9 @@ _BY_HAND = frozenset({Level.CLOSED_FORM, Level.REDUCED, Level.PROJECTION})
 _Point = Mapping[str, Any]
 
 
-def by_hand(point: _Point) -> bool:
-    """Whether a point solves equations derived for the scene, rather than being an engine's model of it."""
-    return point["level"] in set(_BY_HAND)
+def by_hand(level: str | None) -> bool:
+    """Whether a rung of the ladder solves equations derived for the scene, and is not an engine's model of it."""
+    return level in set(_BY_HAND)
 
 
 @dataclass(frozen=True)
@@ -88,7 +88,7 @@ def recommend(study: Mapping[str, Any], wish: Wish) -> dict[str, Any]:
         other = _other(asked, choice, why_not)
         answer["runner_up"] = _told(other, wish, _holds(other, wish, absolute))
     answer["first_failure"] = _first_failure(asked, choice, wish, why_not)
-    hand = next((p for p in timed if by_hand(p) and why_not(p) is None), None)
+    hand = next((p for p in timed if by_hand(p["level"]) and why_not(p) is None), None)
     if choice is None or hand is None or hand["id"] != choice["id"]:
         answer["least_model"] = _told(hand, wish, _holds(hand, wish, absolute))
     if not affordable and wish.budget is not None:
@@ -119,7 +119,7 @@ def _asked(point: _Point, wish: Wish) -> bool:
     if wish.levels and point["level"] not in wish.levels:
         return False
     if not wish.engines:
-        return not by_hand(point) or bool(wish.levels)
+        return not by_hand(point["level"]) or bool(wish.levels)
     return any(fits(point, text) for text in wish.engines)
 
 

@@ -51,6 +51,13 @@ class Reference:
         onset = json.loads(self.dataset.attrs.get("onset", "{}"))
         return bool(onset.get("verdict") == "ill-posed")
 
+    def scale(self, name: str) -> float:
+        """Size of an observable, to which a percentage refers: for the first slip, the time until it."""
+        if name in self.sizes:
+            return self.sizes[name]
+        values = self.curves[name].values if name in OF_EVENTS and name in self.curves else np.zeros(0)
+        return float(values[0]) if values.size and values[0] > 0 else 1.0
+
     def observed(self, dataset: xr.Dataset) -> dict[str, Observable]:
         """The observables of an engine's trajectory of this scene."""
         found = observables(self.scene.rolling, dataset)

@@ -15,6 +15,7 @@ from proofroll.plain import plain
 from proofroll.studies import installed
 from proofroll.studies.budget import Budget, budget, sentence
 from proofroll.studies.pareto import envelope, front
+from proofroll.studies.recommend import by_hand
 from proofroll.studies.sweep import BROKEN, Curve, Point
 from proofroll.studies.tradeoff import Tradeoff, judged_quantities, pareto_entries
 from proofroll.surfaces import FloatArray
@@ -45,7 +46,7 @@ def content(found: Tradeoff) -> dict[str, Any]:
     quantities = {
         name: {
             "unit": known.get(name, "1"),
-            "scale": reference.sizes.get(name),
+            "scale": reference.scale(name),
             "truth_error_bar": reference.true(name, curve)[1],
         }
         for name, curve in reference.curves.items()
@@ -70,10 +71,8 @@ def content(found: Tradeoff) -> dict[str, Any]:
         ],
         "absent": found.absent,
         "budgets": [_budget(curve, item, known.get(item.quantity, "1")) for curve, item in made],
-        "pareto": {
-            name: [numbers[point.case.key] for point in front(pareto_entries(found.curves, name, found.timings))]
-            for name in judged_quantities(found)
-        },
+        "pareto": _fronts(found.curves, numbers, found),
+        "pareto_engines": _fronts([curve for curve in found.curves if not by_hand(curve.level)], numbers, found),
         "truth": {"seconds_per_second": found.truth_seconds, "route": reference.dataset.attrs.get("route", "")},
         "over": found.over,
         "findings": findings(found, made),
@@ -85,6 +84,14 @@ def content(found: Tradeoff) -> dict[str, Any]:
         },
     }
     return dict(plain(document))
+
+
+def _fronts(curves: Sequence[Curve], numbers: dict[str, int], found: Tradeoff) -> dict[str, list[int]]:
+    """For every observable the points that nothing beats, cheapest first."""
+    return {
+        name: [numbers[point.case.key] for point in front(pareto_entries(curves, name, found.timings))]
+        for name in judged_quantities(found)
+    }
 
 
 def _envelopes(curve: Curve, quantities: Iterable[str]) -> list[dict[str, float]]:
@@ -129,7 +136,7 @@ def findings(found: Tradeoff, made: Sequence[tuple[Curve, Budget]]) -> list[str]
     """What stands out, as sentences."""
     said = []
     quantity = found.question.quantity
-    scale = found.reference.sizes.get(quantity, 1.0)
+    scale = found.reference.scale(quantity)
     for curve, item in made:
         if item.quantity == quantity and item.contradicts_declaration:
             said.append(
@@ -141,6 +148,6 @@ def findings(found: Tradeoff, made: Sequence[tuple[Curve, Budget]]) -> list[str]
     ended = len(found.points) - len(done)
     said.append(
         f"{len(found.points)} runs: {ended} did not reach the end and said why; {len(broken)} reached it silently with "
-        f"{quantity} off by more than {BROKEN:.0%} of its range."
+        f"{quantity} off by more than {BROKEN * scale:.2g} {units(found.reference.scene.rolling)[quantity]}."
     )
     return said
