@@ -64,12 +64,14 @@ def test_a_snippet_of_the_readme_runs(source: str, tmp_path: Path) -> None:
 
 @pytest.mark.parametrize("name", ["README.md", "CONTRIBUTING.md"])
 def test_an_entry_point_is_valid_toml(name: str) -> None:
-    """The entry point that a document tells an engine's author to write is valid and in our group."""
+    """The entry points that a document tells an engine's author to write are valid and in our groups."""
     found = blocks(name, "toml")
     assert found
     for block in found:
         text = "\n".join(line.strip() for line in block.splitlines())
-        assert tomllib.loads(text)["project"]["entry-points"]["proofroll.engines"]
+        groups = tomllib.loads(text)["project"]["entry-points"]
+        assert groups.keys() <= {"proofroll.engines", "proofroll.bare_loops"}
+        assert all(groups.values())
 
 
 @pytest.mark.parametrize("name", ["docs/picture.svg", "docs/regimes.svg", "docs/work_precision.svg"])
