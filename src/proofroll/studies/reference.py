@@ -51,6 +51,12 @@ class Reference:
         onset = json.loads(self.dataset.attrs.get("onset", "{}"))
         return bool(onset.get("verdict") == "ill-posed")
 
+    def scale(self, name: str) -> float | None:
+        """What a percentage of an observable refers to: its size, for the first slip its time; None: nothing."""
+        if name == "first_slip" and name in self.curves:
+            return next((float(time) for time in self.curves[name].values), None)
+        return self.sizes.get(name)
+
     def observed(self, dataset: xr.Dataset) -> dict[str, Observable]:
         """The observables of an engine's trajectory of this scene."""
         found = observables(self.scene.rolling, dataset)

@@ -46,7 +46,7 @@ def content(found: Tradeoff) -> dict[str, Any]:
     quantities = {
         name: {
             "unit": known.get(name, "1"),
-            "scale": reference.sizes.get(name),
+            "scale": reference.scale(name),
             "truth_error_bar": reference.true(name, curve)[1],
         }
         for name, curve in reference.curves.items()
@@ -136,7 +136,7 @@ def findings(found: Tradeoff, made: Sequence[tuple[Curve, Budget]]) -> list[str]
     """What stands out, as sentences."""
     said = []
     quantity = found.question.quantity
-    scale = found.reference.sizes.get(quantity, 1.0)
+    scale = found.reference.scale(quantity) or 1.0
     for curve, item in made:
         if item.quantity == quantity and item.contradicts_declaration:
             said.append(
