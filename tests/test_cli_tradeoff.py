@@ -124,10 +124,12 @@ def test_a_tolerance_that_nothing_holds(proofroll: Proofroll, folder: Path) -> N
 @pytest.mark.parametrize(
     ("more", "words"),
     [
-        (["--tolerance", "soon"], "tolerance = 'soon m'"),
+        (["--tolerance", "soon"], "tolerance = 'soon'"),
+        (["--tolerance", "nan"], "positive number"),
+        (["--tolerance", "1 mN"], "the unit of this quantity is m"),
         (["--tolerance", "1e-3 N"], "the unit of this quantity is m"),
         (["--tolerance", "-1"], "positive number"),
-        (["--quantity", "speed"], "measured are gamma, z"),
+        (["--quantity", "speed"], "there is no such observable"),
         (["--engine", "pinocchio"], "measured are exudyn, mujoco"),
         (["--budget", "0"], "positive number of seconds"),
         (["--set", "speed=3.21"], "no curves are stored for this question"),
@@ -138,6 +140,25 @@ def test_a_recommendation_that_cannot_be_given(proofroll: Proofroll, folder: Pat
     code, out, err = proofroll(*asked(folder), *more)
     assert (code, out, err.count("\n")) == (2, "", 1)
     assert words in err
+
+
+@pytest.mark.parametrize("more", [["--tolerance", "soon"], ["--quantity", "colour"], ["--engine", "adams"]])
+def test_nothing_is_measured_for_a_question_that_makes_no_sense(
+    proofroll: Proofroll, tmp_path: Path, more: list[str]
+) -> None:
+    """A slip of the pen is told before the minutes that --measure takes, not after."""
+    code, out, err = proofroll(*asked(tmp_path, "--measure"), *more)
+    assert (code, out, err.count("\n")) == (2, "", 1)
+    assert not list(tmp_path.glob("**/*.nc"))
+
+
+@pytest.mark.parametrize(
+    ("tolerance", "metres"), [("1e-3", 1e-3), ("1e-3 m", 1e-3), ("1 mm", 1e-3), ("20µm", 2e-5), ("20 um", 2e-5)]
+)
+def test_a_tolerance_as_engineers_write_it(proofroll: Proofroll, folder: Path, tolerance: str, metres: float) -> None:
+    """A unit may carry a prefix of SI, with or without a space before it."""
+    _, out, _ = proofroll(*asked(folder, "--json", tolerance=tolerance))
+    assert json.loads(out)["tolerance"] == pytest.approx(metres)
 
 
 def test_curves_of_another_version_are_not_answered_from(
@@ -181,7 +202,11 @@ def test_tradeoff_and_then_recommend(proofroll: Proofroll, tmp_path: Path) -> No
         (["--quantity", "first_slip"], "--set mu_static="),
         (["--engine", "adams"], "engine = 'adams'"),
         (["--engine", "exudyn[formulation=none]"], "exudyn has generic"),
-        (["--over", "speed"], "--set = 'speed'"),
+        (["--quantity", "z", "--quantity", "colour"], "quantity = 'colour'"),
+        (["--over", "speed"], "--over = 'speed'"),
+        (["--over", "speed=2"], "parameter=low:high"),
+        (["--over", "speed=6:2"], "the lower end first"),
+        (["--over", "colour=2:6"], "colour = 2.0"),
         (["--over", "speed=fast:faster"], "parameter=low:high"),
         (["--until", "0"], "positive time"),
         (["--set", "speed=0"], "speed = '0'"),
