@@ -60,10 +60,8 @@ def recommend(study: Mapping[str, Any], wish: Wish) -> dict[str, Any]:
         raise InputError("quantity", wish.quantity, f"measured are {', '.join(known)}")
     scale = known[wish.quantity]["scale"]
     if wish.tolerance.relative and scale is None:
-        unit = known[wish.quantity]["unit"]
-        raise InputError(
-            "tolerance", f"{wish.tolerance.value:.3g}", f"{wish.quantity} has no size here; give it in {unit}"
-        )
+        advice = f"{wish.quantity} has no size here; give it in {known[wish.quantity]['unit']}"
+        raise InputError("tolerance", f"{100 * wish.tolerance.value:.3g} %", advice)
     absolute = wish.tolerance.absolute(scale or 1.0)
     timed = [p for p in study["points"] if p["seconds_per_second"] is not None and wish.quantity in p["envelope"]]
     timed.sort(key=lambda p: float(p["seconds_per_second"]))

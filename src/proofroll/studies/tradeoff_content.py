@@ -145,9 +145,10 @@ def findings(found: Tradeoff, made: Sequence[tuple[Curve, Budget]]) -> list[str]
             )
     done = [point for point in found.points if point.result.status == Status.DONE]
     broken = [point for point in done if not point.errors.get(quantity, np.inf) < BROKEN * scale]
-    ended = len(found.points) - len(done)
+    refused = sum(point.result.status == Status.REFUSED for point in found.points)
+    ended = len(found.points) - len(done) - refused
     said.append(
-        f"{len(found.points)} runs: {ended} did not reach the end and said why; {len(broken)} reached it silently with "
-        f"{quantity} off by more than {BROKEN:.0%} of its range."
+        f"{len(found.points)} runs: {refused} were refused and {ended} did not reach the end, and said why; "
+        f"{len(broken)} reached it silently with {quantity} off by more than {BROKEN:.0%} of its scale."
     )
     return said
