@@ -82,6 +82,18 @@ def test_budget_of_a_good_and_of_a_soft_model(measured: dict[str, Any]) -> None:
     assert soft["fine"] == "model form"
 
 
+def test_every_run_is_counted(measured: dict[str, Any]) -> None:
+    """Runs that were refused, that ended early and that are silently wrong are told apart."""
+    status = [point["status"] for point in measured["points"]]
+    scale = measured["quantities"]["z"]["scale"]
+    wrong = sum(p["status"] == "done" and p["error"]["z"] > 0.1 * scale for p in measured["points"])
+    refused = status.count("refused")
+    ended = len(status) - refused - status.count("done")
+    said = measured["findings"][-1]
+    assert said.startswith(f"{len(status)} runs: {refused} refused, {ended} that did not reach the end")
+    assert f"; {wrong} that reached it silently" in said
+
+
 def test_the_front_is_within_the_points(measured: dict[str, Any]) -> None:
     """Every point of the Pareto front is one of the points, and was run over the range."""
     by_id = {point["id"]: point for point in measured["points"]}

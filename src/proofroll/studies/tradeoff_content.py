@@ -148,7 +148,7 @@ def findings(found: Tradeoff, made: Sequence[tuple[Curve, Budget]]) -> list[str]
     refused = sum(point.result.status == Status.REFUSED for point in found.points)
     ended = len(found.points) - len(done) - refused
     said.append(
-        f"{len(found.points)} runs: {refused} were refused and {ended} did not reach the end, and said why; "
-        f"{len(broken)} reached it silently with {quantity} off by more than {BROKEN:.0%} of its scale."
+        f"{len(found.points)} runs: {refused} refused, {ended} that did not reach the end, all with a reason; "
+        f"{len(broken)} that reached it silently with {quantity} off by more than {BROKEN:.0%} of its scale."
     )
     return said
