@@ -110,3 +110,10 @@ def test_reference_exits_as_its_goals_are_met(proofroll: Proofroll, monkeypatch:
     code, out, _ = proofroll("reference", "--json")
     assert code == (0 if met else 1)
     assert json.loads(out) == content
+
+
+def test_bench_alone(proofroll: Proofroll) -> None:
+    """Without a command it is wrong usage, said in one line, and not the help squeezed into one."""
+    code, out, err = proofroll()
+    assert (code, out) == (2, "")
+    assert err == "proofroll: Missing command.\n"

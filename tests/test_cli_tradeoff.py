@@ -10,6 +10,7 @@ from typing import Any
 import pyperf
 import pytest
 
+from proofroll.report.work_precision import svg
 from proofroll.studies import installed
 from proofroll.studies.sweep import Question
 from proofroll.studies.tradeoff import stored
@@ -230,3 +231,13 @@ def test_a_trade_off_that_makes_no_sense(proofroll: Proofroll, tmp_path: Path, m
     assert (code, out, err.count("\n")) == (2, "", 1)
     assert words in err
     assert not list(tmp_path.glob("**/*.nc"))
+
+
+def test_the_diagram_says_what_was_run(measured: dict[str, Any]) -> None:
+    """It names scene, parameters and length, and one front where no equations of the scene's own are on another."""
+    drawn = svg(measured, ["z", "N"])
+    assert "sphere_in_cylinder, rolling_resistance = 0.0005, over 0.5 s" in drawn
+    assert "Pareto front of the engines" in drawn
+    assert "own equations" not in drawn
+    other = measured["pareto_engines"] | {"z": measured["pareto"]["z"][1:]}
+    assert "own equations" in svg(measured | {"pareto_engines": other}, ["z"])

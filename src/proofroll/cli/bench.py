@@ -8,7 +8,7 @@ import typer
 
 from proofroll.cli.common import CONTRADICTED, ENGINE, Engines, Json, progress_bar, spinner, write_json
 
-bench = typer.Typer(help="Measure speed, and what proofroll itself costs.", no_args_is_help=True, rich_markup_mode=None)
+bench = typer.Typer(help="Measure speed, and what proofroll itself costs.", rich_markup_mode=None)
 
 Rounds = Annotated[int, typer.Option("--rounds", min=2, help="Measurements of each, in turns.")]
 
