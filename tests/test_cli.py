@@ -487,7 +487,7 @@ def test_run_with_orientation(proofroll: Proofroll, tmp_path: Path) -> None:
 def test_ladder(proofroll: Proofroll, tmp_path: Path) -> None:
     """The ladder is two tables and sentences within 100 columns, or one JSON document; a missing engine exits 3."""
     arguments = ["ladder", "sphere_in_cylinder", "--engine", "laddered", "--until", "0.1", "--out", str(tmp_path)]
-    arguments += ["--rounds", "1"]
+    arguments += ["--rounds", "2"]
     code, out, err = proofroll(*arguments, "--tolerance", "1e-3")
     assert (code, err) == (0, "")
     assert max(map(len, out.splitlines())) <= 100

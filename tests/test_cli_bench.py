@@ -9,10 +9,11 @@ from collections.abc import Callable, Mapping
 import pytest
 
 from proofroll import cli
-from proofroll.cli.bench import _print_study
+from proofroll.report.bench import study_lines, study_tables
+from proofroll.report.terminal import console
 
 Proofroll = Callable[..., tuple[int, str, str]]
-QUICK = ("--rounds", "1", "--seconds", "0.005")
+QUICK = ("--rounds", "2", "--seconds", "0.005")
 INTERVAL = {"value", "low", "high"}
 
 
@@ -93,7 +94,26 @@ def test_study(proofroll: Proofroll, capfd: pytest.CaptureFixture[str]) -> None:
     assert len(found["cases"]) == 2
     assert all(case["status"] == "done" and case["spent"]["advance"] > 0 for case in found["cases"])
     assert found["first_answer"]["tiny"] > 0
-    _print_study(found)
+    for part in (*study_tables(found), *study_lines(found)):
+        console().print(part)
     table = capfd.readouterr().out
     assert "outside the engines" in " ".join(table.split())
     assert max(map(len, table.splitlines())) <= 100
+
+
+@pytest.mark.parametrize("met", [True, False])
+def test_reference_exits_as_its_goals_are_met(proofroll: Proofroll, monkeypatch: pytest.MonkeyPatch, met: bool) -> None:
+    """A goal that is not met is exit code 1, as in the other benchmarks; the document is printed all the same."""
+    ratio = {"value": 2.0, "low": 1.0, "high": 3.0, "goal": 2.0, "slow": "a", "fast": "b", "met": True}
+    content = {"ratios": {"one": ratio, "other": {**ratio, "met": met}}, "onsets_per_second": ratio}
+    monkeypatch.setattr("proofroll.bench.reference.reference", lambda *_: content)
+    code, out, _ = proofroll("reference", "--json")
+    assert code == (0 if met else 1)
+    assert json.loads(out) == content
+
+
+def test_bench_alone(proofroll: Proofroll) -> None:
+    """Without a command it is wrong usage, said in one line, and not the help squeezed into one."""
+    code, out, err = proofroll()
+    assert (code, out) == (2, "")
+    assert err == "proofroll: Missing command.\n"

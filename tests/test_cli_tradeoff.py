@@ -10,6 +10,7 @@ from typing import Any
 import pyperf
 import pytest
 
+from proofroll.report.work_precision import svg
 from proofroll.studies import installed
 from proofroll.studies.sweep import Question
 from proofroll.studies.tradeoff import stored
@@ -82,6 +83,18 @@ def test_budget_of_a_good_and_of_a_soft_model(measured: dict[str, Any]) -> None:
     assert soft["fine"] == "model form"
 
 
+def test_every_run_is_counted(measured: dict[str, Any]) -> None:
+    """Runs that were refused, that ended early and that are silently wrong are told apart."""
+    status = [point["status"] for point in measured["points"]]
+    scale = measured["quantities"]["z"]["scale"]
+    wrong = sum(p["status"] == "done" and p["error"]["z"] > 0.1 * scale for p in measured["points"])
+    refused = status.count("refused")
+    ended = len(status) - refused - status.count("done")
+    said = measured["findings"][-1]
+    assert said.startswith(f"{len(status)} runs: {refused} refused, {ended} that did not reach the end")
+    assert f"; {wrong} that reached it silently" in said
+
+
 def test_the_front_is_within_the_points(measured: dict[str, Any]) -> None:
     """Every point of the Pareto front is one of the points, and was run over the range."""
     by_id = {point["id"]: point for point in measured["points"]}
@@ -124,10 +137,12 @@ def test_a_tolerance_that_nothing_holds(proofroll: Proofroll, folder: Path) -> N
 @pytest.mark.parametrize(
     ("more", "words"),
     [
-        (["--tolerance", "soon"], "tolerance = 'soon m'"),
+        (["--tolerance", "soon"], "tolerance = 'soon'"),
+        (["--tolerance", "nan"], "positive number"),
+        (["--tolerance", "1 mN"], "the unit of this quantity is m"),
         (["--tolerance", "1e-3 N"], "the unit of this quantity is m"),
         (["--tolerance", "-1"], "positive number"),
-        (["--quantity", "speed"], "measured are gamma, z"),
+        (["--quantity", "speed"], "there is no such observable"),
         (["--engine", "pinocchio"], "measured are exudyn, mujoco"),
         (["--budget", "0"], "positive number of seconds"),
         (["--set", "speed=3.21"], "no curves are stored for this question"),
@@ -138,6 +153,25 @@ def test_a_recommendation_that_cannot_be_given(proofroll: Proofroll, folder: Pat
     code, out, err = proofroll(*asked(folder), *more)
     assert (code, out, err.count("\n")) == (2, "", 1)
     assert words in err
+
+
+@pytest.mark.parametrize("more", [["--tolerance", "soon"], ["--quantity", "colour"], ["--engine", "adams"]])
+def test_nothing_is_measured_for_a_question_that_makes_no_sense(
+    proofroll: Proofroll, tmp_path: Path, more: list[str]
+) -> None:
+    """A slip of the pen is told before the minutes that --measure takes, not after."""
+    code, out, err = proofroll(*asked(tmp_path, "--measure"), *more)
+    assert (code, out, err.count("\n")) == (2, "", 1)
+    assert not list(tmp_path.glob("**/*.nc"))
+
+
+@pytest.mark.parametrize(
+    ("tolerance", "metres"), [("1e-3", 1e-3), ("1e-3 m", 1e-3), ("1 mm", 1e-3), ("20µm", 2e-5), ("20 um", 2e-5)]
+)
+def test_a_tolerance_as_engineers_write_it(proofroll: Proofroll, folder: Path, tolerance: str, metres: float) -> None:
+    """A unit may carry a prefix of SI, with or without a space before it."""
+    _, out, _ = proofroll(*asked(folder, "--json", tolerance=tolerance))
+    assert json.loads(out)["tolerance"] == pytest.approx(metres)
 
 
 def test_curves_of_another_version_are_not_answered_from(
@@ -202,7 +236,11 @@ def test_onset_to_one_percent(proofroll: Proofroll, tmp_path: Path) -> None:
         (["--quantity", "first_slip"], "--set mu_static="),
         (["--engine", "adams"], "engine = 'adams'"),
         (["--engine", "exudyn[formulation=none]"], "exudyn has generic"),
-        (["--over", "speed"], "--set = 'speed'"),
+        (["--quantity", "z", "--quantity", "colour"], "quantity = 'colour'"),
+        (["--over", "speed"], "--over = 'speed'"),
+        (["--over", "speed=2"], "parameter=low:high"),
+        (["--over", "speed=6:2"], "the lower end first"),
+        (["--over", "colour=2:6"], "colour = 2.0"),
         (["--over", "speed=fast:faster"], "parameter=low:high"),
         (["--until", "0"], "positive time"),
         (["--set", "speed=0"], "speed = '0'"),
@@ -214,3 +252,13 @@ def test_a_trade_off_that_makes_no_sense(proofroll: Proofroll, tmp_path: Path, m
     assert (code, out, err.count("\n")) == (2, "", 1)
     assert words in err
     assert not list(tmp_path.glob("**/*.nc"))
+
+
+def test_the_diagram_says_what_was_run(measured: dict[str, Any]) -> None:
+    """It names scene, parameters and length, and one front where no equations of the scene's own are on another."""
+    drawn = svg(measured, ["z", "N"])
+    assert "sphere_in_cylinder, rolling_resistance = 0.0005, over 0.5 s" in drawn
+    assert "Pareto front of the engines" in drawn
+    assert "own equations" not in drawn
+    other = measured["pareto_engines"] | {"z": measured["pareto"]["z"][1:]}
+    assert "own equations" in svg(measured | {"pareto_engines": other}, ["z"])

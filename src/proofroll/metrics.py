@@ -10,7 +10,6 @@ from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
 import numpy as np
-from scipy.interpolate import make_interp_spline
 
 from proofroll.events import events_of
 from proofroll.mechanics import resistance_moment
@@ -143,6 +142,8 @@ def energy_balance(body: RollingBall, dataset: xr.Dataset) -> FloatArray:
     if bounded:
         power -= sum(dataset[f"F{i}"].to_numpy() * dataset[f"slip{i}"].to_numpy() for i in (2, 3))
     if np.any(power):
+        from scipy.interpolate import make_interp_spline
+
         # The power of friction has kinks where slip begins and ends, at which a smooth spline would ring.
         work = make_interp_spline(t, power, k=1 if bounded else _DEGREE).antiderivative()
         balance = balance + work(t) - work(t[0])
@@ -167,6 +168,8 @@ def force_audit(body: RollingBall, dataset: xr.Dataset) -> FloatArray:
 
 def _audited(body: RollingBall, dataset: xr.Dataset) -> FloatArray:
     """The audit of a stretch without events, shape (time - 10,)."""
+    from scipy.interpolate import make_interp_spline
+
     surface, t = body.surface, dataset["time"].to_numpy()
     u = np.stack([dataset[name].to_numpy() for name in surface.coordinates], axis=-1)
     rates = np.stack([dataset[f"{name}_rate"].to_numpy() for name in surface.coordinates], axis=-1)

@@ -37,6 +37,9 @@ class Stopwatch:
         except WorkerDied:
             self._workers.pop(name).close()
             return None
+        except BaseException:  # its answer is still to come, and would be taken for the next one's
+            self._workers.pop(name).close()
+            raise
         return float(rate) if rate is not None else None
 
     def close(self) -> None:

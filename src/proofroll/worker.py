@@ -53,8 +53,9 @@ _FOUNDATION = (
 _TIMED_SECONDS = 0.2
 _TIMED_RUNS = 3
 _ENOUGH_SECONDS = 0.3
-# A measurement builds a short case again and again, so that its clock has something to show.
-_MOST_BUILDS = 20
+# A measurement builds a short case again and again until it has run long enough to mean something, but all of it, the
+# builds included, may last no more than this many times as long.
+_MOST_BUILDING = 5.0
 
 
 def main(answers: int, parent: int) -> None:
@@ -299,14 +300,13 @@ def time_once(case: dict[str, Any], seconds: float) -> dict[str, Any]:
     scene = load_scene(wanted.scene, asks=wanted.asks, **wanted.parameters)
     times = time_grid(wanted.until, wanted.every)
     elapsed = simulated = 0.0
-    for _ in range(_MOST_BUILDS):
+    start = time.perf_counter()
+    while elapsed < seconds and time.perf_counter() - start < _MOST_BUILDING * seconds:
         try:
             wall, t = _clean_run(kind.build(scene, settings), times, seconds - elapsed)
         except (Refused, Diverged) as error:
             return {"seconds_per_second": None, "message": str(error)}
         elapsed, simulated = elapsed + wall, simulated + t
-        if elapsed >= seconds:
-            break
     return {"seconds_per_second": elapsed / simulated, "message": f"{simulated:g} s simulated"}
 
 

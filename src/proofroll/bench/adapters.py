@@ -151,6 +151,9 @@ def bench_adapters(
             except ProofrollError as error:
                 rows.append(Row(engine, "", preset, "", None, str(error)))
                 continue
+            if preset not in {found for _, found in formulations}:
+                rows.append(Row(engine, "", preset, "", None, f"no formulation has the preset {preset}"))
+                continue
             for formulation, found in formulations:
                 for variant, parameters in VARIANTS.items():
                     if progress:

@@ -94,5 +94,5 @@ def main() -> None:
         os.dup2(os.open(os.devnull, os.O_WRONLY), 1)  # what is left in the buffers would be tried again at the end
         code = USAGE
     if code == INTERRUPTED:
-        complain("interrupted; cases of a comparison that were finished are stored and will be reused")
+        complain("interrupted; cases that were finished and stored will be reused")
     sys.exit(code or OK)

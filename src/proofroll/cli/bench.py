@@ -8,15 +8,17 @@ import typer
 
 from proofroll.cli.common import CONTRADICTED, ENGINE, Engines, Json, progress_bar, spinner, write_json
 
-bench = typer.Typer(help="Measure speed, and what proofroll itself costs.", no_args_is_help=True, rich_markup_mode=None)
+bench = typer.Typer(help="Measure speed, and what proofroll itself costs.", rich_markup_mode=None)
 
-Rounds = Annotated[int, typer.Option("--rounds", min=1, help="Measurements of each, in turns.")]
+Rounds = Annotated[int, typer.Option("--rounds", min=2, help="Measurements of each, in turns.")]
 
 
 @bench.command()
 def adapters(
     engine: Engines = None,
-    preset: Annotated[str, typer.Option(help="Preset of each formulation that has it.")] = "matched",
+    preset: Annotated[
+        str, typer.Option(help="Preset of the formulations that have it; of others their first.")
+    ] = "matched",
     rounds: Rounds = 7,
     seconds: Annotated[float, typer.Option(min=1e-3, help="Least length of one measurement [s].")] = 0.1,
     as_json: Json = False,
@@ -83,11 +85,13 @@ def reference(
         content: dict[str, Any] = measured(rounds, sign.update)
     if as_json:
         write_json(content)
-        return
-    from proofroll.report.bench import reference_tables
-    from proofroll.report.terminal import console
+    else:
+        from proofroll.report.bench import reference_tables
+        from proofroll.report.terminal import console
 
-    out = console()
-    for table in reference_tables(content):
-        out.print(table)
-        out.print()
+        out = console()
+        for table in reference_tables(content):
+            out.print(table)
+            out.print()
+    if not all(item["met"] for item in (*content["ratios"].values(), content["onsets_per_second"])):
+        raise typer.Exit(CONTRADICTED)

@@ -48,15 +48,15 @@ def progress_bar(what: str, total: int | None = None) -> Iterator[Callable[..., 
         yield lambda description, count=1: progress.update(task, advance=count, description=description)
 
 
-def assignments(texts: list[str]) -> dict[str, str]:
-    """Reads ``name=value``."""
+def assignments(texts: list[str], option: str = "--set") -> dict[str, str]:
+    """Reads ``name=value``, as given to an option."""
     found: dict[str, str] = {}
     for text in texts:
         name, equals, value = text.partition("=")
         if not equals or not name:
-            raise InputError("--set", text, "write parameter=value")
+            raise InputError(option, text, "write parameter=value")
         if name in found:
-            raise InputError("--set", text, f"{name} is given twice; give it once")
+            raise InputError(option, text, f"{name} is given twice; give it once")
         found[name] = value
     return found
 

@@ -31,7 +31,7 @@ def ladder(
     tolerance: Annotated[float | None, typer.Option(help="Error of it that is allowed, in its unit.")] = None,
     until: Annotated[float, typer.Option(help="Last time [s].")] = 2.0,
     engine: Engines = None,
-    rounds: Annotated[int | None, typer.Option(min=1, help="Rounds of timing; fewer say less. By default 5.")] = None,
+    rounds: Annotated[int | None, typer.Option(min=2, help="Rounds of timing; fewer say less. By default 5.")] = None,
     out: Out = Path("out"),
     fresh: Fresh = False,
     jobs: Jobs = None,

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import re
 import sys
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
@@ -33,6 +34,8 @@ _SceneOrFile = Annotated[
 ]
 _Until = Annotated[float | None, typer.Option("--until", help="Length of every run [s].")]
 _DEFAULT_UNTIL = 2.0
+# Of SI, before the unit of a tolerance; the second µ is the Greek letter.
+_PREFIXES = {"k": 1e3, "m": 1e-3, "µ": 1e-6, "\u03bc": 1e-6, "u": 1e-6, "n": 1e-9}
 
 
 def tradeoff(
@@ -60,7 +63,8 @@ def tradeoff(
     from proofroll.studies.tradeoff import stored
 
     claims, question = _question(scene, settings, quantity, until)
-    ranges = _ranges(over) if over is not None else (claims.over if claims else {})
+    _require_observables(question, quantity or [])
+    ranges = _ranges(question, over) if over is not None else (claims.over if claims else {})
     study = _measure(question, engine or [], ranges, out, fresh=fresh, jobs=jobs)
     contradictions = claims.contradictions(study) if claims and not engine else []
     study["claims"] = {"file": claims.name if claims else None, "contradictions": contradictions}
@@ -95,7 +99,7 @@ def recommend(
     scene: _SceneOrFile,
     quantity: Annotated[str, typer.Option(help="Observable that matters.")] = "",
     tolerance: Annotated[
-        str, typer.Option(help="Largest error: 1e-3 in its unit, '1e-3 m', or '1 %' of its scale.")
+        str, typer.Option(help="Largest error: 1e-3 in its unit, '1 mm', or '1 %' of its scale.")
     ] = "",
     budget: Annotated[float | None, typer.Option(help="Wall seconds per simulated second that you can afford.")] = None,
     settings: Set = None,
@@ -109,15 +113,19 @@ def recommend(
     as_json: Json = False,
 ) -> None:
     """Name the cheapest engine, formulation and step that holds a tolerance here, and why."""
+    from proofroll.metrics import units
+    from proofroll.registry import parse_engine, require_engine
     from proofroll.report.tradeoff_tables import answer_lines
     from proofroll.studies.recommend import Wish
     from proofroll.studies.recommend import recommend as answered
 
     claims, question = _question(scene, settings, [quantity] if quantity else None, until)
+    _require_observables(question, [question.quantity])  # before minutes are spent on measuring
+    for text in engine or []:
+        require_engine(parse_engine(text).name)
+    unit = units(question.loaded().rolling)[question.quantity]
+    wish = Wish(question.quantity, _tolerance(tolerance, unit), _positive("budget", budget), tuple(engine or ()))
     study = _stored_study(question, engine or [], claims, out, jobs, measure=measure)
-    asked = quantity or study["quantity"]
-    unit = study["quantities"].get(asked, {}).get("unit", "1")
-    wish = Wish(asked, _tolerance(tolerance, unit), _positive("budget", budget), tuple(engine or ()))
     answer = answered(study, wish)
     if as_json:
         write_json(answer)
@@ -160,27 +168,53 @@ def _question(
     return None, Question(name, {key: loaded.parameters[key] for key in given}, length, quantity)
 
 
-def _ranges(texts: list[str]) -> dict[str, list[float]]:
-    """Reads ``parameter=low:high``."""
+def _require_observables(question: Question, names: list[str]) -> None:
+    """Refuses what no run of the scene can be asked for."""
+    from proofroll.metrics import units
+
+    known = units(question.loaded().rolling)
+    for name in names:
+        if name not in known:
+            raise InputError("quantity", name, f"there is no such observable; choose from {', '.join(known)}")
+
+
+def _ranges(question: Question, texts: list[str]) -> dict[str, list[float]]:
+    """Reads ``parameter=low:high``; each end must be one that the scene can have."""
+    from proofroll.scene_file import load_scene
+
     found = {}
-    for name, text in assignments(texts).items():
+    for name, text in assignments(texts, "--over").items():
         try:
-            found[name] = [float(part) for part in text.split(":")]
+            low, high = (float(part) for part in text.split(":"))
         except ValueError:
             raise InputError(f"over: {name}", text, "write parameter=low:high in SI units") from None
+        for value in (low, high):
+            load_scene(question.scene, **{**question.parameters, name: value})
+        if not low < high:
+            raise InputError(f"over: {name}", text, "write the lower end first: parameter=low:high")
+        found[name] = [low, high]
     return found
 
 
 def _tolerance(text: str, unit: str) -> Any:
+    """Reads ``1e-3``, ``1e-3 m``, ``1 mm`` or ``1 %``."""
     from proofroll.comparison import Tolerance
 
     if not text:
         raise InputError("tolerance", text, "give the largest error that you can bear, e.g. --tolerance 1e-3")
-    words = text.replace("%", " %").split()
-    tolerance = Tolerance.parse("tolerance", " ".join(words if len(words) > 1 else [*words, unit]))
-    if not tolerance.relative and tolerance.unit != unit:
-        raise InputError("tolerance", text, f"the unit of this quantity is {unit}")
-    return tolerance
+    advice = f"write a positive number in {unit}, e.g. 1e-3, or 1 % of the quantity's scale"
+    found = re.fullmatch(r"\s*([-+]?[\d.]+(?:[eE][-+]?\d+)?)\s*(\S*)\s*", text)
+    if found is None:
+        raise InputError("tolerance", text, advice)
+    number, given = found[1], found[2] or unit
+    if given not in {unit, "%"}:
+        if given[1:] != unit or given[0] not in _PREFIXES:
+            raise InputError("tolerance", text, f"the unit of this quantity is {unit}")
+        number = f"{float(number) * _PREFIXES[given[0]]:.17g}"
+    try:
+        return Tolerance.parse("tolerance", f"{number} {given if given == '%' else unit}")
+    except InputError:
+        raise InputError("tolerance", text, advice) from None
 
 
 def _positive(name: str, value: float | None) -> float | None:

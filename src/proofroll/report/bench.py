@@ -92,7 +92,7 @@ def study_lines(found: dict[str, Any]) -> Iterator[str]:
 def adapter_table(found: dict[str, Any]) -> Table:
     """One line per engine, formulation and variant of the scene."""
     table = Table(box=None, padding=(0, 1, 0, 0), title=Text("advance over bare loop"), title_justify="left")
-    for column in ("engine formulation", "variant", "ratio", "95 %"):
+    for column in ("engine formulation setting", "variant", "ratio", "95 %"):
         table.add_column(column, no_wrap=True)
     table.add_column("")
     for name, item in found["engines"].items():
@@ -100,7 +100,7 @@ def adapter_table(found: dict[str, Any]) -> Table:
             ratio = row["ratio"]
             interval = "" if ratio is None else f"{ratio['low']:.3f}–{ratio['high']:.3f}"
             table.add_row(
-                Text(f"{name} {row['formulation']}"),
+                Text(f"{name} {row['formulation']} {row['preset']}"),
                 Text(row["variant"]),
                 Text("–" if ratio is None else f"{ratio['value']:.3f}", style="" if row["within_goal"] else "yellow"),
                 Text(interval),

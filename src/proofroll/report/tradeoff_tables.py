@@ -105,7 +105,7 @@ def _order(item: Mapping[str, Any]) -> str:
     if item["order"] is None:
         return f"–{declared}"
     if item["order_low"] is None:
-        return f"{item['order']:.2f}{declared}"
+        return f"{item['order']:.2f} ±?{declared}"  # from two differences, which say nothing of their scatter
     return f"{item['order']:.2f} ±{(item['order_high'] - item['order_low']) / 2:.2f}{declared}"
 
 
@@ -142,7 +142,7 @@ def answer_lines(answer: Mapping[str, Any]) -> Iterator[str]:
 
 def _line(point: Mapping[str, Any], answer: Mapping[str, Any]) -> str:
     return (
-        f"{name_of(point)}, {step_of(point)}: error {error(point['error'])} {answer['unit']}, "
+        f"{', '.join(filter(None, (name_of(point), step_of(point))))}: error {error(point['error'])} {answer['unit']}, "
         f"cost {cost_of(point)} s/s; {point['reason']}."
     )
 

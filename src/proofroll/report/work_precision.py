@@ -52,6 +52,8 @@ def svg(study: Mapping[str, Any], quantities: Sequence[str]) -> str:
             _panel(panel, study, quantity)
         for panel in panels[len(quantities) :]:
             panel.set_visible(False)
+        at = ", ".join(f"{name} = {value:g}" for name, value in study["parameters"].items()) or "default parameters"
+        figure.suptitle(f"{study['scene']}, {at}, over {study['until']:g} s", fontsize=9)
         handles, labels = panels[0].get_legend_handles_labels()
         figure.legend(handles, labels, loc="outside right upper", frameon=False, fontsize=7)
         out = io.StringIO()
@@ -112,8 +114,8 @@ def _front(panel: Any, study: Mapping[str, Any], quantity: str) -> None:
         ("pareto", "#8f9aa3", "with the scene's own equations"),
     ):
         chosen = [by_id[number] for number in study[key].get(quantity, [])]
-        if not chosen:
-            continue
+        if not chosen or (key == "pareto" and study[key][quantity] == study["pareto_engines"].get(quantity)):
+            continue  # there are no equations of the scene's own, or none that is better
         costs = [point["seconds_per_second"] for point in chosen]
         errors = [max(point["envelope"][quantity], floor) for point in chosen]
         panel.step(

@@ -83,7 +83,8 @@ def budget(curve: Curve, quantity: str, every: float, true: FloatArray) -> Budge
     Args:
         curve: swept.
         quantity: an observable.
-        every: sampling interval of the runs that are used [s]: runs with a longer step have fewer samples.
+        every: sampling interval of the runs from which order and limit come [s]. One with a longer step has fewer
+            samples, and only the coarsest of them counts, as the coarse end.
         true: the true values.
     """
     used = [p for p in curve.points if p.case.every == every and np.isfinite(p.errors.get(quantity, np.inf))]
@@ -108,7 +109,8 @@ def budget(curve: Curve, quantity: str, every: float, true: FloatArray) -> Budge
         stalled = differences[-1] >= differences[-2]
     floor = max(differences[-2:]) if stalled else None
     model_form, bar = size(limit.values - true), _bar(used, quantity)
-    coarse, fine = _parts(limit, values, model_form, floor, bar)
+    first, departure = _coarse_end(curve, quantity, every, limit) or (used[0], values[0] - limit.values)
+    coarse, fine = (_dominant(away, limit, model_form, floor, bar) for away in (departure, values[-1] - limit.values))
     error = used[-1].errors[quantity]
     return Budget(
         quantity,
@@ -122,7 +124,7 @@ def budget(curve: Curve, quantity: str, every: float, true: FloatArray) -> Budge
         bar,
         coarse,
         TRUTH if error <= bar else fine,
-        steps[0],
+        first.step or 0.0,
         steps[-1],
         error,
     )
@@ -175,19 +177,28 @@ def _bar(points: Sequence[Point], quantity: str) -> float:
     return max((point.bars.get(quantity, 0.0) for point in points), default=0.0)
 
 
-def _parts(
-    limit: Limit, values: Sequence[FloatArray], model_form: float, floor: float | None, truth: float
-) -> tuple[str, str]:
-    """What dominates at the coarse and at the fine end."""
-    said = []
-    for curve in (values[0], values[-1]):
-        # Where the runs still approach one another, what is not known of their limit is the time step's too.
-        time_step = max(size(curve - limit.values), limit.error_bar if floor is None else 0.0)
-        parts = {TIME_STEP: time_step, TRUTH: truth, FLOOR: floor or 0.0}
-        # A limit that is no further from the truth than it is uncertain says nothing about the model.
-        parts[MODEL_FORM] = model_form if model_form > limit.error_bar + truth else 0.0
-        said.append(max(parts, key=lambda name: parts[name]))
-    return said[0], said[1]
+def _coarse_end(curve: Curve, quantity: str, every: float, limit: Limit) -> tuple[Point, FloatArray] | None:
+    """The coarsest run that reached the end, and how far it is from the limit; None if it cannot be compared.
+
+    With a step longer than the sampling interval it has only some of the limit's samples.
+    """
+    done = (p for p in curve.points if p.case.every > every and np.isfinite(p.errors.get(quantity, np.inf)))
+    point = next(done, None)
+    if point is None:
+        return None
+    stride, at_start = round(point.case.every / every), len(limit.values) > round(point.case.until / every)
+    values, common = point.curves[quantity].values, limit.values[0 if at_start else stride - 1 :: stride]
+    return (point, values - common) if values.shape == common.shape else None
+
+
+def _dominant(departure: FloatArray, limit: Limit, model_form: float, floor: float | None, truth: float) -> str:
+    """What the error of a run at some distance from the limit of small steps mostly is."""
+    # Where the runs still approach one another, what is not known of their limit is the time step's too.
+    time_step = max(size(departure), limit.error_bar if floor is None else 0.0)
+    parts = {TIME_STEP: time_step, TRUTH: truth, FLOOR: floor or 0.0}
+    # A limit that is no further from the truth than it is uncertain says nothing about the model.
+    parts[MODEL_FORM] = model_form if model_form > limit.error_bar + truth else 0.0
+    return max(parts, key=lambda name: parts[name])
 
 
 def sentence(found: Budget, unit: str, resolution: str) -> str:

@@ -53,12 +53,16 @@ def recommend(study: Mapping[str, Any], wish: Wish) -> dict[str, Any]:
     which machine and with which versions.
 
     Raises:
-        InputError: a quantity or an engine that was not measured.
+        InputError: a quantity or an engine that was not measured, or a percentage of what has no size.
     """
     known = study["quantities"]
     if wish.quantity not in known:
         raise InputError("quantity", wish.quantity, f"measured are {', '.join(known)}")
-    absolute = wish.tolerance.absolute(known[wish.quantity]["scale"] or 1.0)
+    scale = known[wish.quantity]["scale"]
+    if wish.tolerance.relative and scale is None:
+        advice = f"{wish.quantity} has no size here; give it in {known[wish.quantity]['unit']}"
+        raise InputError("tolerance", f"{100 * wish.tolerance.value:.3g} %", advice)
+    absolute = wish.tolerance.absolute(scale or 1.0)
     timed = [p for p in study["points"] if p["seconds_per_second"] is not None and wish.quantity in p["envelope"]]
     timed.sort(key=lambda p: float(p["seconds_per_second"]))
     _require_measured(study, wish)
@@ -78,7 +82,7 @@ def recommend(study: Mapping[str, Any], wish: Wish) -> dict[str, Any]:
         "margin": MARGIN,
         "budget": wish.budget,
         "affordable": affordable,
-        "choice": _told(choice, wish, _holds(choice, wish, absolute)),
+        "choice": _told(choice, wish, _holds(study, choice, wish, absolute)),
         "runner_up": None,
         "first_failure": None,
         "least_model": None,
@@ -86,11 +90,11 @@ def recommend(study: Mapping[str, Any], wish: Wish) -> dict[str, Any]:
     }
     if choice is not None:
         other = _other(asked, choice, why_not)
-        answer["runner_up"] = _told(other, wish, _holds(other, wish, absolute))
+        answer["runner_up"] = _told(other, wish, _holds(study, other, wish, absolute))
     answer["first_failure"] = _first_failure(asked, choice, wish, why_not)
     hand = next((p for p in timed if by_hand(p["level"]) and why_not(p) is None), None)
     if choice is None or hand is None or hand["id"] != choice["id"]:
-        answer["least_model"] = _told(hand, wish, _holds(hand, wish, absolute))
+        answer["least_model"] = _told(hand, wish, _holds(study, hand, wish, absolute))
     if not affordable and wish.budget is not None:
         within = [p for p in asked if p["seconds_per_second"] <= wish.budget]
         best = min(within, key=lambda p: _error(p, wish.quantity), default=None)
@@ -157,6 +161,9 @@ def _why_not_here(study: Mapping[str, Any], point: _Point, name: str, absolute: 
         return f"its error of {error:.2g} {unit} is luck: finer steps of the same model are off by {held:.2g} {unit}"
     if held * MARGIN > absolute:
         return f"{name} is off by {held:.2g} {unit}, which leaves less than a factor of {MARGIN:g} to the tolerance"
+    bar = study["quantities"][name]["truth_error_bar"] or 0.0
+    if bar * MARGIN > absolute:
+        return f"the truth itself is known only to {bar:.2g} {unit}, so nothing can be seen to hold it"
     return None
 
 
@@ -186,13 +193,14 @@ def _blame(study: Mapping[str, Any], point: _Point, quantity: str, absolute: flo
     return "the step is too coarse"
 
 
-def _holds(point: _Point | None, wish: Wish, absolute: float) -> str:
+def _holds(study: Mapping[str, Any], point: _Point | None, wish: Wish, absolute: float) -> str:
     if point is None:
         return ""
-    held = point["envelope"][wish.quantity]
-    if not held:
+    held, bar = point["envelope"][wish.quantity], study["quantities"][wish.quantity]["truth_error_bar"] or 0.0
+    if not max(held, bar):
         return "no error is seen"
-    said = f"{absolute / held:.3g} times better than asked"
+    # Of an error below the truth's error bar no more is known than that.
+    said = f"{'at least ' if held < bar else ''}{absolute / max(held, bar):.3g} times better than asked"
     if point["corners"]:
         key = "relative" if wish.tolerance.relative else "errors"
         worst = max(corner[key][wish.quantity] for corner in point["corners"])

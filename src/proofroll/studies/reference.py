@@ -51,12 +51,11 @@ class Reference:
         onset = json.loads(self.dataset.attrs.get("onset", "{}"))
         return bool(onset.get("verdict") == "ill-posed")
 
-    def scale(self, name: str) -> float:
-        """Size of an observable, to which a percentage refers: for the first slip, the time until it."""
-        if name in self.sizes:
-            return self.sizes[name]
-        values = self.curves[name].values if name in OF_EVENTS and name in self.curves else np.zeros(0)
-        return float(values[0]) if values.size and values[0] > 0 else 1.0
+    def scale(self, name: str) -> float | None:
+        """What a percentage of an observable refers to: its size, for the first slip its time; None: nothing."""
+        if name == "first_slip" and name in self.curves:
+            return next((float(time) for time in self.curves[name].values), None)
+        return self.sizes.get(name)
 
     def observed(self, dataset: xr.Dataset) -> dict[str, Observable]:
         """The observables of an engine's trajectory of this scene."""

@@ -195,7 +195,7 @@ def _further(question: Question, curve: Curve, references: Mapping[float, Refere
     if not curve.fixed_step or not curve.points:
         return []
     found = []
-    scale = references[question.every].scale(question.quantity)
+    scale = references[question.every].scale(question.quantity) or 1.0
     coarsest, finest = curve.points[0], curve.points[-1]
     coarser = next((f for f in _COARSER if question.every * f not in asked), None)
     if coarser is not None and coarsest.errors.get(question.quantity, np.inf) < BROKEN * scale:

@@ -188,7 +188,7 @@ def _checked(found: Tradeoff, runner: Runner, told: Callable[[Case, Result], Non
 
 def _corner(place: dict[str, float], point: Point, reference: Reference, runner: Runner) -> Corner:
     errors = judged(point, reference, runner).errors
-    relative = {name: error / reference.scale(name) for name, error in errors.items()}
+    relative = {name: error / (reference.scale(name) or 1.0) for name, error in errors.items()}
     return Corner(place, errors, relative, point.result.message)
 
 

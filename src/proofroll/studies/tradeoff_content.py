@@ -136,7 +136,7 @@ def findings(found: Tradeoff, made: Sequence[tuple[Curve, Budget]]) -> list[str]
     """What stands out, as sentences."""
     said = []
     quantity = found.question.quantity
-    scale = found.reference.scale(quantity)
+    scale, unit = found.reference.scale(quantity) or 1.0, units(found.reference.scene.rolling)[quantity]
     for curve, item in made:
         if item.quantity == quantity and item.contradicts_declaration:
             said.append(
@@ -145,9 +145,10 @@ def findings(found: Tradeoff, made: Sequence[tuple[Curve, Budget]]) -> list[str]
             )
     done = [point for point in found.points if point.result.status == Status.DONE]
     broken = [point for point in done if not point.errors.get(quantity, np.inf) < BROKEN * scale]
-    ended = len(found.points) - len(done)
+    refused = sum(point.result.status == Status.REFUSED for point in found.points)
+    ended = len(found.points) - len(done) - refused
     said.append(
-        f"{len(found.points)} runs: {ended} did not reach the end and said why; {len(broken)} reached it silently with "
-        f"{quantity} off by more than {BROKEN * scale:.2g} {units(found.reference.scene.rolling)[quantity]}."
+        f"{len(found.points)} runs: {refused} refused, {ended} that did not reach the end, all with a reason; "
+        f"{len(broken)} that reached it silently with {quantity} off by more than {BROKEN * scale:.2g} {unit}."
     )
     return said

@@ -37,6 +37,14 @@ def test_an_engine_that_cannot_be_loaded(install_engines: Callable[[Mapping[str,
     assert "no_such_module" in row.message
 
 
+def test_a_preset_that_no_formulation_has(install_engines: Callable[[Mapping[str, str]], None]) -> None:
+    """It is said, and nothing else is measured in its place."""
+    install_engines({"tiny": "tiny:Tiny"})
+    (row,) = bench_adapters(["tiny"], preset="tuned", rounds=2, seconds=0.01)
+    assert row.ratio is None
+    assert row.message == "no formulation has the preset tuned"
+
+
 def measured(monkeypatch: pytest.MonkeyPatch, centre: Callable[[np.ndarray[Any, Any]], Any]) -> dict[str, Any]:
     """What is measured of the projection method with a bare loop that gives this centre."""
     monkeypatch.setattr(

@@ -58,6 +58,29 @@ def test_model_form_is_what_small_steps_leave() -> None:
     assert made(order=1, model=3e-3).coarse == TIME_STEP
 
 
+@pytest.mark.parametrize("start", [0, 1])
+def test_the_coarse_end_is_that_of_the_whole_curve(start: int) -> None:
+    """A step longer than the sampling interval counts at its own samples, with a sample at time 0 or without.
+
+    The time step dominates there, although the model does from the sampling interval on.
+    """
+    curve = Curve("made", EngineFacts("made", "1", "0", {"dt": 0.1}, "dt", 2), None)
+    for step in (0.4, *STEPS):
+        every = max(step, 0.05)
+        stride = round(every / 0.05)
+        t = T[::stride][start:]
+        values = np.sin(3 * t) + step**2 * np.cos(t) + 3e-3 * t
+        own = EngineFacts("made", "1", "0", {"dt": step}, "dt", 2)
+        observed = {"z": Observable("z", "m", values)}
+        error = float(np.max(np.abs(values - np.sin(3 * t))))
+        case = Case("scene", {}, "0", own, 2.0, every)
+        curve.points.append(Point(case, Result(Status.DONE, "done"), observed, {"z": error}, {"z": 1e-13}))
+    found = budget(curve, "z", 0.05, TRUE[start:])
+    assert (found.coarse_step, found.coarse, found.fine) == (0.4, TIME_STEP, MODEL_FORM)
+    curve.points[0].curves["z"] = Observable("z", "m", curve.points[0].curves["z"].values[:-1])
+    assert budget(curve, "z", 0.05, TRUE[start:]).coarse_step == STEPS[0]
+
+
 def test_no_model_form_where_there_is_none() -> None:
     """Without such an error what is left is below its own uncertainty, and the sentence says so."""
     found = made(order=2)

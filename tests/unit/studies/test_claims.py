@@ -62,7 +62,7 @@ def measured(cost_of_fast: float) -> dict[str, Any]:
         "scene": "sphere_in_cylinder",
         "parameters": {},
         "until": 1.0,
-        "quantities": {"z": {"unit": "m", "scale": 0.1}},
+        "quantities": {"z": {"unit": "m", "scale": 0.1, "truth_error_bar": 1e-13}},
         "points": points,
         "budgets": [],
         "over": {},

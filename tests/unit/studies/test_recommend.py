@@ -81,6 +81,24 @@ def test_a_percentage_is_of_the_scale() -> None:
     assert recommend(study(FAST, MIDDLE), wish(0.01, relative=True))["tolerance"] == pytest.approx(1e-3)
 
 
+def test_a_percentage_of_what_has_no_size() -> None:
+    """Where a quantity has no size, as the first slip of a ball that does not slip, a percentage of it is refused."""
+    sizeless = {"z": {"unit": "m", "scale": None, "truth_error_bar": 1e-13}}
+    with pytest.raises(InputError, match="z has no size here; give it in m"):
+        recommend(study(FAST, MIDDLE, quantities=sizeless), wish(0.01, relative=True))
+    assert recommend(study(FAST, MIDDLE, quantities=sizeless), wish(1e-3))["choice"]["engine"] == "middle"
+
+
+def test_no_error_is_seen_below_the_truths_own() -> None:
+    """Nothing holds a tolerance that the truth does not resolve, not even a run that shows no error at all."""
+    exact = point(4, "exact", 1e-2, 0.0)
+    assert recommend(study(exact), wish(1.9e-13))["choice"] is None
+    assert (
+        "the truth itself is known only to 1e-13 m" in recommend(study(exact), wish(1.9e-13))["first_failure"]["reason"]
+    )
+    assert recommend(study(exact), wish(1e-12))["choice"]["reason"].startswith("at least 10 times better")
+
+
 def test_luck_is_not_believed() -> None:
     """A coarse run with a small error does not pass while finer runs of the same curve are worse."""
     lucky = point(1, "fast", 1e-3, 1e-6, envelope={"z": 1e-2})
