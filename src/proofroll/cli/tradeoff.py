@@ -112,7 +112,11 @@ def recommend(
     jobs: Jobs = None,
     as_json: Json = False,
 ) -> None:
-    """Name the cheapest engine, formulation and step that holds a tolerance here, and why."""
+    """Name the cheapest engine, formulation and step that holds a tolerance here, and why.
+
+    It chooses among models of engines; solutions of the scene's own equations (closed form, reduced, projection) are
+    told apart, unless --engine asks for them. Of the cheaper ones, which all fail, the most accurate is shown.
+    """
     from proofroll.metrics import units
     from proofroll.registry import parse_engine, require_engine
     from proofroll.report.tradeoff_tables import answer_lines

@@ -7,21 +7,21 @@ from typing import TypeVar
 
 _Item = TypeVar("_Item")
 
+# How many finer runs must not be worse: one alone may cancel by chance too.
+_NEIGHBOURS = 2
+
 
 def envelope(errors: Sequence[float]) -> list[float]:
-    """The largest error of each run and of all finer ones that have a result; coarse first.
+    """The largest error of each run and of the next finer ones that have a result; coarse first.
 
-    A coarse run whose error happens to cancel is not believed while finer runs are worse.
+    A coarse run whose error happens to cancel is not believed while its finer neighbours are worse. Only neighbours
+    count: that round-off grows again at steps a hundred times smaller says nothing about this one.
     """
-    held: list[float] = []
-    worst = 0.0
-    for error in reversed(errors):
-        if error != float("inf"):
-            worst = max(worst, error)
-            held.append(worst)
-        else:
-            held.append(error)
-    return held[::-1]
+    held = []
+    for index, error in enumerate(errors):
+        finer = [other for other in errors[index + 1 :] if other != float("inf")][:_NEIGHBOURS]
+        held.append(max([error, *finer]))
+    return held
 
 
 def front(entries: Iterable[tuple[_Item, float, float]]) -> list[_Item]:
