@@ -69,18 +69,18 @@ class Euler(Closed):
         o1, o2, o3 = p1 * u + q1 * v, p2 * u + q2 * v, p3 * u + q3 * v
         v2, v3 = self.t2u * u + self.t2v * v, self.t3u * u + self.t3v * v
         N = m * (g1 - (a1 * uu + b1 * uv + c1 * vv))
-        # The axis of φ is n; that of θ is (cos ψ, sin ψ, 0), that of ψ is vertical. Along e2 and e3 they are:
-        nx, ny = sin * sin_psi, -sin * cos_psi
-        phi2, phi3 = x2 * nx + y2 * ny + z2 * cos, x3 * nx + y3 * ny + z3 * cos
+        # The axis of θ is (cos ψ, sin ψ, 0), across it lies (sin ψ, -cos ψ, 0), and in the plane of that and of the
+        # vertical, the axis of ψ, lies the axis of φ. Along e2 and e3 they are:
         theta2, theta3 = x2 * cos_psi + y2 * sin_psi, x3 * cos_psi + y3 * sin_psi
-        w1 = phi * (x1 * nx + y1 * ny + z1 * cos) + theta * (x1 * cos_psi + y1 * sin_psi) + psi * z1
+        k2, k3 = x2 * sin_psi - y2 * cos_psi, x3 * sin_psi - y3 * cos_psi
+        phi2, phi3 = sin * k2 + cos * z2, sin * k3 + cos * z3
+        w1 = phi * (sin * (x1 * sin_psi - y1 * cos_psi) + cos * z1) + theta * (x1 * cos_psi + y1 * sin_psi) + psi * z1
         w2, w3 = phi * phi2 + theta * theta2 + psi * z2, phi * phi3 + theta * theta3 + psi * z3
-        # Ȧ r in the world: see EulerAngles. Along the axes of the angles it is (-θ̇ψ̇, φ̇ψ̇, -φ̇θ̇) sin θ, d̄ of the paper.
+        # Ȧ r: ``turned`` along the axis of θ, ``across`` it, and -``down`` along the vertical; see EulerAngles. Along
+        # the axes of the angles it is (-θ̇ψ̇, φ̇ψ̇, -φ̇θ̇) sin θ, d̄ of the paper.
         tilted, turned, node = phi * theta, phi * psi * sin, theta * psi
-        rx = tilted * cos * sin_psi + turned * cos_psi - node * sin_psi
-        ry = -tilted * cos * cos_psi + turned * sin_psi + node * cos_psi
-        rz = -tilted * sin
-        h_phi, h_theta, h_psi = node * sin, -turned, tilted * sin  # Aᵀ M_C / J - d̄ / J
+        across, down = tilted * cos - node, tilted * sin
+        h_phi, h_theta, h_psi = node * sin, -turned, down  # Aᵀ M_C / J - d̄ / J
         if self.f:
             M2, M3 = self.moment(N, v2, v3)
             M2, M3 = M2 / J, M3 / J
@@ -88,8 +88,8 @@ class Euler(Closed):
             h_theta += theta2 * M2 + theta3 * M3
             h_psi += z2 * M2 + z3 * M3
         p2, p3 = g2 - d2, g3 - d3
-        slip2 = d2 + o1 * v3 + a * (x3 * rx + y3 * ry + z3 * rz - (o1 * w2 - o2 * w1))
-        slip3 = d3 - o1 * v2 - a * (x2 * rx + y2 * ry + z2 * rz - (o3 * w1 - o1 * w3))
+        slip2 = d2 + o1 * v3 + a * (turned * theta3 + across * k3 - down * z3 - (o1 * w2 - o2 * w1))
+        slip3 = d3 - o1 * v2 - a * (turned * theta2 + across * k2 - down * z2 - (o3 * w1 - o1 * w3))
         # M̄⁻¹ h, the rate of slip that it leaves, and the friction that takes this away.
         scale = 1.0 / (sin * sin)
         b_phi, b_psi = scale * (h_phi - cos * h_psi), scale * (h_psi - cos * h_phi)
@@ -148,8 +148,8 @@ class Euler(Closed):
         state = x.tolist()
         _, _, _, _, _, u, v, phi, theta, psi = state
         (_, _, _, x2, y2, z2, x3, y3, z3), _, sin, cos, sin_psi, cos_psi = self._view(state)
-        nx, ny = sin * sin_psi, -sin * cos_psi
-        phi2, phi3 = x2 * nx + y2 * ny + z2 * cos, x3 * nx + y3 * ny + z3 * cos
+        phi2 = sin * (x2 * sin_psi - y2 * cos_psi) + cos * z2
+        phi3 = sin * (x3 * sin_psi - y3 * cos_psi) + cos * z3
         theta2, theta3 = x2 * cos_psi + y2 * sin_psi, x3 * cos_psi + y3 * sin_psi
         slip2 = self.t2u * u + self.t2v * v + self.a * (phi * phi3 + theta * theta3 + psi * z3)
         slip3 = self.t3u * u + self.t3v * v - self.a * (phi * phi2 + theta * theta2 + psi * z2)
