@@ -9,7 +9,15 @@ import numpy as np
 import pinocchio as pin
 
 from proofroll.engines.pinocchio.mechanism import Mechanism, Sliding
-from proofroll.engines.pinocchio.rows import BallTerms, ball_terms, cross, resistance, rolling_rows
+from proofroll.engines.pinocchio.rows import (
+    BallTerms,
+    ball_terms,
+    cross,
+    own_terms,
+    resistance,
+    rolling_directions,
+    rolling_rows,
+)
 from proofroll.errors import Refused
 from proofroll.scene import RollingBall
 from proofroll.surfaces import FloatArray, Generator
@@ -21,6 +29,9 @@ class Composite(Mechanism):
     Coordinates are (u1, u2, orientation of the ball in the carriage), velocities (u̇1, u̇2, spin relative to the
     carriage in the ball's axes). Two rows remain, those of rolling. The normal force is what the spherical joint
     transmits.
+
+    Where the orientation is not integrated, the ball's axes stay the carriage's, which are e1, e2, e3: everything is
+    taken from Pinocchio along these, and the directions of rolling are constant.
     """
 
     def __init__(self, body: RollingBall, orientation: bool) -> None:
@@ -33,6 +44,8 @@ class Composite(Mechanism):
         if generators is None:
             raise Refused("composite joints need a surface that slides along itself; use formulation=free_flyer")
         super().__init__(body)
+        self._orientation = orientation
+        self._along_axes = rolling_directions(self._radius, np.eye(3).ravel().tolist())
         self._frame0 = body.surface.frame(np.zeros(2))
         self._carriage = 0
         for name, generator in zip(body.surface.coordinates, generators, strict=True):
@@ -59,22 +72,46 @@ class Composite(Mechanism):
         e1_rate = cross(turning.tolist(), frame[:, 0].tolist())
         return terms, frame, *rolling_rows(terms, self._radius, frame.T.ravel().tolist(), e1_rate)
 
+    def _own_rows(self, data: Any, q: FloatArray, v: FloatArray) -> tuple[FloatArray, FloatArray, FloatArray]:
+        """Rows and drift of rolling, and the ball's Jacobian, all along e1, e2, e3, which are the ball's axes."""
+        jacobian, bias = own_terms(self.model, data, self.ball, q, v, self._rest)
+        directions = self._along_axes
+        drift = directions.dot(bias)
+        # a ω × ė1 with ė1 = Ω × e1. The spin relative to the carriage is what ω has more than the carriage's Ω.
+        w1, w2, w3 = data.v[self.ball].angular.tolist()
+        _, _, _, spin2, spin3 = v.tolist()
+        drift[0] += self._radius * w1 * (w2 - spin2)
+        drift[1] += self._radius * w1 * (w3 - spin3)
+        return directions.dot(jacobian), drift, jacobian
+
+    def _only_rows(self, data: Any, q: FloatArray, v: FloatArray) -> FloatArray:
+        return (self._rows(data, q, v)[2]) if self._orientation else self._own_rows(data, q, v)[0]
+
     def _transmitted(self, data: Any, e1: FloatArray) -> float:
         """N [N] from the wrench in the spherical joint that the last pass of Pinocchio left in ``data``."""
         return -float(e1.dot(data.oMi[self.ball].rotation.dot(data.f[self.ball].linear)))
 
-    def respond(self, data: Any, q: FloatArray, v: FloatArray) -> tuple[FloatArray, FloatArray]:
-        """Joint acceleration, and F2, F3 [N]."""
-        terms, frame, rows, drift = self._rows(data, q, v)
+    def accelerate(self, data: Any, q: FloatArray, v: FloatArray) -> FloatArray:
+        """See :class:`~proofroll.engines.pinocchio.mechanism.Mechanism`; the multipliers are F2, F3."""
         torque = self._rest
-        if self._f:
-            # The joints cannot accelerate the ball along e1, so N follows from the bias pass alone.
-            torque = resistance(terms, self._f, frame[:, 0]) * self._transmitted(data, frame[:, 0])
-        acceleration = pin.forwardDynamics(self.model, data, torque, rows, drift)
-        return np.array(acceleration), np.array(data.lambda_c)
+        # The joints cannot accelerate the ball along e1, so N follows from the bias pass alone.
+        if self._orientation:
+            terms, frame, rows, drift = self._rows(data, q, v)
+            if self._f:
+                torque = resistance(terms, self._f, frame[:, 0]) * self._transmitted(data, frame[:, 0])
+        else:
+            rows, drift, jacobian = self._own_rows(data, q, v)
+            if self._f:
+                _, v2, v3 = data.v[self.ball].linear.tolist()
+                speed = math.hypot(v2, v3)
+                lever = self._f * self.normal_force(data) / speed if speed else 0.0
+                torque = jacobian[3:].T.dot(np.array([0.0, -lever * v3, lever * v2]))
+        return pin.forwardDynamics(self.model, data, torque, rows, drift)  # type: ignore[no-any-return]  # it is an array
 
     def normal_force(self, data: Any) -> float:
         """See :class:`~proofroll.engines.pinocchio.mechanism.Mechanism`; forwardDynamics leaves the bias pass alone."""
+        if not self._orientation:
+            return -float(data.f[self.ball].linear[0])
         return self._transmitted(data, data.oMi[self._carriage].rotation.dot(self._frame0[:, 0]))
 
     def reaction(self, data: Any, q: FloatArray, v: FloatArray) -> tuple[FloatArray, FloatArray]:
@@ -83,11 +120,6 @@ class Composite(Mechanism):
         frame = data.oMi[self._carriage].rotation @ self._frame0
         pin.rnea(self.model, data, q, v, acceleration)
         return acceleration, frame @ np.array([-self._transmitted(data, frame[:, 0]), *friction])
-
-    def needed(self, data: Any, q: FloatArray, v: FloatArray) -> tuple[float, float]:
-        """See :class:`~proofroll.engines.pinocchio.mechanism.Mechanism`."""
-        friction = self.respond(data, q, v)[1]
-        return math.hypot(*friction), self.normal_force(data)
 
     def slide(self, data: Any, q: FloatArray, v: FloatArray, direction: FloatArray) -> Sliding:
         """See :class:`~proofroll.engines.pinocchio.mechanism.Mechanism`; the friction is put to the joints."""

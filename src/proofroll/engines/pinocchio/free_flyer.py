@@ -9,7 +9,7 @@ import numpy as np
 import pinocchio as pin
 
 from proofroll.engines.pinocchio.mechanism import Mechanism, Sliding
-from proofroll.engines.pinocchio.rows import BallTerms, ball_terms, resistance, rolling_rows
+from proofroll.engines.pinocchio.rows import BallTerms, ball_terms, own_terms, resistance, rolling_rows
 from proofroll.scene import RollingBall
 from proofroll.surfaces import FloatArray
 
@@ -18,7 +18,7 @@ class FreeFlyer(Mechanism):
     """Six freedoms; the rows come from the signed distance to the surface and its derivatives.
 
     Velocities are those of the free-flyer joint, in the ball's own axes. The multipliers are the components of the
-    wall's force along e1, e2 and e3.
+    wall's force along e1, e2 and e3. Where the orientation is not integrated, the ball's axes stay the world's.
     """
 
     def __init__(self, body: RollingBall, orientation: bool) -> None:
@@ -26,6 +26,7 @@ class FreeFlyer(Mechanism):
         super().__init__(body)
         self._surface = body.surface
         self._orientation = orientation
+        self._matrix = np.zeros((9, 9))
         self._add_ball(body, 0, pin.JointModelFreeFlyer(), pin.SE3.Identity())
         self.q0 = np.concatenate([body.p0, [0.0, 0.0, 0.0, 1.0]])
         self.v0 = np.concatenate([body.v0, body.w0])
@@ -46,31 +47,62 @@ class FreeFlyer(Mechanism):
         drift[0], drift[1:] = e1.dot(terms.bias[:3]) + bend, slip_drift
         return terms, frame, rows, drift
 
-    def _solve(self, data: Any, q: FloatArray, v: FloatArray) -> tuple[FloatArray, FloatArray, FloatArray]:
-        """Joint acceleration, multipliers (-N, F2, F3) [N], and the local frame."""
-        terms, frame, rows, drift = self._rows(data, q, v)
+    def _own_rows(self, data: Any, q: FloatArray, v: FloatArray) -> tuple[FloatArray, FloatArray, FloatArray]:
+        """Rows, drift, and the rolling resistance per unit of N on the joint, where its axes are the world's."""
+        jacobian, bias = own_terms(self.model, data, self.ball, q, v, self._rest)
+        place, (vx, vy, vz, wx, wy, wz), a = q[:3].tolist(), v.tolist(), self._radius
+        x1, y1, z1, x2, y2, z2, x3, y3, z3 = self._surface.triad(*place)
+        x, y, z = self._surface.normal_rate(place, (vx, vy, vz))
+        # A list of numbers, not of lists, for numpy needs half the time for that.
+        directions = np.array(
+            (x1, y1, z1, 0.0, 0.0, 0.0, x2, y2, z2, a * x3, a * y3, a * z3, x3, y3, z3, -a * x2, -a * y2, -a * z2)
+        ).reshape(3, 6)
+        drift = directions.dot(bias)
+        tx, ty, tz = wy * z - wz * y, wz * x - wx * z, wx * y - wy * x  # ω × ė1
+        drift[0] += x * vx + y * vy + z * vz
+        drift[1] += a * (x2 * tx + y2 * ty + z2 * tz)
+        drift[2] += a * (x3 * tx + y3 * ty + z3 * tz)
+        lever = self._rest
+        if self._f:
+            speed = math.sqrt(vx * vx + vy * vy + vz * vz)
+            f = self._f / speed if speed else 0.0
+            moment = np.array([f * (y1 * vz - z1 * vy), f * (z1 * vx - x1 * vz), f * (x1 * vy - y1 * vx)])
+            lever = jacobian[3:].T.dot(moment)
+        return directions.dot(jacobian), drift, lever
+
+    def _only_rows(self, data: Any, q: FloatArray, v: FloatArray) -> FloatArray:
+        return (self._rows(data, q, v)[2]) if self._orientation else self._own_rows(data, q, v)[0]
+
+    def _solve(self, data: Any, rows: FloatArray, drift: FloatArray, lever: FloatArray) -> FloatArray:
+        """Joint acceleration; the multipliers (-N, F2, F3) [N] are left in ``data``.
+
+        Rolling resistance is proportional to N, an unknown here: it makes the columns differ from the rows, which
+        forwardDynamics does not allow.
+        """
         if not self._f:
-            acceleration = pin.forwardDynamics(self.model, data, self._rest, rows, drift)
-            return np.array(acceleration), np.array(data.lambda_c), frame
-        # Rolling resistance is proportional to N, an unknown here: it makes the columns differ from the rows, which
-        # forwardDynamics does not allow.
-        columns = rows.T.copy()
-        columns[:, 0] -= resistance(terms, self._f, frame[:, 0])
-        matrix = np.zeros((9, 9))
-        matrix[:6, :6] = data.M
-        matrix[:6, 6:] = -columns
-        matrix[6:, :6] = rows
+            return pin.forwardDynamics(self.model, data, self._rest, rows, drift)  # type: ignore[no-any-return]  # it is an array
+        matrix = self._matrix
+        matrix[:6, :6], matrix[6:, :6], matrix[:6, 6:] = data.M, rows, -rows.T
+        matrix[:6, 6] += lever
         solution = np.linalg.solve(matrix, np.concatenate([-data.nle, -drift]))
         data.lambda_c = solution[6:]  # where forwardDynamics leaves them
-        return solution[:6], solution[6:], frame
+        return solution[:6]
 
-    def respond(self, data: Any, q: FloatArray, v: FloatArray) -> tuple[FloatArray, FloatArray]:
-        """Joint acceleration, and -N, F2, F3 [N]; without orientation the acceleration is that of world components."""
-        acceleration, multipliers, _ = self._solve(data, q, v)
-        if not self._orientation:
-            # The joint accelerates in the ball's axes, which turn with ω; axes that are held fixed do not.
-            acceleration[:3] += pin.skew(v[3:]) @ v[:3]
-        return acceleration, multipliers
+    def accelerate(self, data: Any, q: FloatArray, v: FloatArray) -> FloatArray:
+        """See :class:`~proofroll.engines.pinocchio.mechanism.Mechanism`.
+
+        Without orientation the acceleration is that of world components: the joint accelerates in the ball's axes,
+        which turn with ω, and axes that are held fixed do not.
+        """
+        if self._orientation:
+            terms, frame, rows, drift = self._rows(data, q, v)
+            return self._solve(data, rows, drift, resistance(terms, self._f, frame[:, 0]) if self._f else self._rest)
+        acceleration = self._solve(data, *self._own_rows(data, q, v))
+        vx, vy, vz, wx, wy, wz = v.tolist()
+        acceleration[0] += wy * vz - wz * vy
+        acceleration[1] += wz * vx - wx * vz
+        acceleration[2] += wx * vy - wy * vx
+        return acceleration
 
     def normal_force(self, data: Any) -> float:
         """See :class:`~proofroll.engines.pinocchio.mechanism.Mechanism`."""
@@ -78,8 +110,9 @@ class FreeFlyer(Mechanism):
 
     def reaction(self, data: Any, q: FloatArray, v: FloatArray) -> tuple[FloatArray, FloatArray]:
         """Joint acceleration, and the wall's force from the multipliers."""
-        acceleration, multipliers, frame = self._solve(data, q, v)
-        return acceleration, frame @ multipliers
+        terms, frame, rows, drift = self._rows(data, q, v)
+        lever = resistance(terms, self._f, frame[:, 0]) if self._f else self._rest
+        return np.array(self._solve(data, rows, drift, lever)), frame @ data.lambda_c
 
     def on_surface(self, q: FloatArray) -> FloatArray:
         """The configuration with the centre moved onto the surface along its normal."""
@@ -91,11 +124,6 @@ class FreeFlyer(Mechanism):
     def gap(self, q: FloatArray) -> float:
         """Value of the row of the surface [m]."""
         return float(self._surface.gap(q[:3]))
-
-    def needed(self, data: Any, q: FloatArray, v: FloatArray) -> tuple[float, float]:
-        """See :class:`~proofroll.engines.pinocchio.mechanism.Mechanism`."""
-        minus_N, F2, F3 = self._solve(data, q, v)[1]
-        return math.hypot(F2, F3), -float(minus_N)
 
     def _slide(self, data: Any, q: FloatArray, v: FloatArray, direction: FloatArray) -> Sliding:
         """One row, that of the surface; friction and rolling resistance are columns, for both follow N."""
