@@ -3,13 +3,14 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Sequence
 from typing import Any
 
 import numpy as np
 import pinocchio as pin
 
 from proofroll.engines.pinocchio.mechanism import Mechanism, Sliding
-from proofroll.engines.pinocchio.rows import BallTerms, ball_terms, own_terms, resistance, rolling_rows
+from proofroll.engines.pinocchio.rows import BallTerms, ball_terms, own_bias, own_jacobian, resistance, rolling_rows
 from proofroll.scene import RollingBall
 from proofroll.surfaces import FloatArray
 
@@ -29,6 +30,9 @@ class FreeFlyer(Mechanism):
         self._matrix = np.zeros((9, 9))
         self._add_ball(body, 0, pin.JointModelFreeFlyer(), pin.SE3.Identity())
         self.q0 = np.concatenate([body.p0, [0.0, 0.0, 0.0, 1.0]])
+        # In the axes of the joint it is the same everywhere.
+        self._jacobian = own_jacobian(self.model, self.ball, self.q0)
+        self._by_moment = self._jacobian[3:].T.copy()
         self.v0 = np.concatenate([body.v0, body.w0])
         self.q_scale = np.concatenate([np.full(3, self._radius), np.ones(4)])
         self.v_scale = np.concatenate([np.full(3, self._speed), np.full(3, self._speed / self._radius)])
@@ -47,31 +51,39 @@ class FreeFlyer(Mechanism):
         drift[0], drift[1:] = e1.dot(terms.bias[:3]) + bend, slip_drift
         return terms, frame, rows, drift
 
-    def _own_rows(self, data: Any, q: FloatArray, v: FloatArray) -> tuple[FloatArray, FloatArray, FloatArray]:
-        """Rows, drift, and the rolling resistance per unit of N on the joint, where its axes are the world's."""
-        jacobian, bias = own_terms(self.model, data, self.ball, q, v, self._rest)
-        place, (vx, vy, vz, wx, wy, wz), a = q[:3].tolist(), v.tolist(), self._radius
-        x1, y1, z1, x2, y2, z2, x3, y3, z3 = self._surface.triad(*place)
-        x, y, z = self._surface.normal_rate(place, (vx, vy, vz))
-        # A list of numbers, not of lists, for numpy needs half the time for that.
-        directions = np.array(
+    def _directions(self, triad: Sequence[float]) -> FloatArray:
+        """Velocity along e1, and of slip along e2 and e3, from (v, ω) in the world, shape (3, 6)."""
+        x1, y1, z1, x2, y2, z2, x3, y3, z3 = triad
+        a = self._radius
+        # One row of numbers: numpy needs half the time for that than for rows of rows.
+        return np.array(
             (x1, y1, z1, 0.0, 0.0, 0.0, x2, y2, z2, a * x3, a * y3, a * z3, x3, y3, z3, -a * x2, -a * y2, -a * z2)
         ).reshape(3, 6)
-        drift = directions.dot(bias)
-        tx, ty, tz = wy * z - wz * y, wz * x - wx * z, wx * y - wy * x  # ω × ė1
-        drift[0] += x * vx + y * vy + z * vz
-        drift[1] += a * (x2 * tx + y2 * ty + z2 * tz)
-        drift[2] += a * (x3 * tx + y3 * ty + z3 * tz)
+
+    def _own_rows(self, data: Any, q: FloatArray, v: FloatArray) -> tuple[FloatArray, FloatArray, FloatArray]:
+        """Rows, drift, and the rolling resistance per unit of N on the joint, where its axes are the world's."""
+        place, (vx, vy, vz, wx, wy, wz) = q[:3].tolist(), v.tolist()
+        triad = self._surface.triad(*place)
+        x, y, z = self._surface.normal_rate(place, (vx, vy, vz))
+        directions = self._directions(triad)
+        drift = directions.dot(own_bias(self.model, data, self.ball, q, v, self._rest))
+        x1, y1, z1, x2, y2, z2, x3, y3, z3 = triad
+        a = self._radius
+        tx, ty, tz = a * (wy * z - wz * y), a * (wz * x - wx * z), a * (wx * y - wy * x)  # a ω × ė1
+        drift += (x * vx + y * vy + z * vz, x2 * tx + y2 * ty + z2 * tz, x3 * tx + y3 * ty + z3 * tz)
         lever = self._rest
         if self._f:
             speed = math.sqrt(vx * vx + vy * vy + vz * vz)
             f = self._f / speed if speed else 0.0
-            moment = np.array([f * (y1 * vz - z1 * vy), f * (z1 * vx - x1 * vz), f * (x1 * vy - y1 * vx)])
-            lever = jacobian[3:].T.dot(moment)
-        return directions.dot(jacobian), drift, lever
+            moment = (f * (y1 * vz - z1 * vy), f * (z1 * vx - x1 * vz), f * (x1 * vy - y1 * vx))
+            lever = self._by_moment.dot(np.array(moment))
+        return directions.dot(self._jacobian), drift, lever
 
     def _only_rows(self, data: Any, q: FloatArray, v: FloatArray) -> FloatArray:
-        return (self._rows(data, q, v)[2]) if self._orientation else self._own_rows(data, q, v)[0]
+        if self._orientation:
+            return self._rows(data, q, v)[2]
+        pin.crba(self.model, data, q)
+        return self._directions(self._surface.triad(*q[:3].tolist())).dot(self._jacobian)
 
     def _solve(self, data: Any, rows: FloatArray, drift: FloatArray, lever: FloatArray) -> FloatArray:
         """Joint acceleration; the multipliers (-N, F2, F3) [N] are left in ``data``.
@@ -117,8 +129,8 @@ class FreeFlyer(Mechanism):
     def on_surface(self, q: FloatArray) -> FloatArray:
         """The configuration with the centre moved onto the surface along its normal."""
         q = q.copy()
-        gap, *e1 = self._surface.nearby(*q[:3].tolist())
-        q[:3] += gap * np.array(e1)
+        gap, x, y, z = self._surface.nearby(*q[:3].tolist())
+        q[:3] += (gap * x, gap * y, gap * z)
         return q
 
     def gap(self, q: FloatArray) -> float:

@@ -85,12 +85,17 @@ def rolling_rows(
     return directions.dot(terms.jacobian), drift
 
 
-def own_terms(model: Any, data: Any, ball: int, q: FloatArray, v: FloatArray, rest: FloatArray) -> tuple[Any, Any]:
-    """As :func:`ball_terms`, the Jacobian and the bias alone, in the axes of the ball's joint."""
+def own_bias(model: Any, data: Any, ball: int, q: FloatArray, v: FloatArray, rest: FloatArray) -> FloatArray:
+    """As :func:`ball_terms`, the bias alone, in the axes of the ball's joint."""
     pin.forwardKinematics(model, data, q, v, rest)
-    pin.computeAllTerms(model, data, q, v)
-    jacobian = pin.getJointJacobian(model, data, ball, pin.LOCAL)
-    return jacobian, pin.getClassicalAcceleration(model, data, ball, pin.LOCAL).vector
+    pin.crba(model, data, q)
+    pin.nonLinearEffects(model, data, q, v)
+    return pin.getClassicalAcceleration(model, data, ball, pin.LOCAL).vector  # type: ignore[no-any-return]  # it is an array
+
+
+def own_jacobian(model: Any, ball: int, q: FloatArray) -> FloatArray:
+    """Of (v, ω) of the ball with respect to the joint velocities, in the axes of its joint; shape (6, nv)."""
+    return np.array(pin.computeJointJacobian(model, model.createData(), q, ball))
 
 
 def cross(x: Triple, y: Triple) -> tuple[float, float, float]:
