@@ -70,7 +70,9 @@ class FreeFlyer(Mechanism):
         x1, y1, z1, x2, y2, z2, x3, y3, z3 = triad
         a = self._radius
         tx, ty, tz = a * (wy * z - wz * y), a * (wz * x - wx * z), a * (wx * y - wy * x)  # a ω × ė1
-        drift += (x * vx + y * vy + z * vz, x2 * tx + y2 * ty + z2 * tz, x3 * tx + y3 * ty + z3 * tz)
+        drift[0] += x * vx + y * vy + z * vz
+        drift[1] += x2 * tx + y2 * ty + z2 * tz
+        drift[2] += x3 * tx + y3 * ty + z3 * tz
         lever = self._rest
         if self._f:
             speed = math.sqrt(vx * vx + vy * vy + vz * vz)
@@ -130,7 +132,9 @@ class FreeFlyer(Mechanism):
         """The configuration with the centre moved onto the surface along its normal."""
         q = q.copy()
         gap, x, y, z = self._surface.nearby(*q[:3].tolist())
-        q[:3] += (gap * x, gap * y, gap * z)
+        q[0] += gap * x
+        q[1] += gap * y
+        q[2] += gap * z
         return q
 
     def gap(self, q: FloatArray) -> float:
