@@ -62,9 +62,9 @@ def study_tables(found: dict[str, Any]) -> Iterator[Table]:
     shares.add_column("wall time × workers")
     shares.add_column("part", justify="right")
     shares.add_column("of processor time", justify="right")
-    processor = found["processor"]["shares"]
-    for cause in {**found["shares"], **processor}:
-        shares.add_row(Text(cause), *(f"{by[cause]:.1%}" if cause in by else "–" for by in (found["shares"], processor)))
+    parts = found["shares"], found["processor"]["shares"]
+    for cause in {**parts[0], **parts[1]}:
+        shares.add_row(Text(cause), *(f"{part[cause]:.1%}" if cause in part else "–" for part in parts))
     yield shares
     cases = Table(box=None, padding=(0, 2, 0, 0))
     for column in ("case", "f", "simulated", "wall", "outside"):

@@ -49,8 +49,8 @@ def _ball(body: RollingBall) -> Any:
 class _Composite:
     """Revolute and prismatic joint of a massless carriage, and a spherical joint in it: two rows of rolling.
 
-    The spherical joint stays as it is, for the inertia of a ball is the same about all axes. So the joint's own axes are
-    the local ones, along which the directions of rolling do not change.
+    The spherical joint stays as it is, for the inertia of a ball is the same about all axes. So the joint's own axes
+    are the local ones, along which the Jacobian and the rows of rolling do not change.
     """
 
     def __init__(self, body: RollingBall) -> None:
@@ -67,33 +67,31 @@ class _Composite:
         self.rest = np.zeros(5)
         self.directions = np.array([[0.0, 1.0, 0.0, 0.0, 0.0, self.a], [0.0, 0.0, 1.0, 0.0, -self.a, 0.0]])
         self.moving, self.q = 2, np.array([0.0, 0.0, 0.0, 0.0, 0.0, 1.0])
+        jacobian = np.array(pin.computeJointJacobian(self.model, self.data, self.q, self.ball))
+        self.rows, self.by_moment = self.directions @ jacobian, jacobian[3:].T.copy()
         self.v = np.array([*body.udot0, *(body.w0 - [0.0, 0.0, body.udot0[0]])])
         a, speed = self.a, float(np.linalg.norm(body.v0))
         self.sizes = np.array([a / self.c, a, speed / self.c, speed, *[speed / a] * 3])
 
-    def rows(self, q: FloatArray, v: FloatArray) -> tuple[FloatArray, FloatArray, FloatArray]:
-        """Rows, their drift, and the ball's Jacobian."""
-        model, data, D = self.model, self.data, self.directions
-        pin.forwardKinematics(model, data, q, v, self.rest)
-        pin.computeAllTerms(model, data, q, v)
-        jacobian = pin.getJointJacobian(model, data, self.ball, pin.LOCAL)
-        drift = D.dot(pin.getClassicalAcceleration(model, data, self.ball, pin.LOCAL).vector)
-        drift[1] += self.a * v[0] * v[2]  # a ω1 γ̇, for the axis of γ̇ is e3
-        return D.dot(jacobian), drift, jacobian
-
     def respond(self, q: FloatArray, v: FloatArray) -> FloatArray:
         """Joint acceleration; multipliers in ``data.lambda_c``."""
-        rows, drift, jacobian = self.rows(q, v)
+        model, data = self.model, self.data
+        pin.forwardKinematics(model, data, q, v, self.rest)
+        pin.crba(model, data, q)
+        pin.nonLinearEffects(model, data, q, v)
+        drift = self.directions.dot(pin.getClassicalAcceleration(model, data, self.ball, pin.LOCAL).vector)
+        drift[1] += self.a * v[0] * v[2]  # a ω1 γ̇, for the axis of γ̇ is e3
         torque = self.rest
         if self.f:
             turn, rise = v[:2].tolist()
             scale = self.f * self.m * self.c * turn * turn / math.hypot(self.c * turn, rise)
-            torque = jacobian[3:].T.dot(np.array([0.0, -scale * rise, scale * self.c * turn]))
-        return np.array(pin.forwardDynamics(self.model, self.data, torque, rows, drift))
+            torque = self.by_moment.dot(np.array([0.0, -scale * rise, scale * self.c * turn]))
+        return np.array(pin.forwardDynamics(model, data, torque, self.rows, drift))
 
     def project(self, q: FloatArray, v: FloatArray) -> FloatArray:
         """The velocities without slip."""
-        return np.array(pin.impulseDynamics(self.model, self.data, v, self.rows(q, v)[0]))
+        pin.crba(self.model, self.data, q)
+        return np.array(pin.impulseDynamics(self.model, self.data, v, self.rows))
 
     def contact(self, v: FloatArray) -> tuple[float, float]:
         """Needed friction and normal force of the last response [N]."""
@@ -124,29 +122,34 @@ class _FreeFlyer:
         self.sizes = np.array([a, a, a, *[speed] * 3, *[speed / a] * 3])
         self.multipliers = np.zeros(3)
 
-    def rows(self, q: FloatArray, v: FloatArray) -> tuple[FloatArray, FloatArray, FloatArray]:
-        """Rows, their drift, and the moment of rolling resistance on the joint per newton of normal force."""
-        model, data, D, a = self.model, self.data, self.directions, self.a
-        pin.forwardKinematics(model, data, q, v, self.rest)
-        pin.computeAllTerms(model, data, q, v)
-        jacobian = pin.getJointJacobian(model, data, self.ball, pin.LOCAL)
+    def aim(self, q: FloatArray) -> tuple[float, float]:
+        """The rows where the ball is, and e1; the joint has the velocities of the ball, with no Jacobian between."""
         x, y = q[:2].tolist()
-        r = math.sqrt(x * x + y * y)
+        r, D, a = math.sqrt(x * x + y * y), self.directions, self.a
         ex, ey = x / r, y / r
         D[0, 0], D[0, 1] = ex, ey
         D[1, 0], D[1, 1] = -ey, ex
         D[2, 3], D[2, 4] = a * ey, -a * ex
+        return ex, ey
+
+    def rows(self, q: FloatArray, v: FloatArray) -> tuple[FloatArray, FloatArray, FloatArray]:
+        """Rows, their drift, and the moment of rolling resistance on the joint per newton of normal force."""
+        model, data, D, a = self.model, self.data, self.directions, self.a
+        pin.forwardKinematics(model, data, q, v, self.rest)
+        pin.crba(model, data, q)
+        pin.nonLinearEffects(model, data, q, v)
+        ex, ey = self.aim(q)
         vx, vy, vz, wx, wy, _ = v.tolist()
-        turning = (vy * ex - vx * ey) / r
+        turning = (vy * ex - vx * ey) / self.c
         drift = D.dot(pin.getClassicalAcceleration(model, data, self.ball, pin.LOCAL).vector)
-        drift[0] += turning * turning * r
+        drift[0] += turning * turning * self.c
         drift[2] += a * turning * (wx * ex + wy * ey)
         if not self.f:
-            return D.dot(jacobian), drift, self.rest
+            return D, drift, self.rest
         scale = self.f / math.sqrt(vx * vx + vy * vy + vz * vz)
         # e1 × v
         moment = np.array([scale * ey * vz, -scale * ex * vz, scale * (ex * vy - ey * vx)])
-        return D.dot(jacobian), drift, jacobian[3:].T.dot(moment)
+        return D, drift, np.concatenate([self.rest[:3], moment])
 
     def respond(self, q: FloatArray, v: FloatArray) -> FloatArray:
         """Acceleration in the world's axes; the multipliers (-N, F2, F3) are kept."""
@@ -171,7 +174,9 @@ class _FreeFlyer:
         """The velocities without slip; the centre is put back on the wall."""
         x, y = q[:2].tolist()
         q[:2] *= self.c / math.sqrt(x * x + y * y)
-        return np.array(pin.impulseDynamics(self.model, self.data, v, self.rows(q, v)[0]))
+        pin.crba(self.model, self.data, q)
+        self.aim(q)
+        return np.array(pin.impulseDynamics(self.model, self.data, v, self.directions))
 
     def contact(self, v: FloatArray) -> tuple[float, float]:  # noqa: ARG002 -- the other mechanism's signature
         """Needed friction and normal force of the last response [N]."""

@@ -85,7 +85,7 @@ class StickSlip:
         self.state = self._state(exu.ConfigurationType.Initial)
         self._before, self._before_t = self.state, 0.0
         self._last_step: tuple[Touch, Touch, float] | None = None  # its end, its start and its length [s]
-        # What _roll_on has read after the last step and the one before it; without the coordinates if they do not matter.
+        # What _roll_on read after the last step and the one before it; not the coordinates where they do not matter.
         self._latest: tuple[float, FloatArray, FloatArray] = (0.0, self.state.q, self.state.q_t)
         self._earlier: tuple[float, FloatArray, FloatArray] | None = None
         self._place_matters, self._shortest = model.place_matters, 0.5 * settings.dt

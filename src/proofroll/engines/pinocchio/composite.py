@@ -23,7 +23,6 @@ from proofroll.errors import Refused
 from proofroll.scene import RollingBall
 from proofroll.surfaces import FloatArray, Generator
 
-
 # Two places on the surface, at which its geometry along the local axes is compared.
 _SHIFTS = np.zeros(6), np.array([0.7, -0.4, 0.0, 0.0, 0.0, 0.0])
 

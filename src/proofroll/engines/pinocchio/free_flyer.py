@@ -10,7 +10,7 @@ import numpy as np
 import pinocchio as pin
 
 from proofroll.engines.pinocchio.mechanism import Mechanism, Sliding
-from proofroll.engines.pinocchio.rows import BallTerms, ball_terms, own_bias, own_jacobian, resistance, rolling_rows
+from proofroll.engines.pinocchio.rows import BallTerms, ball_terms, own_bias, resistance, rolling_rows
 from proofroll.scene import RollingBall
 from proofroll.surfaces import FloatArray
 
@@ -30,9 +30,6 @@ class FreeFlyer(Mechanism):
         self._matrix = np.zeros((9, 9))
         self._add_ball(body, 0, pin.JointModelFreeFlyer(), pin.SE3.Identity())
         self.q0 = np.concatenate([body.p0, [0.0, 0.0, 0.0, 1.0]])
-        # In the axes of the joint it is the same everywhere.
-        self._jacobian = own_jacobian(self.model, self.ball, self.q0)
-        self._by_moment = self._jacobian[3:].T.copy()
         self.v0 = np.concatenate([body.v0, body.w0])
         self.q_scale = np.concatenate([np.full(3, self._radius), np.ones(4)])
         self.v_scale = np.concatenate([np.full(3, self._speed), np.full(3, self._speed / self._radius)])
@@ -61,7 +58,10 @@ class FreeFlyer(Mechanism):
         ).reshape(3, 6)
 
     def _own_rows(self, data: Any, q: FloatArray, v: FloatArray) -> tuple[FloatArray, FloatArray, FloatArray]:
-        """Rows, drift, and the rolling resistance per unit of N on the joint, where its axes are the world's."""
+        """Rows, drift, and the rolling resistance per unit of N on the joint, where its axes are the world's.
+
+        The joint's velocities are then those of the ball in the world, with no Jacobian between.
+        """
         place, (vx, vy, vz, wx, wy, wz) = q[:3].tolist(), v.tolist()
         triad = self._surface.triad(*place)
         x, y, z = self._surface.normal_rate(place, (vx, vy, vz))
@@ -78,14 +78,14 @@ class FreeFlyer(Mechanism):
             speed = math.sqrt(vx * vx + vy * vy + vz * vz)
             f = self._f / speed if speed else 0.0
             moment = (f * (y1 * vz - z1 * vy), f * (z1 * vx - x1 * vz), f * (x1 * vy - y1 * vx))
-            lever = self._by_moment.dot(np.array(moment))
-        return directions.dot(self._jacobian), drift, lever
+            lever = np.array((0.0, 0.0, 0.0, *moment))
+        return directions, drift, lever
 
     def _only_rows(self, data: Any, q: FloatArray, v: FloatArray) -> FloatArray:
         if self._orientation:
             return self._rows(data, q, v)[2]
         pin.crba(self.model, data, q)
-        return self._directions(self._surface.triad(*q[:3].tolist())).dot(self._jacobian)
+        return self._directions(self._surface.triad(*q[:3].tolist()))
 
     def _solve(self, data: Any, rows: FloatArray, drift: FloatArray, lever: FloatArray) -> FloatArray:
         """Joint acceleration; the multipliers (-N, F2, F3) [N] are left in ``data``.

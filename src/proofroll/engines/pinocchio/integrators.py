@@ -189,7 +189,9 @@ class Adaptive:
 
     def _moved(self, q: FloatArray, v: FloatArray, acceleration: FloatArray) -> FloatArray:
         """Rates of what is integrated."""
-        return np.concatenate([pin.tangentMap(self._model, q).dot(v) if self._turns else v[: self._places], acceleration])
+        return np.concatenate(
+            [pin.tangentMap(self._model, q).dot(v) if self._turns else v[: self._places], acceleration]
+        )
 
     def _rates(self, _: float, y: FloatArray) -> FloatArray:
         q, v = self._split(y)

@@ -11,7 +11,6 @@ from proofroll.engines.projection.method import ProjectedBall
 from proofroll.engines.projection.modes import DIFFERENCE, Exit, Pace, Survey, time_left
 from proofroll.surfaces import FloatArray
 
-
 # While the cone leaves more than this part of itself, the needed friction cannot leave it and be back within one step:
 # a crest that high is many steps wide.
 _CLEAR = 0.25

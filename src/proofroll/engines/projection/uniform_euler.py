@@ -34,9 +34,7 @@ class Euler(Closed):
         self._upright = self.steady and bool(np.all(np.abs(axis[:2]) <= _VERTICAL))
         self._along = math.copysign(1.0, float(axis[2]))
 
-    def _view(
-        self, state: list[float]
-    ) -> tuple[tuple[float, ...], tuple[float, ...], float, float, float, float]:
+    def _view(self, state: list[float]) -> tuple[tuple[float, ...], tuple[float, ...], float, float, float, float]:
         """Local axes, gravity along them [m/s²], and sine and cosine of θ and of ψ, from where the axes are given.
 
         Raises:
@@ -95,9 +93,7 @@ class Euler(Closed):
         b_phi, b_psi = scale * (h_phi - cos * h_psi), scale * (h_psi - cos * h_phi)
         free2 = p2 + a * (phi3 * b_phi + theta3 * h_theta + z3 * b_psi) + slip2
         free3 = p3 - a * (phi2 * b_phi + theta2 * h_theta + z2 * b_psi) + slip3
-        L2, L3, on_phi, on_theta, on_psi = self._held(
-            (phi2, theta2, z2), (phi3, theta3, z3), cos, scale, free2, free3
-        )
+        L2, L3, on_phi, on_theta, on_psi = self._held((phi2, theta2, z2), (phi3, theta3, z3), cos, scale, free2, free3)
         p2, p3 = p2 - L2 / m, p3 - L3 / m
         everything = (
             u,
@@ -127,9 +123,12 @@ class Euler(Closed):
         """λ of (C M̄⁻¹ Cᵀ) λ = ``free``, and what it takes from the rates of φ, θ, ψ.
 
         Args:
-            along2, along3: components of the axes of φ, θ, ψ along e2 and e3.
-            cos, scale: cos θ and 1 / sin²θ.
-            free2, free3: right side.
+            along2: components of the axes of φ, θ, ψ along e2.
+            along3: the same along e3.
+            cos: cos θ.
+            scale: 1 / sin²θ.
+            free2: right side along e2.
+            free3: right side along e3.
         """
         a, J, per_mass = self.a, self.J, 1.0 / self.m
         (phi2, theta2, z2), (phi3, theta3, z3) = along2, along3
