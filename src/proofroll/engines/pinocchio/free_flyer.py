@@ -28,6 +28,14 @@ class FreeFlyer(Mechanism):
         self._surface = body.surface
         self._orientation = orientation
         self._matrix = np.zeros((9, 9))
+        self._directions = np.zeros((3, 6))
+        self._entries = self._directions.reshape(-1)
+        triad = self._surface.triad(*body.p0.tolist())
+        moving = _changing(body)
+        entries = _entries(self._radius)
+        self._changing = [entry for entry in entries if entry[1] in moving]
+        for index, source, factor in entries:
+            self._entries[index] = factor * triad[source]
         self._add_ball(body, 0, pin.JointModelFreeFlyer(), pin.SE3.Identity())
         self.q0 = np.concatenate([body.p0, [0.0, 0.0, 0.0, 1.0]])
         self.v0 = np.concatenate([body.v0, body.w0])
@@ -48,14 +56,15 @@ class FreeFlyer(Mechanism):
         drift[0], drift[1:] = e1.dot(terms.bias[:3]) + bend, slip_drift
         return terms, frame, rows, drift
 
-    def _directions(self, triad: Sequence[float]) -> FloatArray:
-        """Velocity along e1, and of slip along e2 and e3, from (v, ω) in the world, shape (3, 6)."""
-        x1, y1, z1, x2, y2, z2, x3, y3, z3 = triad
-        a = self._radius
-        # One row of numbers: numpy needs half the time for that than for rows of rows.
-        return np.array(
-            (x1, y1, z1, 0.0, 0.0, 0.0, x2, y2, z2, a * x3, a * y3, a * z3, x3, y3, z3, -a * x2, -a * y2, -a * z2)
-        ).reshape(3, 6)
+    def _aimed(self, triad: Sequence[float]) -> FloatArray:
+        """Velocity along e1, and of slip along e2 and e3, from (v, ω) in the world, shape (3, 6).
+
+        The next call overwrites it: only what changes from place to place is written again.
+        """
+        entries = self._entries
+        for index, source, factor in self._changing:
+            entries[index] = factor * triad[source]
+        return self._directions
 
     def _own_rows(self, data: Any, q: FloatArray, v: FloatArray) -> tuple[FloatArray, FloatArray, FloatArray]:
         """Rows, drift, and the rolling resistance per unit of N on the joint, where its axes are the world's.
@@ -65,7 +74,7 @@ class FreeFlyer(Mechanism):
         place, (vx, vy, vz, wx, wy, wz) = q[:3].tolist(), v.tolist()
         triad = self._surface.triad(*place)
         x, y, z = self._surface.normal_rate(place, (vx, vy, vz))
-        directions = self._directions(triad)
+        directions = self._aimed(triad)
         drift = directions.dot(own_bias(self.model, data, self.ball, q, v, self._rest))
         x1, y1, z1, x2, y2, z2, x3, y3, z3 = triad
         a = self._radius
@@ -85,7 +94,7 @@ class FreeFlyer(Mechanism):
         if self._orientation:
             return self._rows(data, q, v)[2]
         pin.crba(self.model, data, q)
-        return self._directions(self._surface.triad(*q[:3].tolist()))
+        return self._aimed(self._surface.triad(*q[:3].tolist()))
 
     def _solve(self, data: Any, rows: FloatArray, drift: FloatArray, lever: FloatArray) -> FloatArray:
         """Joint acceleration; the multipliers (-N, F2, F3) [N] are left in ``data``.
@@ -178,3 +187,24 @@ class FreeFlyer(Mechanism):
         q = self.on_surface(q)
         rows = self._rows(data, q, v)[2]
         return q, np.array(pin.impulseDynamics(self.model, data, v, rows[:1]))
+
+
+def _entries(radius: float) -> list[tuple[int, int, float]]:
+    """What the directions consist of: place in their 18 numbers, place in a triad, and factor.
+
+    Along e1 it is e1·v, along e2 the slip e2·v + a e3·ω, along e3 the slip e3·v - a e2·ω.
+    """
+    blocks = ((0, 0, 1.0), (6, 3, 1.0), (9, 6, radius), (12, 6, 1.0), (15, 3, -radius))
+    return [(index + k, source + k, factor) for index, source, factor in blocks for k in range(3)]
+
+
+def _changing(body: RollingBall) -> set[int]:
+    """Which of the nine components of e1, e2, e3 change from place to place; all, if that is not known."""
+    surface = body.surface
+    if surface.generators is None:
+        return set(range(9))
+    # A component of a frame that one motion turns by α is p + q sin α + r cos α: where it is the same at three angles
+    # it is the same at all.
+    places = [[x, y] for x in (0.0, 1.0, 2.5) for y in (0.0, 1.0, 2.5)]
+    triads = surface.frame(np.array(places)).swapaxes(-1, -2).reshape(-1, 9)
+    return set(np.flatnonzero(np.ptp(triads, axis=0) > 0).tolist())
