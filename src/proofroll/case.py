@@ -100,6 +100,7 @@ class Result:
         checksum: sha256 of that file.
         spent: where the wall time of the case went, by cause [s]; ``advance`` and ``clean runs`` are the engine's.
             Empty in records from before it was measured.
+        processor: the same in seconds of the worker's processor, which others on the machine do not lengthen [s].
     """
 
     status: Status
@@ -112,6 +113,7 @@ class Result:
     trajectory: str | None = None
     checksum: str | None = None
     spent: dict[str, float] = field(default_factory=dict)
+    processor: dict[str, float] = field(default_factory=dict)
 
     @classmethod
     def from_dict(cls, content: dict[str, Any]) -> Result:

@@ -49,31 +49,36 @@ class Recording:
         dataset: the trajectory up to the last finite sample.
         failure: one sentence if it ended early, else None.
         wall_seconds: spent inside ``advance`` [s].
-        sampling_seconds: spent inside ``sample`` and around it [s].
+        advancing, sampling: spent inside ``advance``, and inside ``sample`` and around it: wall and processor seconds
+            [s].
     """
 
     dataset: xr.Dataset
     failure: str | None
     wall_seconds: float
-    sampling_seconds: float = 0.0
+    advancing: tuple[float, float] = (0.0, 0.0)
+    sampling: tuple[float, float] = (0.0, 0.0)
 
 
 def record(engine: Any, scene: Scene, times: FloatArray) -> Recording:
     """Advances a freshly built engine over ``times`` and samples it at each."""
-    began = time.perf_counter()
+    began, processor = time.perf_counter(), -time.process_time()
+    inside = 0.0
     samples = [_finite(engine.sample(), 0.0)]
     failure: str | None = None
     wall = 0.0
     for t in times[1:]:
-        start = time.perf_counter()
+        before, start = time.process_time(), time.perf_counter()
         try:
             engine.advance(float(t))
             wall += time.perf_counter() - start
+            inside += time.process_time() - before
             samples.append(_finite(engine.sample(), float(t)))
         except Diverged as error:
             failure = str(error)
             break
-    sampling = time.perf_counter() - began - wall
+    processor += time.process_time()
+    sampling = time.perf_counter() - began - wall, processor - inside
     if Capability.BOUNDED_FRICTION in scene.requires and any(sample.sticking is None for sample in samples):
         failure = failure or "the engine does not say whether the ball sticks or slips"
     if Capability.ORIENTATION in scene.requires and any(sample.q_WB is None for sample in samples):
@@ -84,7 +89,7 @@ def record(engine: Any, scene: Scene, times: FloatArray) -> Recording:
         sticking = [bool(sample.sticking) for sample in samples]
         events = engine.events() if located else between_samples(times.tolist(), sticking)
         dataset = with_events(dataset, events)
-    return Recording(dataset, failure, wall, sampling)
+    return Recording(dataset, failure, wall, (wall, inside), sampling)
 
 
 _SAMPLED = ("p_WB", "v_WB", "w_WB", "q_WB", "force")

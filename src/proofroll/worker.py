@@ -181,29 +181,37 @@ def run(case: dict[str, Any], out: str) -> dict[str, Any]:
         gc.collect()  # the next case of this process starts clean,
         gc.freeze()  # and need not look again at what stays: the modules
     spent.on("clean-up")
-    return answer | {"spent": spent.seconds}
+    return answer | {"spent": spent.seconds, "processor": spent.processor}
 
 
 class Spent:
-    """Where the wall time of a case goes.
+    """Where the time of a case goes.
 
     Attributes:
-        seconds: by cause [s].
+        seconds: wall seconds by cause [s].
+        processor: seconds of this process by cause [s], whoever else computes on the machine.
     """
+
+    _counted = 0.0  # of the processor, in the cases before: what has passed since was the start, and other requests
 
     def __init__(self) -> None:
         self.seconds: dict[str, float] = {}
-        self._since = time.perf_counter()
+        now = time.process_time()
+        self.processor: dict[str, float] = {"process start": now - Spent._counted}
+        self._since = time.perf_counter(), now
 
-    def on(self, cause: str, **parts: float) -> None:
-        """What has passed since the last call went to ``cause``, but for ``parts`` of it [s] that had another."""
-        now = time.perf_counter()
-        found = {cause: now - self._since - sum(parts.values())} | {
-            key.replace("_", " "): value for key, value in parts.items()
-        }
-        for key, value in found.items():
-            self.seconds[key] = self.seconds.get(key, 0.0) + value
-        self._since = now
+    def on(self, cause: str, **parts: tuple[float, float]) -> None:
+        """What has passed since the last call went to ``cause``, but for ``parts`` of it that had another.
+
+        Each part is a pair of wall and processor seconds [s].
+        """
+        now = time.perf_counter(), time.process_time()
+        for index, account in enumerate((self.seconds, self.processor)):
+            found = {key.replace("_", " "): part[index] for key, part in parts.items()}
+            found[cause] = now[index] - self._since[index] - sum(found.values())
+            for key, value in found.items():
+                account[key] = account.get(key, 0.0) + value
+        self._since, Spent._counted = now, now[1]
 
 
 def _run(case: Case, out: Path, spent: Spent) -> Result:
@@ -236,7 +244,7 @@ def _run(case: Case, out: Path, spent: Spent) -> Result:
         if difference is not None:
             return Result(Status.REFUSED, difference, certificate=lines, versions=versions)
         recording = record(engine, scene, times)
-        spent.on("trajectory", advance=recording.wall_seconds, sampling=recording.sampling_seconds)
+        spent.on("trajectory", advance=recording.advancing, sampling=recording.sampling)
         del engine
     except Refused as error:
         return Result(Status.REFUSED, str(error), versions=versions)
@@ -342,15 +350,20 @@ def bench(**what: Any) -> dict[str, Any]:
         return {"message": str(error)}
 
 
-def _clean_runs(kind: Any, scene: Any, settings: Any, times: Any) -> tuple[list[float], float]:
-    """Wall seconds per simulated second of runs that only advance, each on an engine built for it; seconds of all."""
+def _clean_runs(kind: Any, scene: Any, settings: Any, times: Any) -> tuple[list[float], tuple[float, float]]:
+    """Wall seconds per simulated second of runs that only advance, each on an engine built for it.
+
+    Besides, wall and processor seconds of all.
+    """
     rates: list[float] = []
-    spent = 0.0
+    spent = processor = 0.0
     while len(rates) < _TIMED_RUNS and spent < _TIMED_SECONDS:
-        wall, t = _clean_run(kind.build(scene, settings), times, _ENOUGH_SECONDS)
+        engine, before = kind.build(scene, settings), time.process_time()
+        wall, t = _clean_run(engine, times, _ENOUGH_SECONDS)
+        processor += time.process_time() - before
         rates.append(wall / t)
         spent += wall
-    return rates, spent
+    return rates, (spent, processor)
 
 
 def _clean_run(engine: Any, times: Any, enough: float) -> tuple[float, float]:

@@ -138,3 +138,18 @@ def test_a_place_that_cannot_be_written(tmp_path: Path) -> None:
     (tmp_path / "file").write_text("")
     with pytest.raises(ProofrollError, match="cannot be written"):
         write(truth(load_scene("inclined_plane"), np.zeros(1)), tmp_path / "file" / "run.nc")
+
+
+def test_a_dimension_without_entries_is_kept(tmp_path: Path) -> None:
+    """A trajectory in which nothing happened, its attributes and its texts come back from the file as they were."""
+    times = np.array([0.0, 0.1])
+    dataset = xr.Dataset(
+        {
+            "event_kind": ("event", np.array([], dtype="<U7"), {"units": "1"}),
+            "sticking": ("time", np.array([1, 0], dtype=np.int8), {"long_name": "größer"}),
+        },
+        coords={"time": ("time", times, {"units": "s"}), "xyz": ["x", "y", "z"]},
+        attrs={"message": "", "wall_seconds": 0.5},
+    )
+    write(dataset, tmp_path / "x.nc")
+    xr.testing.assert_identical(read(tmp_path / "x.nc"), dataset)

@@ -61,8 +61,10 @@ def study_tables(found: dict[str, Any]) -> Iterator[Table]:
     shares = Table(box=None, padding=(0, 2, 0, 0), title=Text(title), title_justify="left")
     shares.add_column("wall time × workers")
     shares.add_column("part", justify="right")
-    for cause, share in found["shares"].items():
-        shares.add_row(Text(cause), f"{share:.1%}")
+    shares.add_column("of processor time", justify="right")
+    parts = found["shares"], found["processor"]["shares"]
+    for cause in {**parts[0], **parts[1]}:
+        shares.add_row(Text(cause), *(f"{part[cause]:.1%}" if cause in part else "–" for part in parts))
     yield shares
     cases = Table(box=None, padding=(0, 2, 0, 0))
     for column in ("case", "f", "simulated", "wall", "outside"):
@@ -84,6 +86,8 @@ def study_lines(found: dict[str, Any]) -> Iterator[str]:
     """What process start costs, how busy the machine was, and the goal."""
     starts = ", ".join(f"{name} {number(seconds)} s" for name, seconds in found["first_answer"].items())
     yield f"from the start of a process to its first answer: {starts}"
+    processor = found["processor"]
+    yield f"of {processor['seconds']:.1f} s of processor time, {processor['outside']:.0%} outside the engines"
     if found["load_before"] is not None:
         yield f"load average of the machine before: {found['load_before']:.1f}"
     yield f"goal: at most {found['goal']:.0%} outside"

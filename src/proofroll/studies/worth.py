@@ -62,10 +62,9 @@ def worth(
         bar: error bar of the truth.
         scale: size of the quantity.
     """
-    if on.error is None:
-        return Worth.NO_ANSWER, f"with it: {on.said}"
-    if on.error > scale:
-        return Worth.NO_ANSWER, f"with it the answer is off by {on.error:.2g}, more than its whole size"
+    if on.error is None or on.error > scale:
+        said = on.said if on.error is None else f"the answer is off by {on.error:.2g}, more than its whole size"
+        return Worth.NO_ANSWER, f"with it: {said}"
     if off.error is None or change is None:
         return Worth.NEEDED, f"without it: {off.said}"
     limit = max(bar, max(min(on.error, off.error), _ROUND_OFF * scale) if tolerance is None else tolerance)

@@ -135,7 +135,7 @@ def test_rows_can_be_switched_off(seed):
 def test_without_resistance_no_moment_is_modelled(monkeypatch):
     """With f = 0 the model does not contain the moment of rolling resistance at all."""
     monkeypatch.delattr(ProjectedBall, "resistance")
-    monkeypatch.delattr(uniform._Translation, "moment")
+    monkeypatch.delattr(uniform.Closed, "moment")
     x = random_state(0)
     free = euler_ball(proofroll.load_scene("sphere_in_cylinder").rolling)
     assert np.all(np.isfinite(free.rates(x)))

@@ -15,7 +15,7 @@ from scipy.integrate import DOP853
 
 from proofroll.bench.bare import Bare, in_vertical_cylinder
 from proofroll.errors import Diverged, Refused
-from proofroll.scene import RollingBall, Scene
+from proofroll.scene import Capability, RollingBall, Scene
 from proofroll.surfaces import FloatArray
 
 _WORLD = pin.LOCAL_WORLD_ALIGNED
@@ -30,13 +30,15 @@ def prepare(scene: Scene, settings: Any) -> Bare:
         if settings.solver != "pgs":
             raise Refused("there is no bare loop with the ADMM solver")
         return Bare(_contact(body, settings), 1e-9, "the geometry is rounded otherwise, and the solver stops at 1e-12")
-    if settings.integrator != "dop853" or not settings.orientation or not settings.projection:
-        raise Refused("there is a bare loop only with dop853, orientation and projection")
+    if settings.integrator != "dop853" or not settings.projection:
+        raise Refused("there is a bare loop only with dop853 and projection")
+    if settings.orientation or Capability.ORIENTATION in scene.requires:
+        raise Refused("there is no bare loop that follows the ball's orientation")
     rows = (_Composite if settings.formulation == "composite" else _FreeFlyer)(body)
     return Bare(
         _rows_run(rows, body, settings),
         1e-9,
-        "the solver restarts at every sample in the adapter only, so the steps differ within their tolerance",
+        "the geometry is rounded otherwise, so the steps differ within their tolerance",
     )
 
 
@@ -45,7 +47,11 @@ def _ball(body: RollingBall) -> Any:
 
 
 class _Composite:
-    """Revolute and prismatic joint of a massless carriage, and a spherical joint in it: two rows of rolling."""
+    """Revolute and prismatic joint of a massless carriage, and a spherical joint in it: two rows of rolling.
+
+    The spherical joint stays as it is, for the inertia of a ball is the same about all axes. So the joint's own axes
+    are the local ones, along which the Jacobian and the rows of rolling do not change.
+    """
 
     def __init__(self, body: RollingBall) -> None:
         self.c, self.a = body.surface.length_scales[0], body.ball.radius
@@ -59,41 +65,33 @@ class _Composite:
         self.model.appendBodyToJoint(self.ball, _ball(body), pin.SE3.Identity())
         self.data = self.model.createData()
         self.rest = np.zeros(5)
-        self.directions = np.zeros((2, 6))
-        self.directions[0, 5], self.directions[1, 2] = self.a, 1.0
-        self.q = np.array([0.0, 0.0, 0.0, 0.0, 0.0, 1.0])
+        self.directions = np.array([[0.0, 1.0, 0.0, 0.0, 0.0, self.a], [0.0, 0.0, 1.0, 0.0, -self.a, 0.0]])
+        self.moving, self.q = 2, np.array([0.0, 0.0, 0.0, 0.0, 0.0, 1.0])
+        jacobian = np.array(pin.computeJointJacobian(self.model, self.data, self.q, self.ball))
+        self.rows, self.by_moment = self.directions @ jacobian, jacobian[3:].T.copy()
         self.v = np.array([*body.udot0, *(body.w0 - [0.0, 0.0, body.udot0[0]])])
         a, speed = self.a, float(np.linalg.norm(body.v0))
-        self.sizes = np.array([a / self.c, a, 1, 1, 1, 1, speed / self.c, speed, *[speed / a] * 3])
-
-    def rows(self, q: FloatArray, v: FloatArray) -> tuple[FloatArray, FloatArray, FloatArray]:
-        """Rows, their drift, and the ball's Jacobian."""
-        model, data, D = self.model, self.data, self.directions
-        pin.forwardKinematics(model, data, q, v, self.rest)
-        pin.computeAllTerms(model, data, q, v)
-        jacobian = pin.getJointJacobian(model, data, self.ball, _WORLD)
-        sin, cos = math.sin(q[0]), math.cos(q[0])
-        D[0, 0], D[0, 1], D[1, 3], D[1, 4] = -sin, cos, self.a * sin, -self.a * cos
-        drift = D.dot(pin.getClassicalAcceleration(model, data, self.ball, _WORLD).vector)
-        w = pin.getVelocity(model, data, self.ball, _WORLD).angular
-        drift[1] += self.a * v[0] * (w[0] * cos + w[1] * sin)
-        return D.dot(jacobian), drift, jacobian
+        self.sizes = np.array([a / self.c, a, speed / self.c, speed, *[speed / a] * 3])
 
     def respond(self, q: FloatArray, v: FloatArray) -> FloatArray:
         """Joint acceleration; multipliers in ``data.lambda_c``."""
-        rows, drift, jacobian = self.rows(q, v)
+        model, data = self.model, self.data
+        pin.forwardKinematics(model, data, q, v, self.rest)
+        pin.crba(model, data, q)
+        pin.nonLinearEffects(model, data, q, v)
+        drift = self.directions.dot(pin.getClassicalAcceleration(model, data, self.ball, pin.LOCAL).vector)
+        drift[1] += self.a * v[0] * v[2]  # a ω1 γ̇, for the axis of γ̇ is e3
         torque = self.rest
         if self.f:
-            turn, rise = float(v[0]), float(v[1])
+            turn, rise = v[:2].tolist()
             scale = self.f * self.m * self.c * turn * turn / math.hypot(self.c * turn, rise)
-            # M2 e2 + M3 e3 with e2 = (-sin γ, cos γ, 0)
-            moment = np.array([scale * rise * math.sin(q[0]), -scale * rise * math.cos(q[0]), scale * self.c * turn])
-            torque = jacobian[3:].T.dot(moment)
-        return np.array(pin.forwardDynamics(self.model, self.data, torque, rows, drift))
+            torque = self.by_moment.dot(np.array([0.0, -scale * rise, scale * self.c * turn]))
+        return np.array(pin.forwardDynamics(model, data, torque, self.rows, drift))
 
-    def project(self, q: FloatArray, v: FloatArray) -> tuple[FloatArray, FloatArray]:
+    def project(self, q: FloatArray, v: FloatArray) -> FloatArray:
         """The velocities without slip."""
-        return q, np.array(pin.impulseDynamics(self.model, self.data, v, self.rows(q, v)[0]))
+        pin.crba(self.model, self.data, q)
+        return np.array(pin.impulseDynamics(self.model, self.data, v, self.rows))
 
     def contact(self, v: FloatArray) -> tuple[float, float]:
         """Needed friction and normal force of the last response [N]."""
@@ -105,7 +103,7 @@ class _Composite:
 
 
 class _FreeFlyer:
-    """Six freedoms and three rows, that of the wall first."""
+    """Six freedoms and three rows, that of the wall first. The ball is not turned, so its axes are the world's."""
 
     def __init__(self, body: RollingBall) -> None:
         self.c, self.a, self.f = body.surface.length_scales[0], body.ball.radius, body.contact.rolling_resistance
@@ -118,58 +116,67 @@ class _FreeFlyer:
         self.directions = np.zeros((3, 6))
         self.directions[1, 5], self.directions[2, 2] = self.a, 1.0
         self.matrix = np.zeros((9, 9))
-        self.q = np.array([*body.p0, 0.0, 0.0, 0.0, 1.0])
+        self.moving, self.q = 3, np.array([*body.p0, 0.0, 0.0, 0.0, 1.0])
         self.v = np.concatenate([body.v0, body.w0])
         a, speed = self.a, float(np.linalg.norm(body.v0))
-        self.sizes = np.array([a, a, a, 1, 1, 1, 1, *[speed] * 3, *[speed / a] * 3])
+        self.sizes = np.array([a, a, a, *[speed] * 3, *[speed / a] * 3])
         self.multipliers = np.zeros(3)
+
+    def aim(self, q: FloatArray) -> tuple[float, float]:
+        """The rows where the ball is, and e1; the joint has the velocities of the ball, with no Jacobian between."""
+        x, y = q[:2].tolist()
+        r, D, a = math.sqrt(x * x + y * y), self.directions, self.a
+        ex, ey = x / r, y / r
+        D[0, 0], D[0, 1] = ex, ey
+        D[1, 0], D[1, 1] = -ey, ex
+        D[2, 3], D[2, 4] = a * ey, -a * ex
+        return ex, ey
 
     def rows(self, q: FloatArray, v: FloatArray) -> tuple[FloatArray, FloatArray, FloatArray]:
         """Rows, their drift, and the moment of rolling resistance on the joint per newton of normal force."""
         model, data, D, a = self.model, self.data, self.directions, self.a
         pin.forwardKinematics(model, data, q, v, self.rest)
-        pin.computeAllTerms(model, data, q, v)
-        jacobian = pin.getJointJacobian(model, data, self.ball, _WORLD)
-        x, y = q[:2].tolist()
-        r = math.sqrt(x * x + y * y)
-        ex, ey = x / r, y / r
-        D[0, 0], D[0, 1] = ex, ey
-        D[1, 0], D[1, 1] = -ey, ex
-        D[2, 3], D[2, 4] = a * ey, -a * ex
-        velocity = pin.getVelocity(model, data, self.ball, _WORLD)
-        vx, vy, vz = velocity.linear.tolist()
-        wx, wy, _ = velocity.angular.tolist()
-        turning = (vy * ex - vx * ey) / r
-        drift = D.dot(pin.getClassicalAcceleration(model, data, self.ball, _WORLD).vector)
-        drift[0] += turning * turning * r
+        pin.crba(model, data, q)
+        pin.nonLinearEffects(model, data, q, v)
+        ex, ey = self.aim(q)
+        vx, vy, vz, wx, wy, _ = v.tolist()
+        turning = (vy * ex - vx * ey) / self.c
+        drift = D.dot(pin.getClassicalAcceleration(model, data, self.ball, pin.LOCAL).vector)
+        drift[0] += turning * turning * self.c
         drift[2] += a * turning * (wx * ex + wy * ey)
         if not self.f:
-            return D.dot(jacobian), drift, self.rest
+            return D, drift, self.rest
         scale = self.f / math.sqrt(vx * vx + vy * vy + vz * vz)
         # e1 × v
         moment = np.array([scale * ey * vz, -scale * ex * vz, scale * (ex * vy - ey * vx)])
-        return D.dot(jacobian), drift, jacobian[3:].T.dot(moment)
+        return D, drift, np.concatenate([self.rest[:3], moment])
 
     def respond(self, q: FloatArray, v: FloatArray) -> FloatArray:
-        """Joint acceleration; the multipliers (-N, F2, F3) are kept."""
+        """Acceleration in the world's axes; the multipliers (-N, F2, F3) are kept."""
         rows, drift, moment = self.rows(q, v)
         if not self.f:
-            acceleration = pin.forwardDynamics(self.model, self.data, self.rest, rows, drift)
+            acceleration = np.array(pin.forwardDynamics(self.model, self.data, self.rest, rows, drift))
             self.multipliers = self.data.lambda_c
-            return np.array(acceleration)
-        matrix = self.matrix
-        matrix[:6, :6], matrix[6:, :6], matrix[:6, 6:] = self.data.M, rows, -rows.T
-        matrix[:6, 6] += moment
-        solution = np.linalg.solve(matrix, np.concatenate([-self.data.nle, -drift]))
-        self.multipliers = solution[6:]
-        return solution[:6]
+        else:
+            matrix = self.matrix
+            matrix[:6, :6], matrix[6:, :6], matrix[:6, 6:] = self.data.M, rows, -rows.T
+            matrix[:6, 6] += moment
+            solution = np.linalg.solve(matrix, np.concatenate([-self.data.nle, -drift]))
+            acceleration, self.multipliers = solution[:6], solution[6:]
+        # The joint accelerates in axes that turn with the ball.
+        vx, vy, vz, wx, wy, wz = v.tolist()
+        acceleration[0] += wy * vz - wz * vy
+        acceleration[1] += wz * vx - wx * vz
+        acceleration[2] += wx * vy - wy * vx
+        return acceleration
 
-    def project(self, q: FloatArray, v: FloatArray) -> tuple[FloatArray, FloatArray]:
-        """The centre put back on the wall, and the velocities without slip."""
-        q = q.copy()
+    def project(self, q: FloatArray, v: FloatArray) -> FloatArray:
+        """The velocities without slip; the centre is put back on the wall."""
         x, y = q[:2].tolist()
         q[:2] *= self.c / math.sqrt(x * x + y * y)
-        return q, np.array(pin.impulseDynamics(self.model, self.data, v, self.rows(q, v)[0]))
+        pin.crba(self.model, self.data, q)
+        self.aim(q)
+        return np.array(pin.impulseDynamics(self.model, self.data, v, self.directions))
 
     def contact(self, v: FloatArray) -> tuple[float, float]:  # noqa: ARG002 -- the other mechanism's signature
         """Needed friction and normal force of the last response [N]."""
@@ -184,14 +191,14 @@ class _FreeFlyer:
 def _rows_run(
     mechanism: _Composite | _FreeFlyer, body: RollingBall, settings: Any
 ) -> Callable[[FloatArray], FloatArray]:
-    model, nq, mu = mechanism.model, mechanism.model.nq, body.contact.mu_static
+    q, n, mu = mechanism.q, mechanism.moving, body.contact.mu_static
 
     def rates(_: float, y: FloatArray) -> FloatArray:
-        q, v = pin.normalize(model, y[:nq]), y[nq:]
-        return np.concatenate([pin.tangentMap(model, q).dot(v), mechanism.respond(q, v)])
+        q[:n], v = y[:n], y[n:]
+        return np.concatenate([v[:n], mechanism.respond(q, v)])
 
     def run(times: FloatArray) -> FloatArray:
-        start = np.concatenate([mechanism.q, mechanism.v])
+        start = np.concatenate([q[:n], mechanism.v])
         # A hundredth of the natural sizes, for components in turning axes pass through zero all the time.
         atol = 1e-2 * settings.rtol * mechanism.sizes
         solver = DOP853(rates, 0.0, start, np.inf, rtol=settings.rtol, atol=atol)
@@ -203,13 +210,14 @@ def _rows_run(
                     raise Diverged("the step size fell to nothing")
                 if solver.t == t:
                     solver.h_abs = max(wanted, solver.h_abs)
-                q, v = mechanism.project(pin.normalize(model, solver.y[:nq]), solver.y[nq:])
-                solver.y = np.concatenate([q, v])
+                q[:n] = solver.y[:n]
+                v = mechanism.project(q, solver.y[n:])
+                solver.y = np.concatenate([q[:n], v])
                 solver.f = rates(solver.t, solver.y)
                 friction, press = mechanism.contact(v)
                 if press < 0 or friction > mu * press:
                     raise Diverged(f"the ball slips or leaves the wall at {t:g} s, for which there is no bare loop")
-        return mechanism.centre(solver.y)
+        return mechanism.centre(q)
 
     return run
 

@@ -69,8 +69,8 @@ class Sliding:
         return size * direction[0], size * direction[1]
 
 
-# (velocity of the centre along e2 and e3, spin about e1, e2, e3, gravity along e1, e2, e3) -> contact
-TouchAt = Callable[[float, float, float, float, float, float, float, float], Touch]
+# (velocity of the centre along e2 and e3, spin about e1, gravity along e1, e2, e3) -> N, need2, need3 of Touch
+NeededAt = Callable[[float, float, float, float, float, float], tuple[float, float, float]]
 
 
 def mobility(body: RollingBall) -> float:
@@ -84,7 +84,7 @@ def refuse_slip(body: RollingBall) -> None:
         raise Refused("this formulation only rolls without slip; with bounded friction use generic or contact")
 
 
-def touch_function(body: RollingBall) -> TouchAt:
+def needed_function(body: RollingBall) -> NeededAt:
     """The contact of a ball on a homogeneous surface, whose curvature in the local frame is the same everywhere.
 
     The slip velocity u = v + a ω × e1 changes by u̇ = g + βF + (a/J) M × e1 + a ω × ė1 along the tangents, with the
@@ -94,7 +94,7 @@ def touch_function(body: RollingBall) -> TouchAt:
     beta, lever = mobility(body), body.ball.radius / body.ball.inertia
     (k22, k23), (k32, k33) = curvature(body.surface, body.u0).tolist()
 
-    def touch(v2: float, v3: float, w1: float, w2: float, w3: float, g1: float, g2: float, g3: float) -> Touch:
+    def needed(v2: float, v3: float, w1: float, g1: float, g2: float, g3: float) -> tuple[float, float, float]:
         turn2, turn3 = k22 * v2 + k23 * v3, k32 * v2 + k33 * v3
         N = m * (v2 * turn2 + v3 * turn3 + g1)
         free2, free3 = g2 - a * w1 * turn3, g3 + a * w1 * turn2
@@ -102,9 +102,9 @@ def touch_function(body: RollingBall) -> TouchAt:
             M2, M3 = resistance_moment(f, N, v2, v3)
             free2 += lever * M3
             free3 -= lever * M2
-        return Touch(N, -free2 / beta, -free3 / beta, v2 + a * w3, v3 - a * w2)
+        return N, -free2 / beta, -free3 / beta
 
-    return touch
+    return needed
 
 
 def slip_direction(

@@ -14,7 +14,7 @@ from typing import Any
 import numpy as np
 
 from proofroll.engine import Built, Sample
-from proofroll.engines.exudyn.friction import Sliding, Touch, touch_function
+from proofroll.engines.exudyn.friction import Sliding, Touch, needed_function
 from proofroll.engines.exudyn.integration import Integration, initial_matrices, new_system
 from proofroll.engines.exudyn.local_frame import LocalGeometry, local_geometry
 from proofroll.engines.exudyn.native import exu, items
@@ -63,7 +63,10 @@ class Generic:
         if self.friction is None:
             self.integration = Integration(self.system, settings)
         else:
-            self._touch, self._local_gravity = touch_function(body), _weight(body, self.local, np.eye(3))
+            self._needed, self._local_gravity = needed_function(body), _weight(body, self.local, np.eye(3))
+            constant = _constant_weight(body, self.local, np.eye(3))
+            self._constant_gravity = None if constant is None else tuple(constant[:3])
+            self._radius = body.ball.radius
             self._tangents: tuple[float, ...] = tuple(self.local.tangents[1:].ravel().tolist())
             self.integration = StickSlip(self, body, settings)
 
@@ -158,12 +161,25 @@ class Generic:
         """Stick and slip so far."""
         return self.integration.events if isinstance(self.integration, StickSlip) else []
 
+    @property
+    def place_matters(self) -> bool:
+        """See :class:`Switched`."""
+        return self._constant_gravity is None
+
+    def needed(self, q: FloatArray, q_t: FloatArray) -> tuple[float, float, float]:
+        """See :class:`Switched`."""
+        _, rate1, rate2, w1, _, _ = q_t.tolist()
+        t2u, t2v, t3u, t3v = self._tangents
+        g1, g2, g3 = self._constant_gravity or self._local_gravity(q)[:3]
+        return self._needed(t2u * rate1 + t2v * rate2, t3u * rate1 + t3v * rate2, w1, g1, g2, g3)
+
     def touch(self, q: FloatArray, q_t: FloatArray) -> Touch:
         """See :class:`Switched`."""
-        _, rate1, rate2, w1, w2, w3 = q_t.tolist()
+        _, rate1, rate2, _, w2, w3 = q_t.tolist()
         t2u, t2v, t3u, t3v = self._tangents
-        g1, g2, g3, *_ = self._local_gravity(q)
-        return self._touch(t2u * rate1 + t2v * rate2, t3u * rate1 + t3v * rate2, w1, w2, w3, g1, g2, g3)
+        slip2 = t2u * rate1 + t2v * rate2 + self._radius * w3
+        slip3 = t3u * rate1 + t3v * rate2 - self._radius * w2
+        return Touch(*self.needed(q, q_t), slip2, slip3)
 
     def hold(self, direction: tuple[float, float] | None) -> None:
         """See :class:`Switched`."""
@@ -243,48 +259,55 @@ def _force_function(body: RollingBall, local: LocalGeometry, friction: Sliding |
     tangents = local.tangents
     quadratic = quadratic_terms(body, local)
     (t2u, t2v), (t3u, t3v) = tangents[1:].tolist()
-    weight = _weight(body, local, body.ball.mass * _base(local))
-
-    def force(system: Any, t: float, item: int, q: list[float], rates: list[float]) -> list[float]:  # noqa: ARG001 -- Exudyn's signature
-        result: list[float] = weight(q)
-        for row, i, j, factor in quadratic:
-            result[row] += factor * rates[i] * rates[j]
-        if f:
-            v2, v3 = t2u * rates[1] + t2v * rates[2], t3u * rates[1] + t3v * rates[2]
-            # Along the distance nothing accelerates, so its force is N.
-            M2, M3 = resistance_moment(f, result[0], v2, v3)
-            result[4] += M2
-            result[5] += M3
-        return result
-
-    if friction is None:
-        return force
+    base = body.ball.mass * _base(local)
+    weight, constant = _weight(body, local, base), _constant_weight(body, local, base)
     a = body.ball.radius
 
-    def force_and_friction(system: Any, t: float, item: int, q: list[float], rates: list[float]) -> list[float]:
-        result = force(system, t, item, q, rates)
-        if friction.direction is not None:
-            F2, F3 = friction.force(friction.direction, result[0])
+    def force(system: Any, t: float, item: int, q: list[float], rates: list[float]) -> list[float]:  # noqa: ARG001 -- Exudyn's signature
+        result: list[float] = constant[:] if constant is not None else weight(q)
+        for row, i, j, factor in quadratic:
+            result[row] += factor * rates[i] * rates[j]
+        N = result[0]  # along the distance nothing accelerates
+        if f:
+            v2, v3 = t2u * rates[1] + t2v * rates[2], t3u * rates[1] + t3v * rates[2]
+            M2, M3 = resistance_moment(f, N, v2, v3)
+            result[4] += M2
+            result[5] += M3
+        if friction is not None and friction.direction is not None:
+            F2, F3 = friction.force(friction.direction, N)
             result[1] += t2u * F2 + t3u * F3
             result[2] += t2v * F2 + t3v * F3
             result[4] -= a * F3
             result[5] += a * F2
         return result
 
-    return force_and_friction
+    return force
+
+
+def _rotations(local: LocalGeometry) -> tuple[list[int], FloatArray]:
+    """Which coordinates turn the frame, and about which axis the first of them does."""
+    rotations = [k for k, generator in enumerate(local.generators) if generator.kind == "rotation"]
+    return rotations, np.asarray(local.generators[rotations[0]].axis) if rotations else np.zeros(3)
+
+
+def _constant_weight(body: RollingBall, local: LocalGeometry, scaled: FloatArray) -> list[float] | None:
+    """Generalised gravity if it is the same everywhere, else None."""
+    rotations, axis = _rotations(local)
+    if rotations and np.any(np.abs(np.cross(axis, body.gravity)) > 1e-14 * np.linalg.norm(body.gravity)):
+        return None
+    return [*(scaled.T @ body.surface.frame(body.u0).T @ body.gravity).tolist(), 0.0, 0.0, 0.0]
 
 
 def _weight(body: RollingBall, local: LocalGeometry, scaled: FloatArray) -> Any:
     """Generalised gravity as a function of q: constant, or turning once around with one of the coordinates."""
+    constant = _constant_weight(body, local, scaled)
+    if constant is not None:
+        return lambda q: constant[:]  # noqa: ARG005 -- the place does not matter here
     to_local = body.surface.frame(body.u0).T
-    rotations = [k for k, generator in enumerate(local.generators) if generator.kind == "rotation"]
-    axis = np.asarray(local.generators[rotations[0]].axis) if rotations else np.zeros(3)
+    rotations, axis = _rotations(local)
     along = axis * (axis @ body.gravity)
     cosine, sine = body.gravity - along, np.cross(axis, body.gravity)
     zero = [0.0, 0.0, 0.0]
-    if not rotations or not np.any(np.abs(sine) > 1e-14 * np.linalg.norm(body.gravity)):
-        constant = [*(scaled.T @ to_local @ body.gravity).tolist(), *zero]
-        return lambda q: constant[:]  # noqa: ARG005 -- the place does not matter here
     if len(rotations) > 1:
         raise Refused("gravity along a wall with two rotations is not built")
     steady, with_cosine, with_sine = (scaled.T @ to_local @ part for part in (along, cosine, sine))

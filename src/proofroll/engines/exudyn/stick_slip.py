@@ -34,6 +34,13 @@ class Switched(Protocol):
 
     system: Any
 
+    @property
+    def place_matters(self) -> bool:
+        """Whether the contact depends on the coordinates themselves, and not on their rates alone."""
+
+    def needed(self, q: FloatArray, q_t: FloatArray) -> tuple[float, float, float]:
+        """N, and the friction along e2 and e3 that it takes to roll on [N]; as in :meth:`touch`."""
+
     def touch(self, q: FloatArray, q_t: FloatArray) -> Touch:
         """The contact in the state of these coordinates and rates."""
 
@@ -78,6 +85,10 @@ class StickSlip:
         self.state = self._state(exu.ConfigurationType.Initial)
         self._before, self._before_t = self.state, 0.0
         self._last_step: tuple[Touch, Touch, float] | None = None  # its end, its start and its length [s]
+        # What _roll_on read after the last step and the one before it; not the coordinates where they do not matter.
+        self._latest: tuple[float, FloatArray, FloatArray] = (0.0, self.state.q, self.state.q_t)
+        self._earlier: tuple[float, FloatArray, FloatArray] | None = None
+        self._place_matters, self._shortest = model.place_matters, 0.5 * settings.dt
         self._watching, self._stopped = False, False
         self.system.SetPostStepUserFunction(self._watch)
         if self._margin(self.state.touch) < 0:
@@ -92,6 +103,8 @@ class StickSlip:
                 self.integration.advance(t)
             finally:
                 self._watching = False
+            if self.sticking and not self._stopped:
+                self.state = self._state(exu.ConfigurationType.Current)
             if self.state.touch.N <= 0:
                 self.events.append(Event("liftoff", 0.5 * (self._before_t + self.t), self._before_t, self.t))
                 raise Diverged(f"the ball leaves the wall at {self.t:g} s")
@@ -104,6 +117,8 @@ class StickSlip:
         """Called by Exudyn after each step, and once where it starts; False stops it."""
         if not self._watching:
             return True
+        if self.sticking:
+            return self._roll_on(t)
         elapsed = t - self.t
         if elapsed > 0.5 * self.settings.dt:
             self._before, self._before_t = self.state, self.t
@@ -114,9 +129,26 @@ class StickSlip:
                 self._stopped = True
                 return False
             self._last_step = touch, self._before.touch, elapsed
-        if not self.sticking:
-            self._aim(self.settings.dt)
+        self._aim(self.settings.dt)
         return True
+
+    def _roll_on(self, t: float) -> bool:
+        """As :meth:`_watch`, while the ball rolls: no more than whether it goes on, for a step takes microseconds."""
+        if t - self.t <= self._shortest:
+            return True
+        q_t = self._q_t()
+        q = self._q() if self._place_matters else q_t
+        N, need2, need3 = self.model.needed(q, q_t)
+        if self.mu_static * N > math.hypot(need2, need3) and N > 0:
+            self._earlier, self._latest, self.t = self._latest, (t, q, q_t), t
+            return True
+        if self._earlier is not None:
+            (now, *latest), (before, *earlier) = self._latest, self._earlier
+            self._last_step = self.model.touch(*latest), self.model.touch(*earlier), now - before
+        self._before, self._before_t = self._state(exu.ConfigurationType.StartOfStep), self.t
+        self.state, self.t = self._state(exu.ConfigurationType.Current), t
+        self._stopped = True
+        return False
 
     def _margin(self, touch: Touch) -> float:
         """Positive while the contact stays as it is: friction left in the cone [N], or slip still forward [m/s]."""
@@ -225,4 +257,5 @@ class StickSlip:
         else:
             self._aim(0.0)
         self.model.reached()
+        self._latest, self._earlier = (self.t, self.state.q, self.state.q_t), None
         self.integration = Integration(self.system, self.settings, at=self.t)

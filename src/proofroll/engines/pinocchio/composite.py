@@ -3,16 +3,46 @@
 from __future__ import annotations
 
 import math
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 import pinocchio as pin
 
 from proofroll.engines.pinocchio.mechanism import Mechanism, Sliding
-from proofroll.engines.pinocchio.rows import BallTerms, ball_terms, cross, resistance, rolling_rows
+from proofroll.engines.pinocchio.rows import (
+    BallTerms,
+    ball_terms,
+    cross,
+    own_bias,
+    own_jacobian,
+    resistance,
+    rolling_directions,
+    rolling_rows,
+)
 from proofroll.errors import Refused
 from proofroll.scene import RollingBall
 from proofroll.surfaces import FloatArray, Generator
+
+# Two places on the surface, at which its geometry along the local axes is compared.
+_SHIFTS = np.zeros(6), np.array([0.7, -0.4, 0.0, 0.0, 0.0, 0.0])
+
+
+class _AlongAxes(NamedTuple):
+    """Constants along e1, e2, e3, from Pinocchio's Jacobian of the ball there.
+
+    Attributes:
+        directions: slip along e2 and e3 from (v, ω), shape (2, 6).
+        rows: the same from the joint velocities, shape (2, 5).
+        by_moment: joint torques of a moment on the ball, shape (5, 3).
+        tangents: velocity of the centre along e2 and e3 per rate of each coordinate [m/unit].
+        turns: angular velocity of the carriage about e1, e2 and e3 per rate of each coordinate [rad/unit].
+    """
+
+    directions: FloatArray
+    rows: FloatArray
+    by_moment: FloatArray
+    tangents: tuple[tuple[float, float], ...]
+    turns: tuple[Any, ...]
 
 
 class Composite(Mechanism):
@@ -21,6 +51,10 @@ class Composite(Mechanism):
     Coordinates are (u1, u2, orientation of the ball in the carriage), velocities (u̇1, u̇2, spin relative to the
     carriage in the ball's axes). Two rows remain, those of rolling. The normal force is what the spherical joint
     transmits.
+
+    Where the orientation is not integrated, the ball's axes stay the carriage's, which are e1, e2, e3. Everything is
+    taken from Pinocchio along these. Where the two motions of the surface commute, the Jacobian is constant there, and
+    so are the rows.
     """
 
     def __init__(self, body: RollingBall, orientation: bool) -> None:
@@ -46,6 +80,7 @@ class Composite(Mechanism):
             pin.forwardKinematics(self.model, data, self.q0)
             self.q0[2:] = pin.Quaternion(data.oMi[self.ball].rotation.T.copy()).coeffs()
         jacobian = ball_terms(self.model, data, self.ball, self.q0, self._rest, self._rest).jacobian
+        self._own = None if orientation else self._along_axes()
         self.v0 = np.linalg.lstsq(jacobian, np.concatenate([body.v0, body.w0]), rcond=None)[0]
         metres = np.asarray(body.surface.length_scales)
         self.q_scale = np.concatenate([self._radius / metres, np.ones(4)])
@@ -59,22 +94,58 @@ class Composite(Mechanism):
         e1_rate = cross(turning.tolist(), frame[:, 0].tolist())
         return terms, frame, *rolling_rows(terms, self._radius, frame.T.ravel().tolist(), e1_rate)
 
+    def _along_axes(self) -> _AlongAxes | None:
+        """What is constant along the ball's axes; None if it changes from place to place."""
+        here, there = (own_jacobian(self.model, self.ball, self.q0 + shift) for shift in _SHIFTS)
+        if not np.allclose(here, there, rtol=1e-12, atol=1e-12):
+            return None
+        directions = rolling_directions(self._radius, np.eye(3).ravel().tolist())
+        (_, _), (t2u, t2v), (t3u, t3v), *turns = here[:, :2].tolist()
+        return _AlongAxes(directions, directions @ here, here[3:].T.copy(), ((t2u, t2v), (t3u, t3v)), tuple(turns))
+
+    def _only_rows(self, data: Any, q: FloatArray, v: FloatArray) -> FloatArray:
+        if self._own is None:
+            return self._rows(data, q, v)[2]
+        pin.crba(self.model, data, q)
+        return self._own.rows
+
+    def _accelerate_along(self, own: _AlongAxes, data: Any, q: FloatArray, v: FloatArray) -> FloatArray:
+        """As :meth:`accelerate`, from what is constant along the ball's axes."""
+        drift = own.directions.dot(own_bias(self.model, data, self.ball, q, v, self._rest))
+        # a ω × ė1 with ė1 = Ω × e1 and Ω of the carriage.
+        first, second, spin, _, _ = v.tolist()
+        (x1, y1), (x2, y2), (x3, y3) = own.turns
+        lever = self._radius * (spin + x1 * first + y1 * second)
+        drift[0] += lever * (x2 * first + y2 * second)
+        drift[1] += lever * (x3 * first + y3 * second)
+        torque = self._rest
+        if self._f:
+            (x2, y2), (x3, y3) = own.tangents
+            v2, v3 = x2 * first + y2 * second, x3 * first + y3 * second
+            speed = math.hypot(v2, v3)
+            lever = self._f * self.normal_force(data) / speed if speed else 0.0
+            torque = own.by_moment.dot(np.array((0.0, -lever * v3, lever * v2)))
+        return pin.forwardDynamics(self.model, data, torque, own.rows, drift)  # type: ignore[no-any-return]  # it is an array
+
     def _transmitted(self, data: Any, e1: FloatArray) -> float:
         """N [N] from the wrench in the spherical joint that the last pass of Pinocchio left in ``data``."""
         return -float(e1.dot(data.oMi[self.ball].rotation.dot(data.f[self.ball].linear)))
 
-    def respond(self, data: Any, q: FloatArray, v: FloatArray) -> tuple[FloatArray, FloatArray]:
-        """Joint acceleration, and F2, F3 [N]."""
+    def accelerate(self, data: Any, q: FloatArray, v: FloatArray) -> FloatArray:
+        """See :class:`~proofroll.engines.pinocchio.mechanism.Mechanism`; the multipliers are F2, F3."""
+        if self._own is not None:
+            return self._accelerate_along(self._own, data, q, v)
         terms, frame, rows, drift = self._rows(data, q, v)
         torque = self._rest
         if self._f:
             # The joints cannot accelerate the ball along e1, so N follows from the bias pass alone.
             torque = resistance(terms, self._f, frame[:, 0]) * self._transmitted(data, frame[:, 0])
-        acceleration = pin.forwardDynamics(self.model, data, torque, rows, drift)
-        return np.array(acceleration), np.array(data.lambda_c)
+        return pin.forwardDynamics(self.model, data, torque, rows, drift)  # type: ignore[no-any-return]  # it is an array
 
     def normal_force(self, data: Any) -> float:
         """See :class:`~proofroll.engines.pinocchio.mechanism.Mechanism`; forwardDynamics leaves the bias pass alone."""
+        if self._own is not None:
+            return -float(data.f[self.ball].linear[0])
         return self._transmitted(data, data.oMi[self._carriage].rotation.dot(self._frame0[:, 0]))
 
     def reaction(self, data: Any, q: FloatArray, v: FloatArray) -> tuple[FloatArray, FloatArray]:
@@ -83,11 +154,6 @@ class Composite(Mechanism):
         frame = data.oMi[self._carriage].rotation @ self._frame0
         pin.rnea(self.model, data, q, v, acceleration)
         return acceleration, frame @ np.array([-self._transmitted(data, frame[:, 0]), *friction])
-
-    def needed(self, data: Any, q: FloatArray, v: FloatArray) -> tuple[float, float]:
-        """See :class:`~proofroll.engines.pinocchio.mechanism.Mechanism`."""
-        friction = self.respond(data, q, v)[1]
-        return math.hypot(*friction), self.normal_force(data)
 
     def slide(self, data: Any, q: FloatArray, v: FloatArray, direction: FloatArray) -> Sliding:
         """See :class:`~proofroll.engines.pinocchio.mechanism.Mechanism`; the friction is put to the joints."""

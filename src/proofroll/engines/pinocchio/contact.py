@@ -17,7 +17,6 @@ import pinocchio as pin
 
 from proofroll.engine import Built, Sample, whole_steps
 from proofroll.engines.pinocchio.contact_tolerances import softened
-from proofroll.engines.pinocchio.rows import cross
 from proofroll.engines.pinocchio.settings import PinocchioSettings
 from proofroll.errors import Diverged, Refused
 from proofroll.events import Event, EventKind
@@ -44,15 +43,22 @@ class Kick(NamedTuple):
     Attributes:
         before, v: joint velocity before and after it, shape (6,).
         span: duration [s].
-        force: of the wall on the ball in the world, mean over the span [N], shape (3,).
+        axes: of the plane, as columns in the world.
+        impulse: along them [N s], shape (3,).
         status: ``stick``, ``slip``, or ``liftoff`` where the wall does not press.
     """
 
     before: FloatArray
     v: FloatArray
     span: float
-    force: FloatArray
+    axes: FloatArray
+    impulse: FloatArray
     status: EventKind
+
+    @property
+    def force(self) -> FloatArray:
+        """Of the wall on the ball in the world, mean over the span [N], shape (3,)."""
+        return np.asarray(self.axes @ self.impulse / self.span)
 
 
 class ContactRun:
@@ -71,6 +77,8 @@ class ContactRun:
             Refused: Pinocchio's solver does not find the first impulse.
         """
         self._body, self._settings = body, settings
+        self._surface, self._f = body.surface, body.contact.rolling_resistance
+        self._no_torque = np.zeros(6)
         self._dt = float(settings.dt or 0.0)
         self._solver_kind, self._tolerance = settings.solver or "pgs", float(settings.solver_tolerance or 0.0)
         self._leapfrog = settings.integrator == "leapfrog"
@@ -127,7 +135,7 @@ class ContactRun:
                 before = max(self._time - self._dt, 0.0)
                 self._events.append(Event(kick.status, 0.5 * (before + self._time), before, self._time))
             self._status, self._started = kick.status, True
-            self._pressed = self._pressed or bool(kick.force.any())
+            self._pressed = self._pressed or bool(kick.impulse.any())
             self._v = kick.v
             self._q = pin.integrate(self.model, self._q, self._dt * kick.v)
         self._time = end
@@ -137,25 +145,22 @@ class ContactRun:
         model, data, q, v = self.model, self._data, self._q, self._v
         span = self._dt if self._started or not self._leapfrog else 0.5 * self._dt
         pin.computeAllTerms(model, data, q, v)
-        velocity = pin.getVelocity(model, data, self._ball, pin.LOCAL_WORLD_ALIGNED)
-        p, turned = data.oMi[self._ball].translation, data.oMi[self._ball].rotation
-        place = p.tolist()
-        triad = self._body.surface.triad(*place)
-        axes = self._pose(p, turned, triad)
+        velocity, pose = pin.getVelocity(model, data, self._ball, pin.LOCAL_WORLD_ALIGNED), data.oMi[self._ball]
+        back, v_WB = pose.rotation.T, velocity.linear.tolist()
+        x, y, z = place = pose.translation.tolist()
+        triad = self._surface.triad(x, y, z)
+        axes = self._pose(place, back, triad)
         self._point.calc(model, data, self._point_data)
         jacobian = self._point.jacobian(model, data, self._point_data)
-        inverse = self._inverse
-        to_joints = inverse.dot(jacobian.T)
+        to_joints = self._inverse.dot(jacobian.T)
         delassus = pin.DelassusOperatorDense(jacobian.dot(to_joints))
-        shift = np.array([0.0, 0.0, self._body.surface.nearby(*place)[0] / self._dt])
-        if self._leapfrog:
-            shift += self._turning(place, velocity, triad)
+        shift = np.array(self._shift(place, v_WB, velocity.angular.tolist(), triad))
 
-        f, torque, normal_force = self._body.contact.rolling_resistance, np.zeros(6), self._normal_force
-        after, velocity_now = v, velocity.linear
+        f, torque, normal_force = self._f, self._no_torque, self._normal_force
+        velocity_now = v_WB
         for _ in range(_REPEATS):
             if f:
-                torque = self._resistance(p, turned, velocity_now) * normal_force
+                torque = self._resistance(triad, back, velocity_now, normal_force)
             free = v + span * pin.aba(model, data, q, v, torque)
             impulse, status = self._solve(delassus, jacobian.dot(free) + shift)
             after = free + to_joints.dot(impulse)
@@ -164,43 +169,65 @@ class ContactRun:
                 break
             normal_force = found
             # the resistance is that at the present time, which with leapfrog is the middle of the kick
-            velocity_now = 0.5 * (v + after)[:3] if self._leapfrog and self._started else velocity.linear
+            if self._leapfrog and self._started:
+                velocity_now = (0.5 * (v + after)[:3]).tolist()
         self._normal_force = found  # only where the next repetition starts
         if status == "liftoff" and not self._pressed:
             status = self._status  # a plane does not press before the ball has moved into it
-        return Kick(v, after, span, axes @ impulse / span, status)
+        return Kick(v, after, span, axes, impulse, status)
 
-    def _pose(self, p: FloatArray, turned: FloatArray, triad: Sequence[float]) -> FloatArray:
-        """Poses the plane, and returns its axes as columns, the last one from the wall into the ball."""
+    def _pose(self, p: Sequence[float], back: FloatArray, triad: Sequence[float]) -> FloatArray:
+        """Poses the plane, and returns its axes as columns, the last one from the wall into the ball.
+
+        Args:
+            p: centre of the ball [m].
+            back: rotation from the world into the ball's axes.
+            triad: components of e1, e2, e3.
+        """
         x1, y1, z1, x2, y2, z2, x3, y3, z3 = triad
-        axes = np.array([[x2, -x3, -x1], [y2, -y3, -y1], [z2, -z3, -z1]])
-        arm = -self._body.ball.radius * axes[:, 2]
-        self._point.joint1_placement = pin.SE3(axes, p + arm)
-        self._point.joint2_placement = pin.SE3(turned.T.dot(axes), turned.T.dot(arm))
+        x, y, z = p
+        a = self._body.ball.radius
+        arm = np.array((a * x1, a * y1, a * z1))
+        axes = np.array((x2, -x3, -x1, y2, -y3, -y1, z2, -z3, -z1)).reshape(3, 3)
+        self._point.joint1_placement = pin.SE3(axes, np.array((x + a * x1, y + a * y1, z + a * z1)))
+        self._point.joint2_placement = pin.SE3(back.dot(axes), back.dot(arm))
         return axes
 
-    def _turning(
-        self, p: tuple[float, float, float], velocity: Any, triad: Sequence[float]
+    def _shift(
+        self, p: Sequence[float], v: Sequence[float], w: Sequence[float], triad: Sequence[float]
     ) -> tuple[float, float, float]:
-        """What the turning of the normal adds to the velocity of the contact point in half a step [m/s].
+        """What is added to the velocity of the contact point, along the axes of the plane, e2, -e3 and -e1 [m/s].
 
-        Along the axes of the plane, e2, -e3 and -e1: a ω × ė1, and the bend of the path.
+        That the gap closes within the step; and with leapfrog what the turning of the normal adds in half a step,
+        a ω × ė1 and the bend of the path.
         """
+        x, y, z = p
+        closing = self._surface.nearby(x, y, z)[0] / self._dt
+        if not self._leapfrog:
+            return 0.0, 0.0, closing
         _, _, _, x2, y2, z2, x3, y3, z3 = triad
-        v = velocity.linear.tolist()
-        rate = self._body.surface.normal_rate(p, v)
-        x, y, z = cross(velocity.angular.tolist(), rate)
-        half, lever = 0.5 * self._dt, 0.5 * self._dt * self._body.ball.radius
-        bend = rate[0] * v[0] + rate[1] * v[1] + rate[2] * v[2]
-        return lever * (x2 * x + y2 * y + z2 * z), -lever * (x3 * x + y3 * y + z3 * z), -half * bend
+        vx, vy, vz = v
+        rx, ry, rz = self._surface.normal_rate((x, y, z), (vx, vy, vz))
+        wx, wy, wz = w
+        tx, ty, tz = wy * rz - wz * ry, wz * rx - wx * rz, wx * ry - wy * rx
+        half = 0.5 * self._dt
+        lever = half * self._body.ball.radius
+        return (
+            lever * (x2 * tx + y2 * ty + z2 * tz),
+            -lever * (x3 * tx + y3 * ty + z3 * tz),
+            closing - half * (rx * vx + ry * vy + rz * vz),
+        )
 
-    def _resistance(self, p: FloatArray, turned: FloatArray, v_WB: FloatArray) -> FloatArray:
-        """Rolling resistance on the joints per unit of normal force [m], shape (6,); zero where the ball rests."""
-        torque, speed = np.zeros(6), math.sqrt(v_WB @ v_WB)
+    def _resistance(
+        self, triad: Sequence[float], back: FloatArray, v: Sequence[float], normal_force: float
+    ) -> FloatArray:
+        """Rolling resistance on the joints [N m], shape (6,); zero where the ball, at ``v`` [m/s], rests."""
+        x, y, z, *_ = triad
+        vx, vy, vz = v
+        torque, speed = np.zeros(6), math.sqrt(vx * vx + vy * vy + vz * vz)
         if speed > 0:
-            e1 = self._body.surface.normal(p)
-            lever = np.array(cross(e1.tolist(), v_WB.tolist())) * (self._body.contact.rolling_resistance / speed)
-            torque[3:] = turned.T.dot(lever)
+            f = self._f * normal_force / speed
+            torque[3:] = back.dot(np.array((f * (y * vz - z * vy), f * (z * vx - x * vz), f * (x * vy - y * vx))))
         return torque
 
     def _solve(self, delassus: Any, free: FloatArray) -> tuple[FloatArray, EventKind]:
@@ -264,10 +291,11 @@ class ContactRun:
         inertia = self.model.inertias[self._ball]
         pose, point = self._data.oMi[self._ball], self._point_data
         f = 0.0
-        if self._body.contact.rolling_resistance:
+        if self._f:
             # At rest it has no direction, so it is looked at in motion: along the first axis of the plane.
-            along = self._point.joint1_placement.rotation[:, 0]
-            f = float(np.linalg.norm(self._resistance(pose.translation, pose.rotation, along)))
+            along = self._point.joint1_placement.rotation[:, 0].tolist()
+            triad = self._surface.triad(*pose.translation.tolist())
+            f = float(np.linalg.norm(self._resistance(triad, pose.rotation.T, along, 1.0)))
         acceleration = (kick.v - kick.before) / kick.span
         return Built(
             mass=float(inertia.mass),

@@ -3,13 +3,14 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Sequence
 from typing import Any
 
 import numpy as np
 import pinocchio as pin
 
 from proofroll.engines.pinocchio.mechanism import Mechanism, Sliding
-from proofroll.engines.pinocchio.rows import BallTerms, ball_terms, resistance, rolling_rows
+from proofroll.engines.pinocchio.rows import BallTerms, ball_terms, own_bias, resistance, rolling_rows
 from proofroll.scene import RollingBall
 from proofroll.surfaces import FloatArray
 
@@ -18,7 +19,7 @@ class FreeFlyer(Mechanism):
     """Six freedoms; the rows come from the signed distance to the surface and its derivatives.
 
     Velocities are those of the free-flyer joint, in the ball's own axes. The multipliers are the components of the
-    wall's force along e1, e2 and e3.
+    wall's force along e1, e2 and e3. Where the orientation is not integrated, the ball's axes stay the world's.
     """
 
     def __init__(self, body: RollingBall, orientation: bool) -> None:
@@ -26,6 +27,15 @@ class FreeFlyer(Mechanism):
         super().__init__(body)
         self._surface = body.surface
         self._orientation = orientation
+        self._matrix = np.zeros((9, 9))
+        self._directions = np.zeros((3, 6))
+        self._entries = self._directions.reshape(-1)
+        triad = self._surface.triad(*body.p0.tolist())
+        moving = _changing(body)
+        entries = _entries(self._radius)
+        self._changing = [entry for entry in entries if entry[1] in moving]
+        for index, source, factor in entries:
+            self._entries[index] = factor * triad[source]
         self._add_ball(body, 0, pin.JointModelFreeFlyer(), pin.SE3.Identity())
         self.q0 = np.concatenate([body.p0, [0.0, 0.0, 0.0, 1.0]])
         self.v0 = np.concatenate([body.v0, body.w0])
@@ -46,31 +56,76 @@ class FreeFlyer(Mechanism):
         drift[0], drift[1:] = e1.dot(terms.bias[:3]) + bend, slip_drift
         return terms, frame, rows, drift
 
-    def _solve(self, data: Any, q: FloatArray, v: FloatArray) -> tuple[FloatArray, FloatArray, FloatArray]:
-        """Joint acceleration, multipliers (-N, F2, F3) [N], and the local frame."""
-        terms, frame, rows, drift = self._rows(data, q, v)
+    def _aimed(self, triad: Sequence[float]) -> FloatArray:
+        """Velocity along e1, and of slip along e2 and e3, from (v, ω) in the world, shape (3, 6).
+
+        The next call overwrites it: only what changes from place to place is written again.
+        """
+        entries = self._entries
+        for index, source, factor in self._changing:
+            entries[index] = factor * triad[source]
+        return self._directions
+
+    def _own_rows(self, data: Any, q: FloatArray, v: FloatArray) -> tuple[FloatArray, FloatArray, FloatArray]:
+        """Rows, drift, and the rolling resistance per unit of N on the joint, where its axes are the world's.
+
+        The joint's velocities are then those of the ball in the world, with no Jacobian between.
+        """
+        place, (vx, vy, vz, wx, wy, wz) = q[:3].tolist(), v.tolist()
+        triad = self._surface.triad(*place)
+        x, y, z = self._surface.normal_rate(place, (vx, vy, vz))
+        directions = self._aimed(triad)
+        drift = directions.dot(own_bias(self.model, data, self.ball, q, v, self._rest))
+        x1, y1, z1, x2, y2, z2, x3, y3, z3 = triad
+        a = self._radius
+        tx, ty, tz = a * (wy * z - wz * y), a * (wz * x - wx * z), a * (wx * y - wy * x)  # a ω × ė1
+        drift[0] += x * vx + y * vy + z * vz
+        drift[1] += x2 * tx + y2 * ty + z2 * tz
+        drift[2] += x3 * tx + y3 * ty + z3 * tz
+        lever = self._rest
+        if self._f:
+            speed = math.sqrt(vx * vx + vy * vy + vz * vz)
+            f = self._f / speed if speed else 0.0
+            moment = (f * (y1 * vz - z1 * vy), f * (z1 * vx - x1 * vz), f * (x1 * vy - y1 * vx))
+            lever = np.array((0.0, 0.0, 0.0, *moment))
+        return directions, drift, lever
+
+    def _only_rows(self, data: Any, q: FloatArray, v: FloatArray) -> FloatArray:
+        if self._orientation:
+            return self._rows(data, q, v)[2]
+        pin.crba(self.model, data, q)
+        return self._aimed(self._surface.triad(*q[:3].tolist()))
+
+    def _solve(self, data: Any, rows: FloatArray, drift: FloatArray, lever: FloatArray) -> FloatArray:
+        """Joint acceleration; the multipliers (-N, F2, F3) [N] are left in ``data``.
+
+        Rolling resistance is proportional to N, an unknown here: it makes the columns differ from the rows, which
+        forwardDynamics does not allow.
+        """
         if not self._f:
-            acceleration = pin.forwardDynamics(self.model, data, self._rest, rows, drift)
-            return np.array(acceleration), np.array(data.lambda_c), frame
-        # Rolling resistance is proportional to N, an unknown here: it makes the columns differ from the rows, which
-        # forwardDynamics does not allow.
-        columns = rows.T.copy()
-        columns[:, 0] -= resistance(terms, self._f, frame[:, 0])
-        matrix = np.zeros((9, 9))
-        matrix[:6, :6] = data.M
-        matrix[:6, 6:] = -columns
-        matrix[6:, :6] = rows
+            return pin.forwardDynamics(self.model, data, self._rest, rows, drift)  # type: ignore[no-any-return]  # it is an array
+        matrix = self._matrix
+        matrix[:6, :6], matrix[6:, :6], matrix[:6, 6:] = data.M, rows, -rows.T
+        matrix[:6, 6] += lever
         solution = np.linalg.solve(matrix, np.concatenate([-data.nle, -drift]))
         data.lambda_c = solution[6:]  # where forwardDynamics leaves them
-        return solution[:6], solution[6:], frame
+        return solution[:6]
 
-    def respond(self, data: Any, q: FloatArray, v: FloatArray) -> tuple[FloatArray, FloatArray]:
-        """Joint acceleration, and -N, F2, F3 [N]; without orientation the acceleration is that of world components."""
-        acceleration, multipliers, _ = self._solve(data, q, v)
-        if not self._orientation:
-            # The joint accelerates in the ball's axes, which turn with ω; axes that are held fixed do not.
-            acceleration[:3] += pin.skew(v[3:]) @ v[:3]
-        return acceleration, multipliers
+    def accelerate(self, data: Any, q: FloatArray, v: FloatArray) -> FloatArray:
+        """See :class:`~proofroll.engines.pinocchio.mechanism.Mechanism`.
+
+        Without orientation the acceleration is that of world components: the joint accelerates in the ball's axes,
+        which turn with ω, and axes that are held fixed do not.
+        """
+        if self._orientation:
+            terms, frame, rows, drift = self._rows(data, q, v)
+            return self._solve(data, rows, drift, resistance(terms, self._f, frame[:, 0]) if self._f else self._rest)
+        acceleration = self._solve(data, *self._own_rows(data, q, v))
+        vx, vy, vz, wx, wy, wz = v.tolist()
+        acceleration[0] += wy * vz - wz * vy
+        acceleration[1] += wz * vx - wx * vz
+        acceleration[2] += wx * vy - wy * vx
+        return acceleration
 
     def normal_force(self, data: Any) -> float:
         """See :class:`~proofroll.engines.pinocchio.mechanism.Mechanism`."""
@@ -78,24 +133,22 @@ class FreeFlyer(Mechanism):
 
     def reaction(self, data: Any, q: FloatArray, v: FloatArray) -> tuple[FloatArray, FloatArray]:
         """Joint acceleration, and the wall's force from the multipliers."""
-        acceleration, multipliers, frame = self._solve(data, q, v)
-        return acceleration, frame @ multipliers
+        terms, frame, rows, drift = self._rows(data, q, v)
+        lever = resistance(terms, self._f, frame[:, 0]) if self._f else self._rest
+        return np.array(self._solve(data, rows, drift, lever)), frame @ data.lambda_c
 
     def on_surface(self, q: FloatArray) -> FloatArray:
         """The configuration with the centre moved onto the surface along its normal."""
         q = q.copy()
-        gap, *e1 = self._surface.nearby(*q[:3].tolist())
-        q[:3] += gap * np.array(e1)
+        gap, x, y, z = self._surface.nearby(*q[:3].tolist())
+        q[0] += gap * x
+        q[1] += gap * y
+        q[2] += gap * z
         return q
 
     def gap(self, q: FloatArray) -> float:
         """Value of the row of the surface [m]."""
         return float(self._surface.gap(q[:3]))
-
-    def needed(self, data: Any, q: FloatArray, v: FloatArray) -> tuple[float, float]:
-        """See :class:`~proofroll.engines.pinocchio.mechanism.Mechanism`."""
-        minus_N, F2, F3 = self._solve(data, q, v)[1]
-        return math.hypot(F2, F3), -float(minus_N)
 
     def _slide(self, data: Any, q: FloatArray, v: FloatArray, direction: FloatArray) -> Sliding:
         """One row, that of the surface; friction and rolling resistance are columns, for both follow N."""
@@ -134,3 +187,24 @@ class FreeFlyer(Mechanism):
         q = self.on_surface(q)
         rows = self._rows(data, q, v)[2]
         return q, np.array(pin.impulseDynamics(self.model, data, v, rows[:1]))
+
+
+def _entries(radius: float) -> list[tuple[int, int, float]]:
+    """What the directions consist of: place in their 18 numbers, place in a triad, and factor.
+
+    Along e1 it is e1·v, along e2 the slip e2·v + a e3·ω, along e3 the slip e3·v - a e2·ω.
+    """
+    blocks = ((0, 0, 1.0), (6, 3, 1.0), (9, 6, radius), (12, 6, 1.0), (15, 3, -radius))
+    return [(index + k, source + k, factor) for index, source, factor in blocks for k in range(3)]
+
+
+def _changing(body: RollingBall) -> set[int]:
+    """Which of the nine components of e1, e2, e3 change from place to place; all, if that is not known."""
+    surface = body.surface
+    if surface.generators is None:
+        return set(range(9))
+    # A component of a frame that one motion turns by α is p + q sin α + r cos α: where it is the same at three angles
+    # it is the same at all.
+    places = [[x, y] for x in (0.0, 1.0, 2.5) for y in (0.0, 1.0, 2.5)]
+    triads = surface.frame(np.array(places)).swapaxes(-1, -2).reshape(-1, 9)
+    return set(np.flatnonzero(np.ptp(triads, axis=0) > 0).tolist())

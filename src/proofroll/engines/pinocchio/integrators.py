@@ -142,50 +142,76 @@ class RungeKutta4(FixedStep):
 # nowhere: ordinary steps are a hundred times longer, and one jump of the forces is passed in a few dozen.
 _SHORT = 1e-4
 _PATIENCE = 500
+# Numbers of the ball's orientation in a configuration.
+_QUATERNION = 4
 
 
 class Adaptive:
-    """DOP853 on configuration and velocity together, the quaternion by its rate (pin.tangentMap)."""
+    """DOP853 on configuration and velocity together, the quaternion by its rate (pin.tangentMap) if it is integrated.
+
+    One solver lives from event to event. Its bound moves from sample to sample, so that a step ends at each: the dense
+    output of DOP853 has a lower order.
+    """
 
     def __init__(self, mechanism: Mechanism, settings: PinocchioSettings) -> None:
         self._mechanism, self._settings = mechanism, settings
         self._model, self._data = mechanism.model, mechanism.model.createData()
-        self._moving = _moving(mechanism, settings)
+        # In both formulations the orientation is last. Without it, see _moving, no more than the place is integrated,
+        # and its rates are velocities of the joints.
+        self._turns = bool(settings.orientation)
+        self._places = self._model.nq if self._turns else self._model.nq - _QUATERNION
         self._rtol = float(settings.rtol or 0.0)
         # Components in the ball's turning axes pass through zero all the time: a hundredth of their natural size
         # keeps the tolerance relative to most of their range.
-        self._atol = 1e-2 * self._rtol * np.concatenate([mechanism.q_scale, mechanism.v_scale])
+        self._atol = 1e-2 * self._rtol * np.concatenate([mechanism.q_scale[: self._places], mechanism.v_scale])
         self._turning_time = mechanism.q_scale[0] / mechanism.v_scale[0]
-        self._step: float | None = None
+        self._solver: Any = None
         self._short_steps = 0
         self.q, self.v = mechanism.q0.copy(), mechanism.v0.copy()
-
-    def _rates(self, _: float, y: FloatArray) -> FloatArray:
-        nq = self._model.nq
-        # The rates must not depend on the length to which the quaternion has drifted.
-        q, v = pin.normalize(self._model, y[:nq]), y[nq:]
-        moving = v if self._settings.orientation else self._moving * v
-        return np.concatenate(
-            [pin.tangentMap(self._model, q).dot(moving), self._mechanism.respond(self._data, q, v)[0]]
-        )
+        self._q = mechanism.q0.copy()
 
     @property
     def turns(self) -> bool:
         """See :class:`Integrator`."""
-        return bool(np.any(self._moving[-3:]))
+        return self._turns
+
+    def _joined(self, q: FloatArray, v: FloatArray) -> FloatArray:
+        """What is integrated."""
+        return np.concatenate([q[: self._places], v])
+
+    def _split(self, y: FloatArray) -> tuple[FloatArray, FloatArray]:
+        """Configuration and velocity; the next call overwrites the configuration."""
+        n = self._places
+        if self._turns:  # the rates must not depend on the length to which the quaternion has drifted
+            return pin.normalize(self._model, y[:n]), y[n:]
+        self._q[:n] = y[:n]
+        return self._q, y[n:]
+
+    def _moved(self, q: FloatArray, v: FloatArray, acceleration: FloatArray) -> FloatArray:
+        """Rates of what is integrated."""
+        return np.concatenate(
+            [pin.tangentMap(self._model, q).dot(v) if self._turns else v[: self._places], acceleration]
+        )
+
+    def _rates(self, _: float, y: FloatArray) -> FloatArray:
+        q, v = self._split(y)
+        return self._moved(q, v, self._mechanism.accelerate(self._data, q, v))
+
+    def _solver_from(self, rates: Any, start: float, y: FloatArray) -> Any:
+        return DOP853(rates, start, y, np.inf, rtol=self._rtol, atol=self._atol)
 
     def advance(self, start: float, end: float) -> None:
-        """See :class:`Integrator`. The last step ends at ``end``: the dense output of DOP853 has a lower order."""
+        """See :class:`Integrator`."""
         if end <= start:
             return
-        first = None if self._step is None else min(self._step, end - start)
-        state = np.concatenate([self.q, self.v])
-        longest, self._short_steps = 0.0, 0
+        self._short_steps = 0
         try:
-            solver = DOP853(self._rates, start, state, end, rtol=self._rtol, atol=self._atol, first_step=first)
+            if self._solver is None:
+                self._solver = self._solver_from(self._rates, start, self._joined(self.q, self.v))
+            solver = self._solver
+            solver.t_bound, solver.status = end, "running"
             while solver.status == "running":
                 self._make_step(solver)
-                longest = max(longest, solver.step_size)
                 if self._settings.projection:
                     self._put_back(solver)
                 # The rates that were found last are those at the end of the step, with projection or without.
@@ -193,10 +219,11 @@ class Adaptive:
                     raise left_the_wall(f"before {solver.t:.6g} s")
         except np.linalg.LinAlgError as error:
             raise Diverged(f"the equations became singular between {start:g} s and {end:g} s ({error})") from None
-        # The step that ends at ``end`` may be short; the next start must not inherit that.
-        self._step = max(longest, self._step or 0.0) if first == end - start else longest
-        nq = self._model.nq
-        self.q, self.v = pin.normalize(self._model, solver.y[:nq]), solver.y[nq:]
+        self._keep(solver.y)
+
+    def _keep(self, y: FloatArray) -> None:
+        q, v = self._split(y)
+        self.q, self.v = q.copy(), v.copy()
 
     def _make_step(self, solver: Any) -> None:
         """One step.
@@ -204,11 +231,17 @@ class Adaptive:
         Raises:
             Diverged: none is small enough, or too many in a row are too short.
         """
+        wanted = solver.h_abs
         message = solver.step()
         if message is not None:
             raise Diverged(f"the motion could not be integrated past {solver.t:g} s: {message}")
-        faster = max(1.0, float(np.max(np.abs(solver.y[self._model.nq :]) / self._mechanism.v_scale)))
-        is_short = solver.step_size * faster < _SHORT * self._turning_time
+        if solver.t == solver.t_bound:  # the step may have been shortened to end there; the next must not inherit that
+            solver.h_abs = max(wanted, solver.h_abs)
+        longest = _SHORT * self._turning_time
+        is_short = solver.step_size < longest
+        if is_short:
+            faster = float(np.max(np.abs(solver.y[self._places :]) / self._mechanism.v_scale))
+            is_short = solver.step_size * max(1.0, faster) < longest
         self._short_steps = self._short_steps + 1 if is_short else 0
         if self._short_steps > _PATIENCE:
             raise Diverged(
@@ -217,7 +250,5 @@ class Adaptive:
             )
 
     def _put_back(self, solver: Any) -> None:
-        nq = self._model.nq
-        q, v = self._mechanism.project(self._data, pin.normalize(self._model, solver.y[:nq]), solver.y[nq:])
-        solver.y = np.concatenate([q, v])
+        solver.y = self._joined(*self._mechanism.project(self._data, *self._split(solver.y)))
         solver.f = self._rates(solver.t, solver.y)  # the next step starts with the rates at its first point

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from abc import ABC, abstractmethod
 from dataclasses import dataclass
 from typing import Any
@@ -85,20 +86,30 @@ class Mechanism(ABC):
         """Terms of the ball, local frame, rows and drift; the last two rows are those of rolling."""
 
     @abstractmethod
+    def accelerate(self, data: Any, q: FloatArray, v: FloatArray) -> FloatArray:
+        """Joint acceleration, shape (nv,), which the next call may overwrite; leaves the reactions in ``data``."""
+
     def respond(self, data: Any, q: FloatArray, v: FloatArray) -> tuple[FloatArray, FloatArray]:
         """Joint acceleration, shape (nv,), and multipliers of the rows [N]."""
+        return np.array(self.accelerate(data, q, v)), np.array(data.lambda_c)
 
     @abstractmethod
     def normal_force(self, data: Any) -> float:
-        """N [N] that the last :meth:`respond` left in ``data``."""
+        """N [N] that the last :meth:`accelerate` left in ``data``."""
+
+    def friction_force(self, data: Any) -> float:
+        """Size of the friction [N] that the last :meth:`accelerate` left in ``data``."""
+        *_, F2, F3 = data.lambda_c.tolist()
+        return math.hypot(F2, F3)
 
     @abstractmethod
     def reaction(self, data: Any, q: FloatArray, v: FloatArray) -> tuple[FloatArray, FloatArray]:
         """Joint acceleration, shape (nv,), and force of the wall on the ball in the world [N], shape (3,)."""
 
-    @abstractmethod
     def needed(self, data: Any, q: FloatArray, v: FloatArray) -> tuple[float, float]:
         """Friction that it takes to keep the slip velocity as it is [N], and N [N]."""
+        self.accelerate(data, q, v)
+        return self.friction_force(data), self.normal_force(data)
 
     @abstractmethod
     def slide(self, data: Any, q: FloatArray, v: FloatArray, direction: FloatArray) -> Sliding:
@@ -135,8 +146,11 @@ class Mechanism(ABC):
         The centre moves along the normal; an impulse at the contact removes slip, and sinking where that is possible.
         """
         q = self.on_surface(q)
-        rows = self._rows(data, q, v)[2]
-        return q, np.array(pin.impulseDynamics(self.model, data, v, rows))
+        return q, np.array(pin.impulseDynamics(self.model, data, v, self._only_rows(data, q, v)))
+
+    def _only_rows(self, data: Any, q: FloatArray, v: FloatArray) -> FloatArray:
+        """The rows, and the mass matrix in ``data``."""
+        return self._rows(data, q, v)[2]
 
     def rolling_row(self, data: Any, q: FloatArray, v: FloatArray) -> FloatArray:
         """Row of slip along e2, shape (nv,)."""

@@ -47,13 +47,26 @@ def ball_terms(model: Any, data: Any, ball: int, q: FloatArray, v: FloatArray, r
     )
 
 
+def rolling_directions(radius: float, triad: Sequence[float]) -> FloatArray:
+    """Slip velocity along e2 and e3 from (v, ω) of the ball, shape (2, 6).
+
+    Slip is v + a ω × e1, so its components are e2·v + a e3·ω and e3·v - a e2·ω.
+
+    Args:
+        radius: a [m].
+        triad: components of e1, e2, e3, one after the other.
+    """
+    _, _, _, x2, y2, z2, x3, y3, z3 = triad
+    a = radius
+    return np.array([[x2, y2, z2, a * x3, a * y3, a * z3], [x3, y3, z3, -a * x2, -a * y2, -a * z2]])
+
+
 def rolling_rows(
     terms: BallTerms, radius: float, triad: Sequence[float], e1_rate: Triple
 ) -> tuple[FloatArray, FloatArray]:
     """Slip velocity along e2 and e3 as J q̇, and its rate at zero joint acceleration; shapes (2, nv) and (2,).
 
-    Slip is v + a ω × e1, so its components are e2·v + a e3·ω and e3·v - a e2·ω. Its rate has the term a ω × ė1, which
-    a row re-posed at each instant would lack.
+    Its rate has the term a ω × ė1, which a row re-posed at each instant would lack.
 
     Args:
         terms: of the ball.
@@ -64,12 +77,25 @@ def rolling_rows(
     # Plain floats: numpy's overhead on three numbers is that of all that Pinocchio computes here.
     _, _, _, x2, y2, z2, x3, y3, z3 = triad
     a = radius
-    directions = np.array([[x2, y2, z2, a * x3, a * y3, a * z3], [x3, y3, z3, -a * x2, -a * y2, -a * z2]])
+    directions = rolling_directions(a, triad)
     x, y, z = cross(terms.w.tolist(), e1_rate)
     drift = directions.dot(terms.bias)
     drift[0] += a * (x2 * x + y2 * y + z2 * z)
     drift[1] += a * (x3 * x + y3 * y + z3 * z)
     return directions.dot(terms.jacobian), drift
+
+
+def own_bias(model: Any, data: Any, ball: int, q: FloatArray, v: FloatArray, rest: FloatArray) -> FloatArray:
+    """As :func:`ball_terms`, the bias alone, in the axes of the ball's joint."""
+    pin.forwardKinematics(model, data, q, v, rest)
+    pin.crba(model, data, q)
+    pin.nonLinearEffects(model, data, q, v)
+    return pin.getClassicalAcceleration(model, data, ball, pin.LOCAL).vector  # type: ignore[no-any-return]  # it is an array
+
+
+def own_jacobian(model: Any, ball: int, q: FloatArray) -> FloatArray:
+    """Of (v, ω) of the ball with respect to the joint velocities, in the axes of its joint; shape (6, nv)."""
+    return np.array(pin.computeJointJacobian(model, model.createData(), q, ball))
 
 
 def cross(x: Triple, y: Triple) -> tuple[float, float, float]:

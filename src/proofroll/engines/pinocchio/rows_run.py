@@ -33,6 +33,7 @@ class RowsRun:
             if math.isfinite(body.contact.mu_static)
             else integrator(self.mechanism, settings)
         )
+        self._looked_at = self.mechanism.model.createData()  # for sampling, which leaves the running data alone
 
     def advance(self, start: float, end: float) -> None:
         """From ``start`` to ``end`` [s]."""
@@ -40,8 +41,7 @@ class RowsRun:
 
     def sample(self) -> Sample:
         """See :class:`proofroll.engine.Engine`; no orientation where it is not integrated."""
-        model, ball = self.mechanism.model, self.mechanism.ball
-        data = model.createData()
+        model, ball, data = self.mechanism.model, self.mechanism.ball, self._looked_at
         force = self._reaction(data)[1]
         velocity = pin.getVelocity(model, data, ball, pin.LOCAL_WORLD_ALIGNED)
         pose = data.oMi[ball]

@@ -10,12 +10,11 @@ the rate that friction takes from |u|, that is the direction of b, lagging by |u
 from __future__ import annotations
 
 import math
+import sys
 from enum import Enum, auto
 from typing import Any
 
 import numpy as np
-import pinocchio as pin
-from scipy.integrate import DOP853
 
 from proofroll.engines.pinocchio.crossing import located
 from proofroll.engines.pinocchio.integrators import Adaptive
@@ -67,11 +66,16 @@ def excess(mechanism: Mechanism, data: Any, q: FloatArray, v: FloatArray, mu_sta
     Slip begins where the first is positive.
     """
     needed, normal_force = mechanism.needed(data, q, v)
+    return relative_excess(needed, normal_force, mu_static), normal_force
+
+
+def relative_excess(needed: float, normal_force: float, mu_static: float) -> float:
+    """(needed - available) / (needed + available) [-] for a needed friction and a normal force [N]."""
     available = mu_static * normal_force
     # A friction of round-off is needed even where none is: it must not count as more than none (mu_static = 0).
     noise = _NOISE * abs(normal_force)
-    size = max(needed + abs(available) + noise, np.finfo(float).tiny)
-    return (needed - available - noise) / size, normal_force
+    size = max(needed + abs(available) + noise, sys.float_info.min)
+    return (needed - available - noise) / size
 
 
 class AdaptiveStickSlip(Adaptive):
@@ -90,7 +94,8 @@ class AdaptiveStickSlip(Adaptive):
         self._handover = self._floor = self._least = 0.0
         self._mode = Mode.STICKING
         self.events: list[Event] = []
-        y = np.concatenate([self.q, self.v])
+        self._monitored = 0.0, 0.0, 0.0
+        y = self._joined(self.q, self.v)
         if self._excess(y) > 0:
             self._record("slip", 0.0, 0.0)
             self._creep(y)
@@ -104,7 +109,7 @@ class AdaptiveStickSlip(Adaptive):
         """Joint acceleration, and force of the wall on the ball in the world [N], now."""
         if self.sticking:
             return self._mechanism.reaction(data, self.q, self.v)
-        direction = self._direction(data, np.concatenate([self.q, self.v]))
+        direction = self._direction(data, self._joined(self.q, self.v))
         return self._mechanism.sliding_reaction(data, self.q, self.v, direction)
 
     def advance(self, start: float, end: float) -> None:
@@ -116,10 +121,6 @@ class AdaptiveStickSlip(Adaptive):
             raise Diverged(f"the equations became singular before {end:g} s ({error})") from None
 
     # -- the laws ---------------------------------------------------------------------------------------------------
-
-    def _split(self, y: FloatArray) -> tuple[FloatArray, FloatArray]:
-        nq = self._model.nq
-        return pin.normalize(self._model, y[:nq]), y[nq:]
 
     def _slide(self, data: Any, y: FloatArray, direction: FloatArray) -> Sliding:
         return self._mechanism.slide(data, *self._split(y), direction)
@@ -154,7 +155,7 @@ class AdaptiveStickSlip(Adaptive):
     def _sliding_rates(self, data: Any, y: FloatArray, direction: FloatArray) -> tuple[FloatArray, Sliding]:
         q, v = self._split(y)
         sliding = self._mechanism.slide(data, q, v, direction)
-        return np.concatenate([pin.tangentMap(self._model, q) @ (self._moving * v), sliding.acceleration]), sliding
+        return self._moved(q, v, sliding.acceleration), sliding
 
     def _law(self, t: float, y: FloatArray) -> FloatArray:
         if self._mode is Mode.STICKING:
@@ -171,36 +172,48 @@ class AdaptiveStickSlip(Adaptive):
 
     def _leg(self, start: float, end: float) -> float:
         """Integrates in the present mode until the mode changes or ``end``; returns that time [s]."""
-        y = np.concatenate([self.q, self.v])
-        first = None if self._step is None else min(self._step, end - start)
-        solver = DOP853(self._law, start, y, end, rtol=self._rtol, atol=self._atol, first_step=first)
-        monitor = self._monitor(y)
-        longest, self._short_steps = 0.0, 0
+        if self._solver is None:
+            y = self._joined(self.q, self.v)
+            self._solver, self._short_steps = self._solver_from(self._law, start, y), 0
+            self._monitored = self._monitor(y)
+        solver, monitor = self._solver, self._monitored
+        solver.t_bound, solver.status = end, "running"
         while solver.status == "running":
             if self._mode is Mode.SLIDING:
                 left = monitor[0] / -monitor[1] if monitor[1] < 0 else math.inf
                 if monitor[0] <= self._floor and left < math.inf:
                     stop = solver.t + left
                     if stop > end:
-                        return self._keep(solver.y + (end - solver.t) * solver.f, end)
+                        return self._rest_of_slip(solver, end)
                     return self._switch(stop, left, solver.y + left * solver.f)
                 solver.max_step = max(_APPROACH * left, 1e-300)
             self._make_step(solver)
-            before, monitor = monitor, self._monitor(solver.y)
+            before, monitor = monitor, self._after_step(solver)
             stop = self._stop(solver, before, monitor)
             if monitor[2] < -self._mechanism.faint:
                 self._leave(solver, before[2], monitor[2], stop)
             if stop is not None:
                 return self._switch(*stop)
-            longest = max(longest, solver.step_size)
-            if self._settings.projection:
-                self._put_back(solver)
-        self._step = max(longest, self._step or 0.0) if first == end - start else longest
-        return self._keep(solver.y, end)
+        self._monitored = monitor
+        self._keep(solver.y)
+        return end
 
-    def _keep(self, y: FloatArray, time: float) -> float:
-        self.q, self.v = self._split(y)
-        return time
+    def _rest_of_slip(self, solver: Any, end: float) -> float:
+        """To ``end`` [s] by extrapolation, where hardly any slip is left and it ends after that."""
+        self._keep(solver.y + (end - solver.t) * solver.f)
+        self._solver = None
+        return end
+
+    def _after_step(self, solver: Any) -> tuple[float, float, float]:
+        """Puts the state back on the constraints, if that is wanted; what :meth:`_monitor` says then."""
+        if self._settings.projection:
+            self._put_back(solver)
+        if self._mode is not Mode.STICKING:
+            return self._speed(solver.y)
+        # The rates that were found last are those at the end of the step, with projection or without.
+        data, mechanism = self._data, self._mechanism
+        needed, normal_force = mechanism.friction_force(data), mechanism.normal_force(data)
+        return relative_excess(needed, normal_force, self.mu_static), 0.0, normal_force
 
     def _put_back(self, solver: Any) -> None:
         if self._mode is Mode.STICKING:
@@ -209,7 +222,7 @@ class AdaptiveStickSlip(Adaptive):
         q, v = self._split(solver.y)
         back = self._mechanism.project_sliding(self._data, q, v)
         if back[1] is not v:
-            solver.y = np.concatenate(back)
+            solver.y = self._joined(*back)
             solver.f = self._law(solver.t, solver.y)
 
     def _monitor(self, y: FloatArray) -> tuple[float, float, float]:
@@ -260,15 +273,15 @@ class AdaptiveStickSlip(Adaptive):
 
     def _switch(self, time: float, width: float, y: FloatArray) -> float:
         """Enters the mode that follows the state at which the last one ended."""
-        self._step = None
-        self.q, self.v = self._split(y)
+        self._solver = None
+        self._keep(y)
         was = self._mode
         if was is Mode.CREEPING and self._speed(y)[0] > 0.5 * self._handover:
             self._mode = Mode.SLIDING
             return time
         # The contact point is at rest up to round-off; the ball sticks if it can.
         self.q, self.v = self._mechanism.project(self._data, self.q, self.v)
-        y = np.concatenate([self.q, self.v])
+        y = self._joined(self.q, self.v)
         if was is Mode.STICKING:
             self._record("slip", time, width)
             self._creep(y)

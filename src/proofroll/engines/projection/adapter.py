@@ -136,7 +136,7 @@ class Projection:
         elif isinstance(self._motion, TaylorSeries):
             force, sticking = self._motion.force, None
         else:
-            force, sticking = self._ball.contact_force(self._ball.response(kin)), None
+            force, sticking = self._ball.contact_force(self._ball.response_at(x)), None
         return Sample(
             p_WB=self._surface.position(x[:2]),
             v_WB=frame @ kin.v[:3],

@@ -68,7 +68,8 @@ class Friction:
 
     def reserve(self, response: Response) -> float:
         """What the static cone leaves [N], from the reactions of sticking; negative where the ball must slip."""
-        available, needed = self.mu_static * response.N, math.hypot(*response.multipliers[:2].tolist())
+        F2, F3, *_ = response.multipliers.tolist()
+        available, needed = self.mu_static * response.N, math.hypot(F2, F3)
         return available - needed + _ON_CONE * (abs(available) + self._weight)
 
     def drive(self, kin: Kinematics) -> FloatArray:

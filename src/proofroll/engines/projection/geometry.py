@@ -74,6 +74,11 @@ class Uniform:
         return self._column
 
     @property
+    def axis(self) -> tuple[float, float, float] | None:
+        """Unit direction about which the frame turns; None if it does not."""
+        return None if self._column is None else self._generators[self._column].axis
+
+    @property
     def parts(self) -> list[FloatArray]:
         """F0, F1, F2 of the frame F0 + sin α F1 + (1 - cos α) F2 at the coordinate α; F0 alone if none turns it."""
         if self._column is None:
@@ -81,7 +86,7 @@ class Uniform:
         return [self._start.frame, self._once, self._twice]
 
     def __init__(self, surface: Surface, generators: tuple[Generator, Generator]) -> None:
-        self._start = local_geometry(surface, np.zeros(2))
+        self._start, self._generators = local_geometry(surface, np.zeros(2)), generators
         # Only one of two commuting motions of a surface turns: a rotation by angle α about the unit axis k takes F
         # to F + sin α [k]F + (1 - cos α) [k]²F (Rodrigues).
         self._column = next((i for i, motion in enumerate(generators) if motion.kind == "rotation"), None)

@@ -19,9 +19,10 @@ from typing import NamedTuple
 import numpy as np
 from scipy.linalg.lapack import dgesv
 
-from proofroll.engines.projection.geometry import Geometry, Local
-from proofroll.engines.projection.orientation import Orientation
-from proofroll.engines.projection.uniform import closed_form
+from proofroll.engines.projection.geometry import Geometry, Local, Uniform
+from proofroll.engines.projection.orientation import EulerAngles, Orientation, RotatingFrame
+from proofroll.engines.projection.uniform import AlongAxes, Closed
+from proofroll.engines.projection.uniform_euler import Euler
 from proofroll.scene import RollingBall
 from proofroll.surfaces import FloatArray
 
@@ -83,7 +84,7 @@ class ProjectedBall:
         self._geometry = geometry
         self._orientation = orientation
         self._coordinates = 2 + orientation.size
-        self._closed = closed_form(body, geometry, orientation)
+        self._closed = _closed(body, geometry, orientation)
 
     def kinematics(self, x: FloatArray) -> Kinematics:
         """The explicit form of the holonomic constraint at the state x."""
@@ -165,8 +166,7 @@ class ProjectedBall:
         """ẋ: the angles, if there are any, follow the velocities s."""
         if self._closed is None:
             return self.derivative(x, self.response(self.kinematics(x)))
-        n = self._coordinates
-        return np.concatenate([x[n : 2 * n], self._closed.solve(x)[0][:5]])
+        return self._closed.rates(x)
 
     def derivative(self, x: FloatArray, response: Response) -> FloatArray:
         """ẋ with the accelerations of ``response``."""
@@ -218,3 +218,12 @@ class ProjectedBall:
         if info:
             raise ArithmeticError("the equations of motion are singular")
         return np.asarray(solution)
+
+
+def _closed(body: RollingBall, geometry: Geometry, orientation: Orientation) -> Closed | None:
+    """The equations written out, or None where they are not known."""
+    if not isinstance(geometry, Uniform):
+        return None
+    if type(orientation) is RotatingFrame:  # not where the orientation is followed: its state is longer
+        return AlongAxes(body, geometry)
+    return Euler(body, geometry) if isinstance(orientation, EulerAngles) else None

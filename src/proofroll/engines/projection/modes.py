@@ -31,7 +31,8 @@ class Survey(NamedTuple):
 
     Attributes:
         margins: one per exit of the mode; the mode holds while none is negative.
-        trend: rate of the margin number ``dips``, the one that may turn negative and recover within one step.
+        trend: rate of the margin number ``dips``, the one that may turn negative and recover within one step; 0 where
+            it is too large for that.
         longest: bound on the next step [s].
         slaved: whether the direction of the slip may be slaved from here on.
     """

@@ -106,9 +106,11 @@ class EulerAngles:
         One fixed step turns the ball by |ω| step. If the axis of φ is nearer to the vertical than that, φ and ψ turn by
         a radian or so in a step and the result is silently wrong (by as much as the weight in F3, measured).
         """
-        theta = float(angles[1])
-        turn = math.sqrt(max(0.0, r @ r + 2.0 * r[0] * r[2] * math.cos(theta))) * step
-        if abs(math.sin(theta)) < max(_SMALLEST_SINE, min(turn, _LARGEST_SINE)):
+        theta, smallest = angles.item(1), _SMALLEST_SINE
+        if step:
+            turn = math.sqrt(max(0.0, r @ r + 2.0 * r[0] * r[2] * math.cos(theta))) * step
+            smallest = max(smallest, min(turn, _LARGEST_SINE))
+        if abs(math.sin(theta)) < smallest:
             raise Diverged(
                 f"θ reached {theta:.4g} rad at t = {t:.6g} s, near the Euler-angle singularity; "
                 "use formulation=rotating_frame"

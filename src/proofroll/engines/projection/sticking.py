@@ -11,6 +11,10 @@ from proofroll.engines.projection.method import ProjectedBall
 from proofroll.engines.projection.modes import DIFFERENCE, Exit, Pace, Survey, time_left
 from proofroll.surfaces import FloatArray
 
+# While the cone leaves more than this part of itself, the needed friction cannot leave it and be back within one step:
+# a crest that high is many steps wide.
+_CLEAR = 0.25
+
 
 class _Held:
     """What every set of active rows has in common."""
@@ -49,9 +53,11 @@ class Stick(_Held):
     def survey(self, y: FloatArray) -> Survey:
         """See :class:`Mode`. With rolling resistance steps shorten towards the place where the centre stands still."""
         response = self._ball.response_at(y)
-        reserve, span = self._friction.reserve(response), DIFFERENCE * self._pace.time
-        ahead = self._ball.response_at(y + span * self._ball.derivative(y, response))
-        trend = (self._friction.reserve(ahead) - reserve) / span
+        reserve, trend = self._friction.reserve(response), 0.0
+        if reserve <= _CLEAR * self._friction.mu_static * response.N:
+            span = DIFFERENCE * self._pace.time
+            ahead = self._ball.response_at(y + span * self._ball.derivative(y, response))
+            trend = (self._friction.reserve(ahead) - reserve) / span
         if not self.halts:
             return Survey((reserve,), trend)
         kin = self._ball.kinematics(y)

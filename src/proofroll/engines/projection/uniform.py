@@ -3,44 +3,30 @@
 There all geometry along the local axes is constant, and what is left of the projections of :mod:`method` are a few
 dozen products. As plain floats they cost a fifth of the same in arrays of three to seven numbers. Nothing is modelled
 here: the results are those of :class:`~proofroll.engines.projection.method.ProjectedBall` with both rows of rolling
-active.
+active. Here is what both formulations share, and the rotating frame; the Euler angles are in :mod:`uniform_euler`.
 """
 
 from __future__ import annotations
 
 import math
-from typing import Protocol
+from abc import ABC, abstractmethod
 
 import numpy as np
-from scipy.linalg.lapack import dgesv
 
 from proofroll.engines.projection.geometry import Uniform
-from proofroll.engines.projection.orientation import EulerAngles, Orientation, RotatingFrame
 from proofroll.scene import RollingBall
 from proofroll.surfaces import FloatArray
 
 
-class Closed(Protocol):
-    """The equations at a state x = [q, s]."""
-
-    def solve(self, x: FloatArray) -> tuple[FloatArray, float]:
-        """[ṡ, λ_nh], shape (7,), and N [N].
-
-        Raises:
-            ArithmeticError: there is no solution, or the state is not finite.
-        """
-
-    def eliminated(self, x: FloatArray) -> FloatArray:
-        """The state with the violation of C v = 0 removed from s."""
-
-
-class _Translation:
-    """What the centre contributes: constants in the local axes.
+class Closed(ABC):
+    """The equations at a state x = [q, s], with what the centre contributes: constants in the local axes.
 
     Attributes:
         mass: m TᵀT, shape (2, 2).
         tangents: T, rows e2 and e3, shape (2, 2).
     """
+
+    _coordinates: int
 
     def __init__(self, body: RollingBall, geometry: Uniform) -> None:
         local = geometry.at(np.zeros(2))
@@ -63,6 +49,7 @@ class _Translation:
         self.gravity = [tuple((body.gravity @ part).tolist()) for part in frames]
         size = 1e-15 * float(np.linalg.norm(body.gravity))
         self.steady = all(abs(x) <= size for part in self.gravity[1:] for x in part)
+        self._last: tuple[FloatArray | None, tuple[FloatArray, float]] = (None, (np.empty(0), 0.0))
 
     def frame(self, sin: float, cos: float) -> tuple[float, ...]:
         """Components of e1, e2, e3 in the world, one after the other."""
@@ -117,9 +104,44 @@ class _Translation:
         lever = N * self.f / speed if speed else 0.0
         return -lever * v3, lever * v2
 
+    @abstractmethod
+    def _all(self, x: FloatArray) -> tuple[FloatArray, float]:
+        """[q̇, ṡ, λ_nh] and N [N]."""
 
-class _AlongAxes(_Translation):
-    """Velocities ω' along the local axes: A = 1, so the matrix is constant, and inverted once."""
+    def rates(self, x: FloatArray) -> FloatArray:
+        """ẋ.
+
+        Raises:
+            ArithmeticError: there is none, or the state is not finite.
+        """
+        found = self._all(x)
+        # Whoever watches the reactions asks for them at the state whose rates were found last: it is that very object.
+        self._last = x, found
+        return found[0][:-2]
+
+    def solve(self, x: FloatArray) -> tuple[FloatArray, float]:
+        """[ṡ, λ_nh], shape (7,), and N [N].
+
+        Raises:
+            ArithmeticError: as in :meth:`rates`.
+        """
+        last, found = self._last
+        everything, N = found if last is x else self._all(x)
+        return everything[self._coordinates :], N
+
+    @abstractmethod
+    def eliminated(self, x: FloatArray) -> FloatArray:
+        """The state with the violation of C v = 0 removed from s."""
+
+
+class AlongAxes(Closed):
+    """Velocities ω' along the local axes: A = 1, so the matrix is constant, and inverted once.
+
+    What it is multiplied by is a sum of products of velocities with constant factors, so these are multiplied by the
+    inverse once and for all too.
+    """
+
+    _coordinates = 2
 
     def __init__(self, body: RollingBall, geometry: Uniform) -> None:
         super().__init__(body, geometry)
@@ -129,140 +151,42 @@ class _AlongAxes(_Translation):
         matrix = np.zeros((7, 7))
         matrix[:2, :2], matrix[2:5, 2:5] = self.mass, self.J * np.eye(3)
         matrix[:5, 5:], matrix[5:, :5] = rows.T, rows
-        self._inverse = np.linalg.inv(matrix)
-        self._by_slip = self._inverse[:5, 5:] @ rows
+        inverse = np.linalg.inv(matrix)
+        self._by_slip = inverse[:5, 5:] @ rows
+        self._by_product = np.zeros((9, 15))
+        self._by_product[0, 2] = self._by_product[1, 3] = 1.0  # u̇ = u and v̇ = v
+        self._by_product[2:] = inverse @ self._right()
 
-    def solve(self, x: FloatArray) -> tuple[FloatArray, float]:
-        """See :class:`Closed`."""
+    def _right(self) -> FloatArray:
+        """Factors of g2, g3, u, v, u², uv, v², u ω', v ω', M2, M3 on the right side, shape (7, 15)."""
+        tangents, right = self.tangents, np.zeros((7, 15))
+        second = np.array(self.second[1:])  # of d2, d3 on u², uv, v²
+        right[:2, :2] = self.m * tangents.T
+        right[:2, 4:7] = -self.m * tangents.T @ second
+        (u1, *_), (v1, *_) = self.turn_u, self.turn_v
+        right[5:, 4:7] = -second
+        for row, (along_u, along_v), sign in ((5, tangents[1], -1.0), (6, tangents[0], 1.0)):
+            right[row, 4:7] += sign * np.array([u1 * along_u, u1 * along_v + v1 * along_u, v1 * along_v])
+        for first, turn in ((7, self.turn_u), (10, self.turn_v)):
+            right[2:5, first : first + 3] = -self.J * np.cross(turn, np.eye(3)).T
+        right[3, 13] = right[4, 14] = 1.0
+        return right
+
+    def _all(self, x: FloatArray) -> tuple[FloatArray, float]:
         state = x.tolist()
         _, _, u, v, w1, w2, w3 = state
         g1, g2, g3 = self.gravity[0] if self.steady else self.weight(*self.angle(state))
-        d1, d2, d3 = self.drift(u, v)
-        o1, o2, o3 = self.frame_rate(u, v)
-        v2, v3 = self.t2u * u + self.t2v * v, self.t3u * u + self.t3v * v
-        m, J = self.m, self.J
-        N = m * (g1 - d1)
-        M2, M3 = self.moment(N, v2, v3) if self.f else (0.0, 0.0)
-        p2, p3 = m * (g2 - d2), m * (g3 - d3)
-        right = (
-            self.t2u * p2 + self.t3u * p3,
-            self.t2v * p2 + self.t3v * p3,
-            -J * (o2 * w3 - o3 * w2),
-            M2 - J * (o3 * w1 - o1 * w3),
-            M3 - J * (o1 * w2 - o2 * w1),
-            -(d2 + o1 * v3),
-            -(d3 - o1 * v2),
-        )
-        return self._inverse.dot(np.array(right)), N
+        uu, uv, vv = u * u, u * v, v * v
+        a1, b1, c1 = self.second[0]
+        N = self.m * (g1 - (a1 * uu + b1 * uv + c1 * vv))
+        M2 = M3 = 0.0
+        if self.f:
+            M2, M3 = self.moment(N, self.t2u * u + self.t2v * v, self.t3u * u + self.t3v * v)
+        products = (g2, g3, u, v, uu, uv, vv, u * w1, u * w2, u * w3, v * w1, v * w2, v * w3, M2, M3)
+        return self._by_product.dot(np.array(products)), N
 
     def eliminated(self, x: FloatArray) -> FloatArray:
         """See :class:`Closed`."""
         result = x.copy()
         result[2:] -= self._by_slip.dot(x[2:])
         return result
-
-
-class _Euler(_Translation):
-    """Velocities φ̇, θ̇, ψ̇: the axes about which they turn are given in the world."""
-
-    def __init__(self, body: RollingBall, geometry: Uniform) -> None:
-        super().__init__(body, geometry)
-        J = self.J
-        self._matrix = np.zeros((7, 7))
-        self._matrix[:2, :2] = self.mass
-        self._matrix[2, 2] = self._matrix[3, 3] = self._matrix[4, 4] = J
-        self._matrix[:2, 5:], self._matrix[5:, :2] = self.tangents.T, self.tangents
-        self._upper = np.zeros(7)
-
-    def _fill(self, frame: tuple[float, ...], sin: float, cos: float, sin_psi: float, cos_psi: float) -> None:
-        """M̄ and C_nh = C D; symmetric, so that the order of the elements in memory does not matter."""
-        _, _, _, x2, y2, z2, x3, y3, z3 = frame
-        a, matrix = self.a, self._matrix
-        nx, ny = sin * sin_psi, -sin * cos_psi  # the axis of φ; that of θ is (cos ψ, sin ψ, 0), that of ψ is vertical
-        matrix[2, 4] = matrix[4, 2] = self.J * cos
-        matrix[2, 5] = matrix[5, 2] = a * (x3 * nx + y3 * ny + z3 * cos)
-        matrix[3, 5] = matrix[5, 3] = a * (x3 * cos_psi + y3 * sin_psi)
-        matrix[4, 5] = matrix[5, 4] = a * z3
-        matrix[2, 6] = matrix[6, 2] = -a * (x2 * nx + y2 * ny + z2 * cos)
-        matrix[3, 6] = matrix[6, 3] = -a * (x2 * cos_psi + y2 * sin_psi)
-        matrix[4, 6] = matrix[6, 4] = -a * z2
-
-    def solve(self, x: FloatArray) -> tuple[FloatArray, float]:
-        """See :class:`Closed`."""
-        state = x.tolist()
-        _, _, _, theta, psi, u, v, phi_rate, theta_rate, psi_rate = state
-        if not math.isfinite(theta + psi):
-            raise FloatingPointError("the Euler angles overflow inside a step")
-        sin, cos, sin_psi, cos_psi = math.sin(theta), math.cos(theta), math.sin(psi), math.cos(psi)
-        sin_a, cos_a = self.angle(state)
-        frame = self.frame(sin_a, cos_a)
-        self._fill(frame, sin, cos, sin_psi, cos_psi)
-        x1, y1, z1, x2, y2, z2, x3, y3, z3 = frame
-        g1, g2, g3 = self.weight(sin_a, cos_a)
-        d1, d2, d3 = self.drift(u, v)
-        o1, o2, o3 = self.frame_rate(u, v)
-        v2, v3 = self.t2u * u + self.t2v * v, self.t3u * u + self.t3v * v
-        m, J, a = self.m, self.J, self.a
-        N = m * (g1 - d1)
-        # Ȧ r in the world, and ω: see EulerAngles.
-        tilted, turned, node = phi_rate * theta_rate, phi_rate * psi_rate * sin, theta_rate * psi_rate
-        rx = tilted * cos * sin_psi + turned * cos_psi - node * sin_psi
-        ry = -tilted * cos * cos_psi + turned * sin_psi + node * cos_psi
-        rz = -tilted * sin
-        nx, ny = sin * sin_psi, -sin * cos_psi
-        wx, wy = phi_rate * nx + theta_rate * cos_psi, phi_rate * ny + theta_rate * sin_psi
-        wz = psi_rate + phi_rate * cos
-        w1 = x1 * wx + y1 * wy + z1 * wz
-        w2 = x2 * wx + y2 * wy + z2 * wz
-        w3 = x3 * wx + y3 * wy + z3 * wz
-        # Aᵀ (M - J Ȧ r): along the three axes, M about e2 and e3 by the rows of the matrix.
-        p2, p3 = m * (g2 - d2), m * (g3 - d3)
-        on_phi = -J * (nx * rx + ny * ry + cos * rz)
-        on_theta = -J * (cos_psi * rx + sin_psi * ry)
-        on_psi = -J * rz
-        if self.f:
-            M2, M3 = self.moment(N, v2, v3)
-            mx, my, mz = M2 * x2 + M3 * x3, M2 * y2 + M3 * y3, M2 * z2 + M3 * z3
-            on_phi += nx * mx + ny * my + cos * mz
-            on_theta += cos_psi * mx + sin_psi * my
-            on_psi += mz
-        slip2 = d2 + o1 * v3 + a * (x3 * rx + y3 * ry + z3 * rz - (o1 * w2 - o2 * w1))
-        slip3 = d3 - o1 * v2 - a * (x2 * rx + y2 * ry + z2 * rz - (o3 * w1 - o1 * w3))
-        right = (
-            self.t2u * p2 + self.t3u * p3,
-            self.t2v * p2 + self.t3v * p3,
-            on_phi,
-            on_theta,
-            on_psi,
-            -slip2,
-            -slip3,
-        )
-        return _solved(self._matrix, np.array(right)), N
-
-    def eliminated(self, x: FloatArray) -> FloatArray:
-        """See :class:`Closed`."""
-        state = x.tolist()
-        theta, psi = state[3:5]
-        frame = self.frame(*self.angle(state))
-        self._fill(frame, math.sin(theta), math.cos(theta), math.sin(psi), math.cos(psi))
-        self._upper[5:] = self._matrix[5:, :5].dot(x[5:])
-        result = x.copy()
-        result[5:] -= _solved(self._matrix, self._upper)[:5]
-        return result
-
-
-def _solved(matrix: FloatArray, right: FloatArray) -> FloatArray:
-    # LAPACK directly: numpy's wrapper costs more than the solution of so small a system.
-    _, _, solution, info = dgesv(matrix, right)
-    if info:
-        raise ArithmeticError("the equations of motion are singular")
-    return np.asarray(solution)
-
-
-def closed_form(body: RollingBall, geometry: object, orientation: Orientation) -> Closed | None:
-    """The equations written out, or None where they are not known."""
-    if not isinstance(geometry, Uniform):
-        return None
-    if type(orientation) is RotatingFrame:  # not where the orientation is followed: its state is longer
-        return _AlongAxes(body, geometry)
-    return _Euler(body, geometry) if isinstance(orientation, EulerAngles) else None
