@@ -3,21 +3,23 @@
 from __future__ import annotations
 
 import io
-import re
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from fractions import Fraction
 from pathlib import Path
+from types import MappingProxyType
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
 from proofroll.files import replacing
 from proofroll.plain import plain
+from proofroll.report.svg import element
 from proofroll.truth.regimes import Regime
 
 if TYPE_CHECKING:
     import xarray as xr
 
+_NO_DATE: dict[str, dict[str, Any]] = {"svg": {"Date": None}, "pdf": {"CreationDate": None}}
 _WORDS = {Regime.NEVER_SLIPS: "never slips", Regime.RECOVERS: "slips and recovers", Regime.FALLS: "falls"}
 _COLOURS = {Regime.NEVER_SLIPS: "#2f7f5f", Regime.RECOVERS: "#e8b64c", Regime.FALLS: "#b5473c"}
 # The analytic boundaries: how each is drawn, and what it parts.
@@ -94,18 +96,24 @@ def inline(maps: Sequence[xr.Dataset], prefix: str) -> str:
     Raises:
         Missing: matplotlib is not installed.
     """
-    text = _svg(maps)
-    text = text[text.index("<svg") :]
-    text = re.sub(r"<(metadata|style)\b.*?</\1>", "", text, flags=re.DOTALL)
-    start, _, rest = text.partition(">")
-    text = re.sub(r' (?:xmlns(?::\w+)?|version|width|height)="[^"]*"', "", start) + ">" + rest
-    # Only ids that something refers to: equal images would share theirs.
-    text = re.sub(r' id="([^"]*)"', lambda found: f' id="{prefix}{found[1]}"' if f"#{found[1]}" in text else "", text)
-    text = re.sub(r'href="#', f'href="#{prefix}', text)
-    return re.sub(r"url\(#", f"url(#{prefix}", text)
+    return element(_svg(maps), prefix)
 
 
 def _svg(maps: Sequence[xr.Dataset]) -> str:
+    return picture(maps, "svg", {"font.size": 9}).decode()
+
+
+def picture(maps: Sequence[xr.Dataset], form: str, style: Mapping[str, Any] = MappingProxyType({})) -> bytes:
+    """The maps side by side as the content of a file.
+
+    Args:
+        maps: one for each rolling resistance.
+        form: ``svg``, ``png`` or ``pdf``.
+        style: matplotlib's settings for text and lines.
+
+    Raises:
+        Missing: matplotlib is not installed.
+    """
     from proofroll.errors import Missing
 
     try:
@@ -116,7 +124,7 @@ def _svg(maps: Sequence[xr.Dataset]) -> str:
         from matplotlib.patches import Patch
     except ImportError:
         raise Missing("drawing needs matplotlib: pip install 'proofroll[report]'") from None
-    with mpl.rc_context({"svg.hashsalt": "proofroll", "svg.fonttype": "none", "font.size": 9}):
+    with mpl.rc_context({"svg.hashsalt": "proofroll", "svg.fonttype": "none", **style, "axes.grid": False}):
         figure = Figure(figsize=(5.2 * len(maps), 4.2), layout="constrained")
         colours = ListedColormap([_COLOURS[regime] for regime in Regime])
         for index, item in enumerate(maps):
@@ -139,6 +147,7 @@ def _svg(maps: Sequence[xr.Dataset]) -> str:
             style, meaning = _LINES[name]
             handles.append(Line2D([], [], color="black", ls=style, lw=1, label=f"{formula}: {meaning}"))
         figure.legend(handles=handles, loc="outside lower center", ncols=3 if len(maps) > 1 else 1, frameon=False)
-        text = io.StringIO()
-        figure.savefig(text, format="svg", metadata={"Date": None})
-    return text.getvalue()
+        content = io.BytesIO()
+        # Equal maps give equal files, so no date; PNG has no such field.
+        figure.savefig(content, format=form, dpi=300, metadata=_NO_DATE.get(form))
+    return content.getvalue()
