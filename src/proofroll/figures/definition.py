@@ -58,7 +58,9 @@ class Panel:
         runs: names of the runs that are drawn.
         x: quantity against which; time by default.
         title: for a person.
+        label: of the ordinate instead of all symbols; mathematics between dollar signs.
         equal: one scale for both axes.
+        zero: the ordinate begins at zero.
         share: panels with the same text share the range of y.
         levels: horizontal lines.
         events: mark what happened in the first run.
@@ -69,7 +71,9 @@ class Panel:
     runs: list[str]
     x: str = TIME
     title: str = ""
+    label: str = ""
     equal: bool = False
+    zero: bool = False
     share: str = ""
     levels: list[Level] = field(default_factory=list)
     events: bool = False

@@ -23,8 +23,10 @@ if TYPE_CHECKING:
     from matplotlib.figure import Figure as Drawn
 
 FORMATS = ("svg", "png", "pdf")
-# Samples of the truth that are drawn over a curve: enough to see that they lie on it, few enough to see it.
-_TRUTH_MARKS = 41
+# Samples of the truth that are drawn over curves in one row: enough to see that they lie on them, few enough to see them.
+_TRUTH_MARKS = 66
+# A curve that varies by less than this part of its size is constant, and its axis does not magnify its round-off.
+_CONSTANT, _ROOM = 1e-3, 0.05
 
 
 @contextmanager
@@ -83,19 +85,26 @@ def drawn(wanted: Figure, study: Study) -> Drawn:
     """The figure as a matplotlib figure; call it within :func:`looks`."""
     from matplotlib.figure import Figure as New
 
-    rows = -(-len(wanted.panels) // wanted.columns)
+    columns = wanted.columns
+    rows = -(-len(wanted.panels) // columns)
     figure = New(figsize=(style.WIDTH, 0.35 + rows * wanted.height), layout="constrained")
     shared: dict[str, Axes] = {}
     for number, panel in enumerate(wanted.panels):
-        axes = figure.add_subplot(rows, wanted.columns, number + 1, sharey=shared.get(panel.share))
+        axes = figure.add_subplot(rows, columns, number + 1, sharey=shared.get(panel.share))
         if panel.share:
             shared.setdefault(panel.share, axes)
         _panel(axes, panel, wanted, study)
+        below = wanted.panels[number + columns :][:1]
+        if not below or below[0].x != panel.x:
+            axes.set_xlabel(style.axis_label(_symbol(panel.x, study), study.units[panel.x]))
+        left = wanted.panels[number - 1] if number % columns else None
+        if left is None or not panel.share or left.share != panel.share:
+            axes.set_ylabel(_ordinate(panel, study))
         letter = f"({string.ascii_lowercase[number % 26]})" if len(wanted.panels) > 1 else ""
-        title = " ".join(filter(None, (letter, panel.title)))
-        axes.set_title(title, loc="left", pad=16 if panel.events and number == 0 else 4)
+        named = panel.events and number == 0
+        axes.set_title(" ".join(filter(None, (letter, panel.title))), loc="left", pad=22 if named else 4)
         if panel.events:
-            _events(axes, study.runs[panel.runs[0]], wanted, named=number == 0)
+            _events(axes, study.runs[panel.runs[0]], wanted, named=named)
     _legend(figure, wanted, study)
     return figure
 
@@ -115,7 +124,8 @@ def _panel(axes: Axes, panel: Panel, wanted: Figure, study: Study) -> None:
             if panel.truth and study.truths is not study.runs:
                 marks = _curve(study.truths[run], panel.x, name, until)
                 if marks is not None:
-                    at = np.linspace(0, len(marks[0]) - 1, min(_TRUTH_MARKS, len(marks[0]))).round().astype(int)
+                    count = min(_TRUTH_MARKS // (wanted.columns + 1), len(marks[0]))
+                    at = np.linspace(0, len(marks[0]) - 1, count).round().astype(int)
                     axes.plot(marks[0][at], marks[1][at], zorder=3, **style.TRUTH)
     for level in panel.levels:
         axes.axhline(level.value, zorder=1.5, **style.LEVEL)
@@ -123,23 +133,43 @@ def _panel(axes: Axes, panel: Panel, wanted: Figure, study: Study) -> None:
             level.label, (1, level.value), (-2, 2), xycoords=("axes fraction", "data"), textcoords="offset points",
             ha="right", va="bottom", fontsize=8, color="0.25",
         )  # fmt: skip
-    symbols = ", ".join(dict.fromkeys(_symbol(name, study) for name in panel.y))
-    axes.set_xlabel(style.axis_label(_symbol(panel.x, study), study.units[panel.x]))
-    axes.set_ylabel(style.axis_label(symbols, study.units[panel.y[0]]))
     if not axes.lines:
         axes.text(0.5, 0.5, f"{study.engine} cannot say", transform=axes.transAxes, ha="center", va="center")
+        return
+    _limits(axes, panel, until)
+    if number > 1:
+        _key(axes, panel, number)
+
+
+def _limits(axes: Axes, panel: Panel, until: float) -> None:
     if panel.x == TIME:
         axes.set_xlim(0, until)
+    drawn = np.concatenate([np.asarray(line.get_ydata(), dtype=np.float64) for line in axes.lines])
+    size = float(np.max(np.abs(drawn)))
+    if np.ptp(drawn) < _CONSTANT * size:
+        middle = float(np.mean(drawn))
+        axes.set_ylim(middle - _ROOM * size, middle + _ROOM * size)
+    if panel.zero:
+        axes.set_ylim(bottom=0)
     if panel.equal:
-        axes.set_aspect("equal", adjustable="datalim")
+        axes.set_aspect("equal", adjustable="box")
         axes.margins(0.08)
-    if len(panel.y) * len(panel.runs) > 1:
-        # Above the axes: inside, whatever is free at one setting is crossed by a curve at another.
-        columns = len(panel.y) * len(panel.runs)
-        axes.legend(
-            loc="lower right", bbox_to_anchor=(1.0, 1.0), ncols=columns, borderaxespad=0.1, columnspacing=1.0,
-            handletextpad=0.4, borderpad=0.1,
-        )  # fmt: skip
+
+
+def _key(axes: Axes, panel: Panel, curves: int) -> None:
+    """What is which curve: above the axes, or inside where events are named above."""
+    if panel.events:
+        axes.legend(loc="upper left" if panel.levels else "lower left")
+        return
+    axes.legend(
+        loc="lower right", bbox_to_anchor=(1.0, 1.0), ncols=curves, borderaxespad=0.1, columnspacing=1.0,
+        handletextpad=0.4, borderpad=0.1,
+    )  # fmt: skip
+
+
+def _ordinate(panel: Panel, study: Study) -> str:
+    symbols = ", ".join(dict.fromkeys(_symbol(name, study) for name in panel.y))
+    return style.axis_label(panel.label or symbols, study.units[panel.y[0]])
 
 
 def _curve(made: Made, x: str, y: str, until: float) -> tuple[Any, Any] | None:
@@ -172,7 +202,7 @@ def _events(axes: Axes, made: Made, wanted: Figure, *, named: bool) -> None:
             axes.axvspan(event.time, until, zorder=0, **style.SLIPPING)
         if named:
             axes.annotate(
-                f"{event.kind}s {event.time:.4g} s", (event.time, 1), (0, 2), xycoords=("data", "axes fraction"),
+                f"{event.kind}s\n{event.time:.3f} s", (event.time, 1), (0, 2), xycoords=("data", "axes fraction"),
                 textcoords="offset points", ha="center", va="bottom", fontsize=8,
             )  # fmt: skip
 
@@ -182,7 +212,7 @@ def _legend(figure: Drawn, wanted: Figure, study: Study) -> None:
     from matplotlib.lines import Line2D
 
     marked = any(panel.truth for panel in wanted.panels) and study.truths is not study.runs
-    handles = [Line2D([], [], color="0.2", label=f"lines: {study.engine}")]
+    handles = [Line2D([], [], color="0.2", label=study.engine)]
     if marked:
-        handles.append(Line2D([], [], label="some samples of the truth", **style.TRUTH))
+        handles.append(Line2D([], [], label="truth (some samples)", **style.TRUTH))
     figure.legend(handles=handles, loc="outside lower right", ncols=2)

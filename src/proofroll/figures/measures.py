@@ -81,15 +81,24 @@ def _first_extreme(_: FloatArray, values: FloatArray) -> float:
     return float(found[0]) if found.size else float("nan")
 
 
+def _centred(values: FloatArray) -> tuple[FloatArray, FloatArray]:
+    """Amplitude and mean level of each swing, shape (k - 2,).
+
+    Each inner extreme is held against the mean of its two neighbours: a drift of the level, which lengthens every
+    swing one way and shortens every swing back, then moves neither, nor does a growing amplitude tilt the level.
+    """
+    found = extremes(values)
+    outer, inner = (found[:-2] + found[2:]) / 2, found[1:-1]
+    return np.abs(inner - outer) / 2, (inner + outer) / 2
+
+
 def _least_growth(_: FloatArray, values: FloatArray) -> float:
-    swings = np.abs(np.diff(extremes(values)))
-    return float(np.min(swings[1:] / swings[:-1])) if swings.size > 1 else float("nan")
+    amplitudes, _levels = _centred(values)
+    return float(np.min(amplitudes[1:] / amplitudes[:-1])) if amplitudes.size > 1 else float("nan")
 
 
 def _largest_step(_: FloatArray, values: FloatArray) -> float:
-    found = extremes(values)
-    # One crest with half of the troughs on both sides, or the reverse: a growing amplitude does not tilt it.
-    levels = (found[:-2] + 2 * found[1:-1] + found[2:]) / 4
+    _amplitudes, levels = _centred(values)
     return float(np.max(np.diff(levels))) if levels.size > 1 else float("nan")
 
 
@@ -127,7 +136,7 @@ def measured(measure: Measure, times: FloatArray, values: FloatArray) -> float:
     * ``variation``: maximum less minimum, over the size of the mean.
     * ``first_extreme``: the first inner maximum or minimum.
     * ``misfit_of_sinusoid``, ``angular_frequency`` [rad/s]: see :func:`sinusoid`.
-    * ``least_growth_of_amplitude``: the smallest ratio of a swing to the swing before it.
+    * ``least_growth_of_amplitude``: the smallest ratio of an amplitude to the one before it.
     * ``largest_step_of_mean_level``: the largest rise of the level about which it swings, from a swing to the next.
     * ``change_of_mean``: mean of the second half less that of the first.
     * ``growth_of_range``: range of the second half over that of the first.

@@ -4,12 +4,12 @@ from __future__ import annotations
 
 from typing import Any
 
-# Three colours of Okabe and Ito (2008) that are told apart by every common kind of colour vision, from dark to light,
-# so that they also differ in grey; the dashes tell the lines apart where even that is lost.
+# Colours after Okabe and Ito (2008), told apart by every common kind of colour vision: here from dark to light
+# (L* = 33, 54 and 70), so that they also differ in grey; the dashes tell the lines apart where even that is lost.
 LINES: tuple[dict[str, Any], ...] = (
-    {"color": "#0072b2", "linestyle": "-"},
+    {"color": "#00518a", "linestyle": "-"},
     {"color": "#d55e00", "linestyle": (0, (5, 1.5))},
-    {"color": "#009e73", "linestyle": (0, (4, 1.2, 1, 1.2))},
+    {"color": "#56b4e9", "linestyle": (0, (4, 1.2, 1, 1.2))},
     {"color": "#000000", "linestyle": (0, (1, 1.2))},
 )
 TRUTH: dict[str, Any] = {
@@ -35,6 +35,7 @@ SETTINGS: dict[str, Any] = {
     "axes.grid": True,
     "axes.xmargin": 0.0,
     "axes.formatter.use_mathtext": True,
+    "axes.formatter.useoffset": False,
     "axes.unicode_minus": True,
     "grid.color": "0.9",
     "grid.linewidth": 0.5,
@@ -46,7 +47,7 @@ SETTINGS: dict[str, Any] = {
     "ytick.major.width": 0.6,
     "legend.fontsize": 8,
     "legend.frameon": False,
-    "legend.handlelength": 2.4,
+    "legend.handlelength": 2.0,
     "lines.linewidth": 1.1,
     "svg.fonttype": "path",  # the same picture wherever it is opened; each text is also there as a comment
     "svg.hashsalt": "proofroll",
