@@ -89,10 +89,12 @@ def drawn(wanted: Figure, study: Study) -> Drawn:
     rows = -(-len(wanted.panels) // columns)
     figure = New(figsize=(style.WIDTH, 0.35 + rows * wanted.height), layout="constrained")
     shared: dict[str, Axes] = {}
+    placed: list[Axes] = []
     for number, panel in enumerate(wanted.panels):
         axes = figure.add_subplot(rows, columns, number + 1, sharey=shared.get(panel.share))
         if panel.share:
             shared.setdefault(panel.share, axes)
+        placed.append(axes)
         _panel(axes, panel, wanted, study)
         below = wanted.panels[number + columns :][:1]
         if not below or below[0].x != panel.x:
@@ -102,11 +104,22 @@ def drawn(wanted: Figure, study: Study) -> Drawn:
             axes.set_ylabel(_ordinate(panel, study))
         letter = f"({string.ascii_lowercase[number % 26]})" if len(wanted.panels) > 1 else ""
         named = panel.events and number == 0
-        axes.set_title(" ".join(filter(None, (letter, panel.title))), loc="left", pad=22 if named else 4)
+        title = " ".join(filter(None, (letter, panel.title)))
+        axes.set_title(title, loc="left", pad=_pad(panel, named))
         if panel.events:
             _events(axes, study.runs[panel.runs[0]], wanted, named=named)
+    for axes, panel in zip(placed, wanted.panels, strict=True):
+        if panel.zero and axes.lines:  # once every panel is drawn that shares the range: a limit ends the automatic one
+            axes.set_ylim(bottom=0)
     _legend(figure, wanted, study)
     return figure
+
+
+def _pad(panel: Panel, named: bool) -> float:
+    """Points between the axes and the title: room for the names of events, or for a key of several runs."""
+    if named:
+        return 22
+    return 16 if len(panel.runs) > 1 and not panel.events else 4
 
 
 def _panel(axes: Axes, panel: Panel, wanted: Figure, study: Study) -> None:
@@ -130,8 +143,8 @@ def _panel(axes: Axes, panel: Panel, wanted: Figure, study: Study) -> None:
     for level in panel.levels:
         axes.axhline(level.value, zorder=1.5, **style.LEVEL)
         axes.annotate(
-            level.label, (1, level.value), (-2, 2), xycoords=("axes fraction", "data"), textcoords="offset points",
-            ha="right", va="bottom", fontsize=8, color="0.25",
+            level.label, (1, level.value), (3, 0), xycoords=("axes fraction", "data"), textcoords="offset points",
+            ha="left", va="center", fontsize=8, color="0.25", annotation_clip=False,
         )  # fmt: skip
     if not axes.lines:
         axes.text(0.5, 0.5, f"{study.engine} cannot say", transform=axes.transAxes, ha="center", va="center")
@@ -149,8 +162,6 @@ def _limits(axes: Axes, panel: Panel, until: float) -> None:
     if np.ptp(drawn) < _CONSTANT * size:
         middle = float(np.mean(drawn))
         axes.set_ylim(middle - _ROOM * size, middle + _ROOM * size)
-    if panel.zero:
-        axes.set_ylim(bottom=0)
     if panel.equal:
         axes.set_aspect("equal", adjustable="box")
         axes.margins(0.08)

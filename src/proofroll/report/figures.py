@@ -28,6 +28,7 @@ if TYPE_CHECKING:
 
 _SIGNS = {True: ("✓", "green"), False: ("✗", "bold red"), None: ("–", "")}
 _DIGITS = 7
+_MAP_HEIGHT = 3.6  # inch
 
 
 def figures_content(study: Study, maps: Maps) -> dict[str, Any]:
@@ -65,7 +66,7 @@ def write_figures(study: Study, maps: Maps, out: Path, forms: Sequence[str]) -> 
         for form in forms:
             if figure.regimes:
                 with looks():
-                    drawn = map_picture(maps[figure.regimes], form, style.SETTINGS)
+                    drawn = map_picture(maps[figure.regimes], form, style.SETTINGS, (style.WIDTH, _MAP_HEIGHT))
             else:
                 drawn = picture(figure, study, form)
             path = out / f"{figure.name}.{form}"

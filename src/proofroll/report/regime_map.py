@@ -6,7 +6,6 @@ import io
 from collections.abc import Mapping, Sequence
 from fractions import Fraction
 from pathlib import Path
-from types import MappingProxyType
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -19,9 +18,12 @@ from proofroll.truth.regimes import Regime
 if TYPE_CHECKING:
     import xarray as xr
 
+# Width of an entry of the legend [inch].
+_ENTRY = 3.4
 _NO_DATE: dict[str, dict[str, Any]] = {"svg": {"Date": None}, "pdf": {"CreationDate": None}}
 _WORDS = {Regime.NEVER_SLIPS: "never slips", Regime.RECOVERS: "slips and recovers", Regime.FALLS: "falls"}
-_COLOURS = {Regime.NEVER_SLIPS: "#2f7f5f", Regime.RECOVERS: "#e8b64c", Regime.FALLS: "#b5473c"}
+# From light to dark, so that they differ in grey too.
+_COLOURS = {Regime.NEVER_SLIPS: "#d5e8de", Regime.RECOVERS: "#e8b64c", Regime.FALLS: "#a63c33"}
 # The analytic boundaries: how each is drawn, and what it parts.
 _LINES = {"mu_falls": ("--", "below it falls (f = 0)"), "mu_slips": ("-", "above it never slips (f = 0)")}
 
@@ -100,16 +102,17 @@ def inline(maps: Sequence[xr.Dataset], prefix: str) -> str:
 
 
 def _svg(maps: Sequence[xr.Dataset]) -> str:
-    return picture(maps, "svg", {"font.size": 9}).decode()
+    return picture(maps, "svg", {"font.size": 9}, (5.2 * len(maps), 4.2)).decode()
 
 
-def picture(maps: Sequence[xr.Dataset], form: str, style: Mapping[str, Any] = MappingProxyType({})) -> bytes:
+def picture(maps: Sequence[xr.Dataset], form: str, style: Mapping[str, Any], size: tuple[float, float]) -> bytes:
     """The maps side by side as the content of a file.
 
     Args:
         maps: one for each rolling resistance.
         form: ``svg``, ``png`` or ``pdf``.
         style: matplotlib's settings for text and lines.
+        size: width and height [inch].
 
     Raises:
         Missing: matplotlib is not installed.
@@ -125,7 +128,7 @@ def picture(maps: Sequence[xr.Dataset], form: str, style: Mapping[str, Any] = Ma
     except ImportError:
         raise Missing("drawing needs matplotlib: pip install 'proofroll[report]'") from None
     with mpl.rc_context({"svg.hashsalt": "proofroll", "svg.fonttype": "none", **style, "axes.grid": False}):
-        figure = Figure(figsize=(5.2 * len(maps), 4.2), layout="constrained")
+        figure = Figure(figsize=size, layout="constrained")
         colours = ListedColormap([_COLOURS[regime] for regime in Regime])
         for index, item in enumerate(maps):
             axes = figure.add_subplot(1, len(maps), index + 1)
@@ -146,7 +149,7 @@ def picture(maps: Sequence[xr.Dataset], form: str, style: Mapping[str, Any] = Ma
         for name, formula in next((found for item in maps if (found := boundaries(item))), {}).items():
             style, meaning = _LINES[name]
             handles.append(Line2D([], [], color="black", ls=style, lw=1, label=f"{formula}: {meaning}"))
-        figure.legend(handles=handles, loc="outside lower center", ncols=3 if len(maps) > 1 else 1, frameon=False)
+        figure.legend(handles=handles, loc="outside lower center", ncols=max(1, int(size[0] / _ENTRY)), frameon=False)
         content = io.BytesIO()
         # Equal maps give equal files, so no date; PNG has no such field.
         figure.savefig(content, format=form, dpi=300, metadata=_NO_DATE.get(form))
