@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from enum import StrEnum
 from pathlib import Path
-from typing import Annotated
+from typing import TYPE_CHECKING, Annotated
 
 import typer
 
@@ -21,6 +21,9 @@ from proofroll.cli.common import (
     progress_bar,
     write_json,
 )
+
+if TYPE_CHECKING:
+    import xarray as xr
 
 
 class Form(StrEnum):
@@ -74,7 +77,7 @@ def figures(
     raise typer.Exit(CONTRADICTED if contradicted else OK)
 
 
-def _maps(name: str, jobs: int | None) -> list[object]:
+def _maps(name: str, jobs: int | None) -> list[xr.Dataset]:
     """The regime maps of a comparison, with a progress bar of their own."""
     import os
 
@@ -85,4 +88,4 @@ def _maps(name: str, jobs: int | None) -> list[object]:
     total = wanted.regimes.count if wanted.regimes else None
     with progress_bar("runs of the truth", total=total) as advance:
         workers = jobs or os.cpu_count() or 1
-        return list(regime_maps(wanted, workers, lambda count: advance("runs of the truth", count)))
+        return regime_maps(wanted, workers, lambda count: advance("runs of the truth", count))

@@ -23,7 +23,7 @@ if TYPE_CHECKING:
     from matplotlib.figure import Figure as Drawn
 
 FORMATS = ("svg", "png", "pdf")
-# Samples of the truth that are drawn over curves in one row: enough to see that they lie on them, few enough to see them.
+# Samples of the truth over the curves of one row: enough to see that they lie on them, few enough to see the curves.
 _TRUTH_MARKS = 66
 # A curve that varies by less than this part of its size is constant, and its axis does not magnify its round-off.
 _CONSTANT, _ROOM = 1e-3, 0.05
@@ -85,8 +85,7 @@ def drawn(wanted: Figure, study: Study) -> Drawn:
     """The figure as a matplotlib figure; call it within :func:`looks`."""
     from matplotlib.figure import Figure as New
 
-    columns = wanted.columns
-    rows = -(-len(wanted.panels) // columns)
+    rows, columns = -(-len(wanted.panels) // wanted.columns), wanted.columns
     figure = New(figsize=(style.WIDTH, 0.35 + rows * wanted.height), layout="constrained")
     shared: dict[str, Axes] = {}
     placed: list[Axes] = []
@@ -96,12 +95,8 @@ def drawn(wanted: Figure, study: Study) -> Drawn:
             shared.setdefault(panel.share, axes)
         placed.append(axes)
         _panel(axes, panel, wanted, study)
-        below = wanted.panels[number + columns :][:1]
-        if not below or below[0].x != panel.x:
-            axes.set_xlabel(style.axis_label(_symbol(panel.x, study), study.units[panel.x]))
-        left = wanted.panels[number - 1] if number % columns else None
-        if left is None or not panel.share or left.share != panel.share:
-            axes.set_ylabel(_ordinate(panel, study))
+        axes.set_xlabel(style.axis_label(_symbol(panel.x, study), study.units[panel.x]))
+        axes.set_ylabel(_ordinate(panel, study))
         letter = f"({string.ascii_lowercase[number % 26]})" if len(wanted.panels) > 1 else ""
         named = panel.events and number == 0
         title = " ".join(filter(None, (letter, panel.title)))

@@ -5,9 +5,9 @@ from __future__ import annotations
 import itertools
 import math
 import operator
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from decimal import Decimal
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
@@ -17,8 +17,15 @@ from proofroll.figures.measures import measured, unit_of
 from proofroll.figures.quantities import TIME
 from proofroll.figures.study import Made, Study
 
+if TYPE_CHECKING:
+    import xarray as xr
+
 Found = float | list[float] | list[str] | None
-_BOUNDS = {"at_most": ("≤", operator.le), "below": ("<", operator.lt), "above": (">", operator.gt)}
+_BOUNDS: dict[str, tuple[str, Callable[[float, float], bool]]] = {
+    "at_most": ("≤", operator.le),
+    "below": ("<", operator.lt),
+    "above": (">", operator.gt),
+}
 # A decimal fraction is not a double: half a unit of the last digit is that, and its round-off.
 _HALF = Decimal("0.5") * (1 + Decimal("1e-9"))
 
@@ -69,7 +76,7 @@ def _unit(study: Study, item: Statement) -> str:
     if item.events:
         return ""
     unit = study.units[item.of]
-    return unit if item.measure in {"every", ""} else unit_of(item.measure, unit)
+    return unit if item.measure == "every" or not item.measure else unit_of(item.measure, unit)
 
 
 def _stated(item: Statement) -> str:
@@ -92,12 +99,7 @@ def _value(item: Statement, made: Made) -> Found:
     if not made.done or made.dataset is None:
         return None
     if item.events or item.event is not None:
-        if "event_kind" not in made.dataset:
-            return None
-        events = [event for event in events_of(made.dataset) if item.until is None or event.time <= item.until]
-        if item.event is None:
-            return [str(event.kind) for event in events]
-        return events[item.event].time if item.event < len(events) else math.nan
+        return _happened(item, made.dataset)
     values = made.curve(item.of, item.until)
     if values is None:
         return None
@@ -107,17 +109,27 @@ def _value(item: Statement, made: Made) -> Found:
     return measured(item.measure, made.dataset[TIME].to_numpy()[: values.size], values)
 
 
+def _happened(item: Statement, dataset: xr.Dataset) -> Found:
+    """The kinds of the events, or the time [s] of one; nan where it did not happen."""
+    if "event_kind" not in dataset:
+        return None
+    events = [event for event in events_of(dataset) if item.until is None or event.time <= item.until]
+    if item.event is None:
+        return [str(event.kind) for event in events]
+    return events[item.event].time if 0 <= item.event < len(events) else math.nan
+
+
 def _holds(item: Statement, found: Found) -> bool:
     (criterion,) = item.criteria
     if isinstance(found, list):
         if criterion == "events":
             return found == item.events
         compare = operator.lt if item.order == "rising" else operator.gt
-        return all(compare(a, b) for a, b in itertools.pairwise(found))
-    assert found is not None
+        return all(compare(a, b) for a, b in itertools.pairwise(float(value) for value in found))
+    assert found is not None  # nothing found is not judged
     if criterion == "stated":
         return rounds_to(found, item.stated)
-    return bool(_BOUNDS[criterion][1](found, getattr(item, criterion)))
+    return _BOUNDS[criterion][1](found, getattr(item, criterion))
 
 
 def _reasons(study: Study, item: Statement, runs: list[str]) -> Iterator[str]:

@@ -49,7 +49,7 @@ def _length(name: str, components: int = 3) -> Callable[[RollingBall, xr.Dataset
 
 
 def _slip(_: RollingBall, dataset: xr.Dataset) -> FloatArray:
-    return np.hypot(dataset["slip2"].to_numpy(), dataset["slip3"].to_numpy())
+    return np.asarray(np.hypot(dataset["slip2"].to_numpy(), dataset["slip3"].to_numpy()))
 
 
 def _inertia(body: RollingBall, dataset: xr.Dataset) -> FloatArray:

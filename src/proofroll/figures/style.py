@@ -23,7 +23,7 @@ EVENT: dict[str, Any] = {"color": "0.35", "linewidth": 0.6}
 WIDTH = 7.09
 PIXELS_PER_INCH = 300
 
-SETTINGS: dict[str, Any] = {
+SETTINGS: Any = {  # matplotlib types the names of its settings, which a dictionary does not keep
     "font.family": "STIXGeneral",  # comes with matplotlib, and is the face of its mathematics
     "mathtext.fontset": "stix",
     "font.size": 9,

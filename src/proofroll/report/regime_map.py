@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import io
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from fractions import Fraction
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -105,13 +105,13 @@ def _svg(maps: Sequence[xr.Dataset]) -> str:
     return picture(maps, "svg", {"font.size": 9}, (5.2 * len(maps), 4.2)).decode()
 
 
-def picture(maps: Sequence[xr.Dataset], form: str, style: Mapping[str, Any], size: tuple[float, float]) -> bytes:
+def picture(maps: Sequence[xr.Dataset], form: str, style: Any, size: tuple[float, float]) -> bytes:
     """The maps side by side as the content of a file.
 
     Args:
         maps: one for each rolling resistance.
         form: ``svg``, ``png`` or ``pdf``.
-        style: matplotlib's settings for text and lines.
+        style: matplotlib's settings for text and lines, by name.
         size: width and height [inch].
 
     Raises:
@@ -135,9 +135,9 @@ def picture(maps: Sequence[xr.Dataset], form: str, style: Mapping[str, Any], siz
             axes.pcolormesh(
                 item["speed"], item["mu_static"], item["regime"].T, cmap=colours, vmin=0, vmax=2, rasterized=True
             )
-            for name, (style, _) in _LINES.items():
+            for name, (dashes, _) in _LINES.items():
                 if name in item:
-                    axes.plot(item["speed"], item[name], color="black", ls=style, lw=1)
+                    axes.plot(item["speed"], item[name], color="black", ls=dashes, lw=1)
             axes.set(
                 xlim=(float(item["speed"].min()), float(item["speed"].max())),
                 ylim=(float(item["mu_static"].min()), float(item["mu_static"].max())),
@@ -147,8 +147,8 @@ def picture(maps: Sequence[xr.Dataset], form: str, style: Mapping[str, Any], siz
             )
         handles: list[Any] = [Patch(color=_COLOURS[regime], label=word) for regime, word in _WORDS.items()]
         for name, formula in next((found for item in maps if (found := boundaries(item))), {}).items():
-            style, meaning = _LINES[name]
-            handles.append(Line2D([], [], color="black", ls=style, lw=1, label=f"{formula}: {meaning}"))
+            dashes, meaning = _LINES[name]
+            handles.append(Line2D([], [], color="black", ls=dashes, lw=1, label=f"{formula}: {meaning}"))
         figure.legend(handles=handles, loc="outside lower center", ncols=max(1, int(size[0] / _ENTRY)), frameon=False)
         content = io.BytesIO()
         # Equal maps give equal files, so no date; PNG has no such field.
