@@ -22,16 +22,16 @@ RUNS = ("free4", "resisted4")
 SHORT = 1.75
 
 
-def only(figures: Figures, *runs: str, **changes: Any) -> Figures:
+def only(whole: Figures, *runs: str, **changes: Any) -> Figures:
     """The file with some of its runs, and with what is said and drawn of those alone."""
-    drawn_of = [f for f in figures.figures if f.panels and all(set(panel.runs) <= set(runs) for panel in f.panels)]
-    said = [dataclasses.replace(s, runs=[run for run in s.runs if run in runs]) for s in figures.statements]
-    kept = {
-        "runs": {name: figures.runs[name] for name in runs},
+    drawn_of = [f for f in whole.figures if f.panels and all(set(panel.runs) <= set(runs) for panel in f.panels)]
+    said = [dataclasses.replace(s, runs=[run for run in s.runs if run in runs]) for s in whole.statements]
+    kept: dict[str, Any] = {
+        "runs": {name: whole.runs[name] for name in runs},
         "figures": [dataclasses.replace(f, until=None) for f in drawn_of],
         "statements": [s for s in said if s.runs and not s.order],
     }
-    return dataclasses.replace(figures, **(kept | changes))
+    return dataclasses.replace(whole, **(kept | changes))
 
 
 @pytest.fixture(scope="module")

@@ -6,6 +6,7 @@ from collections.abc import Callable, Mapping
 from typing import Literal
 
 import numpy as np
+import numpy.typing
 from scipy.optimize import minimize_scalar
 from scipy.signal import find_peaks
 
@@ -30,13 +31,18 @@ Measure = Literal[
 DIMENSIONLESS = frozenset({"variation", "misfit_of_sinusoid", "least_growth_of_amplitude", "growth_of_range"})
 # A swing smaller than this part of the whole range is no oscillation of the path but noise of an engine.
 _PROMINENCE = 0.1
-_FREQUENCY_BAND = (0.7, 1.4)  # around the guess from the extremes, which is off by a few per cent
+_FREQUENCY_BAND = (0.8, 1.25)  # around the guess from the extremes, which is off by a few per cent
+
+
+def _turns(values: FloatArray) -> np.typing.NDArray[np.intp]:
+    """Samples at which the curve turns round, in the order of time."""
+    prominence = _PROMINENCE * float(np.ptp(values))
+    return np.sort(np.concatenate([find_peaks(sign * values, prominence=prominence)[0] for sign in (1, -1)]))
 
 
 def extremes(values: FloatArray) -> FloatArray:
     """The curve's inner maxima and minima in the order of time, shape (k,), between samples by a parabola."""
-    prominence = _PROMINENCE * float(np.ptp(values))
-    at = np.sort(np.concatenate([find_peaks(sign * values, prominence=prominence)[0] for sign in (1, -1)]))
+    at = _turns(values)
     before, here, after = values[at - 1], values[at], values[at + 1]
     bend = before - 2 * here + after
     return np.asarray(here - np.divide((after - before) ** 2, 8 * bend, out=np.zeros_like(here), where=bend != 0))
@@ -48,8 +54,8 @@ def sinusoid(times: FloatArray, values: FloatArray) -> tuple[float, float]:
     The misfit is the root mean square of what it leaves, over its amplitude. Level, sine and cosine are linear and
     are eliminated; the frequency is searched near the one that the extremes tell.
     """
-    count = extremes(values).size
-    if count < 2:
+    turns = _turns(values)
+    if turns.size < 2:
         return float("nan"), float("nan")
 
     def fitted(frequency: float) -> tuple[float, float]:
@@ -58,10 +64,10 @@ def sinusoid(times: FloatArray, values: FloatArray) -> tuple[float, float]:
         left = values - basis @ part
         return float(np.sqrt(np.mean(left**2))), float(np.hypot(part[1], part[2]))
 
-    guess = np.pi * count / (times[-1] - times[0])
+    guess = np.pi * (turns.size - 1) / (times[turns[-1]] - times[turns[0]])
     low, high = (factor * guess for factor in _FREQUENCY_BAND)
     # The misfit has other minima a fringe away, so the search starts from the best of a grid finer than that.
-    grid = np.linspace(low, high, 8 * count)
+    grid = np.linspace(low, high, 8 * turns.size)
     best, step = float(min(grid, key=lambda w: fitted(w)[0])), float(grid[1] - grid[0])
     found = minimize_scalar(lambda w: fitted(w)[0], bounds=(best - step, best + step), options={"xatol": 1e-10 * guess})
     left, amplitude = fitted(float(found.x))

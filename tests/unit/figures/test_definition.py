@@ -97,7 +97,7 @@ def test_files_are_found_by_scene_and_are_no_comparisons() -> None:
     with pytest.raises(InputError, match="proofroll figures sphere_in_cylinder"):
         load_comparison(str(data_folder("comparisons") / f"{ours.name}.toml"))
     with pytest.raises(InputError, match=f"choose one of {ours.name}"):
-        load_figures("inclined_plane")
+        load_figures("sphere_in_cone")
 
 
 def test_a_number_holds_to_the_digits_stated() -> None:
