@@ -9,9 +9,10 @@ from typing import Any
 
 import pytest
 
-from proofroll.figures.definition import Figures, load_figures
+from proofroll.figures.definition import Figures
 from proofroll.figures.drawing import drawn, inline, looks, picture
 from proofroll.figures.judging import judged
+from proofroll.figures.reading import load_figures
 from proofroll.figures.study import Study, run_figures
 from proofroll.report.figures import write_figures
 from proofroll.runner import Runner

@@ -48,8 +48,8 @@ def figures(
     as_json: Json = False,
 ) -> None:
     """Draw the paper's figures from runs; exit 1 if a number that it states does not hold."""
-    from proofroll.figures.definition import load_figures
     from proofroll.figures.drawing import looks
+    from proofroll.figures.reading import load_figures
     from proofroll.figures.study import run_figures
     from proofroll.report.figures import closing_lines, statement_table, write_figures
 

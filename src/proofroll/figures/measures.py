@@ -27,7 +27,7 @@ Measure = Literal[
     "change_of_mean",
     "growth_of_range",
 ]
-# Measures that keep the curve's unit, that are times per second, and that have none.
+# Measures without a unit; all others but the frequency keep the curve's.
 DIMENSIONLESS = frozenset({"variation", "misfit_of_sinusoid", "least_growth_of_amplitude", "growth_of_range"})
 # A swing smaller than this part of the whole range is no oscillation of the path but noise of an engine.
 _PROMINENCE = 0.1

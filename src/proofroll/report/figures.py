@@ -83,12 +83,12 @@ def statement_table(content: dict[str, Any]) -> Table:
     table.add_column("statement")
     table.add_column("run", no_wrap=True)
     table.add_column("stated", justify="right", no_wrap=True)
-    table.add_column("found", justify="right", max_width=21)
+    table.add_column("found", justify="right", max_width=24)
     table.add_column("", no_wrap=True)
     said = ""
     for item in content["statements"]:
         sign, look = _SIGNS[item["holds"]]
-        shown = unit(item["unit"])
+        shown = unit(item["unit"]) if item["found"] is not None else ""
         # The order of runs is told by the found numbers; their names are in the JSON.
         runs = item["runs"][0] if len(item["runs"]) == 1 else f"{len(item['runs'])} runs"
         table.add_row(

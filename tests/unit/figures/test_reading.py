@@ -8,8 +8,8 @@ import pytest
 
 from proofroll.comparison_file import comparison_names, load_comparison
 from proofroll.errors import InputError
-from proofroll.figures.definition import load_figures
 from proofroll.figures.judging import rounds_to
+from proofroll.figures.reading import load_figures
 from proofroll.folders import data_folder
 
 TEXT = """
