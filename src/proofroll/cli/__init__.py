@@ -15,6 +15,7 @@ from proofroll.cli.bench import bench
 from proofroll.cli.common import ENGINE, INTERRUPTED, OK, USAGE, complain
 from proofroll.cli.comparing import compare, regimes, report
 from proofroll.cli.drill import drill
+from proofroll.cli.figures import figures
 from proofroll.cli.ladder import ladder
 from proofroll.cli.listing import engines, scenes
 from proofroll.cli.single import onset, run
@@ -28,7 +29,8 @@ app = typer.Typer(
     pretty_exceptions_enable=False,
     rich_markup_mode=None,
 )
-for _command in (scenes, engines, run, compare, report, onset, regimes, tradeoff, recommend, ladder, stability):
+_STUDIES = (compare, report, onset, regimes, tradeoff, recommend, ladder, stability, figures)
+for _command in (scenes, engines, run, *_STUDIES):
     app.command()(_command)
 app.add_typer(bench, name="bench")
 app.add_typer(drill, name="drill")

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import io
-import re
 from collections.abc import Sequence
 from fractions import Fraction
 from pathlib import Path
@@ -13,13 +12,18 @@ import numpy as np
 
 from proofroll.files import replacing
 from proofroll.plain import plain
+from proofroll.report.svg import element
 from proofroll.truth.regimes import Regime
 
 if TYPE_CHECKING:
     import xarray as xr
 
+# Width of an entry of the legend [inch].
+_ENTRY = 3.4
+_NO_DATE: dict[str, dict[str, Any]] = {"svg": {"Date": None}, "pdf": {"CreationDate": None}}
 _WORDS = {Regime.NEVER_SLIPS: "never slips", Regime.RECOVERS: "slips and recovers", Regime.FALLS: "falls"}
-_COLOURS = {Regime.NEVER_SLIPS: "#2f7f5f", Regime.RECOVERS: "#e8b64c", Regime.FALLS: "#b5473c"}
+# From light to dark, so that they differ in grey too.
+_COLOURS = {Regime.NEVER_SLIPS: "#d5e8de", Regime.RECOVERS: "#e8b64c", Regime.FALLS: "#a63c33"}
 # The analytic boundaries: how each is drawn, and what it parts.
 _LINES = {"mu_falls": ("--", "below it falls (f = 0)"), "mu_slips": ("-", "above it never slips (f = 0)")}
 
@@ -94,18 +98,25 @@ def inline(maps: Sequence[xr.Dataset], prefix: str) -> str:
     Raises:
         Missing: matplotlib is not installed.
     """
-    text = _svg(maps)
-    text = text[text.index("<svg") :]
-    text = re.sub(r"<(metadata|style)\b.*?</\1>", "", text, flags=re.DOTALL)
-    start, _, rest = text.partition(">")
-    text = re.sub(r' (?:xmlns(?::\w+)?|version|width|height)="[^"]*"', "", start) + ">" + rest
-    # Only ids that something refers to: equal images would share theirs.
-    text = re.sub(r' id="([^"]*)"', lambda found: f' id="{prefix}{found[1]}"' if f"#{found[1]}" in text else "", text)
-    text = re.sub(r'href="#', f'href="#{prefix}', text)
-    return re.sub(r"url\(#", f"url(#{prefix}", text)
+    return element(_svg(maps), prefix)
 
 
 def _svg(maps: Sequence[xr.Dataset]) -> str:
+    return picture(maps, "svg", {"font.size": 9}, (5.2 * len(maps), 4.2)).decode()
+
+
+def picture(maps: Sequence[xr.Dataset], form: str, style: Any, size: tuple[float, float]) -> bytes:
+    """The maps side by side as the content of a file.
+
+    Args:
+        maps: one for each rolling resistance.
+        form: ``svg``, ``png`` or ``pdf``.
+        style: matplotlib's settings for text and lines, by name.
+        size: width and height [inch].
+
+    Raises:
+        Missing: matplotlib is not installed.
+    """
     from proofroll.errors import Missing
 
     try:
@@ -116,17 +127,17 @@ def _svg(maps: Sequence[xr.Dataset]) -> str:
         from matplotlib.patches import Patch
     except ImportError:
         raise Missing("drawing needs matplotlib: pip install 'proofroll[report]'") from None
-    with mpl.rc_context({"svg.hashsalt": "proofroll", "svg.fonttype": "none", "font.size": 9}):
-        figure = Figure(figsize=(5.2 * len(maps), 4.2), layout="constrained")
+    with mpl.rc_context({"svg.hashsalt": "proofroll", "svg.fonttype": "none", **style, "axes.grid": False}):
+        figure = Figure(figsize=size, layout="constrained")
         colours = ListedColormap([_COLOURS[regime] for regime in Regime])
         for index, item in enumerate(maps):
             axes = figure.add_subplot(1, len(maps), index + 1)
             axes.pcolormesh(
                 item["speed"], item["mu_static"], item["regime"].T, cmap=colours, vmin=0, vmax=2, rasterized=True
             )
-            for name, (style, _) in _LINES.items():
+            for name, (dashes, _) in _LINES.items():
                 if name in item:
-                    axes.plot(item["speed"], item[name], color="black", ls=style, lw=1)
+                    axes.plot(item["speed"], item[name], color="black", ls=dashes, lw=1)
             axes.set(
                 xlim=(float(item["speed"].min()), float(item["speed"].max())),
                 ylim=(float(item["mu_static"].min()), float(item["mu_static"].max())),
@@ -136,9 +147,10 @@ def _svg(maps: Sequence[xr.Dataset]) -> str:
             )
         handles: list[Any] = [Patch(color=_COLOURS[regime], label=word) for regime, word in _WORDS.items()]
         for name, formula in next((found for item in maps if (found := boundaries(item))), {}).items():
-            style, meaning = _LINES[name]
-            handles.append(Line2D([], [], color="black", ls=style, lw=1, label=f"{formula}: {meaning}"))
-        figure.legend(handles=handles, loc="outside lower center", ncols=3 if len(maps) > 1 else 1, frameon=False)
-        text = io.StringIO()
-        figure.savefig(text, format="svg", metadata={"Date": None})
-    return text.getvalue()
+            dashes, meaning = _LINES[name]
+            handles.append(Line2D([], [], color="black", ls=dashes, lw=1, label=f"{formula}: {meaning}"))
+        figure.legend(handles=handles, loc="outside lower center", ncols=max(1, int(size[0] / _ENTRY)), frameon=False)
+        content = io.BytesIO()
+        # Equal maps give equal files, so no date; PNG has no such field.
+        figure.savefig(content, format=form, dpi=300, metadata=_NO_DATE.get(form))
+    return content.getvalue()

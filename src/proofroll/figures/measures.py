@@ -1,0 +1,160 @@
+"""Single numbers that sum up a curve, so that a sentence of an article can be held against a run."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping
+from typing import Literal
+
+import numpy as np
+import numpy.typing
+from scipy.optimize import minimize_scalar
+from scipy.signal import find_peaks
+
+from proofroll.surfaces import FloatArray
+
+Measure = Literal[
+    "maximum",
+    "minimum",
+    "mean",
+    "last",
+    "variation",
+    "half_range",
+    "first_extreme",
+    "misfit_of_sinusoid",
+    "angular_frequency",
+    "least_growth_of_amplitude",
+    "largest_step_of_mean_level",
+    "change_of_mean",
+    "growth_of_range",
+]
+# Measures without a unit; all others but the frequency keep the curve's.
+DIMENSIONLESS = frozenset({"variation", "misfit_of_sinusoid", "least_growth_of_amplitude", "growth_of_range"})
+# A swing smaller than this part of the whole range is no oscillation of the path but noise of an engine.
+_PROMINENCE = 0.1
+_FREQUENCY_BAND = (0.8, 1.25)  # around the guess from the extremes, which is off by a few per cent
+
+
+def _turns(values: FloatArray) -> np.typing.NDArray[np.intp]:
+    """Samples at which the curve turns round, in the order of time."""
+    prominence = _PROMINENCE * float(np.ptp(values))
+    return np.sort(np.concatenate([find_peaks(sign * values, prominence=prominence)[0] for sign in (1, -1)]))
+
+
+def extremes(values: FloatArray) -> FloatArray:
+    """The curve's inner maxima and minima in the order of time, shape (k,), between samples by a parabola."""
+    at = _turns(values)
+    before, here, after = values[at - 1], values[at], values[at + 1]
+    bend = before - 2 * here + after
+    return np.asarray(here - np.divide((after - before) ** 2, 8 * bend, out=np.zeros_like(here), where=bend != 0))
+
+
+def sinusoid(times: FloatArray, values: FloatArray) -> tuple[float, float]:
+    """The best sinusoid about a constant level: its angular frequency [rad/s] and its misfit [-].
+
+    The misfit is the root mean square of what it leaves, over its amplitude. Level, sine and cosine are linear and
+    are eliminated; the frequency is searched near the one that the extremes tell.
+    """
+    turns = _turns(values)
+    if turns.size < 2:
+        return float("nan"), float("nan")
+
+    def fitted(frequency: float) -> tuple[float, float]:
+        basis = np.stack([np.ones_like(times), np.cos(frequency * times), np.sin(frequency * times)], axis=1)
+        part, *_ = np.linalg.lstsq(basis, values, rcond=None)
+        left = values - basis @ part
+        return float(np.sqrt(np.mean(left**2))), float(np.hypot(part[1], part[2]))
+
+    guess = np.pi * (turns.size - 1) / (times[turns[-1]] - times[turns[0]])
+    low, high = (factor * guess for factor in _FREQUENCY_BAND)
+    # The misfit has other minima a fringe away, so the search starts from the best of a grid finer than that.
+    grid = np.linspace(low, high, 8 * turns.size)
+    best, step = float(min(grid, key=lambda w: fitted(w)[0])), float(grid[1] - grid[0])
+    found = minimize_scalar(lambda w: fitted(w)[0], bounds=(best - step, best + step), options={"xatol": 1e-10 * guess})
+    left, amplitude = fitted(float(found.x))
+    return float(found.x), left / amplitude
+
+
+def _halves(values: FloatArray) -> tuple[FloatArray, FloatArray]:
+    return values[: values.size // 2], values[values.size // 2 :]
+
+
+def _variation(_: FloatArray, values: FloatArray) -> float:
+    return float(np.ptp(values) / abs(np.mean(values)))
+
+
+def _first_extreme(_: FloatArray, values: FloatArray) -> float:
+    found = extremes(values)
+    return float(found[0]) if found.size else float("nan")
+
+
+def _centred(values: FloatArray) -> tuple[FloatArray, FloatArray]:
+    """Amplitude and mean level of each swing, shape (k - 2,).
+
+    Each inner extreme is held against the mean of its two neighbours: a drift of the level, which lengthens every
+    swing one way and shortens every swing back, then moves neither, nor does a growing amplitude tilt the level.
+    """
+    found = extremes(values)
+    outer, inner = (found[:-2] + found[2:]) / 2, found[1:-1]
+    return np.abs(inner - outer) / 2, (inner + outer) / 2
+
+
+def _least_growth(_: FloatArray, values: FloatArray) -> float:
+    amplitudes, _levels = _centred(values)
+    return float(np.min(amplitudes[1:] / amplitudes[:-1])) if amplitudes.size > 1 else float("nan")
+
+
+def _largest_step(_: FloatArray, values: FloatArray) -> float:
+    _amplitudes, levels = _centred(values)
+    return float(np.max(np.diff(levels))) if levels.size > 1 else float("nan")
+
+
+def _change(_: FloatArray, values: FloatArray) -> float:
+    first, second = _halves(values)
+    return float(np.mean(second) - np.mean(first))
+
+
+def _growth_of_range(_: FloatArray, values: FloatArray) -> float:
+    first, second = _halves(values)
+    return float(np.ptp(second) / np.ptp(first))
+
+
+_MEASURES: Mapping[Measure, Callable[[FloatArray, FloatArray], float]] = {
+    "maximum": lambda _, values: float(np.max(values)),
+    "minimum": lambda _, values: float(np.min(values)),
+    "mean": lambda _, values: float(np.mean(values)),
+    "last": lambda _, values: float(values[-1]),
+    "variation": _variation,
+    "half_range": lambda _, values: float(np.ptp(values)) / 2,
+    "first_extreme": _first_extreme,
+    "misfit_of_sinusoid": lambda times, values: sinusoid(times, values)[1],
+    "angular_frequency": lambda times, values: sinusoid(times, values)[0],
+    "least_growth_of_amplitude": _least_growth,
+    "largest_step_of_mean_level": _largest_step,
+    "change_of_mean": _change,
+    "growth_of_range": _growth_of_range,
+}
+
+
+def measured(measure: Measure, times: FloatArray, values: FloatArray) -> float:
+    """The number; nan where the curve has too few oscillations for it or is not finite.
+
+    * ``maximum``, ``minimum``, ``mean``, ``last``, ``half_range`` (half of maximum less minimum): as they are called.
+    * ``variation``: maximum less minimum, over the size of the mean.
+    * ``first_extreme``: the first inner maximum or minimum.
+    * ``misfit_of_sinusoid``, ``angular_frequency`` [rad/s]: see :func:`sinusoid`.
+    * ``least_growth_of_amplitude``: the smallest ratio of an amplitude to the one before it.
+    * ``largest_step_of_mean_level``: the largest rise of the level about which it swings, from a swing to the next.
+    * ``change_of_mean``: mean of the second half less that of the first.
+    * ``growth_of_range``: range of the second half over that of the first.
+    """
+    if not values.size or not np.all(np.isfinite(values)):
+        return float("nan")
+    with np.errstate(divide="ignore", invalid="ignore"):
+        return _MEASURES[measure](times, values)
+
+
+def unit_of(measure: Measure, unit: str) -> str:
+    """Unit of the measure of a curve with this unit."""
+    if measure == "angular_frequency":
+        return "rad/s"
+    return "1" if measure in DIMENSIONLESS else unit
