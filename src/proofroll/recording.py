@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from proofroll.engine import LocatesEvents, Sample
+from proofroll.engine import LocatesEvents, Sample, TellsRemarks
 from proofroll.errors import Diverged, InputError
 from proofroll.events import between_samples, with_events
 from proofroll.scene import Capability, Scene
@@ -50,12 +50,18 @@ class Recording:
         failure: one sentence if it ended early, else None.
         wall_seconds: spent inside ``advance`` [s].
         sampling_seconds: spent inside ``sample`` and around it [s].
+        remarks: what the engine says about a run that went well (:class:`proofroll.engine.TellsRemarks`).
     """
 
     dataset: xr.Dataset
     failure: str | None
     wall_seconds: float
     sampling_seconds: float = 0.0
+    remarks: tuple[str, ...] = ()
+
+    def message(self, until: float) -> str:
+        """One sentence: why it ended early, or that it reached ``until`` [s] and what is to be said about that."""
+        return self.failure or "; ".join([f"reached {until:g} s", *self.remarks])
 
 
 def record(engine: Any, scene: Scene, times: FloatArray) -> Recording:
@@ -84,7 +90,8 @@ def record(engine: Any, scene: Scene, times: FloatArray) -> Recording:
         sticking = [bool(sample.sticking) for sample in samples]
         events = engine.events() if located else between_samples(times.tolist(), sticking)
         dataset = with_events(dataset, events)
-    return Recording(dataset, failure, wall, sampling)
+    remarks = tuple(engine.remarks()) if isinstance(engine, TellsRemarks) else ()
+    return Recording(dataset, failure, wall, sampling, remarks)
 
 
 def _finite(sample: Sample, t: float) -> Sample:

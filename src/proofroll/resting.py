@@ -11,7 +11,7 @@ import numpy as np
 from proofroll.scene import RollingBall
 from proofroll.surfaces import FloatArray
 
-# Part of the speed of a fall by one radius with which a ball sets off: enough to have a direction, too little to matter.
+# A ball sets off with this part of the speed of a fall by one radius: enough for a direction, too little to matter.
 _SETTING_OFF = 1e-12
 
 

@@ -15,6 +15,9 @@ from proofroll.surfaces import FloatArray
 # state is not to be trusted.
 Check = Callable[[FloatArray, float, FloatArray], None]
 
+# Called with the time [s] and state where a step begins; the same state in other coordinates, or None.
+Renewed = Callable[[float, FloatArray], FloatArray | None]
+
 # Longest step [s]: only a motion that is a polynomial of time has no other bound.
 _LONGEST = 1e3
 
@@ -28,7 +31,9 @@ class Series:
         t, x: present time [s] and state.
     """
 
-    def __init__(self, integrator: Any, pars: FloatArray, x: FloatArray, check: Check) -> None:
+    def __init__(
+        self, integrator: Any, pars: FloatArray, x: FloatArray, check: Check, renewed: Renewed = lambda *_: None
+    ) -> None:
         """Starts at time 0.
 
         Args:
@@ -36,9 +41,10 @@ class Series:
             pars: values of its parameters.
             x: initial state.
             check: see :data:`Check`.
+            renewed: see :data:`Renewed`.
         """
         self.t, self.x = 0.0, np.array(x, dtype=np.float64)
-        self._integrator, self._check = copy.copy(integrator), check
+        self._integrator, self._check, self._renewed = copy.copy(integrator), check, renewed
         self._integrator.time = 0.0
         self._integrator.pars[:] = pars
         self._integrator.state[:] = x
@@ -55,6 +61,9 @@ class Series:
         series = self._integrator
         while series.time < t:
             self._trusted(float(series.time), series.state)
+            renewed = self._renewed(float(series.time), series.state.copy())
+            if renewed is not None:
+                series.state[:] = renewed
             self._before = series.state.copy()
             series.step(_LONGEST, write_tc=True)
         x = series.update_d_output(t).copy()

@@ -116,7 +116,7 @@ class Path(Generic[State]):
         return Motion(**columns, route=route), sticking
 
 
-def follow(body: RollingBall, route: Route[State], until: float) -> Path[State]:
+def follow(body: RollingBall, route: Route[State], until: float) -> Path[State]:  # noqa: PLR0912 -- one per end of a leg
     """Everything from time 0 to ``until`` [s].
 
     Raises:
@@ -147,22 +147,19 @@ def follow(body: RollingBall, route: Route[State], until: float) -> Path[State]:
             events.append(("liftoff", time))
             legs.append(_flight(body, route, state, time, until))
             return Path(legs, events)
-        if leg.why is End.HALT:
-            if stays(body, route.world(state)[0]):
-                legs.append(_rest(body, route, state, time, until))
-                return Path(legs, events)
-            state = route.nudged(state, setting_off(body, route.world(state)[0]))
-        if leg.why is End.STILL and _settled(body, route, state):
-            events.append(("stick", time))
-            state = route.nudged(state, np.zeros(3))
-            legs.append(_rest(body, route, state, time, until))
+        if _comes_to_rest(body, route, leg):
+            if not sticking:
+                events.append(("stick", time))
+            legs.append(_rest(body, route, route.nudged(state, np.zeros(3)), time, until))
             return Path(legs, events)
+        if leg.why is End.HALT:
+            state = route.nudged(state, setting_off(body, route.world(state)[0]))
         hastens = len(legs) > 1 and leg.end - leg.start < legs[-2].end - legs[-2].start
         reversals = reversals + 1 if leg.why is End.STILL and not sticking and hastens else 0
         if reversals > _REVERSALS:
             raise Refused(
-                f"from about {time:.6g} s on the ball slips to and fro ever faster, for its resistance stops the rolling "
-                "sooner than friction the centre; end the run earlier, or take more friction or less resistance"
+                f"from about {time:.6g} s on the ball slips to and fro ever faster, for resistance stops the rolling "
+                "before friction stops the centre; end the run earlier, or take more friction or less resistance"
             )
         # With |u| = 0 the ball sticks if it can; where the needed force is outside the cone it goes on slipping.
         must_slip = leg.why is End.CONE or _must_slip(body, route, state)
@@ -183,15 +180,16 @@ def _must_slip(body: RollingBall, route: Route[State], state: State) -> bool:
     return bool(pace > 0 and route.excess(route.ahead(state, 1e-3 * a / pace)) > _ON_CONE)
 
 
-def _settled(body: RollingBall, route: Route[State], state: State) -> bool:
-    """Whether nothing but round-off is left of the motion of a ball that can rest where it is.
+def _comes_to_rest(body: RollingBall, route: Route[State], leg: Leg[State]) -> bool:
+    """Whether the ball stops at the end of a leg and can rest there: its centre, or all but round-off of a slip.
 
     Where resistance slows the rolling faster than friction the centre, the ball slips to a stop, rolls back a part of
     the way and so on: on a level plane infinitely often in a finite time, each time by the same part.
     """
-    p, v, _ = route.world(state)
+    p, v, _ = route.world(leg.state)
     speed = np.sqrt(body.ball.radius * np.linalg.norm(body.gravity)) + np.linalg.norm(body.v0)
-    return bool(body.contact.rolling_resistance > 0 and np.linalg.norm(v) <= _AT_REST * speed and stays(body, p))
+    settled = leg.why is End.STILL and np.linalg.norm(v) <= _AT_REST * speed
+    return body.contact.rolling_resistance > 0 and bool(leg.why is End.HALT or settled) and stays(body, p)
 
 
 def _rest(body: RollingBall, route: Route[State], state: State, time: float, until: float) -> Leg[State]:

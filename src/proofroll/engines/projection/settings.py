@@ -32,6 +32,8 @@ class ProjectionSettings:
             taylor, which keeps the constraints to round-off by itself, has no such step. In ``rotating_frame`` on a
             surface of constant curvature nothing is left to remove: there the constraints are linear with constant
             coefficients, and every Runge-Kutta method keeps those by itself.
+        singularity: what ``euler`` does near θ = 0 and π: ``renew``, choose the body's axes anew and say so, or
+            ``stop``, as the paper's equations do by themselves.
     """
 
     formulation: Literal["euler", "rotating_frame"] = "euler"
@@ -40,6 +42,7 @@ class ProjectionSettings:
     dt: Annotated[float, Gt(0)] = _DT
     rtol: Annotated[float, Gt(0)] = TIGHTEST
     elimination: bool | None = None
+    singularity: Literal["renew", "stop"] = "renew"
 
     def __post_init__(self) -> None:
         tightest = library.TIGHTEST if self.integrator == "taylor" else TIGHTEST
@@ -55,6 +58,9 @@ class ProjectionSettings:
                 "projection: rtol", self.rtol, f"{self.integrator} has a fixed step; set dt, or add integrator=dop853"
             )
 
+        if self.singularity == "stop" and self.formulation != "euler":
+            advice = f"{self.formulation} has no angles, hence no singularity; leave it out, or take formulation=euler"
+            raise InputError("projection: singularity", self.singularity, advice)
         if self.integrator == "taylor" and self.elimination is not None:
             advice = "taylor keeps the constraints to round-off and has no elimination; leave it out"
             raise InputError("projection: elimination", self.elimination, advice)

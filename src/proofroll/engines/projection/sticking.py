@@ -48,10 +48,12 @@ class Stick(_Held):
 
     def survey(self, y: FloatArray) -> Survey:
         """See :class:`Mode`. With rolling resistance steps shorten towards the place where the centre stands still."""
-        response = self._ball.response_at(y)
-        reserve, span = self._friction.reserve(response), DIFFERENCE * self._pace.time
-        ahead = self._ball.response_at(y + span * self._ball.derivative(y, response))
-        trend = (self._friction.reserve(ahead) - reserve) / span
+        response, trend = self._ball.response_at(y), 0.0
+        reserve = self._friction.reserve(response)
+        if self._friction.bounded:
+            span = DIFFERENCE * self._pace.time
+            ahead = self._ball.response_at(y + span * self._ball.derivative(y, response))
+            trend = (self._friction.reserve(ahead) - reserve) / span
         if not self.halts:
             return Survey((reserve,), trend)
         kin = self._ball.kinematics(y)

@@ -9,7 +9,7 @@ import numpy as np
 from proofroll.compiled.library import require_heyoka
 from proofroll.compiled.projection import Formulation, parameters, projected, structure
 from proofroll.compiled.rolling import supports
-from proofroll.compiled.series import Series, still_moving
+from proofroll.compiled.series import Renewed, Series, still_moving
 from proofroll.errors import Refused
 from proofroll.scene import RollingBall
 from proofroll.surfaces import FloatArray
@@ -23,7 +23,13 @@ class TaylorSeries:
     """
 
     def __init__(
-        self, body: RollingBall, formulation: Formulation, x: FloatArray, rtol: float, check: Callable[..., None]
+        self,
+        body: RollingBall,
+        formulation: Formulation,
+        x: FloatArray,
+        rtol: float,
+        check: Callable[..., None],
+        renewed: Renewed,
     ) -> None:
         """Starts at time 0.
 
@@ -33,6 +39,7 @@ class TaylorSeries:
             x: initial state.
             rtol: relative tolerance of a step [-].
             check: called with the time [s] and state after each step; raises Diverged if it is not to be trusted.
+            renewed: see :data:`proofroll.compiled.series.Renewed`.
 
         Raises:
             Refused: heyoka is missing, or the scene is not one of its equations.
@@ -50,7 +57,7 @@ class TaylorSeries:
         self._check, self._resistance = check, body.contact.rolling_resistance > 0
         self._scales, self._mass = np.array(body.surface.length_scales), body.ball.mass
         pars = np.array(self._pars[: len(model.integrator.pars)])
-        self._series = Series(model.integrator, pars, x, self._look)
+        self._series = Series(model.integrator, pars, x, self._look, renewed)
 
     def _look(self, before: FloatArray, t: float, x: FloatArray) -> None:
         self._check(t, x)
