@@ -115,13 +115,15 @@ def _integrate(body: RollingBall, equations: _Equations, x: FloatArray, times: F
     atol, step = _ROUND_OFF * equations.scales, math.inf
     t = float(times[0])
     for index, until in enumerate(times.tolist()):
-        while t < until:
+        while True:
             p, v, _ = equations.world(x)
             if stands(body, v):
                 if stays(body, p):
                     states[index:] = x
                     return states, index
                 x = equations.moving(x, setting_off(body, p))
+            if not t < until:
+                break
             span = until - t
             solver = _solver(equations, t, x, until, atol, min(step, span))
             while solver.status == "running":

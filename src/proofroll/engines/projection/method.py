@@ -19,7 +19,7 @@ from typing import NamedTuple
 import numpy as np
 from scipy.linalg.lapack import dgesv
 
-from proofroll.engines.projection.geometry import Geometry, Local
+from proofroll.engines.projection.geometry import Geometry, Local, Uniform
 from proofroll.engines.projection.orientation import Orientation
 from proofroll.engines.projection.uniform import closed_form
 from proofroll.scene import RollingBall
@@ -84,6 +84,7 @@ class ProjectedBall:
         self._orientation = orientation
         self._coordinates = 2 + orientation.size
         self._closed = closed_form(body, geometry, orientation)
+        self._tangents = geometry.at(body.u0).tangents[1:] if isinstance(geometry, Uniform) else None
 
     def kinematics(self, x: FloatArray) -> Kinematics:
         """The explicit form of the holonomic constraint at the state x."""
@@ -94,6 +95,12 @@ class ProjectedBall:
         D[:3, :2], drift[:3] = local.tangents, local.second @ s[:2] @ s[:2]
         D[3:, 2:], drift[3:] = self._orientation.kinematics(q[2:], s[2:], local.frame, turning)
         return Kinematics(local, turning, D, drift, D @ s)
+
+    def speed(self, x: FloatArray) -> float:
+        """Of the centre [m/s]."""
+        n = self._coordinates
+        tangents = self._geometry.at(x[:2]).tangents[1:] if self._tangents is None else self._tangents
+        return math.hypot(*tangents.dot(x[n : n + 2]).tolist())
 
     def mass_matrix(self, kin: Kinematics) -> FloatArray:
         """M̄ = DᵀMD, shape (5, 5)."""

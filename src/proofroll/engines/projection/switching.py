@@ -109,7 +109,7 @@ class Switching:
         stepper.aim(t)
         while stepper.t < t:
             stepper.step(t, self._survey.longest)
-            survey = self.mode.survey(stepper.y)
+            survey = self._look()
             ended = self._ended(survey)
             if ended is not None:
                 self._switch(*ended)
@@ -119,6 +119,13 @@ class Switching:
                 self._enter(self.mode, stepper.t, np.concatenate([renewed, stepper.y[len(renewed) :]]))
             else:
                 self._survey, self._idle = survey, 0
+
+    def _look(self) -> Survey:
+        """After a step."""
+        stepper = self.stepper
+        if self.mode is self._stick and self._stick.halts and not self._friction.bounded:
+            return self._stick.glance(stepper.y, self._survey, stepper.t - stepper.t_before)
+        return self.mode.survey(stepper.y)
 
     def _enter(self, mode: Mode, t: float, y: FloatArray) -> None:
         def accept(at: float, state: FloatArray) -> FloatArray:
@@ -205,7 +212,7 @@ class Switching:
         ball = self._friction.rolling
         if high > 0:
             x = ball.eliminated(x)
-        speed = self._stick.speed(x) if self._stick.halts else np.inf
+        speed = self._friction.rolling.speed(x) if self._stick.halts else np.inf
         mode: Mode
         if speed <= self._pace.settled and self._rest.holds(x):
             mode, x = self._rest, self._rest.eliminated(x)
