@@ -15,8 +15,12 @@ from proofroll.surfaces import FloatArray
 # state is not to be trusted.
 Check = Callable[[FloatArray, float, FloatArray], None]
 
-# Called with the time [s] and state where a step begins; the same state in other coordinates, or None.
+# Called before every few steps with the time [s] and state; the state from which to go on instead, or None.
 Renewed = Callable[[float, FloatArray], FloatArray | None]
+
+# Steps between two of these calls. Round-off is not worth one after each step, which would cost a third of the run;
+# what happens to the angles in so few steps is bounded by their own step size control.
+_RENEWAL = 4
 
 # Longest step [s]: only a motion that is a polynomial of time has no other bound.
 _LONGEST = 1e3
@@ -32,7 +36,7 @@ class Series:
     """
 
     def __init__(
-        self, integrator: Any, pars: FloatArray, x: FloatArray, check: Check, renewed: Renewed = lambda *_: None
+        self, integrator: Any, pars: FloatArray, x: FloatArray, check: Check, renewed: Renewed | None = None
     ) -> None:
         """Starts at time 0.
 
@@ -45,6 +49,7 @@ class Series:
         """
         self.t, self.x = 0.0, np.array(x, dtype=np.float64)
         self._integrator, self._check, self._renewed = copy.copy(integrator), check, renewed
+        self._steps = 0
         self._integrator.time = 0.0
         self._integrator.pars[:] = pars
         self._integrator.state[:] = x
@@ -61,9 +66,11 @@ class Series:
         series = self._integrator
         while series.time < t:
             self._trusted(float(series.time), series.state)
-            renewed = self._renewed(float(series.time), series.state.copy())
-            if renewed is not None:
-                series.state[:] = renewed
+            self._steps += 1
+            if self._renewed is not None and self._steps % _RENEWAL == 0:
+                renewed = self._renewed(float(series.time), series.state.copy())
+                if renewed is not None:
+                    series.state[:] = renewed
             self._before = series.state.copy()
             series.step(_LONGEST, write_tc=True)
         x = series.update_d_output(t).copy()

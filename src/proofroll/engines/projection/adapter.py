@@ -94,7 +94,7 @@ class Projection:
         self._motion: Integrator | Switching | TaylorSeries
         self._friction: Friction | None = None
         if settings.integrator == "taylor":
-            self._motion = TaylorSeries(body, settings.formulation, x, resolution, self._check, self._renewed)
+            self._motion = TaylorSeries(body, settings.formulation, x, resolution, self._check, self._accepted)
         elif math.isfinite(body.contact.mu_static) or body.contact.rolling_resistance > 0:
             stepper = STEPPERS[settings.integrator](resolution)
             speed = _speed(body) or 1.0
@@ -113,6 +113,10 @@ class Projection:
 
     def _accept(self, t: float, x: FloatArray) -> FloatArray:
         self._check(t, x)
+        return self._accepted(t, x)
+
+    def _accepted(self, t: float, x: FloatArray) -> FloatArray:
+        """The state from which the motion goes on, without violation and away from the singularity."""
         x = self._ball.eliminated(x) if self._eliminate else x
         renewed = self._renewed(t, x)
         return x if renewed is None else renewed

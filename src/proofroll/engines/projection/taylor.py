@@ -18,8 +18,8 @@ from proofroll.surfaces import FloatArray
 class TaylorSeries:
     """A ball that rolls without slip, its state x = [q, s] by steps as long as the tolerance allows.
 
-    The violation of the constraints stays at round-off without being removed (a test shows it): a step is exact to
-    the last digits, and the equations keep C v constant.
+    A step is exact to the last digits, and the equations keep C v constant, so that round-off alone violates the
+    constraints. Over thousands of oscillations that adds up, and is removed like any other violation.
     """
 
     def __init__(
@@ -29,7 +29,7 @@ class TaylorSeries:
         x: FloatArray,
         rtol: float,
         check: Callable[..., None],
-        renewed: Renewed,
+        accepted: Renewed,
     ) -> None:
         """Starts at time 0.
 
@@ -39,7 +39,7 @@ class TaylorSeries:
             x: initial state.
             rtol: relative tolerance of a step [-].
             check: called with the time [s] and state after each step; raises Diverged if it is not to be trusted.
-            renewed: see :data:`proofroll.compiled.series.Renewed`.
+            accepted: the state from which the motion goes on, see :data:`proofroll.compiled.series.Renewed`.
 
         Raises:
             Refused: heyoka is missing, or the scene is not one of its equations.
@@ -57,7 +57,7 @@ class TaylorSeries:
         self._check, self._resistance = check, body.contact.rolling_resistance > 0
         self._scales, self._mass = np.array(body.surface.length_scales), body.ball.mass
         pars = np.array(self._pars[: len(model.integrator.pars)])
-        self._series = Series(model.integrator, pars, x, self._look, renewed)
+        self._series = Series(model.integrator, pars, x, self._look, accepted)
 
     def _look(self, before: FloatArray, t: float, x: FloatArray) -> None:
         self._check(t, x)
