@@ -57,7 +57,8 @@ def certify(engine: Any, scene: Scene) -> list[Line]:
     acceleration, force = initial_response(body)
     natural = natural_acceleration(body)
     frame = body.surface.frame(body.u0)
-    speed = float(np.linalg.norm(body.v0)) or 1.0
+    fall = float(np.sqrt(body.ball.radius * np.linalg.norm(body.gravity)))
+    speed = float(np.linalg.norm(body.v0)) or fall or 1.0
     spin = max(float(np.linalg.norm(body.w0)), speed / body.ball.radius)
     lines: list[Line] = []
 

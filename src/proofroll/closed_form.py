@@ -33,7 +33,11 @@ def _plane(body: RollingBall, t: FloatArray) -> Motion:
 
 
 def _vertical_cylinder(body: RollingBall, surface: Cylinder, t: FloatArray) -> Motion:
-    """γ̇ = Ω; z oscillates with ν = √(κ/(1+κ)) Ω, κ = J/ma² (Blajer 2006; ν = √(2/7) Ω for a homogeneous ball)."""
+    """γ̇ = Ω; z oscillates with ν = √(κ/(1+κ)) Ω, κ = J/ma² (Blajer 2006; ν = √(2/7) Ω for a homogeneous ball).
+
+    Its only error is round-off of the phases, 4 ε νt of the amplitude of z and 4 ε Ωt of the radius of the path: 1e-8
+    after a million oscillations.
+    """
     a, m, c, kappa = body.ball.radius, body.ball.mass, surface.radius, body.ball.inertia_ratio
     axis = np.asarray(surface.generators[1].axis)
     gravity = float(body.gravity @ axis)

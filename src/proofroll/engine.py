@@ -156,6 +156,14 @@ class LocatesEvents(Protocol):
         """The events so far, in order, each with its bracket (one step wide for a fixed step)."""
 
 
+@runtime_checkable
+class TellsRemarks(Protocol):
+    """What an engine has besides, if there is something about a run that a person should know though it went well."""
+
+    def remarks(self) -> Sequence[str]:
+        """One clause each, without a full stop; none if there is nothing to say."""
+
+
 class Level(StrEnum):
     """How much of the scene a formulation models, from the least to the most: the rungs of the ladder."""
 

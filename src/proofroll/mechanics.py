@@ -9,6 +9,7 @@ from __future__ import annotations
 import numpy as np
 import numpy.typing as npt
 
+from proofroll.resting import setting_off, stands, stays
 from proofroll.scene import RollingBall
 from proofroll.surfaces import FloatArray
 
@@ -51,9 +52,11 @@ def initial_response(body: RollingBall) -> tuple[FloatArray, FloatArray]:
     Newton-Euler with rolling without slip, solved for the nine unknowns p̈, ω̇, (N, F2, F3) together; the rows of
     the last three equations are the constraints differentiated, using the signed distance and its derivatives.
     Where that needs more friction than there is, the ball begins to slip against it: N is the same, for friction
-    along the wall does not change it.
+    along the wall does not change it. A ball at rest stays so where rolling resistance and friction can hold it.
     """
-    acceleration, _, force = newton_euler(body, body.p0, body.v0, body.w0)
+    if stands(body, body.v0) and stays(body, body.p0):
+        return np.zeros(3), -body.ball.mass * body.gravity
+    acceleration, _, force = newton_euler(body, body.p0, _way(body), body.w0)
     e1 = body.surface.normal(body.p0)
     normal = (force @ e1) * e1
     friction, press = force - normal, float(np.linalg.norm(normal))
@@ -66,11 +69,18 @@ def initial_response(body: RollingBall) -> tuple[FloatArray, FloatArray]:
 
 def initial_angular_acceleration(body: RollingBall) -> FloatArray:
     """ω̇ at time 0 in the world [rad/s²], shape (3,): moments of the wall's force and of the resistance, over J."""
+    if stands(body, body.v0) and stays(body, body.p0):
+        return np.zeros(3)
     _, force = initial_response(body)
     e1 = body.surface.normal(body.p0)
     moment = body.ball.radius * np.cross(e1, force)
-    moment += resistance_moment(body.contact.rolling_resistance, -force @ e1, e1, body.v0)
+    moment += resistance_moment(body.contact.rolling_resistance, -force @ e1, e1, _way(body))
     return np.asarray(moment / body.ball.inertia)
+
+
+def _way(body: RollingBall) -> FloatArray:
+    """Velocity at time 0 [m/s], or, of a ball at rest that does not stay, the one with which it sets off."""
+    return setting_off(body, body.p0) if stands(body, body.v0) else body.v0
 
 
 def newton_euler(

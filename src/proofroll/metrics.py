@@ -134,9 +134,10 @@ def energy_balance(body: RollingBall, dataset: xr.Dataset) -> FloatArray:
     balance = dataset["energy"].to_numpy() - float(dataset["energy"][0])
     t, f = dataset["time"].to_numpy(), body.contact.rolling_resistance
     bounded = "sticking" in dataset
-    power = np.zeros_like(t)
+    power, rests = np.zeros_like(t), False
     if f:
         e1 = body.surface.normal(dataset["p_WB"].to_numpy())
+        rests = not np.all(np.any(dataset["v_WB"].to_numpy(), axis=-1))
         moment = resistance_moment(f, dataset["N"].to_numpy(), e1, dataset["v_WB"].to_numpy())
         power -= np.einsum("ti,ti->t", moment, dataset["w_WB"].to_numpy())
     if bounded:
@@ -144,8 +145,8 @@ def energy_balance(body: RollingBall, dataset: xr.Dataset) -> FloatArray:
     if np.any(power):
         from scipy.interpolate import make_interp_spline
 
-        # The power of friction has kinks where slip begins and ends, at which a smooth spline would ring.
-        work = make_interp_spline(t, power, k=1 if bounded else _DEGREE).antiderivative()
+        # The power has kinks where slip begins and ends and where the ball stops, at which a smooth spline would ring.
+        work = make_interp_spline(t, power, k=1 if bounded or rests else _DEGREE).antiderivative()
         balance = balance + work(t) - work(t[0])
     return np.asarray(balance)
 

@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from proofroll.engine import LocatesEvents, Sample
+from proofroll.engine import LocatesEvents, Sample, TellsRemarks
 from proofroll.errors import Diverged, InputError
 from proofroll.events import between_samples, with_events
 from proofroll.scene import Capability, Scene
@@ -51,6 +51,7 @@ class Recording:
         wall_seconds: spent inside ``advance`` [s].
         advancing, sampling: spent inside ``advance``, and inside ``sample`` and around it: wall and processor seconds
             [s].
+        remarks: what the engine says about a run that went well (:class:`proofroll.engine.TellsRemarks`).
     """
 
     dataset: xr.Dataset
@@ -58,6 +59,11 @@ class Recording:
     wall_seconds: float
     advancing: tuple[float, float] = (0.0, 0.0)
     sampling: tuple[float, float] = (0.0, 0.0)
+    remarks: tuple[str, ...] = ()
+
+    def message(self, until: float) -> str:
+        """One sentence: why it ended early, or that it reached ``until`` [s] and what is to be said about that."""
+        return self.failure or "; ".join([f"reached {until:g} s", *self.remarks])
 
 
 def record(engine: Any, scene: Scene, times: FloatArray) -> Recording:
@@ -89,7 +95,8 @@ def record(engine: Any, scene: Scene, times: FloatArray) -> Recording:
         sticking = [bool(sample.sticking) for sample in samples]
         events = engine.events() if located else between_samples(times.tolist(), sticking)
         dataset = with_events(dataset, events)
-    return Recording(dataset, failure, wall, (wall, inside), sampling)
+    remarks = tuple(engine.remarks()) if isinstance(engine, TellsRemarks) else ()
+    return Recording(dataset, failure, wall, (wall, inside), sampling, remarks)
 
 
 _SAMPLED = ("p_WB", "v_WB", "w_WB", "q_WB", "force")

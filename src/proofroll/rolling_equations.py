@@ -6,9 +6,10 @@ their agreement says nothing about these equations: only the truth's second rout
 
 from __future__ import annotations
 
+import math
+
 import numpy as np
 
-from proofroll.mechanics import resistance_moment
 from proofroll.scene import RollingBall
 from proofroll.surfaces import FloatArray
 
@@ -25,23 +26,33 @@ def reduced_rates(body: RollingBall, state: FloatArray) -> tuple[FloatArray, Flo
     (1 + κ) v̇ = g - κ a ω1 e1 × ė1 + e1 × M / (m a), and ω̇1 = ω · ė1.
     """
     a, m, kappa, f = body.ball.radius, body.ball.mass, body.ball.inertia_ratio, body.contact.rolling_resistance
-    u, udot, spin = state[:2], state[2:4], state[4]
-    surface = body.surface
-    frame, tangents = surface.frame(u), surface.tangents(u)
-    e1, in_plane = frame[:, 0], frame[:, 1:]
-    curving = surface.second(u) @ udot @ udot
-    v = tangents @ udot
+    u, spin = state[:2], float(state[4])
+    frame, bending = body.surface.frame(u), body.surface.second(u) @ state[2:4]
+    # Along e1, e2, e3 as plain floats: for vectors of two or three numbers arrays cost several times the arithmetic.
+    udot1, udot2 = state[2:4].tolist()
+    _, (t2u, t2v), (t3u, t3v) = (frame.T @ body.surface.tangents(u)).tolist()
+    (bend_u, bend_v), *curving = (frame.T @ bending).tolist()
+    g1, g2, g3 = (body.gravity @ frame).tolist()
+    det = t2u * t3v - t2v * t3u
+    v2, v3 = t2u * udot1 + t2v * udot2, t3u * udot1 + t3v * udot2
     # ė1 · t = -e1 · ṫ for every tangent t: the shape operator from the second derivatives
-    e1_rate = -np.linalg.pinv(tangents).T @ (e1 @ (surface.second(u) @ udot))
-    N = m * (e1_rate @ v + e1 @ body.gravity)
-    drive = body.gravity - kappa * a * spin * np.cross(e1, e1_rate)
-    if f:
-        drive = drive + np.cross(e1, resistance_moment(f, N, e1, v)) / (m * a)
-    tangential = in_plane @ (in_plane.T @ drive) / (1 + kappa)
-    acceleration = tangential - e1 * (e1_rate @ v)
-    uddot = np.linalg.pinv(tangents) @ (tangential - curving)
-    spin_rate = -np.cross(e1, v) @ e1_rate / a
-    return np.concatenate([udot, uddot, [spin_rate]]), v, m * (acceleration - body.gravity)
+    r2, r3 = (bend_v * t3u - bend_u * t3v) / det, (bend_u * t2v - bend_v * t2u) / det
+    inward = r2 * v2 + r3 * v3
+    N = m * (inward + g1)
+    drive2, drive3 = g2 + kappa * a * spin * r3, g3 - kappa * a * spin * r2
+    speed = math.hypot(v2, v3)
+    if f and speed:  # e1 × M = -f N v/V; at rest the moment is zero, as in resistance_moment
+        held = f * N / (m * a)
+        drive2, drive3 = drive2 - held * (v2 / speed), drive3 - held * (v3 / speed)
+    tangential2, tangential3 = drive2 / (1 + kappa), drive3 / (1 + kappa)
+    along2, along3 = (
+        x - row[0] * udot1 - row[1] * udot2 for x, row in zip((tangential2, tangential3), curving, strict=True)
+    )
+    uddot1, uddot2 = (t3v * along2 - t2v * along3) / det, (t2u * along3 - t3u * along2) / det
+    spin_rate = (v3 * r2 - v2 * r3) / a
+    force = (m * (-inward - g1), m * (tangential2 - g2), m * (tangential3 - g3))
+    rates = np.array([udot1, udot2, uddot1, uddot2, spin_rate])
+    return rates, frame @ (0.0, v2, v3), frame @ force
 
 
 def placed(body: RollingBall, states: FloatArray, v_WB: FloatArray) -> tuple[FloatArray, FloatArray, FloatArray]:

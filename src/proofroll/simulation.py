@@ -79,6 +79,6 @@ def simulate(
     recording = record(built, scene, times)
     return recording.dataset.assign_attrs(
         status="done" if recording.failure is None else "diverged",
-        message=recording.failure or f"reached {until:g} s",
+        message=recording.message(until),
         wall_seconds=recording.wall_seconds,
     )

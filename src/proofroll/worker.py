@@ -256,7 +256,7 @@ def _run(case: Case, out: Path, spent: Spent) -> Result:
         spent.on("building", clean_runs=inside)
     result = Result(
         status=Status.DONE if recording.failure is None else Status.DIVERGED,
-        message=recording.failure or f"reached {case.until:g} s",
+        message=recording.message(case.until),
         wall_seconds=recording.wall_seconds,
         seconds_per_second=statistics.median(timings) if timings else None,
         timings=timings,

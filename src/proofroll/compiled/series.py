@@ -15,6 +15,13 @@ from proofroll.surfaces import FloatArray
 # state is not to be trusted.
 Check = Callable[[FloatArray, float, FloatArray], None]
 
+# Called before every few steps with the time [s] and state; the state from which to go on instead, or None.
+Renewed = Callable[[float, FloatArray], FloatArray | None]
+
+# Steps between two of these calls. Round-off is not worth one after each step, which would cost a third of the run;
+# what happens to the angles in so few steps is bounded by their own step size control.
+_RENEWAL = 4
+
 # Longest step [s]: only a motion that is a polynomial of time has no other bound.
 _LONGEST = 1e3
 
@@ -28,7 +35,9 @@ class Series:
         t, x: present time [s] and state.
     """
 
-    def __init__(self, integrator: Any, pars: FloatArray, x: FloatArray, check: Check) -> None:
+    def __init__(
+        self, integrator: Any, pars: FloatArray, x: FloatArray, check: Check, renewed: Renewed | None = None
+    ) -> None:
         """Starts at time 0.
 
         Args:
@@ -36,9 +45,11 @@ class Series:
             pars: values of its parameters.
             x: initial state.
             check: see :data:`Check`.
+            renewed: see :data:`Renewed`.
         """
         self.t, self.x = 0.0, np.array(x, dtype=np.float64)
-        self._integrator, self._check = copy.copy(integrator), check
+        self._integrator, self._check, self._renewed = copy.copy(integrator), check, renewed
+        self._steps = 0
         self._integrator.time = 0.0
         self._integrator.pars[:] = pars
         self._integrator.state[:] = x
@@ -55,6 +66,11 @@ class Series:
         series = self._integrator
         while series.time < t:
             self._trusted(float(series.time), series.state)
+            self._steps += 1
+            if self._renewed is not None and self._steps % _RENEWAL == 0:
+                renewed = self._renewed(float(series.time), series.state.copy())
+                if renewed is not None:
+                    series.state[:] = renewed
             self._before = series.state.copy()
             series.step(_LONGEST, write_tc=True)
         x = series.update_d_output(t).copy()

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable
+from dataclasses import replace
 from functools import partial
 
 import numpy as np
@@ -175,10 +176,13 @@ class _Walk:
     def step(self, length: float, guess: Callable[[float], FloatArray] | None = None) -> tuple[Step, float]:
         """One accepted step, at most of this length [s], and the length to try next."""
         length = min(length, self._until - self.time)
+        # A spin or slip that has grown has round-off of its present size, below which no error can be told.
+        sizes = [0.0, *np.linalg.norm(self.state[3:].reshape(2, 3), axis=-1)]
+        system = replace(self._system, scale=np.maximum(self._system.scale, np.repeat(sizes, 3)))
         while True:
             if self.time + length == self.time:
                 raise Diverged(f"the truth (implicit collocation) could not be integrated past {self.time:g} s")
-            step = take(self._system, self.time, self.state, length, (guess or self._continued)(length))
+            step = take(system, self.time, self.state, length, (guess or self._continued)(length))
             wanted = next_length(step, _TOLERANCE)
             if step.error <= _TOLERANCE:
                 self.steps.append(step)

@@ -101,8 +101,9 @@ class Polar:
     def slip(self, time: float, state: FloatArray, until: float) -> Leg[FloatArray]:
         """See :class:`Route`."""
         strength, change = self._pull(state)
-        pace = min(strength / change if change > 0 else np.inf, until - time)
-        handover = max(self._handover * strength * pace, np.finfo(float).tiny)
+        pace = min(strength / change if change > 0 else np.inf, until - time, self._turning_back(state))
+        # Below the last digits of the time a slip cannot be seen to grow.
+        handover = max(self._handover * strength * pace, 64 * strength * np.spacing(time), np.finfo(float).tiny)
         lead: list[Piece] = []
         why, begun, small = self._creep(lead, time, state, until, handover)
 
@@ -167,9 +168,26 @@ class Polar:
 
     def _pull(self, y: FloatArray) -> tuple[float, float]:
         """|b| and |ḃ| while sticking; ḃ by a central difference, for it only sets a scale."""
-        span, rates = 1e-4 * self._pace, self._rolling(y)
+        rates = self._rolling(y)
+        span = self._span(y)
         b_rate = (self._drive(y + span * rates)[0] - self._drive(y - span * rates)[0]) / (2 * span)
         return float(np.linalg.norm(self._drive(y)[0])), float(np.linalg.norm(b_rate))
+
+    def _turning_back(self, y: FloatArray) -> float:
+        """Time in which gravity and friction stop the centre [s], where the direction of the resistance jumps."""
+        contact, body = self._body.contact, self._body
+        if not contact.rolling_resistance:
+            return np.inf
+        frame, tangents = body.surface.frame(y[:2]), body.surface.tangents(y[:2])
+        speed = float(np.linalg.norm(tangents @ y[2:4]))
+        strength = float(np.linalg.norm(frame.T[1:] @ body.gravity)) + contact.mu_kinetic * abs(self._drive(y)[1]) / (
+            body.ball.mass
+        )
+        return speed / strength if speed > 0 and strength > 0 else np.inf
+
+    def _span(self, y: FloatArray) -> float:
+        """Time over which to difference the drive [s]: short where the centre is about to stand still."""
+        return min(1e-4 * self._pace, 0.1 * self._turning_back(y))
 
     def _with_slip(self, y: FloatArray, size: float, phi: float) -> tuple[FloatArray, FloatArray, float, float]:
         """Rates of (u, u̇, ω1) while slipping, b, N and ė2 · e3."""
@@ -207,7 +225,7 @@ class Polar:
         grip = self._A * self._body.contact.mu_kinetic * N
         phi, size, strength = float(np.arctan2(b[1], b[0])), float(y[5]), float(np.linalg.norm(b))
         leading, _, _, turning = self._with_slip(y, size, phi)
-        span = 1e-4 * self._pace
+        span = self._span(y)
         change = (self._drive(y[:5] + span * leading)[0] - self._drive(y[:5] - span * leading)[0]) / (2 * span)
         rotation = float(b[0] * change[1] - b[1] * change[0]) / strength**2 + turning
         delta = -size * rotation / (2 * strength - grip)

@@ -16,11 +16,18 @@ import numpy as np
 from proofroll.errors import Diverged, Refused
 from proofroll.events import EventKind
 from proofroll.motion import Motion
+from proofroll.resting import setting_off, stands, stays
 from proofroll.scene import RollingBall
 from proofroll.surfaces import FloatArray
 
 # Relative distance from the friction cone below which round-off decides on which side a state is.
 _ON_CONE = 1e-13
+# Part of the natural speed at which a ball that goes back and forth ever less is taken to be at rest: it has some 1e-9
+# of the natural time to go, and 1e-18 of the way. Reversals much smaller than that drown in the round-off of the time.
+_AT_REST = 1e-9
+# As many slips in a row, each shorter than the one before, are followed on the way there; each costs both routes the
+# search for the place where the direction of the resistance jumps.
+_REVERSALS = 10
 
 State = TypeVar("State")
 
@@ -109,20 +116,22 @@ class Path(Generic[State]):
         return Motion(**columns, route=route), sticking
 
 
-def follow(body: RollingBall, route: Route[State], until: float) -> Path[State]:
+def follow(body: RollingBall, route: Route[State], until: float) -> Path[State]:  # noqa: PLR0912 -- one per end of a leg
     """Everything from time 0 to ``until`` [s].
 
     Raises:
-        Refused: the ball leaves the wall and comes back to it; impact is not modelled.
+        Refused: the ball leaves the wall and comes back to it, for impact is not modelled; or it slips to and fro ever
+            faster.
         Diverged: a route makes no progress.
     """
     legs: list[Leg[State]] = []
+    reversals = 0
     events: list[tuple[EventKind, float]] = []
     time, state = 0.0, route.start()
-    if _stands(body, route, state):
-        if _stays(body, route, state):
+    if stands(body, route.world(state)[1]):
+        if stays(body, route.world(state)[0]):
             return Path([_rest(body, route, state, time, until)], events)
-        state = _set_off(body, route, state)
+        state = route.nudged(state, setting_off(body, route.world(state)[0]))
     sticking = not _must_slip(body, route, state)
     if not sticking:
         events.append(("slip", time))
@@ -138,11 +147,20 @@ def follow(body: RollingBall, route: Route[State], until: float) -> Path[State]:
             events.append(("liftoff", time))
             legs.append(_flight(body, route, state, time, until))
             return Path(legs, events)
+        if _comes_to_rest(body, route, leg):
+            if not sticking:
+                events.append(("stick", time))
+            legs.append(_rest(body, route, route.nudged(state, np.zeros(3)), time, until))
+            return Path(legs, events)
         if leg.why is End.HALT:
-            if _stays(body, route, state):
-                legs.append(_rest(body, route, state, time, until))
-                return Path(legs, events)
-            state = _set_off(body, route, state)
+            state = route.nudged(state, setting_off(body, route.world(state)[0]))
+        hastens = len(legs) > 1 and leg.end - leg.start < legs[-2].end - legs[-2].start
+        reversals = reversals + 1 if leg.why is End.STILL and not sticking and hastens else 0
+        if reversals > _REVERSALS:
+            raise Refused(
+                f"from about {time:.6g} s on the ball slips to and fro ever faster, for resistance stops the rolling "
+                "before friction stops the centre; end the run earlier, or take more friction or less resistance"
+            )
         # With |u| = 0 the ball sticks if it can; where the needed force is outside the cone it goes on slipping.
         must_slip = leg.why is End.CONE or _must_slip(body, route, state)
         if must_slip and sticking:
@@ -162,30 +180,16 @@ def _must_slip(body: RollingBall, route: Route[State], state: State) -> bool:
     return bool(pace > 0 and route.excess(route.ahead(state, 1e-3 * a / pace)) > _ON_CONE)
 
 
-def _stands(body: RollingBall, route: Route[State], state: State) -> bool:
-    return body.contact.rolling_resistance > 0 and not np.any(route.world(state)[1])
+def _comes_to_rest(body: RollingBall, route: Route[State], leg: Leg[State]) -> bool:
+    """Whether the ball stops at the end of a leg and can rest there: its centre, or all but round-off of a slip.
 
-
-def _pull(body: RollingBall, p_WB: FloatArray) -> tuple[FloatArray, float]:
-    """Tangential gravity [m/s²], shape (3,), and the normal force per mass of a ball at rest [m/s²]."""
-    e1 = body.surface.normal(p_WB)
-    press = float(e1 @ body.gravity)
-    return body.gravity - press * e1, press
-
-
-def _stays(body: RollingBall, route: Route[State], state: State) -> bool:
-    """Whether a ball whose centre stands still stays so: friction and rolling resistance can both hold it."""
-    pull, press = _pull(body, route.world(state)[0])
-    strength = float(np.linalg.norm(pull))
-    a, contact = body.ball.radius, body.contact
-    return strength * a <= contact.rolling_resistance * press and strength <= contact.mu_static * press
-
-
-def _set_off(body: RollingBall, route: Route[State], state: State) -> State:
-    """The state with a velocity down the slope too small to matter: it gives the resistance its direction."""
-    p_WB = route.world(state)[0]
-    pull, _ = _pull(body, p_WB)
-    return route.nudged(state, 1e-12 * np.sqrt(body.ball.radius / np.linalg.norm(pull)) * pull)
+    Where resistance slows the rolling faster than friction the centre, the ball slips to a stop, rolls back a part of
+    the way and so on: on a level plane infinitely often in a finite time, each time by the same part.
+    """
+    p, v, _ = route.world(leg.state)
+    speed = np.sqrt(body.ball.radius * np.linalg.norm(body.gravity)) + np.linalg.norm(body.v0)
+    settled = leg.why is End.STILL and np.linalg.norm(v) <= _AT_REST * speed
+    return body.contact.rolling_resistance > 0 and bool(leg.why is End.HALT or settled) and stays(body, p)
 
 
 def _rest(body: RollingBall, route: Route[State], state: State, time: float, until: float) -> Leg[State]:

@@ -138,13 +138,34 @@ def test_papers_range_of_nutation(monkeypatch):
 
 
 @pytest.mark.parametrize("settings", [{}, {"preset": "default"}, {"preset": "default", "dt": 1e-4}])
-def test_singularity_is_reported(settings):
-    """A ball started steeply turns its body axis into the vertical: euler says so, rotating_frame goes on."""
+def test_singularity_is_reported_where_the_axes_are_not_renewed(settings):
+    """A ball started steeply turns its body axis into the vertical: with singularity=stop euler says so and ends."""
     scene = load("sphere_in_cylinder", speed=4, axial_speed=4)
-    engine = build(scene, EXACT[0], **settings)
-    with pytest.raises(Diverged, match=r"θ reached .* rad at t = 0\.01\d* s, near .*; use formulation=rotating_frame"):
+    engine = build(scene, EXACT[0], singularity="stop", **settings)
+    with pytest.raises(Diverged, match=r"θ reached .* rad at t = 0\.01\d* s, near .*; leave singularity=stop out"):
         engine.advance(0.1)
-    assert errors(scene, EXACT[1], until=0.1)["z"] < 1e-12
+
+
+@pytest.mark.parametrize(("settings", "accuracy"), [({"preset": "default", "dt": 1e-4}, 1e-4), ({}, 1e-11)])
+def test_the_axes_are_renewed_at_the_singularity(settings, accuracy):
+    """A ball started steeply passes the singularity, comes where it should, and the run says what was done."""
+    scene = load("sphere_in_cylinder", speed=4, axial_speed=4, asks=("orientation",))
+    found = simulate(scene, EXACT[0], until=1.0, every=0.1, **settings)
+    other = simulate(scene, EXACT[1], until=1.0, every=0.1)
+    for name in ("p_WB", "v_WB", "w_WB", "N", "F2", "F3", "q_WB"):
+        wanted = other[name].to_numpy()
+        if name == "q_WB":  # q and -q are one orientation
+            wanted = wanted * np.sign(np.sum(wanted * found[name].to_numpy(), axis=-1, keepdims=True))
+        size = np.max(np.abs(other["N" if name[0] == "F" else name].to_numpy()))
+        np.testing.assert_allclose(found[name], wanted, rtol=0, atol=accuracy * size, err_msg=name)
+    assert "near the Euler-angle singularity the body's axes were chosen anew" in found.attrs["message"]
+    assert "anew" not in other.attrs["message"]
+
+
+def test_a_formulation_without_singularity_refuses_to_stop_at_one():
+    """singularity=stop with rotating_frame would do nothing, so it is an error."""
+    with pytest.raises(InputError, match=r"projection: singularity = 'stop': rotating_frame has no angles"):
+        resolve_settings(Projection, {"formulation": "rotating_frame", "singularity": "stop"})
 
 
 def test_overflow_is_reported_as_divergence():

@@ -10,7 +10,7 @@ import pytest
 
 from proofroll.compiled import library
 from proofroll.engines.projection import Projection
-from proofroll.errors import InputError, Refused
+from proofroll.errors import Refused
 from proofroll.registry import resolve_settings
 from proofroll.scene import Gravity, Scene
 from proofroll.scene_file import load_scene
@@ -76,12 +76,16 @@ def test_nothing_is_left_to_eliminate(formulation: str, drift: float) -> None:
 
 @needs_heyoka
 @pytest.mark.parametrize("preset", ["matched", "tuned"])
-def test_the_singularity_is_reported(preset: str) -> None:
-    """A ball whose spin axis passes the vertical is not carried through the singularity of the Euler angles."""
+def test_the_singularity(preset: str) -> None:
+    """A ball whose spin axis passes the vertical is carried through the singularity only in other axes."""
     scene = load_scene("inclined_plane", speed=0.3, cross_speed=0.0, normal_spin=40.0)
-    run = simulate(scene, "projection", until=2.0, every=0.05, formulation="euler", preset=preset)
-    assert run.attrs["status"] == "diverged"
-    assert "near the Euler-angle singularity" in run.attrs["message"]
+    stopped = simulate(scene, f"projection[preset={preset},singularity=stop]", until=2.0, every=0.05)
+    assert stopped.attrs["status"] == "diverged"
+    assert "near the Euler-angle singularity" in stopped.attrs["message"]
+    run = simulate(scene, f"projection[preset={preset}]", until=2.0, every=0.05)
+    assert "were chosen anew" in run.attrs["message"]
+    true = simulate(scene, "truth", until=2.0, every=0.05)
+    assert float(np.max(np.abs(run["p_WB"] - true["p_WB"]))) < 1e-11  # of 4 m
 
 
 @needs_heyoka
@@ -96,18 +100,11 @@ def test_a_sample_before_the_singularity_is_still_given() -> None:
     assert engine._motion.t == 2e-5
 
 
-@pytest.mark.parametrize("value", [True, False])
-def test_elimination_has_no_effect_and_is_refused(value: bool) -> None:
-    """Switching elimination on or off with taylor is an error: it does nothing there."""
-    with pytest.raises(InputError, match=r"projection: elimination = .*keeps the constraints to round-off"):
-        resolve_settings(Projection, {"integrator": "taylor", "elimination": value})
-
-
 def test_elimination_is_on_by_default() -> None:
-    """rk4 and dop853 eliminate unless told otherwise, taylor never does."""
+    """Every integrator eliminates unless told otherwise."""
     assert resolve_settings(Projection, {}).eliminates
     assert not resolve_settings(Projection, {"elimination": False}).eliminates
-    assert not resolve_settings(Projection, {"integrator": "taylor"}).eliminates
+    assert resolve_settings(Projection, {"integrator": "taylor"}).eliminates
 
 
 def test_what_taylor_cannot_do_is_refused(monkeypatch: pytest.MonkeyPatch) -> None:

@@ -56,7 +56,7 @@ def _run(body: RollingBall, settings: Any, equations: Equations) -> Callable[[Fl
                 k3 = rates(t, x_now + dt / 2 * k2)
                 k4 = rates(t, x_now + dt * k3)
                 x_now = x_now + dt / 6 * (k1 + 2 * (k2 + k3) + k4)
-                if settings.elimination:
+                if settings.eliminates:
                     x_now = eliminated(x_now)
                 check(t + dt, x_now)
         return x_now
@@ -71,7 +71,7 @@ def _run(body: RollingBall, settings: Any, equations: Equations) -> Callable[[Fl
                     raise Diverged("the step size fell to nothing")
                 if solver.t == t:
                     solver.h_abs = max(wanted, solver.h_abs)
-                if settings.elimination:
+                if settings.eliminates:
                     solver.y = eliminated(solver.y)
                     solver.f = rates(solver.t, solver.y)
                 check(solver.t, solver.y)

@@ -19,7 +19,7 @@ from proofroll.engines.projection.modes import Pace
 from proofroll.engines.projection.orientation import EulerAngles, FollowedFrame, Orientation, RotatingFrame
 from proofroll.engines.projection.settings import PRESETS, ProjectionSettings
 from proofroll.engines.projection.stepping import STEPPERS
-from proofroll.engines.projection.switching import Switching
+from proofroll.engines.projection.switching import Hooks, Switching
 from proofroll.engines.projection.taylor import TaylorSeries
 from proofroll.errors import Diverged, Refused
 from proofroll.events import Event
@@ -79,12 +79,13 @@ class Projection:
         geometry = geometry_of(body.surface)
         self._orientation: Orientation
         if settings.formulation == "euler":
-            self._orientation = EulerAngles()
+            self._orientation = EulerAngles(renews=settings.singularity == "renew")
         else:
             self._orientation = FollowedFrame(geometry) if follow else RotatingFrame()
         self._coordinates = 2 + self._orientation.size
         self._ball = ProjectedBall(body, geometry, self._orientation)
         self._eliminate = settings.eliminates
+        self._bounded = math.isfinite(body.contact.mu_static)
         self._fixed_step = settings.dt if settings.resolution == "dt" else 0.0
         frame = body.surface.frame(body.u0)
         angles, r = self._orientation.start(frame, frame.T @ body.w0)
@@ -93,13 +94,14 @@ class Projection:
         self._motion: Integrator | Switching | TaylorSeries
         self._friction: Friction | None = None
         if settings.integrator == "taylor":
-            self._motion = TaylorSeries(body, settings.formulation, x, resolution, self._check)
-        elif math.isfinite(body.contact.mu_static):
+            self._motion = TaylorSeries(body, settings.formulation, x, resolution, self._check, self._accepted)
+        elif math.isfinite(body.contact.mu_static) or body.contact.rolling_resistance > 0:
             stepper = STEPPERS[settings.integrator](resolution)
             speed = _speed(body) or 1.0
             pace = Pace(speed, body.ball.radius / speed, stepper.stability, stepper.reach)
             self._friction = Friction(self._ball, body.contact)
-            self._motion = Switching(self._friction, stepper, x, scales, pace, self._check, self._eliminate)
+            hooks = Hooks(self._check, self._renewed)
+            self._motion = Switching(self._friction, stepper, x, scales, pace, hooks, self._eliminate)
         else:
             self._motion = INTEGRATORS[settings.integrator](self._ball.rates, self._accept, x, scales, resolution)
 
@@ -111,7 +113,19 @@ class Projection:
 
     def _accept(self, t: float, x: FloatArray) -> FloatArray:
         self._check(t, x)
-        return self._ball.eliminated(x) if self._eliminate else x
+        return self._accepted(t, x)
+
+    def _accepted(self, t: float, x: FloatArray) -> FloatArray:
+        """The state from which the motion goes on, without violation and away from the singularity."""
+        x = self._ball.eliminated(x) if self._eliminate else x
+        renewed = self._renewed(t, x)
+        return x if renewed is None else renewed
+
+    def _renewed(self, t: float, x: FloatArray) -> FloatArray | None:
+        """The state in angles chosen anew, or None; see :meth:`Orientation.renewed`."""
+        n = self._coordinates
+        renewed = self._orientation.renewed(t, x[2:n], x[n + 2 :])
+        return None if renewed is None else np.concatenate([x[:2], renewed[0], x[n : n + 2], renewed[1]])
 
     def advance(self, t: float) -> None:
         """See :class:`proofroll.engine.Engine`."""
@@ -126,13 +140,22 @@ class Projection:
         """See :class:`proofroll.engine.LocatesEvents`."""
         return tuple(self._motion.events) if isinstance(self._motion, Switching) else ()
 
+    def remarks(self) -> Sequence[str]:
+        """See :class:`proofroll.engine.TellsRemarks`."""
+        times = self._orientation.renewals if isinstance(self._orientation, EulerAngles) else []
+        if not times:
+            return ()
+        often = "once, at" if len(times) == 1 else f"{len(times)} times, first at"
+        return (f"near the Euler-angle singularity the body's axes were chosen anew {often} t = {times[0]:.6g} s",)
+
     def sample(self) -> Sample:
         """See :class:`proofroll.engine.Engine`."""
         x = self._motion.x
         kin = self._ball.kinematics(x)
         frame = kin.local.frame
         if isinstance(self._motion, Switching):
-            force, sticking = self._motion.force, self._motion.mode.sticking
+            force = self._motion.force
+            sticking = self._motion.mode.sticking if self._bounded else None
         elif isinstance(self._motion, TaylorSeries):
             force, sticking = self._motion.force, None
         else:
@@ -170,7 +193,7 @@ class Projection:
         """What the equations hold besides rolling."""
         if self._ball.rolling_resistance:
             yield Capability.ROLLING_RESISTANCE
-        if isinstance(self._motion, Switching):
+        if self._bounded:
             yield Capability.BOUNDED_FRICTION
         if len(self._motion.x) > _WITHOUT_ORIENTATION:
             yield Capability.ORIENTATION

@@ -57,17 +57,21 @@ class Friction:
         rolling: the ball with both rows active.
         sliding: the ball with none.
         mu_static, mu_kinetic: coefficients [-].
+        bounded: whether there is a static cone to leave.
     """
 
     def __init__(self, ball: ProjectedBall, contact: Contact) -> None:
         self.rolling, self.sliding = ball, ball.with_rows(ball.rows[:0])
         self._rows = ball.rows
+        self.bounded = math.isfinite(contact.mu_static)
         self.mu_static, self.mu_kinetic = contact.mu_static, contact.mu_kinetic
         self._mobility = float(ball.rows[0] ** 2 @ (1 / ball.mass))  # C M⁻¹ Cᵀ [1/kg]
         self._weight = float(ball.mass[0] * np.linalg.norm(ball.gravity))
 
     def reserve(self, response: Response) -> float:
         """What the static cone leaves [N], from the reactions of sticking; negative where the ball must slip."""
+        if not self.bounded:
+            return math.inf  # whatever the sign of N
         F2, F3, *_ = response.multipliers.tolist()
         available, needed = self.mu_static * response.N, math.hypot(F2, F3)
         return available - needed + _ON_CONE * (abs(available) + self._weight)

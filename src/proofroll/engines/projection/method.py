@@ -85,6 +85,7 @@ class ProjectedBall:
         self._orientation = orientation
         self._coordinates = 2 + orientation.size
         self._closed = _closed(body, geometry, orientation)
+        self._tangents = geometry.at(body.u0).tangents[1:] if isinstance(geometry, Uniform) else None
 
     def kinematics(self, x: FloatArray) -> Kinematics:
         """The explicit form of the holonomic constraint at the state x."""
@@ -95,6 +96,12 @@ class ProjectedBall:
         D[:3, :2], drift[:3] = local.tangents, local.second @ s[:2] @ s[:2]
         D[3:, 2:], drift[3:] = self._orientation.kinematics(q[2:], s[2:], local.frame, turning)
         return Kinematics(local, turning, D, drift, D @ s)
+
+    def speed(self, x: FloatArray) -> float:
+        """Of the centre [m/s]."""
+        n = self._coordinates
+        tangents = self._geometry.at(x[:2]).tangents[1:] if self._tangents is None else self._tangents
+        return math.hypot(*tangents.dot(x[n : n + 2]).tolist())
 
     def mass_matrix(self, kin: Kinematics) -> FloatArray:
         """M̄ = DᵀMD, shape (5, 5)."""

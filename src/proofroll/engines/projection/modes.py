@@ -8,8 +8,8 @@ from typing import NamedTuple, Protocol
 
 from proofroll.surfaces import FloatArray
 
-# Slower than this part of the pace of the motion, a contact point or a centre stands still: 1e-13 s before it does.
-_STILL = 1e-12
+# Slower than this part of the pace of the motion, a contact point or a centre stands still: 1e-14 s before it does.
+_STILL = 1e-13
 # Slower than this part of the pace, a ball that could rest where it is comes to rest: it has some 1e-11 m to go.
 _SETTLED = 1e-5
 # Differences over this part of the time scale: 1e-12 of round-off and 1e-4 of curvature in the rate of a force.

@@ -16,8 +16,11 @@ from proofroll.engines.projection.geometry import Geometry
 from proofroll.errors import Diverged
 from proofroll.surfaces import FloatArray
 
-# The condition of M̄ grows like 1/sin²θ as θ nears 0 or π: here four digits are lost. With the tightest tolerance, a
-# ball that passes at this distance still has its reactions to 2e-11 N (weight 5 N); at 0.003 it is 2e-10 N (measured).
+# The condition of M̄ grows like 1/sin²θ as θ nears 0 or π. Here, at 30 degrees, nothing is lost yet; the paper's own
+# run, where sin θ stays above 0.75, does not come so far.
+_RENEWED = 0.5
+# Where the axes are not renewed the run ends here, four digits later. With the tightest tolerance, a ball that passes
+# at this distance still has its reactions to 2e-11 N (weight 5 N); at 0.003 it is 2e-10 N (measured).
 _SMALLEST_SINE = 0.01
 # A fixed step that turns the ball by more than this is too coarse anywhere, not only near the singularity.
 _LARGEST_SINE = 0.5
@@ -50,14 +53,38 @@ class Orientation(Protocol):
     def check(self, t: float, angles: FloatArray, r: FloatArray, step: float) -> None:
         """Raises Diverged if the description fails at time ``t`` [s]; ``step`` [s] is a fixed step's size, else 0."""
 
+    def renewed(self, t: float, angles: FloatArray, r: FloatArray) -> tuple[FloatArray, FloatArray] | None:
+        """Other angles and velocities for the same rotation at time ``t`` [s], where these are about to fail; or None.
+
+        Called once, in order of time, with each state from which the motion goes on; never with one that is only
+        looked at.
+        """
+
     def quaternion(self, angles: FloatArray) -> FloatArray | None:
         """Orientation in the world, scalar first, shape (4,), identity at time 0; None if it is not followed."""
 
 
 class EulerAngles:
-    """Euler angles z-x-z [φ θ ψ]: rotation, nutation, precession (Blajer 2006), about the axes of the world."""
+    """Euler angles z-x-z [φ θ ψ]: rotation, nutation, precession (Blajer 2006), about the axes of the world.
+
+    Near the singularity at θ = 0 and π the body's axes, whose orientation the angles give, are chosen anew with
+    θ = π/2. To a ball all axes through its centre are principal ones with the same moment of inertia, so no equation
+    of the paper changes, nor does the formulation: only where the angles are counted from. A hand-over to coordinates
+    without a singularity would do as well for the motion, but it would leave the formulation that was asked for, and
+    two sets of equations behind one answer.
+
+    Attributes:
+        renewals: times [s] at which the axes were chosen anew.
+    """
 
     size: ClassVar[int] = 3
+
+    def __init__(self, *, renews: bool = True) -> None:
+        """Without ``renews`` the run ends at the singularity, as the paper's equations do by themselves."""
+        self.renewals: list[float] = []
+        self._renews = renews
+        self._orientation_then = Rotation.identity()  # of the ball, where the present axes were chosen
+        self._axes_then = _body_axes(np.array([0.0, math.pi / 2, 0.0]))
 
     def start(self, frame: FloatArray, w: FloatArray) -> tuple[FloatArray, FloatArray]:
         """See :class:`Orientation`. θ = π/2 is as far from the singularity as can be."""
@@ -106,6 +133,8 @@ class EulerAngles:
         One fixed step turns the ball by |ω| step. If the axis of φ is nearer to the vertical than that, φ and ψ turn by
         a radian or so in a step and the result is silently wrong (by as much as the weight in F3, measured).
         """
+        if self._renews:
+            return
         theta, smallest = angles.item(1), _SMALLEST_SINE
         if step:
             turn = math.sqrt(max(0.0, r @ r + 2.0 * r[0] * r[2] * math.cos(theta))) * step
@@ -113,15 +142,37 @@ class EulerAngles:
         if abs(math.sin(theta)) < smallest:
             raise Diverged(
                 f"θ reached {theta:.4g} rad at t = {t:.6g} s, near the Euler-angle singularity; "
-                "use formulation=rotating_frame"
+                "leave singularity=stop out, or use formulation=rotating_frame"
             )
+
+    def renewed(self, t: float, angles: FloatArray, r: FloatArray) -> tuple[FloatArray, FloatArray] | None:
+        """See :class:`Orientation`. The new axis of φ is horizontal, in line with the angular velocity: then θ̇ = 0."""
+        if not self._renews or abs(math.sin(angles[1])) >= _RENEWED:
+            return None
+        still = np.zeros((3, 3))
+        A, _ = self.kinematics(angles, r, np.eye(3), still)
+        w = A @ r
+        psi = math.atan2(w[0], -w[1])
+        chosen = np.array([0.0, math.pi / 2, psi])
+        A, _ = self.kinematics(chosen, r, np.eye(3), still)
+        self._orientation_then = self._orientation(angles)
+        self._axes_then = _body_axes(chosen)
+        self.renewals.append(t)
+        return chosen, np.asarray(np.linalg.solve(A, w), dtype=np.float64)
 
     def quaternion(self, angles: FloatArray) -> FloatArray:
         """See :class:`Orientation`."""
-        phi, theta, psi = angles
-        now = Rotation.from_euler("ZXZ", [psi, theta, phi])
-        at_start = Rotation.from_euler("ZXZ", [0.0, math.pi / 2, 0.0])
-        return np.asarray(np.roll((now * at_start.inv()).as_quat(), 1), dtype=np.float64)
+        return np.asarray(np.roll(self._orientation(angles).as_quat(), 1), dtype=np.float64)
+
+    def _orientation(self, angles: FloatArray) -> Rotation:
+        """Of the ball in the world, identity at time 0."""
+        return _body_axes(angles) * self._axes_then.inv() * self._orientation_then
+
+
+def _body_axes(angles: FloatArray) -> Rotation:
+    """Orientation of the body's axes in the world."""
+    phi, theta, psi = angles
+    return Rotation.from_euler("ZXZ", [psi, theta, phi])
 
 
 class RotatingFrame:
@@ -155,6 +206,9 @@ class RotatingFrame:
 
     def check(self, t: float, angles: FloatArray, r: FloatArray, step: float) -> None:
         """See :class:`Orientation`. Nothing to fail."""
+
+    def renewed(self, t: float, angles: FloatArray, r: FloatArray) -> None:
+        """See :class:`Orientation`. Nothing to renew."""
 
     def quaternion(self, angles: FloatArray) -> FloatArray | None:  # noqa: ARG002 -- there are none
         """See :class:`Orientation`. The orientation is not followed: nothing needs it."""

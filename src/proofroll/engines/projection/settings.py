@@ -28,10 +28,11 @@ class ProjectionSettings:
             the same equations in compiled Taylor series (heyoka), on a cylinder or plane, without bounded friction.
         dt: step of rk4 [s].
         rtol: relative tolerance of dop853 and of taylor [-].
-        elimination: remove the violation of the rolling constraints after each step; None: rk4 and dop853 do, and
-            taylor, which keeps the constraints to round-off by itself, has no such step. In ``rotating_frame`` on a
-            surface of constant curvature nothing is left to remove: there the constraints are linear with constant
-            coefficients, and every Runge-Kutta method keeps those by itself.
+        elimination: remove the violation of the rolling constraints after each step (taylor: after every few); None
+            is yes. In ``rotating_frame`` on a surface of constant curvature no step leaves a violation, for there the
+            constraints are linear with constant coefficients, but round-off does, and it grows.
+        singularity: what ``euler`` does near θ = 0 and π: ``renew``, choose the body's axes anew and say so, or
+            ``stop``, as the paper's equations do by themselves.
     """
 
     formulation: Literal["euler", "rotating_frame"] = "euler"
@@ -40,6 +41,7 @@ class ProjectionSettings:
     dt: Annotated[float, Gt(0)] = _DT
     rtol: Annotated[float, Gt(0)] = TIGHTEST
     elimination: bool | None = None
+    singularity: Literal["renew", "stop"] = "renew"
 
     def __post_init__(self) -> None:
         tightest = library.TIGHTEST if self.integrator == "taylor" else TIGHTEST
@@ -55,14 +57,14 @@ class ProjectionSettings:
                 "projection: rtol", self.rtol, f"{self.integrator} has a fixed step; set dt, or add integrator=dop853"
             )
 
-        if self.integrator == "taylor" and self.elimination is not None:
-            advice = "taylor keeps the constraints to round-off and has no elimination; leave it out"
-            raise InputError("projection: elimination", self.elimination, advice)
+        if self.singularity == "stop" and self.formulation != "euler":
+            advice = f"{self.formulation} has no angles, hence no singularity; leave it out, or take formulation=euler"
+            raise InputError("projection: singularity", self.singularity, advice)
 
     @property
     def eliminates(self) -> bool:
         """Whether violations are removed."""
-        return self.integrator != "taylor" and self.elimination is not False
+        return self.elimination is not False
 
     @property
     def resolution(self) -> Literal["dt", "rtol"]:

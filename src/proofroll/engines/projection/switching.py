@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable
+from typing import NamedTuple
 
 import numpy as np
 from scipy.optimize import brentq
@@ -16,12 +17,22 @@ from proofroll.errors import Diverged
 from proofroll.events import Event, EventKind
 from proofroll.surfaces import FloatArray
 
-Check = Callable[[float, FloatArray], None]
-
 # Times are located to this part of the time scale of the motion, or to round-off of the time itself.
 _LOCATED = 1e-12
 # A mode that ends where it started is possible; as many in a row as this are an endless loop.
 _WITHOUT_PROGRESS = 20
+
+
+class Hooks(NamedTuple):
+    """What is asked about the state x after each step.
+
+    Attributes:
+        check: called with the time [s] and x; raises Diverged if x is not to be trusted.
+        renewed: called with them where the motion goes on from there; the same state in other coordinates, or None.
+    """
+
+    check: Callable[[float, FloatArray], None]
+    renewed: Callable[[float, FloatArray], FloatArray | None]
 
 
 class Switching:
@@ -40,7 +51,7 @@ class Switching:
         x: FloatArray,
         scales: FloatArray,
         pace: Pace,
-        check: Check,
+        hooks: Hooks,
         eliminate: bool,
     ) -> None:
         """Starts at time 0 in the mode that the state x asks for.
@@ -51,12 +62,12 @@ class Switching:
             x: coordinates and velocities, rolling without slip.
             scales: natural size of each component of x.
             pace: of the motion.
-            check: called with the time [s] and x after each step; raises Diverged if x is not to be trusted.
+            hooks: see there.
             eliminate: remove the violation of what C v shall be after each step.
         """
         self.stepper = stepper
         self.events: list[Event] = []
-        self._friction, self._check, self._eliminate, self._pace = friction, check, eliminate, pace
+        self._friction, self._hooks, self._eliminate, self._pace = friction, hooks, eliminate, pace
         self._scales = np.append(scales, [pace.speed, 1.0])
         self._stick, self._rest = Stick(friction, pace), Rest(friction)
         self._slaved, self._free = SlavedSlip(friction, pace), FreeSlip(friction, pace)
@@ -98,18 +109,27 @@ class Switching:
         stepper.aim(t)
         while stepper.t < t:
             stepper.step(t, self._survey.longest)
-            survey = self.mode.survey(stepper.y)
+            survey = self._look()
             ended = self._ended(survey)
             if ended is not None:
                 self._switch(*ended)
             elif survey.slaved:
                 self._enter(self._slaved, stepper.t, stepper.y[:-1])
+            elif (renewed := self._hooks.renewed(stepper.t, self.x)) is not None:
+                self._enter(self.mode, stepper.t, np.concatenate([renewed, stepper.y[len(renewed) :]]))
             else:
                 self._survey, self._idle = survey, 0
 
+    def _look(self) -> Survey:
+        """After a step."""
+        stepper = self.stepper
+        if self.mode is self._stick and self._stick.halts and not self._friction.bounded:
+            return self._stick.glance(stepper.y, self._survey, stepper.t - stepper.t_before)
+        return self.mode.survey(stepper.y)
+
     def _enter(self, mode: Mode, t: float, y: FloatArray) -> None:
         def accept(at: float, state: FloatArray) -> FloatArray:
-            self._check(at, mode.x(state))
+            self._hooks.check(at, mode.x(state))
             return mode.eliminated(state) if self._eliminate else state
 
         self.mode = mode
@@ -192,7 +212,7 @@ class Switching:
         ball = self._friction.rolling
         if high > 0:
             x = ball.eliminated(x)
-        speed = self._stick.speed(x) if self._stick.halts else np.inf
+        speed = self._friction.rolling.speed(x) if self._stick.halts else np.inf
         mode: Mode
         if speed <= self._pace.settled and self._rest.holds(x):
             mode, x = self._rest, self._rest.eliminated(x)

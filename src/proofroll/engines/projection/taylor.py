@@ -9,7 +9,7 @@ import numpy as np
 from proofroll.compiled.library import require_heyoka
 from proofroll.compiled.projection import Formulation, parameters, projected, structure
 from proofroll.compiled.rolling import supports
-from proofroll.compiled.series import Series, still_moving
+from proofroll.compiled.series import Renewed, Series, still_moving
 from proofroll.errors import Refused
 from proofroll.scene import RollingBall
 from proofroll.surfaces import FloatArray
@@ -18,12 +18,18 @@ from proofroll.surfaces import FloatArray
 class TaylorSeries:
     """A ball that rolls without slip, its state x = [q, s] by steps as long as the tolerance allows.
 
-    The violation of the constraints stays at round-off without being removed (a test shows it): a step is exact to
-    the last digits, and the equations keep C v constant.
+    A step is exact to the last digits, and the equations keep C v constant, so that round-off alone violates the
+    constraints. Over thousands of oscillations that adds up, and is removed like any other violation.
     """
 
     def __init__(
-        self, body: RollingBall, formulation: Formulation, x: FloatArray, rtol: float, check: Callable[..., None]
+        self,
+        body: RollingBall,
+        formulation: Formulation,
+        x: FloatArray,
+        rtol: float,
+        check: Callable[..., None],
+        accepted: Renewed,
     ) -> None:
         """Starts at time 0.
 
@@ -33,6 +39,7 @@ class TaylorSeries:
             x: initial state.
             rtol: relative tolerance of a step [-].
             check: called with the time [s] and state after each step; raises Diverged if it is not to be trusted.
+            accepted: the state from which the motion goes on, see :data:`proofroll.compiled.series.Renewed`.
 
         Raises:
             Refused: heyoka is missing, or the scene is not one of its equations.
@@ -50,7 +57,7 @@ class TaylorSeries:
         self._check, self._resistance = check, body.contact.rolling_resistance > 0
         self._scales, self._mass = np.array(body.surface.length_scales), body.ball.mass
         pars = np.array(self._pars[: len(model.integrator.pars)])
-        self._series = Series(model.integrator, pars, x, self._look)
+        self._series = Series(model.integrator, pars, x, self._look, accepted)
 
     def _look(self, before: FloatArray, t: float, x: FloatArray) -> None:
         self._check(t, x)

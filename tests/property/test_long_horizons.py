@@ -1,0 +1,115 @@
+"""What thousands of oscillations leave of the energy, of the constraints and of the phase."""
+
+from __future__ import annotations
+
+import copy
+from decimal import Decimal, getcontext
+
+import numpy as np
+import pytest
+
+from proofroll.closed_form import closed_form
+from proofroll.compiled import library, rolling
+from proofroll.mechanics import energy
+from proofroll.scene_file import load_scene
+from proofroll.simulation import build
+
+needs_heyoka = pytest.mark.skipif(not library.available(), reason="heyoka is not installed")
+
+SCENE = load_scene("sphere_in_cylinder", axial_speed=0.3, radial_spin=7.0)
+BODY = SCENE.rolling
+RATE = float(np.sqrt(2 / 7) * BODY.udot0[0])  # ν [rad/s]
+PERIOD = 2 * np.pi / RATE
+KINETIC = 0.7 * BODY.ball.mass * float(BODY.v0 @ BODY.v0)
+EPS = float(np.finfo(float).eps)
+
+
+def drift(engine: str, oscillations: int) -> tuple[float, float]:
+    """Largest change of energy over the initial kinetic energy, and largest slip over the initial speed."""
+    built = build(SCENE, engine)
+    e1 = BODY.surface.normal
+    changes, slips, first = [], [], None
+    for part in range(11):
+        built.advance(part * oscillations * PERIOD / 10)
+        now = built.sample()
+        level = float(energy(BODY, now.p_WB, now.v_WB, now.w_WB))
+        first = level if first is None else first
+        changes.append(abs(level - first) / KINETIC)
+        slip = now.v_WB + BODY.ball.radius * np.cross(now.w_WB, e1(now.p_WB))
+        slips.append(float(np.linalg.norm(slip)) / float(np.linalg.norm(BODY.v0)))
+    return max(changes), max(slips)
+
+
+@pytest.mark.parametrize(
+    ("engine", "oscillations"),
+    [
+        pytest.param("projection[formulation=rotating_frame,preset=tuned]", 10_000, marks=needs_heyoka),
+        pytest.param("reduced[preset=tuned]", 10_000, marks=needs_heyoka),
+        pytest.param("projection[formulation=euler,preset=tuned]", 300, marks=needs_heyoka),
+        ("projection[formulation=rotating_frame]", 300),
+        ("projection[formulation=euler]", 5),
+        ("reduced[formulation=closed_form,preset=matched]", 10_000),
+    ],
+)
+def test_energy_and_constraints(engine: str, oscillations: int) -> None:
+    """Without resistance the energy stays to 1e-10 of itself, and the contact point slips at round-off."""
+    changed, slipped = drift(engine, oscillations)
+    assert changed < 1e-10
+    assert slipped < 1e-12
+
+
+@needs_heyoka
+def test_without_elimination_round_off_adds_up() -> None:
+    """What elimination is for: without it the same run ends with a slip a thousand times as large."""
+    engine = "projection[formulation=rotating_frame,preset=tuned]"
+    with_it, without = drift(engine, 3000), drift(f"{engine[:-1]},elimination=false]", 3000)
+    assert without[1] > 1e3 * with_it[1]
+    assert without[0] > 1e3 * with_it[0]
+
+
+def test_without_elimination_a_coarse_step_adds_up() -> None:
+    """With the classical method the Euler angles leave a violation at every step; elimination takes it away."""
+    engine = "projection[formulation=euler,integrator=rk4,dt=1e-3]"
+    step = PERIOD / 1000  # a whole number of steps to every sample
+    engine = engine.replace("1e-3", repr(step))
+    assert drift(engine, 2)[1] < 1e-13
+    assert drift(f"{engine[:-1]},elimination=false]", 2)[1] > 1e-9
+
+
+def test_phase_of_the_closed_form() -> None:
+    """After a million oscillations z is as far from the exact value as round-off of νt lets it be, 4 ε νt."""
+    body = load_scene("sphere_in_cylinder").rolling
+    getcontext().prec = 60
+    # V0 = 4, and the c of the scene: the exact values of the numbers in double precision
+    c, omega = Decimal(body.surface.length_scales[0]), Decimal(float(body.udot0[0]))
+    rate = (Decimal(2) / 7).sqrt() * omega
+    times = np.array([1.0, 1e3, 1e6]) * PERIOD * 1.1
+    # π to 60 digits (DLMF 3.12.1)
+    turn = 2 * Decimal("3.14159265358979323846264338327950288419716939937510582097494")
+    phases = [rate * Decimal(float(t)) for t in times]
+    exact = [-2.5 * 9.81 / float(omega) ** 2 * (1 - np.cos(float(phase % turn))) for phase in phases]
+    found = closed_form(body, times)
+    assert found is not None
+    assert float(c) == pytest.approx(0.2)
+    amplitude = 2.5 * 9.81 / float(omega) ** 2
+    for z, wanted, phase in zip(found.p_WB[:, 2], exact, phases, strict=True):
+        assert abs(z - wanted) < 4 * EPS * (1 + float(phase)) * amplitude
+
+
+@needs_heyoka
+def test_a_million_oscillations() -> None:
+    """The reduced equations, compiled, keep the closed form's phase of z over a million oscillations: 16 ε νt.
+
+    4 of that is the closed form's own round-off, the rest that of some three million steps of the series.
+    """
+    body = load_scene("sphere_in_cylinder").rolling
+    model = rolling.reduced(resistance=False, uniform=True, tolerance=EPS)
+    series = copy.copy(model.integrator)
+    series.time, series.state[:] = 0.0, rolling.start(body)
+    series.pars[:] = np.array(rolling.parameters(body)[: len(series.pars)])
+    end = (1e6 + 0.25) * PERIOD
+    series.propagate_until(end)
+    found = closed_form(body, np.array([end]))
+    assert found is not None
+    amplitude = 2.5 * 9.81 / float(body.udot0[0]) ** 2
+    assert abs(series.state[1] - found.p_WB[0, 2]) < 16 * EPS * RATE * end * amplitude
