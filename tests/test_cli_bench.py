@@ -87,7 +87,8 @@ def test_study(proofroll: Proofroll, capfd: pytest.CaptureFixture[str]) -> None:
     assert code in (0, 1), err
     found = json.loads(out)
     assert set(found) == {
-        "goal", "jobs", "load_before", "wall_seconds", "outside", "within_goal", "shares", "cases", "first_answer",
+        "goal", "jobs", "load_before", "wall_seconds", "outside", "within_goal", "shares", "processor", "cases",
+        "first_answer",
     }  # fmt: skip
     assert 0 < found["outside"] < 1
     assert sum(found["shares"].values()) == pytest.approx(1)
