@@ -57,6 +57,10 @@ class Question:
         """Sampling interval [s]."""
         return self.until / SAMPLES
 
+    def step(self, factor: float) -> float:
+        """So many sampling intervals [s], without the digits that multiplying leaves: 0.005, not 0.005000000000000001."""
+        return float(f"{self.every * factor:.12g}")
+
     def loaded(self) -> Scene:
         """The scene with these parameters."""
         return load_scene(self.scene, **self.parameters)
@@ -186,7 +190,7 @@ def _first(question: Question, curve: Curve) -> list[float]:
         return [0.0]  # a closed form has nothing to refine: one point
     own = float(curve.facts.settings[curve.facts.resolution])
     if curve.fixed_step:
-        return [question.every * factor for factor in _STEPS]
+        return [question.step(factor) for factor in _STEPS]
     return [*_TOLERANCES, own]
 
 
@@ -197,15 +201,15 @@ def _further(question: Question, curve: Curve, references: Mapping[float, Refere
     found = []
     scale = references[question.every].scale(question.quantity) or 1.0
     coarsest, finest = curve.points[0], curve.points[-1]
-    coarser = next((f for f in _COARSER if question.every * f not in asked), None)
+    coarser = next((step for step in map(question.step, _COARSER) if step not in asked), None)
     if coarser is not None and coarsest.errors.get(question.quantity, np.inf) < BROKEN * scale:
-        found.append(question.every * coarser)
-    finer = next((f for f in _FINER if question.every * f not in asked), None)
+        found.append(coarser)
+    finer = next((step for step in map(question.step, _FINER) if step not in asked), None)
     if finer is not None and len(curve.points) > 1:
-        ratio = (finest.step or 0.0) / (question.every * finer)
+        ratio = (finest.step or 0.0) / finer
         now, before = (point.errors.get(question.quantity, np.inf) for point in (finest, curve.points[-2]))
         if now < (1 - _GAIN) * before and finest.result.wall_seconds * ratio < _PATIENCE:
-            found.append(question.every * finer)
+            found.append(finer)
     return found
 
 
