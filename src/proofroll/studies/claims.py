@@ -88,7 +88,10 @@ class TradeoffClaims:
 def claims_for(scene: str) -> TradeoffClaims | None:
     """The claims about a scene as its file has them, or None if there is no file."""
     for path in sorted(data_folder("comparisons").glob("*.toml")):
-        content = tomllib.loads(path.read_text(encoding="utf-8"))
+        try:
+            content = tomllib.loads(path.read_text(encoding="utf-8"))
+        except (OSError, ValueError):
+            continue  # whoever asks for that file is told what is wrong with it
         if content.get("study") == STUDY and content.get("scene") == scene:
             return _claims(path, content)
     return None

@@ -55,10 +55,10 @@ class Question:
     @property
     def every(self) -> float:
         """Sampling interval [s]."""
-        return self.until / SAMPLES
+        return float(f"{self.until / SAMPLES:.12g}")
 
     def step(self, factor: float) -> float:
-        """So many sampling intervals [s], without the digits that multiplying leaves: 0.005, not 0.005000000000000001."""
+        """So many sampling intervals [s], without the digits that multiplying leaves (0.005000000000000001)."""
         return float(f"{self.every * factor:.12g}")
 
     def loaded(self) -> Scene:
