@@ -79,12 +79,15 @@ def _mean(run: FirstSlip, until: float) -> float:
     return (clock() - start) / count
 
 
-def numeric(scene: Scene, formulation: str, times: FloatArray, true_p: FloatArray, bound: float) -> Timed | None:
-    """The projection method in numpy by DOP853, in one run without a stop but at the samples.
+def numeric(
+    scene: Scene, formulation: str, equations: str, times: FloatArray, true_p: FloatArray, bound: float
+) -> Timed | None:
+    """The projection method in Python by DOP853, in one run without a stop but at the samples.
 
     Args:
         scene: with unbounded friction.
         formulation: of the engine ``projection``.
+        equations: ``projected`` in numpy, or ``written_out``.
         times: samples [s], shape (n,).
         true_p: position of the centre then [m], shape (n, 3).
         bound: on the error of the position [m].
@@ -94,6 +97,7 @@ def numeric(scene: Scene, formulation: str, times: FloatArray, true_p: FloatArra
     for elimination in (True, False):
         for rtol in _NUMERIC_TOLERANCES:
             options: dict[str, Any] = {"formulation": formulation, "rtol": rtol, "elimination": elimination}
+            options["equations"] = equations
             start = time.perf_counter()
             engine = build(scene, "projection", **options)
             spent = time.perf_counter() - start
@@ -113,7 +117,8 @@ def numeric(scene: Scene, formulation: str, times: FloatArray, true_p: FloatArra
 
             seconds = measure()
             if seconds < best_seconds:
-                name = f"projection {formulation}, numpy and scipy"
+                how = "numpy" if equations == "projected" else "written out"
+                name = f"projection {formulation}, {how}"
                 best, best_seconds = Timed(name, error, rtol, spent, measure), seconds
             break
     return best

@@ -19,6 +19,8 @@ _DASHES = ("-", "--", "-.", ":")
 _MARKERS = "osD^vPX*"
 # Errors below this are round-off of every double; a logarithm needs a number.
 _SMALLEST = 1e-17
+# Height of a line of the legend [in].
+_LINE = 0.145
 
 
 def draw(study: Mapping[str, Any], quantities: Sequence[str], path: Path) -> None:
@@ -43,10 +45,13 @@ def svg(study: Mapping[str, Any], quantities: Sequence[str]) -> str:
         from matplotlib.figure import Figure
     except ModuleNotFoundError:
         raise Missing("matplotlib is not installed: pip install 'proofroll[report]'") from None
+    curves = {point["curve"] for point in study["points"]}
     columns = min(2, len(quantities))
     rows = math.ceil(len(quantities) / columns)
     with mpl.rc_context({"svg.hashsalt": "proofroll", "font.size": 9}):
-        figure = Figure(figsize=(5.2 * columns + 2.6, 3.9 * rows + 0.4), layout="constrained")
+        figure = Figure(
+            figsize=(5.2 * columns + 2.6, max(3.9 * rows + 0.4, _LINE * len(curves) + 1.0)), layout="constrained"
+        )
         panels = figure.subplots(rows, columns, squeeze=False).ravel()
         for panel, quantity in zip(panels, quantities, strict=False):
             _panel(panel, study, quantity)

@@ -14,6 +14,7 @@ from proofroll.engines.projection.switching import Switching
 from proofroll.errors import Diverged, InputError
 from proofroll.registry import resolve_settings
 from proofroll.scene import Capability
+from proofroll.scene_file import load_scene
 from proofroll.simulation import build, simulate
 
 CYLINDER = {"name": "sphere_in_cylinder"}
@@ -265,3 +266,17 @@ def test_presets_say_what_they_are(formulation, preset):
     assert (settings.formulation, settings.preset) == (formulation, preset)
     assert getattr(settings, settings.resolution) > 0
     assert (settings.order is None) == (settings.resolution == "rtol")
+
+
+@pytest.mark.parametrize("formulation", ["euler", "rotating_frame"])
+def test_projections_in_numpy_give_the_equations_written_out(formulation: str) -> None:
+    """The projections carried out at every evaluation and their result written out are one motion to round-off."""
+    resisting = load_scene("sphere_in_cylinder", rolling_resistance=5e-4, axial_speed=0.3, radial_spin=5.0)
+    runs = [
+        simulate(resisting, "projection", formulation=formulation, equations=equations, until=0.3)
+        for equations in ("projected", "written_out")
+    ]
+    for name in ("gamma", "z", "N", "F2", "F3"):
+        np.testing.assert_allclose(runs[0][name], runs[1][name], rtol=1e-10, atol=1e-10)
+    with pytest.raises(InputError, match="equations"):
+        build(resisting, "projection", formulation=formulation, preset="tuned", equations="projected")

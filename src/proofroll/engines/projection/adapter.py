@@ -55,6 +55,13 @@ class Projection:
             "takes away the slip that a step leaves (Blajer 2002); where rolling is linear with constant coefficients, "
             "as in the rotating frame, there is none",
         ),
+        Term(
+            "projections in numpy",
+            ("euler", "rotating_frame"),
+            {"equations": "projected"},
+            {"equations": "written_out"},
+            "carries out the method's projections at every evaluation, as on a surface that looks different everywhere",
+        ),
     )
     inherent: ClassVar[Mapping[str, Mapping[Capability, str]]] = {
         "euler": {Capability.ORIENTATION: "the Euler angles are coordinates of the equations of motion"}
@@ -83,7 +90,8 @@ class Projection:
         else:
             self._orientation = FollowedFrame(geometry) if follow else RotatingFrame()
         self._coordinates = 2 + self._orientation.size
-        self._ball = ProjectedBall(body, geometry, self._orientation)
+        written_out = settings.equations == "written_out"
+        self._ball = ProjectedBall(body, geometry, self._orientation, written_out=written_out)
         self._eliminate = settings.eliminates
         self._bounded = math.isfinite(body.contact.mu_static)
         self._fixed_step = settings.dt if settings.resolution == "dt" else 0.0

@@ -75,7 +75,10 @@ class ProjectedBall:
         rows: C, the active rows of the non-holonomic constraints, shape (0…2, 6).
     """
 
-    def __init__(self, body: RollingBall, geometry: Geometry, orientation: Orientation) -> None:
+    def __init__(
+        self, body: RollingBall, geometry: Geometry, orientation: Orientation, *, written_out: bool = True
+    ) -> None:
+        """The ball on a surface; ``written_out``: where that is known, without carrying out the projections."""
         m, J = body.ball.mass, body.ball.inertia
         self.mass = np.array([m, m, m, J, J, J])
         self.gravity = body.gravity
@@ -84,7 +87,7 @@ class ProjectedBall:
         self._geometry = geometry
         self._orientation = orientation
         self._coordinates = 2 + orientation.size
-        self._closed = _closed(body, geometry, orientation)
+        self._closed = _closed(body, geometry, orientation) if written_out else None
         self._tangents = geometry.at(body.u0).tangents[1:] if isinstance(geometry, Uniform) else None
 
     def kinematics(self, x: FloatArray) -> Kinematics:

@@ -33,6 +33,8 @@ class ProjectionSettings:
             constraints are linear with constant coefficients, but round-off does, and it grows.
         singularity: what ``euler`` does near θ = 0 and π: ``renew``, choose the body's axes anew and say so, or
             ``stop``, as the paper's equations do by themselves.
+        equations: ``written_out``, the result of the projections in plain numbers, where the surface looks the same
+            from every point of it; or ``projected``, with the projections carried out in numpy at every evaluation.
     """
 
     formulation: Literal["euler", "rotating_frame"] = "euler"
@@ -42,6 +44,7 @@ class ProjectionSettings:
     rtol: Annotated[float, Gt(0)] = TIGHTEST
     elimination: bool | None = None
     singularity: Literal["renew", "stop"] = "renew"
+    equations: Literal["written_out", "projected"] = "written_out"
 
     def __post_init__(self) -> None:
         tightest = library.TIGHTEST if self.integrator == "taylor" else TIGHTEST
@@ -57,6 +60,9 @@ class ProjectionSettings:
                 "projection: rtol", self.rtol, f"{self.integrator} has a fixed step; set dt, or add integrator=dop853"
             )
 
+        if self.equations == "projected" and self.integrator == "taylor":
+            advice = "taylor compiles its own equations; leave it out, or take integrator=dop853"
+            raise InputError("projection: equations", self.equations, advice)
         if self.singularity == "stop" and self.formulation != "euler":
             advice = f"{self.formulation} has no angles, hence no singularity; leave it out, or take formulation=euler"
             raise InputError("projection: singularity", self.singularity, advice)
