@@ -99,14 +99,25 @@ class _Waiting:
     def __init__(self, cases: Iterable[Case]) -> None:
         self._lock = threading.Lock()
         self._by_engine: dict[str, deque[Case]] = {}
+        self._begun: set[str] = set()
         for case in cases:
             self._by_engine.setdefault(case.engine.name, deque()).append(case)
 
     def take(self, engine: str | None) -> Case | None:
-        """The next case, of this engine if there is one, else of the one with the most; None: there is none."""
+        """The next case, of this engine if there is one, else of one that nobody has begun; None: there is none.
+
+        Where all are begun, the one with the most cases left is shared.
+        """
         with self._lock:
-            group = self._by_engine.get(engine or "") or max(self._by_engine.values(), key=len, default=None)
-            return group.popleft() if group else None
+            group = self._by_engine.get(engine or "")
+            if not group:
+                fresh = [cases for name, cases in self._by_engine.items() if cases and name not in self._begun]
+                group = max(fresh or self._by_engine.values(), key=len, default=None)
+            if not group:
+                return None
+            case = group.popleft()
+            self._begun.add(case.engine.name)
+            return case
 
 
 class Runner:
