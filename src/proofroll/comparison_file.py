@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import itertools
 import math
-import tomllib
 from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
@@ -18,22 +17,14 @@ from proofroll.folders import data_folder
 from proofroll.metrics import WITHOUT_SCALE, units
 from proofroll.recording import time_grid
 from proofroll.scene_file import first_problem, load_scene
+from proofroll.toml_file import read_toml, study_of
 
 _LADDER_RUNGS = 3
 
 
 def comparison_names() -> list[str]:
     """Names of all comparisons, sorted; files of other studies say which with ``study = "…"``."""
-    return sorted(path.stem for path in data_folder("comparisons").glob("*.toml") if not _other_study(path))
-
-
-def _other_study(path: Path) -> str | None:
-    """Name of the study that a file is for, if it is no comparison; a broken file is reported when it is read."""
-    try:
-        study = tomllib.loads(path.read_text(encoding="utf-8")).get("study")
-    except (OSError, ValueError):
-        return None
-    return None if study is None else str(study)
+    return sorted(path.stem for path in data_folder("comparisons").glob("*.toml") if study_of(path) is None)
 
 
 def load_comparison(name: str) -> Comparison:
@@ -54,12 +45,7 @@ def load_comparison(name: str) -> Comparison:
         raise InputError(
             "comparison", name, f"there is no such comparison; choose one of {', '.join(comparison_names())} or a file"
         )
-    try:
-        content = tomllib.loads(path.read_text(encoding="utf-8"))
-    except (tomllib.TOMLDecodeError, UnicodeDecodeError) as error:
-        raise InputError(str(path), "TOML", f"the file is broken: {error}") from None
-    except OSError as error:
-        raise InputError(str(path), "TOML", f"the file cannot be read: {error.strerror}") from None
+    content = read_toml(path)
     if "study" in content:
         advice = f"this file is for another command: proofroll {content['study']} {content.get('scene', '')}".strip()
         raise InputError(str(path), f"study = {content['study']!r}", advice)

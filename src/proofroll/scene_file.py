@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import math
 import operator
-import tomllib
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
@@ -16,6 +15,7 @@ from proofroll.errors import InputError
 from proofroll.folders import data_folder
 from proofroll.scene import Ball, Contact, Gravity, InitialMotion, Scene
 from proofroll.surfaces import AnySurface
+from proofroll.toml_file import read_toml
 
 
 @dataclass(frozen=True)
@@ -155,12 +155,7 @@ def _names(asks: object) -> list[str]:
 
 
 def _parse(path: Path) -> SceneFile:
-    try:
-        content = tomllib.loads(path.read_text(encoding="utf-8"))
-    except (tomllib.TOMLDecodeError, UnicodeDecodeError) as error:
-        raise InputError(str(path), "TOML", f"the file is broken: {error}") from None
-    except OSError as error:
-        raise InputError(str(path), "TOML", f"the file cannot be read: {error.strerror}") from None
+    content = read_toml(path)
     file = _validated(SceneFile, content, str(path))
     for name, parameter in file.parameters.items():
         for key in ("value", "above", "at_least", "below", "at_most"):

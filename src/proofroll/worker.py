@@ -42,10 +42,12 @@ _FOUNDATION = (
     "mechanics.py",
     "motion.py",
     "recording.py",
+    "resting.py",
     "rolling_equations.py",
     "scene.py",
     "scene_file.py",
     "surfaces.py",
+    "toml_file.py",
     "trajectory.py",
     "worker.py",
 )

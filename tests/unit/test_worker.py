@@ -6,6 +6,7 @@ import contextlib
 import dataclasses
 import json
 import os
+import re
 import signal
 import subprocess
 import sys
@@ -16,6 +17,8 @@ from pathlib import Path
 import pytest
 from hostile import ENTRY_POINTS
 
+import proofroll
+from proofroll import worker as worker_module
 from proofroll.case import Case
 
 # A process between the test and the worker, in the middle of a case that hangs.
@@ -74,3 +77,28 @@ def test_a_worker_ends_with_its_parent(
         if worker:
             with contextlib.suppress(ProcessLookupError):
                 os.kill(worker, signal.SIGKILL)
+
+
+# Modules that foundation modules import and on which no number of a result hangs: errors, files and the process itself.
+NO_NUMBERS = {"__init__.py", "errors.py", "files.py", "folders.py", "memory.py", "registry.py"}
+
+
+def test_whatever_a_result_rests_on_decides_its_key() -> None:
+    """What the foundation, our engines and the truth import is in the digest by which stored results are found."""
+    root = Path(proofroll.__file__).parent
+    foundation = set(worker_module._FOUNDATION)
+    rest = [root / name for name in foundation - {"worker.py"}]  # the worker also serves benchmarks and reproducers
+    resting = [*rest, *(root / "engines").rglob("*.py"), *(root / "truth").rglob("*.py")]
+    missing: dict[str, str] = {}
+    for file in resting:
+        if file.name == "reproducer.py":
+            continue  # a program for a bug report, not a result
+        for module in re.findall(
+            r"^\s*from (proofroll(?:\.\w+)*) import", file.read_text(encoding="utf-8"), re.MULTILINE
+        ):
+            path = root.joinpath(*module.split(".")[1:]).with_suffix(".py")
+            name = str(path.relative_to(root)) if path.is_file() else "__init__.py"
+            # An adapter's package, and the truth's, is in the digest as a whole.
+            if name not in foundation | NO_NUMBERS and not name.startswith(("engines/", "truth/")):
+                missing.setdefault(name, file.name)
+    assert missing == {}

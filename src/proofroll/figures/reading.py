@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import re
-import tomllib
 from decimal import Decimal, InvalidOperation
 from pathlib import Path
 from typing import Any
@@ -17,6 +16,7 @@ from proofroll.figures.quantities import known
 from proofroll.folders import data_folder
 from proofroll.recording import time_grid
 from proofroll.scene_file import first_problem, load_scene
+from proofroll.toml_file import read_toml, study_files
 
 STUDY = "figures"
 
@@ -34,29 +34,15 @@ def load_figures(name: str) -> Figures:
     places = (Path(name), folder / f"{name}.toml", folder / name)
     path = next((place for place in places if place.is_file()), None)
     if path is None:
-        ours = {item: found for item in sorted(folder.glob("*.toml")) if (found := _of_figures(item)) is not None}
+        ours = {item: found.get("scene") for item, found in study_files(STUDY)}
         path = next((item for item, scene in ours.items() if scene == name), None)
         if path is None:
             advice = f"there are no such figures; choose one of {', '.join(item.stem for item in ours)} or a file"
             raise InputError("figures", name, advice)
-    try:
-        content = tomllib.loads(path.read_text(encoding="utf-8"))
-    except (tomllib.TOMLDecodeError, UnicodeDecodeError) as error:
-        raise InputError(str(path), "TOML", f"the file is broken: {error}") from None
-    except OSError as error:
-        raise InputError(str(path), "TOML", f"the file cannot be read: {error.strerror}") from None
+    content = read_toml(path)
     if content.get("study") != STUDY:
         raise InputError(str(path), "study", f'only a file with study = "{STUDY}" defines figures')
     return _read(path, content)
-
-
-def _of_figures(path: Path) -> str | None:
-    """The scene of a file of figures; None: it is another file, or a broken one."""
-    try:
-        content = tomllib.loads(path.read_text(encoding="utf-8"))
-    except (OSError, ValueError):
-        return None
-    return str(content.get("scene")) if content.get("study") == STUDY else None
 
 
 def _read(path: Path, content: dict[str, Any]) -> Figures:

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import tomllib
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 from pathlib import Path
@@ -13,11 +12,11 @@ from pydantic import ConfigDict, TypeAdapter, ValidationError
 from proofroll.comparison import Tolerance
 from proofroll.engine import Level
 from proofroll.errors import InputError
-from proofroll.folders import data_folder
 from proofroll.metrics import units
 from proofroll.scene_file import first_problem, load_scene
 from proofroll.studies.recommend import Wish, fits, recommend
 from proofroll.studies.sweep import Question
+from proofroll.toml_file import read_toml, study_files
 
 STUDY = "tradeoff"
 
@@ -87,14 +86,8 @@ class TradeoffClaims:
 
 def claims_for(scene: str) -> TradeoffClaims | None:
     """The claims about a scene as its file has them, or None if there is no file."""
-    for path in sorted(data_folder("comparisons").glob("*.toml")):
-        try:
-            content = tomllib.loads(path.read_text(encoding="utf-8"))
-        except (OSError, ValueError):
-            continue  # whoever asks for that file is told what is wrong with it
-        if content.get("study") == STUDY and content.get("scene") == scene:
-            return _claims(path, content)
-    return None
+    found = (_claims(path, content) for path, content in study_files(STUDY) if content.get("scene") == scene)
+    return next(found, None)
 
 
 def load_claims(path: Path) -> TradeoffClaims:
@@ -103,12 +96,7 @@ def load_claims(path: Path) -> TradeoffClaims:
     Raises:
         InputError: it is broken, or is about something else.
     """
-    try:
-        content = tomllib.loads(path.read_text(encoding="utf-8"))
-    except (tomllib.TOMLDecodeError, UnicodeDecodeError) as error:
-        raise InputError(str(path), "TOML", f"the file is broken: {error}") from None
-    except OSError as error:
-        raise InputError(str(path), "TOML", f"the file cannot be read: {error.strerror}") from None
+    content = read_toml(path)
     if content.get("study") != STUDY:
         raise InputError(str(path), "study", f'only a file with study = "{STUDY}" is about a trade-off')
     return _claims(path, content)

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import tomllib
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
@@ -11,12 +10,12 @@ from typing import Any, Literal
 from pydantic import ConfigDict, TypeAdapter, ValidationError
 
 from proofroll.errors import InputError
-from proofroll.folders import data_folder
 from proofroll.registry import parse_engine
 from proofroll.scene_file import first_problem, load_scene
 from proofroll.studies.axes import Axis, Term
 from proofroll.studies.failure import Failure
 from proofroll.studies.numbers import MEANINGS
+from proofroll.toml_file import read_toml, study_files
 
 STUDY = "stability"
 
@@ -123,9 +122,8 @@ def file_for(scene: str) -> StabilityFile:
     """
     if scene.endswith(".toml"):
         return _load(Path(scene))
-    for path in sorted(data_folder("comparisons").glob("*.toml")):
-        content = tomllib.loads(path.read_text(encoding="utf-8"))
-        if content.get("study") == STUDY and content.get("scene") == scene:
+    for path, content in study_files(STUDY):
+        if content.get("scene") == scene:
             return _load(path)
     load_scene(scene)
     advice = f'no file under comparisons/ has study = "{STUDY}" and this scene; write one, or give the path of yours'
@@ -134,12 +132,7 @@ def file_for(scene: str) -> StabilityFile:
 
 def _load(path: Path) -> StabilityFile:
     where = path.name
-    try:
-        content = tomllib.loads(path.read_text(encoding="utf-8"))
-    except (tomllib.TOMLDecodeError, UnicodeDecodeError) as error:
-        raise InputError(str(path), "TOML", f"the file is broken: {error}") from None
-    except OSError as error:
-        raise InputError(str(path), "TOML", f"the file cannot be read: {error.strerror}") from None
+    content = read_toml(path)
     if content.pop("study", None) != STUDY:
         raise InputError(str(path), "study", f'only a file with study = "{STUDY}" asks for a stability map')
     try:
