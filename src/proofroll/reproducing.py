@@ -98,6 +98,25 @@ def gap(p):
     )
 
 
+def normal_rate_source(body: RollingBall) -> str:
+    """Function ``normal_rate(p, v)``: rate of e1 [1/s] at a ball at p [m] that moves with v [m/s]; needs ``frame``."""
+    if all(generator.kind == "translation" for generator in body.surface.generators or ()):
+        return '''
+
+def normal_rate(p, v):
+    """Rate of e1: the wall is flat."""
+    return np.zeros(3)
+'''
+    return '''
+
+def normal_rate(p, v):
+    """Rate of e1 at a ball at p that moves with v: it turns with the ball about AXIS."""
+    radial = p - np.dot(p, AXIS) * np.array(AXIS)
+    turning = np.dot(np.cross(AXIS, radial), v) / np.dot(radial, radial)
+    return turning * np.cross(AXIS, frame(p)[0])
+'''
+
+
 def ball_numbers(body: RollingBall) -> dict[str, float | FloatArray]:
     """The numbers of the ball, by the names that programs use."""
     return {

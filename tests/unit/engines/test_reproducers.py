@@ -13,17 +13,33 @@ from proofroll.registry import load_engine, resolve_settings
 from proofroll.scene_file import load_scene
 
 CYLINDER, PLANE = "sphere_in_cylinder", "inclined_plane"
-PROGRAMS = [
-    ("mujoco", "free", "default"),
-    ("mujoco", "free", "matched"),
-    ("mujoco", "chart", "matched"),
-    ("exudyn", "generic", "matched"),
-    ("exudyn", "carrier", "default"),
-    ("exudyn", "rolling_disc", "matched"),
-    ("exudyn", "contact", "matched"),
-    ("pinocchio", "free_flyer", "default"),
-    ("pinocchio", "contact", "default"),
-    ("pinocchio", "contact", "matched"),
+RESISTED, SLIPPING = {"rolling_resistance": 1e-3}, {"mu_static": 0.05}
+# Engine, settings and parameters of the scene.
+PROGRAMS: list[tuple[str, str, dict[str, Any], dict[str, float]]] = [
+    ("mujoco", "free", {"preset": "default"}, {}),
+    ("mujoco", "free", {"preset": "matched"}, {}),
+    ("mujoco", "chart", {"preset": "matched"}, {}),
+    ("exudyn", "generic", {"preset": "matched"}, {}),
+    ("exudyn", "carrier", {"preset": "default"}, {}),
+    ("exudyn", "rolling_disc", {"preset": "matched"}, {}),
+    ("exudyn", "contact", {"preset": "matched"}, {}),
+    *(
+        ("pinocchio", formulation, settings, parameters)
+        for formulation in ("composite", "free_flyer")
+        for settings in (
+            {"preset": "default"},
+            {"preset": "default", "integrator": "rk4_dexpinv", "orientation": False, "projection": True},
+            {"preset": "default", "integrator": "semi_implicit_euler"},
+            {"preset": "tuned", "rtol": 1e-5},
+            {"preset": "tuned", "rtol": 1e-5, "orientation": True, "projection": False},
+        )
+        for parameters in ({}, RESISTED)
+    ),
+    *(
+        ("pinocchio", "contact", {"preset": preset}, parameters)
+        for preset in ("default", "matched")
+        for parameters in ({}, RESISTED, SLIPPING, SLIPPING | {"mu_kinetic": 0.04})
+    ),
 ]
 
 
@@ -40,16 +56,23 @@ def program(engine: str, settings: Any, scene: Any) -> dict[str, Any]:
     return found
 
 
+def name_of(value: Any) -> str:
+    """A short name of a test's parameter."""
+    return ",".join(f"{key}={item}" for key, item in value.items()) if isinstance(value, dict) else str(value)
+
+
 @pytest.mark.parametrize("scene", [CYLINDER, PLANE])
-@pytest.mark.parametrize(("engine", "formulation", "preset"), PROGRAMS)
-def test_the_same_motion(scene: str, engine: str, formulation: str, preset: str) -> None:
+@pytest.mark.parametrize(("engine", "formulation", "options", "parameters"), PROGRAMS, ids=name_of)
+def test_the_same_motion(
+    scene: str, engine: str, formulation: str, options: dict[str, Any], parameters: dict[str, float]
+) -> None:
     """Centre, velocity and angular velocity are those of the adapter, and the wall is the scene's."""
     kind = kind_of(engine)
     assert isinstance(kind, Reproduces)
-    settings = resolve_settings(kind, {"formulation": formulation, "preset": preset})
-    loaded = load_scene(scene)
+    settings = resolve_settings(kind, {"formulation": formulation, **options})
+    loaded = load_scene(scene, **parameters)
     made = program(engine, settings, loaded)
-    times = [10 * step * settings.dt for step in range(6)]
+    times = [10 * step * (settings.dt or 1e-3) for step in range(6)]
     states = list(made["run"](times))
     adapter, surface = kind.build(loaded, settings), loaded.rolling.surface
     for t, state in zip(times, states, strict=True):
@@ -69,8 +92,7 @@ def test_the_same_motion(scene: str, engine: str, formulation: str, preset: str)
         ("mujoco", {"formulation": "chart"}, {"rolling_resistance": 5e-4}, "no rolling resistance"),
         ("exudyn", {"formulation": "generic"}, {"mu_static": 0.3}, "no bounded friction"),
         ("exudyn", {"formulation": "contact"}, {"rolling_resistance": 5e-4}, "no rolling resistance"),
-        ("pinocchio", {"formulation": "free_flyer"}, {}, "scipy's"),
-        ("pinocchio", {"formulation": "composite", "preset": "default"}, {}, "no program"),
+        ("pinocchio", {"formulation": "composite"}, {"mu_static": 0.3}, "proofroll's"),
     ],
 )
 def test_what_has_no_program(engine: str, options: dict[str, str], parameters: dict[str, float], words: str) -> None:

@@ -76,21 +76,15 @@ class Pinocchio:
     @classmethod
     def build(cls, scene: Scene, settings: PinocchioSettings) -> Self:
         """See :class:`proofroll.engine.Engine`."""
-        if settings.formulation == "contact":
-            return cls(ContactRun(scene.rolling, settings))
-        asked = Capability.ORIENTATION in scene.requires
-        if asked and settings.orientation is False:
-            raise Refused(f"needs {Capability.ORIENTATION}, which orientation=false leaves out")
-        if settings.orientation is None:
-            settings = dataclasses.replace(settings, orientation=asked)
-        return cls(RowsRun(scene.rolling, settings))
+        settings = _decided(scene, settings)
+        return cls((ContactRun if settings.formulation == "contact" else RowsRun)(scene.rolling, settings))
 
     @classmethod
     def reproducer(cls, scene: Scene, settings: PinocchioSettings) -> str:
         """See :class:`proofroll.engine.Reproduces`."""
         from proofroll.engines.pinocchio.reproducer import source
 
-        return source(scene.rolling, settings)
+        return source(scene.rolling, _decided(scene, settings))
 
     def advance(self, t: float) -> None:
         """See :class:`proofroll.engine.Engine`."""
@@ -108,3 +102,17 @@ class Pinocchio:
     def built(self) -> Built:
         """See :class:`proofroll.engine.Engine`."""
         return self._run.built()
+
+
+def _decided(scene: Scene, settings: PinocchioSettings) -> PinocchioSettings:
+    """The settings with the orientation as the scene asks for it, where they leave that open.
+
+    Raises:
+        Refused: the scene asks for the orientation, and the settings leave it out.
+    """
+    if settings.formulation == "contact":
+        return settings
+    asked = Capability.ORIENTATION in scene.requires
+    if asked and settings.orientation is False:
+        raise Refused(f"needs {Capability.ORIENTATION}, which orientation=false leaves out")
+    return dataclasses.replace(settings, orientation=asked) if settings.orientation is None else settings

@@ -157,19 +157,20 @@ class ContactRun:
         shift = np.array(self._shift(place, v_WB, velocity.angular.tolist(), triad))
 
         f, torque, normal_force = self._f, self._no_torque, self._normal_force
-        velocity_now = v_WB
-        for _ in range(_REPEATS):
+        velocity_now, centred = v_WB, self._leapfrog and self._started
+        for number in range(_REPEATS):
             if f:
                 torque = self._resistance(triad, back, velocity_now, normal_force)
             free = v + span * pin.aba(model, data, q, v, torque)
             impulse, status = self._solve(delassus, jacobian.dot(free) + shift)
             after = free + to_joints.dot(impulse)
             found = float(impulse[2]) / span
-            if not f or abs(found - normal_force) <= _SETTLED * abs(found):
+            # On a plane N is right at once, but the direction of the resistance is not yet.
+            if not f or (abs(found - normal_force) <= _SETTLED * abs(found) and (number or not centred)):
                 break
             normal_force = found
             # the resistance is that at the present time, which with leapfrog is the middle of the kick
-            if self._leapfrog and self._started:
+            if centred:
                 velocity_now = (0.5 * (v + after)[:3]).tolist()
         self._normal_force = found  # only where the next repetition starts
         if status == "liftoff" and not self._pressed:

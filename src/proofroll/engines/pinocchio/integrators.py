@@ -140,8 +140,8 @@ class RungeKutta4(FixedStep):
 
 # A step shorter than this part of the time in which the ball turns by a radian, this many times in a row, leads
 # nowhere: ordinary steps are a hundred times longer, and one jump of the forces is passed in a few dozen.
-_SHORT = 1e-4
-_PATIENCE = 500
+SHORT = 1e-4
+PATIENCE = 500
 # Numbers of the ball's orientation in a configuration.
 _QUATERNION = 4
 
@@ -237,13 +237,13 @@ class Adaptive:
             raise Diverged(f"the motion could not be integrated past {solver.t:g} s: {message}")
         if solver.t == solver.t_bound:  # the step may have been shortened to end there; the next must not inherit that
             solver.h_abs = max(wanted, solver.h_abs)
-        longest = _SHORT * self._turning_time
+        longest = SHORT * self._turning_time
         is_short = solver.step_size < longest
         if is_short:
             faster = float(np.max(np.abs(solver.y[self._places :]) / self._mechanism.v_scale))
             is_short = solver.step_size * max(1.0, faster) < longest
         self._short_steps = self._short_steps + 1 if is_short else 0
-        if self._short_steps > _PATIENCE:
+        if self._short_steps > PATIENCE:
             raise Diverged(
                 f"the steps became too short at {solver.t:g} s: the forces jump there, as rolling resistance "
                 "does when the ball comes to rest"

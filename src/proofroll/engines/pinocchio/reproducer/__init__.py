@@ -1,0 +1,50 @@
+"""Writes the program that shows what Pinocchio does with a ball on a wall, without proofroll.
+
+A program is put together from the text of a formulation (:mod:`contact`, :mod:`composite`, :mod:`free_flyer`) and, for
+the last two, of an integrator (:mod:`stepping`); numbers come from the adapter's own model.
+"""
+
+from __future__ import annotations
+
+import math
+
+from proofroll.engines.pinocchio.reproducer import composite, contact, free_flyer, stepping
+from proofroll.engines.pinocchio.rows_run import RowsRun
+from proofroll.engines.pinocchio.settings import PinocchioSettings
+from proofroll.errors import Refused
+from proofroll.reproducing import assigned, ball_numbers, normal_rate_source, wall_source
+from proofroll.scene import RollingBall
+
+
+def source(body: RollingBall, settings: PinocchioSettings) -> str:
+    """See :class:`proofroll.engine.Reproduces`.
+
+    Args:
+        body: the scene's.
+        settings: of the adapter; they say whether the orientation is integrated, no longer the scene.
+
+    Raises:
+        Refused: the scene or the settings have something that the program has not.
+    """
+    if settings.formulation == "contact":
+        numbers, parts = contact.numbers(body, settings), [contact.SOURCE]
+        imports = "import numpy as np\nimport pinocchio as pin\n\n"
+    else:
+        if math.isfinite(body.contact.mu_static):
+            raise Refused("the loop that switches between sticking and slipping around Pinocchio's terms is proofroll's")
+        mechanism = RowsRun(body, settings).mechanism
+        formulation = composite if settings.formulation == "composite" else free_flyer
+        numbers = stepping.numbers(mechanism, settings) + formulation.numbers(body)
+        parts = [formulation.SOURCE, stepping.source(settings)]
+        imports = "import numpy as np\nimport pinocchio as pin\n"
+        imports += ("from scipy.integrate import DOP853\n" if settings.integrator == "dop853" else "") + "\n"
+    return "".join(
+        [
+            imports,
+            assigned(**ball_numbers(body), LEVER=body.contact.rolling_resistance),
+            numbers,
+            wall_source(body),
+            normal_rate_source(body),
+            *parts,
+        ]
+    )

@@ -1,0 +1,132 @@
+"""Text of the integrators of the formulations with rows: fixed steps, or scipy's DOP853."""
+
+from __future__ import annotations
+
+from proofroll.engines.pinocchio.integrators import PATIENCE, SHORT
+from proofroll.engines.pinocchio.mechanism import Mechanism
+from proofroll.engines.pinocchio.settings import PinocchioSettings
+from proofroll.reproducing import assigned
+
+_FIXED = '''
+MOVING = np.array([1.0] * (model.nv - 3) + [float(ORIENTATION)] * 3)  # what moves the configuration
+
+
+def pressed(q, v):
+    """Acceleration with which a step starts, if the wall presses."""
+    result = acceleration(q, v)
+    if normal_force() < -FAINT:
+        raise RuntimeError("the wall would have to pull the ball")
+    return result
+
+
+def rate(q, displacement, v):
+    """Of the displacement of a configuration from q."""
+    if INTEGRATOR == "rk4":
+        return MOVING * v
+    return np.linalg.solve(pin.dIntegrate(model, q, displacement, pin.ARG1), MOVING * v)
+
+
+def step(q, v, start, h):
+    """One step from the acceleration at its start."""
+    if INTEGRATOR == "semi_implicit_euler":
+        v = v + h * start
+        return pin.integrate(model, q, h * MOVING * v), v
+    rates, accelerations = [MOVING * v], [start]
+    for reach in (h / 2, h / 2, h):
+        displacement, stage_v = reach * rates[-1], v + reach * accelerations[-1]
+        rates.append(rate(q, displacement, stage_v))
+        accelerations.append(acceleration(pin.integrate(model, q, displacement), stage_v))
+    weights = (1, 2, 2, 1)
+    q = pin.integrate(model, q, h / 6 * sum(k * x for k, x in zip(weights, rates)))
+    return q, v + h / 6 * sum(k * x for k, x in zip(weights, accelerations))
+
+
+def states(times):
+    """Configuration and velocity at each time."""
+    q, v, done = np.array(START_Q), np.array(START_V), 0
+    start = None
+    for t in times:
+        while done < round(t / STEP_SIZE):
+            q, v = step(q, v, pressed(q, v) if start is None else start, STEP_SIZE)
+            if PROJECTION:
+                q, v = project(q, v)
+            start, done = pressed(q, v), done + 1
+        yield q, v
+'''
+
+_ADAPTIVE = '''
+PLACES = model.nq if ORIENTATION else model.nq - 4  # without the orientation no more than the place is integrated
+
+
+def split(y):
+    """Configuration and velocity."""
+    q = np.array(START_Q)
+    q[:PLACES] = y[:PLACES]
+    return (pin.normalize(model, q) if ORIENTATION else q), y[PLACES:]
+
+
+def derivative(t, y):
+    """Of configuration and velocity together, the quaternion by its rate."""
+    q, v = split(y)
+    moved = pin.tangentMap(model, q) @ v if ORIENTATION else v[:PLACES]
+    return np.concatenate([moved, acceleration(q, v)])
+
+
+def states(times):
+    """Configuration and velocity at each time; a step ends at each."""
+    start = np.concatenate([START_Q[:PLACES], START_V])
+    atol = 1e-2 * RTOL * np.concatenate([Q_SCALE[:PLACES], V_SCALE])
+    solver, short = DOP853(derivative, 0.0, start, np.inf, rtol=RTOL, atol=atol), 0
+    longest = SHORT * Q_SCALE[0] / V_SCALE[0]
+    for t in times:
+        solver.t_bound, solver.status = t, "running" if t > solver.t else "finished"
+        while solver.status == "running":
+            wanted, message = solver.h_abs, solver.step()
+            if message is not None:
+                raise RuntimeError(f"no step is small enough past {solver.t:g} s: {message}")
+            if solver.t == t:  # a step cut short at a sample says nothing about the next
+                solver.h_abs = max(wanted, solver.h_abs)
+            faster = max(1.0, float(np.max(np.abs(solver.y[PLACES:]) / V_SCALE)))
+            short = short + 1 if solver.step_size * faster < longest else 0
+            if short > PATIENCE:
+                raise RuntimeError(f"the steps became too short at {solver.t:g} s: the forces jump there")
+            if PROJECTION:
+                q, v = project(*split(solver.y))
+                solver.y = np.concatenate([q[:PLACES], v])
+                solver.f = derivative(solver.t, solver.y)
+            if normal_force() < -FAINT:
+                raise RuntimeError("the wall would have to pull the ball")
+        yield split(solver.y)
+'''
+
+_RUN = '''
+
+def run(times):
+    """Centre, velocity and angular velocity of the ball in the world at each time."""
+    look = model.createData()
+    try:
+        for q, v in states(times):
+            pin.forwardKinematics(model, look, q, v)
+            velocity = pin.getVelocity(model, look, ball, pin.LOCAL_WORLD_ALIGNED)
+            yield look.oMi[ball].translation.copy(), velocity.linear.copy(), velocity.angular.copy()
+    except np.linalg.LinAlgError as error:
+        raise RuntimeError(f"the equations became singular ({error})") from None
+'''
+
+
+def source(settings: PinocchioSettings) -> str:
+    """``states(times)`` and ``run(times)`` for what a formulation defines."""
+    return (_ADAPTIVE if settings.integrator == "dop853" else _FIXED) + _RUN
+
+
+def numbers(mechanism: Mechanism, settings: PinocchioSettings) -> str:
+    """Assignments: the start, and how it is integrated."""
+    values = {"START_Q": mechanism.q0, "START_V": mechanism.v0, "FAINT": mechanism.faint}
+    lines = f"ORIENTATION = {bool(settings.orientation)}\nPROJECTION = {settings.projection}\n"
+    if settings.integrator == "dop853":
+        values |= {"Q_SCALE": mechanism.q_scale, "V_SCALE": mechanism.v_scale}
+        values |= {"RTOL": float(settings.rtol or 0.0), "SHORT": SHORT, "PATIENCE": PATIENCE}
+    else:
+        values["STEP_SIZE"] = float(settings.dt or 0.0)
+        lines += f"INTEGRATOR = {settings.integrator!r}\n"
+    return assigned(**values) + lines
