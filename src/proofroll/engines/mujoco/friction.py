@@ -21,7 +21,7 @@ MEMORY = 18
 # MuJoCo's solver projects a force onto the cone, so one that slips is there to round-off.
 _ON_CONE = 1 - 1e-9
 # The correction vanishes with the slip, so it may begin a little before; then the stages of RK4 agree about it.
-_NEAR_CONE = 1 - 1e-3
+NEAR_CONE = 1 - 1e-3
 _INTEGRATE: Mapping[str, Callable[[Any, Any], None]] = {
     "Euler": mujoco.mj_Euler,
     "RK4": lambda model, data: mujoco.mj_RungeKutta(model, data, 4),
@@ -210,7 +210,7 @@ class BoundedFriction:
         """Whether the friction of the evaluation before was near its bound, by its torque: that needs no frame."""
         t1, t2, t3 = data.qfrc_constraint[self._spin].tolist()
         lever = self._radius + 0.5 * float(data.efc_pos[0])  # MuJoCo's contact point lies midway in the depth
-        return math.hypot(t1, t2, t3) >= _NEAR_CONE * self._mu * N * lever
+        return math.hypot(t1, t2, t3) >= NEAR_CONE * self._mu * N * lever
 
     def _event(self, step: int, kind: EventKind | None = None) -> Event:
         low, high = max(step - 1, 0) * self._dt, step * self._dt
