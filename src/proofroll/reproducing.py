@@ -5,7 +5,6 @@ An engine may offer :meth:`proofroll.engine.Reproduces.reproducer`; what it writ
 
 from __future__ import annotations
 
-import math
 from typing import Any
 
 import numpy as np
@@ -25,25 +24,6 @@ def literal(value: Any) -> str:
 def assigned(**values: Any) -> str:
     """One line ``NAME = value`` for each."""
     return "".join(f"{name} = {literal(value)}\n" for name, value in values.items())
-
-
-def refuse_terms(body: RollingBall, *, friction: bool) -> None:
-    """Says which part of a scene the programs do not have.
-
-    Args:
-        body: the scene's.
-        friction: whether they have bounded friction, with one coefficient.
-
-    Raises:
-        Refused: it has such a part.
-    """
-    if body.contact.rolling_resistance:
-        raise Refused("the program for this formulation has no rolling resistance")
-    bounded = math.isfinite(body.contact.mu_static)
-    if bounded and not friction:
-        raise Refused("the program for this formulation has no bounded friction")
-    if bounded and body.contact.mu_static != body.contact.mu_kinetic:
-        raise Refused("the program for this formulation has one coefficient of friction")
 
 
 def wall_source(body: RollingBall) -> str:

@@ -163,11 +163,15 @@ def _truth_version() -> str:
 
 
 def _digest(sources: list[Path]) -> str:
-    """Hash of the adapter's files and of the modules that every result rests on."""
+    """Hash of the adapter's files and of the modules that every result rests on.
+
+    A module or folder ``reproducer`` of an adapter is left out: it writes bug reports, on which no result hangs.
+    """
     root = Path(proofroll.__file__).parent
     files = [root / name for name in _FOUNDATION if (root / name).is_file()]
     for source in sources:
-        files += sorted(source.rglob("*.py")) if source.is_dir() else [source]
+        found = sorted(source.rglob("*.py")) if source.is_dir() else [source]
+        files += [file for file in found if "reproducer" not in file.relative_to(source).with_suffix("").parts]
     content = hashlib.sha256()
     for file in files:
         content.update(file.read_bytes())
@@ -331,7 +335,7 @@ def reproduce(case: dict[str, Any]) -> dict[str, Any]:
     if not isinstance(kind, Reproduces):
         return {
             "program": None,
-            "message": f"{wanted.engine.name} offers no program of its own; proofroll run shows the case",
+            "message": f"{wanted.engine.name} offers no program of its own",
         }
     try:
         settings = resolve_settings(kind, wanted.engine.settings)

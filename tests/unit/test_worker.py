@@ -91,7 +91,7 @@ def test_whatever_a_result_rests_on_decides_its_key() -> None:
     resting = [*rest, *(root / "engines").rglob("*.py"), *(root / "truth").rglob("*.py")]
     missing: dict[str, str] = {}
     for file in resting:
-        if file.name == "reproducer.py":
+        if "reproducer" in file.with_suffix("").parts:
             continue  # a program for a bug report, not a result
         for module in re.findall(
             r"^\s*from (proofroll(?:\.\w+)*) import", file.read_text(encoding="utf-8"), re.MULTILINE
@@ -102,3 +102,16 @@ def test_whatever_a_result_rests_on_decides_its_key() -> None:
             if name not in foundation | NO_NUMBERS and not name.startswith(("engines/", "truth/")):
                 missing.setdefault(name, file.name)
     assert missing == {}
+
+
+def test_a_program_for_a_bug_report_outdates_no_result(tmp_path: Path) -> None:
+    """An adapter's digest changes with its code, but not with that which only writes reproducers."""
+    package = tmp_path / "adapter"
+    (package / "reproducer").mkdir(parents=True)
+    (package / "adapter.py").write_text("x = 1")
+    before = worker_module._digest([package])
+    (package / "reproducer" / "text.py").write_text("y = 1")
+    (package / "reproducer.py").write_text("y = 1")
+    assert worker_module._digest([package]) == before
+    (package / "adapter.py").write_text("x = 2")
+    assert worker_module._digest([package]) != before

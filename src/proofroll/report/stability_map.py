@@ -21,6 +21,7 @@ LETTERS = {
     "left the surface": "l",
     "sank in": "s",
     "creep": "c",
+    "reversed": "v",
     "lost phase": "p",
     "solver gave up": "g",
     "crashed": "x",

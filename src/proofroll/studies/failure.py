@@ -27,6 +27,9 @@ OFF_SURFACE = 0.1
 # Part of the largest kinetic energy by which the energy may grow. Nothing in a scene drives the ball, so all of it is
 # the engine's; runs that hold 1 % of the path stay far below.
 GAIN = 0.1
+# Part of the initial speed with which a ball may move against the way that it last had, where rolling resistance has
+# to bring it to rest: a fixed step that ends beyond rest leaves the ball some speed, which is no motion yet.
+BACKWARDS = 0.01
 # A path is wrong because of slip where the way slipped while rolling makes up this part of the error or more.
 SLIPPED = 0.5
 
@@ -39,6 +42,7 @@ class Failure(StrEnum):
     LEFT = "left the surface"
     SANK = "sank in"
     CREEP = "creep"
+    REVERSED = "reversed"
     LOST_PHASE = "lost phase"
     GAVE_UP = "solver gave up"
     CRASHED = "crashed"
@@ -52,6 +56,7 @@ MEANINGS = {
     Failure.LEFT: f"the ball came off the wall by more than {OFF_SURFACE:.0%} of its radius",
     Failure.SANK: f"the ball sank into the wall by more than {OFF_SURFACE:.0%} of its radius",
     Failure.CREEP: f"the ball slipped while it should roll, which makes {SLIPPED:.0%} of the error or more",
+    Failure.REVERSED: f"rolling resistance drove the ball back, by more than {BACKWARDS:.0%} of the initial speed",
     Failure.LOST_PHASE: "bounded, on the surface and without gain of energy, but wrong",
     Failure.GAVE_UP: "the engine stopped and said why",
     Failure.CRASHED: "the engine's process ended",
@@ -96,6 +101,9 @@ class Yardstick:
         kinetic: largest kinetic energy [J].
         fastest: largest angular velocity [rad/s]; None where there is no truth.
         off_surface: allowed distance from the wall, and depth in it [m].
+        heading: direction of the true velocity, or of the last one where the ball rests, at each sample, shape (n, 3);
+            None where nothing resists rolling, or there is no truth.
+        rolls: where the true ball does not slip, at each sample; None where it never does, or there is no truth.
     """
 
     body: RollingBall
@@ -106,6 +114,8 @@ class Yardstick:
     kinetic: float
     fastest: float | None
     off_surface: float
+    heading: FloatArray | None = None
+    rolls: FloatArray | None = None
 
     @classmethod
     def of(cls, body: RollingBall, times: FloatArray, truth: xr.Dataset | None) -> Self:
@@ -114,7 +124,7 @@ class Yardstick:
         bend = float(np.linalg.norm(body.surface.normal_gradient(body.p0), 2))
         length = min(ball.radius, 1 / bend) if bend else ball.radius
         kinetic = 0.5 * ball.mass * float(body.v0 @ body.v0) + 0.5 * ball.inertia * float(body.w0 @ body.w0)
-        true, scale, fastest = None, 1.0, None
+        true, scale, fastest, heading, rolls = None, 1.0, None, None, None
         if truth is not None:
             true = truth[name].to_numpy()
             scale = float(np.ptp(true)) or 1.0
@@ -123,7 +133,17 @@ class Yardstick:
             kinetic = max(
                 kinetic, float(np.max(0.5 * ball.mass * (v**2).sum(-1) + 0.5 * ball.inertia * (w**2).sum(-1)))
             )
-        return cls(body, times, name, true, scale, kinetic, fastest, OFF_SURFACE * length)
+            heading = _heading(v) if body.contact.rolling_resistance > 0 else None
+            rolls = truth["sticking"].to_numpy() if "sticking" in truth else None
+        return cls(body, times, name, true, scale, kinetic, fastest, OFF_SURFACE * length, heading, rolls)
+
+
+def _heading(v: FloatArray) -> FloatArray:
+    """Directions of velocities, shape (n, 3); where one is below the threshold, that before it."""
+    speeds = np.linalg.norm(v, axis=-1)
+    moves = speeds > BACKWARDS * speeds[0]
+    last = np.maximum.accumulate(np.where(moves, np.arange(len(v)), 0))
+    return np.asarray(v[last] / np.where(speeds[last] > 0, speeds[last], 1.0)[:, None])
 
 
 def judge(result: Result, dataset: xr.Dataset | None, yardstick: Yardstick) -> Outcome:
@@ -181,6 +201,10 @@ def _first(dataset: xr.Dataset, yardstick: Yardstick, errors: FloatArray | None)
             Failure.SANK: gap < -yardstick.off_surface,
             Failure.ENERGY_GAIN: energy - energy[0] > GAIN * yardstick.kinetic,
         }
+    if yardstick.heading is not None:
+        v = dataset["v_WB"].to_numpy()
+        along = np.sum(v * yardstick.heading[: len(v)], axis=-1)
+        signs[Failure.REVERSED] = along < -BACKWARDS * float(np.linalg.norm(yardstick.body.v0))
     shown = {failure: int(np.argmax(sign)) for failure, sign in signs.items() if np.any(sign)}
     if errors is not None and np.any(errors > WRONG):
         index = int(np.argmax(errors > WRONG))

@@ -79,6 +79,7 @@ def _point(point: MapPoint) -> dict[str, Any]:
         "runs": len(point.results),
         "problem": place.problem,
         "reproducer": None,
+        "reproducer_needs": [],
         "reproducer_note": None,
     }
 

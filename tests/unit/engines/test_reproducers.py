@@ -24,10 +24,17 @@ PROGRAMS: list[tuple[str, str, dict[str, Any], dict[str, float]]] = [
     ),
     ("mujoco", "free", {"preset": "tuned"}, RESISTED | SLIPPING),
     ("mujoco", "facets", {"preset": "default"}, RESISTED),
-    ("exudyn", "generic", {"preset": "matched"}, {}),
-    ("exudyn", "carrier", {"preset": "default"}, {}),
-    ("exudyn", "rolling_disc", {"preset": "matched"}, {}),
-    ("exudyn", "contact", {"preset": "matched"}, {}),
+    *(
+        ("exudyn", formulation, {"preset": preset}, parameters)
+        for formulation, preset in (
+            ("generic", "matched"),
+            ("carrier", "default"),
+            ("rolling_disc", "matched"),
+            ("contact", "matched"),
+        )
+        for parameters in ({}, RESISTED)
+    ),
+    ("exudyn", "contact", {"preset": "matched"}, SLIPPING),
     *(
         ("pinocchio", formulation, settings, parameters)
         for formulation in ("composite", "free_flyer")
@@ -96,8 +103,7 @@ def test_the_same_motion(
     ("engine", "options", "parameters", "words"),
     [
         ("mujoco", {"formulation": "chart"}, {"mu_static": 0.3, "mu_kinetic": 0.2}, "one coefficient"),
-        ("exudyn", {"formulation": "generic"}, {"mu_static": 0.3}, "no bounded friction"),
-        ("exudyn", {"formulation": "contact"}, {"rolling_resistance": 5e-4}, "no rolling resistance"),
+        ("exudyn", {"formulation": "generic"}, {"mu_static": 0.3}, "proofroll's"),
         ("pinocchio", {"formulation": "composite"}, {"mu_static": 0.3}, "proofroll's"),
     ],
 )

@@ -118,3 +118,31 @@ def test_the_natural_time() -> None:
     assert natural_time(SCENE.rolling) == pytest.approx(2 * math.pi / (math.sqrt(2 / 7) * 20.0))
     plane = load_scene("inclined_plane").rolling
     assert natural_time(plane) >= 2 * math.pi * plane.ball.radius / float(np.linalg.norm(plane.v0)) * (1 - 1e-12)
+
+
+RESISTED = load_scene("inclined_plane", rolling_resistance=0.05, cross_speed=0.0)
+
+
+def rolling_down(after_rest: float) -> tuple[Any, Yardstick]:
+    """A ball that resistance brings to rest, and what it does then [m/s along its way]; with its yardstick."""
+    body = RESISTED.rolling
+    times = np.linspace(0.0, 1.0, 21)
+    speed = float(np.linalg.norm(body.v0))
+    along = body.v0 / speed
+
+    def path(after: float) -> Any:
+        slowing = np.maximum(speed * (1 - times / 0.5), 0.0) + np.where(times > 0.5, after, 0.0)
+        way = np.concatenate([[0.0], np.cumsum((slowing[1:] + slowing[:-1]) / 2 * np.diff(times))])
+        v = slowing[:, None] * along
+        w = -np.cross(body.surface.normal(body.p0), v) / body.ball.radius
+        return trajectory(RESISTED, times, body.p0 + way[:, None] * along, v, w)
+
+    return path(after_rest), Yardstick.of(body, times, path(0.0))
+
+
+@pytest.mark.parametrize(("after", "failure"), [(0.0, None), (-0.002, None), (-0.2, Failure.REVERSED)])
+def test_resistance_stops_a_ball_and_does_not_drive_it_back(after: float, failure: Failure | None) -> None:
+    """A ball that moves back where it should rest has been reversed; the little that a step goes too far has not."""
+    dataset, yardstick = rolling_down(after)
+    outcome = judge(DONE, dataset, yardstick)
+    assert (outcome.failure, outcome.stable, outcome.silent) == (failure, failure is None, failure is not None)

@@ -124,6 +124,23 @@ def test_a_program_shows_the_failure_without_us(programs: dict[str, dict[str, An
     assert ": shown" in run.stdout
 
 
+def test_what_is_ours_is_shown_through_proofroll(tmp_path: Path) -> None:
+    """Where an engine has no program of its own, the program asks proofroll, says why, and exits with 1."""
+    axis = Axis("V0", "m/s", "initial speed", [4.0], {"speed": Term()})
+    found = mapped(tmp_path, ["projection[formulation=euler,preset=default]"], [axis])
+    study = plain(content(found))
+    write_reproducers(found, study, tmp_path / "reproducers")
+    (point,) = study["points"]
+    assert point["reproducer_needs"] == ["numpy", "proofroll"]
+    assert "no program of its own" in point["reproducer_note"]
+    assert point["reproducer_note"] in Path(point["reproducer"]).read_text()
+    run = subprocess.run(
+        [sys.executable, point["reproducer"]], capture_output=True, text=True, timeout=120, check=False
+    )
+    assert run.returncode == 1, run.stdout + run.stderr
+    assert ": shown" in run.stdout
+
+
 def test_a_program_does_not_cry_wolf(programs: dict[str, dict[str, Any]]) -> None:
     """The same program with a far smaller step says that nothing is shown."""
     point = programs["exudyn"]

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from typing import Any
 
 import numpy as np
@@ -9,10 +10,12 @@ import numpy as np
 from proofroll.engines.exudyn.carrier import Carrier
 from proofroll.engines.exudyn.contact import SURELY, Contact
 from proofroll.engines.exudyn.generic import Generic
+from proofroll.engines.exudyn.local_frame import curvature
 from proofroll.engines.exudyn.native import exu
 from proofroll.engines.exudyn.rolling_disc import RollingDisc
 from proofroll.engines.exudyn.settings import ExudynSettings
-from proofroll.reproducing import assigned, ball_numbers, refuse_terms, wall_source
+from proofroll.errors import Refused
+from proofroll.reproducing import assigned, ball_numbers, wall_source
 from proofroll.scene import RollingBall
 
 _BALL = """
@@ -24,6 +27,23 @@ body = mbs.AddObject(items.ObjectRigidBody(mass=MASS, inertia=[INERTIA] * 3 + [0
 centre = mbs.AddMarker(items.MarkerBodyRigid(bodyNumber=body))
 weight = mbs.AddMarker(items.MarkerBodyMass(bodyNumber=body))
 mbs.AddLoad(items.LoadMassProportional(markerNumber=weight, loadVector=GRAVITY))
+"""
+
+_RESISTANCE = """
+
+def resistance(mbs, t, load):
+    \"\"\"Moment of rolling resistance: the normal force, which follows from the path, acts LEVER further on.\"\"\"
+    p = mbs.GetNodeOutput(node, exu.OutputVariableType.Position)
+    axes = frame(p)
+    along = axes[1:] @ mbs.GetNodeOutput(node, exu.OutputVariableType.Velocity)
+    N = MASS * (along @ np.array(CURVATURE) @ along + axes[0] @ np.array(GRAVITY))
+    speed = np.hypot(*along)
+    return (LEVER * N / speed * (np.array([-along[1], along[0]]) @ axes[1:])).tolist() if speed else [0.0] * 3
+
+
+mbs.AddLoad(items.LoadTorqueVector(
+    markerNumber=centre, loadVector=[LEVER, 0.0, 0.0], loadVectorUserFunction=resistance
+))
 """
 
 _CARRIER = """
@@ -124,6 +144,11 @@ def force(mbs, t, item, q, rates):
     result = list(WEIGHT)
     for row, i, j, factor in QUADRATIC:
         result[row] += factor * rates[i] * rates[j]
+    if LEVER:  # rolling resistance; along the distance nothing accelerates, so the force there is N
+        v2, v3 = (float(np.dot(row, rates[1:3])) for row in TANGENTS[1:])
+        moment = LEVER * result[0] / np.hypot(v2, v3) if v2 or v3 else 0.0
+        result[4] -= moment * v3
+        result[5] += moment * v2
     return result
 
 
@@ -227,9 +252,12 @@ def source(model: Any, body: RollingBall, settings: ExudynSettings) -> str:
     Raises:
         Refused: the scene has a term that the program has not.
     """
-    refuse_terms(body, friction=isinstance(model, Contact))
-    generic = isinstance(model, Generic)
+    generic, resists = isinstance(model, Generic), body.contact.rolling_resistance > 0
+    if generic and math.isfinite(body.contact.mu_static):
+        raise Refused("the loop that switches Exudyn's constraint of rolling off while the ball slips is proofroll's")
     numbers = ball_numbers(body) | ({} if generic else {"START_SPIN": _start_spin(model)})
+    numbers |= {"LEVER": body.contact.rolling_resistance}
+    numbers |= {"CURVATURE": curvature(body.surface, body.u0)} if resists and not generic else {}
     numbers |= {"STEP_SIZE": settings.dt, "NEWTON_TOLERANCE": settings.newton_tolerance}
     start = _start(model)
     lines = [
@@ -249,7 +277,7 @@ def source(model: Any, body: RollingBall, settings: ExudynSettings) -> str:
         + "\n"
         + wall_source(body)
         + "\nexu.config.printToConsole = False\nmbs = exu.SystemContainer().AddSystem()\n"
-        + ("" if generic else _BALL)
+        + ("" if generic else _BALL + (_RESISTANCE if resists else ""))
         + parts[type(model)]
         + _SOLVER
         + (_GENERIC_STATE if generic else _BALL_STATE)

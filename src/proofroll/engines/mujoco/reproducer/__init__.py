@@ -18,6 +18,7 @@ from proofroll.reproducing import assigned, ball_numbers, normal_rate_source, wa
 from proofroll.scene import RollingBall
 from proofroll.surfaces import FloatArray
 
+
 def source(xml: str, model: Any, data: Any, body: RollingBall, settings: MujocoSettings) -> str:
     """See :class:`proofroll.engine.Reproduces`.
 

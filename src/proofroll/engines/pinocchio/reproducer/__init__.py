@@ -31,7 +31,7 @@ def source(body: RollingBall, settings: PinocchioSettings) -> str:
         imports = "import numpy as np\nimport pinocchio as pin\n\n"
     else:
         if math.isfinite(body.contact.mu_static):
-            raise Refused("the loop that switches between sticking and slipping around Pinocchio's terms is proofroll's")
+            raise Refused("the loop that switches between stick and slip around Pinocchio's terms is proofroll's")
         mechanism = RowsRun(body, settings).mechanism
         formulation = composite if settings.formulation == "composite" else free_flyer
         numbers = stepping.numbers(mechanism, settings) + formulation.numbers(body)
