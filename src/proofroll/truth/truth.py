@@ -12,8 +12,8 @@ from proofroll.motion import Motion
 from proofroll.scene import Capability, Scene
 from proofroll.surfaces import FloatArray
 from proofroll.trajectory import trajectory
+from proofroll.truth import rolling, unreduced_taylor
 from proofroll.truth.error_bars import put_error_bars
-from proofroll.truth.rolling import reduced, unreduced
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -26,7 +26,8 @@ def truth(scene: Scene, times: FloatArray) -> xr.Dataset:
     """The true trajectory, each variable with the attribute ``error_bar`` in its own unit.
 
     The first route is the closed form where there is one, else the reduced equations; the second is the unreduced
-    Newton-Euler system, derived and integrated independently. The error bar of a variable is the largest difference
+    Newton-Euler system, derived and integrated independently (where heyoka is installed and nothing resists rolling, by
+    Taylor series, which ten thousand oscillations take a second). The error bar of a variable is the largest difference
     between the routes plus round-off.
 
     With bounded friction the routes are those of :mod:`proofroll.truth.stick_slip`, and the dataset also holds
@@ -42,8 +43,8 @@ def truth(scene: Scene, times: FloatArray) -> xr.Dataset:
         return with_events(*stick_slip(scene, times))
     body = scene.rolling
     times = np.asarray(times, dtype=np.float64)
-    first = closed_form(body, times) or reduced(body, times)
-    second = unreduced(body, times)
+    first = closed_form(body, times) or rolling.reduced(body, times)
+    second = (unreduced_taylor if unreduced_taylor.available(body) else rolling).unreduced(body, times)
     result, check = _dataset(scene, times, first), _dataset(scene, times, second)
     put_error_bars(result, check, _ROUND_OFF)
     result.attrs["route"] = first.route

@@ -1,0 +1,96 @@
+"""Newton's and Euler's equations in the world as compiled Taylor series (heyoka): the second route where it is long.
+
+The nine states (p, v, ω), their equations and their constraints are those of :func:`proofroll.truth.rolling.unreduced`;
+of the wall only the direction of its normal and how that turns are used. Differentiating e1·v = 0 and
+v + a ω × e1 = 0 leaves, with Newton's m (v̇ - g) = F and Euler's κ m a² ω̇ = a e1 × F,
+
+    e1·v̇ = -ė1·v,      (1 + κ) v̇ = g - κ a ω × ė1 along the wall,      κ a ω̇ = e1 × (v̇ - g).
+
+Nothing holds the state on the constraints, so that errors show.
+"""
+
+from __future__ import annotations
+
+import copy
+import threading
+from functools import cache
+from typing import Any
+
+import numpy as np
+
+from proofroll.compiled import library
+from proofroll.errors import Diverged
+from proofroll.mechanics import newton_euler
+from proofroll.motion import Motion
+from proofroll.scene import RollingBall
+from proofroll.surfaces import Cylinder, FloatArray, Plane
+
+_local = threading.local()
+
+
+def available(body: RollingBall) -> bool:
+    """Whether heyoka is installed, and has these equations: of a cylinder or plane that does not resist rolling."""
+    known = isinstance(body.surface, (Cylinder, Plane)) and not body.contact.rolling_resistance
+    return known and library.available()
+
+
+def unreduced(body: RollingBall, times: FloatArray) -> Motion:
+    """The motion at rising times [s].
+
+    Raises:
+        Diverged: the series could not be continued.
+    """
+    turns = isinstance(body.surface, Cylinder)
+    if not hasattr(_local, "integrators"):
+        _local.integrators = cache(_compiled)  # an integrator holds a state and must not be shared between threads
+    series = copy.copy(_local.integrators(turns))
+    e1 = body.surface.normal(body.p0)
+    geometry = np.zeros(4)
+    if turns:
+        axis = np.asarray(body.surface.generators[1].axis)
+        geometry = np.array([*axis, np.sign(e1 @ (body.p0 - (body.p0 @ axis) * axis))])
+    else:
+        geometry[:3] = e1
+    values = [body.ball.radius, body.ball.inertia_ratio, *body.gravity, *geometry]
+    series.pars[:] = values[: len(series.pars)]
+    series.time, series.state[:] = float(times[0]), np.concatenate([body.p0, body.v0, body.w0])
+    states = series.propagate_grid(np.asarray(times, dtype=np.float64))[-1] if len(times) > 1 else series.state[None, :]
+    if len(states) < len(times) or not np.all(np.isfinite(states)):
+        raise Diverged(f"the truth (Taylor series in the world) could not be integrated past {series.time:g} s")
+    p, v, w = (np.array(part) for part in (states[:, :3], states[:, 3:6], states[:, 6:]))
+    force = np.array([newton_euler(body, *x)[2] for x in zip(p, v, w, strict=True)])
+    return Motion(p, v, w, force, "unreduced Newton-Euler, Taylor series")
+
+
+def _compiled(turns: bool) -> Any:
+    """The integrator, on a cylinder if the normal ``turns``, else on a plane."""
+    import heyoka as hy
+
+    p, v, w = (hy.make_vars(*(f"{name}{axis}" for axis in "xyz")) for name in "pvw")
+    a, kappa = hy.par[0], hy.par[1]
+    g, k, outward = [hy.par[i] for i in (2, 3, 4)], [hy.par[i] for i in (5, 6, 7)], hy.par[8]
+
+    def dot(x: Any, y: Any) -> Any:
+        return sum(one * other for one, other in zip(x, y, strict=True))
+
+    def cross(x: Any, y: Any) -> list[Any]:
+        return [x[1] * y[2] - x[2] * y[1], x[2] * y[0] - x[0] * y[2], x[0] * y[1] - x[1] * y[0]]
+
+    def across(x: Any, axis: Any) -> list[Any]:
+        along = dot(x, axis)
+        return [one - along * other for one, other in zip(x, axis, strict=True)]
+
+    if turns:
+        radial = across(p, k)
+        distance = hy.sqrt(dot(radial, radial))
+        e1 = [outward * x / distance for x in radial]
+        e1_rate = [outward * x / distance for x in across(across(v, k), e1)]
+    else:
+        e1, e1_rate = k, [0.0, 0.0, 0.0]
+    turning = cross(w, e1_rate)
+    along_wall = across([(gi - kappa * a * ti) / (1 + kappa) for gi, ti in zip(g, turning, strict=True)], e1)
+    normal = -dot(e1_rate, v)
+    v_rate = [x + normal * e for x, e in zip(along_wall, e1, strict=True)]
+    w_rate = [x / (kappa * a) for x in cross(e1, [x - gi for x, gi in zip(v_rate, g, strict=True)])]
+    system = list(zip([*p, *v, *w], [*v, *v_rate, *w_rate], strict=True))
+    return hy.taylor_adaptive(system, [1.0] * 9)
