@@ -153,3 +153,14 @@ def test_a_dimension_without_entries_is_kept(tmp_path: Path) -> None:
     )
     write(dataset, tmp_path / "x.nc")
     xr.testing.assert_identical(read(tmp_path / "x.nc"), dataset)
+
+
+def test_others_read_the_same_from_the_file(tmp_path: Path) -> None:
+    """What is read back is what xarray's own reader of netCDF finds, to the types of the values."""
+    write(truth(load_scene("sphere_in_cylinder", mu_static=0.15), np.linspace(0, 0.5, 11)), tmp_path / "x.nc")
+    found, theirs = read(tmp_path / "x.nc"), xr.load_dataset(tmp_path / "x.nc", engine="h5netcdf")
+    assert "event_kind" in theirs
+    xr.testing.assert_identical(found, theirs)
+    assert {name: found[name].dtype for name in found.variables} == {
+        name: theirs[name].dtype for name in found.variables
+    }

@@ -136,6 +136,9 @@ def stability(
     effort = effort or Effort()
     tell: Progress = progress or (lambda _text, _count: None)
     curves, absent = curves_of(engines, runner.workers)
+    for curve in (curve for curve in curves if curve.facts.resolution is None):
+        absent[curve.engine] = "has neither step nor tolerance: exact at any time, it has no boundary to look for"
+    curves = [curve for curve in curves if curve.facts.resolution is not None]
     places = places_of(scene, axes, effort)
     measure(scene, places, runner, lambda: tell("the truth", 0))
     points = [

@@ -9,7 +9,7 @@ import numpy as np
 from proofroll.closed_form import closed_form
 from proofroll.events import with_events
 from proofroll.motion import Motion
-from proofroll.scene import Capability, Scene
+from proofroll.scene import Capability, RollingBall, Scene
 from proofroll.surfaces import FloatArray
 from proofroll.trajectory import trajectory
 from proofroll.truth import rolling, unreduced_taylor
@@ -44,12 +44,18 @@ def truth(scene: Scene, times: FloatArray) -> xr.Dataset:
     body = scene.rolling
     times = np.asarray(times, dtype=np.float64)
     first = closed_form(body, times) or rolling.reduced(body, times)
-    second = (unreduced_taylor if unreduced_taylor.available(body) else rolling).unreduced(body, times)
+    second = _unreduced(body, times)
     result, check = _dataset(scene, times, first), _dataset(scene, times, second)
     put_error_bars(result, check, _ROUND_OFF)
     result.attrs["route"] = first.route
     result.attrs["second_route"] = second.route
     return result
+
+
+def _unreduced(body: RollingBall, times: FloatArray) -> Motion:
+    if unreduced_taylor.available(body):
+        return unreduced_taylor.unreduced(body, times)
+    return rolling.unreduced(body, times)
 
 
 def _dataset(scene: Scene, times: FloatArray, motion: Motion) -> xr.Dataset:

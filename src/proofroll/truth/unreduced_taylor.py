@@ -40,14 +40,15 @@ def unreduced(body: RollingBall, times: FloatArray) -> Motion:
     Raises:
         Diverged: the series could not be continued.
     """
-    turns = isinstance(body.surface, Cylinder)
+    surface = body.surface
+    turns = isinstance(surface, Cylinder)
     if not hasattr(_local, "integrators"):
         _local.integrators = cache(_compiled)  # an integrator holds a state and must not be shared between threads
     series = copy.copy(_local.integrators(turns))
-    e1 = body.surface.normal(body.p0)
+    e1 = surface.normal(body.p0)
     geometry = np.zeros(4)
-    if turns:
-        axis = np.asarray(body.surface.generators[1].axis)
+    if isinstance(surface, Cylinder):
+        axis = np.asarray(surface.generators[1].axis)
         geometry = np.array([*axis, np.sign(e1 @ (body.p0 - (body.p0 @ axis) * axis))])
     else:
         geometry[:3] = e1

@@ -55,6 +55,16 @@ def test_a_map(small: Any) -> None:
     json.dumps(study, allow_nan=False)
 
 
+def test_a_closed_form_has_no_boundary(tmp_path: Path) -> None:
+    """What has neither step nor tolerance is named with the reason, and its neighbour is mapped by its tolerance."""
+    axis = Axis("V0", "m/s", "initial speed", [4.0], {"speed": Term()})
+    found = mapped(tmp_path, ["reduced[preset=matched]"], [axis])
+    assert [point.curve.facts.settings["formulation"] for point in found.points] == ["equations"]
+    assert content(found)["points"][0]["resolution"] == "rtol"
+    (reason,) = found.absent.values()
+    assert "neither step nor tolerance" in reason
+
+
 def test_a_map_resumes(tmp_path: Path) -> None:
     """A map that was interrupted takes up what it had, and finds the same."""
     calls = 0

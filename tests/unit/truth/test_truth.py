@@ -14,7 +14,7 @@ from proofroll.scene import Ball, Scene
 from proofroll.scene_file import load_scene
 from proofroll.surfaces import Cylinder
 from proofroll.trajectory import trajectory
-from proofroll.truth import rolling, truth
+from proofroll.truth import rolling, truth, unreduced_taylor
 from proofroll.truth.rolling import reduced, unreduced
 
 A, C, G, M = 0.025, 0.2, 9.81, 0.517
@@ -203,7 +203,7 @@ def test_error_bar_shows_a_wrong_route(monkeypatch: pytest.MonkeyPatch) -> None:
         return dataclasses.replace(motion, p_WB=motion.p_WB + np.array([1e-3, 0, 0]))
 
     module = sys.modules[truth.__module__]  # the package has a function of the same name
-    monkeypatch.setattr(module, "unreduced", shifted)
+    monkeypatch.setattr(module, "_unreduced", shifted)
     assert truth(scene, t)["down"].attrs["error_bar"] == pytest.approx(1e-3 * np.cos(0.35), rel=1e-6)
     assert honest < 1e-12
 
@@ -242,3 +242,39 @@ def test_routes_share_no_geometry(monkeypatch: pytest.MonkeyPatch) -> None:
     assert unreduced(body, t).p_WB == pytest.approx(right, abs=1e-15)
     assert np.max(np.abs(reduced(body, t).p_WB - right)) > 1e-6
     assert rolling.reduced is reduced
+
+
+needs_heyoka = pytest.mark.skipif(not unreduced_taylor.library.available(), reason="heyoka is not installed")
+
+
+@needs_heyoka
+@pytest.mark.parametrize(
+    "scene",
+    [
+        load_scene("sphere_in_cylinder", axial_speed=1.0, radial_spin=20.0),
+        load_scene("inclined_plane", normal_spin=9.0),
+        dataclasses.replace(load_scene("sphere_in_cylinder"), surfaces=(Cylinder("wall", 0.225, tilt=0.5),)),
+    ],
+    ids=["cylinder", "plane", "tilted cylinder"],
+)
+def test_the_compiled_unreduced_route(scene: Scene) -> None:
+    """In Taylor series the unreduced equations give what they give by DOP853, to the latter's 1e-11."""
+    assert unreduced_taylor.available(scene.rolling)
+    times = np.linspace(0, 1, 11)
+    for value in difference(unreduced(scene.rolling, times), unreduced_taylor.unreduced(scene.rolling, times)).values():
+        assert value < 1e-11
+
+
+def test_where_the_compiled_route_is_not_taken(monkeypatch: pytest.MonkeyPatch) -> None:
+    """With resistance, and without heyoka, the second route is the one that needs neither."""
+    assert not unreduced_taylor.available(load_scene("sphere_in_cylinder", rolling_resistance=1e-4).rolling)
+    monkeypatch.setattr(unreduced_taylor.library, "available", lambda: False)
+    assert truth(load_scene("sphere_in_cylinder"), np.array([0.0, 0.1])).attrs["second_route"].endswith("DOP853")
+
+
+@needs_heyoka
+def test_the_truth_of_ten_thousand_oscillations() -> None:
+    """There is one, to a thousandth of the range of z: constraints that nothing holds drift by that in the world."""
+    scene = load_scene("sphere_in_cylinder")
+    found = truth(scene, np.linspace(0, 1e4 * 2 * np.pi / (np.sqrt(2 / 7) * 20), 12))
+    assert found["z"].attrs["error_bar"] < 1e-3 * np.ptp(found["z"].to_numpy())
