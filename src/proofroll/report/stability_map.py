@@ -3,9 +3,10 @@
 from __future__ import annotations
 
 import io
+import itertools
 import math
 import textwrap
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
@@ -31,6 +32,8 @@ LETTERS = {
 # Steps per natural time at which a colour is darkest and lightest; tolerances are put between by their decades.
 _FEWEST, _MOST = 8.0, 1e5
 _TOLERANCE_DECADES = 13
+# Width of a map on a page of the report [inch]: 1100 pixels of a browser.
+_PAGE_WIDTH = 11.4
 # As many letters of the legend stand above a panel.
 _LETTERS_PER_PANEL = 118
 
@@ -47,41 +50,66 @@ def draw(study: Mapping[str, Any], path: Path) -> None:
 
 
 def svg(study: Mapping[str, Any]) -> str:
-    """The heat maps as SVG text.
+    """All heat maps as one SVG text.
 
     Raises:
         Missing: matplotlib is not installed.
     """
+    axes = _axes(study)
+    return _drawn(study, axes, columns=min(2, len(axes)) or 1)
+
+
+def svgs(study: Mapping[str, Any]) -> dict[str, str]:
+    """A heat map for each axis as SVG text, as wide as a page of a report, by the axis's name.
+
+    Raises:
+        Missing: matplotlib is not installed.
+    """
+    return {axis["name"]: _drawn(study, [axis], columns=1, wide=True) for axis in _axes(study)}
+
+
+def legend(study: Mapping[str, Any]) -> list[str]:
+    """What the cells say, as sentences."""
+    kinds = ", ".join(f"{letter} {kind}" for kind, letter in LETTERS.items())
+    return [
+        f"{study['scene']}: {len(study['points'])} points, {study['boundaries']} boundaries, {study['silent']} silent.",
+        "Steps per natural time (or tolerance) that 1 % of the range needs; – no affordable one does; ? no truth.",
+        f"Letter: what is beyond the boundary of stability, or else of 1 % ({kinds}); ! the engine did not say so.",
+    ]
+
+
+def _axes(study: Mapping[str, Any]) -> list[Mapping[str, Any]]:
+    """Those that have points."""
+    return [axis for axis in study["axes"] if any(point["axis"] == axis["name"] for point in study["points"])]
+
+
+def _drawn(study: Mapping[str, Any], axes: Sequence[Mapping[str, Any]], columns: int, *, wide: bool = False) -> str:
+    """Panels of these axes, row by row; texts stay texts, which a page can scale, search and read out."""
     try:
         import matplotlib as mpl
         from matplotlib.figure import Figure
     except ModuleNotFoundError:
         raise Missing("matplotlib is not installed: pip install 'proofroll[report]'") from None
-    curves = list(dict.fromkeys(point["curve"] for point in study["points"]))
-    axes = [axis for axis in study["axes"] if any(point["axis"] == axis["name"] for point in study["points"])]
-    columns = min(2, len(axes)) or 1
     rows = math.ceil(len(axes) / columns) or 1
-    with mpl.rc_context({"svg.hashsalt": "proofroll", "font.size": 8}):
-        figure = Figure(figsize=(7.2 * columns, rows * (0.9 + 0.24 * len(curves)) + 1.0), layout="constrained")
+    width, line, size = (_PAGE_WIDTH, 0.28, 10.0) if wide else (7.2 * columns, 0.24, 8.0)
+    settings: Any = {"svg.hashsalt": "proofroll", "svg.fonttype": "none", "font.size": size}
+    with mpl.rc_context(settings):
+        names = list(dict.fromkeys(point["curve"] for point in study["points"]))
+        of_axes = {axis["name"] for axis in axes}
+        curves = [n for n in names if any(p["curve"] == n and p["axis"] in of_axes for p in study["points"])]
+        height = rows * (0.9 + line * len(curves)) + (0.0 if wide else 1.0)
+        figure = Figure(figsize=(width, height), layout="constrained")
         panels = figure.subplots(rows, columns, squeeze=False).ravel()
         for panel, axis in zip(panels, axes, strict=False):
             _panel(panel, study, axis, curves, mpl.colormaps["cividis_r"])
         for panel in panels[len(axes) :]:
             panel.set_visible(False)
-        figure.suptitle(_legend(study, _LETTERS_PER_PANEL * columns), fontsize=8, x=0.01, ha="left")
+        if not wide:  # on a page the legend stands once, above all
+            text = "\n".join(textwrap.fill(sentence, _LETTERS_PER_PANEL * columns) for sentence in legend(study))
+            figure.suptitle(text, fontsize=8, x=0.01, ha="left")
         out = io.StringIO()
         figure.savefig(out, format="svg", metadata={"Date": None})
     return out.getvalue()
-
-
-def _legend(study: Mapping[str, Any], width: int) -> str:
-    kinds = ", ".join(f"{letter} {kind}" for kind, letter in LETTERS.items())
-    lines = (
-        f"{study['scene']}: {len(study['points'])} points, {study['boundaries']} boundaries, {study['silent']} silent.",
-        "Steps per natural time (or tolerance) that 1 % of the range needs; – no affordable one does; ? no truth.",
-        f"Letter: what is beyond the boundary of stability, or else of 1 % ({kinds}); ! the engine did not say so.",
-    )
-    return "\n".join(textwrap.fill(line, width) for line in lines)
 
 
 def _panel(panel: Any, study: Mapping[str, Any], axis: Mapping[str, Any], curves: list[str], colours: Any) -> None:
@@ -97,7 +125,7 @@ def _panel(panel: Any, study: Mapping[str, Any], axis: Mapping[str, Any], curves
         dark = shade is not None and shade > 0.5
         behind = {"facecolor": "white", "edgecolor": "none", "pad": 1.0} if hatch else None
         colour = "white" if dark else "black"
-        panel.text(x, y, text, ha="center", va="center", fontsize=6.5, color=colour, bbox=behind)
+        panel.text(x, y, text, ha="center", va="center", fontsize="small", color=colour, bbox=behind)
     panel.set(
         xlim=(-0.5, len(values) - 0.5),
         ylim=(len(curves) - 0.5, -0.5),
@@ -106,6 +134,10 @@ def _panel(panel: Any, study: Mapping[str, Any], axis: Mapping[str, Any], curves
     panel.set_xticks(range(len(values)), [f"{value:g}" for value in values])
     panel.set_yticks(range(len(curves)), [names[curve] for curve in curves])
     panel.tick_params(length=0)
+    engines = [curve.partition("[")[0] for curve in curves]
+    for row, (one, other) in enumerate(itertools.pairwise(engines)):
+        if one != other:
+            panel.axhline(row + 0.5, color="0.2", lw=1.0)
 
 
 def _rectangle(x: int, y: int, face: Any, hatch: str | None) -> Any:
