@@ -15,6 +15,7 @@ from proofroll.scene_file import first_problem, load_scene
 from proofroll.studies.axes import Axis, Term
 from proofroll.studies.failure import Failure
 from proofroll.studies.numbers import MEANINGS
+from proofroll.studies.stability_content import dependence
 from proofroll.toml_file import read_toml, study_files
 
 STUDY = "stability"
@@ -31,6 +32,7 @@ class Claim:
         axes: along which; all if empty.
         values: lowest and highest value of the axis; all if empty.
         never: no step holds; then nothing else is claimed but ``failure`` and ``silent``.
+        same: in natural times the boundary is the same all along each axis.
         number: dimensionless number of the boundary that is claimed to lie in ``between``.
         between: lowest and highest.
         failure: what is beyond is one of these.
@@ -43,6 +45,7 @@ class Claim:
     axes: list[str] = field(default_factory=list)
     values: list[float] = field(default_factory=list)
     never: bool = False
+    same: bool = False
     number: str | None = None
     between: list[float] = field(default_factory=list)
     failure: list[Failure] = field(default_factory=list)
@@ -51,9 +54,14 @@ class Claim:
     def contradictions(self, points: Sequence[Mapping[str, Any]]) -> list[str]:
         """What the points of a map do not confirm, as sentences."""
         found = []
-        for point in points:
-            if not self._about(point) or point["problem"]:
-                continue
+        about = [point for point in points if self._about(point) and not point["problem"]]
+        if self.same:
+            for curve, axis in dict.fromkeys((point["curve"], point["axis"]) for point in about):
+                along = [p for p in about if (p["curve"], p["axis"]) == (curve, axis)]
+                said = dependence(along, self.boundary)
+                if said:
+                    found.append(f"{curve} along {axis}: {self.boundary} up to {said}, expected the same everywhere")
+        for point in about:
             side = point["sides"][self.boundary]
             where = f"{point['curve']} at {point['axis']} = {point['value']:g}"
             found += [f"{where}: {sentence}" for sentence in self._wrong(side, point["too_slow"] is not None)]

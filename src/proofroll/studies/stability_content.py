@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections import Counter
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import asdict
 from typing import Any
 
@@ -129,14 +129,19 @@ def _scale_findings(found: StabilityMap, points: list[dict[str, Any]]) -> list[s
         for curve in dict.fromkeys(point["curve"] for point in points):
             along = [point for point in points if point["curve"] == curve and point["axis"] == axis.name]
             for name in BOUNDARIES:
-                said = _dependence([p for p in along if not (p["problem"] and name == "accurate")], name)
+                said = dependence([p for p in along if not (p["problem"] and name == "accurate")], name)
                 if said:
                     sentences.append(f"{curve} depends on {axis.name}, as it should not: {name} up to {said}")
     return sentences
 
 
-def _dependence(points: list[dict[str, Any]], name: str) -> str:
-    """How a boundary, in parts of the natural time, changes along an axis, if it does; else nothing."""
+def dependence(points: Sequence[Mapping[str, Any]], name: str) -> str:
+    """How a boundary, in parts of the natural time, changes along an axis, if it does; else nothing.
+
+    Args:
+        points: of one curve along one axis, as the study has them.
+        name: of the boundary.
+    """
     sizes: list[tuple[float, float]] = []
     for point in points:
         largest = point["sides"][name]["largest"]

@@ -24,7 +24,7 @@ from proofroll.studies.numbers import explanation, numbers
 from proofroll.studies.places import Effort
 from proofroll.studies.stability import stability
 from proofroll.studies.stability_claims import Claim, file_for
-from proofroll.studies.stability_content import _dependence, content
+from proofroll.studies.stability_content import content, dependence
 from proofroll.studies.stability_reproducers import write_reproducers
 
 SPEED = Axis("V0", "m/s", "initial speed", [2.0, 8.0], {"speed": Term()})
@@ -197,7 +197,7 @@ def test_scale_free_axes() -> None:
         assert first == pytest.approx(second)
 
 
-def test_a_dependence_on_scale() -> None:
+def test_adependence_on_scale() -> None:
     """A boundary that moves along a scale-free axis by more than the rungs are apart is a finding."""
 
     def points(*largest: float | None) -> list[dict[str, Any]]:
@@ -211,12 +211,12 @@ def test_a_dependence_on_scale() -> None:
             for k, x in enumerate(largest)
         ]
 
-    assert _dependence(points(0.1, 0.1, 0.15), "stable") == ""
-    assert _dependence(points(None, None), "stable") == ""
-    assert "0.05 of the natural time at 1, but 0.02 of the natural time at 10" in _dependence(
+    assert dependence(points(0.1, 0.1, 0.15), "stable") == ""
+    assert dependence(points(None, None), "stable") == ""
+    assert "0.05 of the natural time at 1, but 0.02 of the natural time at 10" in dependence(
         points(0.1, 0.04), "stable"
     )
-    assert "nowhere at 10 (refused)" in _dependence(points(0.1, None), "stable")
+    assert "nowhere at 10 (refused)" in dependence(points(0.1, None), "stable")
 
 
 def test_what_explains_a_boundary() -> None:
@@ -263,6 +263,21 @@ POINT = {
 def test_claims(made: Claim, contradictions: int) -> None:
     """A claim is contradicted by what it says otherwise, and only where it applies."""
     assert len(made.contradictions([POINT])) == contradictions
+
+
+def test_a_claim_that_nothing_depends_on_an_axis() -> None:
+    """Boundaries that are the same in natural times confirm it; one that moves along the axis is named."""
+
+    def along(*steps: float) -> list[dict[str, Any]]:
+        """Points with the same natural time."""
+        sides = ({"stable": POINT["sides"]["stable"] | {"largest": step}} for step in steps)
+        more = {"axis": "mass", "period": 1.0, "resolution": "dt"}
+        return [POINT | more | {"value": 10.0**k, "sides": side} for k, side in enumerate(sides)]
+
+    assert claim(same=True).contradictions(along(0.1, 0.1, 0.2)) == []
+    (said,) = claim(same=True).contradictions(along(0.1, 0.1, 0.01))
+    assert "expected the same everywhere" in said
+    assert "0.01 of the natural time at 100" in said
 
 
 BROKEN = [
