@@ -30,7 +30,8 @@ class FreeFlyer(Mechanism):
         self._matrix = np.zeros((9, 9))
         self._directions = np.zeros((3, 6))
         self._entries = self._directions.reshape(-1)
-        moving = self._surface.moving_triad(*body.p0.tolist(), 0.0, 0.0, 0.0)
+        x, y, z = body.p0.tolist()
+        moving = self._surface.moving_triad(x, y, z, 0.0, 0.0, 0.0)
         changing = _changing(body)
         entries = _entries(self._radius)
         self._changing = [entry for entry in entries if entry[1] in changing]
@@ -99,7 +100,8 @@ class FreeFlyer(Mechanism):
         if self._orientation:
             return self._rows(data, q, v)[2]
         pin.crba(self.model, data, q)
-        return self._aimed(self._surface.moving_triad(*q[:3].tolist(), 0.0, 0.0, 0.0))
+        x, y, z = q[:3].tolist()
+        return self._aimed(self._surface.moving_triad(x, y, z, 0.0, 0.0, 0.0))
 
     def _solve(self, data: Any, rows: FloatArray, drift: FloatArray, lever: FloatArray) -> FloatArray:
         """Joint acceleration; the multipliers (-N, F2, F3) [N] are left in ``data``.
