@@ -101,6 +101,9 @@ class Surface(Protocol):
     def normal_rate(self, p: tuple[float, float, float], v: tuple[float, float, float]) -> tuple[float, float, float]:
         """(∂e1/∂p) v at one point p [m], for its velocity v [m/s]; as :meth:`nearby`."""
 
+    def moving_triad(self, x: float, y: float, z: float, vx: float, vy: float, vz: float) -> tuple[float, ...]:
+        """Gap [m], :meth:`triad` and :meth:`normal_rate` [1/s] in one call: 13 numbers, one after the other."""
+
 
 @lru_cache
 def _tilt(angle: float) -> FloatArray:
@@ -221,6 +224,17 @@ class Cylinder:
         rate = (x * v[0] + cos * v[1] + z * v[2]) / (distance or math.nan)
         return rate * x, rate * cos, rate * z
 
+    def moving_triad(self, x: float, y: float, z: float, vx: float, vy: float, vz: float) -> tuple[float, ...]:
+        """See :class:`Surface`."""
+        across, down = self._tilted
+        x = across * x - down * z
+        distance = math.sqrt(x * x + y * y) or math.nan
+        cos, sin = x / distance, y / distance
+        x2, z2 = -across * sin, down * sin
+        rate = (x2 * vx + cos * vy + z2 * vz) / distance
+        e1_and_e2 = across * cos, sin, -down * cos, x2, cos, z2
+        return self.radius - distance, *e1_and_e2, down, 0.0, across, rate * x2, rate * cos, rate * z2
+
     def _local(self, p_WB: npt.ArrayLike) -> FloatArray:
         return np.asarray(np.asarray(p_WB, dtype=np.float64) @ _tilt(self.tilt), dtype=np.float64)
 
@@ -313,6 +327,19 @@ class Plane:
     ) -> tuple[float, float, float]:
         """See :class:`Surface`."""
         return 0.0, 0.0, 0.0
+
+    def moving_triad(
+        self,
+        x: float,
+        y: float,
+        z: float,
+        vx: float,  # noqa: ARG002 -- whatever the velocity
+        vy: float,  # noqa: ARG002
+        vz: float,  # noqa: ARG002
+    ) -> tuple[float, ...]:
+        """See :class:`Surface`."""
+        x1, y1, z1 = self._e1
+        return -(x * x1 + y * y1 + z * z1) - self.height, *self._triad, 0.0, 0.0, 0.0
 
     def nearby(self, x: float, y: float, z: float) -> tuple[float, float, float, float]:
         """See :class:`Surface`."""

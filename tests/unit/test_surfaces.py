@@ -176,3 +176,5 @@ def test_one_point_is_as_many(surface: Cylinder | Plane) -> None:
         np.testing.assert_allclose(triad, surface.frame(surface.locate(p[None]))[0], rtol=1e-12, atol=1e-14)
         rate = surface.normal_rate(tuple(p.tolist()), tuple(v.tolist()))
         np.testing.assert_allclose(rate, surface.normal_gradient(p[None])[0] @ v, rtol=1e-12, atol=1e-13)
+        together = surface.moving_triad(*p.tolist(), *v.tolist())
+        np.testing.assert_allclose(together, [gap, *triad.T.ravel(), *rate], rtol=1e-12, atol=1e-14)

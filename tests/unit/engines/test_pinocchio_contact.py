@@ -11,6 +11,7 @@ import xarray as xr
 from proofroll.certificate import certify
 from proofroll.errors import Diverged, Refused
 from proofroll.events import events_of
+from proofroll.registry import load_engine, resolve_settings
 from proofroll.scene import Scene
 from proofroll.scene_file import load_scene
 from proofroll.simulation import build, simulate
@@ -64,8 +65,8 @@ def test_declared_order(preset: str, order: int, resistance: float) -> None:
         for dt in (2e-3, 1e-3)
     ]
     assert np.log2(found[0] / found[1]) == pytest.approx(order, abs=0.25)
-    engine = build(load_scene("sphere_in_cylinder"), f"pinocchio[formulation=contact,preset={preset}]")
-    assert engine._run._settings.order == order
+    settings = resolve_settings(load_engine("pinocchio"), {"formulation": "contact", "preset": preset})
+    assert settings.order == order
 
 
 @pytest.mark.parametrize("preset", ["default", "matched"])
@@ -194,7 +195,7 @@ def test_too_little_friction_for_unbounded() -> None:
 def test_solver_that_gives_up_is_said() -> None:
     """A solver that does not converge ends the run with a sentence."""
     engine = build(load_scene("sphere_in_cylinder"), "pinocchio[formulation=contact,solver=admm]")
-    engine._run._options.max_iterations = 3
+    engine._run.steps.contact.options.max_iterations = 3
     with pytest.raises(Diverged, match="solver_tolerance"):
         engine.advance(0.01)
 
@@ -202,8 +203,8 @@ def test_solver_that_gives_up_is_said() -> None:
 def test_model_is_only_what_the_scene_requires() -> None:
     """One ball, one contact, no torque without rolling resistance."""
     run = build(load_scene("sphere_in_cylinder"), "pinocchio[formulation=contact]")._run
-    assert run.model.nv == 6
-    assert len(run._models) == 1
+    assert run.steps.contact.model.nv == 6
+    assert len(run.steps.contact.models) == 1
     assert run.built().rolling_resistance == 0.0
     assert run.sample().sticking is None
     assert run.events() == ()

@@ -39,15 +39,18 @@ def prepare(scene: Scene, settings: Any) -> Bare:
 
 
 def _step(model: Any, data: Any, body: RollingBall, settings: Any) -> Callable[[], None]:
-    """One step; where friction is bounded, with a look whether the contact slips before RK4's stages replace forces."""
+    """One step; where friction is bounded, with a look at the forces of its start, whether the contact slips.
+
+    RK4's stages replace them, so there the parts of mj_step are called one by one; those that find what is not finite
+    are among them, or the warnings that ``_check`` reads would never be given.
+    """
     if math.isinf(body.contact.mu_static):
         return lambda: mujoco.mj_step(model, data)
     wrench, mu, events, sticks = np.zeros(6), body.contact.mu_static, [], True
     pyramidal = settings.cone == "pyramidal"
 
-    def step() -> None:
+    def look() -> None:
         nonlocal sticks
-        mujoco.mj_forward(model, data)
         if data.ncon:
             mujoco.mj_contactForce(model, data, 0, wrench)
             N, F1, F2 = wrench[:3].tolist()
@@ -55,12 +58,20 @@ def _step(model: Any, data: Any, body: RollingBall, settings: Any) -> Callable[[
             if N > 0 and (friction < _ON_CONE * mu * N) != sticks:
                 sticks = not sticks
                 events.append((data.time, sticks))
-        if settings.integrator == "RK4":
-            mujoco.mj_RungeKutta(model, data, 4)
-        else:
-            mujoco.mj_Euler(model, data)
 
-    return step
+    def step() -> None:
+        mujoco.mj_step(model, data)
+        look()
+
+    def step_of_stages() -> None:
+        mujoco.mj_checkPos(model, data)
+        mujoco.mj_checkVel(model, data)
+        mujoco.mj_forward(model, data)
+        mujoco.mj_checkAcc(model, data)
+        look()
+        mujoco.mj_RungeKutta(model, data, 4)
+
+    return step_of_stages if settings.integrator == "RK4" else step
 
 
 def _counted(times: FloatArray, dt: float) -> list[int]:

@@ -18,7 +18,6 @@ from proofroll.errors import Diverged, Refused
 from proofroll.scene import Capability, RollingBall, Scene
 from proofroll.surfaces import FloatArray
 
-_WORLD = pin.LOCAL_WORLD_ALIGNED
 # What the adapter gives Pinocchio's cone where friction is unbounded.
 _UNBOUNDED = 1e6
 
@@ -273,29 +272,32 @@ def _contact(body: RollingBall, settings: Any) -> Callable[[FloatArray], FloatAr
     point, point_data = known.point, known.point_data
     axes, torque, shift = np.zeros((3, 3)), np.zeros(6), np.zeros(3)
     axes[2, 1] = -1.0
+    arm, foot = np.zeros(3), np.zeros(3)
+    on_wall, on_ball = point.joint1_placement, point.joint2_placement  # what is written there is in the contact
     events: list[tuple[float, bool]] = []
 
     def run(times: FloatArray) -> FloatArray:
         q, v, span, sticks, normal_force = known.q, known.v, 0.5 * dt if leapfrog else dt, True, 0.0
         count = round(float(times[-1]) / dt)
         for number in range(count):
-            pin.computeAllTerms(model, data, q, v)
-            turned, velocity = data.oMi[ball].rotation, pin.getVelocity(model, data, ball, _WORLD)
+            pin.computeJointJacobians(model, data, q)
+            turned = data.oMi[ball].rotation
             x, y, z = q[:3].tolist()
             r = math.sqrt(x * x + y * y)
             ex, ey = x / r, y / r
             axes[0, 0], axes[1, 0], axes[0, 2], axes[1, 2] = -ey, ex, -ex, -ey
-            arm = np.array([a * ex, a * ey, 0.0])
-            point.joint1_placement = pin.SE3(axes, np.array([x + a * ex, y + a * ey, z]))
-            point.joint2_placement = pin.SE3(turned.T.dot(axes), turned.T.dot(arm))
+            arm[0], arm[1] = a * ex, a * ey
+            foot[0], foot[1], foot[2] = x + a * ex, y + a * ey, z
+            on_wall.rotation, on_wall.translation = axes, foot
+            on_ball.rotation, on_ball.translation = turned.T.dot(axes), turned.T.dot(arm)
             point.calc(model, data, point_data)
             jacobian = point.jacobian(model, data, point_data)
             to_joints = inverse.dot(jacobian.T)
             delassus = pin.DelassusOperatorDense(jacobian.dot(to_joints))
-            vx, vy, vz = velocity.linear.tolist()
+            vx, vy, vz = v[:3].tolist()
             shift[1], shift[2] = 0.0, (c - r) / dt
             if leapfrog:
-                wx, wy, _ = velocity.angular.tolist()
+                wx, wy, _ = turned.dot(v[3:]).tolist()
                 turning = (vy * ex - vx * ey) / r
                 # Along -e3 the term a ω × ė1, along -e1 the bend of the path.
                 shift[1] = -0.5 * dt * a * turning * (wx * ex + wy * ey)

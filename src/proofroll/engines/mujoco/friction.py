@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Mapping
+from collections.abc import Callable
 from typing import Any
 
 import mujoco
@@ -22,11 +22,6 @@ MEMORY = 18
 _ON_CONE = 1 - 1e-9
 # The correction vanishes with the slip, so it may begin a little before; then the stages of RK4 agree about it.
 NEAR_CONE = 1 - 1e-3
-_INTEGRATE: Mapping[str, Callable[[Any, Any], None]] = {
-    "Euler": mujoco.mj_Euler,
-    "RK4": lambda model, data: mujoco.mj_RungeKutta(model, data, 4),
-    "implicitfast": mujoco.mj_implicit,
-}
 
 
 def condim(mu: float, settings: MujocoSettings) -> int:
@@ -83,7 +78,7 @@ class BoundedFriction:
         self._ball = model.body("ball").id
         last = int(model.joint("spin").dofadr[0]) + (6 if settings.formulation == "free" else 3)
         self._spin = slice(last - 3, last)
-        self._integrate = _INTEGRATE[settings.integrator]
+        self._stages = settings.integrator == "RK4"
         self._dt = settings.dt
         self._settings = settings
         self._steps = 0
@@ -91,6 +86,7 @@ class BoundedFriction:
         self._flies = False  # whether these were told as a liftoff
         self._events: list[Event] = []
         self._wrench = np.zeros(6)
+        self._force = self._wrench[:3]
         self.sticking = True
 
     def start(self, data: Any) -> bool:
@@ -100,14 +96,18 @@ class BoundedFriction:
         return self.sticking
 
     def step(self, data: Any) -> None:
-        """One mj_step, with a look at the forces before RK4's further stages replace them."""
+        """One mj_step, with a look at the forces at its start, before RK4's further stages replace them."""
         model = self._model
+        if not self._stages:
+            mujoco.mj_step(model, data)  # the forces are still those of the start
+            self.observe(data)
+            return
         mujoco.mj_checkPos(model, data)
         mujoco.mj_checkVel(model, data)
         mujoco.mj_forward(model, data)
         mujoco.mj_checkAcc(model, data)
         self.observe(data)
-        self._integrate(model, data)
+        mujoco.mj_RungeKutta(model, data, 4)
 
     def observe(self, data: Any) -> None:
         """Takes the forces at the start of a step; once per step."""
@@ -143,7 +143,7 @@ class BoundedFriction:
 
     def _inside(self) -> bool:
         """Whether the force in ``self._wrench`` is inside the cone of the present coefficient."""
-        N, F1, F2, *_ = self._wrench.tolist()
+        N, F1, F2 = self._force.tolist()
         # MuJoCo's pyramid lies inside the true cone: along its own tangents it allows |F1| + |F2| = mu N.
         friction = abs(F1) + abs(F2) if self._pyramidal else math.hypot(F1, F2)
         return friction < _ON_CONE * self._mu * N

@@ -9,7 +9,7 @@ from typing import Any, ClassVar, Self
 import pinocchio as pin
 
 from proofroll.engine import Built, Level, Sample, Term
-from proofroll.engines.pinocchio.contact import ContactRun
+from proofroll.engines.pinocchio.contact_run import ContactRun
 from proofroll.engines.pinocchio.rows_run import RowsRun
 from proofroll.engines.pinocchio.settings import PRESETS, PinocchioSettings
 from proofroll.errors import Refused

@@ -69,9 +69,11 @@ class Composite(Mechanism):
         super().__init__(body)
         self._frame0 = body.surface.frame(np.zeros(2))
         self._carriage = 0
+        self._read: Any = None  # the data in which self._wrench is
         for name, generator in zip(body.surface.coordinates, generators, strict=True):
             self._carriage = self.model.addJoint(self._carriage, _joint(generator), pin.SE3.Identity(), name)
         placement = pin.SE3(self._frame0, body.surface.position(np.zeros(2)))
+        self._wrench = np.zeros(3)
         self._add_ball(body, self._carriage, pin.JointModelSpherical(), placement)
 
         data = self.model.createData()
@@ -116,8 +118,9 @@ class Composite(Mechanism):
         first, second, spin, _, _ = v.tolist()
         (x1, y1), (x2, y2), (x3, y3) = own.turns
         lever = self._radius * (spin + x1 * first + y1 * second)
-        drift[0] += lever * (x2 * first + y2 * second)
-        drift[1] += lever * (x3 * first + y3 * second)
+        along2, along3 = drift.tolist()  # to add to one in an array takes numpy three times as long
+        drift[0] = along2 + lever * (x2 * first + y2 * second)
+        drift[1] = along3 + lever * (x3 * first + y3 * second)
         torque = self._rest
         if self._f:
             (x2, y2), (x3, y3) = own.tangents
@@ -145,7 +148,10 @@ class Composite(Mechanism):
     def normal_force(self, data: Any) -> float:
         """See :class:`~proofroll.engines.pinocchio.mechanism.Mechanism`; forwardDynamics leaves the bias pass alone."""
         if self._own is not None:
-            return -float(data.f[self.ball].linear[0])
+            if data is not self._read:
+                # Pinocchio's memory, looked up once: that takes as long as the dynamics.
+                self._read, self._wrench = data, data.f[self.ball].linear
+            return -self._wrench.item(0)
         return self._transmitted(data, data.oMi[self._carriage].rotation.dot(self._frame0[:, 0]))
 
     def reaction(self, data: Any, q: FloatArray, v: FloatArray) -> tuple[FloatArray, FloatArray]:

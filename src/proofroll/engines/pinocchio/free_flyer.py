@@ -30,12 +30,13 @@ class FreeFlyer(Mechanism):
         self._matrix = np.zeros((9, 9))
         self._directions = np.zeros((3, 6))
         self._entries = self._directions.reshape(-1)
-        triad = self._surface.triad(*body.p0.tolist())
-        moving = _changing(body)
+        x, y, z = body.p0.tolist()
+        moving = self._surface.moving_triad(x, y, z, 0.0, 0.0, 0.0)
+        changing = _changing(body)
         entries = _entries(self._radius)
-        self._changing = [entry for entry in entries if entry[1] in moving]
+        self._changing = [entry for entry in entries if entry[1] in changing]
         for index, source, factor in entries:
-            self._entries[index] = factor * triad[source]
+            self._entries[index] = factor * moving[source]
         self._add_ball(body, 0, pin.JointModelFreeFlyer(), pin.SE3.Identity())
         self.q0 = np.concatenate([body.p0, [0.0, 0.0, 0.0, 1.0]])
         self.v0 = np.concatenate([body.v0, body.w0])
@@ -56,32 +57,37 @@ class FreeFlyer(Mechanism):
         drift[0], drift[1:] = e1.dot(terms.bias[:3]) + bend, slip_drift
         return terms, frame, rows, drift
 
-    def _aimed(self, triad: Sequence[float]) -> FloatArray:
+    def _aimed(self, moving: Sequence[float]) -> FloatArray:
         """Velocity along e1, and of slip along e2 and e3, from (v, ω) in the world, shape (3, 6).
 
         The next call overwrites it: only what changes from place to place is written again.
+
+        Args:
+            moving: of :meth:`proofroll.surfaces.Surface.moving_triad`.
         """
         entries = self._entries
         for index, source, factor in self._changing:
-            entries[index] = factor * triad[source]
+            entries[index] = factor * moving[source]
         return self._directions
 
     def _own_rows(self, data: Any, q: FloatArray, v: FloatArray) -> tuple[FloatArray, FloatArray, FloatArray]:
         """Rows, drift, and the rolling resistance per unit of N on the joint, where its axes are the world's.
 
-        The joint's velocities are then those of the ball in the world, with no Jacobian between.
+        The joint's velocities are then those of the ball in the world, with no Jacobian between. Components as plain
+        floats: to add to one in an array takes numpy three times as long.
         """
-        place, (vx, vy, vz, wx, wy, wz) = q[:3].tolist(), v.tolist()
-        triad = self._surface.triad(*place)
-        x, y, z = self._surface.normal_rate(place, (vx, vy, vz))
-        directions = self._aimed(triad)
+        px, py, pz = q[:3].tolist()
+        vx, vy, vz, wx, wy, wz = v.tolist()
+        moving = self._surface.moving_triad(px, py, pz, vx, vy, vz)
+        _, x1, y1, z1, x2, y2, z2, x3, y3, z3, x, y, z = moving
+        directions = self._aimed(moving)
         drift = directions.dot(own_bias(self.model, data, self.ball, q, v, self._rest))
-        x1, y1, z1, x2, y2, z2, x3, y3, z3 = triad
+        along1, along2, along3 = drift.tolist()
         a = self._radius
         tx, ty, tz = a * (wy * z - wz * y), a * (wz * x - wx * z), a * (wx * y - wy * x)  # a ω × ė1
-        drift[0] += x * vx + y * vy + z * vz
-        drift[1] += x2 * tx + y2 * ty + z2 * tz
-        drift[2] += x3 * tx + y3 * ty + z3 * tz
+        drift[0] = along1 + (x * vx + y * vy + z * vz)
+        drift[1] = along2 + (x2 * tx + y2 * ty + z2 * tz)
+        drift[2] = along3 + (x3 * tx + y3 * ty + z3 * tz)
         lever = self._rest
         if self._f:
             speed = math.sqrt(vx * vx + vy * vy + vz * vz)
@@ -94,7 +100,8 @@ class FreeFlyer(Mechanism):
         if self._orientation:
             return self._rows(data, q, v)[2]
         pin.crba(self.model, data, q)
-        return self._aimed(self._surface.triad(*q[:3].tolist()))
+        x, y, z = q[:3].tolist()
+        return self._aimed(self._surface.moving_triad(x, y, z, 0.0, 0.0, 0.0))
 
     def _solve(self, data: Any, rows: FloatArray, drift: FloatArray, lever: FloatArray) -> FloatArray:
         """Joint acceleration; the multipliers (-N, F2, F3) [N] are left in ``data``.
@@ -122,9 +129,10 @@ class FreeFlyer(Mechanism):
             return self._solve(data, rows, drift, resistance(terms, self._f, frame[:, 0]) if self._f else self._rest)
         acceleration = self._solve(data, *self._own_rows(data, q, v))
         vx, vy, vz, wx, wy, wz = v.tolist()
-        acceleration[0] += wy * vz - wz * vy
-        acceleration[1] += wz * vx - wx * vz
-        acceleration[2] += wx * vy - wy * vx
+        ax, ay, az, *_ = acceleration.tolist()
+        acceleration[0] = ax + (wy * vz - wz * vy)
+        acceleration[1] = ay + (wz * vx - wx * vz)
+        acceleration[2] = az + (wx * vy - wy * vx)
         return acceleration
 
     def normal_force(self, data: Any) -> float:
@@ -190,21 +198,21 @@ class FreeFlyer(Mechanism):
 
 
 def _entries(radius: float) -> list[tuple[int, int, float]]:
-    """What the directions consist of: place in their 18 numbers, place in a triad, and factor.
+    """What the directions consist of: place in their 18 numbers, place in a moving triad, and factor.
 
     Along e1 it is e1·v, along e2 the slip e2·v + a e3·ω, along e3 the slip e3·v - a e2·ω.
     """
-    blocks = ((0, 0, 1.0), (6, 3, 1.0), (9, 6, radius), (12, 6, 1.0), (15, 3, -radius))
+    blocks = ((0, 1, 1.0), (6, 4, 1.0), (9, 7, radius), (12, 7, 1.0), (15, 4, -radius))
     return [(index + k, source + k, factor) for index, source, factor in blocks for k in range(3)]
 
 
 def _changing(body: RollingBall) -> set[int]:
-    """Which of the nine components of e1, e2, e3 change from place to place; all, if that is not known."""
+    """Places in a moving triad of what changes from place to place of e1, e2, e3; all, if that is not known."""
     surface = body.surface
     if surface.generators is None:
-        return set(range(9))
+        return set(range(1, 10))
     # A component of a frame that one motion turns by α is p + q sin α + r cos α: where it is the same at three angles
     # it is the same at all.
     places = [[x, y] for x in (0.0, 1.0, 2.5) for y in (0.0, 1.0, 2.5)]
     triads = surface.frame(np.array(places)).swapaxes(-1, -2).reshape(-1, 9)
-    return set(np.flatnonzero(np.ptp(triads, axis=0) > 0).tolist())
+    return set((1 + np.flatnonzero(np.ptp(triads, axis=0) > 0)).tolist())

@@ -174,7 +174,8 @@ class AdaptiveStickSlip(Adaptive):
         """Integrates in the present mode until the mode changes or ``end``; returns that time [s]."""
         if self._solver is None:
             y = self._joined(self.q, self.v)
-            self._solver, self._short_steps = self._solver_from(self._law, start, y), 0
+            law = self._rates if self._mode is Mode.STICKING else self._law  # a solver lives as long as its mode
+            self._solver, self._short_steps = self._solver_from(law, start, y), 0
             self._monitored = self._monitor(y)
         solver, monitor = self._solver, self._monitored
         solver.t_bound, solver.status = end, "running"

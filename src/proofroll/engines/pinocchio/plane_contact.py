@@ -1,0 +1,121 @@
+"""A ball, one plane that touches it, and Pinocchio's own solver of contact with friction between the two.
+
+The ball has a translation joint with a spherical joint in it: with a free-flyer joint the velocity of the centre has
+components in the ball's turning axes, and a step of semi-implicit Euler multiplies it by the square root of
+1 + (ω dt)², so that a fast ball blows up at any useful step.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import Any
+
+import numpy as np
+import pinocchio as pin
+
+from proofroll.scene import RollingBall
+from proofroll.surfaces import FloatArray
+
+# Pinocchio's limit of 1000 is met at tight tolerances where the normal force is small.
+_ADMM_ITERATIONS = 10_000
+
+
+class PlaneContact:
+    """Pinocchio's objects, and scratch memory for the pose of the plane.
+
+    Attributes:
+        model, data: pin.Model and pin.Data.
+        ball: index of the joint that turns the ball.
+        turned: rotation from the ball's axes into the world: Pinocchio's memory, which follows the last call.
+        q0, v0: joint configuration and velocity at time 0; the first three numbers are the ball's centre [m] and its
+            velocity [m/s] in the world.
+        inverse: of the mass matrix, shape (6, 6): that of a ball in these joints does not change.
+        axes: of the plane where it was last posed, as columns e2, -e3, -e1: the last one from the wall into the ball.
+        point, point_data: the contact as Pinocchio has it.
+        options: of the solver.
+    """
+
+    def __init__(self, body: RollingBall, kind: str, tolerance: float) -> None:
+        """With the ``kind`` of solver ``pgs`` or ``admm``, which stops at ``tolerance``."""
+        self._radius = body.ball.radius
+        self.model = pin.Model()
+        self.model.gravity.linear = body.gravity
+        carriage = self.model.addJoint(0, pin.JointModelTranslation(), pin.SE3.Identity(), "centre")
+        self.ball = self.model.addJoint(carriage, pin.JointModelSpherical(), pin.SE3.Identity(), body.ball.name)
+        inertia = pin.Inertia(body.ball.mass, np.zeros(3), body.ball.inertia * np.eye(3))
+        self.model.appendBodyToJoint(self.ball, inertia, pin.SE3.Identity())
+        self.data = self.model.createData()
+        self.turned = self.data.oMi[self.ball].rotation
+        self.q0 = np.concatenate([body.p0, [0.0, 0.0, 0.0, 1.0]])
+        self.v0 = np.concatenate([body.v0, body.w0])
+        # Pinocchio fills the upper triangle.
+        inverse = np.triu(pin.computeMinverse(self.model, self.data, self.q0))
+        self.inverse: FloatArray = inverse + np.triu(inverse, 1).T
+
+        point = pin.PointContactConstraintModel(self.model, 0, pin.SE3.Identity(), self.ball, pin.SE3.Identity())
+        self.models, self._datas = pin.StdVec_ConstraintModel(), pin.StdVec_ConstraintData()
+        self.models.append(pin.ConstraintModel(point))
+        self._datas.append(self.models[0].createData())
+        # Both refer to what is in the vectors; to extract them again takes longer than to solve for the impulse.
+        self.point, self.point_data = self.models[0].extract(), self._datas[0].extract()
+        # As these do to the placements in the contact; to make new ones takes longer than to solve, too.
+        self._on_wall, self._on_ball = self.point.joint1_placement, self.point.joint2_placement
+        self._from_centre, self._foot = np.zeros((3, 4)), np.zeros(3)  # axes and contact point, in the world
+        self._entries, self.axes = self._from_centre.reshape(-1), self._from_centre[:, :3]
+        self._solver, self.options, self._result = _solver(kind, tolerance)
+
+    def pose(self, place: Sequence[float], triad: Sequence[float]) -> FloatArray:
+        """Poses the plane at the contact point, and returns the velocity of that per joint velocity, shape (3, 6).
+
+        Expects the joints' placements and Jacobians in ``data``; the rows are components along :attr:`axes`.
+
+        Args:
+            place: centre of the ball [m].
+            triad: components of e1, e2, e3.
+        """
+        x, y, z = place
+        x1, y1, z1, x2, y2, z2, x3, y3, z3 = triad
+        a, entries, foot = self._radius, self._entries, self._foot
+        ax, ay, az = a * x1, a * y1, a * z1
+        entries[0], entries[1], entries[2], entries[3] = x2, -x3, -x1, ax
+        entries[4], entries[5], entries[6], entries[7] = y2, -y3, -y1, ay
+        entries[8], entries[9], entries[10], entries[11] = z2, -z3, -z1, az
+        foot[0], foot[1], foot[2] = x + ax, y + ay, z + az
+        self._on_wall.rotation, self._on_wall.translation = self.axes, foot
+        on_ball = self.turned.T.dot(self._from_centre)
+        self._on_ball.rotation, self._on_ball.translation = on_ball[:, :3], on_ball[:, 3]
+        self.point.calc(self.model, self.data, self.point_data)
+        return self.point.jacobian(self.model, self.data, self.point_data)  # type: ignore[no-any-return]  # it is an array
+
+    def impulse(self, delassus: Any, free: FloatArray, mu: float) -> FloatArray | None:
+        """Impulse along the axes [N s], shape (3,), which the next call may overwrite; None if it is not found.
+
+        Args:
+            delassus: pin.DelassusOperatorDense of the contact.
+            free: velocity of the contact point without an impulse [m/s], along the axes, shape (3,).
+            mu: coefficient of friction [-].
+        """
+        self.point.setFriction(mu)
+        # No guess from the last step: the answer must not depend on what was looked at in between.
+        self._result.reset()
+        if not self._solver.solve(delassus, free, self.models, self._datas, self.options, self._result):
+            return None
+        return self._result.retrieveConstraintImpulses()  # type: ignore[no-any-return]  # it is an array
+
+    def friction(self, mu: float) -> float:
+        """What the cone of the contact holds if it is given ``mu``, as before each impulse."""
+        self.point.setFriction(mu)
+        return float(self.point.getFriction())
+
+
+def _solver(kind: str, tolerance: float) -> tuple[Any, Any, Any]:
+    """Solver, its options and its result for one contact."""
+    if kind == "pgs":
+        solver, options, result = pin.PGSConstraintSolver(3), pin.PGSSolverSettings(), pin.PGSSolverResult()
+    else:
+        solver, options, result = pin.ADMMConstraintSolver(3), pin.ADMMSolverSettings(), pin.ADMMSolverResult()
+        options.max_iterations = _ADMM_ITERATIONS
+    for name in ("feasibility", "complementarity"):
+        for bound in ("absolute", "relative"):
+            setattr(options, f"{bound}_{name}_tol", tolerance)
+    return solver, options, result
