@@ -174,9 +174,34 @@ def _fill(file: Any, dataset: xr.Dataset) -> None:
         file.attrs[key] = value
 
 
+# Attributes by which netCDF-4 ties variables to dimensions; what they say is in a dataset's structure.
+_STRUCTURE = frozenset({"CLASS", "NAME", "DIMENSION_LIST", "REFERENCE_LIST", "_Netcdf4Dimid", "_NCProperties"})
+
+
 def read(path: Path) -> xr.Dataset:
-    """A trajectory from its netCDF file, wholly in memory."""
+    """A trajectory from its netCDF file, wholly in memory.
+
+    Raises:
+        OSError: there is no such file, or it is no netCDF-4.
+    """
+    import h5py
     import xarray as xr
 
-    with xr.open_dataset(path, engine="h5netcdf") as dataset:
-        return dataset.load()
+    # As for writing, and for the same reason: a tenth of the time that it takes through the libraries above HDF5.
+    with h5py.File(path, "r") as file:
+        variables = {}
+        for name, item in file.items():
+            attributes = dict(item.attrs)
+            if attributes.get("NAME", b"").startswith(b"This is a netCDF dimension but"):
+                continue
+            scales = [h5py.h5r.get_name(one[0], file.id).decode() for one in attributes.get("DIMENSION_LIST", ())]
+            dims = [scale.removeprefix("/") for scale in scales] if "CLASS" not in attributes else [name]
+            values = item.asstr()[...].astype(str) if h5py.check_string_dtype(item.dtype) else item[...]
+            variables[name] = xr.Variable(dims, values, _kept(attributes))
+        coordinates = {name: variable for name, variable in variables.items() if name in variable.dims}
+        data = {name: variable for name, variable in variables.items() if name not in coordinates}
+        return xr.Dataset(data, coordinates, _kept(dict(file.attrs)))
+
+
+def _kept(attributes: dict[str, Any]) -> dict[str, Any]:
+    return {key: value for key, value in attributes.items() if key not in _STRUCTURE}

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import dataclasses
 import hashlib
 import json
 from collections.abc import Callable, Mapping, Sequence
@@ -119,7 +120,7 @@ def make_stability(
     path = stability_path(folder, asked, axes, engines, effort)
     write_reproducers(found, study, path.with_suffix(""), runner.workers)
     study["claims"] = {"file": asked.name, "contradictions": asked.contradictions(study)}
-    study["measured"] = installed.measured()
+    study |= {"effort": dataclasses.asdict(effort), "measured": installed.measured()}
     study = plain(study)
     write_text(path, json.dumps(study))
     return study, path
