@@ -14,7 +14,7 @@ def advice(entry: Mapping[str, Any]) -> list[dict[str, Any]]:
     groups: dict[str, dict[str, Any]] = {}
     for answer in entry["advice"]:
         of = unit(answer["unit"])
-        group = groups.setdefault(answer["quantity"], {"symbol": symbol(answer["quantity"]), "lines": []})
+        group = groups.setdefault(answer["quantity"], {"symbol": symbol(answer["quantity"]), "said": "", "lines": []})
         relative = answer["relative"]
         wanted = f"{number(answer['tolerance'])} {of}".strip()
         group["lines"].append(
@@ -25,6 +25,9 @@ def advice(entry: Mapping[str, Any]) -> list[dict[str, Any]]:
                 **{key: _told(answer[key], of) for key in ("runner_up", "first_failure", "least_model")},
             }
         )
+    for group in groups.values():
+        names = dict.fromkeys(line["choice"]["name"] for line in group["lines"] if line["holds"])
+        group["said"] = ", then ".join(names) or "nothing holds it"
     return list(groups.values())
 
 

@@ -94,8 +94,8 @@ def _use(content: dict[str, Any]) -> str:
             said += f", at {number(choice['seconds_per_second'])} s of computing per simulated second"
             if least:
                 said += (
-                    f"; where this scene is all there is, {name_of(least)} does it in "
-                    f"{number(least['seconds_per_second'])}"
+                    f"; where this scene is all there is, its own equations do it at "
+                    f"{number(least['seconds_per_second'])} s ({name_of(least)})"
                 )
             return f"{said}."
     for comparison in content["comparisons"]:
