@@ -167,6 +167,7 @@ class Comparison:
         time_limit: wall seconds a case may take [s].
         timed: whether the speed of every run is measured, in clean runs of its own.
         regimes: a map that goes with the comparison, or None.
+        order: place in a report, the smallest first; those without come last, by name.
     """
 
     name: str
@@ -182,6 +183,7 @@ class Comparison:
     time_limit: float = 120.0
     timed: bool = True
     regimes: Regimes | None = None
+    order: float = math.inf
 
     def combinations(self, only: Mapping[str, list[float]] | None = None) -> list[dict[str, float | Edge]]:
         """Every combination of parameters, or those that fit ``only``; the scene as it is if nothing varies."""

@@ -23,8 +23,18 @@ _LADDER_RUNGS = 3
 
 
 def comparison_names() -> list[str]:
-    """Names of all comparisons, sorted; files of other studies say which with ``study = "…"``."""
-    return sorted(path.stem for path in data_folder("comparisons").glob("*.toml") if study_of(path) is None)
+    """Names of all comparisons in the order of a report; files of other studies say which with ``study = "…"``."""
+    paths = [path for path in data_folder("comparisons").glob("*.toml") if study_of(path) is None]
+    return [path.stem for path in sorted(paths, key=lambda path: (_order(path), path.stem))]
+
+
+def _order(path: Path) -> float:
+    """The place that a file asks for; of a broken one its reader is told."""
+    try:
+        order = read_toml(path).get("order", math.inf)
+    except InputError:
+        return math.inf
+    return order if isinstance(order, (int, float)) else math.inf
 
 
 def load_comparison(name: str) -> Comparison:

@@ -60,6 +60,7 @@ def interleaved(
     tasks: Mapping[str, Callable[[], float | None]],
     rounds: int = ROUNDS,
     progress: Callable[[str], None] | None = None,
+    once_above: float = np.inf,
 ) -> dict[str, Timing]:
     """Every task once per round, each round in another order; the first round only warms up.
 
@@ -67,11 +68,13 @@ def interleaved(
         tasks: measure something once and give seconds, or None where it cannot be measured: it is then left out.
         rounds: how many rounds count.
         progress: called with a task's name after each of its measurements.
+        once_above: what takes longer than this in the first round [s] is measured no more, and that value counts.
     """
     order = random.Random(0)
     found: dict[str, list[float]] = {name: [] for name in tasks}
+    once: dict[str, Timing] = {}
     for _ in range(rounds + 1):
-        names = list(found)
+        names = [name for name in found if name not in once]
         order.shuffle(names)
         for name in names:
             seconds = tasks[name]()
@@ -81,7 +84,9 @@ def interleaved(
                 del found[name]
             else:
                 found[name].append(seconds)
-    return {name: Timing(tuple(values[1:]), tuple(values[:1])) for name, values in found.items()}
+                if len(found[name]) == 1 and seconds > once_above:
+                    once[name] = Timing((seconds,))
+    return {name: once.get(name) or Timing(tuple(values[1:]), tuple(values[:1])) for name, values in found.items()}
 
 
 def ratio(numerator: Timing, denominator: Timing) -> Interval:

@@ -2,13 +2,14 @@
 
 from __future__ import annotations
 
+import base64
+import gzip
 from collections.abc import Callable
 from html.parser import HTMLParser
 from pathlib import Path
 from typing import Any
 
 import numpy as np
-import plotly.offline
 import pytest
 
 from proofroll.agreement import Verdict, judge
@@ -151,5 +152,18 @@ def parse() -> Callable[[str], Elements]:
 
 @pytest.fixture(scope="session")
 def html(written: tuple[dict[str, Any], Path]) -> str:
-    """The written page without plotly, which is as its makers ship it."""
-    return (written[1] / "report.html").read_text(encoding="utf-8").replace(plotly.offline.get_plotlyjs(), "")
+    """The written page."""
+    return (written[1] / "report.html").read_text(encoding="utf-8")
+
+
+@pytest.fixture(scope="session")
+def unpack(parse: Callable[[str], Elements]) -> Callable[[str, str], str]:
+    """The text of a compressed element of a page, as the browser would unpack it."""
+
+    def unpacked(html: str, name: str) -> str:
+        elements = parse(html)
+        scripts = [attributes for tag, attributes in elements.tags if tag == "script"]
+        (index,) = [i for i, attributes in enumerate(scripts) if attributes.get("id") == name]
+        return gzip.decompress(base64.b64decode(elements.scripts[index])).decode("utf-8")
+
+    return unpacked

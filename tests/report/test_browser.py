@@ -83,8 +83,9 @@ def test_requests_would_be_seen(tmp_path: Path, browse: Callable[..., tuple[str,
 
 ACTING = """<script>addEventListener("load", async () => {
   const drawn = [...document.querySelectorAll('figure[data-p="0"] .canvas')];
-  const wait = () => new Promise((resolve) => setTimeout(resolve, 300));
-  while (!drawn.every((element) => element.on)) await wait();
+  const wait = (time = 300) => new Promise((resolve) => setTimeout(resolve, time));
+  // Virtual time does not wait for what is unpacked meanwhile, so it passes in small steps.
+  while (!drawn.every((element) => element.on)) await wait(1);
   let told = 0;
   drawn.forEach((element) => element.on("plotly_relayout", () => told++));
   await Plotly.relayout(drawn[0], {"xaxis.range": [0.25, 0.5]});

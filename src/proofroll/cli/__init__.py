@@ -13,14 +13,16 @@ import typer
 import proofroll
 from proofroll.cli.bench import bench
 from proofroll.cli.common import ENGINE, INTERRUPTED, OK, USAGE, complain
-from proofroll.cli.comparing import compare, regimes, report
+from proofroll.cli.comparing import compare, regimes
 from proofroll.cli.drill import drill
 from proofroll.cli.figures import figures
 from proofroll.cli.ladder import ladder
 from proofroll.cli.listing import engines, scenes
+from proofroll.cli.recommend import recommend
+from proofroll.cli.report import report
 from proofroll.cli.single import onset, run
 from proofroll.cli.stability import stability
-from proofroll.cli.tradeoff import recommend, tradeoff
+from proofroll.cli.tradeoff import tradeoff
 from proofroll.errors import InputError, Missing, ProofrollError
 
 app = typer.Typer(

@@ -1,4 +1,4 @@
-"""Comparison files: verdicts, the report and the regime map."""
+"""Comparison files: verdicts and the regime map."""
 
 from __future__ import annotations
 
@@ -41,42 +41,13 @@ def compare(
     from proofroll.report.content import outcome_content
 
     loaded = load_comparison(comparison)
-    outcomes = _outcomes([loaded], engine or [], new_runner(out, fresh, jobs))
+    outcomes = outcomes_of([loaded], engine or [], new_runner(out, fresh, jobs))
     content = outcome_content(outcomes[0])
     if as_json:
         write_json(content)
     else:
-        _print_outcome(content)
-    raise typer.Exit(_exit_code(outcomes))
-
-
-def report(
-    studies: Annotated[list[str] | None, typer.Argument(help="Comparison files or names; all by default.")] = None,
-    engine: Engines = None,
-    out: Out = Path("out"),
-    fresh: Fresh = False,
-    jobs: Jobs = None,
-    as_json: Json = False,
-) -> None:
-    """Run the comparisons and write report.html and report.json."""
-    from proofroll.comparison_file import comparison_names, load_comparison
-    from proofroll.report.html import write_report
-
-    loaded = [load_comparison(name) for name in studies or comparison_names()]
-    runner = new_runner(out, fresh, jobs)
-    outcomes = _outcomes(loaded, engine or [], runner)
-    command = "proofroll report " + " ".join(studies or [])
-    maps = [_regime_maps(item, jobs) if item.regimes else [] for item in loaded]
-    content = write_report(outcomes, runner.store, out, command.strip(), maps)
-    if as_json:
-        write_json(content)
-    else:
-        for item in content["comparisons"]:
-            _print_outcome(item)
-        from proofroll.report.terminal import console
-
-        console().print(f"The report is in {out / 'report.html'}; the same content in {out / 'report.json'}.")
-    raise typer.Exit(_exit_code(outcomes))
+        print_outcome(content)
+    raise typer.Exit(exit_code(outcomes))
 
 
 def regimes(
@@ -92,7 +63,7 @@ def regimes(
 
     loaded = load_comparison(study)
     Store(out)  # fails before the work rather than after it
-    maps = _regime_maps(loaded, jobs)
+    maps = regime_maps_of(loaded, jobs)
     content = regime_content(maps)
     draw(maps, out / "regimes.svg")
     write_text(out / "regimes.json", json.dumps(content, indent=1))
@@ -109,38 +80,41 @@ def regimes(
     console().print(f"The map is in {out / 'regimes.svg'}, its numbers in {out / 'regimes.json'}.")
 
 
-def _outcomes(comparisons: list[Any], engines: list[str], runner: Runner) -> list[Outcome]:
-    """Runs all comparisons with one progress bar."""
+def outcomes_of(comparisons: list[Any], engines: list[str], runner: Runner, stage: str = "") -> list[Outcome]:
+    """Runs all comparisons with one progress bar; ``stage`` is put before what it says."""
     from proofroll.studies.compare import evaluate
     from proofroll.studies.planning import plan
 
     plans = [plan(comparison, engines, runner.workers) for comparison in comparisons]
     cases = {case.key: case for item in plans for case in item.cases}
-    with progress_bar("cases", total=len(cases)) as advance:
-        results = runner.run(cases.values(), lambda case, _: advance(case.engine.name))
+    with progress_bar(f"{stage}cases", total=len(cases)) as advance:
+        results = runner.run(cases.values(), lambda case, _: advance(f"{stage}{case.engine.name}"))
     if runner.damaged:
         complain(f"{len(runner.damaged)} stored results were damaged and have been run again")
     return [evaluate(item, results, runner) for item in plans]
 
 
-def _regime_maps(comparison: Any, jobs: int | None) -> list[Any]:
+def regime_maps_of(comparison: Any, jobs: int | None, stage: str = "") -> list[Any]:
     """The comparison's regime maps, with a progress bar."""
     import os
 
     from proofroll.studies.regimes import regime_maps
 
     total = comparison.regimes.count if comparison.regimes else None
-    with progress_bar("runs of the truth", total=total) as advance:
-        return regime_maps(comparison, jobs or os.cpu_count() or 1, lambda count: advance("runs of the truth", count))
+    words = f"{stage}runs of the truth"
+    with progress_bar(words, total=total) as advance:
+        return regime_maps(comparison, jobs or os.cpu_count() or 1, lambda count: advance(words, count))
 
 
-def _exit_code(outcomes: list[Outcome]) -> int:
+def exit_code(outcomes: list[Outcome]) -> int:
+    """3 if an engine was lost, 1 if a verdict contradicts its file, else 0."""
     if any(outcome.lost for outcome in outcomes):
         return ENGINE
     return CONTRADICTED if any(outcome.contradictions for outcome in outcomes) else OK
 
 
-def _print_outcome(content: dict[str, Any]) -> None:
+def print_outcome(content: dict[str, Any]) -> None:
+    """A comparison on the terminal: the table of verdicts, and what came of it in words."""
     from proofroll.report.terminal import closing_lines, console, verdict_table
 
     out = console()

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import json
 from pathlib import Path
 from typing import Annotated
 
@@ -39,29 +38,19 @@ def stability(
     as_json: Json = False,
 ) -> None:
     """Map up to which step or tolerance each engine is stable, and right, along axes of extremes."""
-    from proofroll.plain import plain
     from proofroll.report.stability_map import draw
-    from proofroll.store import write_text
     from proofroll.studies.axes import chosen
+    from proofroll.studies.keeping import make_stability
     from proofroll.studies.places import QUICK, Effort
-    from proofroll.studies.stability import stability as mapped
     from proofroll.studies.stability_claims import file_for
-    from proofroll.studies.stability_content import content
-    from proofroll.studies.stability_reproducers import write_reproducers
 
     asked = file_for(scene)
     axes = chosen(asked.axes, axis or [])
-    runner = new_runner(out, fresh, jobs)
     effort = QUICK if quick else Effort()
+    runner = new_runner(out, fresh, jobs)
     with progress_bar("stability", None) as advance:
-        found = mapped(asked.scene, axes, runner, engines=engine or [], effort=effort, progress=advance)
-    study = content(found)
-    folder = out / "stability"
-    write_reproducers(found, study, folder / "reproducers", runner.workers)
-    contradictions = asked.contradictions(study)
-    study["claims"] = {"file": asked.name, "contradictions": contradictions}
-    path = folder / f"{found.scene}.json"
-    write_text(path, json.dumps(plain(study)))
+        study, path = make_stability(asked, axes, runner, out, engines=engine or [], effort=effort, progress=advance)
+    contradictions = study["claims"]["contradictions"]
     draw(study, path.with_suffix(".svg"))
     if as_json:
         write_json(study)

@@ -1,10 +1,7 @@
-"""Speed against accuracy: the curves, and the recommendation made from them."""
+"""Speed against accuracy: the curves of error against cost."""
 
 from __future__ import annotations
 
-import json
-import re
-import sys
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
 
@@ -29,17 +26,15 @@ if TYPE_CHECKING:
     from proofroll.studies.claims import TradeoffClaims
     from proofroll.studies.sweep import Question
 
-_SceneOrFile = Annotated[
+SceneOrFile = Annotated[
     str, typer.Argument(help="A scene, or a comparison file for it, e.g. comparisons/tradeoff.toml.")
 ]
-_Until = Annotated[float | None, typer.Option("--until", help="Length of every run [s].")]
+Until = Annotated[float | None, typer.Option("--until", help="Length of every run [s].")]
 _DEFAULT_UNTIL = 2.0
-# Of SI, before the unit of a tolerance; the second µ is the Greek letter.
-_PREFIXES = {"k": 1e3, "m": 1e-3, "µ": 1e-6, "\u03bc": 1e-6, "u": 1e-6, "n": 1e-9}
 
 
 def tradeoff(
-    scene: _SceneOrFile,
+    scene: SceneOrFile,
     quantity: Annotated[
         list[str] | None, typer.Option(help="Observable to show; repeat. The first decides how far curves go.")
     ] = None,
@@ -50,7 +45,7 @@ def tradeoff(
     over: Annotated[
         list[str] | None, typer.Option(help="parameter=low:high over which the best points are checked; repeat.")
     ] = None,
-    until: _Until = None,
+    until: Until = None,
     every_point: Annotated[bool, typer.Option("--all", help="List every point, not only the best.")] = False,
     out: Out = Path("out"),
     fresh: Fresh = False,
@@ -58,17 +53,20 @@ def tradeoff(
     as_json: Json = False,
 ) -> None:
     """Measure error against cost for every engine, formulation and setting, from coarse to fine."""
-    from proofroll.report.tradeoff_tables import budget_lines, budget_table, front_tables, point_table
+    from proofroll.report.tradeoff_tables import (
+        budget_lines,
+        budget_table,
+        default_quantities,
+        front_tables,
+        point_table,
+    )
     from proofroll.report.work_precision import draw
-    from proofroll.studies.tradeoff import stored
 
-    claims, question = _question(scene, settings, quantity, until)
-    _require_observables(question, quantity or [])
+    claims, question = question_of(scene, settings, quantity, until)
+    require_observables(question, quantity or [])
     ranges = _ranges(question, over) if over is not None else (claims.over if claims else {})
-    study = _measure(question, engine or [], ranges, out, fresh=fresh, jobs=jobs)
-    contradictions = claims.contradictions(study) if claims and not engine else []
-    study["claims"] = {"file": claims.name if claims else None, "contradictions": contradictions}
-    path = stored(out, question, engine or ())
+    study, path = measure(question, engine or [], ranges, claims, out, fresh=fresh, jobs=jobs)
+    contradictions = study["claims"]["contradictions"]
     shown = [name for name in quantity or [] if name in study["quantities"]] or default_quantities(study)
     draw(study, shown, path.with_suffix(".svg"))
     if as_json:
@@ -95,59 +93,7 @@ def tradeoff(
     raise typer.Exit(CONTRADICTED if contradictions else OK)
 
 
-def recommend(
-    scene: _SceneOrFile,
-    quantity: Annotated[str, typer.Option(help="Observable that matters.")] = "",
-    tolerance: Annotated[
-        str, typer.Option(help="Largest error: 1e-3 in its unit, '1 mm', or '1 %' of its scale.")
-    ] = "",
-    budget: Annotated[float | None, typer.Option(help="Wall seconds per simulated second that you can afford.")] = None,
-    settings: Set = None,
-    engine: Annotated[
-        list[str] | None, typer.Option(help="Choose among these engines, name[key=value,…]; repeat.")
-    ] = None,
-    until: _Until = None,
-    measure: Annotated[bool, typer.Option("--measure", help="Measure first if no curves are stored.")] = False,
-    out: Out = Path("out"),
-    jobs: Jobs = None,
-    as_json: Json = False,
-) -> None:
-    """Name the cheapest engine, formulation and step that holds a tolerance here, and why.
-
-    It chooses among models of engines; solutions of the scene's own equations (closed form, reduced, projection) are
-    told apart, unless --engine asks for them. Of the cheaper ones, which all fail, the most accurate is shown.
-    """
-    from proofroll.metrics import units
-    from proofroll.registry import parse_engine, require_engine
-    from proofroll.report.tradeoff_tables import answer_lines
-    from proofroll.studies.recommend import Wish
-    from proofroll.studies.recommend import recommend as answered
-
-    claims, question = _question(scene, settings, [quantity] if quantity else None, until)
-    _require_observables(question, [question.quantity])  # before minutes are spent on measuring
-    for text in engine or []:
-        require_engine(parse_engine(text).name)
-    unit = units(question.loaded().rolling)[question.quantity]
-    wish = Wish(question.quantity, _tolerance(tolerance, unit), _positive("budget", budget), tuple(engine or ()))
-    study = _stored_study(question, engine or [], claims, out, jobs, measure=measure)
-    answer = answered(study, wish)
-    if as_json:
-        write_json(answer)
-    else:
-        from proofroll.report.terminal import console
-
-        for line in answer_lines(answer):
-            console().print(line, markup=False)
-    raise typer.Exit(OK if answer["choice"] and answer["affordable"] else CONTRADICTED)
-
-
-def default_quantities(study: dict[str, Any]) -> list[str]:
-    """Path, reaction, onset and energy, as far as the scene has them."""
-    wanted = [study["quantity"], "N", "F3", "first_slip", "energy_balance"]
-    return [name for name in dict.fromkeys(wanted) if name in study["quantities"]][:4]
-
-
-def _question(
+def question_of(
     scene: str, settings: list[str] | None, quantities: list[str] | None, until: float | None
 ) -> tuple[TradeoffClaims | None, Question]:
     """What is asked: the file's own question, or another about its scene, for which the file then claims nothing."""
@@ -172,7 +118,7 @@ def _question(
     return None, Question(name, {key: loaded.parameters[key] for key in given}, length, quantity)
 
 
-def _require_observables(question: Question, names: list[str]) -> None:
+def require_observables(question: Question, names: list[str]) -> None:
     """Refuses what no run of the scene can be asked for."""
     from proofroll.metrics import units
 
@@ -200,92 +146,19 @@ def _ranges(question: Question, texts: list[str]) -> dict[str, list[float]]:
     return found
 
 
-def _tolerance(text: str, unit: str) -> Any:
-    """Reads ``1e-3``, ``1e-3 m``, ``1 mm`` or ``1 %``."""
-    from proofroll.comparison import Tolerance
-
-    if not text:
-        raise InputError("tolerance", text, "give the largest error that you can bear, e.g. --tolerance 1e-3")
-    advice = f"write a positive number in {unit}, e.g. 1e-3, or 1 % of the quantity's scale"
-    found = re.fullmatch(r"\s*([-+]?[\d.]+(?:[eE][-+]?\d+)?)\s*(\S*)\s*", text)
-    if found is None:
-        raise InputError("tolerance", text, advice)
-    number, given = found[1], found[2] or unit
-    if given not in {unit, "%"}:
-        if given[1:] != unit or given[0] not in _PREFIXES:
-            raise InputError("tolerance", text, f"the unit of this quantity is {unit}")
-        number = f"{float(number) * _PREFIXES[given[0]]:.17g}"
-    try:
-        return Tolerance.parse("tolerance", f"{number} {given if given == '%' else unit}")
-    except InputError:
-        raise InputError("tolerance", text, advice) from None
-
-
-def _positive(name: str, value: float | None) -> float | None:
-    if value is not None and not 0 < value < float("inf"):
-        raise InputError(name, value, "give a positive number of seconds")
-    return value
-
-
-def _stored_study(
-    question: Question,
-    engines: list[str],
-    claims: TradeoffClaims | None,
-    out: Path,
-    jobs: int | None,
-    *,
-    measure: bool,
-) -> dict[str, Any]:
-    """The stored curves, of all engines or of those that are asked for, or new ones if the user agrees.
-
-    Raises:
-        InputError: there are none that hold here, and nobody agreed to measure them.
-    """
-    from proofroll.studies import installed
-    from proofroll.studies.tradeoff import stored
-
-    reasons = ["no curves are stored for this question"]
-    for path in (stored(out, question), stored(out, question, engines)):
-        try:
-            study: dict[str, Any] = json.loads(path.read_text(encoding="utf-8"))
-            reasons = installed.changes(study["measured"])
-        except (OSError, ValueError, KeyError, TypeError):
-            continue
-        if not reasons:
-            return study
-    why = "; ".join(reasons[:3]) + (f"; and {len(reasons) - 3} more" if len(reasons) > 3 else "")
-    if not measure and sys.stdin.isatty() and sys.stderr.isatty():
-        measure = typer.confirm(f"{why}. Measure now (some minutes)?", err=True)
-    if not measure:
-        advice = f"{why}; add --measure, which takes some minutes, or run proofroll tradeoff first"
-        raise InputError("stored curves", "none that hold here", advice)
-    return _measure(question, engines, claims.over if claims else {}, out, fresh=False, jobs=jobs)
-
-
-def _measure(
+def measure(
     question: Question,
     engines: list[str],
     over: dict[str, list[float]],
+    claims: TradeoffClaims | None,
     out: Path,
     *,
     fresh: bool,
     jobs: int | None,
-) -> dict[str, Any]:
-    """Measures, and stores what a recommendation can be made from."""
-    from proofroll.store import write_text
-    from proofroll.studies.tradeoff import stored
-    from proofroll.studies.tradeoff import tradeoff as measured
-    from proofroll.studies.tradeoff_content import content
-    from proofroll.timing import write_benchmarks
+) -> tuple[dict[str, Any], Path]:
+    """Measures and keeps the curves that a recommendation can be made from, with a progress bar."""
+    from proofroll.studies.keeping import make_tradeoff
 
     runner = new_runner(out, fresh, jobs)
     with progress_bar("runs and timings") as advance:
-        found = measured(question, runner, engines=engines, over=over, progress=advance)
-    study = content(found)
-    path = stored(out, question, engines)
-    write_text(path, json.dumps(study))
-    names = {
-        point.case.key: f"{curve.engine} {point.step or ''}".strip() for curve in found.curves for point in curve.points
-    }
-    write_benchmarks({names[key]: timing for key, timing in found.timings.items()}, path.with_suffix(".pyperf.json"))
-    return study
+        return make_tradeoff(question, runner, out, engines=engines, over=over, claims=claims, progress=advance)

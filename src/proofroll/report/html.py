@@ -2,22 +2,30 @@
 
 from __future__ import annotations
 
+import functools
 import json
 import shlex
+from collections.abc import Mapping
 from datetime import UTC, datetime
 from pathlib import Path
+from types import MappingProxyType
 from typing import TYPE_CHECKING, Any
 
 from proofroll.plain import plain
-from proofroll.report import labels, onset_tables, tables
+from proofroll.report import heat_map, labels, onset_tables, study_tables, tables
 from proofroll.report.content import environment, outcome_content
 from proofroll.report.findings import findings
 from proofroll.report.onsets import add_events, mark, truth_facts
-from proofroll.report.plots import point_curves, styles
-from proofroll.report.regime_map import counts, inline
+from proofroll.report.packing import packed
+from proofroll.report.parts import KEYS
+from proofroll.report.plots import styles
+from proofroll.report.regime_map import counts
+from proofroll.report.summary import three_sentences
+from proofroll.report.tradeoff_tables import name_of
 from proofroll.scene_file import load_scene
-from proofroll.store import Store, write_text
+from proofroll.store import Store
 from proofroll.studies.compare import Outcome
+from proofroll.studies.numbers import SYMBOLS
 from proofroll.trajectory import read
 
 if TYPE_CHECKING:
@@ -30,34 +38,39 @@ if TYPE_CHECKING:
 
 
 def write_report(outcomes: list[Outcome], store: Store, out: Path, command: str, maps: Maps = ()) -> dict[str, Any]:
-    """Writes ``report.html`` and ``report.json``.
+    """Writes ``report.html`` and ``report.json`` of comparisons alone.
 
     Args:
         outcomes: what was compared.
-        store: where the trajectories are.
+        store: where the trajectories are: a folder in that of the report.
         out: folder of the report.
         command: that makes the report again.
         maps: the regime maps of each comparison, empty where it has none.
 
     Returns:
-        the content of both files as plain data: ``date``, ``comparisons`` and ``environment``.
+        the content of both files as plain data, as :func:`report_content` has it.
 
     Raises:
         ProofrollError: the folder cannot be written.
     """
-    content = report_content(outcomes, store, command, maps)
-    curves = [point_curves(outcome, store) for outcome in outcomes]
-    pictures = [inline(found, f"map{index}-") if found else "" for index, found in enumerate(maps)]
-    write_text(out / "report.json", json.dumps(content, indent=1, allow_nan=False) + "\n")
-    write_text(out / "report.html", page(content, curves, pictures))
-    return content
+    from proofroll.report.whole import begun
+
+    report = begun(outcomes, store, command, maps)
+    report.write(out)
+    return report.content
 
 
 def report_content(outcomes: list[Outcome], store: Store, command: str, maps: Maps = ()) -> dict[str, Any]:
-    """All that the report says, as plain data."""
+    """All that the report says, as plain data.
+
+    ``findings`` on the whole, ``comparisons``, the entries of further studies under ``figures``, ``tradeoffs`` and
+    ``stability``, ``date`` and ``environment``. Paths of files are relative to the folder of the report.
+    """
     comparisons = []
     for index, outcome in enumerate(outcomes):
         content = outcome_content(outcome)
+        for run in content["runs"]:
+            run["trajectory"] = run["trajectory"] and f"{store.folder.name}/{run['trajectory']}"
         content["truths"] = _truths(outcome, store)
         content["findings"] = findings(content)
         content["regimes"] = counts(maps[index]) if index < len(maps) else []
@@ -70,21 +83,24 @@ def report_content(outcomes: list[Outcome], store: Store, command: str, maps: Ma
     content = {
         "date": datetime.now(UTC).isoformat(timespec="seconds"),
         "comparisons": comparisons,
+        **{key: [] for key in KEYS},
         "environment": environment(command, versions),
     }
+    content["findings"] = {"sentences": three_sentences(content)}
     return dict(plain(content))
 
 
-def page(content: dict[str, Any], curves: list[list[dict[str, Any]]], pictures: Sequence[str] = ()) -> str:
+def page(
+    content: dict[str, Any], curves: list[list[dict[str, Any]]], pictures: Mapping[str, str] = MappingProxyType({})
+) -> str:
     """The HTML page.
 
     Args:
         content: from :func:`report_content`.
         curves: from :func:`proofroll.report.plots.point_curves`, one list for each comparison.
-        pictures: for each comparison its regime maps as markup, empty where it has none.
+        pictures: markup by name: ``map0`` are the regime maps of the first comparison, the others belong to
+            further studies; what is not there is left out.
     """
-    import plotly.offline
-
     drawn = {
         "rows": [_drawn_rows(comparison) for comparison in content["comparisons"]],
         "points": [mark(*pair) for pair in zip(content["comparisons"], curves, strict=True)],
@@ -95,24 +111,26 @@ def page(content: dict[str, Any], curves: list[list[dict[str, Any]]], pictures: 
         .render(
             content=content,
             curves=curves,
-            pictures=[*pictures, *[""] * (len(content["comparisons"]) - len(pictures))],
+            pictures=pictures,
             styles=[styles(comparison["rows"]) for comparison in content["comparisons"]],
-            data=_script_json(drawn),
-            plotly=plotly.offline.get_plotlyjs(),
+            data=packed(json.dumps(drawn, allow_nan=False, separators=(",", ":"))),
+            plotly=_plotly(),
         )
     )
     return text.encode("utf-8", "replace").decode("utf-8")  # a lone surrogate from an engine's message
 
 
+@functools.cache
+def _plotly() -> str:
+    """The program that draws, compressed."""
+    import plotly.offline
+
+    return packed(plotly.offline.get_plotlyjs())
+
+
 def _drawn_rows(comparison: dict[str, Any]) -> list[dict[str, Any]]:
     rows = comparison["rows"]
     return [{"name": name, **style} for name, style in zip(labels.names(rows), styles(rows), strict=True)]
-
-
-def _script_json(value: object) -> str:
-    """JSON for a script element: no character in it can end the element."""
-    text = json.dumps(value, allow_nan=False, separators=(",", ":"), ensure_ascii=True)
-    return text.replace("<", "\\u003c").replace(">", "\\u003e").replace("&", "\\u0026")
 
 
 def _templates() -> jinja2.Environment:
@@ -136,9 +154,13 @@ def _templates() -> jinja2.Environment:
         "clock": onset_tables.clock,
         "bracket": onset_tables.bracket,
         "between": onset_tables.between,
+        "name_of": name_of,
+        "dimensionless": lambda name: SYMBOLS.get(name, name),
     }
     made.globals |= {
         "tables": tables,
+        "studies": study_tables,
+        "heat_map": heat_map.table,
         "onsets": onset_tables,
         "names": labels.names,
         "symbols": labels.SYMBOLS,
@@ -161,7 +183,11 @@ def _truths(outcome: Outcome, store: Store) -> list[dict[str, Any]]:
     found = []
     for name, case in outcome.truths.items():
         path = store.trajectory(case)
-        entry: dict[str, Any] = {"point": name, "parameters": case.parameters, "trajectory": path.name}
+        entry: dict[str, Any] = {
+            "point": name,
+            "parameters": case.parameters,
+            "trajectory": f"{store.folder.name}/{path.name}",
+        }
         if path.is_file():
             dataset = read(path)
             entry |= {key: dataset.attrs.get(key, "") for key in ("route", "second_route")}

@@ -118,7 +118,7 @@ def _panel(panel: Any, study: Mapping[str, Any], axis: Mapping[str, Any], curves
     names = {point["curve"]: label(point) for point in study["points"]}
     for point in points:
         x, y = values.index(point["value"]), curves.index(point["curve"])
-        text, shade = _cell(point)
+        text, shade = cell(point)
         face = "#ffffff" if shade is None else colours(shade)
         hatch = "////" if text.startswith("–") else None
         panel.add_patch(_rectangle(x, y, face, hatch))
@@ -146,10 +146,10 @@ def _rectangle(x: int, y: int, face: Any, hatch: str | None) -> Any:
     return Rectangle((x - 0.5, y - 0.5), 1, 1, facecolor=face, hatch=hatch, edgecolor="0.8", lw=0.5)
 
 
-def _cell(point: Mapping[str, Any]) -> tuple[str, float | None]:
+def cell(point: Mapping[str, Any]) -> tuple[str, float | None]:
     """Text of a cell and its place between the lightest (0, cheap) and the darkest colour; None: no colour."""
     largest, failure = point["largest_accurate"], point["failure"]
-    beyond = (LETTERS[failure] + ("!" if point["silent"] else "")) if failure else ""
+    beyond = (LETTERS.get(failure, failure) + ("!" if point["silent"] else "")) if failure else ""
     if point["problem"]:
         return f"? {beyond}".strip(), None
     if largest is None:

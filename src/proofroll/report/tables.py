@@ -46,6 +46,13 @@ def overview(content: dict[str, Any], comparison: int) -> dict[str, Any]:
     return _matrix(content, lines)
 
 
+def counted(content: dict[str, Any]) -> str:
+    """How many settings have which verdict, in one line."""
+    verdicts = [row["verdict"] for row in content["rows"]]
+    said = ", ".join(f"{sign} {verdicts.count(word)} {word}" for word, sign in SYMBOLS.items() if word in verdicts)
+    return f"{len(verdicts)} settings: {said}; " + ("as expected" if content["as_expected"] else "not as expected")
+
+
 def at_point(content: dict[str, Any], comparison: int, point: int, name: str) -> dict[str, Any]:
     """The verdict matrix of one point of the parameters."""
     lines = []

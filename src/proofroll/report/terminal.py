@@ -139,3 +139,47 @@ def closing_lines(content: dict[str, Any]) -> list[str]:
     else:
         lines.append("Every verdict is as the comparison file expects.")
     return lines
+
+
+def part_lines(content: dict[str, Any]) -> list[str]:
+    """One line for each further study of a report."""
+    lines = []
+    for entry in content["figures"]:
+        if entry["study"] is not None:
+            holds = [item["holds"] for item in entry["study"]["statements"]]
+            lines.append(f"{entry['name']}: {holds.count(True)} of {len(holds)} statements hold.")
+    for entry in content["tradeoffs"]:
+        if entry["study"] is not None:
+            held = [claim["holds"] for claim in entry["claims"]]
+            lines.append(
+                f"{entry['name']}: {len(entry['study']['points'])} points; {sum(held)} of {len(held)} claims hold."
+            )
+    for entry in content["stability"]:
+        if entry["study"] is not None:
+            study, held = entry["study"], [not claim["against"] for claim in entry["claims"]]
+            lines.append(
+                f"{entry['name']}: {study['silent']} of {study['boundaries']} boundaries are silent; "
+                f"{sum(held)} of {len(held)} claims hold."
+            )
+    return lines
+
+
+def first_lines(content: dict[str, Any]) -> list[str]:
+    """What to look at first, in at most three lines."""
+    entries = [entry for key in ("figures", "tradeoffs", "stability") for entry in content[key]]
+    unexpected = [line for item in (*content["comparisons"], *entries) for line in item["contradictions"]]
+    missing = [entry for entry in entries if entry["missing"]]
+    lines = []
+    if unexpected:
+        lines.append(_cut(f"Look first at what was not expected ({len(unexpected)}): {unexpected[0]}"))
+    if missing:
+        lines.append(_cut(f"Missing ({len(missing)}): {missing[0]['title']}: {missing[0]['missing']}"))
+    if not unexpected:
+        lines.append(_cut(f"Look first at what is silent: {content['findings']['sentences'][1]}"))
+    return lines
+
+
+def _cut(text: str) -> str:
+    """A text as one line of the terminal."""
+    text = " ".join(text.split())
+    return text if len(text) <= WIDTH else f"{text[: WIDTH - 1]}…"

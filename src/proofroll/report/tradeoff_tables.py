@@ -11,6 +11,12 @@ from rich.text import Text
 from proofroll.report.labels import error, number
 
 
+def default_quantities(study: Mapping[str, Any]) -> list[str]:
+    """Path, reaction, onset and energy, as far as the scene has them."""
+    wanted = [study["quantity"], "N", "F3", "first_slip", "energy_balance"]
+    return [name for name in dict.fromkeys(wanted) if name in study["quantities"]][:4]
+
+
 def name_of(point: Mapping[str, Any]) -> str:
     """Engine, formulation and preset of a point."""
     settings = point["settings"]

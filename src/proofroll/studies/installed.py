@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import datetime
 import hashlib
 import re
 from importlib.metadata import PackageNotFoundError, entry_points, requires, version
@@ -37,6 +38,16 @@ def code() -> str:
         if file.relative_to(root).parts[0] not in _ASIDE:
             content.update(file.read_bytes())
     return content.hexdigest()[:16]
+
+
+def measured() -> dict[str, object]:
+    """When, on which machine and with which versions and code a study is being made."""
+    return {
+        "when": datetime.datetime.now(datetime.UTC).isoformat(timespec="seconds"),
+        "machine": machine(),
+        "versions": versions(),
+        "code": code(),
+    }
 
 
 def changes(measured: dict[str, object]) -> list[str]:

@@ -245,5 +245,6 @@ def _told(point: _Point | None, wish: Wish, reason: str) -> dict[str, Any] | Non
         "error": point["error"].get(wish.quantity),
         "seconds_per_second": point["seconds_per_second"],
         "interval": point["interval"],
+        "measurements": point.get("measurements"),
         "reason": reason,
     }

@@ -27,6 +27,10 @@ from proofroll.studies.sweep import Curve, Point, Question, case_of, curves_of, 
 from proofroll.timing import ROUNDS, Timing, interleaved
 from proofroll.workers import Workers
 
+# What makes up most of a study's time is the repetition of measurements. A brief one repeats less: in three rounds an
+# outlier does not decide the median; a run longer than this [s] warms itself up, and is measured once.
+BRIEF_ROUNDS, BRIEF_ONCE = 3, 0.5
+
 
 @dataclass(frozen=True)
 class Corner:
@@ -58,6 +62,7 @@ class Tradeoff:
         timings: by the key of a case.
         corners: by the key of a case: its runs over the range.
         over: parameter -> values; the range over which the best points were checked.
+        brief: whether speeds were measured less often, as the option of :func:`tradeoff` says.
     """
 
     question: Question
@@ -68,6 +73,7 @@ class Tradeoff:
     timings: dict[str, Timing] = field(default_factory=dict)
     corners: dict[str, list[Corner]] = field(default_factory=dict)
     over: dict[str, list[float]] = field(default_factory=dict)
+    brief: bool = False
 
     @property
     def reference(self) -> Reference:
@@ -95,6 +101,7 @@ def tradeoff(
     engines: Iterable[str] = (),
     over: Mapping[str, Sequence[float]] | None = None,
     rounds: int = ROUNDS,
+    brief: bool = False,
     progress: Progress | None = None,
 ) -> Tradeoff:
     """Runs the study.
@@ -105,6 +112,7 @@ def tradeoff(
         engines: names or ``name[key=value,…]``; all that are installed if empty.
         over: parameter -> values; every combination is a corner of the range.
         rounds: how often every speed is measured.
+        brief: measure every speed :data:`BRIEF_ROUNDS` times at most, and that of a long run once.
         progress: called with a short text after every run and every measurement.
 
     Raises:
@@ -124,7 +132,7 @@ def tradeoff(
 
     references = sweep(question, curves, runner, told)
     truth = next(iter(runner.run([_truth_case(question, references, runner)]).values()))
-    found = Tradeoff(question, curves, absent, references, truth.wall_seconds / question.until)
+    found = Tradeoff(question, curves, absent, references, truth.wall_seconds / question.until, brief=brief)
     found.timings = _timed(found, runner.workers, rounds, progress)
     if over:
         found.over = {name: [float(value) for value in values] for name, values in over.items()}
@@ -146,7 +154,8 @@ def _timed(found: Tradeoff, workers: Workers, rounds: int, progress: Progress | 
     with Stopwatch(workers) as stopwatch:
         return interleaved(
             {key: lambda case=case: stopwatch(case) for key, case in cases.items()},  # type: ignore[misc]
-            rounds,
+            min(rounds, BRIEF_ROUNDS) if found.brief else rounds,
+            once_above=BRIEF_ONCE if found.brief else np.inf,
             progress=(lambda key: progress(f"timing {cases[key].engine.name}")) if progress else None,
         )
 
@@ -211,14 +220,16 @@ def pareto_entries(
     return entries
 
 
-def stored(folder: Path, question: Question, engines: Iterable[str] = ()) -> Path:
+def stored(folder: Path, question: Question, engines: Iterable[str] = (), *, brief: bool = False) -> Path:
     """Where the study of a question is stored under the folder of results.
 
     Args:
         folder: of all results.
         question: what was swept.
         engines: those to which it was restricted; such a study has a file of its own.
+        brief: likewise.
     """
     scene = question.loaded()
     identity = json.dumps([scene.digest, question.until, *sorted(engines)])
-    return folder / "tradeoff" / f"{scene.name}-{hashlib.sha256(identity.encode()).hexdigest()[:10]}.json"
+    digest = hashlib.sha256(identity.encode()).hexdigest()[:10]
+    return folder / "tradeoff" / f"{scene.name}-{digest}{'-brief' if brief else ''}.json"

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import dataclasses
-import datetime
 from collections.abc import Iterable, Sequence
 from typing import Any
 
@@ -19,7 +18,6 @@ from proofroll.studies.recommend import by_hand
 from proofroll.studies.sweep import BROKEN, Curve, Point
 from proofroll.studies.tradeoff import Tradeoff, judged_quantities, pareto_entries
 from proofroll.surfaces import FloatArray
-from proofroll.timing import machine
 
 
 def budgets(found: Tradeoff) -> list[tuple[Curve, Budget]]:
@@ -76,12 +74,8 @@ def content(found: Tradeoff) -> dict[str, Any]:
         "truth": {"seconds_per_second": found.truth_seconds, "route": reference.dataset.attrs.get("route", "")},
         "over": found.over,
         "findings": findings(found, made),
-        "measured": {
-            "when": datetime.datetime.now(datetime.UTC).isoformat(timespec="seconds"),
-            "machine": machine(),
-            "versions": installed.versions(),
-            "code": installed.code(),
-        },
+        "brief": found.brief,
+        "measured": installed.measured(),
     }
     return dict(plain(document))
 
@@ -118,6 +112,7 @@ def _point(curve: Curve, point: Point, number: int, held: dict[str, float], foun
         "envelope": {name: value for name, value in held.items() if name in point.errors},
         "seconds_per_second": timing.interval.value if timing else None,
         "interval": [timing.interval.low, timing.interval.high] if timing else None,
+        "measurements": len(timing.values) if timing else 0,
         "corners": [dataclasses.asdict(corner) for corner in corners] if corners is not None else None,
     }
 

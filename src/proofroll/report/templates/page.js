@@ -2,21 +2,21 @@
 (() => {
   const seen = new Map();      // figure -> its plotly element, once drawn
   const hidden = new Map();    // comparison -> rows that are switched off
-  let cache;
+  let curves;                  // of all figures
+  let ready;                   // a promise: the curves are there, and plotly is a program
 
-  const data = () => (cache ??= JSON.parse(document.getElementById("curves").textContent));
+  const data = () => curves;
   const off = (c) => hidden.get(c) ?? hidden.set(c, new Set()).get(c);
   const css = (name) => getComputedStyle(document.documentElement).getPropertyValue(name).trim();
   const siblings = (figure) => [...seen.keys()].filter((f) => f !== figure && f.parentNode === figure.parentNode);
 
-  function plotly() {
-    if (!window.Plotly) {
-      const script = document.createElement("script");
-      script.textContent = document.getElementById("plotly").textContent;
-      document.head.append(script);
-    }
-    return window.Plotly;
-  }
+  const plotly = () => window.Plotly;
+  const prepare = () => (ready ??= Promise.all([unpack("curves"), unpack("plotly")]).then(([text, program]) => {
+    curves = JSON.parse(text);
+    const script = document.createElement("script");
+    script.textContent = program;
+    document.head.append(script);
+  }));
 
   // plotly reads a few HTML tags and %{…} in names: show them as they are written.
   const literal = (text) =>
@@ -197,11 +197,12 @@
   reveal();
 
   const watcher = new IntersectionObserver((entries) => {
-    for (const entry of entries) if (entry.isIntersecting) { watcher.unobserve(entry.target); draw(entry.target); }
+    for (const entry of entries) if (entry.isIntersecting) { watcher.unobserve(entry.target); prepare().then(() => draw(entry.target)); }
   }, { rootMargin: "200px" });
   document.querySelectorAll("figure[data-o]").forEach((figure) => watcher.observe(figure));
 
   addEventListener("beforeprint", () => {
+    if (!curves) return;
     document.querySelectorAll("details[open] figure[data-o]").forEach((figure) => { if (figure.offsetParent) draw(figure); });
     redraw();
   });

@@ -1,0 +1,128 @@
+"""The cheapest choice that holds a tolerance, from curves that have been measured."""
+
+from __future__ import annotations
+
+import re
+import sys
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated, Any
+
+import typer
+
+from proofroll.cli.common import CONTRADICTED, OK, Jobs, Json, Out, Set, write_json
+from proofroll.cli.tradeoff import SceneOrFile, Until, measure, question_of, require_observables
+from proofroll.errors import InputError
+
+if TYPE_CHECKING:
+    from proofroll.studies.claims import TradeoffClaims
+    from proofroll.studies.sweep import Question
+
+# Of SI, before the unit of a tolerance; the second µ is the Greek letter.
+_PREFIXES = {"k": 1e3, "m": 1e-3, "µ": 1e-6, "\u03bc": 1e-6, "u": 1e-6, "n": 1e-9}
+
+
+def recommend(
+    scene: SceneOrFile,
+    quantity: Annotated[str, typer.Option(help="Observable that matters.")] = "",
+    tolerance: Annotated[
+        str, typer.Option(help="Largest error: 1e-3 in its unit, '1 mm', or '1 %' of its scale.")
+    ] = "",
+    budget: Annotated[float | None, typer.Option(help="Wall seconds per simulated second that you can afford.")] = None,
+    settings: Set = None,
+    engine: Annotated[
+        list[str] | None, typer.Option(help="Choose among these engines, name[key=value,…]; repeat.")
+    ] = None,
+    until: Until = None,
+    measure_first: Annotated[bool, typer.Option("--measure", help="Measure first if no curves are stored.")] = False,
+    out: Out = Path("out"),
+    jobs: Jobs = None,
+    as_json: Json = False,
+) -> None:
+    """Name the cheapest engine, formulation and step that holds a tolerance here, and why.
+
+    It chooses among models of engines; solutions of the scene's own equations (closed form, reduced, projection) are
+    told apart, unless --engine asks for them. Of the cheaper ones, which all fail, the most accurate is shown.
+    """
+    from proofroll.metrics import units
+    from proofroll.registry import parse_engine, require_engine
+    from proofroll.report.tradeoff_tables import answer_lines
+    from proofroll.studies.recommend import Wish
+    from proofroll.studies.recommend import recommend as answered
+
+    claims, question = question_of(scene, settings, [quantity] if quantity else None, until)
+    require_observables(question, [question.quantity])  # before minutes are spent on measuring
+    for text in engine or []:
+        require_engine(parse_engine(text).name)
+    unit = units(question.loaded().rolling)[question.quantity]
+    wish = Wish(question.quantity, _tolerance(tolerance, unit), _positive("budget", budget), tuple(engine or ()))
+    study = _stored_study(question, engine or [], claims, out, jobs, measure_first=measure_first)
+    answer = answered(study, wish)
+    if as_json:
+        write_json(answer)
+    else:
+        from proofroll.report.terminal import console
+
+        for line in answer_lines(answer):
+            console().print(line, markup=False)
+    raise typer.Exit(OK if answer["choice"] and answer["affordable"] else CONTRADICTED)
+
+
+def _tolerance(text: str, unit: str) -> Any:
+    """Reads ``1e-3``, ``1e-3 m``, ``1 mm`` or ``1 %``."""
+    from proofroll.comparison import Tolerance
+
+    if not text:
+        raise InputError("tolerance", text, "give the largest error that you can bear, e.g. --tolerance 1e-3")
+    advice = f"write a positive number in {unit}, e.g. 1e-3, or 1 % of the quantity's scale"
+    found = re.fullmatch(r"\s*([-+]?[\d.]+(?:[eE][-+]?\d+)?)\s*(\S*)\s*", text)
+    if found is None:
+        raise InputError("tolerance", text, advice)
+    number, given = found[1], found[2] or unit
+    if given not in {unit, "%"}:
+        if given[1:] != unit or given[0] not in _PREFIXES:
+            raise InputError("tolerance", text, f"the unit of this quantity is {unit}")
+        number = f"{float(number) * _PREFIXES[given[0]]:.17g}"
+    try:
+        return Tolerance.parse("tolerance", f"{number} {given if given == '%' else unit}")
+    except InputError:
+        raise InputError("tolerance", text, advice) from None
+
+
+def _positive(name: str, value: float | None) -> float | None:
+    if value is not None and not 0 < value < float("inf"):
+        raise InputError(name, value, "give a positive number of seconds")
+    return value
+
+
+def _stored_study(
+    question: Question,
+    engines: list[str],
+    claims: TradeoffClaims | None,
+    out: Path,
+    jobs: int | None,
+    *,
+    measure_first: bool,
+) -> dict[str, Any]:
+    """The stored curves, of all engines or of those that are asked for, or new ones if the user agrees.
+
+    Raises:
+        InputError: there are none that hold here, and nobody agreed to measure them.
+    """
+    from proofroll.studies.keeping import kept
+    from proofroll.studies.tradeoff import stored
+
+    reasons: list[str] = []
+    for path in (stored(out, question), stored(out, question, engines)):
+        study, changes = kept(path)
+        if study is not None:
+            return study
+        reasons = changes or reasons
+    reasons = reasons or ["no curves are stored for this question"]
+    why = "; ".join(reasons[:3]) + (f"; and {len(reasons) - 3} more" if len(reasons) > 3 else "")
+    if not measure_first and sys.stdin.isatty() and sys.stderr.isatty():
+        measure_first = typer.confirm(f"{why}. Measure now (some minutes)?", err=True)
+    if not measure_first:
+        advice = f"{why}; add --measure, which takes some minutes, or run proofroll tradeoff first"
+        raise InputError("stored curves", "none that hold here", advice)
+    over = claims.over if claims else {}
+    return measure(question, engines, over, claims, out, fresh=False, jobs=jobs)[0]

@@ -1,0 +1,120 @@
+"""The report: comparisons, the paper's figures, speed against accuracy, and where engines stop being right."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated, Any
+
+import typer
+
+from proofroll.cli.common import (
+    CONTRADICTED,
+    ENGINE,
+    OK,
+    Engines,
+    Fresh,
+    Jobs,
+    Json,
+    Out,
+    complain,
+    new_runner,
+    progress_bar,
+    write_json,
+)
+from proofroll.cli.comparing import exit_code, outcomes_of, print_outcome, regime_maps_of
+
+if TYPE_CHECKING:
+    from proofroll.report.parts import Part
+    from proofroll.report.whole import Report
+    from proofroll.runner import Runner
+
+
+def report(
+    studies: Annotated[
+        list[str] | None, typer.Argument(help="Comparisons and other studies: files or names; all by default.")
+    ] = None,
+    engine: Engines = None,
+    out: Out = Path("out"),
+    fresh: Fresh = False,
+    jobs: Jobs = None,
+    as_json: Json = False,
+) -> None:
+    """Run the comparisons and the further studies, and write report.html and report.json.
+
+    The files are there after the comparisons, and are written again after each further study. A study that is kept and
+    still holds is used as it is; otherwise it is made briefly, and the report names the command that makes it whole.
+    """
+    from proofroll.comparison_file import comparison_names, load_comparison
+    from proofroll.report.parts import KEYS, all_parts, parts_of
+    from proofroll.report.whole import begun
+
+    names, parts = parts_of(studies, engine or []) if studies else (comparison_names(), all_parts(engine or []))
+    loaded = [load_comparison(name) for name in names]
+    runner = new_runner(out, fresh, jobs)
+    keys = [key for key in KEYS if any(part.key == key for part in parts)]
+    stages = _Stages(len(keys) + bool(loaded))
+    outcomes, maps = [], []
+    if loaded:
+        stage = stages.next("comparisons")
+        outcomes = outcomes_of(loaded, engine or [], runner, stage)
+        maps = [regime_maps_of(item, jobs, stage) if item.regimes else [] for item in loaded]
+    made = begun(outcomes, runner.store, " ".join(["proofroll report", *(studies or [])]), maps)
+    for part in parts:
+        if part.key == "figures":
+            part.maps.update({item.name: found for item, found in zip(loaded, maps, strict=True) if found})  # type: ignore[attr-defined]
+    missing = made.expect(parts, out, fresh=fresh)
+    made.write(out)
+    for key in keys:
+        wanted = [part for part in missing if part.key == key]
+        stage = stages.next(next(part.words for part in parts if part.key == key), kept=not wanted)
+        for part in wanted:
+            _make(made, part, runner, out, stage)
+            made.write(out)
+    if as_json:
+        write_json(made.content)
+    else:
+        _print(made.content, out)
+    raise typer.Exit(_exit_code(made.content, exit_code(outcomes)))
+
+
+class _Stages:
+    """Says on standard error which stage begins."""
+
+    def __init__(self, total: int) -> None:
+        self._total, self._number = total, 0
+
+    def next(self, words: str, kept: bool = False) -> str:
+        """Begins the next stage; returns what its progress bar puts before its own words."""
+        self._number += 1
+        where = f"{self._number} of {self._total}"
+        complain(f"{where}, {words}" + (": kept from before" if kept else ""))
+        return f"{where}: "
+
+
+def _make(made: Report, part: Part, runner: Runner, out: Path, stage: str) -> None:
+    """Makes one further study with a progress bar; a sentence on standard error says if that failed."""
+    with progress_bar(f"{stage}{part.words}") as advance:
+        said = made.make(part, lambda: part.make(runner, out, lambda text, count: advance(f"{stage}{text}", count)))
+    if said["missing"]:
+        complain(f"{part.head['title']}: {said['missing']}")
+
+
+def _exit_code(content: dict[str, Any], compared: int) -> int:
+    """As for the comparisons; a further study that failed counts as a lost engine, a false statement as a verdict."""
+    further = [entry for key in ("figures", "tradeoffs", "stability") for entry in content[key]]
+    if compared == ENGINE or any(entry["missing"] or entry["lost"] for entry in further):
+        return ENGINE
+    return CONTRADICTED if compared or any(entry["contradictions"] for entry in further) else OK
+
+
+def _print(content: dict[str, Any], out: Path) -> None:
+    """The verdicts, what came of the further studies, what to look at first, and where the report is."""
+    from proofroll.report.terminal import console, first_lines, part_lines
+
+    for item in content["comparisons"]:
+        print_outcome(item)
+    terminal = console()
+    for line in [*part_lines(content), *first_lines(content)]:
+        terminal.print(line, markup=False)
+    where = out / "report.html"
+    terminal.print(f"The report is in {where}, the same content in {where.with_suffix('.json')}.", markup=False)

@@ -1,0 +1,113 @@
+"""Where engines stop being right in one scene as a part of a report."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import TYPE_CHECKING, Any, ClassVar
+
+if TYPE_CHECKING:
+    from proofroll.report.parts import Tell
+    from proofroll.runner import Runner
+    from proofroll.studies.stability_claims import Claim, StabilityFile
+
+
+@dataclass
+class StabilityPart:
+    """Where engines stop being right in one scene."""
+
+    key: ClassVar[str] = "stability"
+    words: ClassVar[str] = "where engines stop being right"
+    asked: StabilityFile
+    engines: Sequence[str] = ()
+    study: Mapping[str, Any] | None = None
+    folder: str = ""
+
+    @property
+    def head(self) -> dict[str, str]:
+        """What it is."""
+        asked = self.asked
+        command = f"proofroll stability {asked.scene}" + "".join(f" --engine {name}" for name in self.engines)
+        return {
+            "name": asked.name, "title": asked.title, "question": asked.question, "scene": asked.scene,
+            "command": command,
+        }  # fmt: skip
+
+    def keeps(self, out: Path) -> bool:
+        """The whole map, or else a quick one."""
+        from proofroll.studies.keeping import kept, stability_path
+        from proofroll.studies.places import QUICK, Effort
+
+        for effort in (Effort(), QUICK):
+            path = stability_path(out, self.asked, self.asked.axes, self.engines, effort)
+            self.study, _ = kept(path)
+            if self.study is not None:
+                self.folder = _programs(path)
+                return True
+        return False
+
+    def make(self, runner: Runner, out: Path, tell: Tell) -> None:
+        """A quick map."""
+        from proofroll.studies.keeping import make_stability
+        from proofroll.studies.places import QUICK
+
+        self.study, path = make_stability(
+            self.asked, self.asked.axes, runner, out, engines=self.engines, effort=QUICK, progress=tell
+        )
+        self.folder = _programs(path)
+
+    def content(self) -> dict[str, Any]:
+        """The map, the worst of what nobody is told, and what was claimed."""
+        from proofroll.report.stability_tables import silent_lines
+
+        study = self.study
+        assert study is not None  # it was made
+        claims = []
+        for claim in () if self.engines else self.asked.claims:
+            against = claim.contradictions(study["points"])
+            claims.append({"says": _says(claim), "because": claim.because, "against": against})
+        points = [
+            point | {"reproducer": f"{self.folder}/{Path(point['reproducer']).name}" if point["reproducer"] else None}
+            for point in study["points"]
+        ]
+        return {
+            "study": {**study, "points": points},
+            "silent": list(silent_lines(study)),
+            "claims": claims,
+            "contradictions": [line for claim in claims for line in claim["against"]],
+            "lost": [] if study["points"] else [f"{name}: {reason}" for name, reason in study["absent"].items()],
+        }
+
+    def pictures(self, prefix: str) -> dict[str, str]:  # noqa: ARG002 -- the protocol's
+        """None: the maps are tables."""
+        return {}
+
+
+def _programs(path: Path) -> str:
+    """The folder of a map's programs, seen from that of all results."""
+    return f"{path.parent.name}/{path.stem}"
+
+
+def _says(claim: Claim) -> str:
+    """A claim in one sentence."""
+    from proofroll.report.labels import number
+    from proofroll.studies.numbers import SYMBOLS
+
+    said = f"{claim.engine} is {claim.boundary}"
+    if claim.never:
+        said += " at no step or tolerance"
+    elif claim.number is not None:
+        low, high = claim.between
+        said += f" up to {SYMBOLS.get(claim.number, claim.number)} = {number(low)} … {number(high)}"
+    else:
+        said += " up to its boundary"
+    if claim.axes:
+        said += f" along {', '.join(claim.axes)}"
+    if claim.values:
+        said += f" from {claim.values[0]:g} to {claim.values[1]:g}"
+    if claim.failure:
+        said += f"; beyond: {' or '.join(claim.failure)}"
+    if claim.silent is not None:
+        said += "; the engine does not say so" if claim.silent else "; the engine says so"
+    return said

@@ -1,0 +1,116 @@
+"""Three sentences for the whole report, written from its data: what agrees, what does not, and what to use."""
+
+from __future__ import annotations
+
+from typing import Any
+
+from proofroll.metrics import OBSERVABLES
+from proofroll.report.labels import names, number, symbol, unit
+from proofroll.report.scores import cheapest, scores
+from proofroll.report.tradeoff_tables import name_of, step_of
+
+# The error of motion and forces, relative to their sizes, for which a setting is named where no trade-off was made.
+EVERYDAY = 1e-3
+
+
+def three_sentences(content: dict[str, Any]) -> list[str]:
+    """What agrees best, what does not and says nothing of it, and what to use.
+
+    Args:
+        content: of the report: ``comparisons``, ``tradeoffs`` and ``stability``.
+    """
+    return [_agrees(content["comparisons"]), _silent(content), _use(content)]
+
+
+def _agrees(comparisons: list[dict[str, Any]]) -> str:
+    if not comparisons:
+        return "Nothing was compared with the truth in this report."
+    rows = [row for comparison in comparisons for row in comparison["rows"]]
+    count = sum(row["verdict"] == "agrees" for row in rows)
+    finer = sum(row["verdict"] == "converges" for row in rows)
+    said = f"Of {len(rows)} engine settings, {count} {'agrees' if count == 1 else 'agree'} with the truth everywhere"
+    if finer:
+        said += f" and {finer} would with a finer step"
+    complete = [score for score in scores(comparisons[0]) if score.worst is not None]
+    if not complete:
+        return f"{said}; none gave motion and forces in every case of the first comparison."
+    best = min(complete, key=lambda score: score.worst or 0.0)
+    return (
+        f"{said}; closest is {best.name}, whose motion stays within {number(best.motion)} of its range and whose "
+        f"forces within {number(best.forces)} of the largest."
+    )
+
+
+def _silent(content: dict[str, Any]) -> str:
+    """What is wrong at every step and says nothing, and how many boundaries of stability are passed in silence."""
+    found = [item for comparison in content["comparisons"] for item in _wrong(comparison)]
+    maps = [entry["study"] for entry in content["stability"] if entry["study"] is not None]
+    silent, boundaries = (sum(int(study[key]) for study in maps) for key in ("silent", "boundaries"))
+    passed = f"{silent} of {boundaries} boundaries of stability and accuracy are passed without a word"
+    if not found:
+        nothing = "No setting that ran to its end differs from the truth"
+        return f"{nothing}; {passed}." if maps else f"{nothing}."
+    _, name, text = max(found)
+    verbs = ("differ", "run") if len(found) > 1 else ("differs", "runs")
+    said = f"{len(found)} {verbs[0]} from the truth and {verbs[1]} to the end without a word, worst {name}: {text}"
+    return f"{said}; {passed}." if maps else f"{said}."
+
+
+def _wrong(comparison: dict[str, Any]) -> list[tuple[float, str, str]]:
+    """For each row that differs though each of its runs ended as done: relative error, name, and what is off."""
+    found = []
+    for index, (name, row) in enumerate(zip(names(comparison["rows"]), comparison["rows"], strict=True)):
+        runs = [run for run in comparison["runs"] if run["row"] == index]
+        if row["verdict"] != "differs" or any(run["status"] != "done" for run in runs):
+            continue
+        judged = [
+            (judgement["error"] / judgement["scale"], judgement)
+            for run in runs
+            for judgement in run["judgements"]
+            if judgement["observable"] not in OBSERVABLES
+            and judgement["verdict"] != "ill-posed"
+            and judgement["error"] is not None
+        ]
+        relative, worst = max(judged, key=lambda pair: pair[0], default=(0.0, None))
+        text = "a reaction or an event is wrong"
+        if worst is not None:
+            size = f"{number(worst['error'])} {unit(worst['unit'])}".strip()
+            text = f"its {symbol(worst['observable'])} is off by {size}"
+        found.append((relative, name, text))
+    return found
+
+
+def _use(content: dict[str, Any]) -> str:
+    """The cheapest that holds the usual tolerance, from the trade-off; else from the first comparison's timings."""
+    for entry in content["tradeoffs"]:
+        if entry["study"] is None:
+            continue
+        answers = [answer for answer in entry["advice"] if answer["choice"] is not None]
+        answer = min(answers, key=lambda item: _from_everyday(item, entry["study"]), default=None)
+        if answer is not None:
+            choice, least = answer["choice"], answer["least_model"]
+            wanted = f"{symbol(answer['quantity'])} to {number(answer['tolerance'])} {unit(answer['unit'])}".strip()
+            said = f"For {wanted} use {name_of(choice)}" + (f" at {step_of(choice)}" if step_of(choice) else "")
+            said += f", at {number(choice['seconds_per_second'])} s of computing per simulated second"
+            if least:
+                said += (
+                    f"; where this scene is all there is, its own equations do it at "
+                    f"{number(least['seconds_per_second'])} s ({name_of(least)})"
+                )
+            return f"{said}."
+    for comparison in content["comparisons"]:
+        best = cheapest(scores(comparison), "worst", EVERYDAY)
+        if best:
+            return (
+                f"For motion and forces to {100 * EVERYDAY:g} % use {best['name']}, at "
+                f"{number(best['seconds_per_second'])} s of computing per simulated second."
+            )
+    return f"Nothing that was timed holds motion and forces to {100 * EVERYDAY:g} %, so nothing can be recommended."
+
+
+def _from_everyday(answer: dict[str, Any], study: dict[str, Any]) -> tuple[bool, float]:
+    """How far a tolerance is from the usual one: of the study's own quantity first, and then by its logarithm."""
+    from math import log
+
+    scale = study["quantities"].get(answer["quantity"], {}).get("scale") or 1.0
+    return answer["quantity"] != study["quantity"], abs(log(answer["tolerance"] / scale / EVERYDAY))

@@ -1,0 +1,91 @@
+"""Speed against accuracy in one scene as a part of a report."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import TYPE_CHECKING, Any, ClassVar
+
+if TYPE_CHECKING:
+    from proofroll.report.parts import Tell
+    from proofroll.runner import Runner
+    from proofroll.studies.claims import TradeoffClaims
+
+
+@dataclass
+class TradeoffPart:
+    """Speed against accuracy in one scene."""
+
+    key: ClassVar[str] = "tradeoffs"
+    words: ClassVar[str] = "speed against accuracy"
+    asked: TradeoffClaims
+    engines: Sequence[str] = ()
+    study: Mapping[str, Any] | None = None
+
+    @property
+    def head(self) -> dict[str, str]:
+        """What it is."""
+        asked = self.asked
+        command = f"proofroll tradeoff {asked.scene}" + "".join(f" --engine {name}" for name in self.engines)
+        return {
+            "name": asked.name, "title": asked.title, "question": asked.question, "scene": asked.scene,
+            "command": command,
+        }  # fmt: skip
+
+    def keeps(self, out: Path) -> bool:
+        """The whole study, or else a brief one."""
+        from proofroll.studies.keeping import kept
+        from proofroll.studies.tradeoff import stored
+
+        paths = (stored(out, self.asked.swept, self.engines, brief=brief) for brief in (False, True))
+        self.study = next((study for path in paths if (study := kept(path)[0]) is not None), None)
+        return self.study is not None
+
+    def make(self, runner: Runner, out: Path, tell: Tell) -> None:
+        """A brief study, without the runs over ranges of parameters."""
+        from proofroll.studies.keeping import make_tradeoff
+
+        self.study, _ = make_tradeoff(
+            self.asked.swept, runner, out, engines=self.engines, claims=self.asked, brief=True,
+            progress=lambda text: tell(text, 1),
+        )  # fmt: skip
+
+    def content(self) -> dict[str, Any]:
+        """The study, what to use, and what was claimed."""
+        from proofroll.report.advice import advice
+        from proofroll.report.tradeoff_tables import default_quantities
+        from proofroll.studies.recommend import fits, recommend
+
+        study = self.study
+        assert study is not None  # it was made
+        claims = []
+        for claim in () if self.engines else self.asked.cheapest:
+            choice = recommend(study, self.asked.wish(claim))["choice"]
+            claims.append(
+                {
+                    "tolerance": f"{claim.tolerance.value:g} {claim.tolerance.unit}",
+                    "levels": list(claim.levels),
+                    "engine": claim.engine,
+                    "because": claim.because,
+                    "choice": choice,
+                    "holds": choice is not None and any(fits(choice, text) for text in claim.engine),
+                }
+            )
+        return {
+            "study": study,
+            "shown": default_quantities(study),
+            "advice": advice(study, self.asked),
+            "claims": claims,
+            "contradictions": [] if self.engines else self.asked.contradictions(study),
+            "lost": [],
+        }
+
+    def pictures(self, prefix: str) -> dict[str, str]:
+        """The work-precision diagram."""
+        from proofroll.report.svg import element
+        from proofroll.report.tradeoff_tables import default_quantities
+        from proofroll.report.work_precision import svg
+
+        assert self.study is not None  # it was made
+        return {"diagram": element(svg(self.study, default_quantities(self.study)), prefix)}

@@ -1,0 +1,322 @@
+"""The report as a whole: its parts, their order, what is said of all of them, and what becomes of a part that fails."""
+
+from __future__ import annotations
+
+import copy
+import json
+from pathlib import Path
+from typing import Any, ClassVar
+
+import pytest
+
+from proofroll.errors import ProofrollError
+from proofroll.report.html import page
+from proofroll.report.parts import KEYS, absent, all_parts, attempt, entry, parts_of
+from proofroll.report.stability_part import StabilityPart
+from proofroll.report.summary import three_sentences
+from proofroll.report.tradeoff_part import TradeoffPart
+from proofroll.report.whole import Report, begun
+from proofroll.store import Store
+from proofroll.studies import installed
+from proofroll.studies.claims import claims_for
+from proofroll.studies.compare import Outcome
+from proofroll.studies.keeping import stability_path
+from proofroll.studies.places import QUICK, Effort
+from proofroll.studies.stability_claims import file_for
+from proofroll.studies.tradeoff import stored
+
+POISON = "</script><script>alert('poison')</script><img src=x onerror=alert(1)>\"'"
+COMMAND = "proofroll report"
+
+
+def point(number: int, engine: str, error: float, seconds: float, **more: Any) -> dict[str, Any]:
+    """A point of an invented trade-off."""
+    values = {
+        "id": number, "engine": engine, "curve": f"{engine}[formulation=only]", "level": "engine constraint",
+        "settings": {"formulation": "only", "preset": "tuned", "dt": 1e-3}, "resolution": "dt", "step": 1e-3,
+        "order": 2, "status": "done", "message": "reached 2 s", "error": {"z": error, "N": 10 * error},
+        "envelope": {"z": error, "N": 10 * error}, "seconds_per_second": seconds,
+        "interval": [0.9 * seconds, 1.1 * seconds], "measurements": 3, "corners": None,
+    }  # fmt: skip
+    return values | more
+
+
+def tradeoff_study() -> dict[str, Any]:
+    """A trade-off of a rough and cheap engine, a good and dear one, and the scene's own equations."""
+    points = [
+        point(0, "rough", 3e-3, 1e-3),
+        point(1, "good", 1e-9, 0.5, interval=[0.5, 0.5], measurements=1),
+        point(2, "own", 1e-12, 0.01, level="reduced equations"),
+    ]
+    budget = {
+        "engine": "good", "curve": "good[formulation=only]", "quantity": "z", "model_form": 2e-10,
+        "model_form_bar": 1e-10, "order": 1.97, "order_low": 1.9, "order_high": 2.04, "declared": 2, "floor": 1e-12,
+        "truth": 1e-13, "coarse": "time step", "fine": "model form", "contradicts_declaration": False,
+        "sentence": "At dt 0.05 s the time step dominates.",
+    }  # fmt: skip
+    quantities = {
+        "z": {"unit": "m", "scale": 0.1, "truth_error_bar": 1e-13},
+        "N": {"unit": "N", "scale": 40.0, "truth_error_bar": 1e-12},
+    }
+    return {
+        "study": "tradeoff", "scene": "sphere_in_cylinder", "parameters": {}, "until": 2.0, "every": 0.05,
+        "quantity": "z", "quantities": quantities, "points": points, "dropped": [],
+        "absent": {"lost": "lost is not installed here"}, "budgets": [budget],
+        "pareto": {"z": [0, 2]}, "pareto_engines": {"z": [0, 1]}, "truth": {"seconds_per_second": 1.0, "route": ""},
+        "over": {}, "findings": ["3 runs: none refused."], "brief": True, "measured": installed.measured(),
+    }  # fmt: skip
+
+
+def stability_study() -> dict[str, Any]:
+    """A map of two points: one silent at every step, one with a boundary and a program."""
+    side = {
+        "largest": None, "reached": False, "numbers": {}, "beyond": 1e-4, "failure": "sank in", "silent": True,
+        "error": 1.5, "time": 0.1, "message": "reached 2 s",
+    }  # fmt: skip
+    base = {
+        "engine": "good", "settings": {"formulation": "only", "preset": "tuned"}, "curve": "good[formulation=only]",
+        "level": None, "resolution": "dt", "axis": "V0", "value": 4.0, "parameters": {"speed": 4.0}, "until": 2.0,
+        "period": 0.6, "largest_stable": None, "largest_accurate": None, "boundary": "stable", "failure": "sank in",
+        "silent": True, "message": "reached 2 s", "sides": {"stable": side, "accurate": side}, "least_error": 0.9,
+        "finest": 1e-4, "too_slow": None, "runs": 7, "problem": None, "reproducer": None, "reproducer_note": None,
+    }  # fmt: skip
+    held = side | {"largest": 1e-3, "reached": True, "numbers": {"turn": 0.2}, "silent": False}
+    other = base | {
+        "value": 8.0, "largest_stable": 1e-3, "largest_accurate": 1e-3, "silent": False,
+        "sides": {"stable": held, "accurate": held}, "reproducer": "/somewhere/else/stability/x/good-V0-8.py",
+    }  # fmt: skip
+    axis = {"name": "V0", "unit": "m/s", "meaning": "initial speed", "values": [4.0, 8.0], "parameters": {}}
+    explained = {
+        "curve": base["curve"], "axis": "V0", "boundary": "stable", "number": "turn", "low": 0.2, "high": 0.3,
+        "spread": 1.5, "explains": True,
+    }  # fmt: skip
+    return {
+        "study": "stability", "scene": "sphere_in_cylinder", "axes": [axis], "periods": 3.0, "accurate": 0.01,
+        "runs": 14, "boundaries": 2, "silent": 1, "failures": {"sank in": 2}, "never_accurate": 1, "meanings": {},
+        "points": [base, other], "explanations": [explained], "findings": ["good depends on mass, as it should not"],
+        "places": [], "absent": {}, "effort": {"values": 3}, "measured": installed.measured(),
+    }  # fmt: skip
+
+
+def further() -> list[Any]:
+    """A trade-off and a map with invented studies."""
+    claims = claims_for("sphere_in_cylinder")
+    assert claims is not None
+    file = file_for("sphere_in_cylinder")
+    folder = "stability/sphere_in_cylinder"
+    return [TradeoffPart(claims, study=tradeoff_study()), StabilityPart(file, study=stability_study(), folder=folder)]
+
+
+@pytest.fixture
+def report(made: tuple[Outcome, Store]) -> Report:
+    """A report with one comparison, a trade-off and a map."""
+    whole = begun([made[0]], made[1], COMMAND)
+    for part in further():
+        whole.parts.append(part)
+        whole._put(part, entry(part))
+    return whole
+
+
+def test_every_part_of_the_default_report_is_found_in_its_order() -> None:
+    """Figures, trade-offs, maps: one for each file under comparisons/, and each by its name alone."""
+    parts = all_parts([])
+    assert [part.key for part in parts] == sorted((part.key for part in parts), key=KEYS.index)
+    assert {key for key in KEYS if any(part.key == key for part in parts)} == set(KEYS)
+    for part in parts:
+        comparisons, found = parts_of(["paper", part.head["name"]], [])
+        assert comparisons == ["paper"]
+        assert [other.head for other in found] == [part.head]
+
+
+def test_sections_answer_in_order(report: Report, parse: Any) -> None:
+    """What agrees, what to use, why; each section is there, has a heading and says something."""
+    elements = parse(page(report.content, report.curves, report.pictures))
+    ids = [attributes["id"] for tag, attributes in elements.tags if tag == "section" and "id" in attributes]
+    assert ids == ["verdicts", "use", "findings", "speed0", "stability0", "c0", "made"]
+    assert "1 of 2 boundaries are passed in silence" in elements.text
+    assert "good depends on mass" in elements.text
+    assert "lost is not installed here" in elements.text
+    assert "stability/sphere_in_cylinder/good-V0-8.py" in elements.text
+    links = {attributes["href"][1:] for tag, attributes in elements.tags if tag == "a"}
+    assert links <= {attributes.get("id") for _, attributes in elements.tags}
+    assert {"stability0-0", "stability0-1"} <= links, "each cell of the map leads to its boundary"
+
+
+def test_the_diagram_is_inline_and_keeps_to_itself(report: Report) -> None:
+    """The diagram of the trade-off is an element whose ids are its own and which names no address."""
+    picture = report.pictures["tradeoffs0-diagram"]
+    assert picture.startswith("<svg")
+    assert "http" not in picture
+    assert 'id="tradeoffs0-' in picture
+    assert picture in page(report.content, report.curves, report.pictures)
+
+
+def test_exactly_three_sentences_from_the_data(report: Report) -> None:
+    """What agrees best, what is silent, what to use; other data give other sentences, none at all still give three."""
+    found = report.content["findings"]["sentences"]
+    assert len(found) == 3
+    assert found[0].startswith("Of 4 engine settings, 2 agree with the truth everywhere")
+    assert "closest is alpha fine matched" in found[0]
+    assert found[1].startswith("1 differs from the truth and runs to the end without a word, worst alpha fine default")
+    assert found[1].endswith("1 of 2 boundaries of stability and accuracy are passed without a word.")
+    assert found[2].startswith("For z to 1e-4 m use good only tuned at dt 1e-3 s")
+    changed = copy.deepcopy(report.content)
+    changed["tradeoffs"][0]["study"] = None
+    assert "use alpha fine default" in three_sentences(changed)[2]
+    nothing = three_sentences({"comparisons": [], "tradeoffs": [], "stability": []})
+    assert len(nothing) == 3
+    assert all(sentence.endswith(".") for sentence in nothing)
+
+
+def test_advice_names_the_cheapest_the_runner_up_and_the_first_failure(report: Report, parse: Any) -> None:
+    """At a millimetre the cheap one fails, with its reason; costs measured once say so."""
+    answers = {answer["tolerance"]: answer for answer in report.content["tradeoffs"][0]["advice"]}
+    answer = answers[1e-3]
+    assert answer["choice"]["engine"] == "good"
+    assert answer["first_failure"]["engine"] == "rough"
+    assert "off by 0.003 m" in answer["first_failure"]["reason"]
+    assert answers[1e-2]["choice"]["engine"] == "rough"
+    text = parse(page(report.content, report.curves)).text
+    assert "0.5 (once)" in text
+    assert "1e-3 ± 10 %" in text
+
+
+def poisoned(value: Any) -> Any:
+    """The content with poison at the end of every string."""
+    if isinstance(value, dict):
+        return {key: poisoned(item) for key, item in value.items()}
+    if isinstance(value, list):
+        return [poisoned(item) for item in value]
+    return value + POISON if isinstance(value, str) else value
+
+
+def test_nothing_in_a_further_study_becomes_markup(report: Report, parse: Any) -> None:
+    """Poison in every string of the trade-off and of the map is text on the page."""
+    bad = {**report.content, "tradeoffs": poisoned(report.content["tradeoffs"])}
+    bad["stability"] = poisoned(report.content["stability"])
+    missing = absent(report.parts[0], f"broken {POISON}")
+    bad["figures"] = [missing]
+    elements = parse(page(bad, report.curves))
+    assert elements.text.count("alert('poison')") > 40
+    for tag, attributes in elements.tags:
+        assert tag != "img"
+        assert not any(name.startswith("on") for name in attributes)
+    assert sum(tag == "script" for tag, _ in elements.tags) == 4
+
+
+def test_json_has_no_nan_and_no_path_outside(report: Report, tmp_path: Path) -> None:
+    """Everything that is written can be read by any JSON reader, and every file it names is below the report."""
+
+    def refuse(constant: str) -> None:
+        raise AssertionError(f"{constant} is not JSON")
+
+    report.write(tmp_path)
+    content = json.loads((tmp_path / "report.json").read_text(encoding="utf-8"), parse_constant=refuse)
+    assert content["tradeoffs"][0]["study"]["points"]
+    comparison = content["comparisons"][0]
+    named = [item["trajectory"] for item in (*comparison["runs"], *comparison["truths"]) if item["trajectory"]]
+    named += [p["reproducer"] for p in content["stability"][0]["study"]["points"] if p["reproducer"]]
+    assert len(named) == 9
+    for name in named:
+        assert not Path(name).is_absolute()
+        assert ".." not in Path(name).parts
+    assert all(name.startswith("cases/") for name in named[:-1])
+
+
+class Broken:
+    """A part that cannot be made."""
+
+    key: ClassVar[str] = "tradeoffs"
+    words: ClassVar[str] = "a part"
+
+    def __init__(self, error: BaseException) -> None:
+        self.error = error
+
+    @property
+    def head(self) -> dict[str, str]:
+        """What it is."""
+        return dict.fromkeys(("name", "title", "question", "scene"), "broken") | {"command": "proofroll tradeoff it"}
+
+    def keeps(self, out: Path) -> bool:
+        """Nothing."""
+        return not out
+
+    def make(self, *_: Any) -> None:
+        """Fails."""
+        raise self.error
+
+    def content(self) -> dict[str, Any]:
+        """Of what was made."""
+        return {}
+
+    def pictures(self, prefix: str) -> dict[str, str]:
+        """None."""
+        return {prefix: ""}
+
+
+@pytest.mark.parametrize("error", [ProofrollError("there is no truth here"), ZeroDivisionError("by zero")])
+def test_a_part_that_fails_leaves_a_sentence(
+    made: tuple[Outcome, Store], tmp_path: Path, parse: Any, error: Exception
+) -> None:
+    """The report stands; the section says in one sentence what is missing and which command makes it."""
+    whole, part = begun([made[0]], made[1], COMMAND), Broken(error)
+    assert whole.expect([part], tmp_path) == [part]
+    whole.write(tmp_path)
+    text = parse((tmp_path / "report.html").read_text(encoding="utf-8")).text
+    assert "It has not been made yet; proofroll tradeoff it makes it." in text
+    said = whole.make(part, part.make)
+    whole.write(tmp_path)
+    assert str(error) in said["missing"]
+    assert "Traceback" not in said["missing"]
+    text = parse((tmp_path / "report.html").read_text(encoding="utf-8")).text
+    assert said["missing"] in text
+    assert "Closest to the truth is alpha fine matched" in text
+
+
+def test_an_interrupted_part_takes_nothing_away(made: tuple[Outcome, Store], tmp_path: Path) -> None:
+    """What was written before an interrupt is still there, whole, and says what is missing."""
+    whole, part = begun([made[0]], made[1], COMMAND), Broken(KeyboardInterrupt())
+    whole.expect([part], tmp_path)
+    whole.write(tmp_path)
+    with pytest.raises(KeyboardInterrupt):
+        whole.make(part, part.make)
+    content = json.loads((tmp_path / "report.json").read_text(encoding="utf-8"))
+    assert content["tradeoffs"][0]["missing"].startswith("It has not been made yet")
+    assert content["comparisons"][0]["runs"]
+
+
+def test_what_is_kept_is_taken_and_what_is_outdated_is_not(tmp_path: Path) -> None:
+    """The whole study before the brief one; none of another code; the map likewise."""
+    tradeoff, stability = further()
+    question = tradeoff.asked.swept
+    for name, study, brief in (("whole", tradeoff_study(), False), ("brief", tradeoff_study(), True)):
+        path = stored(tmp_path, question, brief=brief)
+        path.parent.mkdir(exist_ok=True)
+        path.write_text(json.dumps({**study, "mark": name}))
+    assert tradeoff.keeps(tmp_path)
+    assert tradeoff.study["mark"] == "whole"
+    stored(tmp_path, question).unlink()
+    assert tradeoff.keeps(tmp_path)
+    assert tradeoff.study["mark"] == "brief"
+    old = tradeoff_study()
+    old["measured"]["code"] = "another"
+    stored(tmp_path, question, brief=True).write_text(json.dumps(old))
+    assert not tradeoff.keeps(tmp_path)
+    assert not stability.keeps(tmp_path)
+    axes = stability.asked.axes
+    paths = [stability_path(tmp_path, stability.asked, axes, [], effort) for effort in (QUICK, Effort())]
+    assert len(set(paths)) == 2, "a quick map does not take the place of the whole one"
+    paths[0].parent.mkdir()
+    paths[0].write_text(json.dumps(stability_study()))
+    assert stability.keeps(tmp_path)
+    assert stability.folder == f"stability/{paths[0].stem}"
+
+
+def test_an_attempt_survives_what_nobody_foresaw() -> None:
+    """An error of our own becomes a sentence of one line, not the end of the report."""
+    part = Broken(RuntimeError("first line\nsecond"))
+    said = attempt(part, part.make)
+    assert said is not None
+    assert said["missing"] == (
+        "an error of proofroll's own, RuntimeError: first line second; proofroll tradeoff it makes it."
+    )

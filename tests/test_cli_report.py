@@ -1,0 +1,122 @@
+"""The command ``report`` as a user meets it, with studies of a second each."""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Callable
+from pathlib import Path
+
+import pytest
+
+Proofroll = Callable[..., tuple[int, str, str]]
+
+COMPARISON = """
+title = "A claim"
+question = "Does it hold?"
+scene = "sphere_in_cylinder"
+until = 0.1
+every = 0.01
+timed = false
+vary = { speed = [4] }
+tolerances.tight = { because = "the engine is the closed form", z = "1e-9 m", gamma = "1e-9 rad" }
+
+[[rows]]
+engine = "oracle"
+tolerance = "tight"
+"""
+TRADEOFF = """
+study = "tradeoff"
+title = "Speed"
+question = "What does it cost?"
+scene = "sphere_in_cylinder"
+until = 0.1
+quantity = "z"
+"""
+FIGURES = """
+study = "figures"
+title = "Figures"
+source = "somebody"
+scene = "sphere_in_cylinder"
+engine = "projection[formulation=rotating_frame]"
+until = 0.3
+every = 0.01
+runs.free = { label = "free", parameters = { speed = 4 } }
+
+[[figures]]
+name = "height"
+caption = "The height."
+panels = [{ y = ["z"], runs = ["free"] }]
+
+[[statements]]
+says = "ω3 is constant"
+source = "section 3"
+runs = ["free"]
+of = "omega3"
+measure = "every"
+stated = "STATED"
+"""
+
+
+def files(tmp_path: Path, **texts: str) -> list[str]:
+    """Paths of files with these texts."""
+    for name, text in texts.items():
+        (tmp_path / f"{name}.toml").write_text(text, encoding="utf-8")
+    return [str(tmp_path / f"{name}.toml") for name in texts]
+
+
+def test_a_report_of_several_studies(proofroll: Proofroll, tmp_path: Path) -> None:
+    """Stages on standard error, tables and the place on standard output, and both files with what they name."""
+    names = files(tmp_path, claim=COMPARISON, figures=FIGURES.replace("STATED", "-160"))
+    out = tmp_path / "out"
+    code, said, err = proofroll("report", *names, "--out", str(out))
+    assert code == 0, err
+    assert "1 of 2, comparisons" in err
+    assert "2 of 2, figures" in err
+    assert f"The report is in {out / 'report.html'}" in " ".join(said.split())
+    assert max(map(len, said.splitlines())) <= 100
+    content = json.loads((out / "report.json").read_text(encoding="utf-8"))
+    (figures,) = content["figures"]
+    assert figures["study"]["statements"][0]["holds"] is True
+    assert content["tradeoffs"] == content["stability"] == []
+    html = (out / "report.html").read_text(encoding="utf-8")
+    assert "1 of 1</b> statements hold" in html
+    assert 'id="figures0-height-' in html
+    for run in content["comparisons"][0]["runs"]:
+        assert (out / run["trajectory"]).is_file()
+
+
+def test_a_statement_that_does_not_hold_is_a_contradiction(proofroll: Proofroll, tmp_path: Path) -> None:
+    """Exit code 1, named in what to look at first, and on the page; a report needs no comparison."""
+    names = files(tmp_path, figures=FIGURES.replace("STATED", "-150"))
+    code, said, _ = proofroll("report", *names, "--out", str(tmp_path / "out"))
+    assert code == 1
+    assert "Look first at what was not expected (1): ω3 is constant (free)" in said
+    assert "Nothing was compared in this report" in (tmp_path / "out" / "report.html").read_text(encoding="utf-8")
+
+
+def test_a_part_that_fails_does_not_take_the_report_away(
+    proofroll: Proofroll, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Exit code 3 and one line on standard error; the comparison is on the page, and what is missing too."""
+    names = files(tmp_path, claim=COMPARISON, speed=TRADEOFF)
+
+    def fail(*_: object, **__: object) -> None:
+        raise MemoryError("no memory left")
+
+    monkeypatch.setattr("proofroll.studies.keeping.make_tradeoff", fail)
+    code, said, err = proofroll("report", *names, "--out", str(tmp_path / "out"))
+    assert code == 3
+    assert "no memory left; proofroll tradeoff sphere_in_cylinder makes it." in err
+    assert "Traceback" not in err
+    assert "Missing (1): Speed" in said
+    html = (tmp_path / "out" / "report.html").read_text(encoding="utf-8")
+    assert "no memory left" in html
+    assert "A claim" in html
+
+
+def test_what_no_report_has_is_one_line(proofroll: Proofroll, tmp_path: Path) -> None:
+    """A file for another study, and a name that does not exist, are wrong usage before anything runs."""
+    for name in (*files(tmp_path, other='study = "opinion"'), "nothing"):
+        code, said, err = proofroll("report", name, "--out", str(tmp_path / "out"))
+        assert (code, said, err.count("\n")) == (2, "", 1)
+    assert not (tmp_path / "out").exists()
