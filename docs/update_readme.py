@@ -12,6 +12,7 @@ from typing import Any
 import matplotlib as mpl
 import matplotlib.pyplot as plt
 import numpy as np
+from made_from import facts, restamped, stamp
 
 from proofroll.comparison_file import load_comparison
 from proofroll.report.content import outcome_content
@@ -105,7 +106,7 @@ def main() -> None:
             text,
             flags=re.DOTALL,
         )
-    readme.write_text(text, encoding="utf-8")
+    readme.write_text(restamped(text, stamp("paper", facts("paper"))), encoding="utf-8")
 
 
 if __name__ == "__main__":

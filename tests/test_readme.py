@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import dataclasses
+import importlib.util
 import re
 import shlex
 import subprocess
@@ -11,13 +13,19 @@ from pathlib import Path
 
 import pytest
 
-from proofroll.agreement import Verdict
+from proofroll.case import EngineFacts
 from proofroll.comparison_file import load_comparison
 from proofroll.registry import parse_engine
 from proofroll.report.labels import number
+from proofroll.report.terminal import step
 from proofroll.studies.claims import claims_for
 
 ROOT = Path(__file__).resolve().parents[1]
+_SPEC = importlib.util.spec_from_file_location("made_from", ROOT / "docs" / "made_from.py")
+assert _SPEC is not None
+assert _SPEC.loader is not None
+made_from = importlib.util.module_from_spec(_SPEC)
+_SPEC.loader.exec_module(made_from)
 PROOFROLL = str(Path(sys.executable).with_name("proofroll"))
 
 
@@ -83,13 +91,83 @@ def test_a_picture_is_there(name: str) -> None:
     assert "<svg" in path.read_text(encoding="utf-8")[:2000]
 
 
-def test_the_verdict_table_is_whole() -> None:
-    """The table of the README has one line for each row of the paper's comparison, each with a verdict."""
-    text = (ROOT / "README.md").read_text(encoding="utf-8")
+def verdict_lines(text: str) -> list[list[str]]:
+    """The cells of the README's table of verdicts, without its head."""
     table = text.partition("<!-- verdicts:begin -->\n")[2].partition("<!-- verdicts:end -->")[0].splitlines()
-    lines = table[2:]  # below the head and its rule
-    assert len(lines) == len(load_comparison("paper").rows)
-    assert [line for line in lines if not any(f" {verdict} |" in line for verdict in Verdict)] == []
+    return [[cell.strip() for cell in line.split("|")[1:-1]] for line in table[2:]]
+
+
+STALE = "the table of verdicts in README.md is stale; make readme"
+
+
+def complaint(text: str, settings: list[EngineFacts], now: str) -> str:
+    """Why the table of verdicts cannot be that of today's comparison, settings and versions; empty if it can."""
+    comparison, lines = load_comparison("paper"), verdict_lines(text)
+    if len(lines) != len(comparison.rows):
+        return f"{STALE}: {len(lines)} lines for {len(comparison.rows)} rows"
+    for row, found, cells in zip(comparison.rows, settings, lines, strict=True):
+        value = {"resolution": found.resolution, "resolution_value": found.settings.get(str(found.resolution))}
+        expected = [found.name, str(found.settings.get("formulation")), str(found.settings["preset"]), step(value)]
+        if cells[:4] != expected:
+            return f"{STALE}: it has {cells[:4]}, the comparison {expected}"
+        allowed = {*row.expect, *(verdict for exception in row.except_at for verdict in exception.expect)}
+        if cells[4].split()[-1] not in allowed:
+            return f"{STALE}: {row.engine} is expected to show {' or '.join(sorted(allowed))}, it has {cells[4]}"
+    return "" if made_from.stamped(text) == now else f"{STALE}: comparison, scene, settings or versions have changed"
+
+
+def test_the_verdict_table_is_of_today() -> None:
+    """Rows, settings, steps and verdicts are those of the comparison, and what it was made from has not changed."""
+    settings = made_from.facts("paper")
+    now = made_from.stamp("paper", settings)
+    text = (ROOT / "README.md").read_text(encoding="utf-8")
+    assert complaint(text, settings, now) == ""
+
+    table = text.partition("<!-- verdicts:begin -->\n")[2].partition("<!-- verdicts:end -->")[0]
+    first = table.splitlines(keepends=True)[2]
+    for old, new in (
+        (first, ""),
+        ("| 1e-3 s |", "| 2e-3 s |"),
+        ("✗ differs", "✓ agrees"),
+        (f"made-from {now}", "made-from 0"),
+        (f"<!-- verdicts:made-from {now} -->", ""),
+    ):
+        assert old in text
+        assert "make readme" in complaint(text.replace(old, new), settings, now), new
+
+
+def test_the_stamp_of_the_verdict_table_follows_what_it_is_made_from(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Another setting, another pin of an engine, or another claim changes it; a tool's pin and a title do not."""
+    names = ("comparisons/paper.toml", "models/sphere_in_cylinder/scene.toml", "pyproject.toml", "constraints.txt")
+    for name in names:
+        (tmp_path / name).parent.mkdir(parents=True, exist_ok=True)
+        (tmp_path / name).write_bytes((ROOT / name).read_bytes())
+    monkeypatch.setattr(made_from, "data_folder", lambda name: tmp_path / name)
+    settings = [EngineFacts("oracle", "1", "code", {"dt": 1e-3}, "dt", 2)]
+
+    def now() -> str:
+        return made_from.stamp("paper", settings, tmp_path)
+
+    def change(name: str, old: str, new: str) -> None:
+        text = (tmp_path / name).read_text(encoding="utf-8")
+        assert old in text
+        (tmp_path / name).write_text(text.replace(old, new, 1), encoding="utf-8")
+
+    first = now()
+    assert made_from.stamp("paper", [dataclasses.replace(settings[0], settings={"dt": 2e-3})], tmp_path) != first
+    change("comparisons/paper.toml", 'title = "', 'title = "Another: ')
+    change("constraints.txt", "ruff==", "ruff==9")
+    assert now() == first
+    for name, old, new in (
+        ("comparisons/paper.toml", "speed = [2, 4, 6]", "speed = [2, 4, 7]"),
+        ("models/sphere_in_cylinder/scene.toml", "0.517", "0.518"),
+        ("constraints.txt", "exudyn==", "exudyn==9"),
+    ):
+        before = now()
+        change(name, old, new)
+        assert now() != before, name
 
 
 def test_the_table_of_the_cheapest_is_as_claimed() -> None:

@@ -241,6 +241,16 @@ def test_an_unknown_comparison() -> None:
         load_comparison("no_such_claim")
 
 
+def test_comparisons_come_in_the_order_that_they_ask_for(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """The founding one first; those that do not ask come last, by name, and a broken one hides no other."""
+    assert comparison_names()[0] == "paper"
+    texts = {"b": "", "a": "", "z": "order = 1", "y": "order = 2.5", "broken": "order = [", "other": 'study = "x"'}
+    for name, text in texts.items():
+        (tmp_path / f"{name}.toml").write_text(text)
+    monkeypatch.setattr("proofroll.comparison_file.data_folder", lambda _: tmp_path)
+    assert comparison_names() == ["z", "y", "a", "b", "broken"]
+
+
 @pytest.mark.parametrize("name", comparison_names())
 def test_our_comparisons_can_be_read(name: str) -> None:
     """Every comparison of the project is whole, and every reason in it is a sentence."""

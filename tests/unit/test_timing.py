@@ -40,6 +40,22 @@ def test_what_cannot_be_measured_is_left_out() -> None:
     assert len(asked) == 1
 
 
+def test_what_takes_long_is_measured_once() -> None:
+    """Its first measurement counts and it is not asked again; what is short is measured as ever."""
+    asked: list[str] = []
+
+    def task(name: str, seconds: float) -> float:
+        asked.append(name)
+        return seconds
+
+    tasks = {"long": lambda: task("long", 2.0), "short": lambda: task("short", 0.1)}
+    timings = interleaved(tasks, rounds=3, once_above=0.5)
+
+    assert timings["long"] == Timing((2.0,))
+    assert timings["short"] == Timing((0.1,) * 3, (0.1,))
+    assert asked.count("long") == 1
+
+
 def test_a_ratio_is_taken_round_by_round() -> None:
     """A machine that slows down by rounds does not change a ratio."""
     slow, fast = Timing((2.0, 20.0, 200.0)), Timing((1.0, 10.0, 100.0))

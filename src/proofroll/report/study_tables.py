@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from collections.abc import Mapping
 from typing import Any
 
@@ -99,6 +100,11 @@ def effort(study: Mapping[str, Any]) -> str:
     if over:
         return f"{said}Every choice holds {where}, and at the corners of {over}; nothing is known beyond."
     return f"{said}Every choice holds {where}; it was not checked over ranges of the parameters."
+
+
+def titled(name: str) -> str:
+    """A figure's name as a heading: ``figure3`` is ``Figure 3``."""
+    return re.sub(r"(?<=[a-z])(?=\d)", " ", name.replace("_", " ")).capitalize()
 
 
 def statements(study: Mapping[str, Any]) -> list[dict[str, Any]]:

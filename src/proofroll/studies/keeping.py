@@ -31,7 +31,7 @@ def kept(path: Path) -> tuple[dict[str, Any] | None, list[str]]:
     try:
         study: dict[str, Any] = json.loads(path.read_text(encoding="utf-8"))
         reasons = installed.changes(study["measured"])
-    except (OSError, ValueError, KeyError, TypeError):
+    except (OSError, ValueError, KeyError, TypeError, AttributeError):  # absent, half written, or something else
         return None, []
     return (None, reasons) if reasons else (study, [])
 
