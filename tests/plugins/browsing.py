@@ -47,13 +47,17 @@ class Visit:
             assert time.monotonic() < end, f"never: {condition}"
             self.page.wait_for_timeout(10)
 
-    def draw(self, patience: float = 20.0) -> list[str]:
-        """Scrolls to every figure that is not folded away and waits for its picture, for so many seconds at most.
+    def draw(self, which: str = "figure", *, patience: float = 20.0) -> list[str]:
+        """Scrolls to figures and waits for their pictures.
+
+        Args:
+            which: selects them; those that are folded away are left out.
+            patience: how long to wait for each [s].
 
         Returns:
             the captions of those that stay empty.
         """
-        return self.page.evaluate("reading.undrawn", 1000 * patience)
+        return self.page.evaluate("([which, patience]) => reading.undrawn(which, patience)", [which, 1000 * patience])
 
 
 @contextmanager
