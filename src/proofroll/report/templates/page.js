@@ -152,8 +152,8 @@
     }
   }
 
-  function redraw() {
-    for (const [figure, element] of seen) plotly().react(element, traces(figure), layout(figure));
+  function redraw(size = {}) {
+    for (const [figure, element] of seen) plotly().react(element, traces(figure), { ...layout(figure), ...size });
   }
 
   // Rows on and off, in all figures of a comparison at once.
@@ -204,8 +204,9 @@
   addEventListener("beforeprint", () => {
     if (!curves) return;
     document.querySelectorAll("details[open] figure[data-o]").forEach((figure) => { if (figure.offsetParent) draw(figure); });
-    redraw();
+    document.documentElement.classList.add("paper");
+    redraw({ width: 430, height: 380 });  // of half a page; see the style for print
   });
-  addEventListener("afterprint", redraw);
-  matchMedia("(prefers-color-scheme: dark)").addEventListener("change", redraw);
+  addEventListener("afterprint", () => { document.documentElement.classList.remove("paper"); redraw(); });
+  matchMedia("(prefers-color-scheme: dark)").addEventListener("change", () => redraw());
 })();
