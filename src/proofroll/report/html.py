@@ -15,6 +15,7 @@ from proofroll.report.findings import findings
 from proofroll.report.onsets import add_events, mark, truth_facts
 from proofroll.report.plots import point_curves, styles
 from proofroll.report.regime_map import counts, inline
+from proofroll.report.replay import described, replay_content
 from proofroll.scene_file import load_scene
 from proofroll.store import Store, write_text
 from proofroll.studies.compare import Outcome
@@ -45,11 +46,12 @@ def write_report(outcomes: list[Outcome], store: Store, out: Path, command: str,
     Raises:
         ProofrollError: the folder cannot be written.
     """
-    content = report_content(outcomes, store, command, maps)
+    replay = replay_content(outcomes, store)
+    content = report_content(outcomes, store, command, maps) | {"replay": described(replay)}
     curves = [point_curves(outcome, store) for outcome in outcomes]
     pictures = [inline(found, f"map{index}-") if found else "" for index, found in enumerate(maps)]
     write_text(out / "report.json", json.dumps(content, indent=1, allow_nan=False) + "\n")
-    write_text(out / "report.html", page(content, curves, pictures))
+    write_text(out / "report.html", page(content, curves, pictures, replay))
     return content
 
 
@@ -75,13 +77,19 @@ def report_content(outcomes: list[Outcome], store: Store, command: str, maps: Ma
     return dict(plain(content))
 
 
-def page(content: dict[str, Any], curves: list[list[dict[str, Any]]], pictures: Sequence[str] = ()) -> str:
+def page(
+    content: dict[str, Any],
+    curves: list[list[dict[str, Any]]],
+    pictures: Sequence[str] = (),
+    replay: dict[str, Any] | None = None,
+) -> str:
     """The HTML page.
 
     Args:
         content: from :func:`report_content`.
         curves: from :func:`proofroll.report.plots.point_curves`, one list for each comparison.
         pictures: for each comparison its regime maps as markup, empty where it has none.
+        replay: from :func:`proofroll.report.replay.replay_content`; None: the page has none.
     """
     import plotly.offline
 
@@ -98,6 +106,7 @@ def page(content: dict[str, Any], curves: list[list[dict[str, Any]]], pictures: 
             pictures=[*pictures, *[""] * (len(content["comparisons"]) - len(pictures))],
             styles=[styles(comparison["rows"]) for comparison in content["comparisons"]],
             data=_script_json(drawn),
+            replay=replay or {"cases": []},
             plotly=plotly.offline.get_plotlyjs(),
         )
     )

@@ -1,0 +1,69 @@
+"""What the replay needs in the page besides its own program: three.js, and numbers packed small."""
+
+from __future__ import annotations
+
+import base64
+import gzip
+import io
+import re
+import zipfile
+from functools import cache
+from importlib.metadata import PackageNotFoundError, distribution
+from typing import Any
+
+import numpy as np
+
+# trimesh is asked for its files, never imported. The script of its viewer begins with three.js as its makers built it:
+# their notice, then the program, which defines THREE, in one line; what comes after it is not wanted.
+_PACKAGE = "trimesh"
+_VIEWER = "trimesh/resources/templates/viewer.zip"
+_SCRIPT = re.compile(r"(/\*\*[^/]*Three\.js Authors[^/]*\*/)\s*(!function[^\n]*THREE=\{\}[^\n]*)")
+_REVISION = re.compile(r'"use strict";const \w+="(\d+)"')
+
+
+@cache
+def three() -> dict[str, str] | None:
+    """three.js from the installed trimesh, or None where there is none.
+
+    Returns:
+        ``packed``: the script, compressed (:func:`packed`); ``version``: which, and where from; ``licence``: its
+        makers' notice and the terms.
+    """
+    try:
+        found = distribution(_PACKAGE)
+        with zipfile.ZipFile(io.BytesIO(_bytes(found, _VIEWER))) as viewer:
+            page = viewer.read(viewer.namelist()[0]).decode("utf-8")
+        licence = next(str(file) for file in found.files or [] if file.name.startswith("LICENSE"))
+        terms = _bytes(found, licence).decode("utf-8")
+    except (PackageNotFoundError, OSError, KeyError, StopIteration, zipfile.BadZipFile):
+        return None
+    script = _SCRIPT.search(page)
+    if script is None:
+        return None
+    notice, program = script.groups()
+    revision = _REVISION.search(program)
+    return {
+        "packed": packed(f"{notice}\n{program}\n".encode()),
+        "version": f"three.js {'r' + revision[1] if revision else ''} from {_PACKAGE} {found.version}",
+        "licence": f"{notice}\n{terms[terms.index('Permission is') :]}" if "Permission is" in terms else notice,
+    }
+
+
+def _bytes(found: Any, name: str) -> bytes:
+    return bytes(found.locate_file(name).read_bytes())
+
+
+def packed(content: bytes) -> str:
+    """Bytes as text: gzip, then base64; a browser undoes both. The same bytes always give the same text."""
+    return base64.b64encode(gzip.compress(content, 9, mtime=0)).decode("ascii")
+
+
+def shuffled(values: np.typing.NDArray[Any], step: float) -> bytes:
+    """float32 numbers rounded to multiples of ``step``, first all lowest bytes, then the next: it compresses better.
+
+    Args:
+        values: any shape, taken row by row.
+        step: a power of two, in the unit of the values, so that what is rounded off leaves bytes of zeros.
+    """
+    rounded = (np.round(np.asarray(values, dtype=np.float64) / step) * step).astype("<f4")
+    return rounded.reshape(-1).view(np.uint8).reshape(-1, 4).T.tobytes()
