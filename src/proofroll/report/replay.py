@@ -13,7 +13,7 @@ from proofroll.plain import plain
 from proofroll.report.content import by_row, outcome_content
 from proofroll.report.labels import names, symbol, unit
 from proofroll.report.plots import stored, styles
-from proofroll.report.replay_library import packed, shuffled, three
+from proofroll.report.replay_library import packed, thinned, three
 from proofroll.report.replay_poses import NEEDED, Poses, Sampled, frame_times, poses
 from proofroll.report.replay_wall import middle, wall
 from proofroll.scene import RollingBall
@@ -69,7 +69,8 @@ def replay_content(outcomes: list[Outcome], store: Store) -> dict[str, Any]:
     Returns:
         ``library``: from :func:`proofroll.report.replay_library.three`; ``start``: number of the case to begin with;
         ``cases``: names, settings and, as ``arrays``, what lies in the numbers in this order: name, number of the
-        ball or -1, width, length; ``packed``: the numbers of each case.
+        ball or -1, width, length, step (:func:`proofroll.report.replay_library.thinned`); ``packed``: the numbers of
+        each case.
     """
     found: dict[str, tuple[Case, list[tuple[Outcome, str]]]] = {}
     for outcome in outcomes:
@@ -118,17 +119,17 @@ def _case(
     ]
     u = np.stack([np.interp(times, sampled["time"], sampled[name]) for name in coordinates], axis=1)
     built = wall(body, u)
-    arrays: list[tuple[str, int, int, int]] = []
+    arrays: list[tuple[str, int, int, int, float]] = []
     content = bytearray()
 
     def put(name: str, ball: int, values: FloatArray | None, step: float) -> None:
         if values is not None:
-            width = 1 if values.ndim == 1 else values.shape[-1]
-            arrays.append((name, ball, width, values.size // width))
-            content.extend(shuffled(values, step))
+            rows = values.reshape(len(values), -1)
+            arrays.append((name, ball, rows.shape[1], len(rows), step))
+            content.extend(thinned(rows, step))
 
-    put("points", -1, built.points, LENGTH)
-    put("outward", -1, built.normals, TURN)
+    put("points", -1, built.points.reshape(-1, 3), LENGTH)
+    put("outward", -1, built.normals.reshape(-1, 3), TURN)
     put("middle", -1, middle(body, u), LENGTH)
     put("coordinates", 0, u, LENGTH)
     put("contact", 0, true.contact, LENGTH)

@@ -12,6 +12,7 @@ from importlib.metadata import PackageNotFoundError, distribution
 from typing import Any
 
 import numpy as np
+import numpy.typing as npt
 
 # trimesh is asked for its files, never imported. The script of its viewer begins with three.js as its makers built it:
 # their notice, then the program, which defines THREE, in one line; what comes after it is not wanted.
@@ -58,12 +59,17 @@ def packed(content: bytes) -> str:
     return base64.b64encode(gzip.compress(content, 9, mtime=0)).decode("ascii")
 
 
-def shuffled(values: np.typing.NDArray[Any], step: float) -> bytes:
-    """float32 numbers rounded to multiples of ``step``, first all lowest bytes, then the next: it compresses better.
+def thinned(values: npt.NDArray[Any], step: float) -> bytes:
+    """Numbers as they compress best: multiples of ``step``, each as its difference from the one in the row before.
+
+    Little-endian int32, first the lowest bytes of all differences, then the next: what changes smoothly leaves mostly
+    zeros.
 
     Args:
-        values: any shape, taken row by row.
-        step: a power of two, in the unit of the values, so that what is rounded off leaves bytes of zeros.
+        values: shape (n, width) or (n,); what is beyond 2^30 steps is drawn there.
+        step: in the unit of the values.
     """
-    rounded = (np.round(np.asarray(values, dtype=np.float64) / step) * step).astype("<f4")
-    return rounded.reshape(-1).view(np.uint8).reshape(-1, 4).T.tobytes()
+    rows = np.asarray(values, dtype=np.float64).reshape(len(values), -1)
+    steps = np.clip(np.round(np.nan_to_num(rows) / step), -(2**30), 2**30).astype("<i4")
+    changes = np.diff(steps, axis=0, prepend=np.int32(0)).astype("<i4")
+    return changes.reshape(-1).view(np.uint8).reshape(-1, 4).T.tobytes()

@@ -122,12 +122,12 @@ def _orientation(surface: Surface, sampled: Sampled, times: FloatArray, integrat
     grid, stored = sampled["time"], sampled["q_WB"]
     if times.size < 2:
         return np.asarray(stored[:1])
-    # Its own orientation at every sample, carried by its own spin in between; what the spin does not explain is
-    # spread over the interval.
+    # Its own orientation at every sample, carried by its own spin in between. Two orientations with one spin differ by
+    # a rotation that stands still in the ball; how it changes is what the spin does not explain, spread evenly.
     everywhere = np.union1d(grid, times)
     carried = _turned(surface, sampled, everywhere)
-    left = _times(stored, _conjugate(carried[np.searchsorted(everywhere, grid)]))
-    return _times(_slerp(grid, left, times), carried[np.searchsorted(everywhere, times)])
+    apart = _times(_conjugate(carried[np.searchsorted(everywhere, grid)]), stored)
+    return _times(carried[np.searchsorted(everywhere, times)], _slerp(grid, apart, times))
 
 
 def _turned(surface: Surface, sampled: Sampled, times: FloatArray) -> FloatArray:

@@ -23,19 +23,21 @@
     return new Uint8Array(await new Response(stream).arrayBuffer());
   }
 
-  // float32 with its bytes sorted by rank: the lowest of all numbers first.
-  function unshuffled(bytes, at, count) {
-    const sorted = new Uint8Array(4 * count);
+  // Multiples of a step, as differences from row to row, as int32 whose bytes are sorted by rank: the lowest first.
+  function thick(bytes, at, width, length, step) {
+    const count = width * length, sorted = new Uint8Array(4 * count);
     for (let rank = 0; rank < 4; rank++) for (let i = 0; i < count; i++) sorted[4 * i + rank] = bytes[at + rank * count + i];
-    return new Float32Array(sorted.buffer);
+    const sums = new Int32Array(sorted.buffer);
+    for (let i = width; i < count; i++) sums[i] += sums[i - width];
+    return Float32Array.from(sums, (sum) => sum * step);
   }
 
   async function load(number) {
     const spec = cases[number], bytes = await unpacked(root.querySelector(`[data-numbers="${number}"]`).textContent);
     const balls = spec.balls.map((ball) => ({ ...ball })), common = {};
     let at = 0;
-    for (const [name, ball, width, length] of spec.arrays) {
-      (ball < 0 ? common : balls[ball])[name] = { width, length, values: unshuffled(bytes, at, width * length) };
+    for (const [name, ball, width, length, step] of spec.arrays) {
+      (ball < 0 ? common : balls[ball])[name] = { width, length, values: thick(bytes, at, width, length, step) };
       at += 4 * width * length;
     }
     return { ...spec, ...common, balls };
@@ -75,13 +77,14 @@
       const name = make("label", {}, box, make("i", { class: `replay-dot e${ball.colour}` }), make("span", {}, ball.name));
       const cells = ["n", "n", "n", ""].map((kind) => make("td", { class: kind }));
       cells[3].hidden = !bounded;
+      cells[3].append(make("span", { "aria-hidden": "true" }), make("span", { class: "vh" }));
       ball.cells = cells;
       ball.line = make("tr", {}, make("th", { scope: "row" }, name), ...cells);
       return ball.line;
     }));
     const plain = shown.balls.slice(1).filter((ball) => !ball.q).map((ball) => ball.name);
     const notes = shown.balls.filter((ball) => ball.message).map((ball) => `${ball.name}: ${ball.message}.`);
-    if (plain.length) notes.push(`Without marks, for the engine does not give the ball's orientation: ${plain.join(", ")}.`);
+    if (plain.length) notes.push(`Without marks, for the run did not follow the ball's orientation: ${plain.join(", ")}.`);
     if (!shown.balls[0].press) notes.push("The truth gives no forces here.");
     ui.notes.textContent = notes.join(" ");
     ui.events.replaceChildren(...(shown.events.length ? ["The truth:"] : []), ...shown.events.filter((event) => event.time !== null).map((event) => {
@@ -140,10 +143,12 @@
         off < 0.1 ? "< 0.1" : fixed(off, off < 100 ? 1 : 0),
         ball.press ? fixed(straight(ball.press)[0], 1) : "–",
         ball.press ? fixed(straight(ball.pull)[0] / straight(ball.press)[0], 3) : "–",
-        word ? word[1] : "–",
-      ] : ["gone", "–", "–", "–"];
-      ball.cells.forEach((cell, k) => { cell.textContent = texts[k]; });
+      ] : ["gone", "–", "–"];
+      texts.forEach((text, k) => { ball.cells[k].textContent = text; });
+      const [sign, words] = [there && word ? word[1][0] : "–", there && word ? word[1].slice(2) : "not known"];
       ball.cells[3].className = there && word ? word[0] : "";
+      ball.cells[3].title = ball.cells[3].lastChild.textContent = words;
+      ball.cells[3].firstChild.textContent = sign;
       ball.line.classList.toggle("off", !ball.shown);
     }
   }
@@ -335,7 +340,7 @@
     ui.key.replaceChildren(
       ...(scale ? [entry(arrowShape, "var(--ink)", `normal force on the ball (1 cm is ${scale} N)`), entry(arrowShape, bounded ? "var(--sticks)" : "var(--link)", "friction on it")] : []),
       entry("M1 5H21", "var(--muted)", "trace of the contact"),
-      ...(bounded ? [entry("M1 5H21", "var(--slips)", "where it slips; so is the friction then")] : []),
+      ...(bounded ? [entry("M1 5H21", "var(--slips)", "where it slips (so is the friction’s arrow)")] : []),
     );
   }
 
