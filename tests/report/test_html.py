@@ -55,7 +55,7 @@ def test_json_file_is_the_content_and_has_no_nan(written: tuple[dict[str, Any], 
 
     content, out = written
     assert json.loads((out / "report.json").read_text(encoding="utf-8"), parse_constant=refuse) == content
-    assert set(content) == {"comparisons", "environment", "date"}
+    assert set(content) == {"comparisons", "environment", "date", "replay"}
     assert content["environment"]["command"] == COMMAND
     assert len(content["comparisons"][0]["truths"]) == 2
 

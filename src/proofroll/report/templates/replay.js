@@ -74,7 +74,7 @@
       const box = make("input", { type: "checkbox" });
       box.checked = ball.shown;
       box.addEventListener("change", () => { ball.shown = box.checked; update(); });
-      const name = make("label", {}, box, make("i", { class: `replay-dot e${ball.colour}` }), make("span", {}, ball.name));
+      const name = make("label", {}, box, make("i", { class: `replay-dot e${ball.colour}` }), make("span", {}, ball.name.replace(/-(?=\d)/g, "\u2011")));  // 1e-3 stays in one line
       const cells = ["n", "n", "n", ""].map((kind) => make("td", { class: kind }));
       cells[3].hidden = !bounded;
       cells[3].append(make("span", { "aria-hidden": "true" }), make("span", { class: "vh" }));
@@ -225,7 +225,7 @@
   function arrow() {
     const { T } = view, r = 0.055 * shown.radius;
     const material = new T.MeshBasicMaterial({ depthTest: false, transparent: true });
-    const shaft = new T.Mesh(new T.CylinderGeometry(r, r, 1, 12).translate(0, 0.5, 0), material);
+    const shaft = new T.Mesh(new T.LatheGeometry([new T.Vector2(r, 0), new T.Vector2(r, 1)], 12), material);
     const head = new T.Mesh(new T.ConeGeometry(3 * r, 8 * r, 16).translate(0, -4 * r, 0), material);
     const group = new T.Group().add(shaft, head);
     shaft.renderOrder = head.renderOrder = 10;
@@ -327,21 +327,12 @@
   }
 
   function key() {
-    const entry = (shape, name, words) => {
-      const svg = document.createElementNS("http://www.w3.org/2000/svg", "svg");
-      for (const [attribute, value] of Object.entries({ width: 22, height: 10, "aria-hidden": "true" })) svg.setAttribute(attribute, value);
-      const path = document.createElementNS("http://www.w3.org/2000/svg", "path");
-      for (const [attribute, value] of Object.entries({ d: shape, fill: "none", stroke: name, "stroke-width": 2 })) path.setAttribute(attribute, value);
-      svg.append(path);
-      return make("span", {}, svg, words);
-    };
-    const arrowShape = "M1 5H19M14 1L20 5L14 9", bounded = shown.balls[0].state;
-    const scale = stage.perNewton ? Number((0.01 / stage.perNewton).toPrecision(2)) : 0;
-    ui.key.replaceChildren(
-      ...(scale ? [entry(arrowShape, "var(--ink)", `normal force on the ball (1 cm is ${scale} N)`), entry(arrowShape, bounded ? "var(--sticks)" : "var(--link)", "friction on it")] : []),
-      entry("M1 5H21", "var(--muted)", "trace of the contact"),
-      ...(bounded ? [entry("M1 5H21", "var(--slips)", "where it slips (so is the friction’s arrow)")] : []),
-    );
+    const bounded = Boolean(shown.balls[0].state);
+    ui["key-forces"].hidden = !stage.perNewton;
+    ui["key-slips"].hidden = !bounded;
+    ui["key-friction"].style.color = bounded ? "var(--sticks)" : "var(--link)";
+    ui.scale.textContent = stage.perNewton ? Number((0.01 / stage.perNewton).toPrecision(2)) : "";
+    ui.key.hidden = false;
   }
 
   // The camera that shows the whole path, or, where the ball would be lost in it, follows.
