@@ -26,7 +26,8 @@ def browse(tmp_path: Path) -> Callable[[Path, str], tuple[str, str, list[str]]]:
         log = tmp_path / "net.json"
         done = subprocess.run(
             [
-                browser, "--headless", "--no-sandbox", "--disable-gpu", "--enable-unsafe-swiftshader", "--disable-quic", "--no-first-run",
+                browser, "--headless", "--no-sandbox", "--enable-unsafe-swiftshader",
+                "--disable-gpu", "--enable-unsafe-swiftshader", "--disable-quic", "--no-first-run",
                 "--disable-background-networking", "--disable-component-update", "--disable-sync",
                 "--host-resolver-rules=MAP * ~NOTFOUND",
                 f"--user-data-dir={tmp_path / 'profile'}", "--window-size=1280,6000", f"--virtual-time-budget={budget}",
