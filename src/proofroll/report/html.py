@@ -91,7 +91,10 @@ def report_content(outcomes: list[Outcome], store: Store, command: str, maps: Ma
 
 
 def page(
-    content: dict[str, Any], curves: list[list[dict[str, Any]]], pictures: Mapping[str, str] = MappingProxyType({})
+    content: dict[str, Any],
+    curves: list[list[dict[str, Any]]],
+    pictures: Mapping[str, str] = MappingProxyType({}),
+    replay: dict[str, Any] | None = None,
 ) -> str:
     """The HTML page.
 
@@ -100,6 +103,7 @@ def page(
         curves: from :func:`proofroll.report.plots.point_curves`, one list for each comparison.
         pictures: markup by name: ``map0`` are the regime maps of the first comparison, the others belong to
             further studies; what is not there is left out.
+        replay: from :func:`proofroll.report.replay.replay_content`; None: the page has none.
     """
     drawn = {
         "rows": [_drawn_rows(comparison) for comparison in content["comparisons"]],
@@ -113,6 +117,7 @@ def page(
             curves=curves,
             pictures=pictures,
             styles=[styles(comparison["rows"]) for comparison in content["comparisons"]],
+            replay=replay or {"cases": []},
             data=packed(json.dumps(drawn, allow_nan=False, separators=(",", ":"))),
             plotly=_plotly(),
         )

@@ -15,6 +15,7 @@ from proofroll.report.html import page, report_content
 from proofroll.report.parts import KEYS, Part, absent, attempt, entry
 from proofroll.report.plots import point_curves
 from proofroll.report.regime_map import inline
+from proofroll.report.replay import described, replay_content
 from proofroll.report.summary import three_sentences
 from proofroll.store import Store, write_text
 
@@ -34,12 +35,14 @@ class Report:
         content: plain data, as :func:`proofroll.report.html.report_content` has it.
         curves: of each comparison, for the figures.
         pictures: markup by name.
+        replay: of the comparisons, from :func:`proofroll.report.replay.replay_content`.
         parts: the further studies, in the order of the content's lists.
     """
 
     content: dict[str, Any]
     curves: list[list[dict[str, Any]]]
     pictures: dict[str, str]
+    replay: dict[str, Any]
     parts: list[Part] = field(default_factory=list)
 
     def expect(self, parts: Sequence[Part], out: Path, *, fresh: bool = False) -> list[Part]:
@@ -82,7 +85,7 @@ class Report:
             ProofrollError: the folder cannot be written.
         """
         write_text(out / "report.json", json.dumps(self.content, indent=1, allow_nan=False) + "\n")
-        write_text(out / "report.html", page(self.content, self.curves, self.pictures))
+        write_text(out / "report.html", page(self.content, self.curves, self.pictures, self.replay))
 
     def _put(self, part: Part, said: dict[str, Any]) -> None:
         """Gives a part its place in the content, and its pictures theirs."""
@@ -110,9 +113,9 @@ def begun(outcomes: list[Outcome], store: Store, command: str, maps: Sequence[Se
         if found:
             prefix = f"map{index}"
             pictures |= _drawn(prefix, partial(_map, found, prefix))
-    return Report(
-        report_content(outcomes, store, command, maps), [point_curves(outcome, store) for outcome in outcomes], pictures
-    )
+    replay = replay_content(outcomes, store)
+    content = report_content(outcomes, store, command, maps) | {"replay": described(replay)}
+    return Report(content, [point_curves(outcome, store) for outcome in outcomes], pictures, replay)
 
 
 def _kept(part: Part, out: Path) -> dict[str, Any] | None:

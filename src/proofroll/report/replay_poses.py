@@ -1,0 +1,195 @@
+"""Where a ball is, how it is turned and what presses on it at the frames of a replay, from a stored trajectory.
+
+Trajectories are sampled for comparison, not for the eye: between two samples a fast ball turns by half a revolution.
+The rates that lie beside the positions say what happened between them.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+import numpy.typing as npt
+
+from proofroll.scene import RollingBall
+from proofroll.surfaces import FloatArray, Surface
+
+# Variables of a trajectory, by their names there; "time" among them.
+Sampled = Mapping[str, npt.NDArray[Any]]
+# Those that a replay needs, where they are.
+NEEDED = (
+    "time", "p_WB", "v_WB", "w_WB", "q_WB", "omega1", "omega2", "omega3", "N", "F2", "F3", "sticking", "event_kind",
+    "event_time",
+)  # fmt: skip
+
+# Frames per second of the motion that no eye misses, and the most that a replay keeps where that is enough.
+LEAST_PER_SECOND, MOST_FRAMES = 60, 600
+# The ball's turn from one frame to the next [rad]: what is smooth, and what must never be passed, for beyond half a
+# turn the shorter way from one orientation to the next is the wrong one.
+SMOOTH_TURN, WIDEST_TURN = 1.2, 2.5
+# Steps of the quadrature of the spin from one frame to the next; with 1.2 rad a frame its error is below 1e-5 rad.
+_SUBSTEPS = 4
+
+SLIPS, STICKS, AWAY = 0, 1, 2
+_AFTER = {"slip": SLIPS, "stick": STICKS, "liftoff": AWAY}
+
+
+@dataclass(frozen=True)
+class Poses:
+    """A ball at n frames.
+
+    Attributes:
+        time: of the frames [s], shape (n,).
+        p_WB: centre [m], shape (n, 3).
+        q_WB: orientation, scalar first, shape (n, 4), or None if there is none.
+        contact: point of the wall's surface that the ball touches or is nearest to [m], shape (n, 3).
+        normal: e1, from the ball towards the wall, shape (n, 3).
+        press: N [N], shape (n,), or None if no force is reported.
+        friction: F2 e2 + F3 e3, on the ball, in the world [N], shape (n, 3), or None.
+        state: SLIPS, STICKS or AWAY, shape (n,), or None if nobody says.
+    """
+
+    time: FloatArray
+    p_WB: FloatArray
+    q_WB: FloatArray | None
+    contact: FloatArray
+    normal: FloatArray
+    press: FloatArray | None
+    friction: FloatArray | None
+    state: npt.NDArray[np.uint8] | None
+
+
+def frame_times(truth: Sampled) -> FloatArray:
+    """Evenly spaced times of the frames [s], shape (n,): so many that the true ball is seen to turn the right way."""
+    until = float(truth["time"][-1])
+    turned = until * float(np.linalg.norm(truth["w_WB"], axis=1).max())
+    wanted = max(LEAST_PER_SECOND * until, turned / SMOOTH_TURN)
+    return np.linspace(0.0, until, 1 + int(np.ceil(max(min(wanted, MOST_FRAMES), turned / WIDEST_TURN, 1.0))))
+
+
+def poses(body: RollingBall, sampled: Sampled, times: FloatArray, *, integrate: bool = False) -> Poses:
+    """The ball of a trajectory at the frames that it reaches.
+
+    Args:
+        body: the scene's ball.
+        sampled: its samples: the variables :data:`NEEDED`, those that it has.
+        times: of the frames [s], rising from 0.
+        integrate: for a trajectory without orientation, take the one that follows from the spin, the identity at
+            time 0; otherwise it has none.
+    """
+    from scipy.interpolate import CubicHermiteSpline
+
+    grid = sampled["time"]
+    if grid.size < 2:  # it ended before its first step
+        times, p_WB = times[:1], sampled["p_WB"][:1]
+    else:
+        times = times[times <= grid[-1] * (1 + 1e-12)]
+        p_WB = np.asarray(CubicHermiteSpline(grid, sampled["p_WB"], sampled["v_WB"])(times))
+    normal = body.surface.normal(p_WB)
+    friction = press = None
+    if "N" in sampled:
+        press, F2, F3 = (np.interp(times, grid, sampled[name]) for name in ("N", "F2", "F3"))
+        frame = body.surface.frame(body.surface.locate(p_WB))
+        friction = F2[:, None] * frame[..., 1] + F3[:, None] * frame[..., 2]
+    return Poses(
+        time=times,
+        p_WB=p_WB,
+        q_WB=_orientation(body.surface, sampled, times, integrate),
+        contact=p_WB + (body.ball.radius + body.surface.gap(p_WB))[:, None] * normal,
+        normal=normal,
+        press=press,
+        friction=friction,
+        state=_state(sampled, times),
+    )
+
+
+def _state(sampled: Sampled, times: FloatArray) -> npt.NDArray[np.uint8] | None:
+    """What the contact does at each frame, as the events tell it, which are finer in time than the samples."""
+    if "sticking" not in sampled:
+        return None
+    state = np.full(times.shape, int(sampled["sticking"][0]), dtype=np.uint8)
+    for kind, time in zip(sampled.get("event_kind", ()), sampled.get("event_time", ()), strict=True):
+        state[times >= time] = _AFTER[kind.decode() if isinstance(kind, bytes) else str(kind)]  # never, if it is NaN
+    return state
+
+
+def _orientation(surface: Surface, sampled: Sampled, times: FloatArray, integrate: bool) -> FloatArray | None:
+    if "q_WB" not in sampled:
+        return _turned(surface, sampled, times) if integrate and times.size > 1 else None
+    grid, stored = sampled["time"], sampled["q_WB"]
+    if times.size < 2:
+        return np.asarray(stored[:1])
+    # Its own orientation at every sample, carried by its own spin in between. Two orientations with one spin differ by
+    # a rotation that stands still in the ball; how it changes is what the spin does not explain, spread evenly.
+    everywhere = np.union1d(grid, times)
+    carried = _turned(surface, sampled, everywhere)
+    apart = _times(_conjugate(carried[np.searchsorted(everywhere, grid)]), stored)
+    return _times(carried[np.searchsorted(everywhere, times)], _slerp(grid, apart, times))
+
+
+def _turned(surface: Surface, sampled: Sampled, times: FloatArray) -> FloatArray:
+    """Orientation at rising times from 0 [s] by quadrature of the spin, identity at the first, shape (n, 4).
+
+    The components of the spin in the local frame change slowly, those in the world as fast as the ball goes round:
+    the former are interpolated. Each step is the fourth-order Magnus step with two Gauss points (Iserles and Norsett
+    1999, Phil. Trans. R. Soc. A 357, 983-1019, equation 4.5 with the commutator as a cross product).
+    """
+    from scipy.interpolate import Akima1DInterpolator, CubicHermiteSpline
+
+    grid = sampled["time"]
+    spin = Akima1DInterpolator(grid, np.stack([sampled[f"omega{i}"] for i in (1, 2, 3)], axis=1))
+    centre = CubicHermiteSpline(grid, sampled["p_WB"], sampled["v_WB"])
+
+    def world(t: FloatArray) -> FloatArray:
+        frame = surface.frame(surface.locate(centre(t)))
+        return np.asarray(np.einsum("tij,tj->ti", frame, spin(np.minimum(t, grid[-1]))))
+
+    fine = np.interp(np.arange((times.size - 1) * _SUBSTEPS + 1) / _SUBSTEPS, np.arange(times.size), times)
+    h = np.diff(fine)[:, None]
+    middle = fine[:-1, None] + h / 2
+    early, late = (world((middle + sign * np.sqrt(3) / 6 * h)[:, 0]) for sign in (-1, 1))
+    steps = _exponential(h / 2 * (early + late) + np.sqrt(3) / 12 * h**2 * np.cross(late, early))
+    between = steps[::_SUBSTEPS]
+    for index in range(1, _SUBSTEPS):
+        between = _times(steps[index::_SUBSTEPS], between)
+    w, x, y, z = 1.0, 0.0, 0.0, 0.0
+    found = [(w, x, y, z)]
+    for a, b, c, d in between.tolist():  # plain numbers: an array operation would cost ten times as much
+        w, x, y, z = (
+            a * w - b * x - c * y - d * z,
+            a * x + b * w + c * z - d * y,
+            a * y - b * z + c * w + d * x,
+            a * z + b * y - c * x + d * w,
+        )
+        size = math.sqrt(w * w + x * x + y * y + z * z)
+        w, x, y, z = w / size, x / size, y / size, z / size
+        found.append((w, x, y, z))
+    return np.array(found)
+
+
+def _times(p: FloatArray, q: FloatArray) -> FloatArray:
+    """Product of quaternions, scalar first: first ``q``, then ``p``."""
+    a, b, c, d = np.moveaxis(p, -1, 0)
+    w, x, y, z = np.moveaxis(q, -1, 0)
+    parts = [a * w - b * x - c * y - d * z, a * x + b * w + c * z - d * y]
+    return np.stack([*parts, a * y - b * z + c * w + d * x, a * z + b * y - c * x + d * w], axis=-1)
+
+
+def _conjugate(q: FloatArray) -> FloatArray:
+    return np.asarray(q * np.array([1.0, -1.0, -1.0, -1.0]))
+
+
+def _exponential(turn: FloatArray) -> FloatArray:
+    """Quaternions of rotation vectors [rad], shape (n, 3) to (n, 4)."""
+    half = np.linalg.norm(turn, axis=-1, keepdims=True) / 2
+    return np.concatenate([np.cos(half), np.sinc(half / np.pi) / 2 * turn], axis=-1)
+
+
+def _slerp(grid: FloatArray, q: FloatArray, times: FloatArray) -> FloatArray:
+    from scipy.spatial.transform import Rotation, Slerp
+
+    found: Any = Slerp(grid, Rotation.from_quat(np.roll(q, -1, axis=1)))(np.clip(times, grid[0], grid[-1]))
+    return np.asarray(np.roll(found.as_quat(), 1, axis=1))

@@ -1,0 +1,81 @@
+"""The wall of a replay as a mesh, from nothing but what every surface can say of itself."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+
+import numpy as np
+import numpy.typing as npt
+
+from proofroll.scene import RollingBall
+from proofroll.surfaces import FloatArray
+
+# Divisions of a coordinate that comes round, and every how many of them a line is drawn: every 30 degrees.
+_ROUND, _ROUND_LINES = 72, 6
+# Lines along the other coordinates: so far apart that the ball is near one, but no more than these.
+_MOST_LINES = 100
+# How far the wall goes beyond the path, in radii of the ball.
+_MARGIN = 3.0
+
+
+@dataclass(frozen=True)
+class Wall:
+    """A grid of points on the wall.
+
+    Attributes:
+        points: position [m], shape (rows, columns, 3): along the first coordinate in a row, along the second in a
+            column.
+        normals: e1 there, shape (rows, columns, 3).
+        lines: every how many rows and columns a line is drawn.
+        spacing: between the lines [unit of the coordinate], for the first and the second coordinate.
+    """
+
+    points: FloatArray
+    normals: FloatArray
+    lines: tuple[int, int]
+    spacing: tuple[float, float]
+
+
+def wall(body: RollingBall, u: FloatArray) -> Wall:
+    """The wall around a path.
+
+    Args:
+        body: the scene's ball.
+        u: the path in the surface's coordinates, shape (n, 2).
+    """
+    grids: list[npt.NDArray[np.floating]] = []
+    every, spacing = [], []
+    for column, (period, scale) in enumerate(zip(body.surface.periods, body.surface.length_scales, strict=True)):
+        if period is not None:
+            grids.append(np.arange(_ROUND + 1) * np.float64(period / _ROUND))
+            every.append(_ROUND_LINES)
+            spacing.append(period * _ROUND_LINES / _ROUND)
+            continue
+        margin = _MARGIN * body.ball.radius / scale
+        low, high = float(u[:, column].min()) - margin, float(u[:, column].max()) + margin
+        step = _round_step(max(2 * body.ball.radius / scale, (high - low) / _MOST_LINES))
+        grids.append(np.arange(math.floor(low / step), math.ceil(high / step) + 1) * step)
+        every.append(1)
+        spacing.append(step)
+    grid = np.stack(np.meshgrid(*grids, indexing="xy"), axis=-1)
+    points = body.wall.position(grid)
+    return Wall(points, body.wall.normal(points), (every[1], every[0]), (spacing[0], spacing[1]))
+
+
+def middle(body: RollingBall, u: FloatArray) -> FloatArray:
+    """For each point of a path the one that a camera keeps in sight [m], shape (n, 3): on the axis of what comes round.
+
+    Args:
+        body: the scene's ball.
+        u: the path in the surface's coordinates, shape (n, 2).
+    """
+    turns = [np.arange(4) * period / 4 if period is not None else np.zeros(1) for period in body.surface.periods]
+    shifts = np.stack(np.meshgrid(*turns), axis=-1).reshape(-1, 2)
+    return np.asarray(body.surface.position(u[:, None] + shifts).mean(axis=1))
+
+
+def _round_step(least: float) -> float:
+    """The smallest of 1, 2 and 5 times a power of ten that is not below."""
+    power = 10.0 ** math.floor(math.log10(least))
+    return next(factor * power for factor in (1, 2, 5, 10) if factor * power >= least * (1 - 1e-9))

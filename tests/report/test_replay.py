@@ -1,0 +1,468 @@
+"""The replay: its numbers, and the section in a real browser with its network cut."""
+
+from __future__ import annotations
+
+import base64
+import dataclasses
+import gzip
+import json
+import shutil
+from collections.abc import Callable, Iterator
+from importlib.metadata import PackageNotFoundError
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+from scipy.integrate import solve_ivp
+from scipy.spatial.transform import Rotation
+
+from proofroll.report import replay_library
+from proofroll.report.html import page, report_content
+from proofroll.report.plots import point_curves
+from proofroll.report.replay import LENGTH, described, replay_content
+from proofroll.report.replay_library import thinned, three
+from proofroll.report.replay_poses import AWAY, SLIPS, STICKS, WIDEST_TURN, frame_times, poses
+from proofroll.report.replay_wall import middle, wall
+from proofroll.scene_file import load_scene
+from proofroll.trajectory import read, write
+from proofroll.truth import truth
+
+SPEED, UNTIL, EVERY = 4.0, 1.0, 0.02
+
+
+def sampled(dataset: Any) -> dict[str, Any]:
+    """A dataset as the replay reads it from its file."""
+    return {str(name): variable.to_numpy() for name, variable in dataset.variables.items()}
+
+
+@pytest.fixture(scope="module")
+def rolling() -> tuple[Any, dict[str, Any]]:
+    """The ball in the cylinder without resistance, and its truth, sampled as comparisons are."""
+    scene = load_scene("sphere_in_cylinder", speed=SPEED)
+    return scene.rolling, sampled(truth(scene, np.linspace(0, UNTIL, round(UNTIL / EVERY) + 1)))
+
+
+def spin(body: Any, t: float) -> Any:
+    """The closed form's angular velocity in the world (Blajer 2006, f = 0) [rad/s]."""
+    a, c, g = body.ball.radius, body.surface.radius, 9.81
+    rate = SPEED / c
+    nu = np.sqrt(2 / 7) * rate
+    z, z_rate = -5 * g / (2 * rate**2) * (1 - np.cos(nu * t)), -5 * g / (2 * rate**2) * nu * np.sin(nu * t)
+    local = np.array([rate * z / a, z_rate / a, -SPEED / a])
+    return Rotation.from_euler("z", rate * t).apply(local)
+
+
+def test_the_true_ball_turns_as_its_spin_says(rolling: Any) -> None:
+    """Frames between samples half a turn apart hold the orientation that the closed form's spin integrates to."""
+    body, data = rolling
+    times = frame_times(data)
+    found = poses(body, data, times, integrate=True).q_WB
+
+    def rate(t: float, q: Any) -> Any:
+        w = spin(body, t)
+        return 0.5 * np.array([-w @ q[1:], *(q[0] * w + np.cross(w, q[1:]))])
+
+    exact = solve_ivp(rate, (0, UNTIL), [1, 0, 0, 0], "DOP853", times, rtol=1e-10, atol=1e-12).y.T
+    assert found is not None
+    angle = 2 * np.arccos(np.clip(np.abs(np.sum(found * exact, axis=1)), 0, 1))
+    assert angle.max() < 5e-3
+    assert np.linalg.norm(spin(body, 0.0)) * EVERY > np.pi, "the samples alone would not show which way it turns"
+
+
+def test_an_engine_keeps_its_own_orientation(rolling: Any) -> None:
+    """At its samples an engine's orientation is its own, in between its spin carries it; without one it has none."""
+    body, data = rolling
+    assert poses(body, data, frame_times(data)).q_WB is None
+    times = frame_times(data)
+    offset = Rotation.from_rotvec([0.3, -0.5, 0.2])  # an orientation that no quadrature from the identity would find
+    turned = poses(body, data, np.union1d(times, data["time"]), integrate=True)
+    assert turned.q_WB is not None
+    own = (Rotation.from_quat(turned.q_WB, scalar_first=True) * offset).as_quat(scalar_first=True)
+    data = {**data, "q_WB": own[np.searchsorted(turned.time, data["time"])]}
+    found = poses(body, data, times).q_WB
+    assert found is not None
+    dots = np.abs(np.sum(found * own[np.searchsorted(turned.time, times)], axis=1))
+    assert 2 * np.arccos(np.clip(dots, 0, 1)).max() < 1e-2
+
+
+@pytest.mark.parametrize("name", ["sphere_in_cylinder", "inclined_plane"])
+def test_the_contact_lies_on_the_wall(name: str) -> None:
+    """Also where an engine's ball has sunk in or come out, and on every surface."""
+    body = load_scene(name).rolling
+    data = sampled(truth(load_scene(name), np.linspace(0, 0.2, 11)))
+    for depth in (0.0, 2e-3, -2e-3):
+        moved = {**data, "p_WB": data["p_WB"] + depth * body.surface.normal(data["p_WB"])}
+        found = poses(body, moved, data["time"])
+        assert np.abs(body.wall.gap(found.contact)).max() < 1e-12
+        distance = np.linalg.norm(found.contact - found.p_WB, axis=1)
+        assert np.abs(distance - (body.ball.radius - depth)).max() < 1e-12
+
+
+def test_the_forces_add_up(rolling: Any) -> None:
+    """-N e1 + F2 e2 + F3 e3 is the mass times what accelerates the ball besides gravity."""
+    body, data = rolling
+    found = poses(body, data, data["time"])
+    assert found.press is not None
+    assert found.friction is not None
+    c, g, m = body.surface.radius, 9.81, body.ball.mass
+    rate = SPEED / c
+    z_accel = -5 * g / 7 * np.cos(np.sqrt(2 / 7) * rate * found.time)
+    angle = rate * found.time
+    inward = -(SPEED**2) / c * np.stack([np.cos(angle), np.sin(angle), np.zeros_like(angle)], axis=1)
+    needed = m * (inward + np.stack([np.zeros_like(angle), np.zeros_like(angle), z_accel + g], axis=1))
+    assert np.abs(found.friction - found.press[:, None] * found.normal - needed).max() < 1e-9
+
+
+def test_the_contact_changes_at_the_events_and_not_at_the_samples(rolling: Any) -> None:
+    """The state of a frame is that after the last event before it; an event without a time changes nothing."""
+    body, data = rolling
+    events = {
+        "sticking": np.ones(data["time"].shape, dtype=np.int8),
+        "event_kind": np.array([b"slip", b"stick", b"liftoff", b"slip"]),
+        "event_time": np.array([0.205, 0.211, 0.9, np.nan]),
+    }
+    found = poses(body, {**data, **events}, np.array([0.0, 0.204, 0.206, 0.212, 0.899, 0.901])).state
+    assert found is not None
+    assert found.tolist() == [STICKS, STICKS, SLIPS, STICKS, STICKS, AWAY]
+    assert poses(body, data, data["time"]).state is None
+
+
+@pytest.mark.parametrize(("rate", "until"), [(0.0, 1.0), (160.0, 2.0), (240.0, 4.0), (1e4, 1.0)])
+def test_frames_are_close_enough_to_see_which_way_it_turns(rate: float, until: float) -> None:
+    """Sixty a second at least, and never as much as half a turn from one frame to the next."""
+    times = frame_times({"time": np.array([0.0, until]), "w_WB": np.full((2, 3), rate / np.sqrt(3))})
+    assert (times[0], times[-1]) == (0.0, until)
+    assert np.diff(times).max() * rate <= WIDEST_TURN * (1 + 1e-9)
+    assert np.diff(times).max() <= 1 / 60 + 1e-12
+
+
+def test_a_run_that_ends_early_is_shown_until_then(rolling: Any) -> None:
+    """No frame is made up beyond the last sample, also where there is but one."""
+    body, data = rolling
+    times = frame_times(data)
+    for count in (1, 2, 30):
+        found = poses(body, {name: values[:count] for name, values in data.items()}, times, integrate=True)
+        assert found.time[-1] <= data["time"][count - 1] + 1e-12
+        assert len(found.p_WB) == found.time.size >= 1
+
+
+@pytest.mark.parametrize("name", ["sphere_in_cylinder", "inclined_plane"])
+def test_the_drawn_wall_is_the_wall_around_the_path(name: str) -> None:
+    """Its points lie on the wall and reach beyond the path; a camera that follows keeps to the axis or to the ball."""
+    body = load_scene(name).rolling
+    u = body.u0 + np.linspace(0, 1, 20)[:, None] * np.array([0.3, -0.5])
+    built = wall(body, u)
+    assert np.abs(body.wall.gap(built.points)).max() < 1e-12
+    reached = body.wall.locate(built.points.reshape(-1, 3))
+    for column, (period, scale) in enumerate(zip(body.surface.periods, body.surface.length_scales, strict=True)):
+        if period is None:
+            margin = body.ball.radius / scale
+            assert reached[:, column].min() < u[:, column].min() - margin
+            assert reached[:, column].max() > u[:, column].max() + margin
+    followed = middle(body, u)
+    at = body.surface.position(u)
+    expected = np.stack([0 * u[:, 1], 0 * u[:, 1], at[:, 2]], axis=1) if body.surface.periods[0] else at
+    assert np.abs(followed - expected).max() < 1e-12
+
+
+def test_numbers_survive_being_packed() -> None:
+    """Unpacked as the page does it they are off by half a step at most, and what is not finite or huge stays finite."""
+    values = np.random.default_rng(0).normal(size=(50, 3)).cumsum(axis=0)
+    sorted_bytes = np.frombuffer(thinned(values, LENGTH), np.uint8).reshape(4, -1)
+    again = np.ascontiguousarray(sorted_bytes.T).view("<i4").reshape(50, 3).cumsum(axis=0) * LENGTH
+    assert np.abs(again - values).max() <= LENGTH / 2
+    wild = np.frombuffer(thinned(np.array([np.nan, 1e30, -1e30]), 1.0), np.uint8).reshape(4, -1)
+    assert np.ascontiguousarray(wild.T).view("<i4").ravel().cumsum().tolist() == [0, 2**30, -(2**30)]
+
+
+def test_every_truth_is_a_case_with_the_default_settings_as_ghosts(made: Any) -> None:
+    """One ghost of each engine is shown at first: the default one where there is one; the numbers fill what is said."""
+    content = replay_content([made[0]], made[1])
+    assert [case["label"] for case in content["cases"]] == ["speed=3", "speed=4"]
+    assert content["start"] == 1, "the scene as its file has it"
+    for case, numbers in zip(content["cases"], content["packed"], strict=True):
+        names = {ball["name"]: ball["shown"] for ball in case["balls"]}
+        assert names == {"truth": True, "alpha fine default (dt 1e-3)": True, "beta only (dt 1e-3)": True}
+        bytes_said = sum(4 * width * length for _, _, width, length, _ in case["arrays"])
+        assert len(gzip.decompress(base64.b64decode(numbers))) == bytes_said
+    silent = next(i for i, ball in enumerate(content["cases"][0]["balls"]) if ball["name"].startswith("beta"))
+    held = {name for name, ball, *_ in content["cases"][0]["arrays"] if ball == silent}
+    assert held == {"p"}, "neither forces nor an orientation are invented"
+
+
+def test_the_furthest_of_the_other_settings_is_there_if_it_is_seen(made: Any) -> None:
+    """A setting that is not the default but off by more than a hundredth of the ball's radius is a ghost, not shown."""
+    outcome, store = made
+    run = next(run for run in outcome.runs if run.row.engine == "alpha[formulation=fine]")
+    assert run.case is not None
+    file = store.trajectory(run.case)
+    kept = file.read_bytes()
+    try:
+        dataset = read(file)
+        dataset["p_WB"] = dataset["p_WB"] + 1e-3
+        write(dataset, file)
+        balls = replay_content([outcome], store)["cases"][0]["balls"]
+    finally:
+        file.write_bytes(kept)
+    assert {ball["name"]: ball["shown"] for ball in balls}["alpha fine matched (dt 1e-3)"] is False
+
+
+def test_a_ball_that_flies_off_is_dropped_where_it_leaves(made: Any) -> None:
+    """A ghost beyond all bounds has frames until it leaves the picture, and the page says when that is."""
+    outcome, store = made
+    run = next(run for run in outcome.runs if run.row.engine == "beta")
+    assert run.case is not None
+    file = store.trajectory(run.case)
+    kept = file.read_bytes()
+    try:
+        dataset = read(file)
+        dataset["p_WB"][25:] = dataset["p_WB"][25:] * 1e9
+        write(dataset, file)
+        ball = next(b for b in replay_content([outcome], store)["cases"][0]["balls"] if b["name"].startswith("beta"))
+    finally:
+        file.write_bytes(kept)
+    assert 0 < ball["frames"] < replay_content([outcome], store)["cases"][0]["frames"]
+    assert "leaves the picture" in ball["message"]
+
+
+def test_report_json_names_what_is_replayed(written: Any) -> None:
+    """Names, settings and trajectories of the ghosts are in report.json; their poses are not."""
+    content = json.loads((written[1] / "report.json").read_text(encoding="utf-8"))
+    balls = content["replay"][0]["balls"]
+    assert balls[0]["name"] == "truth"
+    assert all(ball["trajectory"].endswith(".nc") for ball in balls)
+    assert all(ball["settings"]["dt"] == 1e-3 for ball in balls[1:])
+    assert "arrays" not in content["replay"][0]
+
+
+def test_three_js_travels_with_its_licence(written: Any) -> None:
+    """The page names three.js's makers and holds the terms; what it unpacks is the program that defines THREE."""
+    library = three()
+    assert library is not None
+    text = gzip.decompress(base64.b64decode(library["packed"])).decode("utf-8")
+    assert "THREE={}" in text
+    assert "GLTFLoader" not in text, "what else the viewer holds stays there"
+    html = (written[1] / "report.html").read_text(encoding="utf-8")
+    assert library["packed"] in html
+    assert "Three.js Authors" in html
+    assert "Permission is hereby granted" in html
+
+
+@pytest.mark.parametrize("what", ["absent", "changed"])
+def test_without_three_js_there_is_no_library(what: str, monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> None:
+    """A trimesh that is absent, or laid out in another way, is no error: the page does without the picture."""
+
+    class Changed:
+        version, files = "0", ()
+
+        def locate_file(self, name: str) -> Path:
+            return tmp_path / name
+
+    def found(_: str) -> Changed:
+        if what == "absent":
+            raise PackageNotFoundError
+        return Changed()
+
+    monkeypatch.setattr(replay_library, "distribution", found)
+    assert three.__wrapped__() is None
+
+
+def test_what_engines_and_files_say_stays_text(made: Any, parse: Callable[[str], Any]) -> None:
+    """Markup in a title, a point, a name or a message makes no element."""
+    evil = "</script><script>alert(1)</script><img src=x onerror=alert(2)>"
+    replay = replay_content([made[0]], made[1])
+    case = replay["cases"][0]
+    case |= {"group": evil, "label": evil, "scene": evil}
+    case["balls"][1] |= {"name": evil, "message": evil}
+    html = page(report_content([made[0]], made[1], "proofroll report"), [point_curves(*made)], replay=replay)
+    elements = parse(html)
+    assert "img" not in {tag for tag, _ in elements.tags}
+    assert not any("alert(1)" in script and "balls" not in script for script in elements.scripts)
+    known = next(script for script in elements.scripts if '"balls"' in script)
+    assert json.loads(known)[0]["balls"][1]["message"] == evil
+
+
+# ---- in a browser ----
+
+
+@dataclasses.dataclass
+class Opened:
+    """A page in the browser, what it said on its console and what it asked for."""
+
+    page: Any
+    errors: list[str]
+    requests: list[str]
+
+
+@pytest.fixture(scope="module")
+def chromium() -> Iterator[Any]:
+    """A headless Chromium, one for all tests here."""
+    playwright = pytest.importorskip("playwright.sync_api", reason="playwright is not installed")
+    browser = shutil.which("chromium") or shutil.which("chromium-browser") or shutil.which("google-chrome")
+    if browser is None:
+        pytest.skip("no chromium here: apt-get install chromium")
+    with playwright.sync_playwright() as running:
+        # WebGL in software, as the machine may have no graphics.
+        options = ["--no-sandbox", "--use-angle=swiftshader", "--enable-unsafe-swiftshader"]
+        started = running.chromium.launch(executable_path=browser, args=options)
+        yield started
+        started.close()
+
+
+@pytest.fixture
+def visit(chromium: Any) -> Iterator[Callable[..., Opened]]:
+    """Opens a page with the network cut."""
+    contexts = []
+
+    def go(file: Path, before: str = "") -> Opened:
+        context = chromium.new_context(offline=True, viewport={"width": 1100, "height": 800})
+        contexts.append(context)
+        shown = context.new_page()
+        shown.set_default_timeout(60_000)
+        opened = Opened(shown, [], [])
+        shown.on("console", lambda m: opened.errors.append(m.text) if m.type == "error" else None)
+        shown.on("pageerror", lambda error: opened.errors.append(str(error)))
+        shown.on("request", lambda request: opened.requests.append(request.url))
+        if before:
+            shown.add_init_script(before)
+        shown.goto(file.as_uri())
+        return opened
+
+    yield go
+    for context in contexts:
+        context.close()
+
+
+def part(opened: Opened, name: str) -> Any:
+    """One element of the replay."""
+    return opened.page.locator(f'.replay [data-part="{name}"]')
+
+
+def ready(opened: Opened) -> None:
+    """Brings the replay into view and waits until it has drawn."""
+    opened.page.locator("#replay").scroll_into_view_if_needed()
+    opened.page.evaluate("document.querySelector('.replay').scrollIntoView()")
+    opened.page.wait_for_selector(".replay[data-ready]")
+    settle(opened)
+
+
+def settle(opened: Opened) -> None:
+    """Waits for two frames of the browser: what was asked for is drawn then."""
+    opened.page.evaluate("() => new Promise((done) => requestAnimationFrame(() => requestAnimationFrame(done)))")
+
+
+def clock(opened: Opened) -> float:
+    """The time shown [s]."""
+    return float(part(opened, "clock").inner_text().split()[0])
+
+
+def picture(opened: Opened) -> bytes:
+    """What is drawn."""
+    settle(opened)
+    return bytes(part(opened, "canvas").screenshot())
+
+
+def until(opened: Opened, met: Callable[[float], bool]) -> None:
+    """Waits for the time shown; asked from here, since the page's policy forbids a polling script to be compiled."""
+    for _ in range(600):
+        if met(clock(opened)):
+            return
+        opened.page.wait_for_timeout(100)
+    pytest.fail(f"the time shown is still {clock(opened)} s")
+
+
+def passes(opened: Opened, time: float) -> None:
+    """Waits until the time shown is beyond ``time`` [s]."""
+    until(opened, lambda shown: shown > time)
+
+
+def test_the_replay_plays(written: Any, visit: Callable[..., Opened]) -> None:
+    """From file:// without network: nothing before it is seen, then time and picture advance; no error, no request."""
+    file = written[1] / "report.html"
+    opened = visit(file)
+    assert opened.page.evaluate("typeof THREE") == "undefined"
+    assert opened.page.locator(".replay[data-ready]").count() == 0
+    ready(opened)
+    assert opened.page.evaluate("typeof THREE") == "object"
+    settle(opened)
+    assert clock(opened) == 0, "nothing moves by itself"
+    still = picture(opened)
+    assert still == picture(opened), "and the picture stands while time does"
+    part(opened, "play").click()
+    passes(opened, 0.02)
+    part(opened, "play").click()
+    stopped = clock(opened)
+    assert picture(opened) != still
+    assert clock(opened) == stopped, "pause holds it"
+    values = part(opened, "values").inner_text()
+    assert "N" in values
+    assert "rolls without slip" in values
+    assert opened.errors == []
+    assert opened.requests == [file.as_uri()]
+
+
+def test_the_replay_obeys(written: Any, visit: Callable[..., Opened]) -> None:
+    """Keys, time line, ghosts, view and the choice of a case each change what is shown."""
+    opened = visit(written[1] / "report.html")
+    ready(opened)
+    opened.page.keyboard.press("Tab")
+    part(opened, "canvas").focus()
+    opened.page.keyboard.press("Space")
+    passes(opened, 0.01)
+    opened.page.keyboard.press("Space")
+    before = clock(opened)
+    part(opened, "time").focus()
+    opened.page.keyboard.press("Shift+ArrowRight")
+    settle(opened)
+    assert clock(opened) > before
+    drawn = picture(opened)
+    part(opened, "canvas").focus()
+    opened.page.keyboard.press("ArrowLeft")
+    turned = picture(opened)
+    assert turned != drawn
+    part(opened, "forces").uncheck()
+    bare = picture(opened)
+    assert bare != turned
+    opened.page.locator('[data-part="balls"] input').first.uncheck()
+    settle(opened)
+    assert opened.page.locator('[data-part="balls"] tr.off').count() == 1
+    part(opened, "case").select_option("0")
+    until(opened, lambda shown: shown == 0)
+    assert picture(opened) != bare
+    assert opened.errors == []
+
+
+def test_the_time_line_shows_the_truth_at_that_time(written: Any, made: Any, visit: Callable[..., Opened]) -> None:
+    """The values are those of the stored truth: z and N at half a second."""
+    opened = visit(written[1] / "report.html")
+    ready(opened)
+    opened.page.evaluate(
+        "() => { const line = document.querySelector('[data-part=time]');"
+        " line.value = 0.5; line.dispatchEvent(new Event('input')); }"
+    )
+    settle(opened)
+    shown = part(opened, "values").inner_text().replace("−", "-").split("\n")
+    dataset = read(made[1].trajectory(made[0].truths["speed=4"])).sel(time=0.5, method="nearest")
+    assert abs(float(shown[shown.index("z") + 1].split()[0]) - float(dataset["z"])) < 2e-4
+    assert abs(float(shown[shown.index("N") + 1].split()[0]) - float(dataset["N"])) < 2e-2
+
+
+@pytest.mark.parametrize("lacking", ["WebGL", "three.js"])
+def test_without_a_picture_the_values_follow_the_time(
+    lacking: str, made: Any, tmp_path: Path, visit: Callable[..., Opened]
+) -> None:
+    """One sentence says what is missing; time and values run, and nothing fails."""
+    replay = replay_content([made[0]], made[1])
+    if lacking == "three.js":
+        replay["library"] = None
+    file = tmp_path / "report.html"
+    content = report_content([made[0]], made[1], "proofroll report") | {"replay": described(replay)}
+    file.write_text(page(content, [point_curves(*made)], replay=replay), encoding="utf-8")
+    blind = "HTMLCanvasElement.prototype.getContext = () => null;" if lacking == "WebGL" else ""
+    opened = visit(file, blind)
+    ready(opened)
+    assert lacking in part(opened, "said").inner_text()
+    part(opened, "play").click()
+    passes(opened, 0.02)
+    assert opened.errors == []
