@@ -11,10 +11,12 @@ from typing import TYPE_CHECKING, Any
 from proofroll.plain import plain
 from proofroll.report import labels, onset_tables, tables
 from proofroll.report.content import environment, outcome_content
+from proofroll.report.evidence import add_evidence
 from proofroll.report.findings import findings
 from proofroll.report.onsets import add_events, mark, truth_facts
-from proofroll.report.plots import point_curves, styles
+from proofroll.report.plots import point_curves
 from proofroll.report.regime_map import counts, inline
+from proofroll.report.styles import SYMBOLS, styles
 from proofroll.scene_file import load_scene
 from proofroll.store import Store, write_text
 from proofroll.studies.compare import Outcome
@@ -62,6 +64,7 @@ def report_content(outcomes: list[Outcome], store: Store, command: str, maps: Ma
         content["findings"] = findings(content)
         content["regimes"] = counts(maps[index]) if index < len(maps) else []
         add_events(content, outcome.runs, store)
+        add_evidence(content, outcome)
         comparisons.append(content)
     versions: dict[str, str] = {}
     for outcome in outcomes:
@@ -143,6 +146,7 @@ def _templates() -> jinja2.Environment:
         "names": labels.names,
         "symbols": labels.SYMBOLS,
         "meanings": labels.MEANINGS,
+        "outlines": SYMBOLS,
         "again": _again,
     }
     return made

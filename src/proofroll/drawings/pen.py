@@ -1,0 +1,134 @@
+"""Lines, arrows and letters of a drawing: points in space go in, marks of an SVG picture come out."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterable, Sequence
+from dataclasses import dataclass, field
+from typing import Any
+
+import numpy as np
+import numpy.typing as npt
+
+from proofroll.surfaces import FloatArray
+
+# Points along a whole circle: as smooth as a screen can show.
+_ROUND = 72
+_HEAD = 8.0  # length of an arrow's head [px]
+_LETTER = 8.0  # width of a letter [px]
+_MARGIN = 4.0  # around a drawing [px]
+
+
+@dataclass(frozen=True)
+class View:
+    """A parallel projection.
+
+    Attributes:
+        viewer: direction towards the viewer, any length, shape (3,).
+        up: direction that is upright in the picture, any length, shape (3,).
+        scale: pixels per metre.
+    """
+
+    viewer: npt.ArrayLike
+    up: npt.ArrayLike
+    scale: float
+
+    def __call__(self, point: npt.ArrayLike) -> FloatArray:
+        """Place of points in the picture [px], y downwards, the point zero at zero, shape (..., 2)."""
+        back = _unit(self.viewer)
+        right = _unit(np.cross(self.up, back))
+        upright = np.cross(back, right)
+        p = np.asarray(point, dtype=np.float64)
+        return np.stack([self.scale * p @ right, -self.scale * p @ upright], axis=-1)
+
+    def towards(self, direction: npt.ArrayLike) -> FloatArray:
+        """How far a direction points to the viewer, shape (...)."""
+        return np.asarray(np.asarray(direction, dtype=np.float64) @ _unit(self.viewer))
+
+
+@dataclass
+class Drawing:
+    """Marks in the order in which they are drawn.
+
+    A mark is a path ``d`` of SVG, or a text with ``x``, ``y``, ``anchor`` and the parts of the text, each with
+    ``text`` and ``sub``, whether it is an index. ``look`` names how it looks: ``line``, ``thin``, ``hidden``, ``axis``,
+    ``wall``, ``ball``, ``ghost``, ``faint``, ``motion``, ``force``, ``frame``, the same with ``-head`` for filled heads of
+    arrows, and ``letter``, ``motion-letter``, ….
+    """
+
+    marks: list[dict[str, Any]] = field(default_factory=list)
+    _bounds: list[FloatArray] = field(default_factory=list)
+
+    def content(self) -> dict[str, Any]:
+        """As plain data: ``box``, the x, y, width and height that hold everything [px], and ``marks``."""
+        places = np.concatenate(self._bounds)
+        low, high = np.floor(places.min(axis=0)) - _MARGIN, np.ceil(places.max(axis=0)) + _MARGIN
+        return {"box": [*low.tolist(), *(high - low).tolist()], "marks": self.marks}
+
+    def path(self, points: npt.ArrayLike, look: str, closed: bool = False) -> None:
+        """A line through places of the picture, shape (n, 2)."""
+        places = np.asarray(points, dtype=np.float64)
+        self._bounds.append(places)
+        text = "L".join(f"{x:.1f} {y:.1f}" for x, y in places.tolist())
+        self.marks.append({"d": f"M{text}{'Z' if closed else ''}", "look": look})
+
+    def disc(self, centre: Sequence[float], radius: float, look: str) -> None:
+        """A circle of the picture; a ball looks so from everywhere."""
+        (x, y), r = centre, radius
+        self._bounds.append(np.array([[x - r, y - r], [x + r, y + r]]))
+        d = f"M{x - r:.1f} {y:.1f}a{r:.1f} {r:.1f} 0 1 0 {2 * r:.1f} 0a{r:.1f} {r:.1f} 0 1 0 {-2 * r:.1f} 0Z"
+        self.marks.append({"d": d, "look": look})
+
+    def arrow(self, tail: npt.ArrayLike, tip: npt.ArrayLike, look: str, both: bool = False) -> None:
+        """An arrow between two places of the picture; ``both``: with a head at each end."""
+        a, b = (np.asarray(end, dtype=np.float64) for end in (tail, tip))
+        self.curved(np.stack([a, b]), look, both)
+
+    def curved(self, points: npt.ArrayLike, look: str, both: bool = False) -> None:
+        """A line with a head at its end, or at both ends."""
+        places = np.asarray(points, dtype=np.float64)
+        ends = [(places[-2], places[-1])] + ([(places[1], places[0])] if both else [])
+        self.path(places, look)
+        for before, tip in ends:
+            along = _unit(tip - before)
+            across = 0.36 * np.array([-along[1], along[0]])
+            self.path([tip, tip - _HEAD * (along + across), tip - _HEAD * (along - across)], f"{look}-head", closed=True)
+
+    def text(self, place: npt.ArrayLike, symbol: str, look: str = "letter", anchor: str = "middle") -> None:
+        """Letters at a place of the picture; ``_`` begins an index of one character: ``V_0``, ``c = b − a``."""
+        x, y = np.asarray(place, dtype=np.float64).tolist()
+        parts: list[dict[str, Any]] = []
+        for number, piece in enumerate(symbol.split("_")):
+            if number:
+                parts.append({"text": piece[:1], "sub": True})
+            rest = piece[1:] if number else piece
+            if rest:
+                parts.append({"text": rest, "sub": False})
+        # Letters are about so wide and high; where they are a little more, the margin holds them.
+        width = _LETTER * sum(len(part["text"]) for part in parts)
+        left = x - {"start": 0.0, "middle": width / 2, "end": width}[anchor]
+        self._bounds.append(np.array([[left, y - 1.5 * _LETTER], [left + width, y + 0.5 * _LETTER]]))
+        place_of = {"x": round(x, 1), "y": round(y, 1), "anchor": anchor}
+        self.marks.append({**place_of, "parts": parts, "look": look})
+
+
+def beyond(tail: npt.ArrayLike, tip: npt.ArrayLike, by: float = 11.0) -> FloatArray:
+    """The place past the tip of an arrow where its letter stands."""
+    a, b = (np.asarray(end, dtype=np.float64) for end in (tail, tip))
+    return np.asarray(b + by * _unit(b - a) + [0.0, 4.5])
+
+
+def turn(start: float, end: float) -> FloatArray:
+    """Angles from one to the other [rad], so close that a circle through them looks round."""
+    return np.linspace(start, end, max(2, round(_ROUND * abs(end - start) / (2 * math.pi)) + 1))
+
+
+def circle(centre: npt.ArrayLike, one: npt.ArrayLike, other: npt.ArrayLike, angles: Iterable[float]) -> FloatArray:
+    """Points of a circle in space at angles from its radius ``one`` to its radius ``other``, shape (n, 3)."""
+    phi = np.asarray(list(angles), dtype=np.float64)[:, None]
+    return np.asarray(np.asarray(centre) + np.cos(phi) * np.asarray(one) + np.sin(phi) * np.asarray(other))
+
+
+def _unit(vector: npt.ArrayLike) -> FloatArray:
+    v = np.asarray(vector, dtype=np.float64)
+    return np.asarray(v / (np.linalg.norm(v) or 1.0))
