@@ -43,10 +43,10 @@ def _frame(drawn: Drawing, at: View) -> None:
     """Unit vectors at the centre, and the angular velocity that goes with each."""
     for index, axis in enumerate((E1, E2, E3)):
         ends = at([0 * axis, 1.7 * axis])
-        drawn.arrow(*ends, "frame")
-        drawn.text(beyond(*ends), f"e_{index + 1}", "frame-letter")
+        drawn.arrow(ends, "frame")
+        drawn.text(beyond(ends), f"e_{index + 1}", "frame-letter")
         one, other = np.roll(E1, index + 1), np.roll(E1, index + 2)
-        drawn.curved(at(circle(1.33 * axis, 0.17 * one, 0.17 * other, turn(-2.4, 2.4))), "motion")
+        drawn.arrow(at(circle(1.33 * axis, 0.17 * one, 0.17 * other, turn(-2.4, 2.4))), "motion")
         drawn.text(_aside(at, 1.33 * axis, axis, 27.0), f"ω_{index + 1}", "motion-letter")
 
 
@@ -68,8 +68,8 @@ def _radius(drawn: Drawing, at: View) -> None:
     gaps = np.abs((angles[:, None] - taken + np.pi) % (2 * np.pi) - np.pi).min(axis=1)
     angle = float(angles[np.argmax(gaps)])
     centre, along = at(np.zeros(3)), np.array([np.cos(angle), np.sin(angle)])
-    drawn.arrow(centre, centre + _BALL * along, "thin")
-    drawn.text(centre + 0.55 * _BALL * along + 11.0 * np.array([-along[1], along[0]]) + [0.0, 4.5], "a")
+    drawn.arrow(np.stack([centre, centre + _BALL * along]), "thin")
+    drawn.text(centre + 0.55 * _BALL * along + 11.0 * np.array([-along[1], along[0]]), "a", beside=(0.0, 4.5))
 
 
 def _forces(drawn: Drawing, at: View, body: RollingBall) -> None:
@@ -77,15 +77,15 @@ def _forces(drawn: Drawing, at: View, body: RollingBall) -> None:
     drawn.disc(at(E1).tolist(), 2.6, "force-head")
     for axis, symbol in ((E2, "F_2"), (E3, "F_3")):
         ends = at([E1, E1 + 1.05 * axis])
-        drawn.arrow(*ends, "force")
-        drawn.text(beyond(*ends, 13.0), symbol, "force-letter")
+        drawn.arrow(ends, "force")
+        drawn.text(beyond(ends, 13.0), symbol, "force-letter")
     f = body.contact.rolling_resistance
     shift = _SHIFT * _forward(body) if f else np.zeros(3)
-    drawn.arrow(*at([E1 + shift, shift + 0.35 * E1]), "force")
-    drawn.text(at(shift + 0.5 * E1) + [-9.0, -6.0], "N", "force-letter")
+    drawn.arrow(at([E1 + shift, shift + 0.35 * E1]), "force")
+    drawn.text(at(shift + 0.5 * E1), "N", "force-letter", beside=(-9.0, -6.0))
     if f:
         drawn.path(at([E1, E1 + shift]), "force")
-        drawn.text(at(E1 + 0.5 * shift) + [4.0, 16.0], "f", "force-letter")
+        drawn.text(at(E1 + 0.5 * shift), "f", "force-letter", beside=(4.0, 16.0))
 
 
 def _forward(body: RollingBall) -> FloatArray:

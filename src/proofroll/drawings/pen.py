@@ -36,7 +36,7 @@ class View:
     def __call__(self, point: npt.ArrayLike) -> FloatArray:
         """Place of points in the picture [px], y downwards, the point zero at zero, shape (..., 2)."""
         back = _unit(self.viewer)
-        right = _unit(np.cross(self.up, back))
+        right = _unit(np.cross(np.asarray(self.up, dtype=np.float64), back))
         upright = np.cross(back, right)
         p = np.asarray(point, dtype=np.float64)
         return np.stack([self.scale * p @ right, -self.scale * p @ upright], axis=-1)
@@ -50,10 +50,10 @@ class View:
 class Drawing:
     """Marks in the order in which they are drawn.
 
-    A mark is a path ``d`` of SVG, or a text with ``x``, ``y``, ``anchor`` and the parts of the text, each with
+    A mark is a path ``d`` of SVG, or a text with ``x``, ``y`` and the parts of the text, each with
     ``text`` and ``sub``, whether it is an index. ``look`` names how it looks: ``line``, ``thin``, ``hidden``, ``axis``,
-    ``wall``, ``ball``, ``ghost``, ``faint``, ``motion``, ``force``, ``frame``, the same with ``-head`` for filled heads of
-    arrows, and ``letter``, ``motion-letter``, ….
+    ``wall``, ``ball``, ``ghost``, ``faint``, ``motion``, ``force``, ``frame``, the same with ``-head`` for filled heads
+    of arrows, and ``letter``, ``motion-letter``, ….
     """
 
     marks: list[dict[str, Any]] = field(default_factory=list)
@@ -79,24 +79,23 @@ class Drawing:
         d = f"M{x - r:.1f} {y:.1f}a{r:.1f} {r:.1f} 0 1 0 {2 * r:.1f} 0a{r:.1f} {r:.1f} 0 1 0 {-2 * r:.1f} 0Z"
         self.marks.append({"d": d, "look": look})
 
-    def arrow(self, tail: npt.ArrayLike, tip: npt.ArrayLike, look: str, both: bool = False) -> None:
-        """An arrow between two places of the picture; ``both``: with a head at each end."""
-        a, b = (np.asarray(end, dtype=np.float64) for end in (tail, tip))
-        self.curved(np.stack([a, b]), look, both)
-
-    def curved(self, points: npt.ArrayLike, look: str, both: bool = False) -> None:
-        """A line with a head at its end, or at both ends."""
+    def arrow(self, points: npt.ArrayLike, look: str) -> None:
+        """A line through places of the picture, straight or curved, with a head at its end; shape (n, 2)."""
         places = np.asarray(points, dtype=np.float64)
-        ends = [(places[-2], places[-1])] + ([(places[1], places[0])] if both else [])
         self.path(places, look)
-        for before, tip in ends:
-            along = _unit(tip - before)
-            across = 0.36 * np.array([-along[1], along[0]])
-            self.path([tip, tip - _HEAD * (along + across), tip - _HEAD * (along - across)], f"{look}-head", closed=True)
+        tip = places[-1]
+        along = _unit(tip - places[-2])
+        across = 0.36 * np.array([-along[1], along[0]])
+        self.path([tip, tip - _HEAD * (along + across), tip - _HEAD * (along - across)], f"{look}-head", closed=True)
 
-    def text(self, place: npt.ArrayLike, symbol: str, look: str = "letter", anchor: str = "middle") -> None:
-        """Letters at a place of the picture; ``_`` begins an index of one character: ``V_0``, ``c = b − a``."""
-        x, y = np.asarray(place, dtype=np.float64).tolist()
+    def text(
+        self, place: npt.ArrayLike, symbol: str, look: str = "letter", beside: tuple[float, float] = (0.0, 0.0)
+    ) -> None:
+        """Letters around a place of the picture, or so many pixels ``beside`` it.
+
+        ``_`` begins an index of one character: ``V_0``, ``c = b − a``.
+        """
+        x, y = (np.asarray(place, dtype=np.float64) + beside).tolist()
         parts: list[dict[str, Any]] = []
         for number, piece in enumerate(symbol.split("_")):
             if number:
@@ -106,15 +105,15 @@ class Drawing:
                 parts.append({"text": rest, "sub": False})
         # Letters are about so wide and high; where they are a little more, the margin holds them.
         width = _LETTER * sum(len(part["text"]) for part in parts)
-        left = x - {"start": 0.0, "middle": width / 2, "end": width}[anchor]
+        left = x - width / 2
         self._bounds.append(np.array([[left, y - 1.5 * _LETTER], [left + width, y + 0.5 * _LETTER]]))
-        place_of = {"x": round(x, 1), "y": round(y, 1), "anchor": anchor}
+        place_of = {"x": round(x, 1), "y": round(y, 1)}
         self.marks.append({**place_of, "parts": parts, "look": look})
 
 
-def beyond(tail: npt.ArrayLike, tip: npt.ArrayLike, by: float = 11.0) -> FloatArray:
-    """The place past the tip of an arrow where its letter stands."""
-    a, b = (np.asarray(end, dtype=np.float64) for end in (tail, tip))
+def beyond(ends: npt.ArrayLike, by: float = 11.0) -> FloatArray:
+    """The place past the tip of an arrow where its letter stands; ``ends`` of shape (2, 2)."""
+    a, b = np.asarray(ends, dtype=np.float64)
     return np.asarray(b + by * _unit(b - a) + [0.0, 4.5])
 
 

@@ -38,25 +38,25 @@ def _cylinder(wall: Cylinder, body: RollingBall) -> list[Drawing]:
     axis = wall.position((0.0, 1.0)) - wall.position((0.0, 0.0))
     drawn.path(at([bottom * axis, top * axis]), "axis")
     ends = at([top * axis, (top + 0.42 * b) * axis])
-    drawn.arrow(*ends, "thin")
-    drawn.text(beyond(*ends) + [10.0, 8.0], "z")
+    drawn.arrow(ends, "thin")
+    drawn.text(beyond(ends), "z", beside=(10.0, 8.0))
     _radius(drawn, at, top * axis, wall.position((-0.9, top)), "b", (12.0, 2.0))
     _radius(drawn, at, np.zeros(3), start, "c = b − a", (0.0, 17.0))
     drawn.path(at([np.zeros(3), level]), "thin")
     arc = at(0.4 * surface.position(_ring(turn(0.0, here[0]), 0.0)))
-    drawn.curved(arc, "thin")
-    drawn.text(arc[len(arc) // 2] + [9.0, -3.0], "γ")
-    drawn.arrow(*at([level, centre]), "thin")
-    drawn.text(at((level + centre) / 2) + [10.0, 4.0], "z")
+    drawn.arrow(arc, "thin")
+    drawn.text(arc[len(arc) // 2], "γ", beside=(9.0, 8.0))
+    drawn.arrow(at([level, centre]), "thin")
+    drawn.text(at((level + centre) / 2), "z", beside=(10.0, 4.0))
     radius = body.ball.radius * at.scale
     drawn.disc(at(start).tolist(), radius, "ghost")
     drawn.disc(at(centre).tolist(), radius, "ball")
     speed = at([start, start + 0.62 * b * surface.frame((0.0, 0.0))[:, 1]])
-    drawn.arrow(*speed, "motion")
-    drawn.text(beyond(*speed) + [2.0, 0.0], "V_0", "motion-letter")
+    drawn.arrow(speed, "motion")
+    drawn.text(beyond(speed), "V_0", "motion-letter", beside=(2.0, 0.0))
     leader = at(centre) + np.outer([0.0, radius, radius + 20.0], [0.9, 0.44])
     drawn.path(leader, "thin")
-    drawn.text(leader[-1] + [8.0, 5.0], "a")
+    drawn.text(leader[-1], "a", beside=(8.0, 5.0))
     _gravity(drawn, at, body, at(-1.35 * b * _right(at)))
     return [drawn, contact(body, (-0.6, -0.72, 0.36), (0, 0, 1))]
 
@@ -75,15 +75,15 @@ def _plane(wall: Plane, body: RollingBall) -> list[Drawing]:
     foot = start + a * frame[:, 0]
     for index, symbol in ((1, "V_0"), (2, "V_3")):
         way = at([foot, foot + 0.95 * size * frame[:, index]])
-        drawn.arrow(*way, "thin")
-        drawn.text(beyond(*way, 14.0), surface.coordinates[index - 1])
+        drawn.arrow(way, "thin")
+        drawn.text(beyond(way, 14.0), surface.coordinates[index - 1])
         ends = at([start, start + 0.62 * size * frame[:, index]])
-        drawn.arrow(*ends, "motion")
-        drawn.text(ends[1] + [6.0, -8.0], symbol, "motion-letter")
+        drawn.arrow(ends, "motion")
+        drawn.text(beyond(ends, 13.0), symbol, "motion-letter")
     drawn.disc(at(start).tolist(), a * at.scale, "ball")
     rim = at(start) + np.outer([0.0, a * at.scale, a * at.scale + 14.0], [-0.7, -0.7])
     drawn.path(rim, "thin")
-    drawn.text(rim[-1] + [-6.0, -2.0], "a")
+    drawn.text(rim[-1], "a", beside=(-6.0, -2.0))
     _gravity(drawn, at, body, at(-1.15 * size * _right(at)))
     return [drawn, contact(body, (-0.42, 0.4, 0.8), (-1, 0, 0))]
 
@@ -101,12 +101,12 @@ def _slope(drawn: Drawing, at: View, low: FloatArray, high: FloatArray) -> None:
     arc = at([low + reach * (np.cos(s) * along + np.sin(s) * np.array([0, 0, 1])) for s in turn(0.0, angle)])
     drawn.path(at([low, flat]), "hidden")
     drawn.path(arc, "thin")
-    drawn.text(arc[len(arc) // 2] + [-10.0, 5.0], "α")
+    drawn.text(arc[len(arc) // 2], "α", beside=(-10.0, 5.0))
 
 
 def _right(at: View) -> FloatArray:
     """The level direction that is to the right in the picture."""
-    across = np.cross((0, 0, 1), at.viewer)
+    across = np.cross(np.array([0.0, 0.0, 1.0]), np.asarray(at.viewer, dtype=np.float64))
     return np.asarray(across / np.linalg.norm(across))
 
 
@@ -141,9 +141,9 @@ def _radius(
     drawn: Drawing, at: View, centre: FloatArray, rim: FloatArray, symbol: str, beside: tuple[float, float]
 ) -> None:
     """An arrow along a radius, and its letter beside the middle of it [px]."""
-    a, b = at([centre, rim])
-    drawn.arrow(a, b, "thin")
-    drawn.text((a + b) / 2 + beside, symbol)
+    ends = at([centre, rim])
+    drawn.arrow(ends, "thin")
+    drawn.text(ends.mean(axis=0) + beside, symbol)
 
 
 def _gravity(drawn: Drawing, at: View, body: RollingBall, place: FloatArray) -> None:
@@ -153,9 +153,9 @@ def _gravity(drawn: Drawing, at: View, body: RollingBall, place: FloatArray) -> 
         return
     a, b = at([np.zeros(3), body.gravity / size])
     along = (b - a) / (np.linalg.norm(b - a) or 1.0)
-    ends = place, place + 44.0 * along
-    drawn.arrow(*ends, "force")
-    drawn.text(beyond(*ends), "g", "force-letter")
+    ends = np.stack([place, place + 44.0 * along])
+    drawn.arrow(ends, "force")
+    drawn.text(beyond(ends), "g", "force-letter")
 
 
 def _direction(azimuth: float, elevation: float) -> tuple[float, float, float]:

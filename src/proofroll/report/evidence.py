@@ -1,4 +1,4 @@
-"""What a comparison's section shows besides verdicts: its scene, everything that is claimed, and cost with intervals."""
+"""What a comparison's section shows besides verdicts: its scene, all that is claimed, and cost with intervals."""
 
 from __future__ import annotations
 

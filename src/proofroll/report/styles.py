@@ -1,4 +1,4 @@
-"""How a row looks in every figure of a comparison: colour, dashes, width and symbol, so that colour alone says nothing."""
+"""How a row looks in every figure of a comparison: colour, dashes, width and symbol; never colour alone."""
 
 from __future__ import annotations
 
