@@ -2,7 +2,10 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
+from contextlib import AbstractContextManager
+from dataclasses import dataclass
+from functools import partial
 from html.parser import HTMLParser
 from pathlib import Path
 from typing import Any
@@ -10,18 +13,22 @@ from typing import Any
 import numpy as np
 import plotly.offline
 import pytest
+from browsing import Visit, launched, visiting
 
 from proofroll.agreement import Verdict, judge
 from proofroll.case import Case, EngineFacts, Result, Status
 from proofroll.comparison import Band, Comparison, Row, Tolerance
 from proofroll.metrics import observables, scales
-from proofroll.report.html import write_report
+from proofroll.report.html import page, report_content, write_report
+from proofroll.report.plots import point_curves
+from proofroll.report.regime_map import inline
 from proofroll.scene_file import load_scene
 from proofroll.store import Store
 from proofroll.studies.compare import Outcome, Run
 from proofroll.studies.planning import point_name
 from proofroll.trajectory import write
 from proofroll.truth import truth
+from proofroll.truth.regimes import regime_map
 
 UNTIL, EVERY = 1.0, 0.02
 
@@ -153,3 +160,45 @@ def parse() -> Callable[[str], Elements]:
 def html(written: tuple[dict[str, Any], Path]) -> str:
     """The written page without plotly, which is as its makers ship it."""
     return (written[1] / "report.html").read_text(encoding="utf-8").replace(plotly.offline.get_plotlyjs(), "")
+
+
+@dataclass
+class Parts:
+    """What a page is made of."""
+
+    content: dict[str, Any]
+    curves: list[list[dict[str, Any]]]
+    pictures: list[str]
+
+    def write(self, file: Path) -> Path:
+        """The page as a file."""
+        file.write_text(page(self.content, self.curves, self.pictures), encoding="utf-8")
+        return file
+
+
+@pytest.fixture(scope="session")
+def everything(made: tuple[Outcome, Store]) -> Parts:
+    """The invented comparison with bounded friction at its first point, so that each part of a report is there."""
+    maps = [regime_map(load_scene("sphere_in_cylinder"), [3.0, 4.0], [0.1, 0.7], until=0.5)]
+    content = report_content([made[0]], made[1], "proofroll report invented", [maps])
+    comparison = content["comparisons"][0]
+    event = {"kind": "slip", "time": 0.5, "time_low": 0.5, "time_high": 0.51}
+    known = dict.fromkeys(("by_mu", "by_f", "edge_below", "edge_above", "distance", "earliest", "latest"))
+    onset = {**known, "time": 0.5, "uncertainty": 1e-3, "verdict": "well-posed"}
+    comparison["truths"][0] |= {"events": [event], "mu_static": 0.3, "mu_kinetic": 0.2, "onset": onset}
+    for run in comparison["runs"]:
+        run |= {"events": [event], "onset_verdict": "agree"}
+    return Parts(content, [point_curves(*made)], [inline(maps, "map0-")])
+
+
+@pytest.fixture(scope="session")
+def report_page(everything: Parts, tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """A page that has every part of a report."""
+    return everything.write(tmp_path_factory.mktemp("page") / "report.html")
+
+
+@pytest.fixture(scope="session")
+def visit() -> Iterator[Callable[..., AbstractContextManager[Visit]]]:
+    """A browser that opens files, ``with visit(file) as seen``; one serves all tests of a process."""
+    with launched() as browser:
+        yield partial(visiting, browser)

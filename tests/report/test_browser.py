@@ -2,140 +2,157 @@
 
 from __future__ import annotations
 
-import json
-import shutil
-import subprocess
 from collections.abc import Callable
+from contextlib import AbstractContextManager
 from pathlib import Path
 from typing import Any
 
 import pytest
+from browsing import Visit
 
-from proofroll.report.html import page, report_content
-from proofroll.report.plots import point_curves
-
-
-@pytest.fixture
-def browse(tmp_path: Path) -> Callable[[Path, str], tuple[str, str, list[str]]]:
-    """Opens a page in headless Chromium: its elements after some seconds, the console, and what was requested."""
-    browser = shutil.which("chromium") or shutil.which("chromium-browser") or shutil.which("google-chrome")
-    if browser is None:
-        pytest.skip("no chromium here: apt-get install chromium")
-
-    def once(file: Path, fragment: str, budget: int) -> tuple[str, str, list[str]]:
-        log = tmp_path / "net.json"
-        done = subprocess.run(
-            [
-                browser, "--headless", "--no-sandbox", "--disable-gpu", "--disable-quic", "--no-first-run",
-                "--disable-background-networking", "--disable-component-update", "--disable-sync",
-                "--host-resolver-rules=MAP * ~NOTFOUND",
-                f"--user-data-dir={tmp_path / 'profile'}", "--window-size=1280,6000", f"--virtual-time-budget={budget}",
-                "--run-all-compositor-stages-before-draw",
-                "--enable-logging=stderr", f"--log-net-log={log}", "--dump-dom", file.as_uri() + fragment,
-            ],
-            capture_output=True, text=True, timeout=120, check=True,
-        )  # fmt: skip
-        console = "\n".join(line for line in done.stderr.splitlines() if "CONSOLE" in line)
-        events = [event.get("params", {}) for event in json.loads(log.read_text(encoding="utf-8"))["events"]]
-        # The browser asks for updates of its own; what a page asks for has the page as its initiator.
-        asked = {event["url"] for event in events if event.get("initiator", "not an origin") != "not an origin"}
-        return done.stdout, console, sorted(url for url in asked if not url.startswith(("file:", "data:", "blob:")))
-
-    def run(file: Path, fragment: str = "", shows: str = "", least: int = 1) -> tuple[str, str, list[str]]:
-        # Virtual time can run out before a busy machine has painted a frame, and what is not painted is not drawn.
-        for budget in (8_000, 60_000, 400_000):
-            found = once(file, fragment, budget)
-            if found[0].count(shows) >= least or found[1]:
-                break
-        return found
-
-    return run
+Visiting = Callable[..., AbstractContextManager[Visit]]
 
 
-def test_a_browser_draws_the_figures_and_asks_for_nothing(
-    written: tuple[dict[str, Any], Path], browse: Callable[..., tuple[str, str, list[str]]]
-) -> None:
-    """No message on the console, no request, and figures where they should be."""
-    dom, console, requested = browse(written[1] / "report.html", shows='class="main-svg"', least=6)
-    assert console == ""
-    assert requested == []
-    assert dom.count('class="main-svg"') >= 6, "the figures of the first point"
+def test_page_asks_for_nothing_and_has_nothing_to_complain_of(report_page: Path, visit: Visiting) -> None:
+    """Read to its end, unfolded and with all figures drawn: one request, its own, and a silent console."""
+    with visit(report_page) as seen:
+        seen.unfold()
+        assert seen.draw() == []
+        assert seen.requested == [report_page.as_uri()]
+        assert seen.messages == []
 
 
-def test_a_link_opens_the_evidence_it_leads_to(
-    written: tuple[dict[str, Any], Path], browse: Callable[..., tuple[str, str, list[str]]], parse: Any
-) -> None:
-    """A link into a folded section unfolds it."""
-    dom, console, _ = browse(written[1] / "report.html", "#c0-r1-p1")
-    assert console == ""
-    tag = next(attributes for _, attributes in parse(dom).tags if attributes.get("id") == "c0-r1-p1")
-    assert "open" in tag
-
-
-def test_requests_would_be_seen(tmp_path: Path, browse: Callable[..., tuple[str, str, list[str]]]) -> None:
-    """The check above can fail: a page that loads an image and raises an error is caught at both."""
+def test_requests_and_errors_would_be_seen(tmp_path: Path, visit: Visiting) -> None:
+    """The check above can fail: a page that asks for an image, raises an error and opens a dialog is caught at all."""
     file = tmp_path / "page.html"
-    file.write_text("<!doctype html><img src='http://proofroll.invalid/a.png'><script>nothing()</script>")
-    _, console, requested = browse(file)
-    assert "nothing is not defined" in console
-    assert requested == ["http://proofroll.invalid/a.png"]
+    address = "http://proofroll.invalid/a.png"
+    file.write_text(f"<!doctype html><img src='{address}'><script>alert('hello')</script><script>nothing()</script>")
+    with visit(file) as seen:
+        assert seen.requested == [file.as_uri(), address]
+        assert "alert: hello" in seen.messages
+        assert any("nothing is not defined" in message for message in seen.messages)
+        assert any("net::ERR_FAILED" in message for message in seen.messages)
 
 
-ACTING = """<script>addEventListener("load", async () => {
-  const drawn = [...document.querySelectorAll('figure[data-p="0"] .canvas')];
-  const wait = () => new Promise((resolve) => setTimeout(resolve, 300));
-  while (!drawn.every((element) => element.on)) await wait();
-  let told = 0;
-  drawn.forEach((element) => element.on("plotly_relayout", () => told++));
-  await Plotly.relayout(drawn[0], {"xaxis.range": [0.25, 0.5]});
-  await wait();
-  const ranges = drawn.map((element) => element.layout.xaxis.range.join(" "));
-  drawn[0].parentNode.matches = () => true;  // as if the pointer were there
-  drawn[0].emit("plotly_hover", {points: [{x: 0.4}]});
-  await wait();
-  const labels = drawn.slice(1).map((element) => element.querySelectorAll(".hovertext").length);
-  document.querySelector('.legend [data-row="1"]').click();
-  const off = drawn[0].data.filter((trace) => trace.visible === false).length;
-  document.body.dataset.found = JSON.stringify({told, ranges, labels, off});
-})</script>"""
+def test_every_section_says_something(report_page: Path, visit: Visiting) -> None:
+    """No section is a bare heading; one that is emptied is found."""
+    with visit(report_page) as seen:
+        seen.unfold()
+        ids = seen.page.evaluate("[...document.querySelectorAll('section[id]')].map((section) => section.id)")
+        assert {"verdicts", "findings", "c0"} <= set(ids)
+        assert seen.page.evaluate("reading.empty()") == []
+        seen.page.evaluate("document.querySelector('#findings').innerHTML = '<h2>Findings</h2> <svg></svg>'")
+        assert seen.page.evaluate("reading.empty()") == ["findings"]
 
 
-def test_figures_of_a_section_act_together(
-    written: tuple[dict[str, Any], Path], tmp_path: Path, browse: Callable[..., tuple[str, str, list[str]]], parse: Any
-) -> None:
-    """Zoom and pointer are passed on once and not back; a row is switched off in every figure."""
-    file = tmp_path / "acting.html"
-    file.write_text((written[1] / "report.html").read_text(encoding="utf-8") + ACTING, encoding="utf-8")
-    dom, console, _ = browse(file, shows="data-found=")
-    assert console == ""
-    found = json.loads(next(attributes["data-found"] for tag, attributes in parse(dom).tags if tag == "body"))
-    assert found == {"told": 6, "ranges": ["0.25 0.5"] * 6, "labels": [1] * 5, "off": 2}
+def test_figures_are_drawn_when_they_come_into_view(report_page: Path, visit: Visiting) -> None:
+    """None far below before, each after a reader has scrolled to it; one that is not there is missed."""
+    with visit(report_page) as seen:
+        figures = seen.page.locator("figure[data-o]")
+        assert figures.last.locator("svg").count() == 0, "not before it is needed"
+        seen.unfold()
+        assert figures.count() == 12, "six quantities at two points"
+        assert seen.draw() == []
+        assert seen.page.locator("figure[data-o] .main-svg").count() >= figures.count()
+        seen.page.evaluate("document.querySelector('main').insertAdjacentHTML('beforeend', '<figure>none</figure>')")
+        assert seen.draw(patience=0.1) == ["none"]
 
 
-COUNTING = """<script>addEventListener("load", async () => {
-  const slips = () => [...document.querySelectorAll(".canvas")].flatMap((element) => element.data ?? [])
-    .filter((trace) => trace.name === "first slip").length;
-  while (!slips()) await new Promise((resolve) => setTimeout(resolve, 300));
-  document.body.dataset.slips = slips();
-})</script>"""
+def test_links_lead_to_evidence_that_opens(report_page: Path, visit: Visiting) -> None:
+    """Every link within the page ends at something one can see, however it was folded; a dead one is found."""
+    with visit(report_page) as seen:
+        assert seen.page.locator("a[href^='#']").count() > 50
+        assert seen.page.evaluate("reading.lost()") == []
+        seen.page.evaluate("document.querySelector('main').insertAdjacentHTML('beforeend', '<a href=\"#no\">x</a>')")
+        assert seen.page.evaluate("reading.lost()") == ["#no"]
+        assert seen.messages == []
 
 
-def test_first_slips_and_bounds_of_friction_are_drawn(
-    made: Any, tmp_path: Path, browse: Callable[..., tuple[str, str, list[str]]]
-) -> None:
-    """A line with its name for each bound, and a marker for each first slip, switched with its row."""
-    content = report_content([made[0]], made[1], "proofroll report invented")
-    comparison = content["comparisons"][0]
-    event = {"kind": "slip", "time": 0.5, "time_low": 0.5, "time_high": 0.51}
-    comparison["truths"][0] |= {"events": [event], "mu_static": 0.3, "mu_kinetic": 0.2}
-    known = dict.fromkeys(("by_mu", "by_f", "edge_below", "edge_above", "distance", "earliest", "latest"))
-    comparison["truths"][0]["onset"] = {**known, "time": 0.5, "uncertainty": 1e-3, "verdict": "well-posed"}
-    for run in comparison["runs"]:
-        run |= {"events": [event], "onset_verdict": "agree"}
-    file = tmp_path / "slips.html"
-    file.write_text(page(content, [point_curves(*made)]) + COUNTING, encoding="utf-8")
-    dom, console, _ = browse(file, shows="data-slips=")
-    assert console == ""
-    assert "μ static = 0.3" in dom
-    assert "μ kinetic = 0.2" in dom
-    assert 'data-slips="5"' in dom, "of the truth and of four runs"
+def test_an_address_with_a_fragment_opens_its_evidence(report_page: Path, visit: Visiting) -> None:
+    """A link from elsewhere into a folded part unfolds it, and what lies around it."""
+    with visit(report_page, "#c0-r1-p1") as seen:
+        target = seen.page.locator("#c0-r1-p1")
+        assert target.get_attribute("open") is not None
+        assert target.locator("table").first.is_visible()
+        seen.wait("document.querySelector('#c0-r1-p1').getBoundingClientRect().top < innerHeight")
+
+
+@pytest.fixture(scope="module")
+def drawn(report_page: Path, visit: Visiting) -> Any:
+    """The page with the figures of its first point drawn, and where the middle of the first figure's truth is."""
+    with visit(report_page) as seen:
+        assert seen.draw() == []
+        seen.page.locator("figure[data-o]").first.scroll_into_view_if_needed()
+        seen.page.evaluate(
+            """() => {
+              window.drawn = [...document.querySelectorAll('figure[data-p="0"] .canvas')];
+              window.told = 0;
+              drawn.forEach((element) => element.on("plotly_relayout", () => ++told));
+            }"""
+        )
+        yield seen
+
+
+def place(seen: Visit, share: float, figure: int = 0) -> tuple[float, float]:
+    """Where on the screen the truth of a figure is, at a share of its time axis."""
+    return tuple(
+        seen.page.evaluate(
+            """([share, figure]) => {
+              const element = drawn[figure], { left, top } = element.getBoundingClientRect();
+              const { xaxis, yaxis } = element._fullLayout, { x, y } = element.data[0];
+              const at = Math.round(share * (x.length - 1));
+              return [left + xaxis._offset + xaxis.l2p(x[at]), top + yaxis._offset + yaxis.l2p(y[at])];
+            }""",
+            [share, figure],
+        )
+    )
+
+
+def test_zoom_in_one_figure_is_zoom_in_all(drawn: Visit) -> None:
+    """Dragging in a figure sets the time axis of each, and each is told once: nothing is passed back."""
+    mouse = drawn.page.mouse
+    (left, top), (right, _) = place(drawn, 0.25), place(drawn, 0.5)
+    mouse.move(left, top)
+    mouse.down()
+    mouse.move(right, top, steps=4)
+    mouse.up()
+    count = drawn.page.evaluate("drawn.length")
+    drawn.wait("told >= drawn.length")
+    drawn.page.wait_for_timeout(200)  # one that was passed back would come now
+    ranges = drawn.page.evaluate("drawn.map((element) => element.layout.xaxis.range.join(' '))")
+    assert len(set(ranges)) == 1
+    assert [float(end) for end in ranges[0].split()] == pytest.approx([0.25, 0.5], abs=0.02)
+    assert drawn.page.evaluate("told") == count
+    mouse.dblclick(left, top)
+    drawn.wait("drawn.every((element) => element.layout.xaxis.range[1] >= 1)")
+
+
+def test_pointer_in_one_figure_shows_the_time_in_all(drawn: Visit) -> None:
+    """Where the pointer is on a curve, every other figure shows its truth, until the pointer leaves."""
+    drawn.page.mouse.move(*place(drawn, 0.4))
+    labels = "drawn.filter((element) => element.querySelector('.hovertext')).length"
+    drawn.wait(f"{labels} === drawn.length")
+    drawn.page.mouse.move(2, 2)
+    drawn.wait(f"{labels} === 0")
+
+
+def test_a_row_is_switched_off_in_every_figure(drawn: Visit) -> None:
+    """The legend acts on all figures of a comparison, and says so to a screen reader."""
+    hidden = "drawn.map((element) => element.data.filter((trace) => trace.visible === false).length)"
+    button = drawn.page.locator('.legend [data-row="1"]').first
+    button.click()
+    assert all(count >= 2 for count in drawn.page.evaluate(hidden)), "its curve and its distance"
+    assert button.get_attribute("aria-pressed") == "false"
+    button.click()
+    assert not any(drawn.page.evaluate(hidden))
+
+
+def test_first_slips_and_bounds_of_friction_are_drawn(report_page: Path, visit: Visiting) -> None:
+    """A line with its name for each bound, and a marker for each first slip."""
+    with visit(report_page) as seen:
+        assert seen.draw() == []
+        figure = seen.page.locator("figure[data-o]", has_text="μ static = 0.3")
+        assert figure.count() == 1
+        assert figure.get_by_text("μ kinetic = 0.2").count() == 1
+        slips = "(figure) => figure.querySelector('.canvas').data.filter((trace) => trace.name === 'first slip').length"
+        assert figure.evaluate(slips) == 5, "of the truth and of four runs"

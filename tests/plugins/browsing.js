@@ -1,0 +1,130 @@
+"use strict";
+// What a reader of a page would notice, measured. Each question is answered with what is wrong: nothing is good.
+window.reading = (() => {
+  const all = () => [...document.body.querySelectorAll("*")].filter((element) => element.checkVisibility());
+  const named = (element) => `${element.tagName}.${element.getAttribute("class") ?? ""} ${element.getAttribute("aria-label") ?? ""}`;
+  const pause = (time) => new Promise((resolve) => setTimeout(resolve, time));
+
+  // An svg without content has a size of its own, but no box.
+  const pictured = (element) => [...element.querySelectorAll("svg, canvas")].some((picture) => {
+    const { width, height } = picture.getBBox?.() ?? picture.getBoundingClientRect();
+    return width > 20 && height > 20;
+  });
+
+  // Scrolls to every figure that is not folded away and waits so many milliseconds for its picture: the captions of those that stay empty.
+  async function undrawn(patience) {
+    const empty = [];
+    for (const figure of document.querySelectorAll("figure")) {
+      if (!figure.checkVisibility()) continue;
+      figure.scrollIntoView({ block: "center", behavior: "instant" });
+      for (let waited = 0; !pictured(figure) && waited < patience; waited += 20) await pause(20);
+      if (!pictured(figure)) empty.push(figure.textContent.trim());
+    }
+    return empty;
+  }
+
+  // Ids of the sections in which there is nothing but headings: no text, and no picture.
+  function empty() {
+    const silent = (section) => {
+      const copy = section.cloneNode(true);
+      copy.querySelectorAll("h1, h2, h3, h4, h5, h6, script, style").forEach((element) => element.remove());
+      return !copy.textContent.trim() && !pictured(section);
+    };
+    return [...document.querySelectorAll("section[id]")].filter(silent).map((section) => section.id);
+  }
+
+  // Where links lead to and a reader who follows them sees nothing, everything being folded before.
+  async function lost() {
+    const links = new Map([...document.querySelectorAll("a[href^='#']")].map((link) => [link.hash, link]));
+    const found = [];
+    document.querySelectorAll("details").forEach((fold) => { fold.open = false; });
+    for (const link of links.values()) {
+      link.click();
+      const target = document.getElementById(link.hash.slice(1));
+      const seen = () => target.checkVisibility() && (!target.matches("details") || target.open);
+      for (let tries = 0; target && !seen() && tries < 50; ++tries) await pause(0);
+      if (!target || !seen()) found.push(link.hash);
+      for (let fold = target?.closest("details"); fold; fold = fold.parentElement.closest("details")) fold.open = false;
+    }
+    return found;
+  }
+
+  // The browser itself reads a colour, however it is written.
+  const brush = Object.assign(document.createElement("canvas"), { width: 1, height: 1 }).getContext("2d", { willReadFrequently: true });
+  const known = new Map();
+  function rgba(colour) {
+    if (!known.has(colour)) {
+      brush.clearRect(0, 0, 1, 1);
+      brush.fillStyle = colour;
+      brush.fillRect(0, 0, 1, 1);
+      const [r, g, b, a] = brush.getImageData(0, 0, 1, 1).data;
+      known.set(colour, [r, g, b, a / 255]);
+    }
+    return known.get(colour);
+  }
+  const over = ([r, g, b, a], [x, y, z]) => [a * r + (1 - a) * x, a * g + (1 - a) * y, a * b + (1 - a) * z];
+  function behind(element) {
+    if (!element) return [255, 255, 255];
+    const colour = rgba(getComputedStyle(element).backgroundColor);
+    return colour[3] === 1 ? colour : over(colour, behind(element.parentElement));
+  }
+  const opacity = (element) => (element ? getComputedStyle(element).opacity * opacity(element.parentElement) : 1);
+  // Relative luminance as WCAG 2.2 defines it, of sRGB.
+  function luminance(colour) {
+    const [r, g, b] = colour.slice(0, 3).map((part) => part / 255).map((s) => (s <= 0.04045 ? s / 12.92 : ((s + 0.055) / 1.055) ** 2.4));
+    return 0.2126 * r + 0.7152 * g + 0.0722 * b;
+  }
+
+  // Every text whose contrast with what is behind it is below the least.
+  function faint(least) {
+    const found = [];
+    for (const element of all()) {
+      const text = [...element.childNodes].filter((node) => node.nodeType === 3).map((node) => node.data.trim()).join("");
+      if (!text || element.closest("script, style, noscript, svg, .skip")) continue;
+      const ground = behind(element), [r, g, b, a] = rgba(getComputedStyle(element).color);
+      const light = [luminance(ground), luminance(over([r, g, b, a * opacity(element)], ground))].sort((x, y) => x - y);
+      const ratio = (light[1] + 0.05) / (light[0] + 0.05);
+      if (ratio < least) found.push(`${named(element)}: "${text.slice(0, 30)}" ${ratio.toFixed(2)}`);
+    }
+    return found;
+  }
+
+  // How far the page reaches past the right edge of the screen, and what does so without lying in something that scrolls.
+  function wide() {
+    const edge = document.documentElement.clientWidth;
+    const scrolls = (element) => element && (getComputedStyle(element).overflowX !== "visible" || scrolls(element.parentElement));
+    const found = all().filter((element) => element.getBoundingClientRect().right > edge + 1 && !scrolls(element.parentElement));
+    return [document.scrollingElement.scrollWidth - edge, found.map(named)];
+  }
+
+  // What is wider than the paper, and what hides a part of itself behind a scroll bar that paper does not have.
+  function cut() {
+    const shown = all().filter((element) => !element.closest("svg, .vh, .canvas"));
+    const beyond = shown.filter((element) => element.getBoundingClientRect().right > document.documentElement.clientWidth + 1);
+    const hidden = shown.filter((element) => getComputedStyle(element).overflowX !== "visible" && element.scrollWidth > element.clientWidth + 1);
+    return [beyond.map(named), hidden.map(named)];
+  }
+
+  // Everything that a keyboard must reach, numbered in the order of the page; and what has the focus now.
+  function reachable() {
+    const found = all().filter((element) => element.matches("a[href], button, summary, input, select, [tabindex='0']") && !element.disabled);
+    found.forEach((element, number) => { element.dataset.number = number; });
+    return found.map(named);
+  }
+  function focused() {
+    const element = document.activeElement, style = getComputedStyle(element), { top, bottom } = element.getBoundingClientRect();
+    return {
+      number: Number(element.dataset.number ?? -1),
+      outlined: style.outlineStyle !== "none" && parseFloat(style.outlineWidth) >= 1,
+      seen: bottom > 0 && top < innerHeight,
+    };
+  }
+
+  // Whatever moves by itself for longer than a frame.
+  const moving = () => all().filter((element) => {
+    const { transitionDuration, animationDuration, scrollBehavior } = getComputedStyle(element);
+    return parseFloat(transitionDuration) > 0.01 || parseFloat(animationDuration) > 0.01 || scrollBehavior === "smooth";
+  }).map(named);
+
+  return { undrawn, empty, lost, faint, wide, cut, reachable, focused, moving };
+})();

@@ -1,0 +1,102 @@
+"""A page in headless Chromium with its network cut: what it asks for, what it complains of, what a reader meets."""
+
+from __future__ import annotations
+
+import shutil
+import time
+from collections.abc import Iterator
+from contextlib import contextmanager
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import Any
+
+import pytest
+
+BROWSERS = ("chromium", "chromium-browser", "google-chrome")
+SCRIPT = Path(__file__).with_suffix(".js")  # ``reading``: what one can ask a page
+WIDE = {"width": 1280, "height": 900}
+
+
+@dataclass
+class Visit:
+    """A page that is open.
+
+    Attributes:
+        page: playwright's page.
+        requested: every address that was asked for; the page's own is the first.
+        messages: every line on the console, every error that nobody caught, and every dialog.
+    """
+
+    page: Any
+    requested: list[str] = field(default_factory=list)
+    messages: list[str] = field(default_factory=list)
+
+    def unfold(self) -> None:
+        """Opens every ``<details>``."""
+        self.page.evaluate("document.querySelectorAll('details').forEach((fold) => { fold.open = true; })")
+
+    def wait(self, condition: str) -> None:
+        """Until an expression is true.
+
+        Raises:
+            AssertionError: it does not become so.
+        """
+        # Playwright's own way needs ``eval`` in the page, which the page's policy forbids.
+        end = time.monotonic() + 10
+        while not self.page.evaluate(condition):
+            assert time.monotonic() < end, f"never: {condition}"
+            self.page.wait_for_timeout(10)
+
+    def draw(self, patience: float = 20.0) -> list[str]:
+        """Scrolls to every figure that is not folded away and waits for its picture, for so many seconds at most.
+
+        Returns:
+            the captions of those that stay empty.
+        """
+        return self.page.evaluate("reading.undrawn", 1000 * patience)
+
+
+@contextmanager
+def launched() -> Iterator[Any]:
+    """Headless Chromium of the system; the test is skipped where there is none."""
+    program = next(filter(None, map(shutil.which, BROWSERS)), None)
+    if program is None:
+        pytest.skip(f"none of {', '.join(BROWSERS)} is installed: apt-get install chromium")
+    from playwright.sync_api import sync_playwright
+
+    with sync_playwright() as playwright:
+        browser = playwright.chromium.launch(executable_path=program)
+        yield browser
+        browser.close()
+
+
+@contextmanager
+def visiting(browser: Any, file: Path, fragment: str = "", **options: Any) -> Iterator[Visit]:
+    """Opens a file; whatever else it asks for is noted and refused.
+
+    Args:
+        browser: from :func:`launched`.
+        file: the page.
+        fragment: with ``#``, where to go in it.
+        options: of ``browser.new_context``, e.g. ``color_scheme="dark"``.
+    """
+    address = file.resolve().as_uri()
+    context = browser.new_context(**{"viewport": WIDE, "offline": True, "service_workers": "block"} | options)
+    try:
+        context.add_init_script(path=SCRIPT)
+        page = context.new_page()
+        visit = Visit(page)
+        context.on("request", lambda request: visit.requested.append(request.url))
+        context.on("console", lambda message: visit.messages.append(f"{message.type}: {message.text}"))
+        context.on("weberror", lambda error: visit.messages.append(str(error.error)))
+
+        def dismiss(dialog: Any) -> None:
+            visit.messages.append(f"{dialog.type}: {dialog.message}")
+            dialog.dismiss()
+
+        context.on("dialog", dismiss)
+        context.route(lambda url: url.partition("#")[0] != address, lambda route: route.abort())
+        page.goto(address + fragment)
+        yield visit
+    finally:
+        context.close()

@@ -1,0 +1,140 @@
+"""The report is read with a keyboard, on a phone, in the dark and without colour: measured in a real browser."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from contextlib import AbstractContextManager
+from itertools import pairwise
+from pathlib import Path
+
+import pytest
+from browsing import Visit
+
+Visiting = Callable[..., AbstractContextManager[Visit]]
+
+PHONE = {"viewport": {"width": 390, "height": 844}, "is_mobile": True, "has_touch": True, "device_scale_factor": 2}
+
+# WCAG 2.2, 1.4.3: text and what is behind it; all of ours is small.
+LEAST_CONTRAST = 4.5
+
+
+def test_tab_reaches_everything_in_order_and_shows_where_it_is(report_page: Path, visit: Visiting) -> None:
+    """Each link, button, fold and scrolling table gets the focus once, in the page's order, outlined and in sight."""
+    with visit(report_page) as seen:
+        reachable = seen.page.evaluate("reading.reachable()")
+        kinds = " ".join(reachable)
+        assert kinds.count("A.v ") >= 8, "verdict links"
+        assert kinds.count("BUTTON") >= 6, "legend"
+        assert kinds.count("SUMMARY") >= 5
+        assert kinds.count("DIV.scroll") >= 5
+        visited = []
+        for _ in range(len(reachable) + 20):  # a browser may stop at something that scrolls besides
+            seen.page.keyboard.press("Tab")
+            focus = seen.page.evaluate("reading.focused()")
+            if focus["number"] < 0 and visited and visited[-1] == len(reachable) - 1:
+                break
+            if focus["number"] >= 0:
+                assert focus["outlined"], reachable[focus["number"]]
+                assert focus["seen"], reachable[focus["number"]]
+                visited.append(focus["number"])
+        assert visited == list(range(len(reachable)))
+
+
+def test_keys_do_what_the_mouse_does(report_page: Path, visit: Visiting) -> None:
+    """Enter follows a verdict and folds a part, space presses a button of the legend."""
+    with visit(report_page) as seen:
+        link = seen.page.locator(".matrix .cell a").first
+        link.press("Enter")
+        evidence = seen.page.locator(link.get_attribute("href"))
+        seen.wait(f"document.getElementById('{evidence.get_attribute('id')}').open")
+        assert evidence.locator("table").first.is_visible()
+        evidence.locator("summary").press("Enter")
+        assert not evidence.locator("table").first.is_visible()
+        button = seen.page.locator(".legend [data-row]").first
+        button.press("Space")
+        assert button.get_attribute("aria-pressed") == "false"
+
+
+def test_headings_form_an_outline(report_page: Path, visit: Visiting) -> None:
+    """One title; no level is skipped on the way down; no heading is empty, and none hides from a screen reader."""
+    with visit(report_page) as seen:
+        seen.unfold()
+        assert seen.draw() == []
+        levels, texts = seen.page.evaluate(
+            """() => {
+              const found = [...document.querySelectorAll("h1, h2, h3, h4, h5, h6")].filter((h) => h.checkVisibility());
+              return [found.map((h) => Number(h.tagName[1])), found.map((h) => h.textContent.trim())];
+            }"""
+        )
+        assert levels[0] == 1
+        assert levels.count(1) == 1
+        assert all(after <= before + 1 for before, after in pairwise(levels))
+        assert all(texts)
+        tree = seen.page.locator("body").aria_snapshot()
+        assert tree.count("heading ") == len(levels)
+
+
+def test_everything_that_is_used_has_a_name(report_page: Path, visit: Visiting) -> None:
+    """Links, buttons, folds, scrolling regions and figures are announced by a name, not by silence."""
+    with visit(report_page) as seen:
+        seen.unfold()
+        for role in ("link", "button", "region", "img", "group"):
+            everyone = seen.page.get_by_role(role)
+            for number in range(everyone.count()):
+                name = everyone.nth(number).aria_snapshot(depth=1).splitlines()[0]
+                assert '"' in name or ":" in name, everyone.nth(number).evaluate("(element) => element.outerHTML")
+
+
+@pytest.mark.parametrize("open_it", [False, True], ids=["folded", "unfolded"])
+def test_a_phone_scrolls_down_only(report_page: Path, visit: Visiting, open_it: bool) -> None:
+    """Nothing is wider than 390 pixels; what must be, scrolls in a region of its own; text too wide would be found."""
+    with visit(report_page, **PHONE) as seen:
+        if open_it:
+            seen.unfold()
+            assert seen.draw() == []
+        assert seen.page.evaluate("reading.wide()") == [0, []]
+        seen.page.evaluate("document.querySelector('h1').style.minWidth = '600px'")
+        width, wide = seen.page.evaluate("reading.wide()")
+        assert width > 0
+        assert any(name.startswith("H1") for name in wide)
+
+
+@pytest.mark.parametrize("scheme", ["light", "dark"])
+def test_text_differs_from_its_background(report_page: Path, visit: Visiting, scheme: str) -> None:
+    """Every text, those of verdicts among them, has the contrast that small text needs; faint text would be found."""
+    with visit(report_page, color_scheme=scheme) as seen:
+        seen.unfold()
+        for verdict in ("agrees", "differs"):
+            assert seen.page.locator(f".cell.{verdict}").count() > 0
+        assert seen.page.evaluate("reading.faint", LEAST_CONTRAST) == []
+        seen.page.add_style_tag(
+            content=".cell.agrees { color: color-mix(in srgb, var(--agrees) 50%, var(--agrees-bg)) }"
+        )
+        found = seen.page.evaluate("reading.faint", LEAST_CONTRAST)
+        assert len(found) >= seen.page.locator(".cell.agrees").count()
+
+
+def test_dark_is_dark(report_page: Path, visit: Visiting) -> None:
+    """The page follows the scheme of the machine, its figures too."""
+
+    def ground_and_ink(scheme: str) -> list[str]:
+        with visit(report_page, color_scheme=scheme) as seen:
+            assert seen.draw() == []
+            return seen.page.evaluate(
+                """() => [getComputedStyle(document.body).backgroundColor,
+                  getComputedStyle(document.querySelector("figure[data-o] .xtick text")).fill]"""
+            )
+
+    for light, dark in zip(ground_and_ink("light"), ground_and_ink("dark"), strict=True):
+        assert light != dark
+
+
+def test_nobody_who_asked_for_stillness_sees_motion(report_page: Path, visit: Visiting) -> None:
+    """With reduced motion preferred, nothing scrolls, fades or turns by itself."""
+    with visit(report_page, reduced_motion="reduce") as seen:
+        assert seen.page.evaluate("reading.moving()") == []
+        seen.page.add_style_tag(content="h1 { transition: color 2s } .answer { animation: none 3s infinite }")
+        assert seen.page.evaluate("reading.moving()") == [], "nor what a part of the page may ask for"
+    with visit(report_page) as seen:
+        seen.page.add_style_tag(content="h1 { transition: color 2s }")
+        assert seen.page.evaluate("reading.moving()") == ["H1. "]

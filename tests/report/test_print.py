@@ -1,0 +1,90 @@
+"""The report on paper: as a browser prints it."""
+
+from __future__ import annotations
+
+import io
+import re
+import unicodedata
+from collections.abc import Callable
+from contextlib import AbstractContextManager
+from pathlib import Path
+
+import pytest
+from browsing import Visit
+from pypdf import PdfReader
+
+Visiting = Callable[..., AbstractContextManager[Visit]]
+
+# Width of A4 between our margins of 12 mm, in CSS pixels of 1/96 inch.
+PAPER = {"width": round((210 - 2 * 12) / 25.4 * 96), "height": round((297 - 2 * 12) / 25.4 * 96)}
+MOST_PAGES = 30
+
+
+@pytest.fixture(scope="module")
+def printed(report_page: Path, visit: Visiting) -> PdfReader:
+    """The page as a PDF, printed as it opens, in the dark."""
+    with visit(report_page, color_scheme="dark") as seen:
+        content = seen.page.pdf(
+            format="A4", prefer_css_page_size=True, print_background=True, tagged=True, outline=True
+        )
+        assert seen.messages == []
+    return PdfReader(io.BytesIO(content))
+
+
+def test_nothing_is_cut_off_at_the_edge_of_the_paper(report_page: Path, visit: Visiting) -> None:
+    """Every table is as wide as it is and no wider than the paper; a table too wide would be found."""
+    with visit(report_page, viewport=PAPER) as seen:
+        seen.page.emulate_media(media="print")
+        assert seen.page.evaluate("reading.cut()") == [[], []]
+        seen.page.add_style_tag(content=".matrix { min-width: 60rem } .answer { overflow: auto; white-space: nowrap }")
+        wide, hidden = seen.page.evaluate("reading.cut()")
+        assert any("matrix" in name for name in wide)
+        assert any("answer" in name for name in hidden)
+
+
+def test_paper_has_the_tables_and_nothing_to_click(report_page: Path, visit: Visiting) -> None:
+    """Verdicts of every point are there, folded or not; contents and buttons are not."""
+    with visit(report_page) as seen:
+        matrices = seen.page.locator(".matrix")
+        assert not matrices.nth(2).is_visible(), "folded on the screen"
+        seen.page.emulate_media(media="print")
+        assert matrices.count() == 3
+        assert all(matrices.nth(number).is_visible() for number in range(3))
+        for control in ("nav", ".skip", "button[data-all]"):
+            assert not seen.page.locator(control).first.is_visible()
+
+
+def test_pdf_holds_the_verdicts_and_is_short(printed: PdfReader) -> None:
+    """The text of each verdict is in the file; no page is empty, and all of them are few."""
+    pages = [unicodedata.normalize("NFKC", page.extract_text()) for page in printed.pages]  # without ligatures
+    text = " ".join(" ".join(pages).split())
+    assert 2 <= len(pages) <= MOST_PAGES
+    assert all(page.strip() for page in pages)
+    for word in ("An invented comparison", "✓ agrees", "✗ differs", "! failed", "gamma is not installed here"):
+        assert word in text, word
+    assert text.count("not expected") >= 2
+    assert "Skip to the verdicts" not in text
+
+
+def test_pdf_has_bookmarks_and_a_title(printed: PdfReader) -> None:
+    """A reader of the file finds their way by the headings."""
+    titles = [entry.title for entry in printed.outline if not isinstance(entry, list)]
+    assert titles == ["An invented comparison"]
+    assert "Verdicts" in [entry.title for entry in printed.outline[1] if not isinstance(entry, list)]
+    assert printed.metadata is not None
+    assert printed.metadata.title == "proofroll: which engine can be trusted"
+
+
+def test_paper_is_white_in_the_dark(report_page: Path, visit: Visiting) -> None:
+    """Who reads on a dark screen prints dark on white, the figures too, and then has their dark screen back."""
+    colours = """() => [getComputedStyle(document.body).backgroundColor,
+      getComputedStyle(document.querySelector("figure[data-o] .xtick text")).fill]"""
+    with visit(report_page, color_scheme="dark") as seen:
+        assert seen.draw() == []
+        before = seen.page.evaluate(colours)
+        seen.page.evaluate(f"addEventListener('beforeprint', () => {{ window.onPaper = ({colours})(); }})")
+        seen.page.pdf()
+        ground, ink = seen.page.evaluate("onPaper")
+        assert ground == "rgb(255, 255, 255)"
+        assert max(int(part) for part in re.findall(r"\d+", ink)) < 60
+        assert seen.page.evaluate(colours) == before
