@@ -143,7 +143,7 @@ def _bars(run: Run, name: str) -> dict[str, Any]:
     judged = next((judgement for judgement in run.judgements if judgement.observable == name), None)
     if judged is None:
         return {}
-    found: dict[str, Any] = {"tolerance": judged.tolerance}
+    found: dict[str, Any] = {"tolerance": float(f"{judged.tolerance:.4g}")}
     if judged.limit_error is not None and judged.limit_error_bar is not None:
         limit = np.array([judged.limit_error, judged.limit_error_bar, judged.order or np.nan])
         found["limit"] = rounded(limit, DIFFERENCE_DIGITS)
