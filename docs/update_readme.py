@@ -12,9 +12,11 @@ from typing import Any
 import matplotlib as mpl
 import matplotlib.pyplot as plt
 import numpy as np
+from screenshot import screenshot
 
 from proofroll.comparison_file import load_comparison
 from proofroll.report.content import outcome_content
+from proofroll.report.html import write_report
 from proofroll.report.markdown import cheapest_table, verdict_table
 from proofroll.report.regime_map import draw as draw_regimes
 from proofroll.report.work_precision import draw as draw_work_precision
@@ -90,6 +92,8 @@ def main() -> None:
         runner = Runner(Store(Path(folder)))
         outcome = compare(load_comparison("paper"), runner)
         draw(outcome, runner.store, ROOT / "docs" / "picture.svg")
+        write_report([outcome], runner.store, Path(folder), "proofroll report paper")
+        screenshot(Path(folder) / "report.html", ROOT / "docs" / "report.png")
         study = measured(runner)
     draw_work_precision(study, [study["quantity"]], ROOT / "docs" / "work_precision.svg")
     draw_regimes(regime_maps(load_comparison("stick_slip"), workers=os.cpu_count() or 1), ROOT / "docs" / "regimes.svg")

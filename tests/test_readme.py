@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import json
 import re
 import shlex
 import subprocess
@@ -10,6 +11,7 @@ import tomllib
 from pathlib import Path
 
 import pytest
+from PIL import Image
 
 from proofroll.agreement import Verdict
 from proofroll.comparison_file import load_comparison
@@ -81,6 +83,18 @@ def test_a_picture_is_there(name: str) -> None:
     path = ROOT / name
     assert path.is_file()
     assert "<svg" in path.read_text(encoding="utf-8")[:2000]
+
+
+def test_the_picture_of_the_report_is_that_of_the_table() -> None:
+    """The picture shows the rows of the paper's comparison with the verdicts of the table, in 300 kB at most."""
+    text = (ROOT / "README.md").read_text(encoding="utf-8")
+    path = ROOT / "docs" / "report.png"
+    assert "](docs/report.png)" in text
+    assert path.stat().st_size <= 300_000
+    shown = json.loads(Image.open(path).text["verdicts"])
+    assert [engine for engine, _ in shown] == [row.engine for row in load_comparison("paper").rows]
+    table = text.partition("<!-- verdicts:begin -->\n")[2].partition("<!-- verdicts:end -->")[0].splitlines()[2:]
+    assert [verdict for _, verdict in shown] == [line.split("|")[5].split()[1] for line in table]
 
 
 def test_the_verdict_table_is_whole() -> None:

@@ -12,9 +12,9 @@ window.reading = (() => {
   });
 
   // Scrolls to every figure that is not folded away and waits so many milliseconds for its picture: the captions of those that stay empty.
-  async function undrawn(patience) {
+  async function undrawn(which, patience) {
     const empty = [];
-    for (const figure of document.querySelectorAll("figure")) {
+    for (const figure of document.querySelectorAll(which)) {
       if (!figure.checkVisibility()) continue;
       figure.scrollIntoView({ block: "center", behavior: "instant" });
       for (let waited = 0; !pictured(figure) && waited < patience; waited += 20) await pause(20);

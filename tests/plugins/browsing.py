@@ -47,13 +47,17 @@ class Visit:
             assert time.monotonic() < end, f"never: {condition}"
             self.page.wait_for_timeout(10)
 
-    def draw(self, patience: float = 20.0) -> list[str]:
-        """Scrolls to every figure that is not folded away and waits for its picture, for so many seconds at most.
+    def draw(self, which: str = "figure", *, patience: float = 20.0) -> list[str]:
+        """Scrolls to figures and waits for their pictures.
+
+        Args:
+            which: selects them; those that are folded away are left out.
+            patience: how long to wait for each [s].
 
         Returns:
             the captions of those that stay empty.
         """
-        return self.page.evaluate("reading.undrawn", 1000 * patience)
+        return self.page.evaluate("([which, patience]) => reading.undrawn(which, patience)", [which, 1000 * patience])
 
 
 @contextmanager
@@ -65,7 +69,8 @@ def launched() -> Iterator[Any]:
     from playwright.sync_api import sync_playwright
 
     with sync_playwright() as playwright:
-        browser = playwright.chromium.launch(executable_path=program)
+        # WebGL without a graphics card.
+        browser = playwright.chromium.launch(executable_path=program, args=["--enable-unsafe-swiftshader"])
         yield browser
         browser.close()
 
@@ -87,7 +92,13 @@ def visiting(browser: Any, file: Path, fragment: str = "", **options: Any) -> It
         page = context.new_page()
         visit = Visit(page)
         context.on("request", lambda request: visit.requested.append(request.url))
-        context.on("console", lambda message: visit.messages.append(f"{message.type}: {message.text}"))
+
+        def hear(message: Any) -> None:
+            # Without a graphics card the browser complains to itself that it reads WebGL's picture back.
+            if "GL Driver Message" not in message.text:
+                visit.messages.append(f"{message.type}: {message.text}")
+
+        context.on("console", hear)
         context.on("weberror", lambda error: visit.messages.append(str(error.error)))
 
         def dismiss(dialog: Any) -> None:

@@ -199,6 +199,6 @@ def report_page(everything: Parts, tmp_path_factory: pytest.TempPathFactory) -> 
 
 @pytest.fixture(scope="session")
 def visit() -> Iterator[Callable[..., AbstractContextManager[Visit]]]:
-    """A browser that opens files, ``with visit(file) as seen``; one serves all tests of a process."""
+    """Opens a file in a browser, as a context; one browser serves all tests of a process."""
     with launched() as browser:
         yield partial(visiting, browser)

@@ -147,12 +147,10 @@ def test_a_row_is_switched_off_in_every_figure(drawn: Visit) -> None:
     assert not any(drawn.page.evaluate(hidden))
 
 
-def test_first_slips_and_bounds_of_friction_are_drawn(report_page: Path, visit: Visiting) -> None:
+def test_first_slips_and_bounds_of_friction_are_drawn(drawn: Visit) -> None:
     """A line with its name for each bound, and a marker for each first slip."""
-    with visit(report_page) as seen:
-        assert seen.draw() == []
-        figure = seen.page.locator("figure[data-o]", has_text="μ static = 0.3")
-        assert figure.count() == 1
-        assert figure.get_by_text("μ kinetic = 0.2").count() == 1
-        slips = "(figure) => figure.querySelector('.canvas').data.filter((trace) => trace.name === 'first slip').length"
-        assert figure.evaluate(slips) == 5, "of the truth and of four runs"
+    figure = drawn.page.locator("figure[data-o]", has_text="μ static = 0.3")
+    assert figure.count() == 1
+    assert figure.get_by_text("μ kinetic = 0.2").count() == 1
+    slips = "(figure) => figure.querySelector('.canvas').data.filter((trace) => trace.name === 'first slip').length"
+    assert figure.evaluate(slips) == 5, "of the truth and of four runs"

@@ -80,7 +80,7 @@ def test_paper_is_white_in_the_dark(report_page: Path, visit: Visiting) -> None:
     colours = """() => [getComputedStyle(document.body).backgroundColor,
       getComputedStyle(document.querySelector("figure[data-o] .xtick text")).fill]"""
     with visit(report_page, color_scheme="dark") as seen:
-        assert seen.draw() == []
+        assert seen.draw("figure[data-o='0'][data-p='0']") == []
         before = seen.page.evaluate(colours)
         seen.page.evaluate(f"addEventListener('beforeprint', () => {{ window.onPaper = ({colours})(); }})")
         seen.page.pdf()

@@ -75,5 +75,6 @@ def test_drawing_and_parameters_are_on_the_page(written: tuple[dict[str, Any], P
     ]  # fmt: skip
     marks = [mark for drawing in written[0]["comparisons"][0]["sheet"]["drawings"] for mark in drawing["marks"]]
     paths = [attributes["d"] for tag, attributes in elements.tags if tag == "path" and "transform" not in attributes]
-    assert paths == [mark["d"] for mark in marks if "d" in mark]
+    assert [path.count("L") + 1 for path in paths] == [len(mark["points"]) for mark in marks if "points" in mark]
+    assert sum(tag == "circle" for tag, _ in elements.tags) == sum("centre" in mark for mark in marks) > 3
     assert "coefficient of rolling resistance" in elements.text

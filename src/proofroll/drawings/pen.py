@@ -50,10 +50,10 @@ class View:
 class Drawing:
     """Marks in the order in which they are drawn.
 
-    A mark is a path ``d`` of SVG, or a text with ``x``, ``y`` and the parts of the text, each with
-    ``text`` and ``sub``, whether it is an index. ``look`` names how it looks: ``line``, ``thin``, ``hidden``, ``axis``,
-    ``wall``, ``ball``, ``ghost``, ``faint``, ``motion``, ``force``, ``frame``, the same with ``-head`` for filled heads
-    of arrows, and ``letter``, ``motion-letter``, ….
+    A mark is a line through ``points``, ``closed`` or not; a circle with ``centre`` and ``radius``; or a text with
+    ``x``, ``y`` and ``parts``, each with ``text`` and ``sub``, whether it is an index. ``look`` names how it looks:
+    ``line``, ``thin``, ``hidden``, ``axis``, ``wall``, ``ball``, ``ghost``, ``faint``, ``motion``, ``force``,
+    ``frame``, the same with ``-head`` for the filled heads of arrows, and ``letter``, ``motion-letter``, ….
     """
 
     marks: list[dict[str, Any]] = field(default_factory=list)
@@ -69,15 +69,13 @@ class Drawing:
         """A line through places of the picture, shape (n, 2)."""
         places = np.asarray(points, dtype=np.float64)
         self._bounds.append(places)
-        text = "L".join(f"{x:.1f} {y:.1f}" for x, y in places.tolist())
-        self.marks.append({"d": f"M{text}{'Z' if closed else ''}", "look": look})
+        self.marks.append({"points": np.round(places, 1).tolist(), "closed": closed, "look": look})
 
     def disc(self, centre: Sequence[float], radius: float, look: str) -> None:
         """A circle of the picture; a ball looks so from everywhere."""
         (x, y), r = centre, radius
         self._bounds.append(np.array([[x - r, y - r], [x + r, y + r]]))
-        d = f"M{x - r:.1f} {y:.1f}a{r:.1f} {r:.1f} 0 1 0 {2 * r:.1f} 0a{r:.1f} {r:.1f} 0 1 0 {-2 * r:.1f} 0Z"
-        self.marks.append({"d": d, "look": look})
+        self.marks.append({"centre": [round(x, 1), round(y, 1)], "radius": round(r, 1), "look": look})
 
     def arrow(self, points: npt.ArrayLike, look: str) -> None:
         """A line through places of the picture, straight or curved, with a head at its end; shape (n, 2)."""

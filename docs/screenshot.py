@@ -1,0 +1,53 @@
+"""The top of a report as a browser shows it: ``python docs/screenshot.py out/report.html docs/report.png``."""
+
+from __future__ import annotations
+
+import io
+import json
+import shutil
+import sys
+from pathlib import Path
+
+from PIL import Image
+from PIL.PngImagePlugin import PngInfo
+from playwright.sync_api import sync_playwright
+
+BROWSERS = ("chromium", "chromium-browser", "google-chrome")
+# In CSS pixels, drawn with two device pixels to each, so that the numbers can be read.
+WIDTH, MOST_HEIGHT, DENSITY = 1280, 1100, 2
+# A page of text and flat cells has few colours; a palette makes the file a third as large.
+COLOURS = 64
+# The first table of verdicts, row for row: what the comparison file calls it, and its verdict.
+ROWS = """() => [...document.querySelector(".matrix").querySelectorAll("tbody tr:not(.group)")].map((row) =>
+  [row.querySelector("th").title, row.querySelector(".v").textContent.trim().split(" ")[1]])"""
+
+
+def screenshot(report: Path, picture: Path) -> None:
+    """Photographs a report down to the end of its first table of verdicts.
+
+    The verdicts that the picture shows are also in it as text, under ``verdicts``: a test reads them there.
+
+    Args:
+        report: the page.
+        picture: a PNG file to write.
+    """
+    program = next(filter(None, map(shutil.which, BROWSERS)), None)
+    if program is None:
+        sys.exit(f"the picture of the report needs one of {', '.join(BROWSERS)}")
+    with sync_playwright() as playwright:
+        browser = playwright.chromium.launch(executable_path=program)
+        page = browser.new_page(
+            viewport={"width": WIDTH, "height": MOST_HEIGHT}, device_scale_factor=DENSITY, color_scheme="light"
+        )
+        page.goto(report.resolve().as_uri())
+        end = page.locator(".matrix").first.evaluate("(table) => table.getBoundingClientRect().bottom + 16")
+        area = {"x": 0, "y": 0, "width": WIDTH, "height": min(end, MOST_HEIGHT)}
+        image = Image.open(io.BytesIO(page.screenshot(clip=area)))
+        said = PngInfo()
+        said.add_text("verdicts", json.dumps(page.evaluate(ROWS)))
+        browser.close()
+    image.convert("RGB").quantize(COLOURS, dither=Image.Dither.NONE).save(picture, optimize=True, pnginfo=said)
+
+
+if __name__ == "__main__":
+    screenshot(*map(Path, sys.argv[1:]))

@@ -1,0 +1,116 @@
+"""Whatever a scene, an engine or a message says is shown as it is written and does nothing: seen in a real browser."""
+
+from __future__ import annotations
+
+import dataclasses
+import html
+from collections.abc import Callable
+from contextlib import AbstractContextManager
+from pathlib import Path
+from typing import Any
+
+import pytest
+from browsing import Visit
+from poison import Poison
+
+Visiting = Callable[..., AbstractContextManager[Visit]]
+
+FIRST = "figure[data-o='0'][data-p='0']"
+PHONE = {"viewport": {"width": 390, "height": 844}, "is_mobile": True, "has_touch": True}
+# What became of poison: whose ran, elements made of it, scripts, and attributes that would run.
+HARM = """() => {
+  const acts = (element) => [...element.attributes].some(({ name }) => name.startsWith("on"));
+  const count = (selector) => document.querySelectorAll(selector).length;
+  const handlers = [...document.querySelectorAll("*")].filter(acts).length;
+  return [window.poisoned ?? [], count("img, b.poison, textarea, [autofocus]"), count("script"), handlers];
+}"""
+TEXT = """() => {
+  const body = document.body.cloneNode(true);
+  body.querySelectorAll("script, style, svg").forEach((element) => element.remove());
+  return body.textContent;
+}"""
+
+
+@pytest.fixture(scope="module")
+def poison() -> Poison:
+    """Remembers what it gave to whom."""
+    return Poison()
+
+
+@pytest.fixture(scope="module")
+def poisoned_page(everything: Any, poison: Poison, tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """A page that has every part of a report, each string in it poisoned."""
+    bad = dataclasses.replace(
+        everything,
+        content=poison.content(everything.content),
+        curves=poison.content(everything.curves, names=False),
+    )
+    return bad.write(tmp_path_factory.mktemp("poisoned") / "report.html")
+
+
+def test_nothing_that_others_write_runs(report_page: Path, poisoned_page: Path, visit: Visiting) -> None:
+    """Read to its end, unfolded, drawn, pointed at and clicked through: no script, element or handler of theirs."""
+    with visit(report_page) as clean:
+        assert clean.draw(FIRST) == []
+        scripts = clean.page.evaluate(HARM)[2]
+    with visit(poisoned_page) as seen:
+        seen.unfold()
+        assert seen.draw() == []
+        for number in range(3):
+            seen.page.locator(".legend button").nth(number).click()
+        assert seen.page.evaluate(HARM) == [[], 0, scripts, 0]
+        assert seen.requested == [poisoned_page.as_uri()]
+        assert seen.messages == []
+
+
+def test_poison_would_be_felt(poisoned_page: Path, poison: Poison, tmp_path: Path, visit: Visiting) -> None:
+    """The check above can fail: one string that is let through once, as text or in an attribute, does its harm."""
+    text = poisoned_page.read_text(encoding="utf-8")
+    title = poison.dose("An invented comparison")
+    written = html.escape(title).replace("&quot;", "&#34;").replace("&#x27;", "&#39;")  # as jinja writes it
+    for mark in (f">{written}", f'="Verdicts: {written}"'):
+        assert mark in text, mark
+        file = tmp_path / "page.html"
+        file.write_text(text.replace(mark, mark.replace(written, title), 1), encoding="utf-8")
+        with visit(file) as seen:
+            ran, elements, *_ = seen.page.evaluate(HARM)
+            assert set(ran) == {int(poison.doses["An invented comparison"])}
+            assert elements >= 1
+
+
+def test_everything_that_others_write_is_shown_as_it_is_written(
+    report_page: Path, poisoned_page: Path, poison: Poison, visit: Visiting
+) -> None:
+    """Each string that the page shows is shown with its poison, letter by letter; none is dropped or read as markup."""
+    texts = []
+    for file in (report_page, poisoned_page):
+        with visit(file) as seen:
+            texts.append(" ".join(seen.page.evaluate(TEXT).split()))
+    clean, bad = texts
+    shown = [text for text in poison.said if len(text) > 9 and text in clean]
+    lost = [text for text in shown if " ".join(poison.dose(text).split()) not in bad]
+    assert len(shown) > 20
+    assert lost == []
+
+
+def test_labels_of_figures_show_names_as_they_are_written(poisoned_page: Path, visit: Visiting) -> None:
+    """The label at the pointer, which plotly writes with markup of its own, shows the poison as text."""
+    with visit(poisoned_page) as seen:
+        assert seen.draw(FIRST) == []
+        seen.page.evaluate(
+            """() => {
+              const element = document.querySelector("figure[data-o] .canvas");
+              Plotly.Fx.hover(element, [{ curveNumber: 1, pointNumber: 9 }]);
+            }"""
+        )
+        label = seen.page.locator("figure[data-o] .hovertext").first
+        assert "</script></style></title></textarea><script>(window.poisoned" in label.text_content()
+        assert "&amp;&lt;%{y}{{7*7}}" in label.text_content()
+        assert seen.page.evaluate(HARM)[:2] == [[], 0]
+
+
+def test_long_words_of_others_do_not_widen_a_phone(poisoned_page: Path, visit: Visiting) -> None:
+    """A name without a gap is broken or scrolls in its region."""
+    with visit(poisoned_page, **PHONE) as seen:
+        seen.unfold()
+        assert seen.page.evaluate("reading.wide()") == [0, []]
