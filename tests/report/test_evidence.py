@@ -19,7 +19,7 @@ from proofroll.report.evidence import add_evidence, cost
 from proofroll.report.html import page, report_content
 from proofroll.report.labels import error
 from proofroll.report.plots import MOST_POINTS, kept, point_curves
-from proofroll.report.styles import SYMBOLS, styles
+from proofroll.report.styles import OUTLINES, styles
 from proofroll.report.tables import cost_title, costs, expectations
 from proofroll.scene_file import load_scene
 from proofroll.store import Store
@@ -105,7 +105,7 @@ def test_no_two_rows_of_an_engine_look_alike_and_none_by_colour_alone() -> None:
     row = {"name": "alpha", "formulation": "one", "preset": "matched", "verdict": "agrees"}
     looks = [(style["colour"], style["symbol"]) for style in styles([row] * 20 + [{**row, "name": "beta"}])]
     assert len(set(looks)) == 21
-    assert {symbol.removesuffix("-open") for _, symbol in looks} == set(SYMBOLS)
+    assert {symbol.removesuffix("-open") for _, symbol in looks} == set(OUTLINES)
 
 
 def test_cost_has_an_interval_where_there_is_one() -> None:
@@ -179,7 +179,7 @@ def test_legend_has_lines_symbols_and_verdicts_and_can_be_reached(html: str, par
     assert len(canvases) == 2 * 6
     assert all(canvas["tabindex"] == "0" and canvas["aria-label"] for canvas in canvases)
     outlines = {attributes["d"] for tag, attributes in elements.tags if tag == "path"}
-    assert len(outlines & set(SYMBOLS.values())) == 2
+    assert len(outlines & set(OUTLINES.values())) == 2
     assert re.search(r'alpha fine matched.*?<b class="v agrees" title="agrees">✓</b></button>', html, re.DOTALL)
 
 

@@ -16,7 +16,7 @@ from proofroll.report.findings import findings
 from proofroll.report.onsets import add_events, mark, truth_facts
 from proofroll.report.plots import point_curves
 from proofroll.report.regime_map import counts, inline
-from proofroll.report.styles import SYMBOLS, styles
+from proofroll.report.styles import OUTLINES, styles
 from proofroll.scene_file import load_scene
 from proofroll.store import Store, write_text
 from proofroll.studies.compare import Outcome
@@ -146,7 +146,7 @@ def _templates() -> jinja2.Environment:
         "names": labels.names,
         "symbols": labels.SYMBOLS,
         "meanings": labels.MEANINGS,
-        "outlines": SYMBOLS,
+        "outlines": OUTLINES,
         "again": _again,
     }
     return made

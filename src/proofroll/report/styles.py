@@ -7,7 +7,7 @@ from typing import Any
 DASHES = ("solid", "dash", "dot", "dashdot", "longdash", "longdashdot")
 COLOURS = 8
 # plotly's names of symbols, each with its outline around (0, 0) for the legend.
-SYMBOLS = {
+OUTLINES = {
     "circle": "M-3.4 0a3.4 3.4 0 1 0 6.8 0a3.4 3.4 0 1 0 -6.8 0Z",
     "square": "M-3 -3H3V3H-3Z",
     "diamond": "M0 -4.2L4.2 0L0 4.2L-4.2 0Z",
@@ -32,7 +32,7 @@ def styles(rows: list[dict[str, Any]]) -> list[dict[str, Any]]:
     engines = list(dict.fromkeys(row["name"] for row in rows))
     formulations = {name: list(dict.fromkeys(r["formulation"] for r in rows if r["name"] == name)) for name in engines}
     widths = {"default": 1.1, "tuned": 2.4}
-    names = list(SYMBOLS)
+    names = list(OUTLINES)
     seen: dict[str, int] = {}
     found = []
     for row in rows:
