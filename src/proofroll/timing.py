@@ -21,7 +21,8 @@ from proofroll.files import replacing
 
 # With fewer than six values the whole range of them holds the median with less than 95 %.
 ROUNDS = 6
-_CONFIDENCE = 0.95
+# Of every interval.
+CONFIDENCE = 0.95
 
 
 @dataclass(frozen=True)
@@ -101,7 +102,7 @@ def _interval(values: np.ndarray[Any, np.dtype[np.float64]]) -> Interval:
     if len(values) < 2 or np.ptp(values) == 0:
         return Interval(median, float(values.min()), float(values.max()))
     found = bootstrap(
-        (values,), np.median, confidence_level=_CONFIDENCE, n_resamples=999, method="percentile", rng=0
+        (values,), np.median, confidence_level=CONFIDENCE, n_resamples=999, method="percentile", rng=0
     ).confidence_interval
     return Interval(median, float(found.low), float(found.high))
 

@@ -76,19 +76,22 @@ def launched() -> Iterator[Any]:
 
 
 @contextmanager
-def visiting(browser: Any, file: Path, fragment: str = "", **options: Any) -> Iterator[Visit]:
+def visiting(browser: Any, file: Path, fragment: str = "", before: str = "", **options: Any) -> Iterator[Visit]:
     """Opens a file; whatever else it asks for is noted and refused.
 
     Args:
         browser: from :func:`launched`.
         file: the page.
         fragment: with ``#``, where to go in it.
+        before: a script that runs before those of the page.
         options: of ``browser.new_context``, e.g. ``color_scheme="dark"``.
     """
     address = file.resolve().as_uri()
     context = browser.new_context(**{"viewport": WIDE, "offline": True, "service_workers": "block"} | options)
     try:
         context.add_init_script(path=SCRIPT)
+        if before:
+            context.add_init_script(before)
         page = context.new_page()
         visit = Visit(page)
         context.on("request", lambda request: visit.requested.append(request.url))

@@ -3,17 +3,17 @@
 from __future__ import annotations
 
 import base64
-import dataclasses
 import gzip
 import json
-import shutil
 from collections.abc import Callable, Iterator
+from contextlib import AbstractContextManager, ExitStack
 from importlib.metadata import PackageNotFoundError
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 import pytest
+from browsing import Visit
 from scipy.integrate import solve_ivp
 from scipy.spatial.transform import Rotation
 
@@ -286,60 +286,19 @@ def test_what_engines_and_files_say_stays_text(made: Any, parse: Callable[[str],
 # ---- in a browser ----
 
 
-@dataclasses.dataclass
-class Opened:
-    """A page in the browser, what it said on its console and what it asked for."""
-
-    page: Any
-    errors: list[str]
-    requests: list[str]
-
-
-@pytest.fixture(scope="module")
-def chromium() -> Iterator[Any]:
-    """A headless Chromium, one for all tests here."""
-    playwright = pytest.importorskip("playwright.sync_api", reason="playwright is not installed")
-    browser = shutil.which("chromium") or shutil.which("chromium-browser") or shutil.which("google-chrome")
-    if browser is None:
-        pytest.skip("no chromium here: apt-get install chromium")
-    with playwright.sync_playwright() as running:
-        # WebGL in software, as the machine may have no graphics.
-        options = ["--no-sandbox", "--use-angle=swiftshader", "--enable-unsafe-swiftshader"]
-        started = running.chromium.launch(executable_path=browser, args=options)
-        yield started
-        started.close()
-
-
 @pytest.fixture
-def visit(chromium: Any) -> Iterator[Callable[..., Opened]]:
-    """Opens a page with the network cut."""
-    contexts = []
-
-    def go(file: Path, before: str = "") -> Opened:
-        context = chromium.new_context(offline=True, viewport={"width": 1100, "height": 800})
-        contexts.append(context)
-        shown = context.new_page()
-        shown.set_default_timeout(60_000)
-        opened = Opened(shown, [], [])
-        shown.on("console", lambda m: opened.errors.append(m.text) if m.type == "error" else None)
-        shown.on("pageerror", lambda error: opened.errors.append(str(error)))
-        shown.on("request", lambda request: opened.requests.append(request.url))
-        if before:
-            shown.add_init_script(before)
-        shown.goto(file.as_uri())
-        return opened
-
-    yield go
-    for context in contexts:
-        context.close()
+def open_(visit: Callable[..., AbstractContextManager[Visit]]) -> Iterator[Callable[..., Visit]]:
+    """Opens pages that stay open until the end of a test."""
+    with ExitStack() as pages:
+        yield lambda file, **options: pages.enter_context(visit(file, **options))
 
 
-def part(opened: Opened, name: str) -> Any:
+def part(opened: Visit, name: str) -> Any:
     """One element of the replay."""
     return opened.page.locator(f'.replay [data-part="{name}"]')
 
 
-def ready(opened: Opened) -> None:
+def ready(opened: Visit) -> None:
     """Brings the replay into view and waits until it has drawn."""
     opened.page.locator("#replay").scroll_into_view_if_needed()
     opened.page.evaluate("document.querySelector('.replay').scrollIntoView()")
@@ -347,23 +306,23 @@ def ready(opened: Opened) -> None:
     settle(opened)
 
 
-def settle(opened: Opened) -> None:
+def settle(opened: Visit) -> None:
     """Waits for two frames of the browser: what was asked for is drawn then."""
     opened.page.evaluate("() => new Promise((done) => requestAnimationFrame(() => requestAnimationFrame(done)))")
 
 
-def clock(opened: Opened) -> float:
+def clock(opened: Visit) -> float:
     """The time shown [s]."""
     return float(part(opened, "clock").inner_text().split()[0])
 
 
-def picture(opened: Opened) -> bytes:
+def picture(opened: Visit) -> bytes:
     """What is drawn."""
     settle(opened)
     return bytes(part(opened, "canvas").screenshot())
 
 
-def until(opened: Opened, met: Callable[[float], bool]) -> None:
+def until(opened: Visit, met: Callable[[float], bool]) -> None:
     """Waits for the time shown; asked from here, since the page's policy forbids a polling script to be compiled."""
     for _ in range(600):
         if met(clock(opened)):
@@ -372,15 +331,15 @@ def until(opened: Opened, met: Callable[[float], bool]) -> None:
     pytest.fail(f"the time shown is still {clock(opened)} s")
 
 
-def passes(opened: Opened, time: float) -> None:
+def passes(opened: Visit, time: float) -> None:
     """Waits until the time shown is beyond ``time`` [s]."""
     until(opened, lambda shown: shown > time)
 
 
-def test_the_replay_plays(written: Any, visit: Callable[..., Opened]) -> None:
+def test_the_replay_plays(written: Any, open_: Callable[..., Visit]) -> None:
     """From file:// without network: nothing before it is seen, then time and picture advance; no error, no request."""
     file = written[1] / "report.html"
-    opened = visit(file)
+    opened = open_(file)
     assert opened.page.evaluate("typeof THREE") == "undefined"
     assert opened.page.locator(".replay[data-ready]").count() == 0
     ready(opened)
@@ -398,13 +357,13 @@ def test_the_replay_plays(written: Any, visit: Callable[..., Opened]) -> None:
     values = part(opened, "values").inner_text()
     assert "N" in values
     assert "rolls without slip" in values
-    assert opened.errors == []
-    assert opened.requests == [file.as_uri()]
+    assert opened.messages == []
+    assert opened.requested == [file.as_uri()]
 
 
-def test_the_replay_obeys(written: Any, visit: Callable[..., Opened]) -> None:
+def test_the_replay_obeys(written: Any, open_: Callable[..., Visit]) -> None:
     """Keys, time line, ghosts, view and the choice of a case each change what is shown."""
-    opened = visit(written[1] / "report.html")
+    opened = open_(written[1] / "report.html")
     ready(opened)
     opened.page.keyboard.press("Tab")
     part(opened, "canvas").focus()
@@ -430,12 +389,12 @@ def test_the_replay_obeys(written: Any, visit: Callable[..., Opened]) -> None:
     part(opened, "case").select_option("0")
     until(opened, lambda shown: shown == 0)
     assert picture(opened) != bare
-    assert opened.errors == []
+    assert opened.messages == []
 
 
-def test_the_time_line_shows_the_truth_at_that_time(written: Any, made: Any, visit: Callable[..., Opened]) -> None:
+def test_the_time_line_shows_the_truth_at_that_time(written: Any, made: Any, open_: Callable[..., Visit]) -> None:
     """The values are those of the stored truth: z and N at half a second."""
-    opened = visit(written[1] / "report.html")
+    opened = open_(written[1] / "report.html")
     ready(opened)
     opened.page.evaluate(
         "() => { const line = document.querySelector('[data-part=time]');"
@@ -450,7 +409,7 @@ def test_the_time_line_shows_the_truth_at_that_time(written: Any, made: Any, vis
 
 @pytest.mark.parametrize("lacking", ["WebGL", "three.js"])
 def test_without_a_picture_the_values_follow_the_time(
-    lacking: str, made: Any, tmp_path: Path, visit: Callable[..., Opened]
+    lacking: str, made: Any, tmp_path: Path, open_: Callable[..., Visit]
 ) -> None:
     """One sentence says what is missing; time and values run, and nothing fails."""
     replay = replay_content([made[0]], made[1])
@@ -460,9 +419,9 @@ def test_without_a_picture_the_values_follow_the_time(
     content = report_content([made[0]], made[1], "proofroll report") | {"replay": described(replay)}
     file.write_text(page(content, [point_curves(*made)], replay=replay), encoding="utf-8")
     blind = "HTMLCanvasElement.prototype.getContext = () => null;" if lacking == "WebGL" else ""
-    opened = visit(file, blind)
+    opened = open_(file, before=blind)
     ready(opened)
     assert lacking in part(opened, "said").inner_text()
     part(opened, "play").click()
     passes(opened, 0.02)
-    assert opened.errors == []
+    assert opened.messages == []

@@ -14,12 +14,13 @@ from typing import TYPE_CHECKING, Any
 from proofroll.plain import plain
 from proofroll.report import heat_map, labels, onset_tables, study_tables, tables
 from proofroll.report.content import environment, outcome_content
+from proofroll.report.evidence import add_evidence
 from proofroll.report.findings import findings
 from proofroll.report.onsets import add_events, mark, truth_facts
 from proofroll.report.packing import packed
 from proofroll.report.parts import KEYS
-from proofroll.report.plots import styles
 from proofroll.report.regime_map import counts
+from proofroll.report.styles import OUTLINES, styles
 from proofroll.report.summary import three_sentences
 from proofroll.report.tradeoff_tables import name_of
 from proofroll.scene_file import load_scene
@@ -75,6 +76,7 @@ def report_content(outcomes: list[Outcome], store: Store, command: str, maps: Ma
         content["findings"] = findings(content)
         content["regimes"] = counts(maps[index]) if index < len(maps) else []
         add_events(content, outcome.runs, store)
+        add_evidence(content, outcome)
         comparisons.append(content)
     versions: dict[str, str] = {}
     for outcome in outcomes:
@@ -170,6 +172,7 @@ def _templates() -> jinja2.Environment:
         "names": labels.names,
         "symbols": labels.SYMBOLS,
         "meanings": labels.MEANINGS,
+        "outlines": OUTLINES,
         "again": _again,
     }
     return made

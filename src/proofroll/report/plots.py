@@ -1,4 +1,4 @@
-"""The curves that the page draws: the truth, and what each engine adds to it, rounded and thinned."""
+"""The curves that the page draws: the truth, what each engine adds to it, and both error bars; rounded and thinned."""
 
 from __future__ import annotations
 
@@ -31,15 +31,15 @@ REACTIONS = ("N", "F2", "F3", "needed_friction")
 MOST_POINTS = 400
 # Digits of a curve, and of its difference from the truth: enough for a figure, and small in the file.
 CURVE_DIGITS, DIFFERENCE_DIGITS = 6, 3
-DASHES = ("solid", "dash", "dot", "dashdot", "longdash", "longdashdot")
-COLOURS = 8
 
 
 def point_curves(outcome: Outcome, store: Store) -> list[dict[str, Any]]:
     """The curves of a comparison, one entry for each point of the parameters.
 
     Each entry has ``point``, ``time`` [s] and ``observables``: name, unit, the truth's error bar and values, and for
-    each engine the number of its row and its *difference* from the truth.
+    each engine the number of its row and its *difference* from the truth. Where it was judged, ``tolerance``; where
+    the judgement has a limit of small steps, ``limit``: its distance from the truth, the uncertainty of that, and the
+    observed order or None.
     """
     entries = []
     for name, case in outcome.truths.items():
@@ -61,39 +61,27 @@ def point_curves(outcome: Outcome, store: Store) -> list[dict[str, Any]]:
     return entries
 
 
-def styles(rows: list[dict[str, Any]]) -> list[dict[str, Any]]:
-    """Colour by engine, dashes by formulation, width by preset, so that a row looks the same in every figure."""
-    engines = list(dict.fromkeys(row["name"] for row in rows))
-    formulations = {name: list(dict.fromkeys(r["formulation"] for r in rows if r["name"] == name)) for name in engines}
-    widths = {"default": 1.1, "tuned": 2.4}
-    return [
-        {
-            "colour": engines.index(row["name"]) % COLOURS,
-            "dash": DASHES[formulations[row["name"]].index(row["formulation"]) % len(DASHES)],
-            "width": widths.get(row["preset"], 1.7),
-            "opacity": 0.5 if row["verdict"] in {"differs", "failed"} else 1,  # not to hide those that agree
-        }
-        for row in rows
-    ]
-
-
 def rounded(values: FloatArray, digits: int) -> list[float | None]:
     """Numbers with so many significant digits; None where one is not finite."""
     return [float(f"{value:.{digits - 1}e}") if math.isfinite(value) else None for value in values.tolist()]
 
 
-def kept(length: int, curves: list[FloatArray], most: int = MOST_POINTS) -> np.typing.NDArray[np.intp]:
-    """Indices of samples that are drawn: both ends, and every curve's lowest and highest sample of each stretch."""
+def kept(curves: list[FloatArray], most: int = MOST_POINTS) -> np.typing.NDArray[np.intp]:
+    """Indices of the samples that are drawn: of each stretch the first, the last, the lowest and the highest.
+
+    These four draw the same pixels as all samples do (M4: Jugel et al. 2014). MinMaxLTTB, which chooses among the
+    lowest and the highest by the area they span, loses the largest error of one rough curve in four.
+
+    Args:
+        curves: of equal length; one that is not finite somewhere has there neither a lowest nor a highest sample.
+        most: samples of each curve, a multiple of 4.
+    """
+    from tsdownsample import M4Downsampler
+
+    length = curves[0].size
     if length <= most:
         return np.arange(length)
-    stretches = np.array_split(np.arange(length), max(1, most // (2 * len(curves))))
-    chosen = {0, length - 1}
-    for stretch in stretches:
-        for curve in curves:
-            finite = stretch[np.isfinite(curve[stretch])]
-            if finite.size:
-                chosen |= {int(finite[np.argmin(curve[finite])]), int(finite[np.argmax(curve[finite])])}
-    return np.array(sorted(chosen))
+    return np.unique(np.concatenate([M4Downsampler().downsample(np.ascontiguousarray(c), n_out=most) for c in curves]))
 
 
 def stored(path: Path, names: list[str]) -> dict[str, np.typing.NDArray[Any]]:
@@ -104,15 +92,15 @@ def stored(path: Path, names: list[str]) -> dict[str, np.typing.NDArray[Any]]:
         return {name: np.asarray(file[name][...]) for name in names if name in file.variables}
 
 
-def _engines(outcome: Outcome, store: Store, point: str, drawn: list[str]) -> list[tuple[int, Curves]]:
-    """Row number and curves of every run at a point that has a trajectory."""
+def _engines(outcome: Outcome, store: Store, point: str, drawn: list[str]) -> list[tuple[int, Run, Curves]]:
+    """Row number, run and curves of every run at a point that has a trajectory."""
     numbers: dict[int, int] = {}
     found = []
     for run in outcome.runs:
         number = numbers.setdefault(id(run.row), len(numbers))
         if point_name(run.parameters) == point and _has_trajectory(run, store):
             assert run.case is not None  # it has a trajectory
-            found.append((number, stored(store.trajectory(run.case), drawn)))
+            found.append((number, run, stored(store.trajectory(run.case), drawn)))
     return found
 
 
@@ -120,11 +108,11 @@ def _has_trajectory(run: Run, store: Store) -> bool:
     return run.case is not None and run.result.trajectory is not None and store.trajectory(run.case).is_file()
 
 
-def _observable(name: str, truth: xr.Dataset, engines: list[tuple[int, Curves]], scale: float) -> dict[str, Any]:
+def _observable(name: str, truth: xr.Dataset, engines: list[tuple[int, Run, Curves]], scale: float) -> dict[str, Any]:
     first = 1 if name in REACTIONS else 0
     true = truth[name].to_numpy()
     curves = []
-    for row, said in engines:
+    for row, run, said in engines:
         if name not in said:
             continue
         values = np.full(true.shape, np.nan)  # a run that ended early has fewer samples
@@ -132,8 +120,9 @@ def _observable(name: str, truth: xr.Dataset, engines: list[tuple[int, Curves]],
         values[first:ended] = said[name][first:ended]
         with np.errstate(invalid="ignore", over="ignore"):
             difference = values - true
-        at = kept(true.size, [values, np.abs(difference)])
+        at = kept([values, np.abs(difference)])
         curve: dict[str, Any] = {"row": row, "difference": rounded(difference[at], DIFFERENCE_DIGITS)}
+        curve |= _bars(run, name)
         if at.size < true.size:
             curve["at"] = at.tolist()
         curves.append(curve)
@@ -147,3 +136,15 @@ def _observable(name: str, truth: xr.Dataset, engines: list[tuple[int, Curves]],
         "truth": rounded(true, CURVE_DIGITS),
         "engines": curves,
     }
+
+
+def _bars(run: Run, name: str) -> dict[str, Any]:
+    """What the judgement of a curve says besides its error, in the observable's unit."""
+    judged = next((judgement for judgement in run.judgements if judgement.observable == name), None)
+    if judged is None:
+        return {}
+    found: dict[str, Any] = {"tolerance": float(f"{judged.tolerance:.4g}")}
+    if judged.limit_error is not None and judged.limit_error_bar is not None:
+        limit = np.array([judged.limit_error, judged.limit_error_bar, judged.order or np.nan])
+        found["limit"] = rounded(limit, DIFFERENCE_DIGITS)
+    return found

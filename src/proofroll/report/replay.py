@@ -12,10 +12,11 @@ from proofroll.case import Case, Status
 from proofroll.plain import plain
 from proofroll.report.content import by_row, outcome_content
 from proofroll.report.labels import names, symbol, unit
-from proofroll.report.plots import stored, styles
+from proofroll.report.plots import stored
 from proofroll.report.replay_library import packed, thinned, three
 from proofroll.report.replay_poses import NEEDED, Poses, Sampled, frame_times, poses
 from proofroll.report.replay_wall import middle, wall
+from proofroll.report.styles import styles
 from proofroll.scene import RollingBall
 from proofroll.scene_file import load_scene
 from proofroll.store import Store

@@ -37,6 +37,7 @@ def overview(content: dict[str, Any], comparison: int) -> dict[str, Any]:
                 "message": row["message"],
                 "as_expected": row["as_expected"],
                 "seconds": row["seconds_per_second"],
+                "cost": next((cost_title(run["cost"]) for run in runs if _slowest(run, row)), ""),
                 "judged": {
                     name: _cell(judgement, anchor(comparison, index, points.index(judgement["point"])))
                     for name, judgement in row["observables"].items()
@@ -69,6 +70,7 @@ def at_point(content: dict[str, Any], comparison: int, point: int, name: str) ->
                 "message": run["message"] if run["status"] != "done" else "",
                 "as_expected": not run["contradictions"],
                 "seconds": run["seconds_per_second"],
+                "cost": cost_title(run["cost"]) if run.get("cost") else "",
                 "judged": {judgement["observable"]: _cell(judgement, href) for judgement in run["judgements"]},
             }
         )
@@ -76,17 +78,61 @@ def at_point(content: dict[str, Any], comparison: int, point: int, name: str) ->
 
 
 def expectations(content: dict[str, Any]) -> list[dict[str, Any]]:
-    """What is expected, settings with the same expectation together."""
-    groups: dict[tuple[str, str, str], list[str]] = {}
+    """What is expected, settings with the same expectation together; ``further``: claims besides the verdict."""
+    groups: dict[tuple[Any, ...], list[str]] = {}
     for name, row in zip(names(content["rows"]), content["rows"], strict=True):
         text = " or ".join(row["expected"])
         for observable, verdicts in row["expected_for"].items():
             text += f"; {symbol(observable)}: {' or '.join(verdicts)}"
-        groups.setdefault((row["tolerance"], text, row["because"]), []).append(name)
+        further = tuple(_further(row.get("claims", {})))
+        groups.setdefault((row["tolerance"], text, row["because"], further), []).append(name)
     return [
-        {"names": found, "tolerance": tolerance, "expected": text, "because": because}
-        for (tolerance, text, because), found in groups.items()
+        {"names": found, "tolerance": tolerance, "expected": text, "because": because, "further": further}
+        for (tolerance, text, because, further), found in groups.items()
     ]
+
+
+def _further(claims: dict[str, Any]) -> list[str]:
+    """A row's claims besides its verdict, as sentences without a full stop."""
+    said = [f"{symbol(name)} within {unit(bound)}" for name, bound in claims.get("bound", {}).items()]
+    said += [f"order of {symbol(name)} {low:g} to {high:g}" for name, (low, high) in claims.get("order", {}).items()]
+    said += [f"limit of {symbol(name)} within {unit(bound)}" for name, bound in claims.get("limit", {}).items()]
+    for item in claims.get("except_at", []):
+        said.append(f"{' or '.join(item['expect'])} at {_where(item['where'])}")
+    if claims.get("only"):
+        said.append(f"run only at {_where(claims['only'])}")
+    return said
+
+
+def _where(values: dict[str, list[float]]) -> str:
+    """Values of parameters: ``speed=2, mu_static=0.35 or 0.4``."""
+    return ", ".join(f"{name}={' or '.join(number(v, 6) for v in found)}" for name, found in values.items())
+
+
+def costs(content: dict[str, Any]) -> list[dict[str, Any]]:
+    """For each timed row its fastest and its slowest case, with intervals."""
+    lines = []
+    for index, name in enumerate(names(content["rows"])):
+        timed = [run for run in content["runs"] if run["row"] == index and run.get("cost")]
+        if timed:
+            timed.sort(key=lambda run: run["cost"]["median"])
+            lines.append({"name": name, "fastest": timed[0], "slowest": timed[-1], "cases": len(timed)})
+    return lines
+
+
+def cost_interval(cost: dict[str, Any] | None) -> str:
+    """The interval of a cost: ``0.011 to 0.013``; a dash where it was measured once or never."""
+    return "–" if not cost or cost["low"] is None else f"{number(cost['low'])} to {number(cost['high'])}"
+
+
+def cost_title(cost: dict[str, Any] | None) -> str:
+    """What a cost is, in a sentence."""
+    if not cost:
+        return "not timed"
+    if cost["low"] is None:
+        return "one clean run, so no interval is known"
+    known = f"{100 * cost['confidence']:.3g} %"
+    return f"median of {cost['runs']} clean runs; {cost_interval(cost)} s/s holds it with {known}"
 
 
 def reasons(certificate: list[dict[str, Any]]) -> dict[str, list[str]]:
@@ -131,6 +177,10 @@ def belief(content: dict[str, Any]) -> list[dict[str, Any]]:
             }
         )
     return lines
+
+
+def _slowest(run: dict[str, Any], row: dict[str, Any]) -> bool:
+    return bool(run.get("cost")) and run["seconds_per_second"] == row["seconds_per_second"]
 
 
 def _head(row: dict[str, Any]) -> dict[str, Any]:

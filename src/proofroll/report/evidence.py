@@ -1,0 +1,65 @@
+"""What a comparison's section shows besides verdicts: its scene, all that is claimed, and cost with intervals."""
+
+from __future__ import annotations
+
+import statistics
+from typing import TYPE_CHECKING, Any
+
+from proofroll.plain import plain
+from proofroll.report.content import by_row
+from proofroll.report.scene_sheet import scene_sheet
+from proofroll.timing import CONFIDENCE, ROUNDS, Timing
+
+if TYPE_CHECKING:
+    from collections.abc import Sequence
+
+    from proofroll.comparison import Row, Tolerance
+    from proofroll.studies.compare import Outcome
+
+
+def add_evidence(content: dict[str, Any], outcome: Outcome) -> None:
+    """Gives a comparison's content its ``sheet``, each row its ``claims``, and each timed run its ``cost``.
+
+    Args:
+        content: of the comparison.
+        outcome: what it found.
+    """
+    points = [case.parameters for case in outcome.truths.values()]
+    content["sheet"] = plain(scene_sheet(outcome.comparison.scene, points))
+    for entry, runs in zip(content["rows"], by_row(outcome).values(), strict=True):
+        entry["claims"] = plain(_claims(runs[0].row))
+    for entry, run in zip(content["runs"], outcome.runs, strict=True):
+        entry["cost"] = plain(cost(run.result.timings))
+
+
+def cost(timings: Sequence[float]) -> dict[str, Any] | None:
+    """Wall seconds per simulated second: ``median``, ``low`` and ``high``, their ``confidence``, and ``runs``.
+
+    With fewer than six clean runs the interval is their whole range, which holds the median with 1 - 2^(1-n); one
+    run has none: ``low``, ``high`` and ``confidence`` are None.
+    """
+    if not timings:
+        return None
+    count = len(timings)
+    found: dict[str, Any] = {"median": statistics.median(timings), "low": None, "high": None, "confidence": None}
+    if count >= ROUNDS:
+        interval = Timing(tuple(timings)).interval
+        found |= {"low": interval.low, "high": interval.high, "confidence": CONFIDENCE}
+    elif count > 1:
+        found |= {"low": min(timings), "high": max(timings), "confidence": 1 - 2.0 ** (1 - count)}
+    return {**found, "runs": count}
+
+
+def _claims(row: Row) -> dict[str, Any]:
+    """What is expected of a row besides its verdict: bounds of its own, orders, limits, and other points' verdicts."""
+    return {
+        "bound": {name: _text(bound) for name, bound in row.bound.items()},
+        "order": {name: list(ends) for name, ends in row.order.items()},
+        "limit": {name: _text(bound) for name, bound in row.limit.items()},
+        "except_at": [{"where": item.where, "expect": list(item.expect)} for item in row.except_at],
+        "only": row.only,
+    }
+
+
+def _text(bound: Tolerance) -> str:
+    return f"{100 * bound.value:g} % of its scale" if bound.relative else f"{bound.value:g} {bound.unit}"

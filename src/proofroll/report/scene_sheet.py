@@ -1,0 +1,82 @@
+"""What a comparison's scene is: its drawing, and every parameter with symbol, values, unit, meaning and source."""
+
+from __future__ import annotations
+
+import math
+from typing import TYPE_CHECKING, Any
+
+from proofroll.drawings import overview
+from proofroll.report.labels import symbol, unit
+from proofroll.scene_file import load_scene, read_scene_file
+
+if TYPE_CHECKING:
+    from collections.abc import Sequence
+
+# Values of one parameter that are listed one by one.
+_LISTED = 5
+
+
+def scene_sheet(scene: str, points: Sequence[dict[str, float]]) -> dict[str, Any]:
+    """The scene as it is compared.
+
+    Args:
+        scene: name of the scene, or its folder.
+        points: values of the parameters that differ from the scene's own, one entry for each case.
+
+    Returns:
+        ``title``, ``source``; ``parameters``: for each ``symbol``, ``values``, ``unit``, ``meaning``, ``source``,
+        ``varied``; ``drawings``: of :class:`proofroll.drawings.Drawing`, empty with the reason in ``undrawn``.
+    """
+    file = read_scene_file(scene)
+    drawn = [load_scene(scene, **point) for point in points] or [load_scene(scene)]
+    # One drawing for all cases: with rolling resistance where any has it.
+    shown = max((made.rolling for made in drawn), key=lambda body: body.contact.rolling_resistance)
+    drawings = overview(shown.wall, shown)
+    parameters = []
+    for name, parameter in file.parameters.items():
+        set_to = [point.get(name) for point in points]
+        default = _own(parameter.value, file.parameters)
+        values = list(dict.fromkeys(default if value is None else _written(value) for value in set_to)) or [default]
+        parameters.append(
+            {
+                "name": name,
+                "symbol": _letter(parameter.symbol) or symbol(name),
+                "values": _listed(values),
+                "unit": unit(parameter.unit),
+                "meaning": parameter.meaning,
+                "source": parameter.source,
+                "varied": len(values) > 1,
+            }
+        )
+    return {
+        "title": file.title,
+        "source": file.source,
+        "parameters": parameters,
+        "drawings": [item.content() for item in drawings],
+        "undrawn": "" if drawings else f"There is no drawing for a wall of the kind {type(shown.wall).__name__}.",
+    }
+
+
+def _letter(text: str) -> str:
+    """A symbol as the file writes it, with Greek letters and without the sign of an index: ``mu_s`` is μs."""
+    name, _, rest = text.partition("_")
+    head, bracket, tail = name.partition("(")
+    return symbol(head) + bracket + tail + rest
+
+
+def _own(value: float | str, parameters: dict[str, Any]) -> str:
+    """A default, or the symbol of the parameter whose value it is."""
+    if isinstance(value, str):
+        return f"= {_letter(parameters[value].symbol) or value}"
+    return _written(value)
+
+
+def _written(value: float) -> str:
+    return "∞" if math.isinf(value) else f"{value:.6g}"
+
+
+def _listed(values: list[str]) -> str:
+    """All values, or the first and how many more."""
+    if len(values) <= _LISTED + 1:
+        return ", ".join(values)
+    return f"{', '.join(values[:_LISTED])} and {len(values) - _LISTED} more"

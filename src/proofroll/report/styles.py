@@ -1,0 +1,49 @@
+"""How a row looks in every figure of a comparison: colour, dashes, width and symbol; never colour alone."""
+
+from __future__ import annotations
+
+from typing import Any
+
+DASHES = ("solid", "dash", "dot", "dashdot", "longdash", "longdashdot")
+COLOURS = 8
+# plotly's names of symbols, each with its outline around (0, 0) for the legend.
+OUTLINES = {
+    "circle": "M-3.4 0a3.4 3.4 0 1 0 6.8 0a3.4 3.4 0 1 0 -6.8 0Z",
+    "square": "M-3 -3H3V3H-3Z",
+    "diamond": "M0 -4.2L4.2 0L0 4.2L-4.2 0Z",
+    "triangle-up": "M0 -3.8L3.8 2.8H-3.8Z",
+    "triangle-down": "M0 3.8L3.8 -2.8H-3.8Z",
+    "cross": "M-1.3 -3.8H1.3V-1.3H3.8V1.3H1.3V3.8H-1.3V1.3H-3.8V-1.3H-1.3Z",
+    "x": "M-3.6 -1.8L-1.8 -3.6L0 -1.8L1.8 -3.6L3.6 -1.8L1.8 0L3.6 1.8L1.8 3.6L0 1.8L-1.8 3.6L-3.6 1.8L-1.8 0Z",
+    "triangle-left": "M-3.8 0L2.8 -3.8V3.8Z",
+    "triangle-right": "M3.8 0L-2.8 -3.8V3.8Z",
+    "bowtie": "M-3.8 -3.4L3.8 3.4V-3.4L-3.8 3.4Z",
+    "hourglass": "M-3.4 -3.8H3.4L-3.4 3.8H3.4Z",
+    "star": "M0 -4.4L1.1 -1.4L4.2 -1.4L1.7 .5L2.6 3.6L0 1.7L-2.6 3.6L-1.7 .5L-4.2 -1.4L-1.1 -1.4Z",
+}
+
+
+def styles(rows: list[dict[str, Any]]) -> list[dict[str, Any]]:
+    """For each row: colour by engine, dashes by formulation, width by preset, and a symbol by its place in the engine.
+
+    Args:
+        rows: of the report's content.
+    """
+    engines = list(dict.fromkeys(row["name"] for row in rows))
+    formulations = {name: list(dict.fromkeys(r["formulation"] for r in rows if r["name"] == name)) for name in engines}
+    widths = {"default": 1.1, "tuned": 2.4}
+    names = list(OUTLINES)
+    seen: dict[str, int] = {}
+    found = []
+    for row in rows:
+        place = seen[row["name"]] = seen.get(row["name"], -1) + 1
+        found.append(
+            {
+                "colour": engines.index(row["name"]) % COLOURS,
+                "dash": DASHES[formulations[row["name"]].index(row["formulation"]) % len(DASHES)],
+                "width": widths.get(row["preset"], 1.7),
+                "symbol": names[place % len(names)] + ("-open" if place // len(names) % 2 else ""),
+                "opacity": 0.5 if row["verdict"] in {"differs", "failed"} else 1,  # not to hide those that agree
+            }
+        )
+    return found

@@ -1,0 +1,153 @@
+// What one figure shows, as plotly wants it. Above: the curves. Below: their distances from the truth on a logarithmic
+// axis, with the truth's error bar, the tolerances, and beside them the limits of small steps with theirs.
+// A figure is told by { rows, time, observable, off, paint }: `off` holds the rows that are switched off, `paint` gives
+// the colour of a name.
+const picture = (() => {
+  // plotly reads a few HTML tags and %{…} in names: show them as they are written.
+  const literal = (text) => String(text).replace(/[&<>{}]/g, (sign) => `&#${sign.charCodeAt(0)};`);
+  const unit = ({ observable }) => (observable.unit ? ` ${literal(observable.unit)}` : "");
+  const short = (value) => (value === null ? "∞" : String(Number(value.toPrecision(3))));
+  const limited = ({ observable }) => observable.engines.filter(({ limit }) => limit && limit[0] !== null && limit[1] !== null && limit[0] + limit[1] > 0);
+
+  // A trace belongs to one row, or to several; it is shown while one of them is.
+  const visible = (meta, off) => (Array.isArray(meta) ? meta.some((row) => !off.has(row)) : !off.has(meta));
+
+  function traces(figure) {
+    const { rows, time, observable, off, paint } = figure;
+    const label = (name, what) => `<b>${literal(name)}</b><br>t = %{x:.4g} s<br>${what} %{y:.4g}${unit(figure)}<extra></extra>`;
+    const above = [], below = [];
+    for (const { row, difference, at } of observable.engines) {
+      const { name, colour, dash, width, opacity, symbol } = rows[row];
+      const where = at ?? [...time.keys()];
+      // Symbols above only where the curve can be told from the truth: on top of each other they would hide it.
+      const apart = difference.some((d) => Math.abs(d) > 0.02 * observable.scale);
+      const shared = {
+        type: "scatter", mode: "lines+markers", opacity, x: where.map((i) => time[i]), meta: row,
+        line: { color: paint(`--e${colour}`), dash, width }, marker: { symbol, size: 6, maxdisplayed: 9, color: paint(`--e${colour}`) },
+      };
+      const sum = (i, k) => (difference[k] === null ? null : observable.truth[i] + difference[k]);
+      above.push({ ...shared, mode: apart ? "lines+markers" : "lines", y: where.map(sum), hovertemplate: label(name, literal(observable.symbol) + " =") });
+      below.push({ ...shared, yaxis: "y2", y: difference.map((d) => (d ? Math.abs(d) : null)), hovertemplate: label(name, "distance") });
+    }
+    const truth = {
+      type: "scatter", mode: "lines", x: time, y: observable.truth, meta: -1, line: { color: paint("--truth"), width: 6 },
+      hovertemplate: label("truth", literal(observable.symbol) + " ="),
+    };
+    const all = [truth, ...above, ...below, ...tolerances(figure), ...limits(figure), ...onsets(figure)];
+    return all.map((trace) => ({ ...trace, visible: visible(trace.meta, off) }));
+  }
+
+  // One line for each tolerance, in ink where several rows have it.
+  function tolerances(figure) {
+    const { rows, time, observable, paint } = figure;
+    return [...shared(observable)].map(([value, having]) => ({
+      type: "scatter", mode: "lines", yaxis: "y2", x: [time[0], time[time.length - 1]], y: [value, value], meta: having,
+      line: { color: having.length > 1 ? paint("--ink") : paint(`--e${rows[having[0]].colour}`), width: 1, dash: "6px,3px" },
+      hovertemplate: `<b>tolerance</b> ${short(value)}${unit(figure)}<br>${having.map((row) => literal(rows[row].name)).join("<br>")}<extra></extra>`,
+    }));
+  }
+
+  function shared({ engines }) {
+    const found = new Map();
+    for (const { row, tolerance } of engines)
+      if (tolerance) found.set(tolerance, [...(found.get(tolerance) ?? []), row]);
+    return found;
+  }
+
+  // Where a ladder of steps leads, as far as it can tell: a whisker that reaches the bottom holds the truth.
+  function limits(figure) {
+    const { rows, paint } = figure;
+    return limited(figure).map(({ row, limit: [error, bar, order] }, place) => {
+      const { name, colour, symbol, opacity } = rows[row], color = paint(`--e${colour}`), y = error || bar;
+      return {
+        type: "scatter", mode: "markers", xaxis: "x2", yaxis: "y2", x: [place], y: [y], meta: row, opacity, marker: { symbol, size: 6, color },
+        error_y: { type: "data", symmetric: false, array: [error + bar - y], arrayminus: [y - Math.max(error - bar, 1e-30)], color, thickness: 1.2, width: 2 },
+        hovertemplate: `<b>${literal(name)}</b><br>limit of small steps: distance ${short(error)} ± ${short(bar)}${unit(figure)}` +
+          `${order === null ? "" : `<br>observed order ${short(order)}`}<extra></extra>`,
+      };
+    });
+  }
+
+  // First slips, on the line that the needed friction must reach.
+  function onsets({ rows, observable, paint }) {
+    return (observable.marks ?? []).map(({ row, time }) => ({
+      type: "scatter", mode: "markers", x: [time], y: [observable.bounds[0].value], meta: row, name: "first slip",
+      marker: row < 0
+        ? { symbol: "diamond", size: 12, color: paint("--truth") }
+        : { symbol: "circle-open", size: 9, color: paint(`--e${rows[row].colour}`), line: { width: rows[row].width } },
+      hovertemplate: `<b>${literal(row < 0 ? "truth" : rows[row].name)}</b><br>first slip at %{x:.7g} s<extra></extra>`,
+    }));
+  }
+
+  // The frame follows the truth: an engine that flies off must not flatten it. Double-click shows everything.
+  function frame({ truth, scale, bounds }) {
+    const known = [...truth, ...(bounds ?? []).map(({ value }) => value)].filter((v) => v !== null);
+    const low = Math.min(...known), high = Math.max(...known);
+    const half = Math.max(0.65 * (high - low), 0.03 * scale) || 1;
+    return [(low + high) / 2 - half, (low + high) / 2 + half];
+  }
+
+  // Decades of the lower half: all distances but the smallest twentieth, the tolerances, the limits and the truth's bar.
+  function decades(figure) {
+    const { engines, error_bar: bar } = figure.observable, ends = [...shared(figure.observable).keys()];
+    for (const { difference } of engines) {
+      const sizes = difference.filter((d) => d).map(Math.abs).sort((a, b) => a - b);
+      if (sizes.length) ends.push(sizes[Math.floor(sizes.length / 20)], sizes[sizes.length - 1]);
+    }
+    for (const { limit: [error, width] } of limited(figure)) ends.push(error || width);
+    if (bar) ends.push(bar / 3, 2 * bar);
+    if (!ends.length) return [-18, -12];
+    const least = 1e-18 * figure.observable.scale;  // less than the rounding of anything
+    return [Math.log10(Math.max(least, Math.min(...ends))) - 0.2, Math.log10(Math.max(...ends)) + 0.3];
+  }
+
+  // Letters beside lines; on a logarithmic axis plotly wants the logarithm of their height.
+  function names(figure) {
+    const { observable, paint } = figure, said = [...shared(observable)];
+    const text = { showarrow: false, font: { size: 11 } };
+    const bounds = (observable.bounds ?? []).map(({ name, value }) => ({
+      ...text, xref: "x domain", x: 1, yref: "y", y: value, xanchor: "right", yanchor: "bottom", text: `${literal(name)} = ${value}`,
+    }));
+    const small = { ...text, xref: "x domain", x: 0, yref: "y2", xanchor: "left", yanchor: "bottom", font: { size: 10, color: paint("--muted") }, bgcolor: paint("--paper"), opacity: 0.85, borderpad: 0 };
+    if (said.length === 1) bounds.push({ ...small, y: Math.log10(said[0][0]), text: `tolerance ${short(said[0][0])}` });
+    if (observable.error_bar) bounds.push({ ...small, y: Math.log10(observable.error_bar), text: `truth ±${short(observable.error_bar)}` });
+    return bounds;
+  }
+
+  function shapes({ observable, paint }, low) {
+    const line = { type: "line", line: { color: paint("--ink"), width: 1, dash: "dash" } };
+    const found = (observable.bounds ?? []).map(({ value }) => ({ ...line, xref: "x domain", x0: 0, x1: 1, yref: "y", y0: value, y1: value }));
+    for (const { time } of (observable.marks ?? []).filter(({ row }) => row < 0))
+      found.push({ type: "line", xref: "x", x0: time, x1: time, yref: "paper", y0: 0, y1: 1, layer: "below", line: { color: paint("--muted"), width: 1, dash: "dot" } });
+    if (observable.error_bar)
+      found.push({ type: "rect", xref: "paper", x0: 0, x1: 1, yref: "y2", y0: 10 ** low, y1: observable.error_bar, fillcolor: paint("--bar"), line: { width: 0 }, layer: "below" });
+    return found;
+  }
+
+  function layout(figure, size) {
+    const { observable, paint } = figure, log = decades(figure), count = limited(figure).length;
+    const axis = { gridcolor: paint("--rule"), linecolor: paint("--rule"), zeroline: false, ticks: "", automargin: true };
+    const title = (text) => ({ text, standoff: 6 }), inside = observable.unit ? ` [${literal(observable.unit)}]` : "";
+    return {
+      ...size, margin: { l: 64, r: 8, t: 8, b: 40 }, showlegend: false, hovermode: "closest",
+      paper_bgcolor: "rgba(0,0,0,0)", plot_bgcolor: "rgba(0,0,0,0)", dragmode: matchMedia("(pointer: coarse)").matches ? false : "zoom",
+      font: { family: paint("--sans"), size: 12, color: paint("--ink") },
+      hoverlabel: { bgcolor: paint("--paper"), bordercolor: paint("--muted"), font: { color: paint("--ink") }, align: "left" },
+      xaxis: { ...axis, anchor: "y2", domain: [0, count ? 0.84 : 1], range: span(figure), title: title("time [s]") },
+      yaxis: { ...axis, domain: [0.5, 1], range: frame(observable), title: title(literal(observable.symbol) + inside) },
+      yaxis2: {
+        ...axis, domain: [0, 0.44], type: "log", range: log, exponentformat: "power", dtick: Math.max(1, Math.ceil((log[1] - log[0]) / 5)),
+        title: title("distance" + inside),
+      },
+      ...(count && { xaxis2: {
+        anchor: "y2", domain: [0.87, 1], range: [-0.8, count - 0.2], fixedrange: true, showgrid: false, showticklabels: false, zeroline: false,
+        showline: true, linecolor: paint("--rule"), title: { text: "limit", standoff: 22 },
+      } }),
+      annotations: names(figure), shapes: shapes(figure, log[0]),
+    };
+  }
+
+  const span = ({ time }) => [time[0], time[time.length - 1]];
+
+  return { traces, layout, visible, span };
+})();

@@ -1,0 +1,154 @@
+// Figures: drawn when they come into view, linked within a section, switched by the legend, repainted and printed.
+(() => {
+  const drawn = new Map();     // figure -> its plotly element
+  const hidden = new Map();    // comparison -> rows that are switched off
+  const cursors = new Map();   // section's figures -> the sample that the keyboard is at
+  const PRINTED = { width: 430, height: 380 };  // of half a page; see the style for print
+  let loading, parts = null;
+  const paper = document.documentElement.classList;  // of the class "paper" while the figures are drawn for it
+
+  const off = (c) => hidden.get(c) ?? hidden.set(c, new Set()).get(c);
+  const canvas = (figure) => figure.querySelector(".canvas");
+  const siblings = (figure) => [...drawn.keys()].filter((f) => f !== figure && f.parentNode === figure.parentNode);
+
+  const paint = (name) => getComputedStyle(document.documentElement).getPropertyValue(name).trim();
+
+  async function plotly() {
+    const script = document.createElement("script");
+    script.textContent = await stored("plotly");
+    document.head.append(script);
+    return window.Plotly;
+  }
+
+  async function load() {
+    const [text, Plotly] = await Promise.all([stored("curves"), plotly()]);
+    return (parts = { data: JSON.parse(text), Plotly });
+  }
+
+  function shown(figure) {
+    const { c, p, o } = figure.dataset, point = parts.data.points[c][p];
+    return { rows: parts.data.rows[c], time: point.time, observable: point.observables[o], off: off(Number(c)), paint };
+  }
+
+  const size = (figure) => (paper.contains("paper") ? PRINTED : { height: canvas(figure).clientHeight });
+
+  function place(figure) {
+    if (drawn.has(figure)) return;
+    const element = canvas(figure), what = shown(figure);
+    drawn.set(figure, element);
+    parts.Plotly.newPlot(element, picture.traces(what), picture.layout(what, size(figure)), { displayModeBar: false, responsive: true, doubleClick: "reset+autosize" });
+    element.on("plotly_relayout", (change) => linkTime(figure, change));
+    element.on("plotly_hover", (event) => { if (figure.matches(":hover")) linkHover(figure, event.points[0].x); });
+    element.on("plotly_unhover", () => { if (!siblings(figure).some((other) => other.matches(":hover"))) linkHover(figure, null); });
+  }
+
+  async function draw(figure) {
+    await (loading ??= load());
+    place(figure);
+  }
+
+  function redraw() {
+    for (const [figure, element] of drawn) {
+      const what = shown(figure), layout = picture.layout(what, size(figure)), before = element.layout.xaxis;
+      layout.xaxis.range = [...before.range];  // a person's zoom stays
+      parts.Plotly.react(element, picture.traces(what), layout);
+    }
+  }
+
+  // plotly reports what it was told as well as what a person did, and later: only what is not so yet is passed on.
+  function linkTime(figure, change) {
+    const range = change["xaxis.range"] ?? (change["xaxis.range[0]"] === undefined ? null : [change["xaxis.range[0]"], change["xaxis.range[1]"]]);
+    if (range === null && !change["xaxis.autorange"]) return;
+    for (const other of siblings(figure)) {
+      const axis = drawn.get(other).layout.xaxis;
+      if (range === null ? axis.autorange === true : !axis.autorange && axis.range.every((end, i) => end === range[i])) continue;
+      parts.Plotly.relayout(drawn.get(other), range === null ? { "xaxis.autorange": true } : { "xaxis.range": [...range], "xaxis.autorange": false });
+    }
+  }
+
+  function nearest(time, x) {
+    let found = 0;
+    time.forEach((t, i) => { if (Math.abs(t - x) < Math.abs(time[found] - x)) found = i; });
+    return found;
+  }
+
+  // The truth's value at the same time, in every other figure of the section.
+  function linkHover(figure, x) {
+    for (const other of siblings(figure)) {
+      if (x === null) parts.Plotly.Fx.unhover(drawn.get(other));
+      else parts.Plotly.Fx.hover(drawn.get(other), [{ curveNumber: 0, pointNumber: nearest(shown(other).time, x) }]);
+    }
+  }
+
+  // With the keyboard: arrows read the truth along time, aloud too; plus and minus zoom there, 0 returns.
+  const JUMPS = { ArrowLeft: -1, ArrowRight: 1, PageUp: -10, PageDown: 10, Home: -Infinity, End: Infinity };
+  document.addEventListener("keydown", (event) => {
+    const figure = event.target.closest?.(".canvas")?.closest("figure[data-o]");
+    if (!figure || !drawn.has(figure) || event.ctrlKey || event.metaKey || event.altKey) return;
+    const group = figure.parentNode, { time } = shown(figure), at = cursors.get(group) ?? 0, element = drawn.get(figure);
+    if (event.key in JUMPS) {
+      const sample = Math.min(Math.max(at + JUMPS[event.key], 0), time.length - 1);
+      cursors.set(group, sample);
+      parts.Plotly.Fx.hover(element, [{ curveNumber: 0, pointNumber: sample }]);
+      linkHover(figure, time[sample]);
+      read(figure, sample);
+    } else if (event.key === "+" || event.key === "-") {
+      const [low, high] = element.layout.xaxis.range, half = (high - low) * (event.key === "+" ? 0.25 : 1);
+      parts.Plotly.relayout(element, { "xaxis.range": [time[at] - half, time[at] + half] });
+    } else if (event.key === "0") {
+      parts.Plotly.relayout(element, { "xaxis.range": picture.span(shown(figure)) });
+    } else if (event.key === "Escape") {
+      parts.Plotly.Fx.unhover(element);
+      linkHover(figure, null);
+    } else return;
+    event.preventDefault();
+  });
+
+  function read(figure, sample) {
+    const { c, p } = figure.dataset, { time, observables } = parts.data.points[c][p];
+    const values = observables.map(({ symbol, truth, unit }) => `${symbol} ${truth[sample] ?? "–"} ${unit}`.trim());
+    figure.closest(".point").querySelector(".readout").textContent = `truth at ${time[sample]} s: ${values.join(", ")}`;
+  }
+
+  // Rows on and off, in all figures of a comparison at once.
+  function show(c) {
+    for (const button of document.querySelectorAll(`.legend[data-c="${c}"] button[data-row]`))
+      button.setAttribute("aria-pressed", String(!off(c).has(Number(button.dataset.row))));
+    for (const [figure, element] of drawn) {
+      if (Number(figure.dataset.c) !== c) continue;
+      parts.Plotly.restyle(element, { visible: element.data.map((trace) => picture.visible(trace.meta, off(c))) });
+    }
+  }
+
+  document.addEventListener("click", (event) => {
+    const button = event.target.closest(".legend button");
+    if (!button) return;
+    const legend = button.closest(".legend"), c = Number(legend.dataset.c);
+    if (button.dataset.all !== undefined) {
+      off(c).clear();
+      if (button.dataset.all === "0") legend.querySelectorAll("[data-row]").forEach((b) => off(c).add(Number(b.dataset.row)));
+    } else {
+      const row = Number(button.dataset.row);
+      if (!off(c).delete(row)) off(c).add(row);
+    }
+    show(c);
+  });
+
+  const watcher = new IntersectionObserver((entries) => {
+    for (const entry of entries) if (entry.isIntersecting) { watcher.unobserve(entry.target); draw(entry.target); }
+  }, { rootMargin: "200px" });
+  document.querySelectorAll("figure[data-o]").forEach((figure) => watcher.observe(figure));
+
+  // Once one figure has been drawn, what the others need is here and they can be drawn before the page is printed.
+  addEventListener("beforeprint", () => {
+    paper.add("paper");
+    if (!parts) return;
+    document.querySelectorAll("details[open] figure[data-o]").forEach((figure) => { if (figure.offsetParent) place(figure); });
+    redraw();
+  });
+  addEventListener("afterprint", () => {
+    paper.remove("paper");
+    redraw();
+  });
+  matchMedia("(prefers-color-scheme: dark)").addEventListener("change", redraw);
+})();

@@ -1,0 +1,193 @@
+"""The evidence of a comparison: curves with both error bars, everything that is claimed, and cost with intervals."""
+
+from __future__ import annotations
+
+import copy
+import dataclasses
+import json
+import re
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+
+from proofroll.agreement import Verdict, judge
+from proofroll.comparison import ExceptAt, Row, Tolerance
+from proofroll.metrics import observables
+from proofroll.report.evidence import add_evidence, cost
+from proofroll.report.html import page, report_content
+from proofroll.report.labels import error
+from proofroll.report.plots import MOST_POINTS, kept, point_curves
+from proofroll.report.styles import OUTLINES, styles
+from proofroll.report.tables import cost_title, costs, expectations
+from proofroll.scene_file import load_scene
+from proofroll.store import Store
+from proofroll.studies.compare import Outcome
+from proofroll.trajectory import read, write
+
+
+def test_rough_curves_keep_extrema_ends_and_gaps() -> None:
+    """Whatever the curve: its largest and smallest sample are drawn, its ends too, and no more than wanted."""
+    rng = np.random.default_rng(7)
+    for length in (401, 1000, 20001):
+        for _ in range(25):
+            one, other = np.cumsum(rng.normal(size=length)), rng.normal(size=length)
+            one[rng.integers(0, length, 9)] = np.nan
+            at = kept([one, other])
+            assert at.size <= 2 * MOST_POINTS
+            assert np.all(np.diff(at) > 0)
+            wanted = {0, length - 1, np.nanargmax(one), np.nanargmin(one), np.argmax(other), np.argmin(other)}
+            assert wanted <= set(at.tolist())
+    ended = np.where(np.arange(2000) < 700, 1.0, np.nan)
+    assert np.isnan(ended[kept([ended])]).any(), "what is not there is not drawn"
+
+
+def test_largest_error_that_is_drawn_is_the_judged_one(made: tuple[Outcome, Store], tmp_path: Path) -> None:
+    """Of thousands of samples with one that sticks out, to all digits that the page shows."""
+    outcome, _ = made
+    store, point = Store(tmp_path), {"speed": 4.0}
+    name = "speed=4"
+    scene = load_scene("sphere_in_cylinder", **point)
+    true = read(made[1].trajectory(outcome.truths[name]))
+    times = np.linspace(0.0, 1.0, 6001)
+    fine = true.interp(time=times)
+    write(fine, store.trajectory(outcome.truths[name]))
+    run = next(run for run in outcome.runs if run.parameters == point)
+    assert run.case is not None
+    off = fine.copy(deep=True)
+    rng = np.random.default_rng(3)
+    for curve in ("gamma", "z", "N", "F2", "F3"):
+        noise = rng.normal(size=times.size) * 1e-6
+        noise[rng.integers(10, times.size)] = -1.23456789e-4
+        off[curve] = off[curve] + noise
+    write(off, store.trajectory(run.case))
+    expected = observables(scene.rolling, fine)
+    judged = {
+        key: judge(
+            key, "", curve.values, expected[key].values, truth_error_bar=0.0, tolerance=1.0, scale=1.0, limit=None
+        )
+        for key, curve in observables(scene.rolling, off).items()
+        if key in {"gamma", "z", "N", "F2", "F3"}
+    }
+    one = dataclasses.replace(outcome, runs=[run], truths={name: outcome.truths[name]})
+    drawn = {item["name"]: item["engines"][0] for item in point_curves(one, store)[0]["observables"]}
+    for key, judgement in judged.items():
+        assert len(drawn[key]["at"]) < times.size / 5
+        largest = max(abs(value) for value in drawn[key]["difference"] if value is not None)
+        assert error(largest, 3) == error(judgement.error, 3), key
+
+
+def test_tolerances_and_limits_go_with_the_curves(made: tuple[Outcome, Store]) -> None:
+    """A judged curve has its tolerance; one with a ladder its limit; one that was not judged neither."""
+    outcome, store = made
+    first = outcome.runs[0]
+    limited = [
+        dataclasses.replace(judgement, limit_error=3.21e-7, limit_error_bar=1.5e-8, order=2.0)
+        if judgement.observable == "z"
+        else dataclasses.replace(judgement, limit_error=np.inf, limit_error_bar=1.0)
+        for judgement in first.judgements
+        if judgement.observable != "F3"
+    ]
+    runs = [dataclasses.replace(first, judgements=limited), *outcome.runs[1:]]
+    curves = point_curves(dataclasses.replace(outcome, runs=runs), store)[0]["observables"]
+    drawn = {item["name"]: next(engine for engine in item["engines"] if engine["row"] == 0) for item in curves}
+    z = next(judgement for judgement in first.judgements if judgement.observable == "z")
+    assert drawn["z"]["tolerance"] == pytest.approx(z.tolerance, rel=1e-3)
+    assert drawn["z"]["limit"] == [3.21e-7, 1.5e-8, 2.0]
+    assert drawn["gamma"]["limit"] == [None, 1.0, None], "what is not finite is null"
+    assert not {"tolerance", "limit"} & set(drawn["F3"])
+    assert "limit" not in curves[0]["engines"][1]
+
+
+def test_no_two_rows_of_an_engine_look_alike_and_none_by_colour_alone() -> None:
+    """Symbols differ within an engine; beyond a dozen they are hollow. Each has an outline for the legend."""
+    row = {"name": "alpha", "formulation": "one", "preset": "matched", "verdict": "agrees"}
+    looks = [(style["colour"], style["symbol"]) for style in styles([row] * 20 + [{**row, "name": "beta"}])]
+    assert len(set(looks)) == 21
+    assert {symbol.removesuffix("-open") for _, symbol in looks} == set(OUTLINES)
+
+
+def test_cost_has_an_interval_where_there_is_one() -> None:
+    """Six runs: 95 %; three: their range, which holds the median in three cases of four; one: none."""
+    assert cost([]) is None
+    assert cost([2.0]) == {"median": 2.0, "low": None, "high": None, "confidence": None, "runs": 1}
+    three = cost([3.0, 1.0, 2.0])
+    assert three == {"median": 2.0, "low": 1.0, "high": 3.0, "confidence": 0.75, "runs": 3}
+    many = cost([1.0, 1.1, 1.2, 1.3, 1.4, 1.5, 9.0])
+    assert many
+    assert many["confidence"] == 0.95
+    assert 1.0 <= many["low"] < many["median"] == 1.3 < many["high"] <= 9.0
+    assert "holds it with 75 %" in cost_title(three)
+    assert "no interval" in cost_title(cost([2.0]))
+
+
+def test_costs_are_on_the_page(made: tuple[Outcome, Store], parse: Any) -> None:
+    """Slowest and fastest case of each timed row with their intervals; a row that never ran has no line."""
+    outcome, store = made
+    seconds = [[0.2, 0.25, 0.3], [0.4, 0.45, 0.5]]
+    runs, seen = [], 0
+    for run in outcome.runs:
+        timings = seconds[seen] if run.row is outcome.runs[0].row else run.result.timings
+        seen += run.row is outcome.runs[0].row
+        runs.append(dataclasses.replace(run, result=dataclasses.replace(run.result, timings=timings)))
+    content = report_content([dataclasses.replace(outcome, runs=runs)], store, "proofroll report invented")
+    lines = costs(content["comparisons"][0])
+    assert len(lines) == 3
+    assert (lines[0]["slowest"]["cost"]["median"], lines[0]["fastest"]["cost"]["median"]) == (0.45, 0.25)
+    text = " ".join(parse(page(content, [point_curves(*made)])).text.split())
+    assert "0.4 to 0.5" in text
+    assert "0.2 to 0.3" in text
+
+
+def test_all_that_is_claimed_of_a_row_is_said() -> None:
+    """Bounds of its own, orders, limits, and the points at which something else is expected."""
+    row = Row(
+        "alpha", "band",
+        except_at=[ExceptAt({"speed": [2.0, 4.0]}, [Verdict.CONVERGES, Verdict.DIFFERS])],
+        only={"tilt": [0.1]},
+        order={"z": (1.9, 2.1)},
+        limit={"gamma": Tolerance(1e-6, False, "rad")},
+        bound={"N": Tolerance(1e-3, True)},
+    )  # fmt: skip
+    run = type("Run", (), {"row": row, "result": type("Result", (), {"timings": []})})
+    comparison = type("Comparison", (), {"scene": "inclined_plane"})
+    outcome: Any = type("Outcome", (), {"runs": [run], "truths": {}, "comparison": comparison})
+    entry = {
+        "name": "alpha", "formulation": None, "setting": "", "resolution": None, "engine": "alpha",
+        "expected": ["agrees"],
+        "expected_for": {}, "because": "", "tolerance": "band", "resolution_value": None,
+    }  # fmt: skip
+    content: dict[str, Any] = {"rows": [entry], "runs": [{}]}
+    add_evidence(content, outcome)
+    assert expectations(content)[0]["further"] == (
+        "N within 0.1 % of its scale",
+        "order of z 1.9 to 2.1",
+        "limit of γ within 1e-06 rad",
+        "converges or differs at speed=2 or 4",
+        "run only at tilt=0.1",
+    )
+
+
+def test_legend_has_lines_symbols_and_verdicts_and_can_be_reached(html: str, parse: Any) -> None:
+    """Every row is a button that says whether it is pressed; every figure can be focused and has a text."""
+    elements = parse(html)
+    buttons = [attributes for tag, attributes in elements.tags if tag == "button" and "data-row" in attributes]
+    assert len(buttons) == 2 * 4
+    assert all(button["aria-pressed"] == "true" for button in buttons)
+    canvases = [attributes for _, attributes in elements.tags if attributes.get("class") == "canvas"]
+    assert len(canvases) == 2 * 6
+    assert all(canvas["tabindex"] == "0" and canvas["aria-label"] for canvas in canvases)
+    outlines = {attributes["d"] for tag, attributes in elements.tags if tag == "path"}
+    assert len(outlines & set(OUTLINES.values())) == 2
+    assert re.search(r'alpha fine matched.*?<b class="v agrees" title="agrees">✓</b></button>', html, re.DOTALL)
+
+
+def test_whatever_the_limits_the_page_is_json(made: tuple[Outcome, Store]) -> None:
+    """Curves with limits that are not finite do not break the script's data."""
+    content = report_content([made[0]], made[1], "proofroll report invented")
+    curves = copy.deepcopy([point_curves(*made)])
+    curves[0][0]["observables"][0]["engines"][0]["limit"] = [None, None, None]
+    html = page(content, curves)
+    start = html.index('id="curves">') + len('id="curves">')
+    assert json.loads(html[start : html.index("</script>", start)])["points"]

@@ -1,0 +1,137 @@
+"""Figures in a real browser: both error bars, the keyboard, and colours that follow the screen and the paper."""
+
+from __future__ import annotations
+
+import copy
+from collections.abc import Callable, Iterator
+from contextlib import AbstractContextManager
+from pathlib import Path
+from typing import Any
+
+import pytest
+from browsing import Visit
+
+from proofroll.report.html import page
+from proofroll.report.labels import error
+
+Visiting = Callable[..., AbstractContextManager[Visit]]
+FIGURE = 'figure[data-p="0"][data-o="1"] .canvas'  # z at the first point
+
+
+@pytest.fixture(scope="module")
+def limits_page(everything: Any, tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """A page whose first row has a ladder of steps: for z a limit, for γ one that holds the truth exactly."""
+    curves = copy.deepcopy(everything.curves)
+    gamma, z = curves[0][0]["observables"][:2]
+    gamma["engines"][0]["limit"] = [0.0, 1e-12, None]
+    z["engines"][0]["limit"] = [3e-7, 1e-7, 2.0]
+    z["engines"][1]["tolerance"] = 1e-4
+    file = tmp_path_factory.mktemp("limits") / "report.html"
+    file.write_text(page(everything.content, [*curves], everything.pictures), encoding="utf-8")
+    return file
+
+
+@pytest.fixture
+def seen(limits_page: Path, visit: Visiting) -> Iterator[Visit]:
+    """That page with its figures drawn."""
+    with visit(limits_page) as visited:
+        assert visited.draw() == []
+        yield visited
+
+
+def traces(seen: Visit, condition: str) -> list[dict[str, Any]]:
+    """Parts of the traces of the figure of z that fulfil a condition on ``t``."""
+    found = seen.page.evaluate(
+        f"""() => document.querySelector('{FIGURE}').data.filter((t) => {condition})
+          .map(({{ x, y, meta, error_y, visible }}) => ({{ x, y, meta, error_y, visible }}))"""
+    )
+    return list(found)
+
+
+def test_limits_have_the_engines_error_bar(seen: Visit) -> None:
+    """A whisker of the limit's uncertainty about its distance; an exact limit is drawn by its uncertainty alone."""
+    (limit,) = traces(seen, "t.xaxis === 'x2'")
+    assert (limit["y"], limit["meta"]) == ([3e-7], 0)
+    assert limit["error_y"]["array"] == [pytest.approx(1e-7)]
+    assert limit["error_y"]["arrayminus"] == [pytest.approx(1e-7)]
+    first = FIGURE.replace('data-o="1"', 'data-o="0"')
+    exact = seen.page.evaluate(f"document.querySelector('{first}').data.find((t) => t.xaxis === 'x2').y")
+    assert exact == [1e-12]
+
+
+def test_truth_and_tolerances_have_their_lines(seen: Visit, everything: Any) -> None:
+    """The band ends at the truth's error bar; each tolerance is a line of the rows that have it, and goes with them."""
+    z = everything.curves[0][0]["observables"][1]
+    band = seen.page.evaluate(f"document.querySelector('{FIGURE}').layout.shapes.find((s) => s.type === 'rect').y1")
+    assert band == z["error_bar"] > 0
+    lines = traces(seen, "Array.isArray(t.meta)")
+    assert {tuple(line["meta"]): line["y"][0] for line in lines} == {(0, 2): z["engines"][0]["tolerance"], (1,): 1e-4}
+    seen.page.locator('.legend [data-row="1"]').first.click()
+    assert {tuple(line["meta"]): line["visible"] for line in traces(seen, "Array.isArray(t.meta)")} == {
+        (0, 2): True,
+        (1,): False,
+    }
+
+
+def test_largest_distance_in_the_figure_is_the_judged_error(seen: Visit, everything: Any) -> None:
+    """What the eye reads off the curve is what the table says, to the digits shown."""
+    runs = [run for run in everything.content["comparisons"][0]["runs"] if run["point"] == "speed=3"]
+    for row in (0, 1, 2):
+        (curve,) = traces(seen, f"t.yaxis === 'y2' && t.meta === {row} && t.xaxis !== 'x2'")
+        judged = next(j for j in runs[row]["judgements"] if j["observable"] == "z")
+        assert error(max(y for y in curve["y"] if y is not None), 3) == error(judged["error"], 3)
+
+
+def test_keyboard_reads_and_zooms(seen: Visit) -> None:
+    """Arrows show the truth at a sample in every figure of the section and say it; plus zooms all; 0 returns."""
+    canvas = seen.page.locator(FIGURE)
+    canvas.focus()
+    canvas.press("PageDown")
+    canvas.press("ArrowRight")
+    readout = seen.page.locator(".readout").first
+    assert readout.get_attribute("aria-live") == "polite"
+    assert readout.text_content().startswith("truth at 0.22 s: γ ")
+    assert " m, N " in readout.text_content()
+    shown = (
+        "[...document.querySelectorAll('figure[data-p=\"0\"] .canvas')].filter((e) => e.querySelector('.hovertext'))"
+    )
+    seen.wait(f"{shown}.length === 6")
+    canvas.press("Escape")
+    seen.wait(f"{shown}.length === 0")
+    ranges = """new Set([...document.querySelectorAll('figure[data-p="0"] .canvas')]
+      .map((e) => e.layout.xaxis.range.map((end) => end.toFixed(3)).join(' ')))"""
+    canvas.press("+")
+    seen.wait(f"{ranges}.size === 1 && {ranges}.has('-0.030 0.470')")
+    canvas.press("0")
+    seen.wait(f"{ranges}.size === 1 && {ranges}.has('0.000 1.000')")
+
+
+INK = f"getComputedStyle(document.querySelector('{FIGURE} .xtick text')).fill"
+SKETCH = "getComputedStyle(document.querySelector('.drawing .ball')).stroke"
+
+
+def test_colours_follow_the_screen_while_it_is_open_and_paper_is_white(seen: Visit) -> None:
+    """Figures and drawings change with the scheme, a zoom stays; for print they are light whatever the scheme is."""
+    light = [seen.page.evaluate(INK), seen.page.evaluate(SKETCH)]
+    seen.page.evaluate(f"Plotly.relayout(document.querySelector('{FIGURE}'), {{'xaxis.range': [0.25, 0.5]}})")
+    seen.page.emulate_media(color_scheme="dark")
+    seen.wait(f"{INK} !== '{light[0]}' && {SKETCH} !== '{light[1]}'")
+    assert seen.page.evaluate(f"document.querySelector('{FIGURE}').layout.xaxis.range") == [0.25, 0.5]
+    dark = seen.page.evaluate(INK)
+    seen.page.evaluate("dispatchEvent(new Event('beforeprint'))")
+    assert seen.page.evaluate(INK) == light[0]
+    seen.page.evaluate("dispatchEvent(new Event('afterprint'))")
+    assert seen.page.evaluate(INK) == dark
+
+
+def test_what_was_never_looked_at_is_drawn_for_paper_once_the_parts_are_here(
+    limits_page: Path, visit: Visiting
+) -> None:
+    """A figure far below the screen has no picture until the page is printed."""
+    with visit(limits_page, viewport={"width": 900, "height": 300}) as seen:
+        seen.page.locator(".plots figure").first.scroll_into_view_if_needed()
+        seen.wait("document.querySelector('.plots .canvas').data !== undefined")
+        drawn = "[...document.querySelectorAll('figure[data-p=\"0\"] .canvas')].filter((e) => e.data).length"
+        assert seen.page.evaluate(drawn) < 6
+        seen.page.evaluate("dispatchEvent(new Event('beforeprint'))")
+        assert seen.page.evaluate(drawn) == 6
