@@ -135,6 +135,7 @@ def test_sections_answer_in_order(report: Report, parse: Any) -> None:
     assert ids == ["verdicts", "use", "findings", "speed0", "stability0", "c0", "made"]
     assert "1 of 2 boundaries are passed in silence" in elements.text
     assert "good depends on mass" in elements.text
+    assert "with at most 3 values for each axis" in elements.text
     assert "lost is not installed here" in elements.text
     assert "stability/sphere_in_cylinder/good-V0-8.py" in elements.text
     links = {attributes["href"][1:] for tag, attributes in elements.tags if tag == "a"}

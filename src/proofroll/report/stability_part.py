@@ -97,6 +97,8 @@ def _says(claim: Claim) -> str:
     said = f"{claim.engine} is {claim.boundary}"
     if claim.never:
         said += " at no step or tolerance"
+    elif getattr(claim, "same", False):
+        said += " up to the same part of the natural time everywhere"
     elif claim.number is not None:
         low, high = claim.between
         said += f" up to {SYMBOLS.get(claim.number, claim.number)} = {number(low)} … {number(high)}"

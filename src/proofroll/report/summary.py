@@ -49,6 +49,8 @@ def _silent(content: dict[str, Any]) -> str:
     passed = f"{silent} of {boundaries} boundaries of stability and accuracy are passed without a word"
     if not found:
         nothing = "No setting that ran to its end differs from the truth"
+        if not content["comparisons"]:
+            return f"{passed}." if maps else "Nothing that was run could be silently wrong: nothing was compared."
         return f"{nothing}; {passed}." if maps else f"{nothing}."
     _, name, text = max(found)
     verbs = ("differ", "run") if len(found) > 1 else ("differs", "runs")

@@ -158,10 +158,13 @@ def part_lines(content: dict[str, Any]) -> list[str]:
         if entry["study"] is not None:
             study, held = entry["study"], [not claim["against"] for claim in entry["claims"]]
             lines.append(
-                f"{entry['name']}: {study['silent']} of {study['boundaries']} boundaries are silent; "
-                f"{sum(held)} of {len(held)} claims hold."
+                f"{entry['name']}: {study['silent']} of {study['boundaries']} boundaries are silent{_held(held)}."
             )
     return lines
+
+
+def _held(held: Sequence[bool]) -> str:
+    return f"; {sum(held)} of {len(held)} claims hold" if held else ""
 
 
 def first_lines(content: dict[str, Any]) -> list[str]:
