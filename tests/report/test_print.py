@@ -15,9 +15,19 @@ from pypdf import PdfReader
 
 Visiting = Callable[..., AbstractContextManager[Visit]]
 
-# Width of A4 between our margins of 12 mm, in CSS pixels of 1/96 inch.
-PAPER = {"width": round((210 - 2 * 12) / 25.4 * 96), "height": round((297 - 2 * 12) / 25.4 * 96)}
+# A4 between our margins, in CSS pixels of 1/96 inch.
+PAPER = {"width": round((210 - 2 * 10) / 25.4 * 96), "height": round((297 - 12 - 15) / 25.4 * 96)}
 MOST_PAGES = 30
+# A table of verdicts with as many observables as our largest comparison judges: cells as wide as numbers become.
+WIDEN = """(more) => {
+  const table = document.querySelector(".matrix");
+  for (const row of table.querySelectorAll("tr:not(.group)")) {
+    const cell = row.querySelector("th.n, .cell");
+    for (let added = 0; cell && added < more; ++added) cell.after(cell.cloneNode(true));
+  }
+  table.querySelectorAll(".cell a").forEach((link) => { link.lastChild.data = " 9.9e-13"; });
+  return table.querySelectorAll("thead th.n").length - 1;
+}"""
 
 
 @pytest.fixture(scope="module")
@@ -35,6 +45,7 @@ def test_nothing_is_cut_off_at_the_edge_of_the_paper(report_page: Path, visit: V
     """Every table is as wide as it is and no wider than the paper; a table too wide would be found."""
     with visit(report_page, viewport=PAPER) as seen:
         seen.page.emulate_media(media="print")
+        assert seen.page.evaluate(WIDEN, 4) == 11
         assert seen.page.evaluate("reading.cut()") == [[], []]
         seen.page.add_style_tag(
             content=".matrix { min-width: 60rem } h1 { overflow: auto; max-width: 2rem; white-space: nowrap }"
