@@ -146,7 +146,8 @@ class BoundedFriction:
         N, F1, F2 = self._force.tolist()
         # MuJoCo's pyramid lies inside the true cone: along its own tangents it allows |F1| + |F2| = mu N.
         friction = abs(F1) + abs(F2) if self._pyramidal else math.hypot(F1, F2)
-        return friction < _ON_CONE * self._mu * N
+        inside: bool = friction < _ON_CONE * self._mu * N
+        return inside
 
     def events(self, data: Any) -> list[Event]:
         """The events so far, each with a bracket of one step.
