@@ -70,6 +70,7 @@ def budget_table(study: Mapping[str, Any], quantity: str) -> Table:
     table = Table(title=Text(title), title_justify="left", box=None, padding=(0, 1, 0, 0))
     table.add_column("engine formulation setting", no_wrap=True)
     table.add_column("order (declared)", no_wrap=True)
+    table.add_column("at steps [s]", no_wrap=True)
     for column in ("limit off", "known to", "floor"):
         table.add_column(column, justify="right", no_wrap=True)
     table.add_column("dominated by", no_wrap=True)
@@ -82,6 +83,7 @@ def budget_table(study: Mapping[str, Any], quantity: str) -> Table:
         table.add_row(
             Text(name_of(first[item["curve"]])),
             Text(_order(item), style="yellow" if item["contradicts_declaration"] else ""),
+            _steps(item),
             *(number(value) for value in limit),
             " → ".join(dict.fromkeys(ends)),
         )
@@ -107,6 +109,13 @@ def _order(item: Mapping[str, Any]) -> str:
     if item["order_low"] is None:
         return f"{item['order']:.2f} ±?{declared}"  # from two differences, which say nothing of their scatter
     return f"{item['order']:.2f} ±{(item['order_high'] - item['order_low']) / 2:.2f}{declared}"
+
+
+def _steps(item: Mapping[str, Any]) -> str:
+    """Coarsest and finest step between which the order was observed."""
+    if item["order_from"] is None:
+        return ""
+    return f"{number(item['order_from'])} → {number(item['order_to'])}"
 
 
 def budget_lines(study: Mapping[str, Any], quantity: str) -> Iterator[str]:

@@ -137,12 +137,15 @@ def findings(found: Tradeoff, made: Sequence[tuple[Curve, Budget]]) -> list[str]
     said = []
     quantity = found.question.quantity
     scale, unit = found.reference.scale(quantity) or 1.0, units(found.reference.scene.rolling)[quantity]
-    for curve, item in made:
-        if item.quantity == quantity and item.contradicts_declaration:
-            said.append(
-                f"{curve.engine} declares order {item.declared}, but {quantity} shows "
-                f"{item.order:.2f} ({item.order_low:.2f} to {item.order_high:.2f})."
-            )
+    for curve in found.curves:
+        other = [item for of, item in made if of is curve and item.contradicts_declaration]
+        if other:
+            shown = ", ".join(f"{i.quantity} {i.order:.2f} ({i.order_low:.2f} to {i.order_high:.2f})" for i in other)
+            said.append(f"{curve.engine} declares order {other[0].declared}, but there show: {shown}.")
+    whole = [c for c in found.curves if c.saturated and c.points[0].errors.get(quantity, np.inf) < BROKEN * scale]
+    if whole:
+        names = ", ".join(curve.engine for curve in whole)
+        said.append(f"No tolerance breaks {names}: steps end at every sample, {found.question.every:g} s apart.")
     done = [point for point in found.points if point.result.status == Status.DONE]
     broken = [point for point in done if not point.errors.get(quantity, np.inf) < BROKEN * scale]
     refused = sum(point.result.status == Status.REFUSED for point in found.points)
