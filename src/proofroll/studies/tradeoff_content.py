@@ -19,7 +19,7 @@ from proofroll.studies.recommend import by_hand
 from proofroll.studies.sweep import BROKEN, Curve, Point
 from proofroll.studies.tradeoff import Tradeoff, judged_quantities, pareto_entries
 from proofroll.surfaces import FloatArray
-from proofroll.timing import machine
+from proofroll.timing import Timing, machine
 
 
 def budgets(found: Tradeoff) -> list[tuple[Curve, Budget]]:
@@ -73,7 +73,7 @@ def content(found: Tradeoff) -> dict[str, Any]:
         "budgets": [_budget(curve, item, known.get(item.quantity, "1")) for curve, item in made],
         "pareto": _fronts(found.curves, numbers, found),
         "pareto_engines": _fronts([curve for curve in found.curves if not by_hand(curve.level)], numbers, found),
-        "truth": {"seconds_per_second": found.truth_seconds, "route": reference.dataset.attrs.get("route", "")},
+        "truth": {**_cost(found.truth_timing), "route": reference.dataset.attrs.get("route", "")},
         "over": found.over,
         "findings": findings(found, made),
         "measured": {
@@ -116,9 +116,16 @@ def _point(curve: Curve, point: Point, number: int, held: dict[str, float], foun
         "message": point.result.message,
         "error": point.errors,
         "envelope": {name: value for name, value in held.items() if name in point.errors},
+        **_cost(timing),
+        "corners": [dataclasses.asdict(corner) for corner in corners] if corners is not None else None,
+    }
+
+
+def _cost(timing: Timing | None) -> dict[str, Any]:
+    """Median and interval of wall seconds per simulated second, or None where nothing was measured."""
+    return {
         "seconds_per_second": timing.interval.value if timing else None,
         "interval": [timing.interval.low, timing.interval.high] if timing else None,
-        "corners": [dataclasses.asdict(corner) for corner in corners] if corners is not None else None,
     }
 
 
@@ -137,8 +144,9 @@ def findings(found: Tradeoff, made: Sequence[tuple[Curve, Budget]]) -> list[str]
     said = []
     quantity = found.question.quantity
     scale, unit = found.reference.scale(quantity) or 1.0, units(found.reference.scene.rolling)[quantity]
+    judged = judged_quantities(found)
     for curve in found.curves:
-        other = [item for of, item in made if of is curve and item.contradicts_declaration]
+        other = [i for of, i in made if of is curve and i.quantity in judged and i.contradicts_declaration]
         if other:
             shown = ", ".join(f"{i.quantity} {i.order:.2f} ({i.order_low:.2f} to {i.order_high:.2f})" for i in other)
             said.append(f"{curve.engine} declares order {other[0].declared}, but there show: {shown}.")
