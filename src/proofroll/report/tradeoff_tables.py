@@ -2,13 +2,15 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping, Sequence
+import itertools
+from collections.abc import Collection, Iterator, Mapping, Sequence
 from typing import Any
 
 from rich.table import Table
 from rich.text import Text
 
 from proofroll.report.labels import error, number
+from proofroll.studies.pareto import tied
 
 
 def name_of(point: Mapping[str, Any]) -> str:
@@ -34,10 +36,30 @@ def cost_of(point: Mapping[str, Any]) -> str:
 
 
 def point_table(
-    study: Mapping[str, Any], points: Sequence[Mapping[str, Any]], quantities: Sequence[str], title: str
+    study: Mapping[str, Any],
+    points: Sequence[Mapping[str, Any]],
+    quantities: Sequence[str],
+    title: str,
+    ties: Collection[int] = (),
 ) -> Table:
-    """One line per point: what it costs, and its error in each quantity."""
-    table = Table(title=Text(title), title_justify="left", box=None, padding=(0, 1, 0, 0))
+    """One line per point: what it costs, and its error in each quantity.
+
+    Args:
+        study: stored.
+        points: of it.
+        quantities: to show.
+        title: of the table.
+        ties: numbers of points on a front whose cost cannot be told from that of the next.
+    """
+    caption = Text("≈ a tie: the cost cannot be told from that of the next line, which is more accurate")
+    table = Table(
+        title=Text(title),
+        title_justify="left",
+        caption=caption if ties else None,
+        caption_justify="left",
+        box=None,
+        padding=(0, 1, 0, 0),
+    )
     for column in ("engine formulation setting", "step", "cost s/s"):
         table.add_column(column, no_wrap=True)
     for name in quantities:
@@ -47,7 +69,8 @@ def point_table(
         shown = [error(point["error"].get(name)) if name in point["error"] else "–" for name in quantities]
         if point["status"] != "done":
             shown = [str(point["status"]), *[""] * (len(quantities) - 1)]
-        table.add_row(Text(name_of(point)), step_of(point), cost_of(point), *shown)
+        mark = " ≈" if point["id"] in ties else ""
+        table.add_row(Text(name_of(point)), step_of(point), cost_of(point) + mark, *shown)
     return table
 
 
@@ -57,10 +80,17 @@ def front_tables(study: Mapping[str, Any], quantities: Sequence[str]) -> Iterato
     fronts = {key: study[key][quantities[0]] for key in ("pareto_engines", "pareto")}
     title = f"The Pareto front of the engines for {quantities[0]}: nothing is cheaper and more accurate"
     if fronts["pareto_engines"]:
-        yield point_table(study, [by_id[number] for number in fronts["pareto_engines"]], quantities, title)
+        yield _front(study, [by_id[number] for number in fronts["pareto_engines"]], quantities, title)
     if fronts["pareto"] != fronts["pareto_engines"]:
         title = "The front with the scene's own equations, which no engine needs"
-        yield point_table(study, [by_id[number] for number in fronts["pareto"]], quantities, title)
+        yield _front(study, [by_id[number] for number in fronts["pareto"]], quantities, title)
+
+
+def _front(
+    study: Mapping[str, Any], points: Sequence[Mapping[str, Any]], quantities: Sequence[str], title: str
+) -> Table:
+    ties = {cheap["id"] for cheap, fine in itertools.pairwise(points) if tied(cheap["interval"], fine["interval"])}
+    return point_table(study, points, quantities, title, ties)
 
 
 def budget_table(study: Mapping[str, Any], quantity: str) -> Table:
@@ -137,6 +167,8 @@ def answer_lines(answer: Mapping[str, Any]) -> Iterator[str]:
         yield f"For {asked}, use {_line(choice, answer)}"
         if not answer["affordable"]:
             yield f"That is more than the budget of {number(answer['budget'])} s per simulated second."
+    for tie in answer["ties"]:
+        yield f"A tie in cost, as far as the intervals tell: {_line(tie, answer)}"
     for key, words in (
         ("best_within_budget", "Within the budget"),
         ("runner_up", "Runner-up"),
