@@ -33,6 +33,9 @@ _SceneOrFile = Annotated[
     str, typer.Argument(help="A scene, or a comparison file for it, e.g. comparisons/tradeoff.toml.")
 ]
 _Until = Annotated[float | None, typer.Option("--until", help="Length of every run [s].")]
+_Over = Annotated[
+    list[str] | None, typer.Option(help="parameter=low:high over which the best points are checked; repeat.")
+]
 _DEFAULT_UNTIL = 2.0
 # Of SI, before the unit of a tolerance; the second µ is the Greek letter.
 _PREFIXES = {"k": 1e3, "m": 1e-3, "µ": 1e-6, "\u03bc": 1e-6, "u": 1e-6, "n": 1e-9}
@@ -47,9 +50,7 @@ def tradeoff(
     engine: Annotated[
         list[str] | None, typer.Option(help="Engine, or name[key=value,…]; repeat. All by default.")
     ] = None,
-    over: Annotated[
-        list[str] | None, typer.Option(help="parameter=low:high over which the best points are checked; repeat.")
-    ] = None,
+    over: _Over = None,
     until: _Until = None,
     every_point: Annotated[bool, typer.Option("--all", help="List every point, not only the best.")] = False,
     out: Out = Path("out"),
@@ -58,7 +59,7 @@ def tradeoff(
     as_json: Json = False,
 ) -> None:
     """Measure error against cost for every engine, formulation and setting, from coarse to fine."""
-    from proofroll.report.tradeoff_tables import budget_lines, budget_table, front_tables, point_table
+    from proofroll.report.tradeoff_tables import budget_lines, budget_table, corner_table, front_tables, point_table
     from proofroll.report.work_precision import draw
     from proofroll.studies.tradeoff import stored
 
@@ -82,6 +83,9 @@ def tradeoff(
         else:
             for table in front_tables(study, shown):
                 terminal.print(table)
+        if study["over"]:
+            terminal.print()
+            terminal.print(corner_table(study, shown[0]))
         terminal.print()
         terminal.print(budget_table(study, shown[0]))
         terminal.print()
@@ -106,6 +110,7 @@ def recommend(
     engine: Annotated[
         list[str] | None, typer.Option(help="Choose among these engines, name[key=value,…]; repeat.")
     ] = None,
+    over: _Over = None,
     until: _Until = None,
     measure: Annotated[bool, typer.Option("--measure", help="Measure first if no curves are stored.")] = False,
     out: Out = Path("out"),
@@ -129,7 +134,8 @@ def recommend(
         require_engine(parse_engine(text).name)
     unit = units(question.loaded().rolling)[question.quantity]
     wish = Wish(question.quantity, _tolerance(tolerance, unit), _positive("budget", budget), tuple(engine or ()))
-    study = _stored_study(question, engine or [], claims, out, jobs, measure=measure)
+    ranges = _ranges(question, over) if over is not None else None
+    study = _stored_study(question, engine or [], claims, ranges, out, jobs, measure=measure)
     answer = answered(study, wish)
     if as_json:
         write_json(answer)
@@ -231,12 +237,15 @@ def _stored_study(
     question: Question,
     engines: list[str],
     claims: TradeoffClaims | None,
+    ranges: dict[str, list[float]] | None,
     out: Path,
     jobs: int | None,
     *,
     measure: bool,
 ) -> dict[str, Any]:
     """The stored curves, of all engines or of those that are asked for, or new ones if the user agrees.
+
+    With ``ranges`` of parameters they must have been checked over these.
 
     Raises:
         InputError: there are none that hold here, and nobody agreed to measure them.
@@ -249,6 +258,8 @@ def _stored_study(
         try:
             study: dict[str, Any] = json.loads(path.read_text(encoding="utf-8"))
             reasons = installed.changes(study["measured"])
+            if ranges is not None and study["over"] != ranges:
+                reasons.append("the stored curves were not checked over these ranges")
         except (OSError, ValueError, KeyError, TypeError):
             continue
         if not reasons:
@@ -259,7 +270,8 @@ def _stored_study(
     if not measure:
         advice = f"{why}; add --measure, which takes some minutes, or run proofroll tradeoff first"
         raise InputError("stored curves", "none that hold here", advice)
-    return _measure(question, engines, claims.over if claims else {}, out, fresh=False, jobs=jobs)
+    over = ranges if ranges is not None else (claims.over if claims else {})
+    return _measure(question, engines, over, out, fresh=False, jobs=jobs)
 
 
 def _measure(

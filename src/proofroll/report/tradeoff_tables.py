@@ -93,6 +93,41 @@ def _front(
     return point_table(study, points, quantities, title, ties)
 
 
+def corner_table(study: Mapping[str, Any], quantity: str) -> Table:
+    """For every point that was run over the range: its error here, and the worst at the corners and where."""
+    over = ", ".join(f"{name} {number(min(v))} to {number(max(v))}" for name, v in study["over"].items())
+    table = Table(
+        title=Text(f"Over {over}: error of {quantity} [{study['quantities'][quantity]['unit']}]"),
+        title_justify="left",
+        box=None,
+        padding=(0, 1, 0, 0),
+    )
+    for column in ("engine formulation setting", "step"):
+        table.add_column(column, no_wrap=True)
+    for column in ("here", "worst"):
+        table.add_column(column, justify="right", no_wrap=True)
+    table.add_column("where")
+    checked = [p for p in study["points"] if p["corners"] and quantity in p["error"]]
+    for point in sorted(checked, key=lambda p: p["seconds_per_second"] or 0.0):
+        worst, where = _worst(point["corners"], quantity)
+        table.add_row(Text(name_of(point)), step_of(point), error(point["error"][quantity]), worst, Text(where))
+    return table
+
+
+def _worst(corners: Sequence[Mapping[str, Any]], quantity: str) -> tuple[str, str]:
+    """The largest error at any corner and where that is; a corner without a result is worse than any error."""
+    missing = [corner for corner in corners if corner["errors"].get(quantity) is None]
+    if missing:
+        more = f" and {len(missing) - 1} more" if len(missing) > 1 else ""
+        return "–", f"{_place(missing[0])}{more}: {missing[0]['message']}"
+    corner = max(corners, key=lambda c: float(c["errors"][quantity]))
+    return error(corner["errors"][quantity]), _place(corner)
+
+
+def _place(corner: Mapping[str, Any]) -> str:
+    return ", ".join(f"{name} = {number(value)}" for name, value in corner["parameters"].items())
+
+
 def budget_table(study: Mapping[str, Any], quantity: str) -> Table:
     """For every curve, what its error consists of and what dominates at either end."""
     unit = study["quantities"][quantity]["unit"]
