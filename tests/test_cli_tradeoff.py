@@ -9,7 +9,11 @@ from typing import Any
 
 import pyperf
 import pytest
+from rich.console import Console
 
+from proofroll.errors import ProofrollError
+from proofroll.report import labels
+from proofroll.report.tradeoff_tables import corner_table
 from proofroll.report.work_precision import svg
 from proofroll.studies import installed
 from proofroll.studies.sweep import Question
@@ -73,11 +77,19 @@ def test_every_point_has_a_cost_with_its_interval(measured: dict[str, Any]) -> N
     assert costs[-1] > 10 * costs[0]
 
 
+def test_the_truth_has_a_cost_with_its_interval(measured: dict[str, Any]) -> None:
+    """It was measured in turns with the points, and not once."""
+    truth = measured["truth"]
+    assert 0 < truth["interval"][0] <= truth["seconds_per_second"] <= truth["interval"][1]
+    assert truth["interval"][0] < truth["interval"][1]
+
+
 def test_budget_of_a_good_and_of_a_soft_model(measured: dict[str, Any]) -> None:
     """The trapezoidal rule shows its order 2 and no error of the model; MuJoCo's default contact shows one of cm."""
     budgets = {item["engine"]: item for item in measured["budgets"] if item["quantity"] == "z"}
     good, soft = budgets["exudyn"], budgets["mujoco"]
     assert good["order_low"] - 0.1 < 2 < good["order_high"] + 0.1
+    assert good["order_from"] > good["order_to"] > 0
     assert good["model_form"] < 1e-8
     assert soft["model_form"] > 0.01
     assert soft["fine"] == "model form"
@@ -206,6 +218,39 @@ def test_tradeoff_and_then_recommend(proofroll: Proofroll, tmp_path: Path) -> No
     code, _, err = proofroll("recommend", "sphere_in_cylinder", "--tolerance", "1 %", *given[:4], *given[-2:])
     assert code == 2
     assert "no curves are stored" in err
+
+
+def test_an_answer_over_a_range(proofroll: Proofroll, folder: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """With --over only curves checked over that range are answered from; --measure checks over it, and not another."""
+    assert proofroll(*asked(folder), "--over", "speed=3:5")[0] == 0
+    code, _, err = proofroll(*asked(folder), "--over", "speed=3:4.5")
+    assert code == 2
+    assert "not checked over these ranges" in err
+    given: list[Any] = []
+
+    def measuring(*_: object, over: object, **__: object) -> None:
+        given.append(over)
+        raise ProofrollError("enough")
+
+    monkeypatch.setattr("proofroll.studies.tradeoff.tradeoff", measuring)
+    assert "enough" in proofroll(*asked(folder), "--over", "speed=3:4.5", "--measure")[2]
+    assert given == [{"speed": [3.0, 4.5]}]
+
+
+def test_what_was_found_over_a_range(measured: dict[str, Any], capsys: pytest.CaptureFixture[str]) -> None:
+    """Each point that was run there has its worst corner, within 100 columns, and one without a result says why."""
+    points = [point for point in measured["points"] if point["corners"]]
+    last = {**points[-1], "corners": [{**points[-1]["corners"][0], "errors": {}, "message": "it fell"}]}
+    study = measured | {"points": [*points[:-1], last]}
+    Console(width=100).print(corner_table(study, "z"))
+    lines = capsys.readouterr().out.splitlines()
+    assert all(len(line) <= 100 for line in lines)
+    assert lines[0].strip() == "Over speed 3 to 5: error of z [m]"
+    assert "it fell" in " ".join(lines)
+    for point in points[:-1]:
+        worst = max(point["corners"], key=lambda corner: corner["errors"]["z"])
+        expected = f"{labels.number(worst['errors']['z'])} speed = {worst['parameters']['speed']:g}"
+        assert any(expected in " ".join(line.split()) for line in lines)
 
 
 def test_onset_to_one_percent(proofroll: Proofroll, tmp_path: Path) -> None:

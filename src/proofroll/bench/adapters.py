@@ -10,7 +10,7 @@ from typing import Any
 
 import numpy as np
 
-from proofroll.errors import ProofrollError
+from proofroll.errors import ProofrollError, Refused
 from proofroll.timing import Interval, Timing, interleaved, ratio
 
 SCENE = "sphere_in_cylinder"
@@ -137,6 +137,7 @@ def bench_adapters(
     progress: Callable[[str], None] | None = None,
 ) -> list[Row]:
     """All formulations of some engines, each with every variant, one worker process per engine."""
+    from proofroll.bench.loops import announced
     from proofroll.runner import Worker, WorkerDied
 
     rows: list[Row] = []
@@ -153,6 +154,11 @@ def bench_adapters(
                 continue
             if preset not in {found for _, found in formulations}:
                 rows.append(Row(engine, "", preset, "", None, f"no formulation has the preset {preset}"))
+                continue
+            try:
+                announced(engine)
+            except Refused as error:
+                rows.append(Row(engine, "", preset, "", None, str(error)))  # once, not for every variant
                 continue
             for formulation, found in formulations:
                 for variant, parameters in VARIANTS.items():

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from importlib.metadata import entry_points
+from importlib.metadata import EntryPoint, entry_points
 from typing import Any
 
 from proofroll.bench.bare import GROUP
@@ -15,7 +15,16 @@ def load_bare_loop(engine: str) -> Any:
     Raises:
         Refused: no installed package announces one.
     """
+    return announced(engine).load()
+
+
+def announced(engine: str) -> EntryPoint:
+    """The entry point of an engine's bare loop, which is not loaded yet.
+
+    Raises:
+        Refused: no installed package announces one.
+    """
     for point in entry_points(group=GROUP):
         if point.name == engine:
-            return point.load()
+            return point
     raise Refused(f"no bare loop is announced for {engine} (entry-point group {GROUP})")

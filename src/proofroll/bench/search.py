@@ -27,14 +27,6 @@ _TOLERANCES = ((1e-1, 1e-2, 1e-3, 1e-4, 1e-5, 1e-6), (1e-7, 1e-8))
 _PARTS = (0.55, 0.62, 0.7, 0.8, 0.9)
 # Wall seconds of one run, simulating 1.72 s: what takes longer is some thousandfold of the fastest.
 _LIMIT = 5.0
-# Settings besides the presets that cost less where they are not needed: engine, formulation, preset -> settings.
-_VARIANTS: Mapping[tuple[str, str, str], Sequence[Mapping[str, Any]]] = {
-    ("projection", "rotating_frame", "default"): [{"elimination": False}],
-    ("projection", "rotating_frame", "matched"): [{"elimination": False}],
-    ("pinocchio", "composite", "default"): [{"orientation": False}],
-    ("pinocchio", "composite", "tuned"): [{"projection": False}],
-    ("pinocchio", "free_flyer", "default"): [{"orientation": False}],
-}
 
 
 @dataclasses.dataclass(frozen=True)
@@ -142,12 +134,21 @@ def _kinds() -> Iterator[tuple[EngineFacts, bool]]:
                 if settings.get("integrator") == "taylor":
                     continue
                 base = {"formulation": formulation, "preset": preset}
-                for variant in ({}, *_VARIANTS.get((name, formulation, preset), ())):
+                for variant in ({}, *_without(described["terms"], formulation, settings)):
                     wanted.append((name, base | dict(variant)))
                     contacts.append(contact)
     for facts, contact in zip(resolve(wanted), contacts, strict=True):
         if isinstance(facts, EngineFacts) and facts.resolution is not None:
             yield facts, contact
+
+
+def _without(
+    terms: Sequence[Mapping[str, Any]], formulation: str, settings: Mapping[str, Any]
+) -> Iterator[Mapping[str, Any]]:
+    """For each of the engine's own terms that the settings may have: what leaves it out."""
+    for term in terms:
+        if formulation in term["formulations"] and any(settings[key] != value for key, value in term["off"].items()):
+            yield term["off"]
 
 
 def _values(facts: EngineFacts, every: float, rung: int) -> list[float]:

@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 import typer
 
 from proofroll.cli.common import CONTRADICTED, OK, Jobs, Json, Out, Set, write_json
-from proofroll.cli.tradeoff import SceneOrFile, Until, measure, question_of, require_observables
+from proofroll.cli.tradeoff import Over, SceneOrFile, Until, measure, question_of, ranges_of, require_observables
 from proofroll.errors import InputError
 
 if TYPE_CHECKING:
@@ -32,6 +32,7 @@ def recommend(
     engine: Annotated[
         list[str] | None, typer.Option(help="Choose among these engines, name[key=value,…]; repeat.")
     ] = None,
+    over: Over = None,
     until: Until = None,
     measure_first: Annotated[bool, typer.Option("--measure", help="Measure first if no curves are stored.")] = False,
     out: Out = Path("out"),
@@ -55,7 +56,8 @@ def recommend(
         require_engine(parse_engine(text).name)
     unit = units(question.loaded().rolling)[question.quantity]
     wish = Wish(question.quantity, _tolerance(tolerance, unit), _positive("budget", budget), tuple(engine or ()))
-    study = _stored_study(question, engine or [], claims, out, jobs, measure_first=measure_first)
+    ranges = ranges_of(question, over) if over is not None else None
+    study = _stored_study(question, engine or [], claims, ranges, out, jobs, measure_first=measure_first)
     answer = answered(study, wish)
     if as_json:
         write_json(answer)
@@ -98,12 +100,15 @@ def _stored_study(
     question: Question,
     engines: list[str],
     claims: TradeoffClaims | None,
+    ranges: dict[str, list[float]] | None,
     out: Path,
     jobs: int | None,
     *,
     measure_first: bool,
 ) -> dict[str, Any]:
     """The stored curves, of all engines or of those that are asked for, or new ones if the user agrees.
+
+    With ``ranges`` of parameters they must have been checked over these.
 
     Raises:
         InputError: there are none that hold here, and nobody agreed to measure them.
@@ -114,6 +119,8 @@ def _stored_study(
     reasons: list[str] = []
     for path in (stored(out, question), stored(out, question, engines)):
         study, changes = kept(path)
+        if study is not None and ranges is not None and study["over"] != ranges:
+            study, changes = None, ["the stored curves were not checked over these ranges"]
         if study is not None:
             return study
         reasons = changes or reasons
@@ -124,5 +131,5 @@ def _stored_study(
     if not measure_first:
         advice = f"{why}; add --measure, which takes some minutes, or run proofroll tradeoff first"
         raise InputError("stored curves", "none that hold here", advice)
-    over = claims.over if claims else {}
+    over = ranges if ranges is not None else (claims.over if claims else {})
     return measure(question, engines, over, claims, out, fresh=False, jobs=jobs)[0]

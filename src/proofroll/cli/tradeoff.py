@@ -30,6 +30,9 @@ SceneOrFile = Annotated[
     str, typer.Argument(help="A scene, or a comparison file for it, e.g. comparisons/tradeoff.toml.")
 ]
 Until = Annotated[float | None, typer.Option("--until", help="Length of every run [s].")]
+Over = Annotated[
+    list[str] | None, typer.Option(help="parameter=low:high over which the best points are checked; repeat.")
+]
 _DEFAULT_UNTIL = 2.0
 
 
@@ -42,9 +45,7 @@ def tradeoff(
     engine: Annotated[
         list[str] | None, typer.Option(help="Engine, or name[key=value,…]; repeat. All by default.")
     ] = None,
-    over: Annotated[
-        list[str] | None, typer.Option(help="parameter=low:high over which the best points are checked; repeat.")
-    ] = None,
+    over: Over = None,
     until: Until = None,
     every_point: Annotated[bool, typer.Option("--all", help="List every point, not only the best.")] = False,
     out: Out = Path("out"),
@@ -56,6 +57,7 @@ def tradeoff(
     from proofroll.report.tradeoff_tables import (
         budget_lines,
         budget_table,
+        corner_table,
         default_quantities,
         front_tables,
         point_table,
@@ -64,7 +66,7 @@ def tradeoff(
 
     claims, question = question_of(scene, settings, quantity, until)
     require_observables(question, quantity or [])
-    ranges = _ranges(question, over) if over is not None else (claims.over if claims else {})
+    ranges = ranges_of(question, over) if over is not None else (claims.over if claims else {})
     study, path = measure(question, engine or [], ranges, claims, out, fresh=fresh, jobs=jobs)
     contradictions = study["claims"]["contradictions"]
     shown = [name for name in quantity or [] if name in study["quantities"]] or default_quantities(study)
@@ -80,6 +82,9 @@ def tradeoff(
         else:
             for table in front_tables(study, shown):
                 terminal.print(table)
+        if study["over"]:
+            terminal.print()
+            terminal.print(corner_table(study, shown[0]))
         terminal.print()
         terminal.print(budget_table(study, shown[0]))
         terminal.print()
@@ -128,7 +133,7 @@ def require_observables(question: Question, names: list[str]) -> None:
             raise InputError("quantity", name, f"there is no such observable; choose from {', '.join(known)}")
 
 
-def _ranges(question: Question, texts: list[str]) -> dict[str, list[float]]:
+def ranges_of(question: Question, texts: list[str]) -> dict[str, list[float]]:
     """Reads ``parameter=low:high``; each end must be one that the scene can have."""
     from proofroll.scene_file import load_scene
 

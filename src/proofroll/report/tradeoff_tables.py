@@ -2,13 +2,15 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping, Sequence
+import itertools
+from collections.abc import Collection, Iterator, Mapping, Sequence
 from typing import Any
 
 from rich.table import Table
 from rich.text import Text
 
 from proofroll.report.labels import error, number
+from proofroll.studies.pareto import tied
 
 
 def default_quantities(study: Mapping[str, Any]) -> list[str]:
@@ -40,10 +42,30 @@ def cost_of(point: Mapping[str, Any]) -> str:
 
 
 def point_table(
-    study: Mapping[str, Any], points: Sequence[Mapping[str, Any]], quantities: Sequence[str], title: str
+    study: Mapping[str, Any],
+    points: Sequence[Mapping[str, Any]],
+    quantities: Sequence[str],
+    title: str,
+    ties: Collection[int] = (),
 ) -> Table:
-    """One line per point: what it costs, and its error in each quantity."""
-    table = Table(title=Text(title), title_justify="left", box=None, padding=(0, 1, 0, 0))
+    """One line per point: what it costs, and its error in each quantity.
+
+    Args:
+        study: stored.
+        points: of it.
+        quantities: to show.
+        title: of the table.
+        ties: numbers of points on a front whose cost cannot be told from that of the next.
+    """
+    caption = Text("≈ a tie: the cost cannot be told from that of the next line, which is more accurate")
+    table = Table(
+        title=Text(title),
+        title_justify="left",
+        caption=caption if ties else None,
+        caption_justify="left",
+        box=None,
+        padding=(0, 1, 0, 0),
+    )
     for column in ("engine formulation setting", "step", "cost s/s"):
         table.add_column(column, no_wrap=True)
     for name in quantities:
@@ -53,7 +75,8 @@ def point_table(
         shown = [error(point["error"].get(name)) if name in point["error"] else "–" for name in quantities]
         if point["status"] != "done":
             shown = [str(point["status"]), *[""] * (len(quantities) - 1)]
-        table.add_row(Text(name_of(point)), step_of(point), cost_of(point), *shown)
+        mark = " ≈" if point["id"] in ties else ""
+        table.add_row(Text(name_of(point)), step_of(point), cost_of(point) + mark, *shown)
     return table
 
 
@@ -63,10 +86,52 @@ def front_tables(study: Mapping[str, Any], quantities: Sequence[str]) -> Iterato
     fronts = {key: study[key][quantities[0]] for key in ("pareto_engines", "pareto")}
     title = f"The Pareto front of the engines for {quantities[0]}: nothing is cheaper and more accurate"
     if fronts["pareto_engines"]:
-        yield point_table(study, [by_id[number] for number in fronts["pareto_engines"]], quantities, title)
+        yield _front(study, [by_id[number] for number in fronts["pareto_engines"]], quantities, title)
     if fronts["pareto"] != fronts["pareto_engines"]:
         title = "The front with the scene's own equations, which no engine needs"
-        yield point_table(study, [by_id[number] for number in fronts["pareto"]], quantities, title)
+        yield _front(study, [by_id[number] for number in fronts["pareto"]], quantities, title)
+
+
+def _front(
+    study: Mapping[str, Any], points: Sequence[Mapping[str, Any]], quantities: Sequence[str], title: str
+) -> Table:
+    ties = {cheap["id"] for cheap, fine in itertools.pairwise(points) if tied(cheap["interval"], fine["interval"])}
+    return point_table(study, points, quantities, title, ties)
+
+
+def corner_table(study: Mapping[str, Any], quantity: str) -> Table:
+    """For every point that was run over the range: its error here, and the worst at the corners and where."""
+    over = ", ".join(f"{name} {number(min(v))} to {number(max(v))}" for name, v in study["over"].items())
+    table = Table(
+        title=Text(f"Over {over}: error of {quantity} [{study['quantities'][quantity]['unit']}]"),
+        title_justify="left",
+        box=None,
+        padding=(0, 1, 0, 0),
+    )
+    for column in ("engine formulation setting", "step"):
+        table.add_column(column, no_wrap=True)
+    for column in ("here", "worst"):
+        table.add_column(column, justify="right", no_wrap=True)
+    table.add_column("where")
+    checked = [p for p in study["points"] if p["corners"] and quantity in p["error"]]
+    for point in sorted(checked, key=lambda p: p["seconds_per_second"] or 0.0):
+        worst, where = _worst(point["corners"], quantity)
+        table.add_row(Text(name_of(point)), step_of(point), error(point["error"][quantity]), worst, Text(where))
+    return table
+
+
+def _worst(corners: Sequence[Mapping[str, Any]], quantity: str) -> tuple[str, str]:
+    """The largest error at any corner and where that is; a corner without a result is worse than any error."""
+    missing = [corner for corner in corners if corner["errors"].get(quantity) is None]
+    if missing:
+        more = f" and {len(missing) - 1} more" if len(missing) > 1 else ""
+        return "–", f"{_place(missing[0])}{more}: {missing[0]['message']}"
+    corner = max(corners, key=lambda c: float(c["errors"][quantity]))
+    return error(corner["errors"][quantity]), _place(corner)
+
+
+def _place(corner: Mapping[str, Any]) -> str:
+    return ", ".join(f"{name} = {number(value)}" for name, value in corner["parameters"].items())
 
 
 def budget_table(study: Mapping[str, Any], quantity: str) -> Table:
@@ -76,6 +141,7 @@ def budget_table(study: Mapping[str, Any], quantity: str) -> Table:
     table = Table(title=Text(title), title_justify="left", box=None, padding=(0, 1, 0, 0))
     table.add_column("engine formulation setting", no_wrap=True)
     table.add_column("order (declared)", no_wrap=True)
+    table.add_column("at steps [s]", no_wrap=True)
     for column in ("limit off", "known to", "floor"):
         table.add_column(column, justify="right", no_wrap=True)
     table.add_column("dominated by", no_wrap=True)
@@ -88,6 +154,7 @@ def budget_table(study: Mapping[str, Any], quantity: str) -> Table:
         table.add_row(
             Text(name_of(first[item["curve"]])),
             Text(_order(item), style="yellow" if item["contradicts_declaration"] else ""),
+            _steps(item),
             *(number(value) for value in limit),
             " → ".join(dict.fromkeys(ends)),
         )
@@ -115,6 +182,13 @@ def _order(item: Mapping[str, Any]) -> str:
     return f"{item['order']:.2f} ±{(item['order_high'] - item['order_low']) / 2:.2f}{declared}"
 
 
+def _steps(item: Mapping[str, Any]) -> str:
+    """Coarsest and finest step between which the order was observed."""
+    if item["order_from"] is None:
+        return ""
+    return f"{number(item['order_from'])} → {number(item['order_to'])}"
+
+
 def budget_lines(study: Mapping[str, Any], quantity: str) -> Iterator[str]:
     """The same as sentences."""
     for item in study["budgets"]:
@@ -134,6 +208,8 @@ def answer_lines(answer: Mapping[str, Any]) -> Iterator[str]:
         yield f"For {asked}, use {_line(choice, answer)}"
         if not answer["affordable"]:
             yield f"That is more than the budget of {number(answer['budget'])} s per simulated second."
+    for tie in answer["ties"]:
+        yield f"A tie in cost, as far as the intervals tell: {_line(tie, answer)}"
     for key, words in (
         ("best_within_budget", "Within the budget"),
         ("runner_up", "Runner-up"),

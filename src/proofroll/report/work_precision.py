@@ -100,9 +100,7 @@ def _panel(panel: Any, study: Mapping[str, Any], quantity: str) -> None:
         panel.axhspan(_SMALLEST, bar, color="0.88", lw=0, zorder=0)
     cost = study["truth"]["seconds_per_second"]
     if cost and bar:
-        panel.plot(
-            [cost], [bar], marker="*", color="black", markersize=9, linestyle="", label="truth: its error bar, one run"
-        )
+        panel.plot([cost], [bar], marker="*", color="black", markersize=9, linestyle="", label="truth: its error bar")
     unit = shown_unit(facts["unit"])
     panel.set(
         xlabel="cost [wall seconds per simulated second]",

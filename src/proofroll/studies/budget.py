@@ -10,6 +10,7 @@ from __future__ import annotations
 import itertools
 from collections.abc import Sequence
 from dataclasses import dataclass
+from typing import NamedTuple
 
 import numpy as np
 
@@ -36,6 +37,22 @@ TIME_STEP, MODEL_FORM, FLOOR, TRUTH = (
 )
 
 
+class Order(NamedTuple):
+    """An order of convergence, and where it was observed; all None where no power law shows.
+
+    Attributes:
+        value: of the order.
+        low, high: its confidence interval of 95 %; None from too few runs.
+        coarsest, finest: steps of the runs that follow the power law.
+    """
+
+    value: float | None = None
+    low: float | None = None
+    high: float | None = None
+    coarsest: float | None = None
+    finest: float | None = None
+
+
 @dataclass(frozen=True)
 class Budget:
     """What the error of one quantity consists of along a curve; lengths of error in the quantity's unit.
@@ -46,6 +63,8 @@ class Budget:
         model_form_bar: uncertainty of that limit.
         order: observed order of the time step; None with an adaptive step or where no power law shows.
         order_low, order_high: its confidence interval of 95 %; None from too few runs.
+        order_from, order_to: coarsest and finest step of the runs that follow that power law [s]; outside them the
+            order is not claimed.
         declared: order that the engine declares.
         floor: how far the finest runs scatter, where refining them no longer helps; None: not reached.
         truth: error bar of the truth.
@@ -68,6 +87,8 @@ class Budget:
     coarse_step: float | None = None
     fine_step: float | None = None
     fine_error: float | None = None
+    order_from: float | None = None
+    order_to: float | None = None
 
     @property
     def contradicts_declaration(self) -> bool:
@@ -102,9 +123,9 @@ def budget(curve: Curve, quantity: str, every: float, true: FloatArray) -> Budge
         if stalled:  # what lies in the scatter of the finest runs shows no order
             scatter = _ABOVE * max(differences[-2:])
             seen = list(itertools.takewhile(lambda difference: difference > scatter, differences))
-        order, low, high = order_of(steps[: len(seen) + 1], seen)
+        order = order_of(steps[: len(seen) + 1], seen)
     else:
-        limit, (order, low, high) = tightest(values), (None, None, None)
+        limit, order = tightest(values), Order()
         # A tolerance that limits nothing any more gives the same run again; one at the floor gives scatter.
         stalled = differences[-1] >= differences[-2]
     floor = max(differences[-2:]) if stalled else None
@@ -116,9 +137,9 @@ def budget(curve: Curve, quantity: str, every: float, true: FloatArray) -> Budge
         quantity,
         model_form,
         limit.error_bar,
-        order,
-        low,
-        high,
+        order.value,
+        order.low,
+        order.high,
         declared,
         floor,
         bar,
@@ -127,10 +148,12 @@ def budget(curve: Curve, quantity: str, every: float, true: FloatArray) -> Budge
         first.step or 0.0,
         steps[-1],
         error,
+        order.coarsest,
+        order.finest,
     )
 
 
-def order_of(steps: Sequence[float], differences: Sequence[float]) -> tuple[float | None, float | None, float | None]:
+def order_of(steps: Sequence[float], differences: Sequence[float]) -> Order:
     """Order and its confidence interval from the longest stretch of runs that follow one power law.
 
     The difference of neighbouring runs is C |h1^p - h2^p|; C and p are fitted in logarithms.
@@ -145,12 +168,13 @@ def order_of(steps: Sequence[float], differences: Sequence[float]) -> tuple[floa
     local = [observed_order(differences[i], differences[i + 1], steps[i : i + 3]) for i in range(len(differences) - 1)]
     start, end = _stretch(local)
     if end == start:
-        return None, None, None
+        return Order()
+    between = steps[start], steps[end + 1]
     span = slice(start, end + 1)  # the differences that the local orders of the stretch come from
     pairs = np.array(list(itertools.pairwise(steps)), dtype=np.float64)[span]
     pairs /= pairs[-1, 1]
     if len(pairs) < 3:
-        return float(np.mean(local[start:end])), None, None
+        return Order(float(np.mean(local[start:end])), None, None, *between)
 
     def law(h: FloatArray, constant: float, power: float) -> FloatArray:
         return np.asarray(constant + np.log(np.abs(h[:, 0] ** power - h[:, 1] ** power)))
@@ -158,7 +182,7 @@ def order_of(steps: Sequence[float], differences: Sequence[float]) -> tuple[floa
     seen = np.log(np.asarray(differences)[span])
     (_, order), covariance = curve_fit(law, pairs, seen, p0=(seen[-1], np.mean(local[start:end])))
     half = float(t.ppf(0.5 + _CONFIDENCE / 2, len(pairs) - 2) * np.sqrt(covariance[1, 1]))
-    return float(order), float(order) - half, float(order) + half
+    return Order(float(order), float(order) - half, float(order) + half, *between)
 
 
 def _stretch(local: Sequence[float]) -> tuple[int, int]:
@@ -228,6 +252,7 @@ def _order(found: Budget) -> str:
     if found.order is None:
         return ""
     declared = "" if found.declared is None else f", declared {found.declared}"
+    seen = f" from {found.order_from:.3g} s to {found.order_to:.3g} s{declared}"
     if found.order_low is None or found.order_high is None:
-        return f" (order {found.order:.2f}{declared})"
-    return f" (order {found.order:.2f} ± {(found.order_high - found.order_low) / 2:.2f}{declared})"
+        return f" (order {found.order:.2f}{seen})"
+    return f" (order {found.order:.2f} ± {(found.order_high - found.order_low) / 2:.2f}{seen})"

@@ -125,6 +125,9 @@ def _check(where: str, found: TradeoffClaims) -> None:
     if found.quantity not in known:
         advice = f"there is no such observable; choose from {', '.join(known)}"
         raise InputError(f"{where}: quantity", found.quantity, advice)
+    if not found.cheapest:
+        advice = "the file claims nothing; add [[cheapest]] with tolerance, engine and because"
+        raise InputError(f"{where}: cheapest", "nothing", advice)
     for index, claim in enumerate(found.cheapest):
         if not claim.because:
             raise InputError(f"{where}: cheapest.{index}.because", "nothing", "every claim needs its reason; add it")

@@ -24,6 +24,11 @@ def envelope(errors: Sequence[float]) -> list[float]:
     return held
 
 
+def tied(one: Sequence[float] | None, other: Sequence[float] | None) -> bool:
+    """Whether two costs cannot be told apart: their intervals (low, high) overlap; not where one has none."""
+    return one is not None and other is not None and one[0] <= other[1] and other[0] <= one[1]
+
+
 def front(entries: Iterable[tuple[_Item, float, float]]) -> list[_Item]:
     """The items of ``(item, cost, error)`` that no other item beats in both, cheapest first."""
     kept: list[_Item] = []

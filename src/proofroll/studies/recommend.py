@@ -10,6 +10,7 @@ from proofroll.comparison import Tolerance
 from proofroll.engine import Level
 from proofroll.errors import InputError
 from proofroll.registry import parse_engine
+from proofroll.studies.pareto import tied
 
 # How many times smaller than the tolerance an error must be, at the scene's own parameters, to pass with margin.
 MARGIN = 2.0
@@ -47,6 +48,7 @@ def recommend(study: Mapping[str, Any], wish: Wish) -> dict[str, Any]:
     """The answer as plain data.
 
     ``choice``: the cheapest point that holds the tolerance with margin, and at every corner of the range;
+    ``ties``: others that hold it and whose cost cannot be told from the choice's, for their intervals overlap;
     ``runner_up``: the cheapest of another engine or formulation; ``first_failure``: of all cheaper points, which fail,
     the most accurate; ``least_model``: the cheapest solution of the scene's own equations; each with
     engine, settings, error, seconds_per_second and reason, or None. ``checked``: the range; ``measured``: when, on
@@ -73,7 +75,7 @@ def recommend(study: Mapping[str, Any], wish: Wish) -> dict[str, Any]:
     asked = [p for p in timed if _asked(p, wish)]
     choice = next((p for p in asked if why_not(p) is None), None)
     affordable = choice is not None and (wish.budget is None or choice["seconds_per_second"] <= wish.budget)
-    answer = {
+    answer: dict[str, Any] = {
         "scene": study["scene"],
         "parameters": study["parameters"],
         "quantity": wish.quantity,
@@ -83,12 +85,16 @@ def recommend(study: Mapping[str, Any], wish: Wish) -> dict[str, Any]:
         "budget": wish.budget,
         "affordable": affordable,
         "choice": _told(choice, wish, _holds(study, choice, wish, absolute)),
+        "ties": [],
         "runner_up": None,
         "first_failure": None,
         "least_model": None,
         "best_within_budget": None,
     }
     if choice is not None:
+        equal = [p for p in asked if p["id"] != choice["id"] and tied(p["interval"], choice["interval"])]
+        held = [p for p in equal if why_not(p) is None]
+        answer["ties"] = [_told(p, wish, _holds(study, p, wish, absolute)) for p in held]
         other = _other(asked, choice, why_not)
         answer["runner_up"] = _told(other, wish, _holds(study, other, wish, absolute))
     answer["first_failure"] = _first_failure(asked, choice, wish, why_not)

@@ -28,6 +28,7 @@ _STEPS = (1.0, 1 / 2, 1 / 5, 1 / 10, 1 / 25, 1 / 50, 1 / 100, 1 / 250)
 _COARSER = (2.0, 4.0, 8.0)
 _FINER = (1 / 500, 1 / 1000, 1 / 2500)
 _TOLERANCES = (1e-1, 1e-2, 1e-3, 1e-4, 1e-6, 1e-8, 1e-10, 1e-12)
+_LOOSER = (1.0, 10.0, 100.0)
 # A run is broken where its error is this part of the quantity's scale; a curve starts in the broken range.
 BROKEN = 0.1
 # A curve is refined while that still takes off this part of the error …
@@ -113,6 +114,14 @@ class Curve:
         """Whether it is swept over steps rather than over tolerances."""
         return self.facts.resolution == "dt"
 
+    @property
+    def saturated(self) -> bool:
+        """Whether the two loosest tolerances give the same run: what limits its steps is then the sampling interval."""
+        if self.fixed_step or len(self.points) < 2:
+            return False
+        loosest, next_to_it = self.points[:2]
+        return bool(loosest.errors) and loosest.errors == next_to_it.errors
+
 
 def curves_of(engines: Iterable[str], workers: Workers | None = None) -> tuple[list[Curve], dict[str, str]]:
     """A curve without points for every formulation and preset of the engines, and why some engine has none.
@@ -195,15 +204,19 @@ def _first(question: Question, curve: Curve) -> list[float]:
 
 
 def _further(question: Question, curve: Curve, references: Mapping[float, Reference], asked: set[float]) -> list[float]:
-    """One coarser step if the coarsest is not broken yet, and one finer if that pays."""
-    if not curve.fixed_step or not curve.points:
+    """One coarser step or looser tolerance if the coarsest is not broken yet, and one finer step if that pays."""
+    if curve.facts.resolution is None or not curve.points:
         return []
     found = []
     scale = references[question.every].scale(question.quantity) or 1.0
     coarsest, finest = curve.points[0], curve.points[-1]
-    coarser = next((step for step in map(question.step, _COARSER) if step not in asked), None)
-    if coarser is not None and coarsest.errors.get(question.quantity, np.inf) < BROKEN * scale:
+    ladder = [question.step(factor) for factor in _COARSER] if curve.fixed_step else _LOOSER
+    coarser = next((value for value in ladder if value not in asked), None)
+    whole = coarsest.errors.get(question.quantity, np.inf) < BROKEN * scale
+    if coarser is not None and whole and not curve.saturated:
         found.append(coarser)
+    if not curve.fixed_step:
+        return found
     finer = next((step for step in map(question.step, _FINER) if step not in asked), None)
     if finer is not None and len(curve.points) > 1:
         ratio = (finest.step or 0.0) / finer

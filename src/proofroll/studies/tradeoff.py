@@ -58,8 +58,8 @@ class Tradeoff:
         curves: with their points.
         absent: engine -> why it has no curve.
         references: the truth by sampling interval.
-        truth_seconds: wall seconds per simulated second of the truth itself.
         timings: by the key of a case.
+        truth_timing: of the truth itself, measured in turns with the points; None if it could not be.
         corners: by the key of a case: its runs over the range.
         over: parameter -> values; the range over which the best points were checked.
         brief: whether speeds were measured less often, as the option of :func:`tradeoff` says.
@@ -69,8 +69,8 @@ class Tradeoff:
     curves: list[Curve]
     absent: dict[str, str]
     references: dict[float, Reference]
-    truth_seconds: float
     timings: dict[str, Timing] = field(default_factory=dict)
+    truth_timing: Timing | None = None
     corners: dict[str, list[Corner]] = field(default_factory=dict)
     over: dict[str, list[float]] = field(default_factory=dict)
     brief: bool = False
@@ -131,9 +131,10 @@ def tradeoff(
             progress(case.engine.name)
 
     references = sweep(question, curves, runner, told)
-    truth = next(iter(runner.run([_truth_case(question, references, runner)]).values()))
-    found = Tradeoff(question, curves, absent, references, truth.wall_seconds / question.until, brief=brief)
-    found.timings = _timed(found, runner.workers, rounds, progress)
+    found = Tradeoff(question, curves, absent, references, brief=brief)
+    truth = _truth_case(question, references, runner)
+    found.timings = _timed(found, truth, runner.workers, rounds, progress)
+    found.truth_timing = found.timings.pop(truth.key, None)
     if over:
         found.over = {name: [float(value) for value in values] for name, values in over.items()}
         found.corners = _checked(found, runner, told)
@@ -149,8 +150,9 @@ def _truth_case(question: Question, references: Mapping[float, Reference], runne
     return case_of(question, references[question.every].scene, facts, question.every)
 
 
-def _timed(found: Tradeoff, workers: Workers, rounds: int, progress: Progress | None) -> dict[str, Timing]:
+def _timed(found: Tradeoff, truth: Case, workers: Workers, rounds: int, progress: Progress | None) -> dict[str, Timing]:
     cases = {point.case.key: point.case for point in found.points if point.result.status == Status.DONE}
+    cases[truth.key] = truth
     with Stopwatch(workers) as stopwatch:
         return interleaved(
             {key: lambda case=case: stopwatch(case) for key, case in cases.items()},  # type: ignore[misc]

@@ -18,6 +18,7 @@ from proofroll.studies.recommend import by_hand
 from proofroll.studies.sweep import BROKEN, Curve, Point
 from proofroll.studies.tradeoff import Tradeoff, judged_quantities, pareto_entries
 from proofroll.surfaces import FloatArray
+from proofroll.timing import Timing
 
 
 def budgets(found: Tradeoff) -> list[tuple[Curve, Budget]]:
@@ -71,7 +72,7 @@ def content(found: Tradeoff) -> dict[str, Any]:
         "budgets": [_budget(curve, item, known.get(item.quantity, "1")) for curve, item in made],
         "pareto": _fronts(found.curves, numbers, found),
         "pareto_engines": _fronts([curve for curve in found.curves if not by_hand(curve.level)], numbers, found),
-        "truth": {"seconds_per_second": found.truth_seconds, "route": reference.dataset.attrs.get("route", "")},
+        "truth": {**_cost(found.truth_timing), "route": reference.dataset.attrs.get("route", "")},
         "over": found.over,
         "findings": findings(found, made),
         "brief": found.brief,
@@ -110,10 +111,17 @@ def _point(curve: Curve, point: Point, number: int, held: dict[str, float], foun
         "message": point.result.message,
         "error": point.errors,
         "envelope": {name: value for name, value in held.items() if name in point.errors},
+        **_cost(timing),
+        "corners": [dataclasses.asdict(corner) for corner in corners] if corners is not None else None,
+    }
+
+
+def _cost(timing: Timing | None) -> dict[str, Any]:
+    """Median and interval of wall seconds per simulated second, or None where nothing was measured."""
+    return {
         "seconds_per_second": timing.interval.value if timing else None,
         "interval": [timing.interval.low, timing.interval.high] if timing else None,
         "measurements": len(timing.values) if timing else 0,
-        "corners": [dataclasses.asdict(corner) for corner in corners] if corners is not None else None,
     }
 
 
@@ -132,12 +140,16 @@ def findings(found: Tradeoff, made: Sequence[tuple[Curve, Budget]]) -> list[str]
     said = []
     quantity = found.question.quantity
     scale, unit = found.reference.scale(quantity) or 1.0, units(found.reference.scene.rolling)[quantity]
-    for curve, item in made:
-        if item.quantity == quantity and item.contradicts_declaration:
-            said.append(
-                f"{curve.engine} declares order {item.declared}, but {quantity} shows "
-                f"{item.order:.2f} ({item.order_low:.2f} to {item.order_high:.2f})."
-            )
+    judged = judged_quantities(found)
+    for curve in found.curves:
+        other = [i for of, i in made if of is curve and i.quantity in judged and i.contradicts_declaration]
+        if other:
+            shown = ", ".join(f"{i.quantity} {i.order:.2f} ({i.order_low:.2f} to {i.order_high:.2f})" for i in other)
+            said.append(f"{curve.engine} declares order {other[0].declared}, but there show: {shown}.")
+    whole = [c for c in found.curves if c.saturated and c.points[0].errors.get(quantity, np.inf) < BROKEN * scale]
+    if whole:
+        names = ", ".join(curve.engine for curve in whole)
+        said.append(f"No tolerance breaks {names}: steps end at every sample, {found.question.every:g} s apart.")
     done = [point for point in found.points if point.result.status == Status.DONE]
     broken = [point for point in done if not point.errors.get(quantity, np.inf) < BROKEN * scale]
     refused = sum(point.result.status == Status.REFUSED for point in found.points)

@@ -57,7 +57,6 @@ def test_search_takes_what_holds(monkeypatch: pytest.MonkeyPatch, tmp_path: Path
     monkeypatch.setattr(searching, "engine_names", lambda: ["projection"])
     monkeypatch.setattr(searching, "_STEPS", ((2, 8),))
     monkeypatch.setattr(searching, "_TOLERANCES", ((1e-3, 1e-6),))
-    monkeypatch.setattr(searching, "_VARIANTS", {})
     true_z = simulate(FREE, "truth", until=0.5, every=0.05)["z"].to_numpy()
 
     found = searching.search(FREE, 0.5, true_z, 1e-4, Runner(Store(tmp_path)), 2, lambda _: None)
@@ -66,6 +65,18 @@ def test_search_takes_what_holds(monkeypatch: pytest.MonkeyPatch, tmp_path: Path
     assert all(item.error <= 1e-4 for item in found)
     assert not any(item.contact or item.case.engine.settings["integrator"] == "taylor" for item in found)
     assert searching.search(FREE, 0.5, true_z + 1.0, 1e-4, Runner(Store(tmp_path)), 2, lambda _: None) == []
+
+
+def test_search_leaves_out_what_an_engine_can_do_without() -> None:
+    """Each term of the formulation that the preset has gives a variant without it; others give none."""
+    terms = [
+        {"formulations": ("a", "b"), "off": {"exact": False}},
+        {"formulations": ("b",), "off": {"drift": None, "damping": 0.0}},
+    ]
+    settings = {"exact": True, "drift": None, "damping": 0.5}
+    assert list(searching._without(terms, "a", settings)) == [{"exact": False}]
+    assert list(searching._without(terms, "b", settings)) == [{"exact": False}, {"drift": None, "damping": 0.0}]
+    assert list(searching._without(terms, "b", settings | {"exact": False, "damping": 0.0})) == []
 
 
 @needs_heyoka

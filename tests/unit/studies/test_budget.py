@@ -7,7 +7,7 @@ import pytest
 
 from proofroll.case import Case, EngineFacts, Result, Status
 from proofroll.metrics import Observable
-from proofroll.studies.budget import FLOOR, MODEL_FORM, TIME_STEP, TRUTH, Budget, budget, order_of, sentence
+from proofroll.studies.budget import FLOOR, MODEL_FORM, TIME_STEP, TRUTH, Budget, Order, budget, order_of, sentence
 from proofroll.studies.sweep import Curve, Point
 
 T = np.linspace(0, 2, 41)
@@ -121,12 +121,24 @@ def test_too_few_runs() -> None:
 
 def test_order_from_two_differences_has_no_interval() -> None:
     """Two differences fix an order but say nothing about its uncertainty."""
-    order, low, high = order_of([4, 2, 1], [12.0, 3.0])
-    assert order == pytest.approx(2)
-    assert low is None
-    assert high is None
+    found = order_of([4, 2, 1], [12.0, 3.0])
+    assert found.value == pytest.approx(2)
+    assert (found.low, found.high) == (None, None)
 
 
 def test_differences_that_do_not_shrink_have_no_order() -> None:
     """Scatter of one size shows no power law."""
-    assert order_of([8, 4, 2, 1], [1.0, 1.1, 1.0]) == (None, None, None)
+    assert order_of([8, 4, 2, 1], [1.0, 1.1, 1.0]) == Order()
+
+
+def test_an_order_is_told_with_the_steps_it_holds_on() -> None:
+    """Differences off the power law at either end are outside the steps for which the order is claimed."""
+    steps = [32.0, 16.0, 8.0, 4.0, 2.0, 1.0, 0.5]
+    square = [3.0 * step**2 for step in steps[1:]]  # of neighbouring runs, where the error is the square of the step
+    assert order_of(steps, square)[3:] == (32.0, 0.5)
+    found = order_of(steps, [0.9 * square[1], *square[1:5], 0.9 * square[4]])
+    assert found.value == pytest.approx(2)
+    assert (found.coarsest, found.finest) == (16.0, 1.0)
+    swept = made(order=2)
+    assert (swept.order_from, swept.order_to) == (STEPS[0], STEPS[-1])
+    assert "from 0.05 s to 0.001 s" in sentence(swept, "m", "dt")

@@ -93,6 +93,7 @@ def test_a_claim_is_held_against_the_points(tmp_path: Path) -> None:
         ("speed = [3, 5]", "haste = [3, 5]", "haste"),
         ("until = 1.0", "until = 1.0\nwheels = 4", "wheels"),
         ('scene = "sphere_in_cylinder"', 'scene = "cone"', "there is no such scene"),
+        (TEXT[TEXT.index("[[cheapest]]") :], "", "claims nothing"),
         ('title = "A claim"', "title = A claim", "the file is broken"),
     ],
 )

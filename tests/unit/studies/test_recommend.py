@@ -8,6 +8,7 @@ import pytest
 
 from proofroll.comparison import Tolerance
 from proofroll.errors import InputError
+from proofroll.report.tradeoff_tables import answer_lines, front_tables
 from proofroll.studies.recommend import Wish, recommend
 
 
@@ -74,6 +75,18 @@ def test_the_cheapest_that_holds_with_margin() -> None:
     assert answer["choice"]["error"] == 1e-4
     assert answer["choice"]["seconds_per_second"] == 1e-2
     assert recommend(study(FAST, MIDDLE, SLOW), wish(1.5e-4))["choice"]["engine"] == "slow"
+
+
+def test_costs_that_cannot_be_told_apart_are_ties() -> None:
+    """Points that hold the tolerance, and whose cost interval overlaps the choice's, are named; others are not."""
+    near, far = point(4, "near", 1.15e-2, 1e-5), point(5, "far", 1.3e-2, 1e-5)
+    failing = point(6, "failing", 1.05e-2, 1e-2)
+    answer = recommend(study(FAST, MIDDLE, near, far, failing, SLOW), wish(1e-3))
+    assert answer["choice"]["engine"] == "middle"
+    assert [tie["engine"] for tie in answer["ties"]] == ["near"]
+    assert answer["ties"][0]["reason"]
+    assert recommend(study(FAST, SLOW), wish(1e-3))["ties"] == []
+    assert any("tie" in line and "near only" in line for line in answer_lines(answer))
 
 
 def test_a_percentage_is_of_the_scale() -> None:
@@ -163,3 +176,15 @@ def test_why_a_finer_step_would_not_do() -> None:
     budgets = [{"curve": FAST["curve"], "quantity": "z", "model_form": 5e-3, "model_form_bar": 1e-5}]
     answer = recommend(study(FAST, MIDDLE, budgets=budgets), wish(1e-3))
     assert "no step would do" in answer["first_failure"]["reason"]
+
+
+def test_ties_are_marked_on_the_front() -> None:
+    """A line of the front whose cost cannot be told from that of a more accurate one is marked, and the mark named."""
+    near = point(4, "near", 1.15e-2, 1e-5)
+    for points, marked in (((FAST, MIDDLE, near, SLOW), ["middle"]), ((FAST, MIDDLE, SLOW), [])):
+        numbers = [p["id"] for p in points]
+        fronts = {"pareto": {"z": numbers}, "pareto_engines": {"z": numbers}}
+        (table,) = front_tables(study(*points, **fronts), ["z"])
+        names, costs = (list(table.columns[index].cells) for index in (0, 2))
+        assert [str(name).split()[0] for name, cost in zip(names, costs, strict=True) if "≈" in str(cost)] == marked
+        assert ("≈" in str(table.caption)) == bool(marked)

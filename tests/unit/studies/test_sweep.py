@@ -15,8 +15,14 @@ QUESTION = Question("sphere_in_cylinder", {"speed": 3.0}, 0.4, "z")
 
 @pytest.fixture(scope="module")
 def swept(tmp_path_factory: pytest.TempPathFactory) -> tuple[dict[str, Curve], float]:
-    """A curve over steps and one over tolerances, and the range of z."""
-    curves, absent = curves_of(["exudyn[formulation=generic,preset=default]", "projection[formulation=rotating_frame]"])
+    """Curves over steps and over tolerances, and the range of z."""
+    curves, absent = curves_of(
+        [
+            "exudyn[formulation=generic,preset=default]",
+            "projection[formulation=rotating_frame]",
+            "pinocchio[formulation=composite,preset=matched]",
+        ]
+    )
     assert absent == {}
     references = sweep(QUESTION, curves, Runner(Store(tmp_path_factory.mktemp("cases"))))
     return {curve.engine: curve for curve in curves}, references[QUESTION.every].sizes["z"]
@@ -42,6 +48,21 @@ def test_a_curve_over_tolerances(swept: tuple[dict[str, Curve], float]) -> None:
     steps = [point.step for point in curve.points]
     assert steps[-1] == curve.facts.settings["rtol"]
     assert max(steps) >= 1e-2
+    # it never breaks: from some tolerance on the sampling interval limits the steps, and no looser one is run
+    assert curve.saturated
+    assert curve.points[0].errors == curve.points[1].errors
+    assert max(steps) < 1e2
+
+
+def test_a_curve_over_tolerances_begins_where_it_breaks(swept: tuple[dict[str, Curve], float]) -> None:
+    """Tolerances are loosened until the run is broken, or until the sampling interval alone limits its steps."""
+    curves, scale = swept
+    curve = curves["pinocchio[formulation=composite,preset=matched]"]
+    first = curve.points[0]
+    broken = first.result.status != Status.DONE or first.errors["z"] >= BROKEN * scale
+    assert broken or curve.saturated
+    assert first.step is not None
+    assert first.step >= 1e-1
 
 
 def test_nothing_of_a_curve_is_lost(swept: tuple[dict[str, Curve], float]) -> None:

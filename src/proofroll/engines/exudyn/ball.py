@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+import math
+from collections.abc import Callable, Iterator
 from dataclasses import dataclass
 from typing import Any
 
@@ -11,9 +12,8 @@ import numpy as np
 from proofroll.engine import Built, Sample
 from proofroll.engines.exudyn.local_frame import curvature
 from proofroll.engines.exudyn.native import Output, items, loads
-from proofroll.engines.exudyn.resistance import resistance_moment
 from proofroll.scene import Capability, RollingBall
-from proofroll.surfaces import FloatArray
+from proofroll.surfaces import FloatArray, Surface
 
 
 @dataclass(frozen=True)
@@ -115,34 +115,39 @@ def _resistance(rolling: RollingBall, node: Any) -> Any:
     N follows from the state: along e1 the centre accelerates by -v·(∂e1/∂p)v, so that
     N = m (v·(∂e1/∂p)v + e1·g). The last multiplier instead would lag by an iterate and make the moment ring with it.
     """
-    frame = rolling.surface.triad
-    bend = _bend(rolling)
+    triad = rolling.surface.triad
+    (k22, k23), (_, k33) = curvature(rolling.surface, rolling.u0).tolist()
+    bend = None if rolling.surface.generators is not None else _bend(rolling.surface)
     m = rolling.ball.mass
     gx, gy, gz = rolling.gravity.tolist()
     position, velocity = Output.Position, Output.Velocity
 
     def moment(system: Any, t: float, load: Any) -> list[float]:  # noqa: ARG001 -- Exudyn's signature
-        x, y, z = system.GetNodeOutput(node, position).tolist()
-        vx, vy, vz = system.GetNodeOutput(node, velocity).tolist()
-        x1, y1, z1, x2, y2, z2, x3, y3, z3 = frame(x, y, z)
+        output = system.GetNodeOutput
+        x, y, z = output(node, position).tolist()
+        vx, vy, vz = output(node, velocity).tolist()
+        x1, y1, z1, x2, y2, z2, x3, y3, z3 = triad(x, y, z)
         v2, v3 = vx * x2 + vy * y2 + vz * z2, vx * x3 + vy * y3 + vz * z3
-        N = m * (bend(x, y, z, v2, v3) + x1 * gx + y1 * gy + z1 * gz)
-        M2, M3 = resistance_moment(load[0], N, v2, v3)
+        speed = math.hypot(v2, v3)
+        if not speed:
+            return [0.0, 0.0, 0.0]
+        # v·(∂e1/∂p)v, of which a homogeneous surface has the same coefficients everywhere
+        turning = k22 * v2 * v2 + 2 * k23 * v2 * v3 + k33 * v3 * v3 if bend is None else bend(x, y, z, v2, v3)
+        N = m * (turning + x1 * gx + y1 * gy + z1 * gz)
+        # as resistance_moment, the call of which would be felt
+        factor = load[0] * N / speed
+        M2, M3 = -factor * v3, factor * v2
         return [M2 * x2 + M3 * x3, M2 * y2 + M3 * y3, M2 * z2 + M3 * z3]
 
     return moment
 
 
-def _bend(rolling: RollingBall) -> Any:
+def _bend(surface: Surface) -> Callable[[float, float, float, float, float], float]:
     """v·(∂e1/∂p)v [m/s²] as a function of place and of v along e2 and e3."""
-    surface = rolling.surface
-    if surface.generators is None:
 
-        def anywhere(x: float, y: float, z: float, v2: float, v3: float) -> float:
-            p = np.array([x, y, z])
-            v = surface.frame(surface.locate(p))[:, 1:] @ (v2, v3)
-            return float(v @ surface.normal_gradient(p) @ v)
+    def anywhere(x: float, y: float, z: float, v2: float, v3: float) -> float:
+        p = np.array([x, y, z])
+        v = surface.frame(surface.locate(p))[:, 1:] @ (v2, v3)
+        return float(v @ surface.normal_gradient(p) @ v)
 
-        return anywhere
-    (k22, k23), (_, k33) = curvature(surface, rolling.u0).tolist()
-    return lambda x, y, z, v2, v3: k22 * v2 * v2 + 2 * k23 * v2 * v3 + k33 * v3 * v3  # noqa: ARG005 -- same everywhere
+    return anywhere

@@ -69,10 +69,9 @@ class Contact:
         self.ball = add_ball(self.system, rolling)
         radius = body.ball.radius
         hollow = _hollow_radius(body)
-        self._centre = _centre_function(body, hollow - radius)
         ground = self.system.AddObject(items.ObjectGround())
         self.follower = self.system.AddMarker(
-            items.MarkerBodyRigid(bodyNumber=ground, localPosition=self._centre(*body.p0.tolist()))
+            items.MarkerBodyRigid(bodyNumber=ground, localPosition=_centre(body, hollow - radius))
         )
         self.data = self.system.AddNode(
             items.NodeGenericData(
@@ -91,7 +90,9 @@ class Contact:
                 contactStiffness=stiffness,
             )
         )
-        self.system.SetPreNewtonResidualUserFunction(_follower(self.ball.node, self.follower, self._centre))
+        self.system.SetPreNewtonResidualUserFunction(
+            _follower(self.system, self.ball.node, self.follower, body.surface.nearby, hollow - radius)
+        )
         self.system.Assemble()
         self._softened = _softened(body, settings, creep, N, mu, hollow)
         self._t, self._events = 0.0, []
@@ -152,12 +153,20 @@ class Contact:
         return dataclasses.replace(built, mu_static=mu, mu_kinetic=mu, terms=terms, regularised=self._softened)
 
 
-def _follower(node: Any, marker: Any, centre: Callable[[float, float, float], list[float]]) -> Callable[..., None]:
-    """Moves the hollow sphere to where the ball touches the wall."""
+def _follower(
+    system: Any, node: Any, marker: Any, nearby: Callable[..., tuple[float, ...]], distance: float
+) -> Callable[..., None]:
+    """Moves the hollow sphere to where the ball touches the wall, as :func:`_centre` says; called for every residual.
+
+    So what Exudyn is asked is looked up once.
+    """
+    output, move = system.GetNodeOutput, system.SetMarkerParameter
 
     def follow(system: Any, t: float, newton_iteration: int, discontinuous_iteration: int) -> None:  # noqa: ARG001 -- Exudyn's signature
-        x, y, z = system.GetNodeOutput(node, POSITION).tolist()
-        system.SetMarkerParameter(marker, "localPosition", centre(x, y, z))
+        x, y, z = output(node, POSITION).tolist()
+        gap, e1x, e1y, e1z = nearby(x, y, z)
+        back = gap - distance
+        move(marker, "localPosition", [x + back * e1x, y + back * e1y, z + back * e1z])
 
     return follow
 
@@ -210,13 +219,7 @@ def _softened(
     return softened
 
 
-def _centre_function(body: RollingBall, distance: float) -> Callable[[float, float, float], list[float]]:
-    """Centre of the hollow sphere for a ball at x, y, z [m]: a touching ball's centre is ``distance`` away from it."""
-    nearby = body.surface.nearby
-
-    def centre(x: float, y: float, z: float) -> list[float]:
-        gap, e1x, e1y, e1z = nearby(x, y, z)
-        back = gap - distance
-        return [x + back * e1x, y + back * e1y, z + back * e1z]
-
-    return centre
+def _centre(body: RollingBall, distance: float) -> FloatArray:
+    """Centre of the hollow sphere at time 0 [m], shape (3,): a touching ball's centre is ``distance`` away from it."""
+    gap, *e1 = body.surface.nearby(*body.p0.tolist())
+    return np.asarray(body.p0 + (gap - distance) * np.array(e1))

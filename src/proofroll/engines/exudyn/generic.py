@@ -15,19 +15,23 @@ import numpy as np
 
 from proofroll.engine import Built, Sample
 from proofroll.engines.exudyn.friction import Sliding, Touch, needed_function
+from proofroll.engines.exudyn.generic_forces import (
+    SIZE,
+    base,
+    constant_weight,
+    force_function,
+    quadratic_terms,
+    weight_function,
+)
 from proofroll.engines.exudyn.integration import Integration, initial_matrices, new_system
-from proofroll.engines.exudyn.local_frame import LocalGeometry, local_geometry
+from proofroll.engines.exudyn.local_frame import local_geometry
 from proofroll.engines.exudyn.native import exu, items
-from proofroll.engines.exudyn.resistance import resistance_moment
 from proofroll.engines.exudyn.settings import ExudynSettings
 from proofroll.engines.exudyn.stick_slip import StickSlip
 from proofroll.errors import Refused
 from proofroll.events import Event
 from proofroll.scene import Capability, RollingBall
 from proofroll.surfaces import FloatArray
-
-# q = (distance towards the wall, u1, u2, three quasi-coordinates whose rates are ω1, ω2, ω3)
-SIZE = 6
 
 
 class Generic:
@@ -53,7 +57,7 @@ class Generic:
         mass[1:3, 1:3] = m * self.local.tangents.T @ self.local.tangents
         self.object = self.system.AddObject(
             items.ObjectGenericODE2(
-                nodeNumbers=[node], massMatrix=mass, forceUserFunction=_force_function(body, self.local, self.friction)
+                nodeNumbers=[node], massMatrix=mass, forceUserFunction=force_function(body, self.local, self.friction)
             )
         )
         self.rolling = self._constrain(node, body.ball.radius)
@@ -63,8 +67,8 @@ class Generic:
         if self.friction is None:
             self.integration = Integration(self.system, settings)
         else:
-            self._needed, self._local_gravity = needed_function(body), _weight(body, self.local, np.eye(3))
-            constant = _constant_weight(body, self.local, np.eye(3))
+            self._needed, self._local_gravity = needed_function(body), weight_function(body, self.local, np.eye(3))
+            constant = constant_weight(body, self.local, np.eye(3))
             self._constant_gravity = None if constant is None else tuple(constant[:3])
             self._radius = body.ball.radius
             self._tangents: tuple[float, ...] = tuple(self.local.tangents[1:].ravel().tolist())
@@ -86,7 +90,7 @@ class Generic:
                 self.friction.direction = 0.6, 0.8
                 slipping = initial_matrices(self.system, settings)[2]
                 self.friction.direction = None
-            to_force = np.linalg.inv(_base(self.local)).T
+            to_force = np.linalg.inv(base(self.local)).T
             return mass[0, 0], to_force @ rolling[:3], rolling[3:], to_force @ (slipping - rolling)[:3]
 
         mass, weight, _, _ = forces(np.zeros(SIZE))
@@ -119,7 +123,7 @@ class Generic:
         Raises:
             Refused: the weight turns with the coordinates.
         """
-        weight = _weight(body, self.local, body.ball.mass * _base(self.local))
+        weight = weight_function(body, self.local, body.ball.mass * base(self.local))
         forces = [weight([0.0, *(body.u0 + turned), 0.0, 0.0, 0.0]) for turned in (np.zeros(2), np.ones(2))]
         if forces[0] != forces[1]:
             raise Refused("the program for this formulation has no gravity across the wall's axis")
@@ -230,92 +234,3 @@ class Generic:
             yield Capability.ROLLING_RESISTANCE
         if isinstance(self.integration, StickSlip):
             yield Capability.BOUNDED_FRICTION
-
-
-def _base(local: LocalGeometry) -> FloatArray:
-    """∂p/∂(distance, u1, u2) in the local frame."""
-    return np.concatenate([np.eye(3)[:, :1], local.tangents], axis=1)
-
-
-def quadratic_terms(body: RollingBall, local: LocalGeometry) -> list[tuple[int, int, int, float]]:
-    """All inertial terms Q_r = Σ c_rij q̇_i q̇_j as (r, i, j, c).
-
-    Terms with the distance itself as a factor are left out: the constraint keeps it at zero.
-    """
-    m, J = body.ball.mass, body.ball.inertia
-    c = np.zeros((SIZE, SIZE, SIZE))
-    base = _base(local)
-    c[:3, 1:3, 1:3] = -m * np.einsum("ir,ijk->rjk", base, local.second)
-    for k in range(2):
-        turn = local.turn[:, k]
-        c[:3, 0, 1 + k] -= 2 * m * base.T @ np.cross(turn, [1.0, 0.0, 0.0])
-        c[3:, 1 + k, 3:] -= J * np.cross(turn, np.eye(3)).T
-    return [(int(r), int(i), int(j), float(c[r, i, j])) for r, i, j in np.argwhere(np.abs(c) > 0)]
-
-
-def _force_function(body: RollingBall, local: LocalGeometry, friction: Sliding | None) -> Any:
-    """Right-hand side of M q̈ + Cᵀλ = Q as plain floats: Exudyn calls it for every residual."""
-    f = body.contact.rolling_resistance
-    tangents = local.tangents
-    quadratic = quadratic_terms(body, local)
-    (t2u, t2v), (t3u, t3v) = tangents[1:].tolist()
-    base = body.ball.mass * _base(local)
-    weight, constant = _weight(body, local, base), _constant_weight(body, local, base)
-    a = body.ball.radius
-
-    def force(system: Any, t: float, item: int, q: list[float], rates: list[float]) -> list[float]:  # noqa: ARG001 -- Exudyn's signature
-        result: list[float] = constant[:] if constant is not None else weight(q)
-        for row, i, j, factor in quadratic:
-            result[row] += factor * rates[i] * rates[j]
-        N = result[0]  # along the distance nothing accelerates
-        if f:
-            v2, v3 = t2u * rates[1] + t2v * rates[2], t3u * rates[1] + t3v * rates[2]
-            M2, M3 = resistance_moment(f, N, v2, v3)
-            result[4] += M2
-            result[5] += M3
-        if friction is not None and friction.direction is not None:
-            F2, F3 = friction.force(friction.direction, N)
-            result[1] += t2u * F2 + t3u * F3
-            result[2] += t2v * F2 + t3v * F3
-            result[4] -= a * F3
-            result[5] += a * F2
-        return result
-
-    return force
-
-
-def _rotations(local: LocalGeometry) -> tuple[list[int], FloatArray]:
-    """Which coordinates turn the frame, and about which axis the first of them does."""
-    rotations = [k for k, generator in enumerate(local.generators) if generator.kind == "rotation"]
-    return rotations, np.asarray(local.generators[rotations[0]].axis) if rotations else np.zeros(3)
-
-
-def _constant_weight(body: RollingBall, local: LocalGeometry, scaled: FloatArray) -> list[float] | None:
-    """Generalised gravity if it is the same everywhere, else None."""
-    rotations, axis = _rotations(local)
-    if rotations and np.any(np.abs(np.cross(axis, body.gravity)) > 1e-14 * np.linalg.norm(body.gravity)):
-        return None
-    return [*(scaled.T @ body.surface.frame(body.u0).T @ body.gravity).tolist(), 0.0, 0.0, 0.0]
-
-
-def _weight(body: RollingBall, local: LocalGeometry, scaled: FloatArray) -> Any:
-    """Generalised gravity as a function of q: constant, or turning once around with one of the coordinates."""
-    constant = _constant_weight(body, local, scaled)
-    if constant is not None:
-        return lambda q: constant[:]  # noqa: ARG005 -- the place does not matter here
-    to_local = body.surface.frame(body.u0).T
-    rotations, axis = _rotations(local)
-    along = axis * (axis @ body.gravity)
-    cosine, sine = body.gravity - along, np.cross(axis, body.gravity)
-    zero = [0.0, 0.0, 0.0]
-    if len(rotations) > 1:
-        raise Refused("gravity along a wall with two rotations is not built")
-    steady, with_cosine, with_sine = (scaled.T @ to_local @ part for part in (along, cosine, sine))
-    column, start = 1 + rotations[0], float(body.u0[rotations[0]])
-
-    def weight(q: list[float]) -> list[float]:
-        angle = q[column] - start
-        force: list[float] = (steady + np.cos(angle) * with_cosine - np.sin(angle) * with_sine).tolist()
-        return force + zero
-
-    return weight

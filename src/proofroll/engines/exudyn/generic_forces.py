@@ -1,0 +1,122 @@
+"""Forces of the formulation ``generic``: gravity, inertia, rolling resistance and friction in its coordinates."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from typing import Any
+
+import numpy as np
+
+from proofroll.engines.exudyn.friction import Sliding
+from proofroll.engines.exudyn.local_frame import LocalGeometry
+from proofroll.engines.exudyn.resistance import resistance_moment
+from proofroll.errors import Refused
+from proofroll.scene import RollingBall
+from proofroll.surfaces import FloatArray
+
+# The distance towards the wall, its two coordinates, and three whose rates are the spin.
+SIZE = 6
+
+
+def base(local: LocalGeometry) -> FloatArray:
+    """∂p/∂(distance, u1, u2) in the local frame."""
+    return np.concatenate([np.eye(3)[:, :1], local.tangents], axis=1)
+
+
+def quadratic_terms(body: RollingBall, local: LocalGeometry) -> list[tuple[int, int, int, float]]:
+    """All inertial terms Q_r = Σ c_rij q̇_i q̇_j as (r, i, j, c).
+
+    Terms with the distance itself as a factor are left out: the constraint keeps it at zero.
+    """
+    m, J = body.ball.mass, body.ball.inertia
+    c = np.zeros((SIZE, SIZE, SIZE))
+    along = base(local)
+    c[:3, 1:3, 1:3] = -m * np.einsum("ir,ijk->rjk", along, local.second)
+    for k in range(2):
+        turn = local.turn[:, k]
+        c[:3, 0, 1 + k] -= 2 * m * along.T @ np.cross(turn, [1.0, 0.0, 0.0])
+        c[3:, 1 + k, 3:] -= J * np.cross(turn, np.eye(3)).T
+    return [(int(r), int(i), int(j), float(c[r, i, j])) for r, i, j in np.argwhere(np.abs(c) > 0)]
+
+
+def force_function(body: RollingBall, local: LocalGeometry, friction: Sliding | None) -> Any:
+    """Right-hand side of M q̈ + Cᵀλ = Q as plain floats: Exudyn calls it for every residual."""
+    f = body.contact.rolling_resistance
+    tangents = local.tangents
+    (t2u, t2v), (t3u, t3v) = tangents[1:].tolist()
+    scaled = body.ball.mass * base(local)
+    weight, constant = weight_function(body, local, scaled), constant_weight(body, local, scaled)
+    terms = _summed(constant or [0.0] * SIZE, quadratic_terms(body, local))
+    a = body.ball.radius
+
+    def force(system: Any, t: float, item: int, q: list[float], rates: list[float]) -> list[float]:  # noqa: ARG001 -- Exudyn's signature
+        result = terms(*rates)
+        if constant is None:
+            along1, along2, along3 = weight(q)[:3]
+            result[0], result[1], result[2] = result[0] + along1, result[1] + along2, result[2] + along3
+        N = result[0]  # along the distance nothing accelerates
+        if f:
+            v2, v3 = t2u * rates[1] + t2v * rates[2], t3u * rates[1] + t3v * rates[2]
+            M2, M3 = resistance_moment(f, N, v2, v3)
+            result[4] += M2
+            result[5] += M3
+        if friction is not None and friction.direction is not None:
+            F2, F3 = friction.force(friction.direction, N)
+            result[1] += t2u * F2 + t3u * F3
+            result[2] += t2v * F2 + t3v * F3
+            result[4] -= a * F3
+            result[5] += a * F2
+        return result
+
+    return force
+
+
+def _summed(constant: list[float], quadratic: list[tuple[int, int, int, float]]) -> Callable[..., list[float]]:
+    """A function of the rates: a constant in each row, and the quadratic terms.
+
+    Its numbers are written into its source, as they are found at run time: a loop over the terms takes as long as all
+    that Exudyn does in a step.
+    """
+    rows = [[repr(value)] for value in constant]
+    for row, i, j, factor in quadratic:
+        rows[row].append(f"{factor!r} * q{i} * q{j}")
+    arguments, sums = ", ".join(f"q{i}" for i in range(SIZE)), ", ".join(" + ".join(row) for row in rows)
+    function: Callable[..., list[float]] = eval(f"lambda {arguments}: [{sums}]", {})  # numbers of our own alone
+    return function
+
+
+def _rotations(local: LocalGeometry) -> tuple[list[int], FloatArray]:
+    """Which coordinates turn the frame, and about which axis the first of them does."""
+    rotations = [k for k, generator in enumerate(local.generators) if generator.kind == "rotation"]
+    return rotations, np.asarray(local.generators[rotations[0]].axis) if rotations else np.zeros(3)
+
+
+def constant_weight(body: RollingBall, local: LocalGeometry, scaled: FloatArray) -> list[float] | None:
+    """Generalised gravity if it is the same everywhere, else None."""
+    rotations, axis = _rotations(local)
+    if rotations and np.any(np.abs(np.cross(axis, body.gravity)) > 1e-14 * np.linalg.norm(body.gravity)):
+        return None
+    return [*(scaled.T @ body.surface.frame(body.u0).T @ body.gravity).tolist(), 0.0, 0.0, 0.0]
+
+
+def weight_function(body: RollingBall, local: LocalGeometry, scaled: FloatArray) -> Any:
+    """Generalised gravity as a function of q: constant, or turning once around with one of the coordinates."""
+    constant = constant_weight(body, local, scaled)
+    if constant is not None:
+        return lambda q: constant[:]  # noqa: ARG005 -- the place does not matter here
+    to_local = body.surface.frame(body.u0).T
+    rotations, axis = _rotations(local)
+    along = axis * (axis @ body.gravity)
+    cosine, sine = body.gravity - along, np.cross(axis, body.gravity)
+    zero = [0.0, 0.0, 0.0]
+    if len(rotations) > 1:
+        raise Refused("gravity along a wall with two rotations is not built")
+    steady, with_cosine, with_sine = (scaled.T @ to_local @ part for part in (along, cosine, sine))
+    column, start = 1 + rotations[0], float(body.u0[rotations[0]])
+
+    def weight(q: list[float]) -> list[float]:
+        angle = q[column] - start
+        force: list[float] = (steady + np.cos(angle) * with_cosine - np.sin(angle) * with_sine).tolist()
+        return force + zero
+
+    return weight
