@@ -204,6 +204,7 @@ def test_adependence_on_scale() -> None:
         return [
             {
                 "value": 10.0**k,
+                "too_slow": None,
                 "period": 2.0,
                 "resolution": "dt",
                 "sides": {"stable": {"largest": x, "failure": "refused"}},
@@ -217,6 +218,8 @@ def test_adependence_on_scale() -> None:
         points(0.1, 0.04), "stable"
     )
     assert "nowhere at 10 (refused)" in dependence(points(0.1, None), "stable")
+    cut = [point | {"too_slow": 0.05} for point in points(0.1, None)]
+    assert dependence(cut, "stable") == ""
 
 
 def test_what_explains_a_boundary() -> None:
