@@ -138,6 +138,8 @@ def _scale_findings(found: StabilityMap, points: list[dict[str, Any]]) -> list[s
 def dependence(points: Sequence[Mapping[str, Any]], name: str) -> str:
     """How a boundary, in parts of the natural time, changes along an axis, if it does; else nothing.
 
+    Where the search was cut by its patience, a boundary that is missing says nothing.
+
     Args:
         points: of one curve along one axis, as the study has them.
         name: of the boundary.
@@ -148,7 +150,7 @@ def dependence(points: Sequence[Mapping[str, Any]], name: str) -> str:
         if largest is not None:
             fixed_step = point["resolution"] == "dt"
             sizes.append((largest / point["period"] if fixed_step else largest, point["value"]))
-    without = [point for point in points if point["sides"][name]["largest"] is None]
+    without = [point for point in points if point["sides"][name]["largest"] is None and point["too_slow"] is None]
     if not sizes or (not without and max(sizes)[0] <= _SAME[fixed_step] * min(sizes)[0]):
         return ""
     what = " of the natural time" if fixed_step else ""

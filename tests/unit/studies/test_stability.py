@@ -58,7 +58,9 @@ def test_a_map(small: Any) -> None:
 def test_a_closed_form_has_no_boundary(tmp_path: Path) -> None:
     """What has neither step nor tolerance is named with the reason, and its neighbour is mapped by its tolerance."""
     axis = Axis("V0", "m/s", "initial speed", [4.0], {"speed": Term()})
-    found = mapped(tmp_path, ["reduced[preset=matched]"], [axis])
+    told: list[str] = []
+    found = mapped(tmp_path, ["reduced[preset=matched]"], [axis], progress=lambda text, _: told.append(text))
+    assert told[-1].endswith("V0 = 4: 1 of 1 points")
     assert [point.curve.facts.settings["formulation"] for point in found.points] == ["equations"]
     assert content(found)["points"][0]["resolution"] == "rtol"
     (reason,) = found.absent.values()
@@ -204,6 +206,7 @@ def test_adependence_on_scale() -> None:
         return [
             {
                 "value": 10.0**k,
+                "too_slow": None,
                 "period": 2.0,
                 "resolution": "dt",
                 "sides": {"stable": {"largest": x, "failure": "refused"}},
@@ -217,6 +220,8 @@ def test_adependence_on_scale() -> None:
         points(0.1, 0.04), "stable"
     )
     assert "nowhere at 10 (refused)" in dependence(points(0.1, None), "stable")
+    cut = [point | {"too_slow": 0.05} for point in points(0.1, None)]
+    assert dependence(cut, "stable") == ""
 
 
 def test_what_explains_a_boundary() -> None:
