@@ -117,6 +117,7 @@ def _resistance(rolling: RollingBall, node: Any) -> Any:
     """
     triad = rolling.surface.triad
     (k22, k23), (_, k33) = curvature(rolling.surface, rolling.u0).tolist()
+    twist = 2 * k23
     bend = None if rolling.surface.generators is not None else _bend(rolling.surface)
     m = rolling.ball.mass
     gx, gy, gz = rolling.gravity.tolist()
@@ -132,7 +133,7 @@ def _resistance(rolling: RollingBall, node: Any) -> Any:
         if not speed:
             return [0.0, 0.0, 0.0]
         # v·(∂e1/∂p)v, of which a homogeneous surface has the same coefficients everywhere
-        turning = k22 * v2 * v2 + 2 * k23 * v2 * v3 + k33 * v3 * v3 if bend is None else bend(x, y, z, v2, v3)
+        turning = k22 * v2 * v2 + (twist * v2 + k33 * v3) * v3 if bend is None else bend(x, y, z, v2, v3)
         N = m * (turning + x1 * gx + y1 * gy + z1 * gz)
         # as resistance_moment, the call of which would be felt
         factor = load[0] * N / speed

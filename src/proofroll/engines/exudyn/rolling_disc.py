@@ -55,11 +55,12 @@ class RollingDisc:
         position, rotation = Output.Position, Output.RotationMatrix
 
         def aim(system: Any, t: float, newton_iteration: int, discontinuous_iteration: int) -> None:  # noqa: ARG001 -- Exudyn's signature
-            e1x, e1y, e1z, x, y, z, *_ = frame(*system.GetNodeOutput(node, position).tolist())
-            r = system.GetNodeOutput(node, rotation).tolist()
-            axis = [x * r[k] + y * r[k + 3] + z * r[k + 6] for k in (0, 1, 2)]  # e2 in the ball's frame
-            system.SetObjectParameter(joint, "planeNormal", [-e1x, -e1y, -e1z])
-            system.SetObjectParameter(joint, "discAxis", axis)
+            x, y, z = system.GetNodeOutput(node, position).tolist()
+            x1, y1, z1, x2, y2, z2, _, _, _ = frame(x, y, z)
+            xx, xy, xz, yx, yy, yz, zx, zy, zz = system.GetNodeOutput(node, rotation).tolist()
+            axis = [x2 * xx + y2 * yx + z2 * zx, x2 * xy + y2 * yy + z2 * zy, x2 * xz + y2 * yz + z2 * zz]
+            system.SetObjectParameter(joint, "planeNormal", [-x1, -y1, -z1])
+            system.SetObjectParameter(joint, "discAxis", axis)  # e2 in the ball's frame
 
         return aim
 
