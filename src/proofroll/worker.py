@@ -313,10 +313,12 @@ def time_once(case: dict[str, Any], seconds: float) -> dict[str, Any]:
     from proofroll.scene_file import load_scene
 
     wanted = Case.from_dict(case)
-    kind = load_engine(wanted.engine.name)
-    settings = resolve_settings(kind, wanted.engine.settings)
     scene = load_scene(wanted.scene, asks=wanted.asks, **wanted.parameters)
     times = time_grid(wanted.until, wanted.every)
+    if wanted.engine.name == "truth":
+        return _time_truth(scene, times, seconds)
+    kind = load_engine(wanted.engine.name)
+    settings = resolve_settings(kind, wanted.engine.settings)
     elapsed = simulated = 0.0
     start = time.perf_counter()
     while elapsed < seconds and time.perf_counter() - start < _MOST_BUILDING * seconds:
@@ -325,6 +327,21 @@ def time_once(case: dict[str, Any], seconds: float) -> dict[str, Any]:
         except (Refused, Diverged) as error:
             return {"seconds_per_second": None, "message": str(error)}
         elapsed, simulated = elapsed + wall, simulated + t
+    return {"seconds_per_second": elapsed / simulated, "message": f"{simulated:g} s simulated"}
+
+
+def _time_truth(scene: Any, times: Any, seconds: float) -> dict[str, Any]:
+    """As :func:`time_once`, of both routes of the truth together; at least one whole run."""
+    from proofroll.truth import truth
+
+    start, runs, elapsed = time.perf_counter(), 0, 0.0
+    while not runs or elapsed < seconds:
+        try:
+            truth(scene, times)
+        except (Refused, Diverged) as error:
+            return {"seconds_per_second": None, "message": str(error)}
+        runs, elapsed = runs + 1, time.perf_counter() - start
+    simulated = runs * float(times[-1])
     return {"seconds_per_second": elapsed / simulated, "message": f"{simulated:g} s simulated"}
 
 
