@@ -17,9 +17,9 @@ from screenshot import screenshot
 
 from proofroll.comparison_file import load_comparison
 from proofroll.report.content import outcome_content
-from proofroll.report.html import write_report
 from proofroll.report.markdown import cheapest_table, verdict_table
 from proofroll.report.regime_map import draw as draw_regimes
+from proofroll.report.whole import write_report
 from proofroll.report.work_precision import draw as draw_work_precision
 from proofroll.runner import Runner
 from proofroll.store import Store

@@ -15,14 +15,14 @@ from typing import Any
 import numpy as np
 import pytest
 from browsing import Visit, launched, visiting
+from invented import figures_part, further
 
 from proofroll.agreement import Verdict, judge
 from proofroll.case import Case, EngineFacts, Result, Status
 from proofroll.comparison import Band, Comparison, Row, Tolerance
 from proofroll.metrics import observables, scales
-from proofroll.report.html import page, report_content, write_report
-from proofroll.report.plots import point_curves
-from proofroll.report.regime_map import inline
+from proofroll.report.html import page
+from proofroll.report.whole import begun, write_report
 from proofroll.scene_file import load_scene
 from proofroll.store import Store
 from proofroll.studies.compare import Outcome, Run
@@ -183,18 +183,23 @@ class Parts:
     content: dict[str, Any]
     curves: list[list[dict[str, Any]]]
     pictures: dict[str, str]
+    replay: dict[str, Any]
 
     def write(self, file: Path) -> Path:
         """The page as a file."""
-        file.write_text(page(self.content, self.curves, self.pictures), encoding="utf-8")
+        file.write_text(page(self.content, self.curves, self.pictures, self.replay), encoding="utf-8")
         return file
 
 
 @pytest.fixture(scope="session")
-def everything(made: tuple[Outcome, Store]) -> Parts:
+def everything(made: tuple[Outcome, Store], tmp_path_factory: pytest.TempPathFactory) -> Parts:
     """The invented comparison with bounded friction at its first point, so that each part of a report is there."""
     maps = [regime_map(load_scene("sphere_in_cylinder"), [3.0, 4.0], [0.1, 0.7], until=0.5)]
-    content = report_content([made[0]], made[1], "proofroll report invented", [maps])
+    whole = begun([made[0]], made[1], "proofroll report invented", [maps])
+    for part in (figures_part(tmp_path_factory.mktemp("figures")), *further()):
+        whole.parts.append(part)
+        whole.make(part, lambda: None)
+    content = whole.content
     comparison = content["comparisons"][0]
     event = {"kind": "slip", "time": 0.5, "time_low": 0.5, "time_high": 0.51}
     known = dict.fromkeys(("by_mu", "by_f", "edge_below", "edge_above", "distance", "earliest", "latest"))
@@ -202,7 +207,7 @@ def everything(made: tuple[Outcome, Store]) -> Parts:
     comparison["truths"][0] |= {"events": [event], "mu_static": 0.3, "mu_kinetic": 0.2, "onset": onset}
     for run in comparison["runs"]:
         run |= {"events": [event], "onset_verdict": "agree"}
-    return Parts(content, [point_curves(*made)], {"map0": inline(maps, "map0-")})
+    return Parts(content, whole.curves, whole.pictures, whole.replay)
 
 
 @pytest.fixture(scope="session")

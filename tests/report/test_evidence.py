@@ -16,9 +16,10 @@ from proofroll.agreement import Verdict, judge
 from proofroll.comparison import ExceptAt, Row, Tolerance
 from proofroll.metrics import observables
 from proofroll.report.evidence import add_evidence, cost
-from proofroll.report.html import page, report_content
+from proofroll.report.html import page
 from proofroll.report.labels import error
 from proofroll.report.plots import MOST_POINTS, kept, point_curves
+from proofroll.report.report_content import report_content
 from proofroll.report.styles import OUTLINES, styles
 from proofroll.report.tables import cost_title, costs, expectations
 from proofroll.scene_file import load_scene

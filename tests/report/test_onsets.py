@@ -16,14 +16,16 @@ from proofroll.agreement import Judgement, Verdict
 from proofroll.case import Case, EngineFacts, Result, Status
 from proofroll.comparison import Band, Comparison, Row, Tolerance
 from proofroll.events import Event, events_of, with_events
-from proofroll.report.html import page, report_content, write_report
+from proofroll.report.html import page
 from proofroll.report.labels import MEANINGS, SYMBOLS
 from proofroll.report.markdown import verdict_table as markdown_table
 from proofroll.report.onset_tables import bracket, clock, conditioning, slip_table
 from proofroll.report.onsets import CURVE, mark
 from proofroll.report.plots import point_curves
+from proofroll.report.report_content import report_content
 from proofroll.report.scores import scores
 from proofroll.report.terminal import closing_lines, console, verdict_table
+from proofroll.report.whole import write_report
 from proofroll.scene_file import load_scene
 from proofroll.store import Store
 from proofroll.studies.compare import Outcome, Run

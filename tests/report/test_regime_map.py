@@ -8,8 +8,8 @@ from typing import Any
 import pytest
 import xarray as xr
 
-from proofroll.report.html import write_report
 from proofroll.report.regime_map import boundaries, counts, draw, inline
+from proofroll.report.whole import write_report
 from proofroll.scene_file import load_scene
 from proofroll.store import Store
 from proofroll.studies.compare import Outcome

@@ -18,12 +18,13 @@ from scipy.integrate import solve_ivp
 from scipy.spatial.transform import Rotation
 
 from proofroll.report import replay_library
-from proofroll.report.html import page, report_content
+from proofroll.report.html import page
 from proofroll.report.plots import point_curves
 from proofroll.report.replay import LENGTH, described, replay_content
 from proofroll.report.replay_library import thinned, three
 from proofroll.report.replay_poses import AWAY, SLIPS, STICKS, WIDEST_TURN, frame_times, poses
 from proofroll.report.replay_wall import middle, wall
+from proofroll.report.report_content import report_content
 from proofroll.scene_file import load_scene
 from proofroll.trajectory import read, write
 from proofroll.truth import truth

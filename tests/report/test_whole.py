@@ -8,103 +8,21 @@ from pathlib import Path
 from typing import Any, ClassVar
 
 import pytest
+from invented import further, stability_study, tradeoff_study
 
 from proofroll.errors import ProofrollError
 from proofroll.report.html import page
 from proofroll.report.parts import KEYS, absent, all_parts, attempt, entry, parts_of
-from proofroll.report.stability_part import StabilityPart
 from proofroll.report.summary import three_sentences
-from proofroll.report.tradeoff_part import TradeoffPart
 from proofroll.report.whole import Report, begun
 from proofroll.store import Store
-from proofroll.studies import installed
-from proofroll.studies.claims import claims_for
 from proofroll.studies.compare import Outcome
 from proofroll.studies.keeping import stability_path
 from proofroll.studies.places import QUICK, Effort
-from proofroll.studies.stability_claims import file_for
 from proofroll.studies.tradeoff import stored
 
 POISON = "</script><script>alert('poison')</script><img src=x onerror=alert(1)>\"'"
 COMMAND = "proofroll report"
-
-
-def point(number: int, engine: str, error: float, seconds: float, **more: Any) -> dict[str, Any]:
-    """A point of an invented trade-off."""
-    values = {
-        "id": number, "engine": engine, "curve": f"{engine}[formulation=only]", "level": "engine constraint",
-        "settings": {"formulation": "only", "preset": "tuned", "dt": 1e-3}, "resolution": "dt", "step": 1e-3,
-        "order": 2, "status": "done", "message": "reached 2 s", "error": {"z": error, "N": 10 * error},
-        "envelope": {"z": error, "N": 10 * error}, "seconds_per_second": seconds,
-        "interval": [0.9 * seconds, 1.1 * seconds], "measurements": 3, "corners": None,
-    }  # fmt: skip
-    return values | more
-
-
-def tradeoff_study() -> dict[str, Any]:
-    """A trade-off of a rough and cheap engine, a good and dear one, and the scene's own equations."""
-    points = [
-        point(0, "rough", 3e-3, 1e-3),
-        point(1, "good", 1e-9, 0.5, interval=[0.5, 0.5], measurements=1),
-        point(2, "own", 1e-12, 0.01, level="reduced equations"),
-    ]
-    budget = {
-        "engine": "good", "curve": "good[formulation=only]", "quantity": "z", "model_form": 2e-10,
-        "model_form_bar": 1e-10, "order": 1.97, "order_low": 1.9, "order_high": 2.04, "declared": 2, "floor": 1e-12,
-        "truth": 1e-13, "coarse": "time step", "fine": "model form", "contradicts_declaration": False,
-        "sentence": "At dt 0.05 s the time step dominates.",
-    }  # fmt: skip
-    quantities = {
-        "z": {"unit": "m", "scale": 0.1, "truth_error_bar": 1e-13},
-        "N": {"unit": "N", "scale": 40.0, "truth_error_bar": 1e-12},
-    }
-    return {
-        "study": "tradeoff", "scene": "sphere_in_cylinder", "parameters": {}, "until": 2.0, "every": 0.05,
-        "quantity": "z", "quantities": quantities, "points": points, "dropped": [],
-        "absent": {"lost": "lost is not installed here"}, "budgets": [budget],
-        "pareto": {"z": [0, 2]}, "pareto_engines": {"z": [0, 1]}, "truth": {"seconds_per_second": 1.0, "route": ""},
-        "over": {}, "findings": ["3 runs: none refused."], "brief": True, "measured": installed.measured(),
-    }  # fmt: skip
-
-
-def stability_study() -> dict[str, Any]:
-    """A map of two points: one silent at every step, one with a boundary and a program."""
-    side = {
-        "largest": None, "reached": False, "numbers": {}, "beyond": 1e-4, "failure": "sank in", "silent": True,
-        "error": 1.5, "time": 0.1, "message": "reached 2 s",
-    }  # fmt: skip
-    base = {
-        "engine": "good", "settings": {"formulation": "only", "preset": "tuned"}, "curve": "good[formulation=only]",
-        "level": None, "resolution": "dt", "axis": "V0", "value": 4.0, "parameters": {"speed": 4.0}, "until": 2.0,
-        "period": 0.6, "largest_stable": None, "largest_accurate": None, "boundary": "stable", "failure": "sank in",
-        "silent": True, "message": "reached 2 s", "sides": {"stable": side, "accurate": side}, "least_error": 0.9,
-        "finest": 1e-4, "too_slow": None, "runs": 7, "problem": None, "reproducer": None, "reproducer_note": None,
-    }  # fmt: skip
-    held = side | {"largest": 1e-3, "reached": True, "numbers": {"turn": 0.2}, "silent": False}
-    other = base | {
-        "value": 8.0, "largest_stable": 1e-3, "largest_accurate": 1e-3, "silent": False,
-        "sides": {"stable": held, "accurate": held}, "reproducer": "/somewhere/else/stability/x/good-V0-8.py",
-    }  # fmt: skip
-    axis = {"name": "V0", "unit": "m/s", "meaning": "initial speed", "values": [4.0, 8.0], "parameters": {}}
-    explained = {
-        "curve": base["curve"], "axis": "V0", "boundary": "stable", "number": "turn", "low": 0.2, "high": 0.3,
-        "spread": 1.5, "explains": True,
-    }  # fmt: skip
-    return {
-        "study": "stability", "scene": "sphere_in_cylinder", "axes": [axis], "periods": 3.0, "accurate": 0.01,
-        "runs": 14, "boundaries": 2, "silent": 1, "failures": {"sank in": 2}, "never_accurate": 1, "meanings": {},
-        "points": [base, other], "explanations": [explained], "findings": ["good depends on mass, as it should not"],
-        "places": [], "absent": {}, "effort": {"values": 3}, "measured": installed.measured(),
-    }  # fmt: skip
-
-
-def further() -> list[Any]:
-    """A trade-off and a map with invented studies."""
-    claims = claims_for("sphere_in_cylinder")
-    assert claims is not None
-    file = file_for("sphere_in_cylinder")
-    folder = "stability/sphere_in_cylinder"
-    return [TradeoffPart(claims, study=tradeoff_study()), StabilityPart(file, study=stability_study(), folder=folder)]
 
 
 @pytest.fixture

@@ -159,11 +159,12 @@ def _case(
         "wall": {"rows": len(built.points), "columns": built.points.shape[1], "lines": list(built.lines)},
         "balls": [
             {"name": "truth", "colour": -1, "shown": True, "frames": times.size, "message": "",
-             "trajectory": store.trajectory(case).name},
+             "trajectory": f"{store.folder.name}/{store.trajectory(case).name}"},
             *(
                 {"name": ghost.name, "colour": ghost.colour, "shown": first[ghost.engine] is ghost,
                  "frames": shown.time.size, "message": _ending(ghost.run, shown, times),
-                 "trajectory": ghost.run.result.trajectory, "settings": plain(_settings(ghost.run))}
+                 "trajectory": f"{store.folder.name}/{ghost.run.result.trajectory}",
+                 "settings": plain(_settings(ghost.run))}
                 for ghost, shown in zip(ghosts, drawn, strict=True)
             ),
         ],

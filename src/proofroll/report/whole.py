@@ -11,11 +11,12 @@ from typing import TYPE_CHECKING, Any
 
 from proofroll.errors import ProofrollError
 from proofroll.plain import plain
-from proofroll.report.html import page, report_content
+from proofroll.report.html import page
 from proofroll.report.parts import KEYS, Part, absent, attempt, entry
 from proofroll.report.plots import point_curves
 from proofroll.report.regime_map import inline
 from proofroll.report.replay import described, replay_content
+from proofroll.report.report_content import report_content
 from proofroll.report.summary import three_sentences
 from proofroll.store import Store, write_text
 
@@ -32,7 +33,7 @@ class Report:
     """What the files are written from.
 
     Attributes:
-        content: plain data, as :func:`proofroll.report.html.report_content` has it.
+        content: plain data, as :func:`proofroll.report.report_content.report_content` has it.
         curves: of each comparison, for the figures.
         pictures: markup by name.
         replay: of the comparisons, from :func:`proofroll.report.replay.replay_content`.
@@ -116,6 +117,29 @@ def begun(outcomes: list[Outcome], store: Store, command: str, maps: Sequence[Se
     replay = replay_content(outcomes, store)
     content = report_content(outcomes, store, command, maps) | {"replay": described(replay)}
     return Report(content, [point_curves(outcome, store) for outcome in outcomes], pictures, replay)
+
+
+def write_report(
+    outcomes: list[Outcome], store: Store, out: Path, command: str, maps: Sequence[Sequence[xr.Dataset]] = ()
+) -> dict[str, Any]:
+    """Writes ``report.html`` and ``report.json`` of comparisons alone.
+
+    Args:
+        outcomes: what was compared.
+        store: where the trajectories are: a folder in that of the report.
+        out: folder of the report.
+        command: that makes the report again.
+        maps: the regime maps of each comparison, empty where it has none.
+
+    Returns:
+        the content of both files as plain data, as :func:`report_content` has it.
+
+    Raises:
+        ProofrollError: the folder cannot be written.
+    """
+    report = begun(outcomes, store, command, maps)
+    report.write(out)
+    return report.content
 
 
 def _kept(part: Part, out: Path) -> dict[str, Any] | None:

@@ -1,0 +1,81 @@
+"""All that the report says, as plain data."""
+
+from __future__ import annotations
+
+from datetime import UTC, datetime
+from typing import TYPE_CHECKING, Any
+
+from proofroll.plain import plain
+from proofroll.report.content import environment, outcome_content
+from proofroll.report.evidence import add_evidence
+from proofroll.report.findings import findings
+from proofroll.report.onsets import add_events, truth_facts
+from proofroll.report.parts import KEYS
+from proofroll.report.regime_map import counts
+from proofroll.report.summary import three_sentences
+from proofroll.scene_file import load_scene
+from proofroll.trajectory import read
+
+if TYPE_CHECKING:
+    from collections.abc import Sequence
+
+    import xarray as xr
+
+    from proofroll.store import Store
+    from proofroll.studies.compare import Outcome
+
+    Maps = Sequence[Sequence[xr.Dataset]]
+
+
+def report_content(outcomes: list[Outcome], store: Store, command: str, maps: Maps = ()) -> dict[str, Any]:
+    """All that the report says, as plain data.
+
+    ``findings`` on the whole, ``comparisons``, the entries of further studies under ``figures``, ``tradeoffs`` and
+    ``stability``, ``date`` and ``environment``. Paths of files are relative to the folder of the report.
+    """
+    comparisons = []
+    for index, outcome in enumerate(outcomes):
+        content = outcome_content(outcome)
+        for run in content["runs"]:
+            run["trajectory"] = run["trajectory"] and f"{store.folder.name}/{run['trajectory']}"
+        content["truths"] = _truths(outcome, store)
+        content["findings"] = findings(content)
+        content["regimes"] = counts(maps[index]) if index < len(maps) else []
+        add_events(content, outcome.runs, store)
+        add_evidence(content, outcome)
+        comparisons.append(content)
+    versions: dict[str, str] = {}
+    for outcome in outcomes:
+        for run in outcome.runs:
+            versions |= run.result.versions
+    content = {
+        "date": datetime.now(UTC).isoformat(timespec="seconds"),
+        "comparisons": comparisons,
+        **{key: [] for key in KEYS},
+        "environment": environment(command, versions),
+    }
+    content["findings"] = {"sentences": three_sentences(content)}
+    return dict(plain(content))
+
+
+def _truths(outcome: Outcome, store: Store) -> list[dict[str, Any]]:
+    """For each point where the truth comes from and how well it is known."""
+    found = []
+    for name, case in outcome.truths.items():
+        path = store.trajectory(case)
+        entry: dict[str, Any] = {
+            "point": name,
+            "parameters": case.parameters,
+            "trajectory": f"{store.folder.name}/{path.name}",
+        }
+        if path.is_file():
+            dataset = read(path)
+            entry |= {key: dataset.attrs.get(key, "") for key in ("route", "second_route")}
+            entry["error_bars"] = {
+                str(key): {"value": float(curve.attrs["error_bar"]), "unit": curve.attrs["units"]}
+                for key, curve in dataset.data_vars.items()
+                if curve.dims == ("time",) and "error_bar" in curve.attrs
+            }
+            entry |= truth_facts(dataset, load_scene(case.scene, **case.parameters))
+        found.append(entry)
+    return found
