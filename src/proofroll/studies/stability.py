@@ -156,6 +156,13 @@ def _ladder(curve: Curve, place: Place) -> list[float]:
 
 def _search(name: str, points: Sequence[MapPoint], effort: Effort, runner: Runner, tell: Progress) -> None:
     """Runs all searches, round by round."""
+    finished = 0
+
+    def ended(point: MapPoint) -> None:
+        nonlocal finished
+        finished += 1
+        tell(f"{_label(point)}: {finished} of {len(points)} points", 1)
+
     waiting: list[tuple[MapPoint, Searching, int]] = []
     for point in points:
         searching: Searching = search(len(point.ladder), _STRIDE["dt" if point.curve.fixed_step else "rtol"])
@@ -171,7 +178,7 @@ def _search(name: str, points: Sequence[MapPoint], effort: Effort, runner: Runne
             while asked is not None and _too_slow(point, asked, effort):
                 asked = _send(point, searching, None)
             if asked is None:
-                tell(_label(point), 1)
+                ended(point)
             else:
                 wanted.append((point, searching, asked))
         for point, _, rung in wanted:
@@ -185,7 +192,7 @@ def _search(name: str, points: Sequence[MapPoint], effort: Effort, runner: Runne
             assert point.place.yardstick is not None  # points have a scene
             asked = _send(point, searching, judge(result, dataset, point.place.yardstick))
             if asked is None:
-                tell(_label(point), 1)
+                ended(point)
             else:
                 waiting.append((point, searching, asked))
 

@@ -58,7 +58,9 @@ def test_a_map(small: Any) -> None:
 def test_a_closed_form_has_no_boundary(tmp_path: Path) -> None:
     """What has neither step nor tolerance is named with the reason, and its neighbour is mapped by its tolerance."""
     axis = Axis("V0", "m/s", "initial speed", [4.0], {"speed": Term()})
-    found = mapped(tmp_path, ["reduced[preset=matched]"], [axis])
+    told: list[str] = []
+    found = mapped(tmp_path, ["reduced[preset=matched]"], [axis], progress=lambda text, _: told.append(text))
+    assert told[-1].endswith("V0 = 4: 1 of 1 points")
     assert [point.curve.facts.settings["formulation"] for point in found.points] == ["equations"]
     assert content(found)["points"][0]["resolution"] == "rtol"
     (reason,) = found.absent.values()
