@@ -28,6 +28,7 @@ from proofroll.surfaces import FloatArray
 
 # Numbers of the state that are not the ball's orientation: two coordinates and five velocities.
 _WITHOUT_ORIENTATION = 7
+_TURN = 2 * math.pi
 
 
 class Projection:
@@ -90,6 +91,9 @@ class Projection:
         else:
             self._orientation = FollowedFrame(geometry) if follow else RotatingFrame()
         self._coordinates = 2 + self._orientation.size
+        turning = [generator.kind == "rotation" for generator in body.surface.generators or ()]
+        periodic = [*turning, *([False] * (2 - len(turning))), *self._orientation.periodic]
+        self._angles = [index for index, whole in enumerate(periodic) if whole]
         written_out = settings.equations == "written_out"
         self._ball = ProjectedBall(body, geometry, self._orientation, written_out=written_out)
         self._eliminate = settings.eliminates
@@ -127,7 +131,19 @@ class Projection:
         """The state from which the motion goes on, without violation and away from the singularity."""
         x = self._ball.eliminated(x) if self._eliminate else x
         renewed = self._renewed(t, x)
-        return x if renewed is None else renewed
+        return self._within_a_turn(x if renewed is None else renewed)
+
+    def _within_a_turn(self, x: FloatArray) -> FloatArray:
+        """The state with each angle less than a turn from zero.
+
+        Nothing depends on whole turns, but round-off and the tolerance of a step go with the largest component of the
+        state: after ten thousand turns the angles would be known to eleven digits, and with them what rolls.
+        """
+        beyond = [index for index in self._angles if abs(x.item(index)) > _TURN]
+        if beyond:
+            x = x.copy()
+            x[beyond] -= _TURN * np.trunc(x[beyond] / _TURN)
+        return x
 
     def _renewed(self, t: float, x: FloatArray) -> FloatArray | None:
         """The state in angles chosen anew, or None; see :meth:`Orientation.renewed`."""

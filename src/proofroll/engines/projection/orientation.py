@@ -31,9 +31,11 @@ class Orientation(Protocol):
 
     Attributes:
         size: number of angles.
+        periodic: which of them say the same after a whole turn.
     """
 
     size: ClassVar[int]
+    periodic: ClassVar[tuple[bool, ...]]
 
     def start(self, frame: FloatArray, w: FloatArray) -> tuple[FloatArray, FloatArray]:
         """Angles [rad], shape (size,), and velocities r, shape (3,), of the angular velocity ω' [rad/s] at time 0."""
@@ -78,6 +80,7 @@ class EulerAngles:
     """
 
     size: ClassVar[int] = 3
+    periodic: ClassVar[tuple[bool, ...]] = (True, True, True)
 
     def __init__(self, *, renews: bool = True) -> None:
         """Without ``renews`` the run ends at the singularity, as the paper's equations do by themselves."""
@@ -182,6 +185,7 @@ class RotatingFrame:
     """
 
     size: ClassVar[int] = 0
+    periodic: ClassVar[tuple[bool, ...]] = ()
 
     def __init__(self) -> None:
         self._identity = np.eye(3)
@@ -219,6 +223,7 @@ class FollowedFrame(RotatingFrame):
     """The same, and besides the orientation: a quaternion in the world, a quadrature on which nothing depends."""
 
     size: ClassVar[int] = 4
+    periodic: ClassVar[tuple[bool, ...]] = (False,) * 4
 
     def __init__(self, geometry: Geometry) -> None:
         super().__init__()
