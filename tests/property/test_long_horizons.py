@@ -61,7 +61,7 @@ def test_energy_and_constraints(engine: str, oscillations: int) -> None:
 
 @needs_heyoka
 def test_angles_stay_within_a_turn() -> None:
-    """However often the ball goes round, the angles of the state keep all their digits: none grows beyond some turns."""
+    """However often the ball goes round, its angles keep all their digits: none grows beyond some turns."""
     built = build(SCENE, "projection[formulation=euler,preset=tuned]")
     built.advance(20 * PERIOD)
     angles = built._motion.x[built._angles]
