@@ -170,8 +170,12 @@ def _digest(sources: list[Path]) -> str:
     root = Path(proofroll.__file__).parent
     files = [root / name for name in _FOUNDATION if (root / name).is_file()]
     for source in sources:
-        found = sorted(source.rglob("*.py")) if source.is_dir() else [source]
-        files += [file for file in found if "reproducer" not in file.relative_to(source).with_suffix("").parts]
+        if not source.is_dir():
+            files.append(source)
+            continue
+        for file in sorted(source.rglob("*.py")):
+            if "reproducer" not in file.relative_to(source).with_suffix("").parts:
+                files.append(file)
     content = hashlib.sha256()
     for file in files:
         content.update(file.read_bytes())

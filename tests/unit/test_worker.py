@@ -115,3 +115,4 @@ def test_a_program_for_a_bug_report_outdates_no_result(tmp_path: Path) -> None:
     assert worker_module._digest([package]) == before
     (package / "adapter.py").write_text("x = 2")
     assert worker_module._digest([package]) != before
+    assert worker_module._digest([package / "adapter.py"]) != before  # an adapter of one file
