@@ -72,7 +72,7 @@ def stability_study() -> dict[str, Any]:
         "value": 8.0, "largest_stable": 1e-3, "largest_accurate": 1e-3, "silent": False,
         "sides": {"stable": held, "accurate": held}, "reproducer": "/somewhere/else/stability/x/good-V0-8.py",
     }  # fmt: skip
-    axis = {"name": "V0", "unit": "m/s", "meaning": "initial speed", "values": [4.0, 8.0], "parameters": {}}
+    axis = {"name": "V0", "unit": "m/s", "meaning": "how fast it begins", "values": [4.0, 8.0], "parameters": {}}
     explained = {
         "curve": base["curve"], "axis": "V0", "boundary": "stable", "number": "turn", "low": 0.2, "high": 0.3,
         "spread": 1.5, "explains": True,

@@ -9,7 +9,7 @@ from proofroll.agreement import Verdict
 from proofroll.case import Status
 
 # What the code of the report itself says or compares with; nobody else can write these.
-OUR_WORDS = frozenset({*Verdict, *Status, "well-posed", "agree", "disagree"})
+OUR_WORDS = frozenset({*Verdict, *Status, "well-posed", "agree", "disagree", "model form", "time step"})
 
 
 @dataclass
