@@ -8,10 +8,10 @@ from typing import Any
 
 import pytest
 
+from proofroll.clean_runs import time_once
 from proofroll.process import Worker
 from proofroll.stopwatch import Stopwatch
 from proofroll.studies.single import single_case
-from proofroll.worker import time_once
 from proofroll.workers import Workers
 
 

@@ -18,7 +18,7 @@ import pytest
 from hostile import ENTRY_POINTS
 
 import proofroll
-from proofroll import worker as worker_module
+from proofroll import identity
 from proofroll.case import Case
 
 # A process between the test and the worker, in the middle of a case that hangs.
@@ -80,15 +80,18 @@ def test_a_worker_ends_with_its_parent(
 
 
 # Modules that foundation modules import and on which no number of a result hangs: errors, files and the process itself.
-NO_NUMBERS = {"__init__.py", "errors.py", "files.py", "folders.py", "memory.py", "registry.py"}
+NO_NUMBERS = {"__init__.py", "errors.py", "files.py", "folders.py", "memory.py", "registry.py", "spent.py"}
 
 
 def test_whatever_a_result_rests_on_decides_its_key() -> None:
     """What the foundation, our engines and the truth import is in the digest by which stored results are found."""
     root = Path(proofroll.__file__).parent
-    foundation = set(worker_module._FOUNDATION)
-    rest = [root / name for name in foundation - {"worker.py"}]  # the worker also serves benchmarks and reproducers
-    resting = [*rest, *(root / "engines").rglob("*.py"), *(root / "truth").rglob("*.py")]
+    foundation = set(identity.FOUNDATION)
+    resting = [
+        *(root / name for name in foundation),
+        *(root / "engines").rglob("*.py"),
+        *(root / "truth").rglob("*.py"),
+    ]
     missing: dict[str, str] = {}
     for file in resting:
         if "reproducer" in file.with_suffix("").parts:
@@ -109,10 +112,10 @@ def test_a_program_for_a_bug_report_outdates_no_result(tmp_path: Path) -> None:
     package = tmp_path / "adapter"
     (package / "reproducer").mkdir(parents=True)
     (package / "adapter.py").write_text("x = 1")
-    before = worker_module._digest([package])
+    before = identity.digest([package])
     (package / "reproducer" / "text.py").write_text("y = 1")
     (package / "reproducer.py").write_text("y = 1")
-    assert worker_module._digest([package]) == before
+    assert identity.digest([package]) == before
     (package / "adapter.py").write_text("x = 2")
-    assert worker_module._digest([package]) != before
-    assert worker_module._digest([package / "adapter.py"]) != before  # an adapter of one file
+    assert identity.digest([package]) != before
+    assert identity.digest([package / "adapter.py"]) != before  # an adapter of one file
