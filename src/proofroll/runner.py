@@ -96,28 +96,41 @@ def _lent(workers: Workers | None) -> Iterator[Workers]:
 class _Waiting:
     """Cases that wait. A worker goes on with its engine while it can: starting another costs more than many a case."""
 
-    def __init__(self, cases: Iterable[Case]) -> None:
-        self._lock = threading.Lock()
+    def __init__(self) -> None:
+        self._changed = threading.Condition()
         self._by_engine: dict[str, deque[Case]] = {}
         self._begun: set[str] = set()
-        for case in cases:
+        self._closed = False
+
+    def add(self, case: Case) -> None:
+        """Puts a case at the end."""
+        with self._changed:
             self._by_engine.setdefault(case.engine.name, deque()).append(case)
+            self._changed.notify()
+
+    def close(self) -> None:
+        """Nothing more will come, and what waits is not to be begun."""
+        with self._changed:
+            self._closed = True
+            self._changed.notify_all()
 
     def take(self, engine: str | None) -> Case | None:
-        """The next case, of this engine if there is one, else of one that nobody has begun; None: there is none.
+        """The next case, of this engine if there is one, else of one that nobody has begun; None: it is closed.
 
-        Where all are begun, the one with the most cases left is shared.
+        Where all are begun, the one with the most cases left is shared. Where there is none, it waits for one.
         """
-        with self._lock:
-            group = self._by_engine.get(engine or "")
-            if not group:
-                fresh = [cases for name, cases in self._by_engine.items() if cases and name not in self._begun]
-                group = max(fresh or self._by_engine.values(), key=len, default=None)
-            if not group:
-                return None
-            case = group.popleft()
-            self._begun.add(case.engine.name)
-            return case
+        with self._changed:
+            while not self._closed:
+                group = self._by_engine.get(engine or "")
+                if not group:
+                    fresh = [cases for name, cases in self._by_engine.items() if cases and name not in self._begun]
+                    group = max(fresh or self._by_engine.values(), key=len, default=None)
+                if group:
+                    case = group.popleft()
+                    self._begun.add(case.engine.name)
+                    return case
+                self._changed.wait()
+            return None
 
 
 class Runner:
@@ -144,42 +157,71 @@ class Runner:
 
     def run(self, cases: Iterable[Case], progress: Callable[[Case, Result], None] | None = None) -> dict[str, Result]:
         """Results by key of the case. ``progress`` is called in this thread as each arrives."""
-        unique = {case.key: case for case in cases}
+
+        def told(case: Case, result: Result) -> tuple[()]:
+            if progress:
+                progress(case, result)
+            return ()
+
+        return self.follow(cases, told)
+
+    def follow(self, cases: Iterable[Case], then: Callable[[Case, Result], Iterable[Case]]) -> dict[str, Result]:
+        """Like :meth:`run`, but each result may ask for further cases, which are begun at once.
+
+        Args:
+            cases: with which it begins.
+            then: called in this thread as each result arrives; returns cases that have not been asked for yet.
+        """
         results: dict[str, Result] = {}
-        waiting: list[Case] = []
-        for case in unique.values():
+        asked: set[str] = set()
+        arrived: queue.SimpleQueue[tuple[Case, Result] | Exception] = queue.SimpleQueue()
+        shared = _Waiting()
+        running = 0
+        ready: deque[tuple[Case, Result]] = deque()
+
+        def ask(case: Case) -> int:
+            """How many more answers will arrive: one, or none where the answer is there already."""
+            if case.key in asked:
+                return 0
+            asked.add(case.key)
             stored = None if self.fresh else self.store.get(case)
             if stored is None:
-                waiting.append(case)
                 if not self.fresh and self.store.has(case):
                     self.damaged.add(case.key)
-                continue
+                shared.add(case)
+                return 1
             self.reused += 1
-            results[case.key] = stored
-            if progress:
-                progress(case, stored)
-        arrived: queue.SimpleQueue[tuple[Case, Result] | Exception] = queue.SimpleQueue()
+            ready.append((case, stored))
+            return 0
+
         pool = ThreadPoolExecutor(self.jobs)
         try:
-            shared = _Waiting(waiting)
-            for _ in range(self.jobs):
-                pool.submit(self._serve, shared, arrived)
-            for _ in waiting:
-                item = arrived.get()
-                if isinstance(item, Exception):
-                    raise item
-                case, result = item
-                if case.key in self.damaged:
-                    result = dataclasses.replace(result, message=f"{result.message}; what was stored was damaged")
+            running += sum([ask(case) for case in cases])
+            serving = False
+            while ready or running:
+                if running and not serving:
+                    serving = True
+                    for _ in range(self.jobs):
+                        pool.submit(self._serve, shared, arrived)
+                if ready:
+                    case, result = ready.popleft()
+                else:
+                    item = arrived.get()
+                    if isinstance(item, Exception):
+                        raise item
+                    running -= 1
+                    case, result = item
+                    if case.key in self.damaged:
+                        result = dataclasses.replace(result, message=f"{result.message}; what was stored was damaged")
                 results[case.key] = result
-                if progress:
-                    progress(case, result)
+                running += sum([ask(further) for further in then(case, result)])
         except BaseException:
             self._stopping.set()
             for worker in list(self._busy):
                 worker.kill()
             raise
         finally:
+            shared.close()
             pool.shutdown(wait=True, cancel_futures=True)
             self._stopping.clear()
         return results

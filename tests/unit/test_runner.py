@@ -99,6 +99,26 @@ def test_progress_is_told_of_every_case_once(tmp_path: Path, make_case: MakeCase
     assert sorted(seen) == [("oracle", Status.DONE, True), ("refuses", Status.REFUSED, True)]
 
 
+def test_a_result_asks_for_further_cases(tmp_path: Path, make_case: MakeCase) -> None:
+    """Each answer may ask for more, stored or not; what was asked for before is not run again; an end comes."""
+    cases = [make_case("oracle", parameters={"speed": float(speed)}) for speed in (2, 3, 4, 5)]
+    stored = cases[2]
+    Runner(Store(tmp_path), jobs=1).run([stored])
+    told: list[str] = []
+
+    def then(case: Case, result: Result) -> list[Case]:
+        assert result.status == Status.DONE
+        told.append(case.key)
+        return cases[: cases.index(case) + 2]  # those before are asked for again
+
+    runner = Runner(Store(tmp_path), jobs=2)
+    results = runner.follow(cases[:1], then)
+    assert told == [case.key for case in cases]
+    assert list(results) == told
+    assert runner.reused == 1
+    assert Runner(Store(tmp_path), jobs=2).follow([], then) == {}
+
+
 def test_a_case_that_makes_no_sense_costs_only_itself(tmp_path: Path, make_case: MakeCase) -> None:
     """A setting that does not exist is that case's refusal; the other cases arrive, and alone it is raised."""
     wrong, right = make_case("oracle", settings={"speed": 3}), make_case("oracle")

@@ -1,7 +1,7 @@
 """Where every engine, formulation and setting stops being right, along axes that take a scene to its extremes.
 
 Each point of the map is a search for two boundaries on a ladder of steps or tolerances. All searches go on side by
-side: each round runs what they ask for next. Every run is a stored case, so an interrupted map resumes where it was.
+side, each as fast as its answers come. Every run is a stored case, so an interrupted map resumes where it was.
 """
 
 from __future__ import annotations
@@ -155,7 +155,9 @@ def _ladder(curve: Curve, place: Place) -> list[float]:
 
 
 def _search(name: str, points: Sequence[MapPoint], effort: Effort, runner: Runner, tell: Progress) -> None:
-    """Runs all searches, round by round."""
+    """Runs all searches side by side: each asks for its next case as soon as it has the answer to the last."""
+    asking: dict[str, list[tuple[MapPoint, Searching, int]]] = {}
+    known: dict[str, Result] = {}
     finished = 0
 
     def ended(point: MapPoint) -> None:
@@ -163,38 +165,40 @@ def _search(name: str, points: Sequence[MapPoint], effort: Effort, runner: Runne
         finished += 1
         tell(f"{_label(point)}: {finished} of {len(points)} points", 1)
 
-    waiting: list[tuple[MapPoint, Searching, int]] = []
+    def ask(point: MapPoint, searching: Searching, rung: int | None) -> list[Case]:
+        """Goes on with a search until it needs a case that has not been run; that case, unless another asked for it."""
+        while rung is not None:
+            if _too_slow(point, rung, effort):
+                rung = _send(point, searching, None)
+                continue
+            case = point.cases[rung] = case_at(name, point.place, point.facts(rung), effort.limit)
+            if case.key not in known:
+                asking.setdefault(case.key, []).append((point, searching, rung))
+                return [case] if len(asking[case.key]) == 1 else []
+            rung = answer(point, searching, rung)
+        ended(point)
+        return []
+
+    def answer(point: MapPoint, searching: Searching, rung: int) -> int | None:
+        case = point.cases[rung]
+        point.results[rung] = result = known[case.key]
+        dataset = None if result.trajectory is None else read(runner.store.trajectory(case))
+        assert point.place.yardstick is not None  # points have a scene
+        return _send(point, searching, judge(result, dataset, point.place.yardstick))
+
+    def arrived(case: Case, result: Result) -> list[Case]:
+        known[case.key] = result
+        tell(case.engine.name, 0)
+        further = []
+        for point, searching, rung in asking.pop(case.key):
+            further += ask(point, searching, answer(point, searching, rung))
+        return further
+
+    first = []
     for point in points:
         searching: Searching = search(len(point.ladder), _STRIDE["dt" if point.curve.fixed_step else "rtol"])
-        waiting.append((point, searching, next(searching)))
-
-    def told(case: Case, _: Result) -> None:
-        tell(case.engine.name, 0)
-
-    while waiting:
-        wanted: list[tuple[MapPoint, Searching, int]] = []
-        for point, searching, rung in waiting:
-            asked: int | None = rung
-            while asked is not None and _too_slow(point, asked, effort):
-                asked = _send(point, searching, None)
-            if asked is None:
-                ended(point)
-            else:
-                wanted.append((point, searching, asked))
-        for point, _, rung in wanted:
-            point.cases[rung] = case_at(name, point.place, point.facts(rung), effort.limit)
-        results = runner.run([point.cases[rung] for point, _, rung in wanted], told)
-        waiting = []
-        for point, searching, rung in wanted:
-            case = point.cases[rung]
-            point.results[rung] = result = results[case.key]
-            dataset = None if result.trajectory is None else read(runner.store.trajectory(case))
-            assert point.place.yardstick is not None  # points have a scene
-            asked = _send(point, searching, judge(result, dataset, point.place.yardstick))
-            if asked is None:
-                ended(point)
-            else:
-                waiting.append((point, searching, asked))
+        first += ask(point, searching, next(searching))
+    runner.follow(first, arrived)
 
 
 def _too_slow(point: MapPoint, rung: int, effort: Effort) -> bool:
