@@ -113,7 +113,8 @@ def attempt(part: Part, action: Callable[[], dict[str, Any] | None]) -> dict[str
     except ProofrollError as error:
         return absent(part, str(error))
     except Exception as error:
-        return absent(part, f"an error of proofroll's own, {type(error).__name__}: {error}")
+        said = f"{type(error).__name__}: {error}".strip(": ")
+        return absent(part, f"an error of proofroll's own, {said}")
 
 
 def entry(part: Part) -> dict[str, Any]:
