@@ -13,6 +13,7 @@ from invented import further, stability_study, tradeoff_study
 from proofroll.errors import ProofrollError
 from proofroll.report.html import page
 from proofroll.report.parts import KEYS, absent, all_parts, attempt, entry, parts_of
+from proofroll.report.stability_part import StabilityPart
 from proofroll.report.summary import three_sentences
 from proofroll.report.whole import Report, begun
 from proofroll.store import Store
@@ -35,9 +36,14 @@ def report(made: tuple[Outcome, Store]) -> Report:
     return whole
 
 
-def test_every_part_of_the_default_report_is_found_in_its_order() -> None:
+def test_every_part_of_the_default_report_is_found_in_its_order(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
     """Figures, trade-offs, maps: one for each file under comparisons/, and each by its name alone."""
-    parts = all_parts([])
+    assert "stability_plane" not in [part.head["name"] for part in all_parts([], tmp_path)], "it is made on request"
+    monkeypatch.setattr(StabilityPart, "keeps", lambda part, out: bool(part and out))
+    parts = all_parts([], tmp_path)
+    assert "stability_plane" in [part.head["name"] for part in parts], "where it is kept it is there"
     assert [part.key for part in parts] == sorted((part.key for part in parts), key=KEYS.index)
     assert {key for key in KEYS if any(part.key == key for part in parts)} == set(KEYS)
     for part in parts:

@@ -48,7 +48,7 @@ def report(
     from proofroll.report.parts import KEYS, all_parts, parts_of
     from proofroll.report.whole import begun
 
-    names, parts = parts_of(studies, engine or []) if studies else (comparison_names(), all_parts(engine or []))
+    names, parts = parts_of(studies, engine or []) if studies else (comparison_names(), all_parts(engine or [], out))
     loaded = [load_comparison(name) for name in names]
     runner = new_runner(out, fresh, jobs)
     keys = [key for key in KEYS if any(part.key == key for part in parts)]

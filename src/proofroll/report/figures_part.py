@@ -21,6 +21,7 @@ class FiguresPart:
 
     key: ClassVar[str] = "figures"
     words: ClassVar[str] = "figures"
+    on_request: ClassVar[bool] = False
     asked: Figures
     maps: dict[str, list[xr.Dataset]] = field(default_factory=dict)
     """Regime maps by comparison; those that are missing are made."""

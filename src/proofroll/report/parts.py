@@ -25,6 +25,10 @@ class Part(Protocol):
     """What is made, for a person."""
 
     @property
+    def on_request(self) -> bool:
+        """Whether a report of everything leaves it out unless it is kept."""
+
+    @property
     def head(self) -> dict[str, str]:
         """``name`` of the file, ``title``, ``question``, ``scene`` and the ``command`` that makes it."""
 
@@ -66,9 +70,15 @@ def parts_of(names: Sequence[str], engines: Sequence[str]) -> tuple[list[str], l
     return comparisons, sorted(found, key=lambda part: KEYS.index(part.key))
 
 
-def all_parts(engines: Sequence[str]) -> list[Part]:
-    """The parts that the files under ``comparisons/`` ask for, in the order of a report."""
-    return [load(path, engines) for study, load in _LOADERS.items() for path, _ in study_files(study)]
+def all_parts(engines: Sequence[str], out: Path) -> list[Part]:
+    """The parts that the files under ``comparisons/`` ask for, in the order of a report.
+
+    Args:
+        engines: to which studies are restricted.
+        out: folder of all results; what is made on request is a part where it is kept there.
+    """
+    found = [load(path, engines) for study, load in _LOADERS.items() for path, _ in study_files(study)]
+    return [part for part in found if not part.on_request or part.keeps(out)]
 
 
 def _figures(path: Path, engines: Sequence[str]) -> Part:  # noqa: ARG001 -- the figures name their own engine

@@ -25,6 +25,11 @@ class StabilityPart:
     folder: str = ""
 
     @property
+    def on_request(self) -> bool:
+        """As its file says."""
+        return self.asked.on_request
+
+    @property
     def head(self) -> dict[str, str]:
         """What it is."""
         asked = self.asked

@@ -19,6 +19,7 @@ class TradeoffPart:
 
     key: ClassVar[str] = "tradeoffs"
     words: ClassVar[str] = "speed against accuracy"
+    on_request: ClassVar[bool] = False
     asked: TradeoffClaims
     engines: Sequence[str] = ()
     study: Mapping[str, Any] | None = None

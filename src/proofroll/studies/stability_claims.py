@@ -108,6 +108,7 @@ class StabilityFile:
         scene: which scene.
         axes: along which it is taken to its extremes.
         claims: what is expected.
+        on_request: a report of everything has this map only where it is kept.
     """
 
     name: str
@@ -116,6 +117,7 @@ class StabilityFile:
     scene: str
     axes: list[Axis]
     claims: list[Claim] = field(default_factory=list)
+    on_request: bool = False
 
     def contradictions(self, study: Mapping[str, Any]) -> list[str]:
         """What a map does not confirm, as sentences."""
