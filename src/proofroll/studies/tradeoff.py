@@ -163,12 +163,18 @@ def _timed(found: Tradeoff, truth: Case, workers: Workers, rounds: int, progress
 
 
 def _checked(found: Tradeoff, runner: Runner, told: Callable[[Case, Result], None]) -> dict[str, list[Corner]]:
-    """Runs the points on any engine's own Pareto front, for any quantity, at every corner of the range."""
+    """Runs the points on any formulation's own Pareto front, for any quantity, at every corner of the range.
+
+    Whoever asks for a kind of model must not lose a formulation that another one of the same engine dominates.
+    """
+    formulations: dict[tuple[str, object], list[Curve]] = {}
+    for curve in found.curves:
+        formulations.setdefault((curve.facts.name, curve.facts.settings.get("formulation")), []).append(curve)
     chosen = {
         point.case.key: point
-        for name in dict.fromkeys(curve.facts.name for curve in found.curves)
+        for curves in formulations.values()
         for quantity in judged_quantities(found)
-        for point in front(pareto_entries([c for c in found.curves if c.facts.name == name], quantity, found.timings))
+        for point in front(pareto_entries(curves, quantity, found.timings))
     }
     base, truth_facts = found.question, _truth_case(found.question, found.references, runner).engine
     intervals = {point.case.every for point in chosen.values()}
