@@ -1,4 +1,4 @@
-# Two commands do everything: `make report` (the comparison) and `make test`. Each makes .venv itself.
+# Two commands do everything: `make report` (everything, into one page) and `make test`. Each makes .venv itself.
 PYTHON ?= python3
 BIN := .venv/bin
 OUT ?= out
@@ -31,7 +31,7 @@ format: install
 	$(BIN)/ruff check --fix .
 	$(BIN)/ruff format .
 
-# The picture and the table of README.md, from a real run.
+# The pictures and the tables of README.md, from real runs; some minutes, on a machine that does nothing else.
 readme: install
 	$(BIN)/python docs/update_readme.py
 

@@ -16,6 +16,7 @@ from proofroll.report import labels
 from proofroll.report.tradeoff_tables import corner_table
 from proofroll.report.work_precision import svg
 from proofroll.studies import installed
+from proofroll.studies.keeping import keep
 from proofroll.studies.sweep import Question
 from proofroll.studies.tradeoff import stored
 
@@ -51,7 +52,7 @@ def folder(measured: dict[str, Any], tmp_path: Path) -> Path:
             cost = 1e-5 / point["step"]
             point = point | {"seconds_per_second": cost, "interval": [0.99 * cost, 1.01 * cost]}  # noqa: PLW2901 -- a copy
         points.append(point)
-    path.write_text(json.dumps(measured | {"measured": now, "points": points}))
+    keep(measured | {"measured": now, "points": points}, path)
     return tmp_path
 
 
@@ -157,6 +158,7 @@ def test_a_tolerance_that_nothing_holds(proofroll: Proofroll, folder: Path) -> N
     [
         (["--tolerance", "soon"], "tolerance = 'soon'"),
         (["--tolerance", "nan"], "positive number"),
+        (["--tolerance", "1.2.3 mm"], "positive number"),
         (["--tolerance", "1 mN"], "the unit of this quantity is m"),
         (["--tolerance", "1e-3 N"], "the unit of this quantity is m"),
         (["--tolerance", "-1"], "positive number"),
@@ -198,7 +200,7 @@ def test_curves_of_another_version_are_not_answered_from(
     """Curves measured with another version of an engine, or on another machine, are named stale, and why."""
     (path,) = (folder / "tradeoff").iterdir()
     old = measured["measured"] | {"versions": installed.versions() | {"mujoco": "1.0"}, "code": installed.code()}
-    path.write_text(json.dumps(measured | {"measured": old}))
+    keep(measured | {"measured": old}, path)
     code, _, err = proofroll(*asked(folder))
     assert code == 2
     assert "mujoco 1.0 then" in err

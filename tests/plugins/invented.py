@@ -79,7 +79,8 @@ def stability_study() -> dict[str, Any]:
     }  # fmt: skip
     return {
         "study": "stability", "scene": "sphere_in_cylinder", "axes": [axis], "periods": 3.0, "accurate": 0.01,
-        "runs": 14, "boundaries": 2, "silent": 1, "failures": {"sank in": 2}, "never_accurate": 1, "meanings": {},
+        "runs": 14, "boundaries": 2, "silent": 1, "refused": 0,
+        "failures": {"sank in": 2}, "never_accurate": 1, "meanings": {},
         "points": [base, other], "explanations": [explained], "findings": ["good depends on mass, as it should not"],
         "places": [], "absent": {}, "effort": {"values": 3}, "measured": installed.measured(),
     }  # fmt: skip

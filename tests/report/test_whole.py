@@ -18,7 +18,7 @@ from proofroll.report.summary import three_sentences
 from proofroll.report.whole import Report, begun
 from proofroll.store import Store
 from proofroll.studies.compare import Outcome
-from proofroll.studies.keeping import stability_path
+from proofroll.studies.keeping import keep, stability_path
 from proofroll.studies.places import QUICK, Effort
 from proofroll.studies.tradeoff import stored
 
@@ -80,7 +80,7 @@ def test_exactly_three_sentences_from_the_data(report: Report) -> None:
     """What agrees best, what is silent, what to use; other data give other sentences, none at all still give three."""
     found = report.content["findings"]["sentences"]
     assert len(found) == 3
-    assert found[0].startswith("Of 4 engine settings, 2 agree with the truth everywhere")
+    assert found[0].startswith("Of 4 settings in one comparison, 2 agree with the truth everywhere")
     assert "closest is alpha fine matched" in found[0]
     assert found[1].startswith("1 differs from the truth and runs to the end without a word, worst alpha fine default")
     assert found[1].endswith("1 of 2 boundaries of stability and accuracy are passed without a word.")
@@ -217,7 +217,7 @@ def test_what_is_kept_is_taken_and_what_is_outdated_is_not(tmp_path: Path) -> No
     for name, study, brief in (("whole", tradeoff_study(), False), ("brief", tradeoff_study(), True)):
         path = stored(tmp_path, question, brief=brief)
         path.parent.mkdir(exist_ok=True)
-        path.write_text(json.dumps({**study, "mark": name}))
+        keep({**study, "mark": name}, path)
     assert tradeoff.keeps(tmp_path)
     assert tradeoff.study["mark"] == "whole"
     stored(tmp_path, question).unlink()
@@ -225,14 +225,14 @@ def test_what_is_kept_is_taken_and_what_is_outdated_is_not(tmp_path: Path) -> No
     assert tradeoff.study["mark"] == "brief"
     old = tradeoff_study()
     old["measured"]["code"] = "another"
-    stored(tmp_path, question, brief=True).write_text(json.dumps(old))
+    keep(old, stored(tmp_path, question, brief=True))
     assert not tradeoff.keeps(tmp_path)
     assert not stability.keeps(tmp_path)
     axes = stability.asked.axes
     paths = [stability_path(tmp_path, stability.asked, axes, [], effort) for effort in (QUICK, Effort())]
     assert len(set(paths)) == 2, "a quick map does not take the place of the whole one"
     paths[0].parent.mkdir()
-    paths[0].write_text(json.dumps(stability_study()))
+    keep(stability_study(), paths[0])
     assert stability.keeps(tmp_path)
     assert stability.folder == f"stability/{paths[0].stem}"
 

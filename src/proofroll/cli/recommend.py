@@ -80,13 +80,13 @@ def _tolerance(text: str, unit: str) -> Any:
     if found is None:
         raise InputError("tolerance", text, advice)
     number, given = found[1], found[2] or unit
-    if given not in {unit, "%"}:
-        if given[1:] != unit or given[0] not in _PREFIXES:
-            raise InputError("tolerance", text, f"the unit of this quantity is {unit}")
-        number = f"{float(number) * _PREFIXES[given[0]]:.17g}"
+    if given not in {unit, "%"} and (given[1:] != unit or given[0] not in _PREFIXES):
+        raise InputError("tolerance", text, f"the unit of this quantity is {unit}")
     try:
+        if given not in {unit, "%"}:
+            number = f"{float(number) * _PREFIXES[given[0]]:.17g}"
         return Tolerance.parse("tolerance", f"{number} {given if given == '%' else unit}")
-    except InputError:
+    except (InputError, ValueError):
         raise InputError("tolerance", text, advice) from None
 
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import shlex
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
 
@@ -58,7 +59,7 @@ def report(
         stage = stages.next("comparisons")
         outcomes = outcomes_of(loaded, engine or [], runner, stage)
         maps = [regime_maps_of(item, jobs, stage) if item.regimes else [] for item in loaded]
-    made = begun(outcomes, runner.store, " ".join(["proofroll report", *(studies or [])]), maps)
+    made = begun(outcomes, runner.store, _command(studies or [], engine or [], out), maps)
     for part in parts:
         if part.key == "figures":
             part.maps.update({item.name: found for item, found in zip(loaded, maps, strict=True) if found})  # type: ignore[attr-defined]
@@ -75,6 +76,14 @@ def report(
     else:
         _print(made.content, out)
     raise typer.Exit(_exit_code(made.content, exit_code(outcomes)))
+
+
+def _command(studies: list[str], engines: list[str], out: Path) -> str:
+    """The command that makes the report again."""
+    words = ["proofroll", "report", *studies]
+    for name in engines:
+        words += ["--engine", name]
+    return shlex.join(words if out == Path("out") else [*words, "--out", str(out)])
 
 
 class _Stages:

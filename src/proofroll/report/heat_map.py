@@ -69,6 +69,13 @@ def _rest(point: Mapping[str, Any]) -> str:
     return " ".join(filter(None, (settings.get("formulation"), settings.get("preset")))) or str(point["curve"])
 
 
+def told(point: Mapping[str, Any]) -> str:
+    """Who was told of a failure: nobody, or before the run, or the engine said so."""
+    if point["failure"] == "refused":
+        return "before the run"
+    return "silent" if point["silent"] else "says so"
+
+
 def _cell(point: Mapping[str, Any], href: str) -> dict[str, Any]:
     text, shade = cell(point)
     words = [f"{label(point)} at {point['axis']} = {point['value']:g}"]
@@ -79,13 +86,12 @@ def _cell(point: Mapping[str, Any], href: str) -> dict[str, Any]:
     else:
         words.append(f"1 % up to {point['resolution']} {number(point['largest_accurate'])}")
     if point["failure"]:
-        words.append(f"beyond: {point['failure']}, {'silent' if point['silent'] else 'and the engine says so'}")
+        words.append(f"beyond: {point['failure']}, {told(point)}")
     return {
         "text": text,
         "shade": None if shade is None else round(min(max(shade, 0.0), 1.0), 2),
         "deep": shade is not None and shade > _DEEP,
         "never": point["largest_accurate"] is None,
-        "silent": point["silent"],
         "href": href,
         "title": "; ".join(words),
     }

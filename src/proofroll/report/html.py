@@ -101,6 +101,7 @@ def _templates() -> jinja2.Environment:
         "tables": tables,
         "studies": study_tables,
         "heat_map": heat_map.table,
+        "told": heat_map.told,
         "onsets": onset_tables,
         "names": labels.names,
         "symbols": labels.SYMBOLS,
@@ -115,7 +116,7 @@ def _unbroken(text: str) -> markupsafe.Markup:
     """A sentence in which no line ends within a number such as ``1e-3``, where browsers see a hyphen."""
     import markupsafe
 
-    return markupsafe.Markup(_EXPONENT.sub(r'<span class="pair">\g<0></span>', str(markupsafe.escape(text))))
+    return markupsafe.Markup(_EXPONENT.sub(r'<span class="whole">\g<0></span>', str(markupsafe.escape(text))))
 
 
 def _again(comparison: dict[str, Any], run: dict[str, Any]) -> str:

@@ -32,8 +32,6 @@ LETTERS = {
 # Steps per natural time at which a colour is darkest and lightest; tolerances are put between by their decades.
 _FEWEST, _MOST = 8.0, 1e5
 _TOLERANCE_DECADES = 13
-# Width of a map on a page of the report [inch]: 1100 pixels of a browser.
-_PAGE_WIDTH = 11.4
 # As many letters of the legend stand above a panel.
 _LETTERS_PER_PANEL = 118
 
@@ -59,15 +57,6 @@ def svg(study: Mapping[str, Any]) -> str:
     return _drawn(study, axes, columns=min(2, len(axes)) or 1)
 
 
-def svgs(study: Mapping[str, Any]) -> dict[str, str]:
-    """A heat map for each axis as SVG text, as wide as a page of a report, by the axis's name.
-
-    Raises:
-        Missing: matplotlib is not installed.
-    """
-    return {axis["name"]: _drawn(study, [axis], columns=1, wide=True) for axis in _axes(study)}
-
-
 def legend(study: Mapping[str, Any]) -> list[str]:
     """What the cells say, as sentences."""
     kinds = ", ".join(f"{letter} {kind}" for kind, letter in LETTERS.items())
@@ -83,7 +72,7 @@ def _axes(study: Mapping[str, Any]) -> list[Mapping[str, Any]]:
     return [axis for axis in study["axes"] if any(point["axis"] == axis["name"] for point in study["points"])]
 
 
-def _drawn(study: Mapping[str, Any], axes: Sequence[Mapping[str, Any]], columns: int, *, wide: bool = False) -> str:
+def _drawn(study: Mapping[str, Any], axes: Sequence[Mapping[str, Any]], columns: int) -> str:
     """Panels of these axes, row by row; texts stay texts, which a page can scale, search and read out."""
     try:
         import matplotlib as mpl
@@ -91,22 +80,20 @@ def _drawn(study: Mapping[str, Any], axes: Sequence[Mapping[str, Any]], columns:
     except ModuleNotFoundError:
         raise Missing("matplotlib is not installed: pip install 'proofroll[report]'") from None
     rows = math.ceil(len(axes) / columns) or 1
-    width, line, size = (_PAGE_WIDTH, 0.28, 10.0) if wide else (7.2 * columns, 0.24, 8.0)
-    settings: Any = {"svg.hashsalt": "proofroll", "svg.fonttype": "none", "font.size": size}
+    settings: Any = {"svg.hashsalt": "proofroll", "svg.fonttype": "none", "font.size": 8.0}
     with mpl.rc_context(settings):
         names = list(dict.fromkeys(point["curve"] for point in study["points"]))
         of_axes = {axis["name"] for axis in axes}
         curves = [n for n in names if any(p["curve"] == n and p["axis"] in of_axes for p in study["points"])]
-        height = rows * (0.9 + line * len(curves)) + (0.0 if wide else 1.0)
-        figure = Figure(figsize=(width, height), layout="constrained")
+        height = rows * (0.9 + 0.24 * len(curves)) + 1.0
+        figure = Figure(figsize=(7.2 * columns, height), layout="constrained")
         panels = figure.subplots(rows, columns, squeeze=False).ravel()
         for panel, axis in zip(panels, axes, strict=False):
             _panel(panel, study, axis, curves, mpl.colormaps["cividis_r"])
         for panel in panels[len(axes) :]:
             panel.set_visible(False)
-        if not wide:  # on a page the legend stands once, above all
-            text = "\n".join(textwrap.fill(sentence, _LETTERS_PER_PANEL * columns) for sentence in legend(study))
-            figure.suptitle(text, fontsize=8, x=0.01, ha="left")
+        text = "\n".join(textwrap.fill(sentence, _LETTERS_PER_PANEL * columns) for sentence in legend(study))
+        figure.suptitle(text, fontsize=8, x=0.01, ha="left")
         out = io.StringIO()
         figure.savefig(out, format="svg", metadata={"Date": None})
     return out.getvalue()

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import shlex
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
@@ -33,7 +34,9 @@ class StabilityPart:
     def head(self) -> dict[str, str]:
         """What it is."""
         asked = self.asked
-        command = f"proofroll stability {asked.scene}" + "".join(f" --engine {name}" for name in self.engines)
+        command = f"proofroll stability {asked.scene}" + "".join(
+            f" --engine {shlex.quote(name)}" for name in self.engines
+        )
         return {
             "name": asked.name, "title": asked.title, "question": asked.question, "scene": asked.scene,
             "command": command,
@@ -68,10 +71,15 @@ class StabilityPart:
 
         study = self.study
         assert study is not None  # it was made
-        claims = []
+        claims, contradictions = [], []
         for claim in () if self.engines else self.asked.claims:
             against = claim.contradictions(study["points"])
-            claims.append({"says": _says(claim), "because": claim.because, "against": against})
+            contradictions += against
+            untested = "" if against else claim.untested(study["points"])
+            claims.append(
+                {"says": _says(claim), "because": claim.because, "against": against, "untested": untested,
+                 "holds": None if untested else not against}
+            )  # fmt: skip
         points = [
             point | {"reproducer": f"{self.folder}/{Path(point['reproducer']).name}" if point["reproducer"] else None}
             for point in study["points"]
@@ -80,7 +88,7 @@ class StabilityPart:
             "study": {**study, "points": points},
             "silent": list(silent_lines(study)),
             "claims": claims,
-            "contradictions": [line for claim in claims for line in claim["against"]],
+            "contradictions": contradictions,
             "lost": [] if study["points"] else [f"{name}: {reason}" for name, reason in study["absent"].items()],
         }
 
@@ -102,17 +110,18 @@ def _says(claim: Claim) -> str:
     said = f"{claim.engine} is {claim.boundary}"
     if claim.never:
         said += " at no step or tolerance"
-    elif getattr(claim, "same", False):
+    elif claim.same:
         said += " up to the same part of the natural time everywhere"
     elif claim.number is not None:
         low, high = claim.between
         said += f" up to {SYMBOLS.get(claim.number, claim.number)} = {number(low)} … {number(high)}"
     else:
-        said += " up to its boundary"
+        said += " up to a boundary"
     if claim.axes:
         said += f" along {', '.join(claim.axes)}"
     if claim.values:
-        said += f" from {claim.values[0]:g} to {claim.values[1]:g}"
+        low, high = claim.values
+        said += f" at {low:g}" if low == high else f" from {low:g} to {high:g}"
     if claim.failure:
         said += f"; beyond: {' or '.join(claim.failure)}"
     if claim.silent is not None:

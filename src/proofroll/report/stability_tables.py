@@ -21,6 +21,8 @@ def headline(study: Mapping[str, Any]) -> str:
         f"{len(study['points'])} points, {study['boundaries']} boundaries of which {study['silent']} are silent "
         f"({study['runs']} runs). Beyond: {counts}."
     )
+    if study["refused"]:
+        said += f" {study['refused']} points were refused before the run."
     if study["never_accurate"]:
         said += f" At {study['never_accurate']} points no step or tolerance that was affordable holds 1 %."
     return said
@@ -110,9 +112,11 @@ def silent_lines(study: Mapping[str, Any], count: int = 8) -> Iterator[str]:
             continue
         seen.add((point["curve"], point["axis"]))
         side = point["sides"][point["boundary"]]
-        wrong = "" if side["error"] is None else f", off by {100 * side['error']:.3g} % of the range"
-        if side["largest"] is None:
-            step = "at every step tried"
+        wrong = "" if side["error"] is None else f", off by {number(100 * side['error'])} % of the range"
+        if side["largest"] is None and point["too_slow"] is not None:
+            step = f"down to {point['resolution']} {number(point['finest'])}, finer ones are too slow"
+        elif side["largest"] is None:
+            step = f"at every {point['resolution']} down to {number(point['finest'])}"
         else:
             step = f"just beyond {point['resolution']} {number(side['largest'])}"
         yield f"{label(point)} at {point['axis']} = {number(point['value'])}: {point['failure']} {step}{wrong}"

@@ -23,6 +23,7 @@ def advice(entry: Mapping[str, Any]) -> list[dict[str, Any]]:
                 "wanted": f"{number(100 * relative)} %, {wanted}" if relative is not None else wanted,
                 "choice": _told(answer["choice"] or answer.get("closest"), of),
                 "holds": answer["choice"] is not None,
+                "ties": [_told(point, of) for point in answer.get("ties", [])],
                 **{key: _told(answer[key], of) for key in ("runner_up", "first_failure", "least_model")},
             }
         )

@@ -28,17 +28,23 @@ def _agrees(comparisons: list[dict[str, Any]]) -> str:
     rows = [row for comparison in comparisons for row in comparison["rows"]]
     count = sum(row["verdict"] == "agrees" for row in rows)
     finer = sum(row["verdict"] == "converges" for row in rows)
-    said = f"Of {len(rows)} engine settings, {count} {'agrees' if count == 1 else 'agree'} with the truth everywhere"
+    agree = "agrees" if count == 1 else "agree"
+    said = f"Of {len(rows)} settings in {_comparisons(len(comparisons))}, {count} {agree} with the truth everywhere"
     if finer:
         said += f" and {finer} would with a finer step"
     complete = [score for score in scores(comparisons[0]) if score.worst is not None]
     if not complete:
         return f"{said}; none gave motion and forces in every case of the first comparison."
+    first = " in the first" if len(comparisons) > 1 else ""
     best = min(complete, key=lambda score: score.worst or 0.0)
     return (
-        f"{said}; closest is {best.name}, whose motion stays within {number(best.motion)} of its range and whose "
-        f"forces within {number(best.forces)} of the largest."
+        f"{said}; closest{first} is {best.name}, whose motion stays within {number(best.motion)} of its range and "
+        f"whose forces within {number(best.forces)} of the largest."
     )
+
+
+def _comparisons(count: int) -> str:
+    return "one comparison" if count == 1 else f"{count} comparisons"
 
 
 def _silent(content: dict[str, Any]) -> str:

@@ -156,7 +156,7 @@ def part_lines(content: dict[str, Any]) -> list[str]:
             )
     for entry in content["stability"]:
         if entry["study"] is not None:
-            study, held = entry["study"], [not claim["against"] for claim in entry["claims"]]
+            study, held = entry["study"], [claim["holds"] for claim in entry["claims"] if claim["holds"] is not None]
             lines.append(
                 f"{entry['name']}: {study['silent']} of {study['boundaries']} boundaries are silent{_held(held)}."
             )

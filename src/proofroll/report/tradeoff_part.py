@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import shlex
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
@@ -28,7 +29,9 @@ class TradeoffPart:
     def head(self) -> dict[str, str]:
         """What it is."""
         asked = self.asked
-        command = f"proofroll tradeoff {asked.scene}" + "".join(f" --engine {name}" for name in self.engines)
+        command = f"proofroll tradeoff {asked.scene}" + "".join(
+            f" --engine {shlex.quote(name)}" for name in self.engines
+        )
         return {
             "name": asked.name, "title": asked.title, "question": asked.question, "scene": asked.scene,
             "command": command,

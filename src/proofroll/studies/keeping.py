@@ -30,10 +30,28 @@ def kept(path: Path) -> tuple[dict[str, Any] | None, list[str]]:
     """
     try:
         study: dict[str, Any] = json.loads(path.read_text(encoding="utf-8"))
+        if study["seal"] != _seal(study):
+            return None, ["what is stored is not what had been put there"]
         reasons = installed.changes(study["measured"])
     except (OSError, ValueError, KeyError, TypeError, AttributeError):  # absent, half written, or something else
         return None, []
     return (None, reasons) if reasons else (study, [])
+
+
+def _seal(study: Mapping[str, Any]) -> str:
+    """Hash of all that a kept study holds besides it: a file that was cut or changed does not have it."""
+    content = {key: value for key, value in study.items() if key != "seal"}
+    return hashlib.sha256(json.dumps(content, sort_keys=True).encode()).hexdigest()
+
+
+def keep(study: Mapping[str, Any], path: Path) -> None:
+    """Writes a study as :func:`kept` reads it.
+
+    Raises:
+        ProofrollError: the folder cannot be written.
+    """
+    as_read = json.loads(json.dumps(study))  # what will be read: no tuples, and no numbers as keys
+    write_text(path, json.dumps({**as_read, "seal": _seal(as_read)}))
 
 
 def make_tradeoff(
@@ -75,7 +93,7 @@ def make_tradeoff(
     contradictions = claims.contradictions(study) if claims and not engines else []
     study["claims"] = {"file": claims.name if claims else None, "contradictions": contradictions}
     path = stored(folder, question, engines, brief=brief)
-    write_text(path, json.dumps(study))
+    keep(study, path)
     names = {
         point.case.key: f"{curve.engine} {point.step or ''}".strip() for curve in found.curves for point in curve.points
     }
@@ -122,18 +140,16 @@ def make_stability(
     study["claims"] = {"file": asked.name, "contradictions": asked.contradictions(study)}
     study |= {"effort": dataclasses.asdict(effort), "measured": installed.measured()}
     study = plain(study)
-    write_text(path, json.dumps(study))
+    keep(study, path)
     return study, path
 
 
 def stability_path(
     folder: Path, asked: StabilityFile, axes: Sequence[Axis], engines: Sequence[str], effort: Effort
 ) -> Path:
-    """Where a map is kept: the whole one under the name of its scene, any other under a name of its own."""
-    from proofroll.studies.places import Effort
+    """Where a map is kept: a file for each scene, axes with their values, engines and effort."""
+    from proofroll.scene_file import load_scene
 
-    scene = Path(asked.scene).name
-    if axes == asked.axes and not engines and effort == Effort():
-        return folder / "stability" / f"{scene}.json"
-    identity = json.dumps([[axis.name for axis in axes], sorted(engines), repr(effort)])
-    return folder / "stability" / f"{scene}-{hashlib.sha256(identity.encode()).hexdigest()[:10]}.json"
+    identity = [load_scene(asked.scene).digest, [dataclasses.asdict(axis) for axis in axes], sorted(engines)]
+    digest = hashlib.sha256(json.dumps([*identity, repr(effort)]).encode()).hexdigest()[:10]
+    return folder / "stability" / f"{Path(asked.scene).name}-{digest}.json"

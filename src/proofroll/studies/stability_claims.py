@@ -19,6 +19,10 @@ from proofroll.studies.stability_content import dependence
 from proofroll.toml_file import read_toml, study_files
 
 STUDY = "stability"
+# A dependence along an axis shows between as many values.
+_FEWEST_ALIKE = 2
+# That no step holds is seen on as many of them, each a fraction of the one before; no search goes down to nothing.
+_TRIED = 4
 
 
 @dataclass(frozen=True)
@@ -51,6 +55,20 @@ class Claim:
     failure: list[Failure] = field(default_factory=list)
     silent: bool | None = None
 
+    def untested(self, points: Sequence[Mapping[str, Any]]) -> str:
+        """Why the points of a map can say nothing of it; empty if they can."""
+        about = [point for point in points if self._about(point) and not point["problem"]]
+        if not about:
+            return "no point of this map is about it"
+        sides = [(point, point["sides"][self.boundary]) for point in about]
+        if self.same and sum(side["largest"] is not None for _, side in sides) < _FEWEST_ALIKE:
+            return "nothing holds at two values of the axis"
+        cut = [side["largest"] is None and point["too_slow"] is not None for point, side in sides]
+        tried = max(point["runs"] for point in about)
+        if all(cut) and not self.failure and not (self.never and tried >= _TRIED):
+            return "its searches were cut: finer runs are too slow for this map"
+        return ""
+
     def contradictions(self, points: Sequence[Mapping[str, Any]]) -> list[str]:
         """What the points of a map do not confirm, as sentences."""
         found = []
@@ -61,6 +79,9 @@ class Claim:
                 said = dependence(along, self.boundary)
                 if said:
                     found.append(f"{curve} along {axis}: {self.boundary} up to {said}, expected the same everywhere")
+        expected = self.failure and not any(point["sides"][self.boundary]["failure"] for point in about)
+        if about and expected and not any(point["too_slow"] for point in about):
+            found.append(f"{self.engine}: nothing fails beyond {self.boundary}, expected: {' or '.join(self.failure)}")
         for point in about:
             side = point["sides"][self.boundary]
             where = f"{point['curve']} at {point['axis']} = {point['value']:g}"

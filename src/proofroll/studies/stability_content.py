@@ -7,7 +7,7 @@ from collections.abc import Callable, Mapping, Sequence
 from dataclasses import asdict
 from typing import Any
 
-from proofroll.studies.failure import ACCURATE, MEANINGS, Outcome
+from proofroll.studies.failure import ACCURATE, MEANINGS, Failure, Outcome
 from proofroll.studies.numbers import explanation, numbers
 from proofroll.studies.stability import MapPoint, StabilityMap, failure_beyond
 
@@ -23,7 +23,8 @@ _PASSES: Mapping[str, Callable[[Outcome], bool]] = {
 def content(found: StabilityMap) -> dict[str, Any]:
     """Everything, with counts on top."""
     points = [_point(point) for point in found.points]
-    failing = [point for point in points if point["failure"]]
+    # Who refuses before the run, or is refused by the certificate, has passed no boundary.
+    failing = [point for point in points if point["failure"] and point["failure"] != Failure.REFUSED]
     return {
         "study": "stability",
         "scene": found.scene,
@@ -33,6 +34,7 @@ def content(found: StabilityMap) -> dict[str, Any]:
         "runs": found.runs,
         "boundaries": len(failing),
         "silent": sum(point["silent"] for point in failing),
+        "refused": sum(point["failure"] == Failure.REFUSED for point in points),
         "failures": dict(Counter(point["failure"] for point in failing)),
         "never_accurate": sum(point["largest_accurate"] is None and not point["problem"] for point in points),
         "meanings": {str(failure): meaning for failure, meaning in MEANINGS.items()},
@@ -162,12 +164,16 @@ def dependence(points: Sequence[Mapping[str, Any]], name: str) -> str:
 
 
 def silent_ranking(study: Mapping[str, Any]) -> list[dict[str, Any]]:
-    """The silent failures, the worst first: wrong at any step, then by how wrong the run beyond the boundary was."""
+    """The silent failures, the worst first: wrong at any step, then by how wrong the run beyond the boundary was.
+
+    Searches that were cut because finer runs take too long come last: a finer step might have been right.
+    """
     silent = [point for point in study["points"] if point["silent"]]
 
-    def badness(point: Mapping[str, Any]) -> tuple[bool, bool, float]:
+    def badness(point: Mapping[str, Any]) -> tuple[bool, bool, bool, float]:
         error = point["sides"][point["boundary"]]["error"]
         never = point["sides"][point["boundary"]]["largest"] is None
-        return never, point["boundary"] == "stable", error if error is not None else 0.0
+        cut = never and point["too_slow"] is not None
+        return not cut, never, point["boundary"] == "stable", error if error is not None else 0.0
 
     return sorted(silent, key=badness, reverse=True)

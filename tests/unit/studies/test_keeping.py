@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import dataclasses
 import json
 from pathlib import Path
 from typing import Any
@@ -9,7 +10,7 @@ from typing import Any
 import pytest
 
 from proofroll.studies import installed
-from proofroll.studies.keeping import kept, stability_path
+from proofroll.studies.keeping import keep, kept, stability_path
 from proofroll.studies.places import QUICK, Effort
 from proofroll.studies.stability_claims import file_for
 
@@ -18,7 +19,7 @@ from proofroll.studies.stability_claims import file_for
 def path(tmp_path: Path) -> Path:
     """A study that was kept just now."""
     path = tmp_path / "study.json"
-    path.write_text(json.dumps({"points": [1], "measured": installed.measured()}))
+    keep({"points": [1], "measured": installed.measured()}, path)
     return path
 
 
@@ -26,7 +27,7 @@ def changed(path: Path, **values: Any) -> Path:
     """The same file with something else in what it was measured with."""
     study = json.loads(path.read_text())
     study["measured"] |= values
-    path.write_text(json.dumps(study))
+    keep(study, path)
     return path
 
 
@@ -52,6 +53,20 @@ def test_a_study_of_another_code_version_or_machine_does_not(path: Path, values:
     assert any(reason.startswith(words) for reason in reasons), reasons
 
 
+def test_a_study_that_was_tampered_with_does_not(path: Path) -> None:
+    """One number that is not what was put there, and it is not given."""
+    path.write_text(path.read_text().replace('"points": [1]', '"points": [2]'))
+    assert kept(path) == (None, ["what is stored is not what had been put there"])
+
+
+def test_another_file_has_a_map_of_its_own(tmp_path: Path) -> None:
+    """Other values of an axis, though of the same name, are another map."""
+    asked = file_for("inclined_plane")
+    axes = [dataclasses.replace(axis, values=axis.values[:2]) for axis in asked.axes]
+    first = stability_path(tmp_path, asked, asked.axes, (), Effort())
+    assert stability_path(tmp_path, dataclasses.replace(asked, axes=axes), axes, (), Effort()) != first
+
+
 @pytest.mark.parametrize("text", ["", "{", "[]", "{}", '{"measured": 3}'])
 def test_a_file_that_is_no_study_is_as_none(tmp_path: Path, text: str) -> None:
     """Half a file, another file and none at all are alike: there is no study, and no reason to name."""
@@ -71,5 +86,4 @@ def test_a_part_of_a_map_never_takes_the_place_of_the_whole(tmp_path: Path) -> N
         for effort in efforts
     ]
     assert len(set(paths)) == len(paths)
-    assert paths[0] == tmp_path / "stability" / "inclined_plane.json"
     assert stability_path(tmp_path, asked, list(asked.axes), (), QUICK) == paths[1]

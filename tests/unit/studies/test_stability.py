@@ -13,7 +13,7 @@ import pytest
 
 from proofroll.errors import InputError
 from proofroll.plain import plain
-from proofroll.report.stability_map import LETTERS, legend, svg, svgs
+from proofroll.report.stability_map import LETTERS, legend, svg
 from proofroll.report.stability_tables import boundary_table, headline, silent_lines
 from proofroll.runner import Runner
 from proofroll.scene_file import load_scene
@@ -101,11 +101,7 @@ def test_reports_of_a_map(small: Any) -> None:
     assert len(list(silent_lines(study))) <= 8
     picture = svg(study)
     assert picture.startswith("<?xml")
-    (axis,) = svgs(study).items()
-    assert axis[0] == "V0"
-    assert "<text" in axis[1]
-    assert "projection rotating_frame default" in axis[1]
-    assert len(axis[1]) < 300_000
+    assert "projection rotating_frame default" in picture, "texts stay texts"
     assert all(f"{letter} {kind}" in " ".join(legend(study)) for kind, letter in LETTERS.items())
     assert set(LETTERS) == {str(failure) for failure in Failure}
 

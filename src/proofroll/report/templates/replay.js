@@ -139,10 +139,11 @@
     for (const ball of shown.balls.slice(1)) {
       const there = time <= until(ball) + 1e-9, p = smooth(ball.p), word = state(ball);
       const off = 1000 * Math.hypot(...p.map((x, k) => x - centre[k]));
+      const presses = ball.press && time > 0;  // a reaction at time 0 is the start's: contacts that begin unloaded have none yet
       const texts = there ? [
         off < 0.1 ? "< 0.1" : fixed(off, off < 100 ? 1 : 0),
-        ball.press ? fixed(straight(ball.press)[0], 1) : "–",
-        ball.press ? fixed(straight(ball.pull)[0] / straight(ball.press)[0], 3) : "–",
+        presses ? fixed(straight(ball.press)[0], 1) : "–",
+        presses ? fixed(straight(ball.pull)[0] / straight(ball.press)[0], 3) : "–",
       ] : ["gone", "–", "–"];
       texts.forEach((text, k) => { ball.cells[k].textContent = text; });
       const [sign, words] = [there && word ? word[1][0] : "–", there && word ? word[1].slice(2) : "not known"];
