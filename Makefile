@@ -20,7 +20,7 @@ tradeoff: install
 	$(BIN)/proofroll tradeoff sphere_in_cylinder --out $(OUT)
 
 test: install
-	$(BIN)/python -m pytest -n 2
+	$(BIN)/python -m pytest -n 2 --dist loadgroup
 
 check: install
 	$(BIN)/ruff check .

@@ -20,6 +20,8 @@ from proofroll.studies.keeping import keep
 from proofroll.studies.sweep import Question
 from proofroll.studies.tradeoff import stored
 
+pytestmark = pytest.mark.xdist_group("tradeoff")  # one process makes the study that most of them read
+
 Proofroll = Callable[..., tuple[int, str, str]]
 ENGINE = "exudyn[formulation=generic,preset=matched]"
 

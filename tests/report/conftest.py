@@ -31,6 +31,14 @@ from proofroll.trajectory import write
 from proofroll.truth import truth
 from proofroll.truth.regimes import regime_map
 
+
+def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
+    """The tests of this folder share a browser, pages and figures: one process makes them once."""
+    for item in items:
+        if Path(__file__).parent in item.path.parents:
+            item.add_marker(pytest.mark.xdist_group("report"))
+
+
 UNTIL, EVERY = 1.0, 0.02
 
 
