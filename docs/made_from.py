@@ -9,11 +9,11 @@ import tomllib
 from pathlib import Path
 from typing import Any
 
-from proofroll.case import EngineFacts
-from proofroll.comparison_file import load_comparison
-from proofroll.folders import data_folder
-from proofroll.registry import parse_engine
-from proofroll.runner import resolve
+from proofroll.core.plugins import parse_engine
+from proofroll.files.comparison_file import load_comparison
+from proofroll.files.data_folders import data_folder
+from proofroll.running.case import EngineFacts
+from proofroll.running.runner import resolve
 
 ROOT = Path(__file__).resolve().parents[1]
 # Extras without which nothing is simulated otherwise.

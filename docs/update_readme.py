@@ -15,21 +15,21 @@ import numpy as np
 from made_from import facts, restamped, stamp
 from screenshot import screenshot
 
-from proofroll.comparison_file import load_comparison
-from proofroll.report.content import outcome_content
+from proofroll.elements.ball_on_surface.regimes_study import regime_maps
+from proofroll.elements.ball_on_surface.trajectory import read
+from proofroll.files.comparison_file import load_comparison
+from proofroll.report.comparison_content import outcome_content
+from proofroll.report.growing_report import write_report
 from proofroll.report.markdown import cheapest_table, verdict_table
 from proofroll.report.regime_map import draw as draw_regimes
-from proofroll.report.whole import write_report
 from proofroll.report.work_precision import draw as draw_work_precision
-from proofroll.runner import Runner
-from proofroll.store import Store
+from proofroll.running.runner import Runner
+from proofroll.running.store import Store
 from proofroll.studies.claims import claims_for
 from proofroll.studies.compare import Outcome, compare
 from proofroll.studies.planning import point_name
-from proofroll.studies.regimes import regime_maps
 from proofroll.studies.tradeoff import tradeoff
 from proofroll.studies.tradeoff_content import content
-from proofroll.trajectory import read
 
 ROOT = Path(__file__).resolve().parents[1]
 TOLERANCES = (1e-2, 1e-3, 1e-4, 1e-6)

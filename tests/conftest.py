@@ -14,9 +14,9 @@ from hostile import ENTRY_POINTS
 from hypothesis import HealthCheck, settings
 
 from proofroll import cli
-from proofroll.case import Case, EngineFacts
-from proofroll.scene import Scene
-from proofroll.scene_file import load_scene
+from proofroll.core.scene import Scene
+from proofroll.files.scene_file import load_scene
+from proofroll.running.case import Case, EngineFacts
 
 PLUGINS = Path(__file__).parent / "plugins"
 

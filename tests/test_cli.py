@@ -160,7 +160,7 @@ def test_run_for_a_person(proofroll: Proofroll) -> None:
 
 def test_run_writes_netcdf(proofroll: Proofroll, tmp_path: Path) -> None:
     """``--out`` writes the trajectory over what was there, and leaves nothing else behind."""
-    from proofroll.trajectory import read
+    from proofroll.elements.ball_on_surface.trajectory import read
 
     target = tmp_path / "new" / "run.nc"
     target.parent.mkdir()
@@ -185,7 +185,7 @@ def test_scenes(proofroll: Proofroll) -> None:
 
 def test_engines(proofroll: Proofroll, monkeypatch: pytest.MonkeyPatch) -> None:
     """The engines are listed with what they provide, and one that is missing with the reason."""
-    monkeypatch.setattr("proofroll.registry.engine_names", lambda: ["absent", "misspelt", "oracle"])
+    monkeypatch.setattr("proofroll.core.plugins.engine_names", lambda: ["absent", "misspelt", "oracle"])
     code, out, err = proofroll("engines", "--json")
     assert (code, err) == (0, "")
     found = {engine["name"]: engine for engine in json.loads(out)}
@@ -323,7 +323,7 @@ def test_onset_where_nobody_was_asked_for(
     proofroll: Proofroll, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     """Among engines that were not asked for by name a refusal is an answer; what a person reads fits 100 columns."""
-    monkeypatch.setattr("proofroll.studies.onset.default_engines", lambda _: ["refuses"])
+    monkeypatch.setattr("proofroll.elements.ball_on_surface.onset_study.default_engines", lambda _: ["refuses"])
     code, out, err = proofroll(*EARLY, "--out", str(tmp_path))
     assert code == 0, err
     assert "first slips at 0.144130" in out
@@ -478,7 +478,7 @@ def test_a_reader_that_stops_reading() -> None:
 
 def test_run_with_orientation(proofroll: Proofroll, tmp_path: Path) -> None:
     """``--ask orientation`` makes an engine follow it that otherwise would not."""
-    from proofroll.trajectory import read
+    from proofroll.elements.ball_on_surface.trajectory import read
 
     arguments = with_option("--engine", "projection[formulation=rotating_frame]")
     for asked in ([], ["--ask", "orientation"]):

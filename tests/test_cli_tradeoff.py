@@ -11,12 +11,12 @@ import pyperf
 import pytest
 from rich.console import Console
 
-from proofroll.errors import ProofrollError
+from proofroll.core.errors import ProofrollError
 from proofroll.report import labels
 from proofroll.report.tradeoff_tables import corner_table
 from proofroll.report.work_precision import svg
-from proofroll.studies import installed
-from proofroll.studies.keeping import keep
+from proofroll.studies import study_identity as installed
+from proofroll.studies.study_store import keep
 from proofroll.studies.sweep import Question
 from proofroll.studies.tradeoff import stored
 
@@ -29,8 +29,8 @@ ENGINE = "exudyn[formulation=generic,preset=matched]"
 @pytest.fixture(scope="session")
 def measured(tmp_path_factory: pytest.TempPathFactory) -> dict[str, Any]:
     """A real trade-off of two curves over half a second, and of a range of two speeds."""
-    from proofroll.runner import Runner
-    from proofroll.store import Store
+    from proofroll.running.runner import Runner
+    from proofroll.running.store import Store
     from proofroll.studies.tradeoff import tradeoff
     from proofroll.studies.tradeoff_content import content
 

@@ -15,11 +15,11 @@ from pathlib import Path
 import pytest
 from PIL import Image
 
-from proofroll.case import EngineFacts
-from proofroll.comparison_file import load_comparison
-from proofroll.registry import parse_engine
+from proofroll.core.plugins import parse_engine
+from proofroll.files.comparison_file import load_comparison
 from proofroll.report.labels import number
 from proofroll.report.terminal import step
+from proofroll.running.case import EngineFacts
 from proofroll.studies.claims import claims_for
 
 ROOT = Path(__file__).resolve().parents[1]

@@ -8,9 +8,9 @@ from typing import Annotated, ClassVar, Literal
 
 from annotated_types import Gt
 
-from proofroll.engine import Built, Sample, whole_steps
-from proofroll.mechanics import newton_euler
-from proofroll.scene import Capability, RollingBall, Scene
+from proofroll.core.engine import Built, Sample, whole_steps
+from proofroll.core.scene import Capability, RollingBall, Scene
+from proofroll.elements.ball_on_surface.mechanics import newton_euler
 
 
 @dataclass(frozen=True)

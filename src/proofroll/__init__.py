@@ -9,13 +9,13 @@ from importlib import import_module
 from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
-    from proofroll.scene_file import load_scene
-    from proofroll.simulation import simulate
+    from proofroll.files.scene_file import load_scene
+    from proofroll.running.simulation import simulate
 
 __all__ = ["load_scene", "simulate"]
 __version__ = "0.1.0"
 
-_HOMES = {"load_scene": "proofroll.scene_file", "simulate": "proofroll.simulation"}
+_HOMES = {"load_scene": "proofroll.files.scene_file", "simulate": "proofroll.running.simulation"}
 
 
 def __getattr__(name: str) -> Any:

@@ -7,12 +7,12 @@ from pathlib import Path
 
 import pytest
 
-from proofroll.agreement import Verdict
-from proofroll.comparison import Comparison, Edge, Row
-from proofroll.comparison_file import comparison_names, load_comparison
-from proofroll.registry import engine_names, load_engine, parse_engine, resolve_settings
-from proofroll.runner import Runner
-from proofroll.store import Store
+from proofroll.core.comparison import Comparison, Edge, Row
+from proofroll.core.plugins import engine_names, load_engine, parse_engine, resolve_settings
+from proofroll.core.verdict import Verdict
+from proofroll.files.comparison_file import comparison_names, load_comparison
+from proofroll.running.runner import Runner
+from proofroll.running.store import Store
 from proofroll.studies.compare import compare
 
 ROWS = [

@@ -8,8 +8,8 @@ from typing import Any
 import pytest
 
 from proofroll.conformance import Check, checks
-from proofroll.errors import Missing
-from proofroll.registry import engine_names, load_engine
+from proofroll.core.errors import Missing
+from proofroll.core.plugins import engine_names, load_engine
 
 # Engine -> pattern of checks -> why they are known to fail.
 KNOWN: Mapping[str, Mapping[str, str]] = {

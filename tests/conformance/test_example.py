@@ -11,11 +11,11 @@ from types import ModuleType
 
 import pytest
 
-from proofroll.case import Status
 from proofroll.conformance import Check, checks
-from proofroll.runner import Runner
-from proofroll.store import Store
-from proofroll.studies.single import single_case
+from proofroll.running.case import Status
+from proofroll.running.runner import Runner
+from proofroll.running.store import Store
+from proofroll.studies.run_once import single_case
 
 EXAMPLE = Path(__file__).resolve().parents[2] / "docs" / "examples" / "semi_implicit.py"
 

@@ -12,14 +12,14 @@ from pathlib import Path
 
 import pytest
 
-from proofroll.case import Case, Result
+from proofroll.core.plugins import engine_names
 from proofroll.drill import engine_faults
 from proofroll.drill.engine_faults import ENGINE_FAULTS, drill_damage, drill_engine, prepare
 from proofroll.drill.row import Drilled, drilled
 from proofroll.drill.site import Site, site
-from proofroll.registry import engine_names
 from proofroll.report.terminal import drill_table
-from proofroll.store import Store
+from proofroll.running.case import Case, Result
+from proofroll.running.store import Store
 
 # What must have happened in every drill.
 TRIED = {
@@ -75,7 +75,7 @@ def test_a_half_result_that_is_left(place: tuple[Site, Path], monkeypatch: pytes
     """A store that leaves half a file behind does not pass, nor does a row that says something else."""
     fault = next(fault for fault in ENGINE_FAULTS if fault.formulation == "half")
     other = engine_faults.EngineFault(fault.name, fault.formulation, fault.status, "ended well")
-    monkeypatch.setattr("proofroll.store.shutil.rmtree", lambda *_, **__: None)
+    monkeypatch.setattr("proofroll.running.store.shutil.rmtree", lambda *_, **__: None)
     row = drill_engine(*place, other)
     assert not row.contained
     assert "what was said is not one sentence with 'ended well'" in row.problem

@@ -7,11 +7,11 @@ from pathlib import Path
 
 import pytest
 
-from proofroll.agreement import Verdict
-from proofroll.case import Status
-from proofroll.comparison_file import load_comparison
-from proofroll.runner import Runner
-from proofroll.store import Store
+from proofroll.core.verdict import Verdict
+from proofroll.files.comparison_file import load_comparison
+from proofroll.running.case import Status
+from proofroll.running.runner import Runner
+from proofroll.running.store import Store
 from proofroll.studies.compare import Outcome, Run, compare
 
 # Defect that shows in what was built -> the quantity that the certificate must name.

@@ -75,7 +75,9 @@ def test_contents(wheel: Path) -> None:
 
 def test_it_is_the_wheel_that_is_used(installed: Path, tmp_path: Path) -> None:
     """The package and its data come from the wheel, not from the repository."""
-    code = "import proofroll, proofroll.folders as f; print(proofroll.__file__); print(f.data_folder('models'))"
+    code = (
+        "import proofroll, proofroll.files.data_folders as f; print(proofroll.__file__); print(f.data_folder('models'))"
+    )
     done = python(installed, tmp_path, "-c", code)
     assert done.returncode == 0, done.stderr
     assert all(line.startswith(str(installed)) for line in done.stdout.splitlines())
@@ -112,7 +114,7 @@ def test_run(installed: Path, tmp_path: Path, engine: str) -> None:
 
 def test_comparisons_are_found_by_name(installed: Path, tmp_path: Path) -> None:
     """The claims in the wheel can be read by name."""
-    code = "from proofroll.comparison_file import *; print([load_comparison(n).name for n in comparison_names()])"
+    code = "from proofroll.files.comparison_file import *; print([load_comparison(n).name for n in comparison_names()])"
     done = python(installed, tmp_path, "-c", code)
     assert done.returncode == 0, done.stderr
     assert "[]" not in done.stdout

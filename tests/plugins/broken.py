@@ -11,10 +11,10 @@ from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from typing import ClassVar, Self
 
-from proofroll.engine import Built, Sample
+from proofroll.core.engine import Built, Sample
+from proofroll.core.scene import Capability, Gravity, Scene
+from proofroll.elements.ball_on_surface.surfaces import FloatArray
 from proofroll.engines.projection import Projection
-from proofroll.scene import Capability, Gravity, Scene
-from proofroll.surfaces import FloatArray
 
 
 def _ball(**factors: float) -> Callable[[Scene], Scene]:
@@ -62,12 +62,12 @@ class BrokenSettings:
 
     @property
     def resolution(self) -> str:
-        """See :class:`proofroll.engine.Settings`."""
+        """See :class:`proofroll.core.engine.Settings`."""
         return "rtol"
 
     @property
     def order(self) -> int | None:
-        """See :class:`proofroll.engine.Settings`."""
+        """See :class:`proofroll.core.engine.Settings`."""
         return None
 
 
@@ -84,12 +84,12 @@ class Broken:
 
     @staticmethod
     def version() -> str:
-        """See :class:`proofroll.engine.Engine`."""
+        """See :class:`proofroll.core.engine.Engine`."""
         return "1"
 
     @classmethod
     def build(cls, scene: Scene, settings: BrokenSettings) -> Self:
-        """See :class:`proofroll.engine.Engine`."""
+        """See :class:`proofroll.core.engine.Engine`."""
         return cls(scene, settings)
 
     def __init__(self, scene: Scene, settings: BrokenSettings) -> None:
@@ -101,12 +101,12 @@ class Broken:
         self.t = 0.0
 
     def advance(self, t: float) -> None:
-        """See :class:`proofroll.engine.Engine`."""
+        """See :class:`proofroll.core.engine.Engine`."""
         self.t = t
         self.wrong.advance(t * 0.999 if self.defect == "clock" else t)
 
     def sample(self) -> Sample:
-        """See :class:`proofroll.engine.Engine`."""
+        """See :class:`proofroll.core.engine.Engine`."""
         if self.hidden and self.t == 0:
             return self.right.sample()
         found = self.wrong.sample()
@@ -119,5 +119,5 @@ class Broken:
         return 2 * (force @ e1) * e1 - force
 
     def built(self) -> Built:
-        """See :class:`proofroll.engine.Engine`."""
+        """See :class:`proofroll.core.engine.Engine`."""
         return (self.right if self.hidden else self.wrong).built()

@@ -12,11 +12,11 @@ from typing import Any, ClassVar, Self
 
 import numpy as np
 
-from proofroll.closed_form import closed_form
-from proofroll.engine import Built, Sample
-from proofroll.errors import Diverged, Refused
-from proofroll.mechanics import initial_response
-from proofroll.scene import Capability, Scene
+from proofroll.core.engine import Built, Sample
+from proofroll.core.errors import Diverged, Refused
+from proofroll.core.scene import Capability, Scene
+from proofroll.elements.ball_on_surface.closed_form import closed_form
+from proofroll.elements.ball_on_surface.mechanics import initial_response
 
 
 @dataclass(frozen=True)
@@ -29,7 +29,7 @@ class HostileSettings:
 
     @property
     def resolution(self) -> str:
-        """See :class:`proofroll.engine.Settings`."""
+        """See :class:`proofroll.core.engine.Settings`."""
         return "dt"
 
     @property
@@ -48,12 +48,12 @@ class Oracle:
 
     @staticmethod
     def version() -> str:
-        """See :class:`proofroll.engine.Engine`."""
+        """See :class:`proofroll.core.engine.Engine`."""
         return "1"
 
     @classmethod
     def build(cls, scene: Scene, settings: HostileSettings) -> Self:  # noqa: ARG003 -- the protocol's signature
-        """See :class:`proofroll.engine.Engine`."""
+        """See :class:`proofroll.core.engine.Engine`."""
         return cls(scene)
 
     def __init__(self, scene: Scene) -> None:
@@ -61,17 +61,17 @@ class Oracle:
         self.t = 0.0
 
     def advance(self, t: float) -> None:
-        """See :class:`proofroll.engine.Engine`."""
+        """See :class:`proofroll.core.engine.Engine`."""
         self.t = t
 
     def sample(self) -> Sample:
-        """See :class:`proofroll.engine.Engine`."""
+        """See :class:`proofroll.core.engine.Engine`."""
         motion = closed_form(self.body, np.array([self.t]))
         assert motion is not None  # the engine does not provide rolling resistance
         return Sample(motion.p_WB[0], motion.v_WB[0], motion.w_WB[0], force=motion.force[0])
 
     def built(self) -> Built:
-        """See :class:`proofroll.engine.Engine`."""
+        """See :class:`proofroll.core.engine.Engine`."""
         return Built(mass=self.body.ball.mass, acceleration=initial_response(self.body)[0])
 
 
@@ -81,7 +81,7 @@ class Garbage(Oracle):
     name = "garbage"
 
     def advance(self, t: float) -> None:
-        """See :class:`proofroll.engine.Engine`."""
+        """See :class:`proofroll.core.engine.Engine`."""
         sys.stdout.write('{"status": "done"}\n\x00 not UTF-8: ')
         os.write(1, b"\xff\xfe\n" * 10000)
         os.write(2, b"warning: nothing is well\n")
@@ -94,7 +94,7 @@ class Exits(Oracle):
     name = "exits"
 
     def advance(self, t: float) -> None:
-        """See :class:`proofroll.engine.Engine`."""
+        """See :class:`proofroll.core.engine.Engine`."""
         sys.stderr.write(f"fatal: no licence at {t}\n")
         sys.stderr.flush()
         os._exit(7)
@@ -106,7 +106,7 @@ class Moody(Oracle):
     name = "moody"
 
     def advance(self, t: float) -> None:
-        """See :class:`proofroll.engine.Engine`."""
+        """See :class:`proofroll.core.engine.Engine`."""
         if self.body.v0[1] == 5:
             os._exit(1)
         super().advance(t)
@@ -118,7 +118,7 @@ class Segfaults(Oracle):
     name = "segfaults"
 
     def advance(self, t: float) -> None:  # noqa: ARG002 -- the protocol's signature
-        """See :class:`proofroll.engine.Engine`."""
+        """See :class:`proofroll.core.engine.Engine`."""
         os.kill(os.getpid(), signal.SIGSEGV)
 
 
@@ -128,7 +128,7 @@ class Hangs(Oracle):
     name = "hangs"
 
     def advance(self, t: float) -> None:  # noqa: ARG002 -- the protocol's signature
-        """See :class:`proofroll.engine.Engine`."""
+        """See :class:`proofroll.core.engine.Engine`."""
         signal.signal(signal.SIGTERM, signal.SIG_IGN)
         time.sleep(600)
 
@@ -139,7 +139,7 @@ class HangsAloud(Hangs):
     name = "hangs_aloud"
 
     def advance(self, t: float) -> None:
-        """See :class:`proofroll.engine.Engine`."""
+        """See :class:`proofroll.core.engine.Engine`."""
         self.pipe = os.open(os.environ["HANGS_ALOUD"], os.O_WRONLY)
         os.write(self.pipe, f"{os.getpid()}\n".encode())
         super().advance(t)
@@ -151,7 +151,7 @@ class Raises(Oracle):
     name = "raises"
 
     def advance(self, t: float) -> None:
-        """See :class:`proofroll.engine.Engine`."""
+        """See :class:`proofroll.core.engine.Engine`."""
         raise RuntimeError(f"matrix is singular\nat t = {t}")
 
 
@@ -161,7 +161,7 @@ class SaysExit(Oracle):
     name = "says_exit"
 
     def advance(self, t: float) -> None:  # noqa: ARG002 -- the protocol's signature
-        """See :class:`proofroll.engine.Engine`."""
+        """See :class:`proofroll.core.engine.Engine`."""
         sys.exit("goodbye")
 
 
@@ -171,7 +171,7 @@ class NotANumber(Oracle):
     name = "not_a_number"
 
     def sample(self) -> Sample:
-        """See :class:`proofroll.engine.Engine`."""
+        """See :class:`proofroll.core.engine.Engine`."""
         right = super().sample()
         v = right.v_WB * (np.nan if self.t >= 0.1 else 1.0)
         return Sample(right.p_WB, v, right.w_WB, force=right.force)
@@ -183,7 +183,7 @@ class GivesUp(Oracle):
     name = "gives_up"
 
     def advance(self, t: float) -> None:
-        """See :class:`proofroll.engine.Engine`."""
+        """See :class:`proofroll.core.engine.Engine`."""
         if t > 0.06:
             raise Diverged(f"the step size fell to nothing at {t:g} s")
         super().advance(t)
@@ -196,7 +196,7 @@ class Refuses(Oracle):
 
     @classmethod
     def build(cls, scene: Scene, settings: Any) -> Self:  # noqa: ARG003 -- the protocol's signature
-        """See :class:`proofroll.engine.Engine`."""
+        """See :class:`proofroll.core.engine.Engine`."""
         raise Refused("no wheel, no ball")
 
 

@@ -9,9 +9,9 @@ from proofroll.figures.reading import load_figures
 from proofroll.report.figures_part import FiguresPart
 from proofroll.report.stability_part import StabilityPart
 from proofroll.report.tradeoff_part import TradeoffPart
-from proofroll.runner import Runner
-from proofroll.store import Store
-from proofroll.studies import installed
+from proofroll.running.runner import Runner
+from proofroll.running.store import Store
+from proofroll.studies import study_identity as installed
 from proofroll.studies.claims import claims_for
 from proofroll.studies.stability_claims import file_for
 

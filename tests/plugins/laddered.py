@@ -8,9 +8,9 @@ from typing import Any, ClassVar, Literal, Self
 
 from tiny import Tiny, TinySettings
 
-from proofroll.engine import Level, Term, whole_steps
-from proofroll.errors import Refused
-from proofroll.scene import Capability, Scene
+from proofroll.core.engine import Level, Term, whole_steps
+from proofroll.core.errors import Refused
+from proofroll.core.scene import Capability, Scene
 
 
 @dataclass(frozen=True)
@@ -53,7 +53,7 @@ class Laddered(Tiny):
         self.chosen = settings
 
     def advance(self, t: float) -> None:
-        """See :class:`proofroll.engine.Engine`."""
+        """See :class:`proofroll.core.engine.Engine`."""
         for _ in range(whole_steps(self.t, t, self.dt)):
             stage = self.x + self.dt / 2 * self.rates(self.x) if self.chosen.second_stage else self.x
             for _ in range(5 if self.chosen.idle else 1):

@@ -10,9 +10,9 @@ from typing import Any, ClassVar, Self
 import numpy as np
 from tiny import Tiny, TinySettings
 
-from proofroll.engine import Built, Sample
-from proofroll.errors import Refused
-from proofroll.scene import Capability, Scene
+from proofroll.core.engine import Built, Sample
+from proofroll.core.errors import Refused
+from proofroll.core.scene import Capability, Scene
 
 
 class Unannounced(Tiny):

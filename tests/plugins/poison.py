@@ -5,8 +5,8 @@ from __future__ import annotations
 from dataclasses import dataclass, field
 from typing import Any
 
-from proofroll.agreement import Verdict
-from proofroll.case import Status
+from proofroll.core.verdict import Verdict
+from proofroll.running.case import Status
 
 # What the code of the report itself says or compares with; nobody else can write these.
 OUR_WORDS = frozenset({*Verdict, *Status, "well-posed", "agree", "disagree", "model form", "time step"})

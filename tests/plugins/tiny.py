@@ -9,11 +9,11 @@ from typing import Annotated, Any, ClassVar, Literal, Self
 import numpy as np
 from annotated_types import Gt
 
-from proofroll.engine import Built, Sample, whole_steps
-from proofroll.mechanics import initial_response
-from proofroll.rolling_equations import reduced_rates
-from proofroll.scene import Capability, Scene
-from proofroll.surfaces import FloatArray
+from proofroll.core.engine import Built, Sample, whole_steps
+from proofroll.core.scene import Capability, Scene
+from proofroll.elements.ball_on_surface.mechanics import initial_response
+from proofroll.elements.ball_on_surface.rolling_equations import reduced_rates
+from proofroll.elements.ball_on_surface.surfaces import FloatArray
 
 
 @dataclass(frozen=True)
@@ -26,12 +26,12 @@ class TinySettings:
 
     @property
     def resolution(self) -> str:
-        """See :class:`proofroll.engine.Settings`."""
+        """See :class:`proofroll.core.engine.Settings`."""
         return "dt"
 
     @property
     def order(self) -> int | None:
-        """See :class:`proofroll.engine.Settings`."""
+        """See :class:`proofroll.core.engine.Settings`."""
         return 2
 
 
@@ -47,12 +47,12 @@ class Tiny:
 
     @staticmethod
     def version() -> str:
-        """See :class:`proofroll.engine.Engine`."""
+        """See :class:`proofroll.core.engine.Engine`."""
         return "1.0"
 
     @classmethod
     def build(cls, scene: Scene, settings: Any) -> Self:
-        """See :class:`proofroll.engine.Engine`."""
+        """See :class:`proofroll.core.engine.Engine`."""
         return cls(scene, settings)
 
     def __init__(self, scene: Scene, settings: Any) -> None:
@@ -65,20 +65,20 @@ class Tiny:
         return reduced_rates(self.body, x)[0]
 
     def advance(self, t: float) -> None:
-        """See :class:`proofroll.engine.Engine`."""
+        """See :class:`proofroll.core.engine.Engine`."""
         for _ in range(whole_steps(self.t, t, self.dt)):
             self.x = self.x + self.dt * self.rates(self.x + self.dt / 2 * self.rates(self.x))
         self.t = t
 
     def sample(self) -> Sample:
-        """See :class:`proofroll.engine.Engine`."""
+        """See :class:`proofroll.core.engine.Engine`."""
         _, v, force = reduced_rates(self.body, self.x)
         e1 = self.body.surface.frame(self.x[:2])[:, 0]
         w = self.x[4] * e1 - np.cross(e1, v) / self.body.ball.radius
         return Sample(self.body.surface.position(self.x[:2]), v, w, force=force)
 
     def built(self) -> Built:
-        """See :class:`proofroll.engine.Engine`."""
+        """See :class:`proofroll.core.engine.Engine`."""
         ball = self.body.ball
         return Built(
             mass=ball.mass,

@@ -12,10 +12,10 @@ import xarray as xr
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from proofroll.errors import Diverged, Refused
-from proofroll.scene import Scene
-from proofroll.scene_file import load_scene
-from proofroll.simulation import simulate
+from proofroll.core.errors import Diverged, Refused
+from proofroll.core.scene import Scene
+from proofroll.files.scene_file import load_scene
+from proofroll.running.simulation import simulate
 from proofroll.truth import truth
 
 FRAME, EULER = "projection[formulation=rotating_frame]", "projection[formulation=euler]"

@@ -8,11 +8,11 @@ from decimal import Decimal, getcontext
 import numpy as np
 import pytest
 
-from proofroll.closed_form import closed_form
-from proofroll.compiled import library, rolling
-from proofroll.mechanics import energy
-from proofroll.scene_file import load_scene
-from proofroll.simulation import build
+from proofroll.elements.ball_on_surface.closed_form import closed_form
+from proofroll.elements.ball_on_surface.compiled import library, rolling
+from proofroll.elements.ball_on_surface.mechanics import energy
+from proofroll.files.scene_file import load_scene
+from proofroll.running.simulation import build
 
 needs_heyoka = pytest.mark.skipif(not library.available(), reason="heyoka is not installed")
 

@@ -12,12 +12,12 @@ import xarray as xr
 from hypothesis import given
 from hypothesis import strategies as st
 
-from proofroll.certificate import certify, first_difference
-from proofroll.metrics import energy_balance
-from proofroll.scene import Scene
-from proofroll.scene_file import load_scene
-from proofroll.simulation import build, simulate
-from proofroll.trajectory import trajectory
+from proofroll.core.scene import Scene
+from proofroll.elements.ball_on_surface.certificate import certify, first_difference
+from proofroll.elements.ball_on_surface.observables import energy_balance
+from proofroll.elements.ball_on_surface.trajectory import trajectory
+from proofroll.files.scene_file import load_scene
+from proofroll.running.simulation import build, simulate
 from proofroll.truth.rolling import reduced, unreduced
 
 Changes = Mapping[str, float]

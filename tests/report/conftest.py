@@ -17,17 +17,17 @@ import pytest
 from browsing import Visit, launched, visiting
 from invented import figures_part, further
 
-from proofroll.agreement import Verdict, judge
-from proofroll.case import Case, EngineFacts, Result, Status
-from proofroll.comparison import Band, Comparison, Row, Tolerance
-from proofroll.metrics import observables, scales
+from proofroll.core.comparison import Band, Comparison, Row, Tolerance
+from proofroll.core.verdict import Verdict, judge
+from proofroll.elements.ball_on_surface.observables import observables, scales
+from proofroll.elements.ball_on_surface.trajectory import write
+from proofroll.files.scene_file import load_scene
+from proofroll.report.growing_report import begun, write_report
 from proofroll.report.html import page
-from proofroll.report.whole import begun, write_report
-from proofroll.scene_file import load_scene
-from proofroll.store import Store
+from proofroll.running.case import Case, EngineFacts, Result, Status
+from proofroll.running.store import Store
 from proofroll.studies.compare import Outcome, Run
 from proofroll.studies.planning import point_name
-from proofroll.trajectory import write
 from proofroll.truth import truth
 from proofroll.truth.regimes import regime_map
 

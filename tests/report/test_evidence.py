@@ -12,9 +12,11 @@ from typing import Any
 import numpy as np
 import pytest
 
-from proofroll.agreement import Verdict, judge
-from proofroll.comparison import ExceptAt, Row, Tolerance
-from proofroll.metrics import observables
+from proofroll.core.comparison import ExceptAt, Row, Tolerance
+from proofroll.core.verdict import Verdict, judge
+from proofroll.elements.ball_on_surface.observables import observables
+from proofroll.elements.ball_on_surface.trajectory import read, write
+from proofroll.files.scene_file import load_scene
 from proofroll.report.evidence import add_evidence, cost
 from proofroll.report.html import page
 from proofroll.report.labels import error
@@ -22,10 +24,8 @@ from proofroll.report.plots import MOST_POINTS, kept, point_curves
 from proofroll.report.report_content import report_content
 from proofroll.report.styles import OUTLINES, styles
 from proofroll.report.tables import cost_title, costs, expectations
-from proofroll.scene_file import load_scene
-from proofroll.store import Store
+from proofroll.running.store import Store
 from proofroll.studies.compare import Outcome
-from proofroll.trajectory import read, write
 
 
 def test_rough_curves_keep_extrema_ends_and_gaps() -> None:

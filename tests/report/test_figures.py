@@ -15,8 +15,8 @@ from proofroll.figures.judging import judged
 from proofroll.figures.reading import load_figures
 from proofroll.figures.study import Study, run_figures
 from proofroll.report.figures import write_figures
-from proofroll.runner import Runner
-from proofroll.store import Store
+from proofroll.running.runner import Runner
+from proofroll.running.store import Store
 
 # The runs that can be made in seconds, and long enough for the first slip past 1.7 s and four swings of z.
 RUNS = ("free4", "resisted4")

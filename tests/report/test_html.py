@@ -16,14 +16,14 @@ import pytest
 from poison import Poison
 
 import proofroll.report.html
+from proofroll.report.compression import packed
+from proofroll.report.growing_report import write_report
 from proofroll.report.html import page
 from proofroll.report.labels import number, symbol
-from proofroll.report.packing import packed
 from proofroll.report.plots import kept, point_curves
 from proofroll.report.report_content import report_content
 from proofroll.report.scores import Score, recommendation
-from proofroll.report.whole import write_report
-from proofroll.store import Store
+from proofroll.running.store import Store
 from proofroll.studies.compare import Outcome
 
 COMMAND = "proofroll report invented"

@@ -12,10 +12,12 @@ from typing import Any
 import numpy as np
 import pytest
 
-from proofroll.agreement import Judgement, Verdict
-from proofroll.case import Case, EngineFacts, Result, Status
-from proofroll.comparison import Band, Comparison, Row, Tolerance
-from proofroll.events import Event, events_of, with_events
+from proofroll.core.comparison import Band, Comparison, Row, Tolerance
+from proofroll.core.events import Event, events_of, with_events
+from proofroll.core.verdict import Judgement, Verdict
+from proofroll.elements.ball_on_surface.trajectory import write
+from proofroll.files.scene_file import load_scene
+from proofroll.report.growing_report import write_report
 from proofroll.report.html import page
 from proofroll.report.labels import MEANINGS, SYMBOLS
 from proofroll.report.markdown import verdict_table as markdown_table
@@ -25,12 +27,10 @@ from proofroll.report.plots import point_curves
 from proofroll.report.report_content import report_content
 from proofroll.report.scores import scores
 from proofroll.report.terminal import closing_lines, console, verdict_table
-from proofroll.report.whole import write_report
-from proofroll.scene_file import load_scene
-from proofroll.store import Store
+from proofroll.running.case import Case, EngineFacts, Result, Status
+from proofroll.running.store import Store
 from proofroll.studies.compare import Outcome, Run
 from proofroll.studies.planning import point_name
-from proofroll.trajectory import write
 from proofroll.truth import truth
 from proofroll.truth.onset import onset
 

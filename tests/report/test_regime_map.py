@@ -8,10 +8,10 @@ from typing import Any
 import pytest
 import xarray as xr
 
+from proofroll.files.scene_file import load_scene
+from proofroll.report.growing_report import write_report
 from proofroll.report.regime_map import boundaries, counts, draw, inline
-from proofroll.report.whole import write_report
-from proofroll.scene_file import load_scene
-from proofroll.store import Store
+from proofroll.running.store import Store
 from proofroll.studies.compare import Outcome
 from proofroll.truth.regimes import regime_map
 

@@ -17,6 +17,8 @@ from browsing import Visit
 from scipy.integrate import solve_ivp
 from scipy.spatial.transform import Rotation
 
+from proofroll.elements.ball_on_surface.trajectory import read, write
+from proofroll.files.scene_file import load_scene
 from proofroll.report import replay_library
 from proofroll.report.html import page
 from proofroll.report.plots import point_curves
@@ -25,8 +27,6 @@ from proofroll.report.replay_library import thinned, three
 from proofroll.report.replay_poses import AWAY, SLIPS, STICKS, WIDEST_TURN, frame_times, poses
 from proofroll.report.replay_wall import middle, wall
 from proofroll.report.report_content import report_content
-from proofroll.scene_file import load_scene
-from proofroll.trajectory import read, write
 from proofroll.truth import truth
 
 SPEED, UNTIL, EVERY = 4.0, 1.0, 0.02

@@ -8,8 +8,8 @@ from typing import Any
 import pytest
 
 import proofroll.report.scene_sheet
+from proofroll.files.scene_file import read_scene_file
 from proofroll.report.scene_sheet import scene_sheet
-from proofroll.scene_file import read_scene_file
 
 POINTS = [{"speed": v, "rolling_resistance": f} for v in (2.0, 4.0, 6.0) for f in (0.0, 5e-4)]
 

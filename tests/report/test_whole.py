@@ -10,16 +10,16 @@ from typing import Any, ClassVar
 import pytest
 from invented import further, stability_study, tradeoff_study
 
-from proofroll.errors import ProofrollError
+from proofroll.core.errors import ProofrollError
+from proofroll.report.growing_report import Report, begun
 from proofroll.report.html import page
-from proofroll.report.parts import KEYS, absent, all_parts, attempt, entry, parts_of
 from proofroll.report.stability_part import StabilityPart
+from proofroll.report.study_parts import KEYS, absent, all_parts, attempt, entry, parts_of
 from proofroll.report.summary import three_sentences
-from proofroll.report.whole import Report, begun
-from proofroll.store import Store
+from proofroll.running.store import Store
 from proofroll.studies.compare import Outcome
-from proofroll.studies.keeping import keep, stability_path
-from proofroll.studies.places import QUICK, Effort
+from proofroll.studies.stability_places import QUICK, Effort
+from proofroll.studies.study_store import keep, stability_path
 from proofroll.studies.tradeoff import stored
 
 POISON = "</script><script>alert('poison')</script><img src=x onerror=alert(1)>\"'"

@@ -11,9 +11,9 @@ from pathlib import Path
 
 import pytest
 
-from proofroll.case import Case, Result, Status
-from proofroll.errors import ProofrollError
-from proofroll.store import Store, move, write_text
+from proofroll.core.errors import ProofrollError
+from proofroll.running.case import Case, Result, Status
+from proofroll.running.store import Store, move, write_text
 
 MakeCase = Callable[..., Case]
 
@@ -228,8 +228,8 @@ def test_two_writers_and_a_reader(tmp_path: Path, make_case: MakeCase) -> None:
     case = make_case("oracle")
     made(Store(tmp_path), case, b"0")
     script = (
-        "import json, sys\nfrom pathlib import Path\nfrom proofroll.case import Case, Result, Status\n"
-        "from proofroll.store import Store\n"
+        "import json, sys\nfrom pathlib import Path\nfrom proofroll.running.case import Case, Result, Status\n"
+        "from proofroll.running.store import Store\n"
         "store, case = Store(Path(sys.argv[1])), Case.from_dict(json.loads(sys.argv[2]))\n"
         "for number in range(150):\n"
         "    with store.incoming(case) as written:\n"

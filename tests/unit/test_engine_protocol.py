@@ -2,8 +2,8 @@ from __future__ import annotations
 
 import pytest
 
-from proofroll.engine import whole_steps
-from proofroll.errors import InputError
+from proofroll.core.engine import whole_steps
+from proofroll.core.errors import InputError
 
 
 @pytest.mark.parametrize(

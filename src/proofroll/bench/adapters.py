@@ -10,8 +10,8 @@ from typing import Any
 
 import numpy as np
 
-from proofroll.errors import ProofrollError, Refused
-from proofroll.timing import Interval, Timing, interleaved, ratio
+from proofroll.core.errors import ProofrollError, Refused
+from proofroll.running.timing import Interval, Timing, interleaved, ratio
 
 SCENE = "sphere_in_cylinder"
 # The study's usual sampling interval, and the longest run [s].
@@ -74,8 +74,8 @@ def measure_adapter(
         Refused, Diverged: one of the two cannot be run.
     """
     from proofroll.bench.loops import load_bare_loop
-    from proofroll.registry import load_engine, resolve_settings
-    from proofroll.scene_file import load_scene
+    from proofroll.core.plugins import load_engine, resolve_settings
+    from proofroll.files.scene_file import load_scene
 
     prepare = load_bare_loop(engine)
     kind = load_engine(engine)
@@ -138,7 +138,7 @@ def bench_adapters(
 ) -> list[Row]:
     """All formulations of some engines, each with every variant, one worker process per engine."""
     from proofroll.bench.loops import announced
-    from proofroll.runner import Worker, WorkerDied
+    from proofroll.running.runner import Worker, WorkerDied
 
     rows: list[Row] = []
     for engine in engines:
@@ -206,7 +206,7 @@ def _row(answer: dict[str, Any]) -> dict[str, Any]:
 
 def content(rows: Sequence[Row]) -> dict[str, Any]:
     """The rows as plain data: per engine the worst ratio, and all of its rows."""
-    from proofroll.timing import machine
+    from proofroll.running.timing import machine
 
     engines: dict[str, Any] = {}
     for name in dict.fromkeys(row.engine for row in rows):

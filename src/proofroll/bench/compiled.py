@@ -9,13 +9,13 @@ from typing import Any
 
 import numpy as np
 
-from proofroll.compiled.first_slip import FirstSlip, Model, first_slip
-from proofroll.compiled.first_slips import first_slips
-from proofroll.compiled.library import TIGHTEST
-from proofroll.scene import Scene
-from proofroll.scene_file import load_scene
-from proofroll.simulation import build
-from proofroll.surfaces import FloatArray
+from proofroll.core.scene import Scene
+from proofroll.elements.ball_on_surface.compiled.first_slip import FirstSlip, Model, first_slip
+from proofroll.elements.ball_on_surface.compiled.first_slips import first_slips
+from proofroll.elements.ball_on_surface.compiled.library import TIGHTEST
+from proofroll.elements.ball_on_surface.surfaces import FloatArray
+from proofroll.files.scene_file import load_scene
+from proofroll.running.simulation import build
 
 # A measurement lasts about this long [s], so that the clock and one interruption do not matter.
 _SECONDS = 0.05

@@ -6,7 +6,7 @@ from importlib.metadata import EntryPoint, entry_points
 from typing import Any
 
 from proofroll.bench.bare import GROUP
-from proofroll.errors import Refused
+from proofroll.core.errors import Refused
 
 
 def load_bare_loop(engine: str) -> Any:

@@ -16,15 +16,15 @@ import numpy as np
 
 from proofroll.bench.compiled import Onsets, Timed, compiled, numeric
 from proofroll.bench.search import SAMPLES, Found, search
-from proofroll.compiled.first_slip import first_slip
-from proofroll.compiled.library import require_heyoka
-from proofroll.runner import Runner
-from proofroll.scene_file import load_scene
-from proofroll.simulation import simulate
-from proofroll.stopwatch import Stopwatch
-from proofroll.store import Store
-from proofroll.surfaces import FloatArray
-from proofroll.timing import Interval, Timing, interleaved, machine, ratio
+from proofroll.elements.ball_on_surface.compiled.first_slip import first_slip
+from proofroll.elements.ball_on_surface.compiled.library import require_heyoka
+from proofroll.elements.ball_on_surface.surfaces import FloatArray
+from proofroll.files.scene_file import load_scene
+from proofroll.running.runner import Runner
+from proofroll.running.simulation import simulate
+from proofroll.running.stopwatch import Stopwatch
+from proofroll.running.store import Store
+from proofroll.running.timing import Interval, Timing, interleaved, machine, ratio
 from proofroll.truth.onset import first_slip as true_first_slip
 from proofroll.truth.rolling import unreduced
 

@@ -8,14 +8,14 @@ from typing import Any
 
 import numpy as np
 
-from proofroll.case import Case, EngineFacts, Result, Status
-from proofroll.engine import Level
-from proofroll.errors import ProofrollError
-from proofroll.registry import engine_names
-from proofroll.runner import Runner, describe, resolve
-from proofroll.scene import Scene
-from proofroll.surfaces import FloatArray
-from proofroll.trajectory import read
+from proofroll.core.engine import Level
+from proofroll.core.errors import ProofrollError
+from proofroll.core.plugins import engine_names
+from proofroll.core.scene import Scene
+from proofroll.elements.ball_on_surface.surfaces import FloatArray
+from proofroll.elements.ball_on_surface.trajectory import read
+from proofroll.running.case import Case, EngineFacts, Result, Status
+from proofroll.running.runner import Runner, describe, resolve
 
 # Samples per run: enough that the largest error of an oscillation of about 0.6 s is seen. Every run stops at them, the
 # timed ones too; that costs a fixed step nothing, and an adaptive one of high order at most a factor of about two.

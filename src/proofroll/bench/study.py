@@ -11,12 +11,12 @@ from collections.abc import Callable, Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
-from proofroll.case import Case, EngineFacts, Result
-from proofroll.errors import ProofrollError
-from proofroll.runner import Runner, Worker, describe, resolve
-from proofroll.scene_file import load_scene
-from proofroll.stopwatch import Stopwatch
-from proofroll.store import Store
+from proofroll.core.errors import ProofrollError
+from proofroll.files.scene_file import load_scene
+from proofroll.running.case import Case, EngineFacts, Result
+from proofroll.running.runner import Runner, Worker, describe, resolve
+from proofroll.running.stopwatch import Stopwatch
+from proofroll.running.store import Store
 
 SCENE, EVERY = "sphere_in_cylinder", 0.02
 JOBS = 2

@@ -12,18 +12,18 @@ import typer
 
 import proofroll
 from proofroll.cli.bench import bench
-from proofroll.cli.common import ENGINE, INTERRUPTED, OK, USAGE, complain
 from proofroll.cli.comparing import compare, regimes
 from proofroll.cli.drill import drill
 from proofroll.cli.figures import figures
 from proofroll.cli.ladder import ladder
-from proofroll.cli.listing import engines, scenes
+from proofroll.cli.lists import engines, scenes
+from proofroll.cli.options import ENGINE, INTERRUPTED, OK, USAGE, complain
 from proofroll.cli.recommend import recommend
 from proofroll.cli.report import report
-from proofroll.cli.single import onset, run
+from proofroll.cli.run import onset, run
 from proofroll.cli.stability import stability
 from proofroll.cli.tradeoff import tradeoff
-from proofroll.errors import InputError, Missing, ProofrollError
+from proofroll.core.errors import InputError, Missing, ProofrollError
 
 app = typer.Typer(
     help="Which multibody engine, formulation and time step can you trust for a scene?",
@@ -60,8 +60,8 @@ def _given(error: typer.TyperException) -> str:
 
 def _interrupt(number: int, _: FrameType | None) -> None:
     """Ends all workers, so that whatever waits for one goes on, and then this process; at once when asked again."""
-    if "proofroll.process" in sys.modules:
-        from proofroll.process import end_all
+    if "proofroll.running.process" in sys.modules:
+        from proofroll.running.process import end_all
 
         end_all()
     signal.signal(number, lambda *_: os._exit(INTERRUPTED))
@@ -83,8 +83,8 @@ def main() -> None:
         complain(str(error))
         code = USAGE
     except ProofrollError as error:
-        from proofroll.errors import Refused
-        from proofroll.runner import WorkerDied
+        from proofroll.core.errors import Refused
+        from proofroll.running.runner import WorkerDied
 
         complain(str(error))
         code = ENGINE if isinstance(error, (Missing, WorkerDied, Refused)) else USAGE

@@ -6,7 +6,7 @@ from typing import Annotated, Any
 
 import typer
 
-from proofroll.cli.common import CONTRADICTED, ENGINE, Engines, Json, progress_bar, spinner, write_json
+from proofroll.cli.options import CONTRADICTED, ENGINE, Engines, Json, progress_bar, spinner, write_json
 
 bench = typer.Typer(help="Measure speed, and what proofroll itself costs.", rich_markup_mode=None)
 
@@ -25,7 +25,7 @@ def adapters(
 ) -> None:
     """Compare each adapter with the bare loop that a careful user of its engine would write."""
     from proofroll.bench.adapters import bench_adapters, content
-    from proofroll.registry import engine_names, require_engine
+    from proofroll.core.plugins import engine_names, require_engine
 
     for name in engine or ():
         require_engine(name)
@@ -55,7 +55,7 @@ def study(
 ) -> None:
     """Say what part of a study's wall time × workers is spent outside the engines, and on what."""
     from proofroll.bench.study import bench_study
-    from proofroll.registry import engine_names, require_engine
+    from proofroll.core.plugins import engine_names, require_engine
 
     for name in engine or ():
         require_engine(name)

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
-from proofroll.cli.common import (
+from proofroll.cli.options import (
     CONTRADICTED,
     ENGINE,
     OK,
@@ -24,7 +24,7 @@ from proofroll.cli.common import (
 )
 
 if TYPE_CHECKING:
-    from proofroll.runner import Runner
+    from proofroll.running.runner import Runner
     from proofroll.studies.compare import Outcome
 
 
@@ -37,8 +37,8 @@ def compare(
     as_json: Json = False,
 ) -> None:
     """Hold the engines of a comparison file against the truth; exit 1 if a verdict contradicts the file."""
-    from proofroll.comparison_file import load_comparison
-    from proofroll.report.content import outcome_content
+    from proofroll.files.comparison_file import load_comparison
+    from proofroll.report.comparison_content import outcome_content
 
     loaded = load_comparison(comparison)
     outcomes = outcomes_of([loaded], engine or [], new_runner(out, fresh, jobs))
@@ -57,9 +57,9 @@ def regimes(
     as_json: Json = False,
 ) -> None:
     """Draw the map over speed and friction: never slips, slips and recovers, falls."""
-    from proofroll.comparison_file import load_comparison
+    from proofroll.files.comparison_file import load_comparison
     from proofroll.report.regime_map import draw, regime_content
-    from proofroll.store import Store, write_text
+    from proofroll.running.store import Store, write_text
 
     loaded = load_comparison(study)
     Store(out)  # fails before the work rather than after it
@@ -98,7 +98,7 @@ def regime_maps_of(comparison: Any, jobs: int | None, stage: str = "") -> list[A
     """The comparison's regime maps, with a progress bar."""
     import os
 
-    from proofroll.studies.regimes import regime_maps
+    from proofroll.elements.ball_on_surface.regimes_study import regime_maps
 
     total = comparison.regimes.count if comparison.regimes else None
     words = f"{stage}runs of the truth"

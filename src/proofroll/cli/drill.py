@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import typer
 
-from proofroll.cli.common import CONTRADICTED, OK, Json, progress_bar, write_json
+from proofroll.cli.options import CONTRADICTED, OK, Json, progress_bar, write_json
 
 drill = typer.Typer(help="Do on purpose what must not break anything.", rich_markup_mode=None)
 

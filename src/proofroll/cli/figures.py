@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from proofroll.cli.common import (
+from proofroll.cli.options import (
     CONTRADICTED,
     ENGINE,
     OK,
@@ -81,8 +81,8 @@ def _maps(name: str, jobs: int | None) -> list[xr.Dataset]:
     """The regime maps of a comparison, with a progress bar of their own."""
     import os
 
-    from proofroll.comparison_file import load_comparison
-    from proofroll.studies.regimes import regime_maps
+    from proofroll.elements.ball_on_surface.regimes_study import regime_maps
+    from proofroll.files.comparison_file import load_comparison
 
     wanted = load_comparison(name)
     total = wanted.regimes.count if wanted.regimes else None

@@ -7,7 +7,7 @@ from typing import Annotated
 
 import typer
 
-from proofroll.cli.common import (
+from proofroll.cli.options import (
     ENGINE,
     OK,
     Engines,

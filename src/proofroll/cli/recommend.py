@@ -9,9 +9,9 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
-from proofroll.cli.common import CONTRADICTED, OK, Jobs, Json, Out, Set, write_json
+from proofroll.cli.options import CONTRADICTED, OK, Jobs, Json, Out, Set, write_json
 from proofroll.cli.tradeoff import Over, SceneOrFile, Until, measure, question_of, ranges_of, require_observables
-from proofroll.errors import InputError
+from proofroll.core.errors import InputError
 
 if TYPE_CHECKING:
     from proofroll.studies.claims import TradeoffClaims
@@ -44,8 +44,8 @@ def recommend(
     It chooses among models of engines; solutions of the scene's own equations (closed form, reduced, projection) are
     told apart, unless --engine asks for them. Of the cheaper ones, which all fail, the most accurate is shown.
     """
-    from proofroll.metrics import units
-    from proofroll.registry import parse_engine, require_engine
+    from proofroll.core.plugins import parse_engine, require_engine
+    from proofroll.elements.ball_on_surface.observables import units
     from proofroll.report.tradeoff_tables import answer_lines
     from proofroll.studies.recommend import Wish
     from proofroll.studies.recommend import recommend as answered
@@ -71,7 +71,7 @@ def recommend(
 
 def _tolerance(text: str, unit: str) -> Any:
     """Reads ``1e-3``, ``1e-3 m``, ``1 mm`` or ``1 %``."""
-    from proofroll.comparison import Tolerance
+    from proofroll.core.comparison import Tolerance
 
     if not text:
         raise InputError("tolerance", text, "give the largest error that you can bear, e.g. --tolerance 1e-3")
@@ -113,7 +113,7 @@ def _stored_study(
     Raises:
         InputError: there are none that hold here, and nobody agreed to measure them.
     """
-    from proofroll.studies.keeping import kept
+    from proofroll.studies.study_store import kept
     from proofroll.studies.tradeoff import stored
 
     reasons: list[str] = []

@@ -8,7 +8,8 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
-from proofroll.cli.common import (
+from proofroll.cli.comparing import exit_code, outcomes_of, print_outcome, regime_maps_of
+from proofroll.cli.options import (
     CONTRADICTED,
     ENGINE,
     OK,
@@ -22,12 +23,11 @@ from proofroll.cli.common import (
     progress_bar,
     write_json,
 )
-from proofroll.cli.comparing import exit_code, outcomes_of, print_outcome, regime_maps_of
 
 if TYPE_CHECKING:
-    from proofroll.report.parts import Part
-    from proofroll.report.whole import Report
-    from proofroll.runner import Runner
+    from proofroll.report.growing_report import Report
+    from proofroll.report.study_parts import Part
+    from proofroll.running.runner import Runner
 
 
 def report(
@@ -45,9 +45,9 @@ def report(
     The files are there after the comparisons, and are written again after each further study. A study that is kept and
     still holds is used as it is; otherwise it is made briefly, and the report names the command that makes it whole.
     """
-    from proofroll.comparison_file import comparison_names, load_comparison
-    from proofroll.report.parts import KEYS, all_parts, parts_of
-    from proofroll.report.whole import begun
+    from proofroll.files.comparison_file import comparison_names, load_comparison
+    from proofroll.report.growing_report import begun
+    from proofroll.report.study_parts import KEYS, all_parts, parts_of
 
     names, parts = parts_of(studies, engine or []) if studies else (comparison_names(), all_parts(engine or [], out))
     loaded = [load_comparison(name) for name in names]

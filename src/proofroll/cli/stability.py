@@ -7,7 +7,7 @@ from typing import Annotated
 
 import typer
 
-from proofroll.cli.common import (
+from proofroll.cli.options import (
     CONTRADICTED,
     ENGINE,
     OK,
@@ -40,9 +40,9 @@ def stability(
     """Map up to which step or tolerance each engine is stable, and right, along axes of extremes."""
     from proofroll.report.stability_map import draw
     from proofroll.studies.axes import chosen
-    from proofroll.studies.keeping import make_stability
-    from proofroll.studies.places import QUICK, Effort
     from proofroll.studies.stability_claims import file_for
+    from proofroll.studies.stability_places import QUICK, Effort
+    from proofroll.studies.study_store import make_stability
 
     asked = file_for(scene)
     axes = chosen(asked.axes, axis or [])

@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
-from proofroll.cli.common import (
+from proofroll.cli.options import (
     CONTRADICTED,
     OK,
     Fresh,
@@ -20,7 +20,7 @@ from proofroll.cli.common import (
     progress_bar,
     write_json,
 )
-from proofroll.errors import InputError
+from proofroll.core.errors import InputError
 
 if TYPE_CHECKING:
     from proofroll.studies.claims import TradeoffClaims
@@ -102,8 +102,8 @@ def question_of(
     scene: str, settings: list[str] | None, quantities: list[str] | None, until: float | None
 ) -> tuple[TradeoffClaims | None, Question]:
     """What is asked: the file's own question, or another about its scene, for which the file then claims nothing."""
-    from proofroll.recording import time_grid
-    from proofroll.scene_file import load_scene
+    from proofroll.files.scene_file import load_scene
+    from proofroll.running.recording import time_grid
     from proofroll.studies.claims import claims_for, load_claims
     from proofroll.studies.sweep import Question
 
@@ -125,7 +125,7 @@ def question_of(
 
 def require_observables(question: Question, names: list[str]) -> None:
     """Refuses what no run of the scene can be asked for."""
-    from proofroll.metrics import units
+    from proofroll.elements.ball_on_surface.observables import units
 
     known = units(question.loaded().rolling)
     for name in names:
@@ -135,7 +135,7 @@ def require_observables(question: Question, names: list[str]) -> None:
 
 def ranges_of(question: Question, texts: list[str]) -> dict[str, list[float]]:
     """Reads ``parameter=low:high``; each end must be one that the scene can have."""
-    from proofroll.scene_file import load_scene
+    from proofroll.files.scene_file import load_scene
 
     found = {}
     for name, text in assignments(texts, "--over").items():
@@ -162,7 +162,7 @@ def measure(
     jobs: int | None,
 ) -> tuple[dict[str, Any], Path]:
     """Measures and keeps the curves that a recommendation can be made from, with a progress bar."""
-    from proofroll.studies.keeping import make_tradeoff
+    from proofroll.studies.study_store import make_tradeoff
 
     runner = new_runner(out, fresh, jobs)
     with progress_bar("runs and timings") as advance:

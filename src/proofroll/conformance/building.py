@@ -8,11 +8,11 @@ from unittest import SkipTest
 
 import numpy as np
 
-from proofroll.certificate import certify, first_difference
 from proofroll.conformance.subject import Subject, bits, require, scenes
-from proofroll.engine import Sample
-from proofroll.errors import Refused
-from proofroll.scene import Capability, Scene
+from proofroll.core.engine import Sample
+from proofroll.core.errors import Refused
+from proofroll.core.scene import Capability, Scene
+from proofroll.elements.ball_on_surface.certificate import certify, first_difference
 
 
 def builds_or_refuses(subject: Subject) -> None:
@@ -64,7 +64,7 @@ def certificate_holds(subject: Subject) -> None:
 def builds_only_what_is_required(subject: Subject) -> None:
     """What the scene requires is in the model; what it does not is not, unless a setting or the engine says why.
 
-    The setting is ``orientation=true``; the engine's reasons are :class:`proofroll.engine.CannotLeaveOut`.
+    The setting is ``orientation=true``; the engine's reasons are :class:`proofroll.core.engine.CannotLeaveOut`.
     """
     engine = subject.build()
     terms = engine.built().terms

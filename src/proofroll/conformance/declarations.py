@@ -9,9 +9,9 @@ from importlib.metadata import entry_points
 from typing import Any
 
 from proofroll.conformance.subject import require
-from proofroll.errors import InputError
-from proofroll.registry import GROUP, resolve_settings
-from proofroll.scene import Capability
+from proofroll.core.errors import InputError
+from proofroll.core.plugins import GROUP, resolve_settings
+from proofroll.core.scene import Capability
 
 
 def name_is_the_entry_point(engine: Any) -> None:

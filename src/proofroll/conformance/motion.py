@@ -10,8 +10,8 @@ import numpy as np
 from scipy.spatial.transform import Rotation
 
 from proofroll.conformance.subject import Subject, bits, require
-from proofroll.errors import Diverged
-from proofroll.scene_file import load_scene
+from proofroll.core.errors import Diverged
+from proofroll.files.scene_file import load_scene
 
 # Below this relative difference two states differ by little more than accumulated round-off.
 _ROUND_OFF = 1e-9

@@ -11,11 +11,11 @@ from unittest import SkipTest
 
 import numpy as np
 
-from proofroll.engine import Sample
-from proofroll.errors import Refused
-from proofroll.scene import Scene
-from proofroll.scene_file import load_scene
-from proofroll.surfaces import FloatArray
+from proofroll.core.engine import Sample
+from proofroll.core.errors import Refused
+from proofroll.core.scene import Scene
+from proofroll.elements.ball_on_surface.surfaces import FloatArray
+from proofroll.files.scene_file import load_scene
 
 # Simulated time of a check of the motion [s]: the ball goes a sixth of a turn round the cylinder.
 _SPAN = 0.05

@@ -14,11 +14,11 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
-from proofroll.case import Case
 from proofroll.drill.row import Drilled, drilled
 from proofroll.drill.site import BEFORE, BESIDE, Site, contents, scraps
-from proofroll.runner import Runner
-from proofroll.store import Store
+from proofroll.running.case import Case
+from proofroll.running.runner import Runner
+from proofroll.running.store import Store
 
 # No command of the drill takes this long on any machine [s].
 _LIMIT = 120.0

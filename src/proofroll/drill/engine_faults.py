@@ -9,11 +9,11 @@ from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from pathlib import Path
 
-from proofroll.case import LASTING, Case, Status
 from proofroll.drill.row import Drilled, drilled
 from proofroll.drill.site import BEFORE, BESIDE, HANG, Site, contents, scraps
-from proofroll.runner import Runner
-from proofroll.store import Store
+from proofroll.running.case import LASTING, Case, Status
+from proofroll.running.runner import Runner
+from proofroll.running.store import Store
 
 # Enough for any engine of the drill, start-up included, and little enough that no machine suffers [GB].
 _MEMORY = 0.8

@@ -21,9 +21,9 @@ from typing import Any, ClassVar, Self
 
 import numpy as np
 
-from proofroll.engine import Built, Sample
+from proofroll.core.engine import Built, Sample
+from proofroll.core.scene import Capability, Scene
 from proofroll.engines.projection import Projection
-from proofroll.scene import Capability, Scene
 
 FOLDER = "PROOFROLL_DRILL"
 _FOREVER = 600.0
@@ -144,12 +144,12 @@ class Drill:
 
     @staticmethod
     def version() -> str:
-        """See :class:`proofroll.engine.Engine`."""
+        """See :class:`proofroll.core.engine.Engine`."""
         return Projection.version()
 
     @classmethod
     def build(cls, scene: Scene, settings: DrillSettings) -> Self:
-        """See :class:`proofroll.engine.Engine`."""
+        """See :class:`proofroll.core.engine.Engine`."""
         return cls(scene, settings)
 
     def __init__(self, scene: Scene, settings: DrillSettings) -> None:
@@ -168,13 +168,13 @@ class Drill:
             self._deed()
 
     def advance(self, t: float) -> None:
-        """See :class:`proofroll.engine.Engine`."""
+        """See :class:`proofroll.core.engine.Engine`."""
         self._do("advance")
         self._inner.advance(t)
         self._t = t
 
     def sample(self) -> Sample:
-        """See :class:`proofroll.engine.Engine`."""
+        """See :class:`proofroll.core.engine.Engine`."""
         right = self._inner.sample()
         if self._t == 0:
             return right
@@ -183,6 +183,6 @@ class Drill:
         return dataclasses.replace(right, **wrong.get(self._where, {}))
 
     def built(self) -> Built:
-        """See :class:`proofroll.engine.Engine`."""
+        """See :class:`proofroll.core.engine.Engine`."""
         self._do("built")
         return self._inner.built()

@@ -13,10 +13,10 @@ from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
-from proofroll.case import Case, EngineFacts
 from proofroll.drill.engines import DEEDS, FOLDER
-from proofroll.runner import resolve
-from proofroll.scene_file import load_scene
+from proofroll.files.scene_file import load_scene
+from proofroll.running.case import Case, EngineFacts
+from proofroll.running.runner import resolve
 
 SCENE = "sphere_in_cylinder"
 # Speeds of the results that are there before anything goes wrong, and of the cases beside the fault [m/s].

@@ -1,1 +1,1 @@
-"""Our own engine adapters; each follows :class:`proofroll.engine.Engine` and is found through its entry point."""
+"""Our own engine adapters; each follows :class:`proofroll.core.engine.Engine` and is found through its entry point."""

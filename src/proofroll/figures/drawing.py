@@ -10,8 +10,8 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from proofroll.errors import InputError, Missing
-from proofroll.events import events_of
+from proofroll.core.errors import InputError, Missing
+from proofroll.core.events import events_of
 from proofroll.figures import style
 from proofroll.figures.definition import Figure, Panel
 from proofroll.figures.quantities import TIME

@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from proofroll.events import events_of
+from proofroll.core.events import events_of
 from proofroll.figures.definition import Statement
 from proofroll.figures.measures import measured, unit_of
 from proofroll.figures.quantities import TIME

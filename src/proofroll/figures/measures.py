@@ -10,7 +10,7 @@ import numpy.typing
 from scipy.optimize import minimize_scalar
 from scipy.signal import find_peaks
 
-from proofroll.surfaces import FloatArray
+from proofroll.elements.ball_on_surface.surfaces import FloatArray
 
 Measure = Literal[
     "maximum",

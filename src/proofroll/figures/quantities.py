@@ -11,8 +11,8 @@ from typing import TYPE_CHECKING
 import numpy as np
 from scipy.spatial.transform import Rotation
 
-from proofroll.scene import RollingBall
-from proofroll.surfaces import FloatArray
+from proofroll.core.scene import RollingBall
+from proofroll.elements.ball_on_surface.surfaces import FloatArray
 
 if TYPE_CHECKING:
     import xarray as xr

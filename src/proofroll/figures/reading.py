@@ -9,14 +9,14 @@ from typing import Any
 
 from pydantic import TypeAdapter, ValidationError
 
-from proofroll.comparison_file import load_comparison
-from proofroll.errors import InputError
+from proofroll.core.errors import InputError
 from proofroll.figures.definition import CRITERIA, Figure, Figures, Statement
 from proofroll.figures.quantities import known
-from proofroll.folders import data_folder
-from proofroll.recording import time_grid
-from proofroll.scene_file import first_problem, load_scene
-from proofroll.toml_file import read_toml, study_files
+from proofroll.files.comparison_file import load_comparison
+from proofroll.files.data_folders import data_folder
+from proofroll.files.scene_file import first_problem, load_scene
+from proofroll.files.toml import read_toml, study_files
+from proofroll.running.recording import time_grid
 
 STUDY = "figures"
 

@@ -6,16 +6,16 @@ from collections.abc import Callable
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
 
-from proofroll.case import Case, EngineFacts, Result, Status
-from proofroll.errors import ProofrollError
+from proofroll.core.errors import ProofrollError
+from proofroll.core.plugins import parse_engine
+from proofroll.core.scene import ASKED, RollingBall
+from proofroll.elements.ball_on_surface.surfaces import FloatArray
+from proofroll.elements.ball_on_surface.trajectory import read
 from proofroll.figures.definition import Figures
 from proofroll.figures.quantities import TIME, known, quantity
-from proofroll.registry import parse_engine
-from proofroll.runner import Runner, describe, resolve
-from proofroll.scene import ASKED, RollingBall
-from proofroll.scene_file import load_scene
-from proofroll.surfaces import FloatArray
-from proofroll.trajectory import read
+from proofroll.files.scene_file import load_scene
+from proofroll.running.case import Case, EngineFacts, Result, Status
+from proofroll.running.runner import Runner, describe, resolve
 
 if TYPE_CHECKING:
     import xarray as xr

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Mapping
 from typing import TYPE_CHECKING, Any
 
-from proofroll.comparison import Tolerance
+from proofroll.core.comparison import Tolerance
 from proofroll.report.tradeoff_tables import default_quantities
 from proofroll.studies.recommend import Wish, recommend
 

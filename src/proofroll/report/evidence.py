@@ -5,15 +5,15 @@ from __future__ import annotations
 import statistics
 from typing import TYPE_CHECKING, Any
 
-from proofroll.plain import plain
-from proofroll.report.content import by_row
+from proofroll.files.json_data import plain
+from proofroll.report.comparison_content import by_row
 from proofroll.report.scene_sheet import scene_sheet
-from proofroll.timing import CONFIDENCE, ROUNDS, Timing
+from proofroll.running.timing import CONFIDENCE, ROUNDS, Timing
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
 
-    from proofroll.comparison import Row, Tolerance
+    from proofroll.core.comparison import Row, Tolerance
     from proofroll.studies.compare import Outcome
 
 

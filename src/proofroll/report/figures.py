@@ -14,12 +14,12 @@ from proofroll.figures import style
 from proofroll.figures.drawing import looks, picture
 from proofroll.figures.judging import judged
 from proofroll.figures.study import Study, study_content
-from proofroll.files import replacing
-from proofroll.plain import plain
+from proofroll.files.atomic import replacing
+from proofroll.files.json_data import plain
 from proofroll.report.labels import number, unit
 from proofroll.report.regime_map import counts
 from proofroll.report.regime_map import picture as map_picture
-from proofroll.store import write_text
+from proofroll.running.store import write_text
 
 if TYPE_CHECKING:
     import xarray as xr

@@ -11,8 +11,8 @@ if TYPE_CHECKING:
 
     from proofroll.figures.definition import Figures
     from proofroll.figures.study import Study
-    from proofroll.report.parts import Tell
-    from proofroll.runner import Runner
+    from proofroll.report.study_parts import Tell
+    from proofroll.running.runner import Runner
 
 
 @dataclass
@@ -40,9 +40,9 @@ class FiguresPart:
 
     def make(self, runner: Runner, out: Path, tell: Tell) -> None:  # noqa: ARG002 -- the protocol's
         """Makes the runs, and the maps that no comparison has made."""
-        from proofroll.comparison_file import load_comparison
+        from proofroll.elements.ball_on_surface.regimes_study import regime_maps
         from proofroll.figures.study import run_figures
-        from proofroll.studies.regimes import regime_maps
+        from proofroll.files.comparison_file import load_comparison
 
         self.study = run_figures(self.asked, runner, None, lambda case, _: tell(case.engine.name, 1))
         for name in dict.fromkeys(figure.regimes for figure in self.asked.figures if figure.regimes):

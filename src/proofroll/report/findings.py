@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from typing import Any
 
-from proofroll.metrics import OBSERVABLES
+from proofroll.elements.ball_on_surface.observables import OBSERVABLES
 from proofroll.report.labels import names, number, symbol, unit
 from proofroll.report.scores import Score, cheapest, recommendation, scores
 

@@ -11,11 +11,11 @@ from types import MappingProxyType
 from typing import TYPE_CHECKING, Any
 
 from proofroll.report import heat_map, labels, onset_tables, study_tables, tables
+from proofroll.report.compression import packed
 from proofroll.report.onsets import mark
-from proofroll.report.packing import packed
 from proofroll.report.styles import OUTLINES, styles
 from proofroll.report.tradeoff_tables import name_of
-from proofroll.studies.numbers import SYMBOLS
+from proofroll.studies.step_numbers import SYMBOLS
 
 if TYPE_CHECKING:
     import jinja2

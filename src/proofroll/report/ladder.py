@@ -10,14 +10,14 @@ from typing import Any
 from rich.table import Table
 from rich.text import Text
 
-from proofroll.case import Status
-from proofroll.errors import ProofrollError
-from proofroll.metrics import scales
+from proofroll.core.errors import ProofrollError
+from proofroll.elements.ball_on_surface.observables import scales
 from proofroll.report.terminal import number, step
+from proofroll.running.case import Status
+from proofroll.running.timing import Interval, machine, ratio
 from proofroll.studies.ladder import Ladder, absence, distance, key_of
-from proofroll.studies.models import Model, Rung, Switch
-from proofroll.studies.worth import Side, Worth, worth
-from proofroll.timing import Interval, machine, ratio
+from proofroll.studies.ladder_models import Model, Rung, Switch
+from proofroll.studies.term_worth import Side, Worth, worth
 
 _SHORT = {Worth.NOT_NEEDED: "not needed"}
 _STYLES = {Worth.NEEDED: "green", Worth.NOT_NEEDED: "yellow", Worth.HARMFUL: "red", Worth.NO_ANSWER: "bold red"}

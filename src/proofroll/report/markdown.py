@@ -5,8 +5,8 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from typing import Any
 
-from proofroll.comparison import Tolerance
-from proofroll.engine import Level
+from proofroll.core.comparison import Tolerance
+from proofroll.core.engine import Level
 from proofroll.report.labels import SYMBOLS
 from proofroll.report.labels import number as short
 from proofroll.report.terminal import columns, number, step

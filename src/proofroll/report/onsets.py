@@ -6,10 +6,10 @@ import dataclasses
 import json
 from typing import TYPE_CHECKING, Any
 
-from proofroll.events import Event, events_of
-from proofroll.plain import plain
+from proofroll.core.events import Event, events_of
+from proofroll.elements.ball_on_surface.onset_study import onset_verdict as judged_onset
+from proofroll.files.json_data import plain
 from proofroll.report.plots import stored
-from proofroll.studies.onset import onset_verdict as judged_onset
 from proofroll.truth.onset import Onset
 
 if TYPE_CHECKING:
@@ -17,8 +17,8 @@ if TYPE_CHECKING:
 
     import xarray as xr
 
-    from proofroll.scene import Scene
-    from proofroll.store import Store
+    from proofroll.core.scene import Scene
+    from proofroll.running.store import Store
     from proofroll.studies.compare import Run
 
 # The curve on which onsets are marked.

@@ -8,20 +8,20 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 import numpy.typing
 
-from proofroll.metrics import scales
+from proofroll.elements.ball_on_surface.observables import scales
+from proofroll.elements.ball_on_surface.surfaces import FloatArray
+from proofroll.elements.ball_on_surface.trajectory import read
+from proofroll.files.scene_file import load_scene
 from proofroll.report.labels import symbol, unit
-from proofroll.scene_file import load_scene
 from proofroll.studies.compare import Outcome, Run
 from proofroll.studies.planning import point_name
-from proofroll.surfaces import FloatArray
-from proofroll.trajectory import read
 
 if TYPE_CHECKING:
     from pathlib import Path
 
     import xarray as xr
 
-    from proofroll.store import Store
+    from proofroll.running.store import Store
 
 Curves = dict[str, FloatArray]
 

@@ -10,8 +10,8 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from proofroll.files import replacing
-from proofroll.plain import plain
+from proofroll.files.atomic import replacing
+from proofroll.files.json_data import plain
 from proofroll.report.svg import element
 from proofroll.truth.regimes import Regime
 
@@ -117,7 +117,7 @@ def picture(maps: Sequence[xr.Dataset], form: str, style: Any, size: tuple[float
     Raises:
         Missing: matplotlib is not installed.
     """
-    from proofroll.errors import Missing
+    from proofroll.core.errors import Missing
 
     try:
         import matplotlib as mpl

@@ -8,21 +8,21 @@ from typing import Any
 
 import numpy as np
 
-from proofroll.case import Case, Status
-from proofroll.plain import plain
-from proofroll.report.content import by_row, outcome_content
+from proofroll.core.scene import RollingBall
+from proofroll.elements.ball_on_surface.surfaces import FloatArray
+from proofroll.files.json_data import plain
+from proofroll.files.scene_file import load_scene
+from proofroll.report.comparison_content import by_row, outcome_content
 from proofroll.report.labels import names, symbol, unit
 from proofroll.report.plots import stored
 from proofroll.report.replay_library import packed, thinned, three
 from proofroll.report.replay_poses import NEEDED, Poses, Sampled, frame_times, poses
 from proofroll.report.replay_wall import middle, wall
 from proofroll.report.styles import styles
-from proofroll.scene import RollingBall
-from proofroll.scene_file import load_scene
-from proofroll.store import Store
+from proofroll.running.case import Case, Status
+from proofroll.running.store import Store
 from proofroll.studies.compare import Outcome, Run
 from proofroll.studies.planning import point_name
-from proofroll.surfaces import FloatArray
 
 # What the numbers of the picture are rounded to, powers of two: 8e-6 m, 6e-5 of a quaternion, 1e-3 N. None is seen.
 LENGTH, TURN, FORCE = 2.0**-17, 2.0**-14, 2.0**-10

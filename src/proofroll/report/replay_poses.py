@@ -14,8 +14,8 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 
-from proofroll.scene import RollingBall
-from proofroll.surfaces import FloatArray, Surface
+from proofroll.core.scene import RollingBall
+from proofroll.elements.ball_on_surface.surfaces import FloatArray, Surface
 
 # Variables of a trajectory, by their names there; "time" among them.
 Sampled = Mapping[str, npt.NDArray[Any]]

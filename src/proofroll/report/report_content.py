@@ -5,23 +5,23 @@ from __future__ import annotations
 from datetime import UTC, datetime
 from typing import TYPE_CHECKING, Any
 
-from proofroll.plain import plain
-from proofroll.report.content import environment, outcome_content
+from proofroll.elements.ball_on_surface.trajectory import read
+from proofroll.files.json_data import plain
+from proofroll.files.scene_file import load_scene
+from proofroll.report.comparison_content import environment, outcome_content
 from proofroll.report.evidence import add_evidence
 from proofroll.report.findings import findings
 from proofroll.report.onsets import add_events, truth_facts
-from proofroll.report.parts import KEYS
 from proofroll.report.regime_map import counts
+from proofroll.report.study_parts import KEYS
 from proofroll.report.summary import three_sentences
-from proofroll.scene_file import load_scene
-from proofroll.trajectory import read
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
 
     import xarray as xr
 
-    from proofroll.store import Store
+    from proofroll.running.store import Store
     from proofroll.studies.compare import Outcome
 
     Maps = Sequence[Sequence[xr.Dataset]]

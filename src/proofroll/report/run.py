@@ -6,9 +6,9 @@ import dataclasses
 from pathlib import Path
 from typing import Any
 
-from proofroll.case import Case, Result
-from proofroll.events import events_of
-from proofroll.trajectory import read
+from proofroll.core.events import events_of
+from proofroll.elements.ball_on_surface.trajectory import read
+from proofroll.running.case import Case, Result
 
 
 def run_content(case: Case, result: Result, trajectory: Path) -> dict[str, Any]:

@@ -5,9 +5,9 @@ from __future__ import annotations
 import math
 from typing import TYPE_CHECKING, Any
 
-from proofroll.drawings import overview
+from proofroll.elements.ball_on_surface.drawings import overview
+from proofroll.files.scene_file import load_scene, read_scene_file
 from proofroll.report.labels import symbol, unit
-from proofroll.scene_file import load_scene, read_scene_file
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
@@ -25,7 +25,7 @@ def scene_sheet(scene: str, points: Sequence[dict[str, float]]) -> dict[str, Any
 
     Returns:
         ``title``, ``source``; ``parameters``: for each ``symbol``, ``values``, ``unit``, ``meaning``, ``source``,
-        ``varied``; ``drawings``: of :class:`proofroll.drawings.Drawing`, empty with the reason in ``undrawn``.
+        ``varied``; ``drawings``: of :class:`drawings.Drawing`, empty with the reason in ``undrawn``.
     """
     file = read_scene_file(scene)
     drawn = [load_scene(scene, **point) for point in points] or [load_scene(scene)]

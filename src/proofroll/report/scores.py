@@ -5,7 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import Any
 
-from proofroll.metrics import OBSERVABLES
+from proofroll.elements.ball_on_surface.observables import OBSERVABLES
 from proofroll.report.labels import names
 
 FORCES = ("N", "F2", "F3")

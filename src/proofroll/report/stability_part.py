@@ -9,8 +9,8 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any, ClassVar
 
 if TYPE_CHECKING:
-    from proofroll.report.parts import Tell
-    from proofroll.runner import Runner
+    from proofroll.report.study_parts import Tell
+    from proofroll.running.runner import Runner
     from proofroll.studies.stability_claims import Claim, StabilityFile
 
 
@@ -44,8 +44,8 @@ class StabilityPart:
 
     def keeps(self, out: Path) -> bool:
         """The whole map, or else a quick one."""
-        from proofroll.studies.keeping import kept, stability_path
-        from proofroll.studies.places import QUICK, Effort
+        from proofroll.studies.stability_places import QUICK, Effort
+        from proofroll.studies.study_store import kept, stability_path
 
         for effort in (Effort(), QUICK):
             path = stability_path(out, self.asked, self.asked.axes, self.engines, effort)
@@ -57,8 +57,8 @@ class StabilityPart:
 
     def make(self, runner: Runner, out: Path, tell: Tell) -> None:
         """A quick map."""
-        from proofroll.studies.keeping import make_stability
-        from proofroll.studies.places import QUICK
+        from proofroll.studies.stability_places import QUICK
+        from proofroll.studies.study_store import make_stability
 
         self.study, path = make_stability(
             self.asked, self.asked.axes, runner, out, engines=self.engines, effort=QUICK, progress=tell
@@ -105,7 +105,7 @@ def _programs(path: Path) -> str:
 def _says(claim: Claim) -> str:
     """A claim in one sentence."""
     from proofroll.report.labels import number
-    from proofroll.studies.numbers import SYMBOLS
+    from proofroll.studies.step_numbers import SYMBOLS
 
     said = f"{claim.engine} is {claim.boundary}"
     if claim.never:

@@ -10,8 +10,8 @@ from rich.table import Table
 from rich.text import Text
 
 from proofroll.report.labels import number
-from proofroll.studies.numbers import SYMBOLS
 from proofroll.studies.stability_content import silent_ranking
+from proofroll.studies.step_numbers import SYMBOLS
 
 
 def headline(study: Mapping[str, Any]) -> str:

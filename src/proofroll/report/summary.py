@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from typing import Any
 
-from proofroll.metrics import OBSERVABLES
+from proofroll.elements.ball_on_surface.observables import OBSERVABLES
 from proofroll.report.labels import names, number, symbol, unit
 from proofroll.report.scores import cheapest, scores
 from proofroll.report.tradeoff_tables import name_of, step_of

@@ -9,7 +9,7 @@ from rich.console import Console
 from rich.table import Table
 from rich.text import Text
 
-from proofroll.metrics import OBSERVABLES
+from proofroll.elements.ball_on_surface.observables import OBSERVABLES
 from proofroll.report.labels import SYMBOLS
 
 if TYPE_CHECKING:

@@ -9,8 +9,8 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any, ClassVar
 
 if TYPE_CHECKING:
-    from proofroll.report.parts import Tell
-    from proofroll.runner import Runner
+    from proofroll.report.study_parts import Tell
+    from proofroll.running.runner import Runner
     from proofroll.studies.claims import TradeoffClaims
 
 
@@ -39,7 +39,7 @@ class TradeoffPart:
 
     def keeps(self, out: Path) -> bool:
         """The whole study, or else a brief one."""
-        from proofroll.studies.keeping import kept
+        from proofroll.studies.study_store import kept
         from proofroll.studies.tradeoff import stored
 
         paths = (stored(out, self.asked.swept, self.engines, brief=brief) for brief in (False, True))
@@ -48,7 +48,7 @@ class TradeoffPart:
 
     def make(self, runner: Runner, out: Path, tell: Tell) -> None:
         """A brief study, without the runs over ranges of parameters."""
-        from proofroll.studies.keeping import make_tradeoff
+        from proofroll.studies.study_store import make_tradeoff
 
         self.study, _ = make_tradeoff(
             self.asked.swept, runner, out, engines=self.engines, claims=self.asked, brief=True,

@@ -8,8 +8,8 @@ from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
-from proofroll.errors import Missing
-from proofroll.files import replacing
+from proofroll.core.errors import Missing
+from proofroll.files.atomic import replacing
 from proofroll.report.labels import symbol
 from proofroll.report.labels import unit as shown_unit
 

@@ -5,8 +5,8 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass, field
 
-from proofroll.errors import InputError
-from proofroll.scene import Scene
+from proofroll.core.errors import InputError
+from proofroll.core.scene import Scene
 
 
 @dataclass(frozen=True)

@@ -14,9 +14,9 @@ from typing import NamedTuple
 
 import numpy as np
 
-from proofroll.convergence import Limit, observed_order, richardson, size, tightest
+from proofroll.core.convergence import Limit, observed_order, richardson, size, tightest
+from proofroll.elements.ball_on_surface.surfaces import FloatArray
 from proofroll.studies.sweep import Curve, Point
-from proofroll.surfaces import FloatArray
 
 # Neighbouring local orders this near to each other belong to one power law.
 _SAME_ORDER = 0.3

@@ -9,14 +9,14 @@ from typing import Any
 
 from pydantic import ConfigDict, TypeAdapter, ValidationError
 
-from proofroll.comparison import Tolerance
-from proofroll.engine import Level
-from proofroll.errors import InputError
-from proofroll.metrics import units
-from proofroll.scene_file import first_problem, load_scene
+from proofroll.core.comparison import Tolerance
+from proofroll.core.engine import Level
+from proofroll.core.errors import InputError
+from proofroll.elements.ball_on_surface.observables import units
+from proofroll.files.scene_file import first_problem, load_scene
+from proofroll.files.toml import read_toml, study_files
 from proofroll.studies.recommend import Wish, fits, recommend
 from proofroll.studies.sweep import Question
-from proofroll.toml_file import read_toml, study_files
 
 STUDY = "tradeoff"
 

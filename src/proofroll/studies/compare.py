@@ -9,17 +9,17 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from proofroll.agreement import Judgement, Verdict, judge
-from proofroll.case import LASTING, Case, EngineFacts, Result, Status
-from proofroll.comparison import Band, Comparison, Row
-from proofroll.convergence import Limit, richardson, tightest
-from proofroll.errors import Missing, ProofrollError
-from proofroll.metrics import Observable
-from proofroll.runner import Runner, WorkerDied
-from proofroll.scene_file import load_scene
+from proofroll.core.comparison import Band, Comparison, Row
+from proofroll.core.convergence import Limit, richardson, tightest
+from proofroll.core.errors import Missing, ProofrollError
+from proofroll.core.verdict import Judgement, Verdict, judge
+from proofroll.elements.ball_on_surface.observables import Observable
+from proofroll.elements.ball_on_surface.trajectory import read
+from proofroll.files.scene_file import load_scene
+from proofroll.running.case import LASTING, Case, EngineFacts, Result, Status
+from proofroll.running.runner import Runner, WorkerDied
 from proofroll.studies.planning import Plan, Planned, plan, point_name
 from proofroll.studies.reference import OF_EVENTS, Reference
-from proofroll.trajectory import read
 
 if TYPE_CHECKING:
     import xarray as xr

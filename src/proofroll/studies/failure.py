@@ -8,11 +8,11 @@ from typing import TYPE_CHECKING, Self
 
 import numpy as np
 
-from proofroll.case import Result, Status
-from proofroll.events import events_of
-from proofroll.recording import noticed
-from proofroll.scene import RollingBall
-from proofroll.surfaces import FloatArray
+from proofroll.core.events import events_of
+from proofroll.core.scene import RollingBall
+from proofroll.elements.ball_on_surface.surfaces import FloatArray
+from proofroll.running.case import Result, Status
+from proofroll.running.recording import noticed
 
 if TYPE_CHECKING:
     import xarray as xr

@@ -10,17 +10,17 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from proofroll.case import Case, EngineFacts, Result, Status
-from proofroll.errors import InputError, ProofrollError, Refused
-from proofroll.metrics import observables, units
-from proofroll.recording import time_grid
-from proofroll.runner import Runner, WorkerDied, resolve
-from proofroll.scene_file import load_scene
-from proofroll.stopwatch import Stopwatch
-from proofroll.studies.models import Model, Rung, Switch, described, rungs, switches
-from proofroll.surfaces import FloatArray
-from proofroll.timing import ROUNDS, Timing, interleaved
-from proofroll.trajectory import read
+from proofroll.core.errors import InputError, ProofrollError, Refused
+from proofroll.elements.ball_on_surface.observables import observables, units
+from proofroll.elements.ball_on_surface.surfaces import FloatArray
+from proofroll.elements.ball_on_surface.trajectory import read
+from proofroll.files.scene_file import load_scene
+from proofroll.running.case import Case, EngineFacts, Result, Status
+from proofroll.running.recording import time_grid
+from proofroll.running.runner import Runner, WorkerDied, resolve
+from proofroll.running.stopwatch import Stopwatch
+from proofroll.running.timing import ROUNDS, Timing, interleaved
+from proofroll.studies.ladder_models import Model, Rung, Switch, described, rungs, switches
 
 if TYPE_CHECKING:
     import xarray as xr

@@ -7,15 +7,15 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
-from proofroll.case import Case, EngineFacts
-from proofroll.comparison import Comparison, Row
-from proofroll.errors import InputError, ProofrollError
-from proofroll.registry import parse_engine
-from proofroll.runner import resolve
-from proofroll.scene import Scene
-from proofroll.scene_file import load_scene
-from proofroll.studies.points import settled
-from proofroll.workers import Workers
+from proofroll.core.comparison import Comparison, Row
+from proofroll.core.errors import InputError, ProofrollError
+from proofroll.core.plugins import parse_engine
+from proofroll.core.scene import Scene
+from proofroll.files.scene_file import load_scene
+from proofroll.running.case import Case, EngineFacts
+from proofroll.running.runner import resolve
+from proofroll.running.worker_pool import Workers
+from proofroll.studies.comparison_points import settled
 
 
 def point_name(parameters: dict[str, float]) -> str:
@@ -51,7 +51,7 @@ def plan(comparison: Comparison, engines: Iterable[str] = (), workers: Workers |
     """The cases of a comparison.
 
     Args:
-        comparison: from :func:`proofroll.comparison_file.load_comparison`.
+        comparison: from :func:`proofroll.files.comparison_file.load_comparison`.
         engines: names of engines to which it is restricted; all if empty.
         workers: processes in which they are asked.
 

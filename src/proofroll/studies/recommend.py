@@ -6,10 +6,10 @@ from collections.abc import Callable, Iterable, Mapping
 from dataclasses import dataclass
 from typing import Any
 
-from proofroll.comparison import Tolerance
-from proofroll.engine import Level
-from proofroll.errors import InputError
-from proofroll.registry import parse_engine
+from proofroll.core.comparison import Tolerance
+from proofroll.core.engine import Level
+from proofroll.core.errors import InputError
+from proofroll.core.plugins import parse_engine
 from proofroll.studies.pareto import tied
 
 # How many times smaller than the tolerance an error must be, at the scene's own parameters, to pass with margin.

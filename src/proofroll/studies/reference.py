@@ -10,11 +10,11 @@ from typing import TYPE_CHECKING, Self
 
 import numpy as np
 
-from proofroll.events import events_of
-from proofroll.metrics import Observable, observables, scales
-from proofroll.scene import Scene
-from proofroll.surfaces import FloatArray
-from proofroll.trajectory import read
+from proofroll.core.events import events_of
+from proofroll.core.scene import Scene
+from proofroll.elements.ball_on_surface.observables import Observable, observables, scales
+from proofroll.elements.ball_on_surface.surfaces import FloatArray
+from proofroll.elements.ball_on_surface.trajectory import read
 
 if TYPE_CHECKING:
     import xarray as xr

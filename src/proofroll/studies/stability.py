@@ -12,14 +12,14 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
-from proofroll.case import Case, EngineFacts, Result, Status
-from proofroll.runner import Runner
+from proofroll.elements.ball_on_surface.trajectory import read
+from proofroll.running.case import Case, EngineFacts, Result, Status
+from proofroll.running.runner import Runner
 from proofroll.studies.axes import Axis
 from proofroll.studies.bisection import Found, search
 from proofroll.studies.failure import Failure, Outcome, judge
-from proofroll.studies.places import PER_PERIOD, Effort, Place, case_at, measure, places_of
+from proofroll.studies.stability_places import PER_PERIOD, Effort, Place, case_at, measure, places_of
 from proofroll.studies.sweep import Curve, curves_of
-from proofroll.trajectory import read
 
 # Parts into which a sampling interval is divided, about two per octave.
 _FINEST = 17

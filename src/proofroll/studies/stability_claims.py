@@ -9,14 +9,14 @@ from typing import Any, Literal
 
 from pydantic import ConfigDict, TypeAdapter, ValidationError
 
-from proofroll.errors import InputError
-from proofroll.registry import parse_engine
-from proofroll.scene_file import first_problem, load_scene
+from proofroll.core.errors import InputError
+from proofroll.core.plugins import parse_engine
+from proofroll.files.scene_file import first_problem, load_scene
+from proofroll.files.toml import read_toml, study_files
 from proofroll.studies.axes import Axis, Term
 from proofroll.studies.failure import Failure
-from proofroll.studies.numbers import MEANINGS
 from proofroll.studies.stability_content import dependence
-from proofroll.toml_file import read_toml, study_files
+from proofroll.studies.step_numbers import MEANINGS
 
 STUDY = "stability"
 # A dependence along an axis shows between as many values.

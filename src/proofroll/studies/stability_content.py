@@ -8,8 +8,8 @@ from dataclasses import asdict
 from typing import Any
 
 from proofroll.studies.failure import ACCURATE, MEANINGS, Failure, Outcome
-from proofroll.studies.numbers import explanation, numbers
 from proofroll.studies.stability import MapPoint, StabilityMap, failure_beyond
+from proofroll.studies.step_numbers import explanation, numbers
 
 BOUNDARIES = ("stable", "accurate")
 # Boundaries this factor apart count as the same: two rungs of the ladder of steps, one of that of tolerances.

@@ -6,10 +6,10 @@ from typing import Any
 
 import numpy as np
 
-from proofroll.case import Case
-from proofroll.reproducing import ball_numbers, literal
+from proofroll.elements.ball_on_surface.reproducer_source import ball_numbers, literal
+from proofroll.running.case import Case
 from proofroll.studies.failure import ACCURATE, BACKWARDS, GAIN, SLIPPED, WRONG
-from proofroll.studies.places import Place
+from proofroll.studies.stability_places import Place
 
 _CHECK = '''
 

@@ -6,13 +6,13 @@ import re
 from pathlib import Path
 from typing import Any
 
-from proofroll.case import Case
-from proofroll.runner import programs
-from proofroll.store import write_text
+from proofroll.running.case import Case
+from proofroll.running.runner import programs
+from proofroll.running.store import write_text
+from proofroll.running.worker_pool import Workers
 from proofroll.studies.failure import Failure
 from proofroll.studies.stability import MapPoint, StabilityMap
 from proofroll.studies.stability_programs import needs, program, through_proofroll
-from proofroll.workers import Workers
 
 # A run that did not begin, and one that nobody waited for, show nothing.
 _NOTHING_TO_SHOW = {

@@ -8,17 +8,17 @@ from typing import Any
 
 import numpy as np
 
-from proofroll.case import Case, EngineFacts, Result, Status
-from proofroll.engine import whole_steps
-from proofroll.errors import InputError, ProofrollError
-from proofroll.metrics import Observable
-from proofroll.registry import engine_names, parse_engine
-from proofroll.runner import Runner, describe, resolve
-from proofroll.scene import Scene
-from proofroll.scene_file import load_scene
+from proofroll.core.engine import whole_steps
+from proofroll.core.errors import InputError, ProofrollError
+from proofroll.core.plugins import engine_names, parse_engine
+from proofroll.core.scene import Scene
+from proofroll.elements.ball_on_surface.observables import Observable
+from proofroll.elements.ball_on_surface.trajectory import read
+from proofroll.files.scene_file import load_scene
+from proofroll.running.case import Case, EngineFacts, Result, Status
+from proofroll.running.runner import Runner, describe, resolve
+from proofroll.running.worker_pool import Workers
 from proofroll.studies.reference import Reference
-from proofroll.trajectory import read
-from proofroll.workers import Workers
 
 # Samples per run. An oscillation of the founding scene's z has a dozen of them, and an adaptive step, which ends at
 # each, is still as long as it likes to be.

@@ -16,16 +16,16 @@ from pathlib import Path
 
 import numpy as np
 
-from proofroll.case import Case, Result, Status
-from proofroll.errors import InputError
-from proofroll.metrics import units
-from proofroll.runner import Runner
-from proofroll.stopwatch import Stopwatch
+from proofroll.core.errors import InputError
+from proofroll.elements.ball_on_surface.observables import units
+from proofroll.running.case import Case, Result, Status
+from proofroll.running.runner import Runner
+from proofroll.running.stopwatch import Stopwatch
+from proofroll.running.timing import ROUNDS, Timing, interleaved
+from proofroll.running.worker_pool import Workers
 from proofroll.studies.pareto import envelope, front
 from proofroll.studies.reference import Reference
 from proofroll.studies.sweep import Curve, Point, Question, case_of, curves_of, judged, sweep
-from proofroll.timing import ROUNDS, Timing, interleaved
-from proofroll.workers import Workers
 
 # What makes up most of a study's time is the repetition of measurements. A brief one repeats less: in three rounds an
 # outlier does not decide the median; a run longer than this [s] warms itself up, and is measured once.
@@ -142,8 +142,8 @@ def tradeoff(
 
 
 def _truth_case(question: Question, references: Mapping[float, Reference], runner: Runner) -> Case:
-    from proofroll.case import EngineFacts
-    from proofroll.runner import resolve
+    from proofroll.running.case import EngineFacts
+    from proofroll.running.runner import resolve
 
     (facts,) = resolve([("truth", {})], runner.workers)
     assert isinstance(facts, EngineFacts)  # the sweep has run with it

@@ -8,17 +8,17 @@ from typing import Any
 
 import numpy as np
 
-from proofroll.case import Status
-from proofroll.metrics import units
-from proofroll.plain import plain
-from proofroll.studies import installed
+from proofroll.elements.ball_on_surface.observables import units
+from proofroll.elements.ball_on_surface.surfaces import FloatArray
+from proofroll.files.json_data import plain
+from proofroll.running.case import Status
+from proofroll.running.timing import Timing
+from proofroll.studies import study_identity as installed
 from proofroll.studies.budget import Budget, budget, sentence
 from proofroll.studies.pareto import envelope, front
 from proofroll.studies.recommend import by_hand
 from proofroll.studies.sweep import BROKEN, Curve, Point
 from proofroll.studies.tradeoff import Tradeoff, judged_quantities, pareto_entries
-from proofroll.surfaces import FloatArray
-from proofroll.timing import Timing
 
 
 def budgets(found: Tradeoff) -> list[tuple[Curve, Budget]]:

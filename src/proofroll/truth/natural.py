@@ -6,7 +6,7 @@ import math
 
 import numpy as np
 
-from proofroll.scene import RollingBall
+from proofroll.core.scene import RollingBall
 
 
 def turning_rate(body: RollingBall) -> float:

@@ -7,8 +7,8 @@ from typing import Literal
 
 import numpy as np
 
-from proofroll.errors import InputError
-from proofroll.scene import RollingBall, Scene
+from proofroll.core.errors import InputError
+from proofroll.core.scene import RollingBall, Scene
 from proofroll.truth.friction_curve import FrictionCurve, friction_curve
 from proofroll.truth.variants import with_contact
 

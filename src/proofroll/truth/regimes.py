@@ -12,8 +12,8 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from proofroll.scene import RollingBall, Scene
-from proofroll.surfaces import Cylinder, FloatArray
+from proofroll.core.scene import RollingBall, Scene
+from proofroll.elements.ball_on_surface.surfaces import Cylinder, FloatArray
 from proofroll.truth.stick_slip import first_route
 from proofroll.truth.switching import End, follow
 from proofroll.truth.variants import at_speed, with_contact

@@ -1,11 +1,11 @@
 """Two independent routes to rolling without slip, both integrated at tight tolerance.
 
 * :func:`reduced`: five states (u, u̇, ω1) on the surface's parametrisation, reactions eliminated by hand
-  (:mod:`proofroll.rolling_equations`).
+  (:mod:`proofroll.elements.ball_on_surface.rolling_equations`).
 * :func:`unreduced`: nine states (p, v, ω) in the world, reactions from a linear system, and the surface only through
   its signed distance.
 
-A ball that rolling resistance brings to rest stays there or sets off down the slope (:mod:`proofroll.resting`).
+A ball that rolling resistance brings to rest stays there or sets off down the slope (:mod:`ball_on_surface.resting`).
 """
 
 from __future__ import annotations
@@ -17,13 +17,13 @@ from dataclasses import dataclass
 import numpy as np
 from scipy.integrate import DOP853
 
-from proofroll.errors import Diverged
-from proofroll.mechanics import newton_euler
-from proofroll.motion import Motion
-from proofroll.resting import setting_off, stands, stays
-from proofroll.rolling_equations import placed, reduced_rates, start
-from proofroll.scene import RollingBall
-from proofroll.surfaces import FloatArray
+from proofroll.core.errors import Diverged
+from proofroll.core.scene import RollingBall
+from proofroll.elements.ball_on_surface.mechanics import newton_euler
+from proofroll.elements.ball_on_surface.motion import Motion
+from proofroll.elements.ball_on_surface.resting import setting_off, stands, stays
+from proofroll.elements.ball_on_surface.rolling_equations import placed, reduced_rates, start
+from proofroll.elements.ball_on_surface.surfaces import FloatArray
 
 # The tightest relative tolerance that scipy accepts is 100 machine epsilons.
 _RTOL = 100 * np.finfo(float).eps

@@ -6,11 +6,11 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from proofroll.errors import Diverged
-from proofroll.events import Event, EventKind
-from proofroll.scene import RollingBall, Scene
-from proofroll.surfaces import FloatArray
-from proofroll.trajectory import trajectory
+from proofroll.core.errors import Diverged
+from proofroll.core.events import Event, EventKind
+from proofroll.core.scene import RollingBall, Scene
+from proofroll.elements.ball_on_surface.surfaces import FloatArray
+from proofroll.elements.ball_on_surface.trajectory import trajectory
 from proofroll.truth import taylor
 from proofroll.truth.error_bars import put_error_bars
 from proofroll.truth.implicit import Implicit
@@ -37,7 +37,7 @@ def stick_slip(scene: Scene, times: FloatArray) -> tuple[xr.Dataset, list[Event]
         times: of the samples [s], rising, shape (time,).
 
     Returns:
-        Dataset as of :func:`proofroll.trajectory.trajectory`, each variable with the attribute ``error_bar`` in its
+        Dataset as of :func:`trajectory.trajectory`, each variable with the attribute ``error_bar`` in its
         own unit, and ``sticking`` (bool per sample; a sample at an event belongs to what follows); and the events up
         to the last sample, each with a bracket that holds both routes.
 

@@ -1,6 +1,6 @@
 """Stick and slip of a ball on a cylinder or plane as compiled Taylor integrators (heyoka).
 
-The equations, their state and their symbols are those of :mod:`proofroll.compiled.rolling`.
+The equations, their state and their symbols are those of :mod:`proofroll.elements.ball_on_surface.compiled.rolling`.
 """
 
 from __future__ import annotations
@@ -10,8 +10,8 @@ from dataclasses import dataclass
 from functools import cache
 from typing import Any
 
-from proofroll.compiled.rolling import PARAMETERS as SHARED
-from proofroll.compiled.rolling import Function, expressions
+from proofroll.elements.ball_on_surface.compiled.rolling import PARAMETERS as SHARED
+from proofroll.elements.ball_on_surface.compiled.rolling import Function, expressions
 
 # Order of the run-time parameters of every integrator.
 # Functions and integrators take as many of them as they use; those that few use stand last.

@@ -6,12 +6,12 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from proofroll.closed_form import closed_form
-from proofroll.events import with_events
-from proofroll.motion import Motion
-from proofroll.scene import Capability, RollingBall, Scene
-from proofroll.surfaces import FloatArray
-from proofroll.trajectory import trajectory
+from proofroll.core.events import with_events
+from proofroll.core.scene import Capability, RollingBall, Scene
+from proofroll.elements.ball_on_surface.closed_form import closed_form
+from proofroll.elements.ball_on_surface.motion import Motion
+from proofroll.elements.ball_on_surface.surfaces import FloatArray
+from proofroll.elements.ball_on_surface.trajectory import trajectory
 from proofroll.truth import rolling, unreduced_taylor
 from proofroll.truth.error_bars import put_error_bars
 
@@ -31,7 +31,7 @@ def truth(scene: Scene, times: FloatArray) -> xr.Dataset:
     between the routes plus round-off.
 
     With bounded friction the routes are those of :mod:`proofroll.truth.stick_slip`, and the dataset also holds
-    ``sticking`` and the events (:func:`proofroll.events.events_of`).
+    ``sticking`` and the events (:func:`proofroll.core.events.events_of`).
 
     Raises:
         Diverged: the routes disagree about the order of events.

@@ -18,12 +18,12 @@ from typing import Any
 
 import numpy as np
 
-from proofroll.compiled import library
-from proofroll.errors import Diverged
-from proofroll.mechanics import newton_euler
-from proofroll.motion import Motion
-from proofroll.scene import RollingBall
-from proofroll.surfaces import Cylinder, FloatArray, Plane
+from proofroll.core.errors import Diverged
+from proofroll.core.scene import RollingBall
+from proofroll.elements.ball_on_surface.compiled import library
+from proofroll.elements.ball_on_surface.mechanics import newton_euler
+from proofroll.elements.ball_on_surface.motion import Motion
+from proofroll.elements.ball_on_surface.surfaces import Cylinder, FloatArray, Plane
 
 _local = threading.local()
 

@@ -7,7 +7,7 @@ from dataclasses import replace
 
 import numpy as np
 
-from proofroll.scene import RollingBall
+from proofroll.core.scene import RollingBall
 
 
 def with_contact(

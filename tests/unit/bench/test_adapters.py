@@ -11,7 +11,7 @@ import pytest
 from proofroll.bench import loops
 from proofroll.bench.adapters import GOAL, Row, bench_adapters, content, measure_adapter
 from proofroll.bench.bare import Bare
-from proofroll.timing import Interval
+from proofroll.running.timing import Interval
 
 
 def test_a_third_party_engine_without_a_bare_loop(

@@ -9,9 +9,9 @@ import pytest
 
 from proofroll.bench.adapters import VARIANTS
 from proofroll.bench.loops import load_bare_loop
-from proofroll.errors import Diverged, Refused
-from proofroll.registry import load_engine, resolve_settings
-from proofroll.scene_file import load_scene
+from proofroll.core.errors import Diverged, Refused
+from proofroll.core.plugins import load_engine, resolve_settings
+from proofroll.files.scene_file import load_scene
 
 FORMULATIONS = [
     (engine, formulation)

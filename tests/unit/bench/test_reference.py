@@ -14,14 +14,14 @@ from rich.console import Console
 from proofroll.bench import reference as bench
 from proofroll.bench import search as searching
 from proofroll.bench.compiled import Onsets, compiled, numeric
-from proofroll.compiled import library
-from proofroll.errors import Refused
+from proofroll.core.errors import Refused
+from proofroll.elements.ball_on_surface.compiled import library
+from proofroll.files.scene_file import load_scene
 from proofroll.report.bench import reference_tables
-from proofroll.runner import Runner
-from proofroll.scene_file import load_scene
-from proofroll.simulation import simulate
-from proofroll.store import Store
-from proofroll.timing import Timing
+from proofroll.running.runner import Runner
+from proofroll.running.simulation import simulate
+from proofroll.running.store import Store
+from proofroll.running.timing import Timing
 from proofroll.truth.rolling import unreduced
 
 needs_heyoka = pytest.mark.skipif(not library.available(), reason="heyoka is not installed")

@@ -8,9 +8,9 @@ from pathlib import Path
 import pytest
 
 from proofroll.bench.study import account, first_answer
-from proofroll.case import Case, Result, Status
-from proofroll.runner import Runner
-from proofroll.store import Store
+from proofroll.running.case import Case, Result, Status
+from proofroll.running.runner import Runner
+from proofroll.running.store import Store
 
 
 def test_shares_add_up() -> None:

@@ -7,12 +7,12 @@ import numpy as np
 import pytest
 
 from proofroll import load_scene
-from proofroll.certificate import certify
-from proofroll.errors import Diverged, InputError, Refused
-from proofroll.registry import resolve_settings
-from proofroll.scene import Scene
-from proofroll.simulation import build, simulate
-from proofroll.surfaces import Cylinder
+from proofroll.core.errors import Diverged, InputError, Refused
+from proofroll.core.plugins import resolve_settings
+from proofroll.core.scene import Scene
+from proofroll.elements.ball_on_surface.certificate import certify
+from proofroll.elements.ball_on_surface.surfaces import Cylinder
+from proofroll.running.simulation import build, simulate
 
 pytest.importorskip("exudyn")
 

@@ -9,10 +9,10 @@ import numpy as np
 import pytest
 
 from proofroll import load_scene
-from proofroll.certificate import Line, certify
-from proofroll.errors import Refused
-from proofroll.scene import Scene
-from proofroll.simulation import build
+from proofroll.core.errors import Refused
+from proofroll.core.scene import Scene
+from proofroll.elements.ball_on_surface.certificate import Line, certify
+from proofroll.running.simulation import build
 
 pytest.importorskip("exudyn")
 

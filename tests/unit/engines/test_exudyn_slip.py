@@ -8,13 +8,13 @@ import pytest
 import xarray as xr
 
 from proofroll import load_scene
-from proofroll.certificate import certify
-from proofroll.errors import Diverged, InputError, Refused
-from proofroll.events import events_of
-from proofroll.mechanics import resistance_moment
-from proofroll.recording import record, time_grid
-from proofroll.scene import Scene
-from proofroll.simulation import build
+from proofroll.core.errors import Diverged, InputError, Refused
+from proofroll.core.events import events_of
+from proofroll.core.scene import Scene
+from proofroll.elements.ball_on_surface.certificate import certify
+from proofroll.elements.ball_on_surface.mechanics import resistance_moment
+from proofroll.running.recording import record, time_grid
+from proofroll.running.simulation import build
 
 pytest.importorskip("exudyn")
 
@@ -272,7 +272,7 @@ def test_contact_certificate(preset: str, scene: Scene) -> None:
 @pytest.mark.parametrize("f", [0.0, 5e-4])
 def test_contact_with_unbounded_friction(f: float) -> None:
     """With unbounded friction the contact follows the rolling ball, and creeps no more than its grip says."""
-    from proofroll.simulation import simulate
+    from proofroll.running.simulation import simulate
 
     scene = cylinder(mu_static=np.inf, rolling_resistance=f)
     found = simulate(scene, "exudyn", until=0.5, every=0.05, formulation="contact", dt=1e-3)

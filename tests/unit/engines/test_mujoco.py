@@ -9,16 +9,16 @@ import mujoco
 import numpy as np
 import pytest
 
-from proofroll.certificate import certify, first_difference
-from proofroll.engine import Sample
+from proofroll.core.engine import Sample
+from proofroll.core.errors import Diverged, InputError, Refused
+from proofroll.core.scene import Scene
+from proofroll.elements.ball_on_surface.certificate import certify, first_difference
+from proofroll.elements.ball_on_surface.surfaces import Cylinder
 from proofroll.engines.mujoco import Mujoco
 from proofroll.engines.mujoco.settings import PRESETS
-from proofroll.errors import Diverged, InputError, Refused
-from proofroll.recording import record, time_grid
-from proofroll.scene import Scene
-from proofroll.scene_file import load_scene
-from proofroll.simulation import build, simulate
-from proofroll.surfaces import Cylinder
+from proofroll.files.scene_file import load_scene
+from proofroll.running.recording import record, time_grid
+from proofroll.running.simulation import build, simulate
 
 CYLINDER, PLANE = "sphere_in_cylinder", "inclined_plane"
 MODELS = [(formulation, preset) for formulation, presets in PRESETS.items() for preset in presets]

@@ -9,12 +9,12 @@ import itertools
 import numpy as np
 import pytest
 
-from proofroll.errors import InputError, Refused
-from proofroll.events import events_of
-from proofroll.recording import record, time_grid
-from proofroll.scene_file import load_scene
-from proofroll.simulation import build, simulate
-from proofroll.surfaces import Cylinder
+from proofroll.core.errors import InputError, Refused
+from proofroll.core.events import events_of
+from proofroll.elements.ball_on_surface.surfaces import Cylinder
+from proofroll.files.scene_file import load_scene
+from proofroll.running.recording import record, time_grid
+from proofroll.running.simulation import build, simulate
 
 CYLINDER, PLANE = "sphere_in_cylinder", "inclined_plane"
 TUNED = ["formulation=chart,preset=tuned", "formulation=free,preset=tuned"]

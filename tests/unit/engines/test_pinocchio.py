@@ -9,12 +9,12 @@ import pytest
 import xarray as xr
 from scipy.spatial.transform import Rotation
 
-from proofroll.certificate import certify
-from proofroll.errors import Diverged, InputError, Refused
-from proofroll.recording import record, time_grid
-from proofroll.scene import Capability, Scene
-from proofroll.scene_file import load_scene
-from proofroll.simulation import build, simulate
+from proofroll.core.errors import Diverged, InputError, Refused
+from proofroll.core.scene import Capability, Scene
+from proofroll.elements.ball_on_surface.certificate import certify
+from proofroll.files.scene_file import load_scene
+from proofroll.running.recording import record, time_grid
+from proofroll.running.simulation import build, simulate
 
 pin = pytest.importorskip("pinocchio")
 

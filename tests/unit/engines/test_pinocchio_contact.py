@@ -8,13 +8,13 @@ import numpy as np
 import pytest
 import xarray as xr
 
-from proofroll.certificate import certify
-from proofroll.errors import Diverged, Refused
-from proofroll.events import events_of
-from proofroll.registry import load_engine, resolve_settings
-from proofroll.scene import Scene
-from proofroll.scene_file import load_scene
-from proofroll.simulation import build, simulate
+from proofroll.core.errors import Diverged, Refused
+from proofroll.core.events import events_of
+from proofroll.core.plugins import load_engine, resolve_settings
+from proofroll.core.scene import Scene
+from proofroll.elements.ball_on_surface.certificate import certify
+from proofroll.files.scene_file import load_scene
+from proofroll.running.simulation import build, simulate
 
 pin = pytest.importorskip("pinocchio")
 

@@ -12,10 +12,10 @@ import numpy as np
 import pytest
 import xarray as xr
 
-from proofroll.certificate import certify
-from proofroll.events import events_of
-from proofroll.scene_file import load_scene
-from proofroll.simulation import build, simulate
+from proofroll.core.events import events_of
+from proofroll.elements.ball_on_surface.certificate import certify
+from proofroll.files.scene_file import load_scene
+from proofroll.running.simulation import build, simulate
 
 pytest.importorskip("pinocchio")
 

@@ -6,16 +6,16 @@ import numpy as np
 import pytest
 
 import proofroll
-from proofroll.certificate import certify, first_difference
+from proofroll.core.errors import Diverged, InputError
+from proofroll.core.plugins import resolve_settings
+from proofroll.core.scene import Capability
+from proofroll.elements.ball_on_surface.certificate import certify, first_difference
 from proofroll.engines.projection import Projection
 from proofroll.engines.projection.orientation import EulerAngles
 from proofroll.engines.projection.settings import PRESETS
 from proofroll.engines.projection.switching import Switching
-from proofroll.errors import Diverged, InputError
-from proofroll.registry import resolve_settings
-from proofroll.scene import Capability
-from proofroll.scene_file import load_scene
-from proofroll.simulation import build, simulate
+from proofroll.files.scene_file import load_scene
+from proofroll.running.simulation import build, simulate
 
 CYLINDER = {"name": "sphere_in_cylinder"}
 PLANE = {"name": "inclined_plane", "tilt": 0.35, "cross_speed": 0.3}

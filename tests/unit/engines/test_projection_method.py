@@ -8,12 +8,12 @@ import numpy as np
 import pytest
 
 import proofroll
+from proofroll.elements.ball_on_surface.rolling_equations import reduced_rates
+from proofroll.elements.ball_on_surface.surfaces import Cylinder, Plane
 from proofroll.engines.projection import uniform
 from proofroll.engines.projection.geometry import General, Uniform, geometry_of, local_geometry
 from proofroll.engines.projection.method import ProjectedBall
 from proofroll.engines.projection.orientation import EulerAngles, RotatingFrame
-from proofroll.rolling_equations import reduced_rates
-from proofroll.surfaces import Cylinder, Plane
 
 BODY = proofroll.load_scene("sphere_in_cylinder", rolling_resistance=5e-4).rolling
 A, C, M, J = BODY.ball.radius, BODY.surface.radius, BODY.ball.mass, BODY.ball.inertia

@@ -8,17 +8,17 @@ import numpy as np
 import pytest
 
 import proofroll
+from proofroll.core.errors import Diverged, InputError
+from proofroll.core.events import events_of
+from proofroll.elements.ball_on_surface.mechanics import slip_velocity
+from proofroll.elements.ball_on_surface.surfaces import Cylinder
 from proofroll.engines.projection import slipping
 from proofroll.engines.projection.friction import Friction
 from proofroll.engines.projection.geometry import geometry_of
 from proofroll.engines.projection.method import ProjectedBall
 from proofroll.engines.projection.orientation import EulerAngles, RotatingFrame
-from proofroll.errors import Diverged, InputError
-from proofroll.events import events_of
-from proofroll.mechanics import slip_velocity
-from proofroll.recording import record
-from proofroll.simulation import build, simulate
-from proofroll.surfaces import Cylinder
+from proofroll.running.recording import record
+from proofroll.running.simulation import build, simulate
 
 EULER, FRAME = "projection[formulation=euler]", "projection[formulation=rotating_frame]"
 RK4 = "projection[formulation=rotating_frame,preset=default]"

@@ -8,13 +8,13 @@ from typing import Any
 import numpy as np
 import pytest
 
-from proofroll.compiled import library
+from proofroll.core.errors import Refused
+from proofroll.core.plugins import resolve_settings
+from proofroll.core.scene import Gravity, Scene
+from proofroll.elements.ball_on_surface.compiled import library
 from proofroll.engines.projection import Projection
-from proofroll.errors import Refused
-from proofroll.registry import resolve_settings
-from proofroll.scene import Gravity, Scene
-from proofroll.scene_file import load_scene
-from proofroll.simulation import build, simulate
+from proofroll.files.scene_file import load_scene
+from proofroll.running.simulation import build, simulate
 
 needs_heyoka = pytest.mark.skipif(not library.available(), reason="heyoka is not installed")
 

@@ -7,11 +7,11 @@ import dataclasses
 import numpy as np
 import pytest
 
+from proofroll.core.scene import RollingBall
 from proofroll.engines.projection.geometry import General, Uniform, geometry_of
 from proofroll.engines.projection.method import ProjectedBall
 from proofroll.engines.projection.orientation import EulerAngles, Orientation, RotatingFrame
-from proofroll.scene import RollingBall
-from proofroll.scene_file import load_scene
+from proofroll.files.scene_file import load_scene
 
 RNG = np.random.default_rng(0)
 

@@ -7,15 +7,15 @@ import dataclasses
 import numpy as np
 import pytest
 
-from proofroll.compiled import library
 from proofroll.conformance.subject import scenes
-from proofroll.engine import Level, TellsLevels
+from proofroll.core.engine import Level, TellsLevels
+from proofroll.core.errors import Diverged, InputError, Refused
+from proofroll.core.plugins import resolve_settings
+from proofroll.core.scene import Capability, Gravity, Scene
+from proofroll.elements.ball_on_surface.compiled import library
 from proofroll.engines.reduced import Reduced
-from proofroll.errors import Diverged, InputError, Refused
-from proofroll.registry import resolve_settings
-from proofroll.scene import Capability, Gravity, Scene
-from proofroll.scene_file import load_scene
-from proofroll.simulation import build, simulate
+from proofroll.files.scene_file import load_scene
+from proofroll.running.simulation import build, simulate
 from proofroll.truth.rolling import unreduced
 
 TAYLOR = "reduced[preset=tuned]"

@@ -7,10 +7,10 @@ from typing import Any
 import numpy as np
 import pytest
 
-from proofroll.engine import Reproduces
-from proofroll.errors import Refused
-from proofroll.registry import load_engine, resolve_settings
-from proofroll.scene_file import load_scene
+from proofroll.core.engine import Reproduces
+from proofroll.core.errors import Refused
+from proofroll.core.plugins import load_engine, resolve_settings
+from proofroll.files.scene_file import load_scene
 
 CYLINDER, PLANE = "sphere_in_cylinder", "inclined_plane"
 RESISTED, SLIPPING = {"rolling_resistance": 1e-3}, {"mu_static": 0.05}

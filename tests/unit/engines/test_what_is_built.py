@@ -7,11 +7,11 @@ import numpy as np
 import pytest
 from scipy.spatial.transform import Rotation
 
+from proofroll.core.errors import InputError, Refused
+from proofroll.core.scene import Capability, Scene
 from proofroll.engines.projection.modes import Exit
-from proofroll.errors import InputError, Refused
-from proofroll.scene import Capability, Scene
-from proofroll.scene_file import load_scene
-from proofroll.simulation import build, simulate
+from proofroll.files.scene_file import load_scene
+from proofroll.running.simulation import build, simulate
 
 RESISTANCE = 5e-4
 NEEDS = {

@@ -9,7 +9,7 @@ import pytest
 
 from proofroll.engines.projection.orientation import EulerAngles
 from proofroll.figures.quantities import euler_angles, known, quantity
-from proofroll.scene_file import load_scene
+from proofroll.files.scene_file import load_scene
 from proofroll.truth import truth
 
 

@@ -6,11 +6,11 @@ from pathlib import Path
 
 import pytest
 
-from proofroll.comparison_file import comparison_names, load_comparison
-from proofroll.errors import InputError
+from proofroll.core.errors import InputError
 from proofroll.figures.judging import rounds_to
 from proofroll.figures.reading import load_figures
-from proofroll.folders import data_folder
+from proofroll.files.comparison_file import comparison_names, load_comparison
+from proofroll.files.data_folders import data_folder
 
 TEXT = """
 study = "figures"

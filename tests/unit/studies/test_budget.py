@@ -5,8 +5,8 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from proofroll.case import Case, EngineFacts, Result, Status
-from proofroll.metrics import Observable
+from proofroll.elements.ball_on_surface.observables import Observable
+from proofroll.running.case import Case, EngineFacts, Result, Status
 from proofroll.studies.budget import FLOOR, MODEL_FORM, TIME_STEP, TRUTH, Budget, Order, budget, order_of, sentence
 from proofroll.studies.sweep import Curve, Point
 

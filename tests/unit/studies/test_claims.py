@@ -7,9 +7,9 @@ from typing import Any
 
 import pytest
 
-from proofroll.comparison_file import comparison_names, load_comparison
-from proofroll.errors import InputError
-from proofroll.folders import data_folder
+from proofroll.core.errors import InputError
+from proofroll.files.comparison_file import comparison_names, load_comparison
+from proofroll.files.data_folders import data_folder
 from proofroll.studies.claims import claims_for, load_claims
 
 TEXT = """

@@ -11,18 +11,18 @@ import pytest
 import xarray as xr
 from hostile import ENTRY_POINTS
 
-from proofroll.agreement import Verdict
-from proofroll.case import Case, EngineFacts, Result, Status
-from proofroll.comparison import Band, Comparison, ExceptAt, Row, Tolerance
-from proofroll.recording import time_grid
-from proofroll.runner import Runner
-from proofroll.scene import Capability, Scene
-from proofroll.scene_file import load_scene
-from proofroll.simulation import simulate
-from proofroll.store import Store
+from proofroll.core.comparison import Band, Comparison, ExceptAt, Row, Tolerance
+from proofroll.core.scene import Capability, Scene
+from proofroll.core.verdict import Verdict
+from proofroll.elements.ball_on_surface.trajectory import write
+from proofroll.files.scene_file import load_scene
+from proofroll.running.case import Case, EngineFacts, Result, Status
+from proofroll.running.recording import time_grid
+from proofroll.running.runner import Runner
+from proofroll.running.simulation import simulate
+from proofroll.running.store import Store
 from proofroll.studies.compare import Outcome, compare, evaluate
 from proofroll.studies.planning import Plan, Planned, point_name
-from proofroll.trajectory import write
 from proofroll.truth import truth
 from proofroll.truth.onset import onset
 

@@ -8,11 +8,11 @@ from typing import Any
 import numpy as np
 import pytest
 
-from proofroll.case import Result, Status
-from proofroll.events import Event, with_events
-from proofroll.scene_file import load_scene
+from proofroll.core.events import Event, with_events
+from proofroll.elements.ball_on_surface.trajectory import trajectory
+from proofroll.files.scene_file import load_scene
+from proofroll.running.case import Result, Status
 from proofroll.studies.failure import MEANINGS, Failure, Yardstick, judge
-from proofroll.trajectory import trajectory
 from proofroll.truth import truth
 from proofroll.truth.natural import natural_time
 

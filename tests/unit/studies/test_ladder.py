@@ -9,15 +9,15 @@ from typing import Any
 
 import pytest
 
-from proofroll.engine import Level
-from proofroll.errors import InputError
-from proofroll.report.content import plain
+from proofroll.core.engine import Level
+from proofroll.core.errors import InputError
+from proofroll.files.scene_file import load_scene
+from proofroll.report.comparison_content import plain
 from proofroll.report.ladder import ladder_content, rung_table, term_table
 from proofroll.report.terminal import WIDTH, console
-from proofroll.runner import Runner
-from proofroll.scene_file import load_scene
-from proofroll.simulation import simulate
-from proofroll.store import Store
+from proofroll.running.runner import Runner
+from proofroll.running.simulation import simulate
+from proofroll.running.store import Store
 from proofroll.studies.ladder import Ladder
 
 UNTIL = 0.2

@@ -6,8 +6,8 @@ from typing import Any
 
 import pytest
 
-from proofroll.comparison import Tolerance
-from proofroll.errors import InputError
+from proofroll.core.comparison import Tolerance
+from proofroll.core.errors import InputError
 from proofroll.report.tradeoff_tables import answer_lines, front_tables
 from proofroll.studies.recommend import Wish, recommend
 

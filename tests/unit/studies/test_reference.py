@@ -6,8 +6,8 @@ from typing import Any
 
 import numpy as np
 
-from proofroll.metrics import Observable
-from proofroll.scene_file import load_scene
+from proofroll.elements.ball_on_surface.observables import Observable
+from proofroll.files.scene_file import load_scene
 from proofroll.studies.reference import Reference
 
 

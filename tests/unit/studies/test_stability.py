@@ -11,21 +11,21 @@ from typing import Any
 
 import pytest
 
-from proofroll.errors import InputError
-from proofroll.plain import plain
+from proofroll.core.errors import InputError
+from proofroll.files.json_data import plain
+from proofroll.files.scene_file import load_scene
 from proofroll.report.stability_map import LETTERS, legend, svg
 from proofroll.report.stability_tables import boundary_table, headline, silent_lines
-from proofroll.runner import Runner
-from proofroll.scene_file import load_scene
-from proofroll.store import Store
+from proofroll.running.runner import Runner
+from proofroll.running.store import Store
 from proofroll.studies.axes import Axis, Term, chosen, thinned
 from proofroll.studies.failure import Failure
-from proofroll.studies.numbers import explanation, numbers
-from proofroll.studies.places import Effort
 from proofroll.studies.stability import stability
 from proofroll.studies.stability_claims import Claim, file_for
 from proofroll.studies.stability_content import content, dependence
+from proofroll.studies.stability_places import Effort
 from proofroll.studies.stability_reproducers import write_reproducers
+from proofroll.studies.step_numbers import explanation, numbers
 
 SPEED = Axis("V0", "m/s", "initial speed", [2.0, 8.0], {"speed": Term()})
 ENGINE = "projection[formulation=rotating_frame,preset=default]"

@@ -4,10 +4,10 @@ from __future__ import annotations
 
 import pytest
 
-from proofroll.case import Status
-from proofroll.errors import InputError
-from proofroll.runner import Runner
-from proofroll.store import Store
+from proofroll.core.errors import InputError
+from proofroll.running.case import Status
+from proofroll.running.runner import Runner
+from proofroll.running.store import Store
 from proofroll.studies.sweep import BROKEN, Curve, Question, curves_of, sweep
 
 QUESTION = Question("sphere_in_cylinder", {"speed": 3.0}, 0.4, "z")

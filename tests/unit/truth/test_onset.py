@@ -4,8 +4,8 @@ import numpy as np
 import pytest
 
 from proofroll import load_scene
-from proofroll.errors import InputError
-from proofroll.scene import Scene
+from proofroll.core.errors import InputError
+from proofroll.core.scene import Scene
 from proofroll.truth.friction_curve import friction_curve
 from proofroll.truth.onset import edge_between, first_slip, onset
 from proofroll.truth.stick_slip import stick_slip

@@ -5,13 +5,13 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from proofroll.errors import Refused
-from proofroll.events import events_of
-from proofroll.metrics import energy_balance
-from proofroll.resting import setting_off, stays
-from proofroll.scene import RollingBall
-from proofroll.scene_file import load_scene
-from proofroll.simulation import simulate
+from proofroll.core.errors import Refused
+from proofroll.core.events import events_of
+from proofroll.core.scene import RollingBall
+from proofroll.elements.ball_on_surface.observables import energy_balance
+from proofroll.elements.ball_on_surface.resting import setting_off, stays
+from proofroll.files.scene_file import load_scene
+from proofroll.running.simulation import simulate
 
 G, A = 9.81, 0.025
 EULER, FRAME = "projection[formulation=euler]", "projection[formulation=rotating_frame]"

@@ -8,9 +8,9 @@ import numpy as np
 import pytest
 
 from proofroll import load_scene
-from proofroll.errors import Diverged, Refused
-from proofroll.events import events_of
-from proofroll.scene import Scene
+from proofroll.core.errors import Diverged, Refused
+from proofroll.core.events import events_of
+from proofroll.core.scene import Scene
 from proofroll.truth import stick_slip as module
 from proofroll.truth import taylor, truth
 from proofroll.truth.implicit import Implicit

@@ -8,12 +8,12 @@ import numpy as np
 import pytest
 import xarray as xr
 
-from proofroll.closed_form import closed_form
-from proofroll.motion import Motion
-from proofroll.scene import Ball, Scene
-from proofroll.scene_file import load_scene
-from proofroll.surfaces import Cylinder
-from proofroll.trajectory import trajectory
+from proofroll.core.scene import Ball, Scene
+from proofroll.elements.ball_on_surface.closed_form import closed_form
+from proofroll.elements.ball_on_surface.motion import Motion
+from proofroll.elements.ball_on_surface.surfaces import Cylinder
+from proofroll.elements.ball_on_surface.trajectory import trajectory
+from proofroll.files.scene_file import load_scene
 from proofroll.truth import rolling, truth, unreduced_taylor
 from proofroll.truth.rolling import reduced, unreduced
 

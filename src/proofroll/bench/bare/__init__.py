@@ -11,9 +11,9 @@ from __future__ import annotations
 from collections.abc import Callable
 from dataclasses import dataclass
 
-from proofroll.errors import Refused
-from proofroll.scene import RollingBall, Scene
-from proofroll.surfaces import Cylinder, FloatArray
+from proofroll.core.errors import Refused
+from proofroll.core.scene import RollingBall, Scene
+from proofroll.elements.ball_on_surface.surfaces import Cylinder, FloatArray
 
 GROUP = "proofroll.bare_loops"
 

@@ -14,14 +14,14 @@ from typing import Any
 import numpy as np
 
 from proofroll.bench.bare import Bare, in_vertical_cylinder
+from proofroll.core.errors import Diverged
+from proofroll.core.scene import RollingBall, Scene
+from proofroll.elements.ball_on_surface.surfaces import FloatArray
 from proofroll.engines.exudyn.carrier import Carrier
 from proofroll.engines.exudyn.contact import Contact
 from proofroll.engines.exudyn.integration import new_system, simulation_settings
 from proofroll.engines.exudyn.native import Output, exu, items
 from proofroll.engines.exudyn.rolling_disc import RollingDisc
-from proofroll.errors import Diverged
-from proofroll.scene import RollingBall, Scene
-from proofroll.surfaces import FloatArray
 
 Start = tuple[FloatArray, FloatArray]
 

@@ -14,10 +14,10 @@ import mujoco
 import numpy as np
 
 from proofroll.bench.bare import Bare, in_vertical_cylinder
+from proofroll.core.errors import Diverged, Refused
+from proofroll.core.scene import RollingBall, Scene
+from proofroll.elements.ball_on_surface.surfaces import FloatArray
 from proofroll.engines.mujoco import Mujoco
-from proofroll.errors import Diverged, Refused
-from proofroll.scene import RollingBall, Scene
-from proofroll.surfaces import FloatArray
 
 _ON_CONE = 1 - 1e-9
 _FATAL = (mujoco.mjtWarning.mjWARN_BADQPOS, mujoco.mjtWarning.mjWARN_BADQVEL, mujoco.mjtWarning.mjWARN_BADQACC)

@@ -14,9 +14,9 @@ import pinocchio as pin
 from scipy.integrate import DOP853
 
 from proofroll.bench.bare import Bare, in_vertical_cylinder
-from proofroll.errors import Diverged, Refused
-from proofroll.scene import Capability, RollingBall, Scene
-from proofroll.surfaces import FloatArray
+from proofroll.core.errors import Diverged, Refused
+from proofroll.core.scene import Capability, RollingBall, Scene
+from proofroll.elements.ball_on_surface.surfaces import FloatArray
 
 # What the adapter gives Pinocchio's cone where friction is unbounded.
 _UNBOUNDED = 1e6

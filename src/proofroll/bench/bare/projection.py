@@ -15,9 +15,9 @@ from scipy.integrate import DOP853
 from scipy.linalg.lapack import dgesv
 
 from proofroll.bench.bare import Bare, in_vertical_cylinder
-from proofroll.errors import Diverged
-from proofroll.scene import RollingBall, Scene
-from proofroll.surfaces import FloatArray
+from proofroll.core.errors import Diverged
+from proofroll.core.scene import RollingBall, Scene
+from proofroll.elements.ball_on_surface.surfaces import FloatArray
 
 Equations = tuple[FloatArray, Callable[[float, FloatArray], FloatArray], Callable[[FloatArray], FloatArray], FloatArray]
 

@@ -12,15 +12,15 @@ from collections.abc import Mapping, Sequence
 from importlib.metadata import version
 from typing import ClassVar, Self
 
-from proofroll.engine import Built, Level, Sample, Term
+from proofroll.core.engine import Built, Level, Sample, Term
+from proofroll.core.errors import Refused
+from proofroll.core.events import Event
+from proofroll.core.scene import Capability, Scene
 from proofroll.engines.exudyn.carrier import Carrier
 from proofroll.engines.exudyn.contact import Contact
 from proofroll.engines.exudyn.generic import Generic
 from proofroll.engines.exudyn.rolling_disc import RollingDisc
 from proofroll.engines.exudyn.settings import PRESETS, ExudynSettings
-from proofroll.errors import Refused
-from proofroll.events import Event
-from proofroll.scene import Capability, Scene
 
 Model = Generic | Carrier | RollingDisc | Contact
 MODELS: Mapping[str, type[Model]] = {
@@ -83,7 +83,7 @@ class Exudyn:
 
     @classmethod
     def build(cls, scene: Scene, settings: ExudynSettings) -> Self:
-        """See :class:`proofroll.engine.Engine`."""
+        """See :class:`proofroll.core.engine.Engine`."""
         if Capability.ORIENTATION in scene.requires and settings.formulation == "generic":
             raise Refused(
                 f"needs {Capability.ORIENTATION}, and the spin of generic is a quasi-velocity, the rate of no "
@@ -93,24 +93,24 @@ class Exudyn:
 
     @classmethod
     def reproducer(cls, scene: Scene, settings: ExudynSettings) -> str:
-        """See :class:`proofroll.engine.Reproduces`."""
+        """See :class:`proofroll.core.engine.Reproduces`."""
         from proofroll.engines.exudyn.reproducer import source
 
         body = scene.rolling
         return source(MODELS[settings.formulation](body, settings), body, settings)
 
     def advance(self, t: float) -> None:
-        """See :class:`proofroll.engine.Engine`."""
+        """See :class:`proofroll.core.engine.Engine`."""
         self._model.integration.advance(t)
 
     def sample(self) -> Sample:
-        """See :class:`proofroll.engine.Engine`."""
+        """See :class:`proofroll.core.engine.Engine`."""
         return self._model.sample()
 
     def events(self) -> Sequence[Event]:
-        """See :class:`proofroll.engine.LocatesEvents`."""
+        """See :class:`proofroll.core.engine.LocatesEvents`."""
         return self._model.events()
 
     def built(self) -> Built:
-        """See :class:`proofroll.engine.Engine`."""
+        """See :class:`proofroll.core.engine.Engine`."""
         return self._model.built()

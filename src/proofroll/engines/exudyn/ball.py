@@ -9,11 +9,11 @@ from typing import Any
 
 import numpy as np
 
-from proofroll.engine import Built, Sample
+from proofroll.core.engine import Built, Sample
+from proofroll.core.scene import Capability, RollingBall
+from proofroll.elements.ball_on_surface.surfaces import FloatArray, Surface
 from proofroll.engines.exudyn.local_frame import curvature
 from proofroll.engines.exudyn.native import Output, items, loads
-from proofroll.scene import Capability, RollingBall
-from proofroll.surfaces import FloatArray, Surface
 
 
 @dataclass(frozen=True)

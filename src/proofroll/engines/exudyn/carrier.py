@@ -11,17 +11,17 @@ from typing import Any
 
 import numpy as np
 
-from proofroll.engine import Built, Sample
+from proofroll.core.engine import Built, Sample
+from proofroll.core.errors import Refused
+from proofroll.core.events import Event
+from proofroll.core.scene import RollingBall
+from proofroll.elements.ball_on_surface.surfaces import FloatArray, Generator
 from proofroll.engines.exudyn.ball import add_ball, add_body
 from proofroll.engines.exudyn.friction import refuse_slip
 from proofroll.engines.exudyn.integration import Integration, consistent_start, new_system
 from proofroll.engines.exudyn.local_frame import LocalGeometry, local_geometry
 from proofroll.engines.exudyn.native import Output, exu, items
 from proofroll.engines.exudyn.settings import ExudynSettings
-from proofroll.errors import Refused
-from proofroll.events import Event
-from proofroll.scene import RollingBall
-from proofroll.surfaces import FloatArray, Generator
 
 
 class Carrier:
@@ -118,7 +118,7 @@ class Carrier:
         ]
 
     def sample(self) -> Sample:
-        """See :class:`proofroll.engine.Engine`. The pivot transmits the whole force of the wall."""
+        """See :class:`proofroll.core.engine.Engine`. The pivot transmits the whole force of the wall."""
         turn = self.system.GetNodeOutput(self.node, Output.RotationMatrix).reshape(3, 3)
         return self.ball.sample(-turn @ self.system.GetObjectOutput(self.joint, Output.ForceLocal))
 
@@ -127,7 +127,7 @@ class Carrier:
         return []
 
     def built(self) -> Built:
-        """See :class:`proofroll.engine.Engine`."""
+        """See :class:`proofroll.core.engine.Engine`."""
         item, rate = self.rolling[1]
         # How far the ball's centre is from its place in the carrier, which is not turned at time 0.
         off = self.system.GetObjectOutput(self.joint, Output.DisplacementLocal)

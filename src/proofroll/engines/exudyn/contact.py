@@ -15,17 +15,17 @@ from typing import Any
 
 import numpy as np
 
-from proofroll.engine import Built, Regularised, Sample
+from proofroll.core.engine import Built, Regularised, Sample
+from proofroll.core.errors import Refused
+from proofroll.core.events import Event, EventKind
+from proofroll.core.scene import Capability, RollingBall
+from proofroll.elements.ball_on_surface.mechanics import natural_acceleration, newton_euler
+from proofroll.elements.ball_on_surface.surfaces import FloatArray
 from proofroll.engines.exudyn.ball import add_ball
 from proofroll.engines.exudyn.integration import Integration, new_system
 from proofroll.engines.exudyn.local_frame import curvature
 from proofroll.engines.exudyn.native import Output, items
 from proofroll.engines.exudyn.settings import ExudynSettings
-from proofroll.errors import Refused
-from proofroll.events import Event, EventKind
-from proofroll.mechanics import natural_acceleration, newton_euler
-from proofroll.scene import Capability, RollingBall
-from proofroll.surfaces import FloatArray
 
 # Radius of the hollow sphere in radii of the ball where the wall is not curved. The larger it is, the less its normal
 # turns between two residuals, and the more the stiffness magnifies the round-off of the distance.
@@ -137,12 +137,12 @@ class Contact:
         return list(self._events)
 
     def sample(self) -> Sample:
-        """See :class:`proofroll.engine.Engine`. The force is that of the contact."""
+        """See :class:`proofroll.core.engine.Engine`. The force is that of the contact."""
         force = self.system.GetObjectOutput(self.contact, Output.Force)
         return dataclasses.replace(self.ball.sample(force), sticking=self._sticks if self.bounded else None)
 
     def built(self) -> Built:
-        """See :class:`proofroll.engine.Engine`."""
+        """See :class:`proofroll.core.engine.Engine`."""
         contact = self.system.GetObject(self.contact)
         gap = float(self.system.GetObjectOutput(self.contact, Output.DisplacementLocal))
         built = self.ball.built(float(contact["spheresRadii"][0] + gap / 2), gap)

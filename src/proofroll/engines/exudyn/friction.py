@@ -11,10 +11,10 @@ from collections.abc import Callable
 from dataclasses import dataclass
 from typing import NamedTuple
 
+from proofroll.core.errors import Refused
+from proofroll.core.scene import RollingBall
 from proofroll.engines.exudyn.local_frame import curvature
 from proofroll.engines.exudyn.resistance import resistance_moment
-from proofroll.errors import Refused
-from proofroll.scene import RollingBall
 
 # A slip that the needed friction would change within this part of a step is the round-off of a rolling constraint.
 AT_REST = 1e-6

@@ -13,7 +13,11 @@ from typing import Any
 
 import numpy as np
 
-from proofroll.engine import Built, Sample
+from proofroll.core.engine import Built, Sample
+from proofroll.core.errors import Refused
+from proofroll.core.events import Event
+from proofroll.core.scene import Capability, RollingBall
+from proofroll.elements.ball_on_surface.surfaces import FloatArray
 from proofroll.engines.exudyn.friction import Sliding, Touch, needed_function
 from proofroll.engines.exudyn.generic_forces import (
     SIZE,
@@ -28,10 +32,6 @@ from proofroll.engines.exudyn.local_frame import local_geometry
 from proofroll.engines.exudyn.native import exu, items
 from proofroll.engines.exudyn.settings import ExudynSettings
 from proofroll.engines.exudyn.stick_slip import StickSlip
-from proofroll.errors import Refused
-from proofroll.events import Event
-from proofroll.scene import Capability, RollingBall
-from proofroll.surfaces import FloatArray
 
 
 class Generic:
@@ -142,7 +142,7 @@ class Generic:
         ]
 
     def sample(self) -> Sample:
-        """See :class:`proofroll.engine.Engine`. The spin is a quasi-velocity, so there is no orientation to report.
+        """See :class:`engine.Engine`. The spin is a quasi-velocity, so there is no orientation to report.
 
         While the ball slips, N is the wall's multiplier, and the friction what Exudyn was given for this state.
         """
@@ -205,7 +205,7 @@ class Generic:
         return np.asarray(q_t - by_impulse @ np.linalg.solve(rows @ by_impulse, rows @ q_t))
 
     def built(self) -> Built:
-        """See :class:`proofroll.engine.Engine`. Gravity, f and μk stem from the forces Exudyn computed."""
+        """See :class:`proofroll.core.engine.Engine`. Gravity, f and μk stem from the forces Exudyn computed."""
         mass = self.system.GetObject(self.object)["massMatrix"].Convert2DenseMatrix()
         data = self.system.systemData
         q, q_t, q_tt = data.GetODE2Coordinates(), data.GetODE2Coordinates_t(), data.GetODE2Coordinates_tt()

@@ -7,12 +7,12 @@ from typing import Any
 
 import numpy as np
 
+from proofroll.core.errors import Refused
+from proofroll.core.scene import RollingBall
+from proofroll.elements.ball_on_surface.surfaces import FloatArray
 from proofroll.engines.exudyn.friction import Sliding
 from proofroll.engines.exudyn.local_frame import LocalGeometry
 from proofroll.engines.exudyn.resistance import resistance_moment
-from proofroll.errors import Refused
-from proofroll.scene import RollingBall
-from proofroll.surfaces import FloatArray
 
 # The distance towards the wall, its two coordinates, and three whose rates are the spin.
 SIZE = 6

@@ -7,11 +7,11 @@ from typing import Any
 
 import numpy as np
 
-from proofroll.engine import whole_steps
+from proofroll.core.engine import whole_steps
+from proofroll.core.errors import Diverged, Refused
+from proofroll.elements.ball_on_surface.surfaces import FloatArray
 from proofroll.engines.exudyn.native import exu
 from proofroll.engines.exudyn.settings import ExudynSettings
-from proofroll.errors import Diverged, Refused
-from proofroll.surfaces import FloatArray
 
 
 def new_system() -> tuple[Any, Any]:

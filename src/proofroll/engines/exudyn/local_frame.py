@@ -6,8 +6,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from proofroll.errors import Refused
-from proofroll.surfaces import FloatArray, Generator, Surface
+from proofroll.core.errors import Refused
+from proofroll.elements.ball_on_surface.surfaces import FloatArray, Generator, Surface
 
 
 @dataclass(frozen=True)

@@ -7,6 +7,9 @@ from typing import Any
 
 import numpy as np
 
+from proofroll.core.errors import Refused
+from proofroll.core.scene import RollingBall
+from proofroll.elements.ball_on_surface.reproducer_source import assigned, ball_numbers, wall_source
 from proofroll.engines.exudyn.carrier import Carrier
 from proofroll.engines.exudyn.contact import SURELY, Contact
 from proofroll.engines.exudyn.generic import Generic
@@ -14,9 +17,6 @@ from proofroll.engines.exudyn.local_frame import curvature
 from proofroll.engines.exudyn.native import exu
 from proofroll.engines.exudyn.rolling_disc import RollingDisc
 from proofroll.engines.exudyn.settings import ExudynSettings
-from proofroll.errors import Refused
-from proofroll.reproducing import assigned, ball_numbers, wall_source
-from proofroll.scene import RollingBall
 
 _BALL = """
 node = mbs.AddNode(items.NodeRigidBodyEP(
@@ -242,7 +242,7 @@ def state_of_ball():
 
 
 def source(model: Any, body: RollingBall, settings: ExudynSettings) -> str:
-    """See :class:`proofroll.engine.Reproduces`.
+    """See :class:`proofroll.core.engine.Reproduces`.
 
     Args:
         model: of the formulation, at time 0.

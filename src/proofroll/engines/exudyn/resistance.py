@@ -8,7 +8,7 @@ import math
 def resistance_moment(f: float, N: float, v2: float, v3: float) -> tuple[float, float]:
     """Moment about the centre along e2 and e3 [N m]: that of -N e1 shifted by ``f`` [m] along the velocity [m/s].
 
-    :func:`proofroll.mechanics.resistance_moment` in the local frame and as plain floats: it runs for every residual.
+    :func:`mechanics.resistance_moment` in the local frame and as plain floats: it runs for every residual.
     """
     speed = math.hypot(v2, v3)
     if not speed:

@@ -10,15 +10,15 @@ from typing import Any
 
 import numpy as np
 
-from proofroll.engine import Built, Sample
+from proofroll.core.engine import Built, Sample
+from proofroll.core.events import Event
+from proofroll.core.scene import RollingBall
+from proofroll.elements.ball_on_surface.surfaces import FloatArray
 from proofroll.engines.exudyn.ball import add_ball
 from proofroll.engines.exudyn.friction import refuse_slip
 from proofroll.engines.exudyn.integration import Integration, consistent_start, new_system
 from proofroll.engines.exudyn.native import Output, items
 from proofroll.engines.exudyn.settings import ExudynSettings
-from proofroll.events import Event
-from proofroll.scene import RollingBall
-from proofroll.surfaces import FloatArray
 
 
 class RollingDisc:
@@ -69,7 +69,7 @@ class RollingDisc:
         return np.asarray(self.system.GetObjectOutput(self.joint, Output.RotationMatrix).reshape(3, 3))
 
     def sample(self) -> Sample:
-        """See :class:`proofroll.engine.Engine`."""
+        """See :class:`proofroll.core.engine.Engine`."""
         return self.ball.sample(self._directions() @ self.system.GetObjectOutput(self.joint, Output.ForceLocal))
 
     def events(self) -> list[Event]:
@@ -77,5 +77,5 @@ class RollingDisc:
         return []
 
     def built(self) -> Built:
-        """See :class:`proofroll.engine.Engine`. The joint holds velocities only and knows no distance."""
+        """See :class:`proofroll.core.engine.Engine`. The joint holds velocities only and knows no distance."""
         return self.ball.built(self.system.GetObject(self.joint)["discRadius"], None)

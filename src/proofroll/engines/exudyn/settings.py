@@ -8,7 +8,7 @@ from typing import Annotated, ClassVar, Literal
 
 from annotated_types import Gt, Interval
 
-from proofroll.errors import InputError
+from proofroll.core.errors import InputError
 
 
 @dataclass(frozen=True)

@@ -13,15 +13,15 @@ from typing import Any, NamedTuple, Protocol
 
 from scipy.optimize import brentq
 
-from proofroll.engine import whole_steps
+from proofroll.core.engine import whole_steps
+from proofroll.core.errors import Diverged
+from proofroll.core.events import Event, EventKind
+from proofroll.core.scene import RollingBall
+from proofroll.elements.ball_on_surface.surfaces import FloatArray
 from proofroll.engines.exudyn.friction import Touch, mobility, slip_direction
 from proofroll.engines.exudyn.integration import Integration
 from proofroll.engines.exudyn.native import exu
 from proofroll.engines.exudyn.settings import ExudynSettings
-from proofroll.errors import Diverged
-from proofroll.events import Event, EventKind
-from proofroll.scene import RollingBall
-from proofroll.surfaces import FloatArray
 
 # An event is located to this part of a step, far below what one step of the integrator is wrong by.
 LOCATED = 1e-6
@@ -96,7 +96,7 @@ class StickSlip:
         self._restart()
 
     def advance(self, t: float) -> None:
-        """Moves the system to time ``t`` [s]; see :class:`proofroll.engine.Engine`."""
+        """Moves the system to time ``t`` [s]; see :class:`proofroll.core.engine.Engine`."""
         while whole_steps(self.t, t, self.settings.dt) > 0:
             self._watching, self._stopped = True, False
             try:

@@ -10,7 +10,11 @@ from typing import Any, ClassVar, Protocol, Self
 import mujoco
 import numpy as np
 
-from proofroll.engine import Built, Level, Sample, Term, whole_steps
+from proofroll.core.engine import Built, Level, Sample, Term, whole_steps
+from proofroll.core.errors import Diverged, Refused
+from proofroll.core.events import Event
+from proofroll.core.scene import Capability, RollingBall, Scene
+from proofroll.elements.ball_on_surface.mechanics import natural_acceleration
 from proofroll.engines.mujoco.chart import Chart
 from proofroll.engines.mujoco.contact import Resistance, contact_coefficient, contact_force
 from proofroll.engines.mujoco.free import Facets, Free
@@ -20,10 +24,6 @@ from proofroll.engines.mujoco.settings import PRESETS, ROLLS, MujocoSettings, ch
 from proofroll.engines.mujoco.softness import softness
 from proofroll.engines.mujoco.start import EVALUATIONS, accelerations, start
 from proofroll.engines.mujoco.terms import TERMS
-from proofroll.errors import Diverged, Refused
-from proofroll.events import Event
-from proofroll.mechanics import natural_acceleration
-from proofroll.scene import Capability, RollingBall, Scene
 
 
 class Formulation(Protocol):
@@ -123,7 +123,7 @@ class Mujoco:
 
     @classmethod
     def build(cls, scene: Scene, settings: MujocoSettings) -> Self:
-        """See :class:`proofroll.engine.Engine`."""
+        """See :class:`proofroll.core.engine.Engine`."""
         body = scene.rolling
         bounded = math.isfinite(body.contact.mu_static)
         check(settings, bounded=bounded)
@@ -137,7 +137,7 @@ class Mujoco:
 
     @classmethod
     def reproducer(cls, scene: Scene, settings: MujocoSettings) -> str:
-        """See :class:`proofroll.engine.Reproduces`."""
+        """See :class:`proofroll.core.engine.Reproduces`."""
         from proofroll.engines.mujoco.reproducer import source
 
         body = scene.rolling
@@ -149,7 +149,7 @@ class Mujoco:
         return source(spec.to_xml(), built._model, built._data, body, settings)
 
     def advance(self, t: float) -> None:
-        """See :class:`proofroll.engine.Engine`."""
+        """See :class:`proofroll.core.engine.Engine`."""
         dt = self._settings.dt
         # Counted, because the sum that MjData.time keeps drifts from the grid by round-off.
         steps = whole_steps(self._steps * dt, t, dt)
@@ -169,7 +169,7 @@ class Mujoco:
         return self._model, self._data
 
     def sample(self) -> Sample:
-        """See :class:`proofroll.engine.Engine`."""
+        """See :class:`proofroll.core.engine.Engine`."""
         data = self._evaluated()
         force = contact_force(self._model, data, self._geom)
         sticking = None if self._friction is None else self._friction.holds(data)
@@ -187,11 +187,11 @@ class Mujoco:
         )
 
     def events(self) -> Sequence[Event]:
-        """See :class:`proofroll.engine.LocatesEvents`."""
+        """See :class:`proofroll.core.engine.LocatesEvents`."""
         return [] if self._friction is None else self._friction.events(self._evaluated())
 
     def built(self) -> Built:
-        """See :class:`proofroll.engine.Engine`."""
+        """See :class:`proofroll.core.engine.Engine`."""
         model = self._model
         static, kinetic = self._coefficients()
         data = self._evaluated()

@@ -9,12 +9,12 @@ from typing import Any
 import mujoco
 import numpy as np
 
+from proofroll.core.errors import Refused
+from proofroll.core.scene import RollingBall
 from proofroll.engines.mujoco.contact import Resistance, foreseen_normal_force
 from proofroll.engines.mujoco.friction import BoundedFriction, corrects
 from proofroll.engines.mujoco.model import pose, quaternion_of, tangent_plane
 from proofroll.engines.mujoco.settings import MujocoSettings
-from proofroll.errors import Refused
-from proofroll.scene import RollingBall
 
 
 class Chart:

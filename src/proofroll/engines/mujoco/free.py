@@ -9,13 +9,13 @@ from typing import Any
 import mujoco
 import numpy as np
 
+from proofroll.core.errors import Diverged, Refused
+from proofroll.core.scene import RollingBall
+from proofroll.elements.ball_on_surface.surfaces import FloatArray
 from proofroll.engines.mujoco.contact import Resistance, cross, foreseen_normal_force
 from proofroll.engines.mujoco.friction import BoundedFriction, corrects
 from proofroll.engines.mujoco.model import pose, quaternion_of, tangent_plane
 from proofroll.engines.mujoco.settings import MujocoSettings, normal_lead, own_share, velocity_lag
-from proofroll.errors import Diverged, Refused
-from proofroll.scene import RollingBall
-from proofroll.surfaces import FloatArray
 
 # A velocity that is this part of what half a step adds to it is round-off, and has no direction: the ball is at rest.
 _AT_REST = 1e-6

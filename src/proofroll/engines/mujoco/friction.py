@@ -9,10 +9,10 @@ from typing import Any
 import mujoco
 import numpy as np
 
+from proofroll.core.errors import Refused
+from proofroll.core.events import Event, EventKind
+from proofroll.core.scene import Contact, RollingBall
 from proofroll.engines.mujoco.settings import LARGEST_PYRAMIDAL_FRICTION, PRELOAD, MujocoSettings
-from proofroll.errors import Refused
-from proofroll.events import Event, EventKind
-from proofroll.scene import Contact, RollingBall
 
 # MuJoCo raises a smaller coefficient to this without a word (mjMINMU), unless the contact has no friction at all.
 SMALLEST_FRICTION = 1e-5

@@ -8,13 +8,13 @@ from typing import Any
 import mujoco
 import numpy as np
 
+from proofroll.core.errors import Refused
+from proofroll.core.scene import RollingBall, Scene
+from proofroll.elements.ball_on_surface.surfaces import FloatArray
 from proofroll.engines.mujoco.contact import MEMORY
 from proofroll.engines.mujoco.friction import MEMORY as SLIP_MEMORY
 from proofroll.engines.mujoco.friction import condim, corrects
 from proofroll.engines.mujoco.settings import MujocoSettings, friction_coefficients, impedance, time_constant
-from proofroll.errors import Refused
-from proofroll.scene import RollingBall, Scene
-from proofroll.surfaces import FloatArray
 
 _INTEGRATORS = {
     "Euler": mujoco.mjtIntegrator.mjINT_EULER,

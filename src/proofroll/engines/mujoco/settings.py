@@ -9,7 +9,7 @@ from typing import Annotated, Literal
 from annotated_types import Ge, Gt, Le, Lt
 from pydantic import BeforeValidator
 
-from proofroll.errors import InputError
+from proofroll.core.errors import InputError
 
 # What a MuJoCo model has whose author writes nothing: step, friction, solref [s], solimp (dmin, dmax).
 DEFAULT_STEP = 2e-3
@@ -86,7 +86,7 @@ class MujocoSettings:
 
     @property
     def resolution(self) -> str:
-        """See :class:`proofroll.engine.Settings`."""
+        """See :class:`proofroll.core.engine.Settings`."""
         return "dt"
 
     @property

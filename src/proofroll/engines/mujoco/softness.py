@@ -7,7 +7,9 @@ from collections.abc import Iterator, Mapping
 
 import numpy as np
 
-from proofroll.engine import Regularised
+from proofroll.core.engine import Regularised
+from proofroll.core.scene import RollingBall
+from proofroll.elements.ball_on_surface.mechanics import initial_response, natural_acceleration, newton_euler
 from proofroll.engines.mujoco.friction import corrects
 from proofroll.engines.mujoco.settings import (
     PRELOAD,
@@ -18,8 +20,6 @@ from proofroll.engines.mujoco.settings import (
     time_constant,
     velocity_lag,
 )
-from proofroll.mechanics import initial_response, natural_acceleration, newton_euler
-from proofroll.scene import RollingBall
 
 _FORCES = ("acceleration", "N", "F2", "F3")
 _MORE = "friction against turning or rolling, which the scene does not ask for, turns the ball otherwise"

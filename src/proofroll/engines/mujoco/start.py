@@ -10,11 +10,11 @@ import mujoco
 import numpy as np
 from scipy.optimize import brentq
 
+from proofroll.core.errors import Refused
+from proofroll.core.scene import RollingBall
+from proofroll.elements.ball_on_surface.surfaces import FloatArray
 from proofroll.engines.mujoco.friction import corrects
 from proofroll.engines.mujoco.settings import MujocoSettings, impedance, time_constant, velocity_lag
-from proofroll.errors import Refused
-from proofroll.scene import RollingBall
-from proofroll.surfaces import FloatArray
 
 # The resistance's torque uses the normal force of the evaluation before: at a standstill in time, repeats converge.
 EVALUATIONS = 3

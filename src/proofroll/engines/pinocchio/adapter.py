@@ -8,13 +8,13 @@ from typing import Any, ClassVar, Self
 
 import pinocchio as pin
 
-from proofroll.engine import Built, Level, Sample, Term
+from proofroll.core.engine import Built, Level, Sample, Term
+from proofroll.core.errors import Refused
+from proofroll.core.events import Event
+from proofroll.core.scene import Capability, Scene
 from proofroll.engines.pinocchio.contact_run import ContactRun
 from proofroll.engines.pinocchio.rows_run import RowsRun
 from proofroll.engines.pinocchio.settings import PRESETS, PinocchioSettings
-from proofroll.errors import Refused
-from proofroll.events import Event
-from proofroll.scene import Capability, Scene
 
 
 class Pinocchio:
@@ -70,37 +70,37 @@ class Pinocchio:
 
     @staticmethod
     def version() -> str:
-        """See :class:`proofroll.engine.Engine`."""
+        """See :class:`proofroll.core.engine.Engine`."""
         return str(pin.__version__)
 
     @classmethod
     def build(cls, scene: Scene, settings: PinocchioSettings) -> Self:
-        """See :class:`proofroll.engine.Engine`."""
+        """See :class:`proofroll.core.engine.Engine`."""
         settings = _decided(scene, settings)
         return cls((ContactRun if settings.formulation == "contact" else RowsRun)(scene.rolling, settings))
 
     @classmethod
     def reproducer(cls, scene: Scene, settings: PinocchioSettings) -> str:
-        """See :class:`proofroll.engine.Reproduces`."""
+        """See :class:`proofroll.core.engine.Reproduces`."""
         from proofroll.engines.pinocchio.reproducer import source
 
         return source(scene.rolling, _decided(scene, settings))
 
     def advance(self, t: float) -> None:
-        """See :class:`proofroll.engine.Engine`."""
+        """See :class:`proofroll.core.engine.Engine`."""
         self._run.advance(self._t, t)
         self._t = t
 
     def sample(self) -> Sample:
-        """See :class:`proofroll.engine.Engine`."""
+        """See :class:`proofroll.core.engine.Engine`."""
         return self._run.sample()
 
     def events(self) -> Sequence[Event]:
-        """See :class:`proofroll.engine.LocatesEvents`; none with unbounded friction."""
+        """See :class:`proofroll.core.engine.LocatesEvents`; none with unbounded friction."""
         return self._run.events()
 
     def built(self) -> Built:
-        """See :class:`proofroll.engine.Engine`."""
+        """See :class:`proofroll.core.engine.Engine`."""
         return self._run.built()
 
 

@@ -8,6 +8,9 @@ from typing import Any, NamedTuple
 import numpy as np
 import pinocchio as pin
 
+from proofroll.core.errors import Refused
+from proofroll.core.scene import RollingBall
+from proofroll.elements.ball_on_surface.surfaces import FloatArray, Generator
 from proofroll.engines.pinocchio.mechanism import Mechanism, Sliding
 from proofroll.engines.pinocchio.rows import (
     BallTerms,
@@ -19,9 +22,6 @@ from proofroll.engines.pinocchio.rows import (
     rolling_directions,
     rolling_rows,
 )
-from proofroll.errors import Refused
-from proofroll.scene import RollingBall
-from proofroll.surfaces import FloatArray, Generator
 
 # Two places on the surface, at which its geometry along the local axes is compared.
 _SHIFTS = np.zeros(6), np.array([0.7, -0.4, 0.0, 0.0, 0.0, 0.0])

@@ -13,13 +13,13 @@ from typing import Any, NamedTuple
 import numpy as np
 import pinocchio as pin
 
-from proofroll.engine import whole_steps
+from proofroll.core.engine import whole_steps
+from proofroll.core.errors import Diverged, Refused
+from proofroll.core.events import Event, EventKind
+from proofroll.core.scene import RollingBall
+from proofroll.elements.ball_on_surface.surfaces import FloatArray
 from proofroll.engines.pinocchio.plane_contact import PlaneContact
 from proofroll.engines.pinocchio.settings import PinocchioSettings
-from proofroll.errors import Diverged, Refused
-from proofroll.events import Event, EventKind
-from proofroll.scene import RollingBall
-from proofroll.surfaces import FloatArray
 
 # Pinocchio's cone needs a number where friction is unbounded. PGS takes any; the iterations of ADMM grow with it.
 UNBOUNDED_FRICTION = {"pgs": 1e6, "admm": 1e2}

@@ -7,20 +7,20 @@ from collections.abc import Iterator
 import numpy as np
 import pinocchio as pin
 
-from proofroll.engine import Built, Sample
+from proofroll.core.engine import Built, Sample
+from proofroll.core.events import Event
+from proofroll.core.scene import Capability, RollingBall
+from proofroll.elements.ball_on_surface.surfaces import FloatArray
 from proofroll.engines.pinocchio.contact import UNBOUNDED_FRICTION, ContactSteps
 from proofroll.engines.pinocchio.contact_tolerances import softened
 from proofroll.engines.pinocchio.settings import PinocchioSettings
-from proofroll.events import Event
-from proofroll.scene import Capability, RollingBall
-from proofroll.surfaces import FloatArray
 
 # Numbers of a joint's configuration if it is an orientation.
 _QUATERNION = 4
 
 
 class ContactRun:
-    """See :class:`proofroll.engine.Engine` for the methods."""
+    """See :class:`proofroll.core.engine.Engine` for the methods."""
 
     def __init__(self, body: RollingBall, settings: PinocchioSettings) -> None:
         """At time 0.
@@ -38,7 +38,7 @@ class ContactRun:
         self.steps.advance(start, end)
 
     def sample(self) -> Sample:
-        """See :class:`proofroll.engine.Engine`; the force is that of the step beginning or centred here."""
+        """See :class:`proofroll.core.engine.Engine`; the force is that of the step beginning or centred here."""
         steps, data = self.steps, self._looked_at
         contact, kick = steps.contact, steps.kick()
         # The velocity runs ahead by half a step with leapfrog, once it has begun to run.
@@ -56,7 +56,7 @@ class ContactRun:
         )
 
     def built(self) -> Built:
-        """See :class:`proofroll.engine.Engine`: from the model, and from its contact and torques at the state now."""
+        """See :class:`engine.Engine`: from the model, and from its contact and torques at the state now."""
         steps = self.steps
         contact, kick = steps.contact, steps.kick()
         inertia, point, pose = contact.model.inertias[contact.ball], contact.point, contact.data.oMi[contact.ball]
@@ -101,5 +101,5 @@ class ContactRun:
             yield Capability.ORIENTATION
 
     def events(self) -> tuple[Event, ...]:
-        """See :class:`proofroll.engine.LocatesEvents`; none with unbounded friction."""
+        """See :class:`proofroll.core.engine.LocatesEvents`; none with unbounded friction."""
         return tuple(self.steps.events) if self.steps.bounded else ()

@@ -6,9 +6,14 @@ from dataclasses import replace
 
 import numpy as np
 
-from proofroll.engine import Regularised
-from proofroll.mechanics import initial_angular_acceleration, initial_response, natural_acceleration, newton_euler
-from proofroll.scene import RollingBall
+from proofroll.core.engine import Regularised
+from proofroll.core.scene import RollingBall
+from proofroll.elements.ball_on_surface.mechanics import (
+    initial_angular_acceleration,
+    initial_response,
+    natural_acceleration,
+    newton_euler,
+)
 
 # Errors that the solver's tolerance and round-off explain, over what was measured at most on either scene.
 _MARGIN = 10.0
@@ -17,7 +22,7 @@ _MARGIN = 10.0
 def softened(
     body: RollingBall, *, bends: bool, dt: float, impulse: float, unbounded: float | None
 ) -> dict[str, Regularised]:
-    """What :attr:`proofroll.engine.Built.regularised` holds.
+    """What :attr:`proofroll.core.engine.Built.regularised` holds.
 
     Args:
         body: as the scene has it.

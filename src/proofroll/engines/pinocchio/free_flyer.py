@@ -9,10 +9,10 @@ from typing import Any
 import numpy as np
 import pinocchio as pin
 
+from proofroll.core.scene import RollingBall
+from proofroll.elements.ball_on_surface.surfaces import FloatArray
 from proofroll.engines.pinocchio.mechanism import Mechanism, Sliding
 from proofroll.engines.pinocchio.rows import BallTerms, ball_terms, own_bias, resistance, rolling_rows
-from proofroll.scene import RollingBall
-from proofroll.surfaces import FloatArray
 
 
 class FreeFlyer(Mechanism):
@@ -63,7 +63,7 @@ class FreeFlyer(Mechanism):
         The next call overwrites it: only what changes from place to place is written again.
 
         Args:
-            moving: of :meth:`proofroll.surfaces.Surface.moving_triad`.
+            moving: of :meth:`proofroll.elements.ball_on_surface.surfaces.Surface.moving_triad`.
         """
         entries = self._entries
         for index, source, factor in self._changing:

@@ -4,14 +4,14 @@ from __future__ import annotations
 
 from typing import Any, Protocol, runtime_checkable
 
+from proofroll.core.events import Event
+from proofroll.core.scene import Contact
+from proofroll.elements.ball_on_surface.surfaces import FloatArray
 from proofroll.engines.pinocchio.integrators import Integrator
 from proofroll.engines.pinocchio.mechanism import Mechanism
 from proofroll.engines.pinocchio.settings import PinocchioSettings
 from proofroll.engines.pinocchio.stick_slip import AdaptiveStickSlip
 from proofroll.engines.pinocchio.stick_slip_steps import StickSlipEuler, StickSlipRungeKutta4
-from proofroll.events import Event
-from proofroll.scene import Contact
-from proofroll.surfaces import FloatArray
 
 
 @runtime_checkable

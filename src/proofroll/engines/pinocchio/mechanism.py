@@ -10,10 +10,10 @@ from typing import Any
 import numpy as np
 import pinocchio as pin
 
+from proofroll.core.errors import Diverged
+from proofroll.core.scene import RollingBall
+from proofroll.elements.ball_on_surface.surfaces import FloatArray
 from proofroll.engines.pinocchio.rows import BallTerms, resistance
-from proofroll.errors import Diverged
-from proofroll.scene import RollingBall
-from proofroll.surfaces import FloatArray
 
 # A pull of the wall smaller than this part of the ball's weight, and of the force that turns its path by a radius, is
 # round-off.

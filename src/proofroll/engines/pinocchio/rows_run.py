@@ -9,20 +9,20 @@ from typing import Any
 import numpy as np
 import pinocchio as pin
 
-from proofroll.engine import Built, Sample
+from proofroll.core.engine import Built, Sample
+from proofroll.core.events import Event
+from proofroll.core.scene import Capability, RollingBall
+from proofroll.elements.ball_on_surface.surfaces import FloatArray
 from proofroll.engines.pinocchio.composite import Composite
 from proofroll.engines.pinocchio.free_flyer import FreeFlyer
 from proofroll.engines.pinocchio.friction import StickSlip, stick_slip
 from proofroll.engines.pinocchio.integrators import Integrator, integrator
 from proofroll.engines.pinocchio.mechanism import Mechanism
 from proofroll.engines.pinocchio.settings import PinocchioSettings
-from proofroll.events import Event
-from proofroll.scene import Capability, RollingBall
-from proofroll.surfaces import FloatArray
 
 
 class RowsRun:
-    """See :class:`proofroll.engine.Engine` for the methods."""
+    """See :class:`proofroll.core.engine.Engine` for the methods."""
 
     def __init__(self, body: RollingBall, settings: PinocchioSettings) -> None:
         """At time 0; the settings say whether the orientation is integrated, no longer the scene."""
@@ -40,7 +40,7 @@ class RowsRun:
         self.motion.advance(start, end)
 
     def sample(self) -> Sample:
-        """See :class:`proofroll.engine.Engine`; no orientation where it is not integrated."""
+        """See :class:`proofroll.core.engine.Engine`; no orientation where it is not integrated."""
         model, ball, data = self.mechanism.model, self.mechanism.ball, self._looked_at
         force = self._reaction(data)[1]
         velocity = pin.getVelocity(model, data, ball, pin.LOCAL_WORLD_ALIGNED)
@@ -55,11 +55,11 @@ class RowsRun:
         )
 
     def events(self) -> tuple[Event, ...]:
-        """See :class:`proofroll.engine.LocatesEvents`; none with unbounded friction."""
+        """See :class:`proofroll.core.engine.LocatesEvents`; none with unbounded friction."""
         return tuple(self.motion.events) if isinstance(self.motion, StickSlip) else ()
 
     def built(self) -> Built:
-        """See :class:`proofroll.engine.Engine`: from the model, and from its rows and torques at the state now."""
+        """See :class:`proofroll.core.engine.Engine`: from the model, and from its rows and torques at the state now."""
         mechanism, q, v = self.mechanism, self.motion.q, self.motion.v
         model, data, ball = mechanism.model, mechanism.model.createData(), mechanism.ball
         inertia = model.inertias[ball]

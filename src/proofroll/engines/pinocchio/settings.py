@@ -9,7 +9,7 @@ from typing import Annotated, Literal
 import numpy as np
 from annotated_types import Ge, Gt
 
-from proofroll.errors import InputError
+from proofroll.core.errors import InputError
 
 # scipy raises anything below 100 machine epsilons to it, with no more than a warning.
 TIGHTEST_RTOL = 100 * float(np.finfo(float).eps)
@@ -101,12 +101,12 @@ class PinocchioSettings:
 
     @property
     def resolution(self) -> str:
-        """See :class:`proofroll.engine.Settings`."""
+        """See :class:`proofroll.core.engine.Settings`."""
         return "rtol" if self.integrator == "dop853" else "dt"
 
     @property
     def order(self) -> int | None:
-        """See :class:`proofroll.engine.Settings`.
+        """See :class:`proofroll.core.engine.Settings`.
 
         rk4 is of order 4 only where configurations form a vector space, that is without the orientation: see
         :mod:`proofroll.engines.pinocchio.integrators`. Where the scene decides, this is the order for one that does

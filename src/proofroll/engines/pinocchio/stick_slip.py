@@ -16,14 +16,14 @@ from typing import Any
 
 import numpy as np
 
+from proofroll.core.errors import Diverged
+from proofroll.core.events import Event, EventKind
+from proofroll.core.scene import Contact
+from proofroll.elements.ball_on_surface.surfaces import FloatArray
 from proofroll.engines.pinocchio.crossing import located
 from proofroll.engines.pinocchio.integrators import Adaptive
 from proofroll.engines.pinocchio.mechanism import Mechanism, Sliding, left_the_wall
 from proofroll.engines.pinocchio.settings import PinocchioSettings
-from proofroll.errors import Diverged
-from proofroll.events import Event, EventKind
-from proofroll.scene import Contact
-from proofroll.surfaces import FloatArray
 
 # |u| at which creeping ends, relative to |b|/ω_b: what is left out of the direction goes with its square.
 _HANDOVER = 1e-4

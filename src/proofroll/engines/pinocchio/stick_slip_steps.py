@@ -7,13 +7,13 @@ from typing import Any
 
 import numpy as np
 
+from proofroll.core.events import Event
+from proofroll.core.scene import Contact
+from proofroll.elements.ball_on_surface.surfaces import FloatArray
 from proofroll.engines.pinocchio.integrators import FixedStep, RungeKutta4, SemiImplicitEuler
 from proofroll.engines.pinocchio.mechanism import Mechanism, Sliding, left_the_wall
 from proofroll.engines.pinocchio.settings import PinocchioSettings
 from proofroll.engines.pinocchio.stick_slip import excess, unit
-from proofroll.events import Event
-from proofroll.scene import Contact
-from proofroll.surfaces import FloatArray
 
 
 class FixedStickSlip(FixedStep):

@@ -9,8 +9,12 @@ from typing import ClassVar, Self
 import numpy as np
 
 import proofroll
-from proofroll.compiled.library import with_heyoka
-from proofroll.engine import Built, Level, Sample, Term
+from proofroll.core.engine import Built, Level, Sample, Term
+from proofroll.core.errors import Diverged, Refused
+from proofroll.core.events import Event
+from proofroll.core.scene import Capability, RollingBall, Scene
+from proofroll.elements.ball_on_surface.compiled.library import with_heyoka
+from proofroll.elements.ball_on_surface.surfaces import FloatArray
 from proofroll.engines.projection.friction import Friction
 from proofroll.engines.projection.geometry import geometry_of
 from proofroll.engines.projection.integrators import INTEGRATORS, Integrator
@@ -21,10 +25,6 @@ from proofroll.engines.projection.settings import PRESETS, ProjectionSettings
 from proofroll.engines.projection.stepping import STEPPERS
 from proofroll.engines.projection.switching import Hooks, Switching
 from proofroll.engines.projection.taylor import TaylorSeries
-from proofroll.errors import Diverged, Refused
-from proofroll.events import Event
-from proofroll.scene import Capability, RollingBall, Scene
-from proofroll.surfaces import FloatArray
 
 # Numbers of the state that are not the ball's orientation: two coordinates and five velocities.
 _WITHOUT_ORIENTATION = 7
@@ -75,7 +75,7 @@ class Projection:
 
     @classmethod
     def build(cls, scene: Scene, settings: ProjectionSettings) -> Self:
-        """See :class:`proofroll.engine.Engine`."""
+        """See :class:`proofroll.core.engine.Engine`."""
         follow = Capability.ORIENTATION in scene.requires
         if follow and settings.integrator == "taylor" and settings.formulation == "rotating_frame":
             raise Refused("the compiled series do not follow the orientation; use integrator=dop853")
@@ -152,7 +152,7 @@ class Projection:
         return None if renewed is None else np.concatenate([x[:2], renewed[0], x[n : n + 2], renewed[1]])
 
     def advance(self, t: float) -> None:
-        """See :class:`proofroll.engine.Engine`."""
+        """See :class:`proofroll.core.engine.Engine`."""
         start = self._motion.t
         try:
             with np.errstate(over="ignore", invalid="ignore"):  # found by _check, and raised as Diverged
@@ -161,11 +161,11 @@ class Projection:
             raise Diverged(f"{error}, between t = {start:.6g} s and {t:.6g} s") from None
 
     def events(self) -> Sequence[Event]:
-        """See :class:`proofroll.engine.LocatesEvents`."""
+        """See :class:`proofroll.core.engine.LocatesEvents`."""
         return tuple(self._motion.events) if isinstance(self._motion, Switching) else ()
 
     def remarks(self) -> Sequence[str]:
-        """See :class:`proofroll.engine.TellsRemarks`."""
+        """See :class:`proofroll.core.engine.TellsRemarks`."""
         times = self._orientation.renewals if isinstance(self._orientation, EulerAngles) else []
         if not times:
             return ()
@@ -173,7 +173,7 @@ class Projection:
         return (f"near the Euler-angle singularity the body's axes were chosen anew {often} t = {times[0]:.6g} s",)
 
     def sample(self) -> Sample:
-        """See :class:`proofroll.engine.Engine`."""
+        """See :class:`proofroll.core.engine.Engine`."""
         x = self._motion.x
         kin = self._ball.kinematics(x)
         frame = kin.local.frame
@@ -194,7 +194,7 @@ class Projection:
         )
 
     def built(self) -> Built:
-        """See :class:`proofroll.engine.Engine`."""
+        """See :class:`proofroll.core.engine.Engine`."""
         ball = self._ball
         x = self._motion.x
         kin = ball.kinematics(x)

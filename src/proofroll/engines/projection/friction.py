@@ -14,9 +14,9 @@ from typing import NamedTuple
 
 import numpy as np
 
+from proofroll.core.scene import Contact
+from proofroll.elements.ball_on_surface.surfaces import FloatArray
 from proofroll.engines.projection.method import Kinematics, ProjectedBall, Response
-from proofroll.scene import Contact
-from proofroll.surfaces import FloatArray
 
 # Needed friction is compared with the cone to this part of both and of the weight: below lies round-off.
 _ON_CONE = 1e-12

@@ -10,7 +10,7 @@ from typing import NamedTuple, Protocol
 
 import numpy as np
 
-from proofroll.surfaces import FloatArray, Generator, Surface
+from proofroll.elements.ball_on_surface.surfaces import FloatArray, Generator, Surface
 
 
 class Local(NamedTuple):

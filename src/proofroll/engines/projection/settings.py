@@ -8,9 +8,9 @@ from typing import Annotated, Literal
 
 from annotated_types import Gt
 
-from proofroll.compiled import library
+from proofroll.core.errors import InputError
+from proofroll.elements.ball_on_surface.compiled import library
 from proofroll.engines.projection.integrators import INTEGRATORS, TIGHTEST
-from proofroll.errors import InputError
 
 _DT = 1e-3
 

@@ -20,10 +20,10 @@ import math
 
 import numpy as np
 
+from proofroll.elements.ball_on_surface.surfaces import FloatArray
 from proofroll.engines.projection.friction import Friction, Sliding, along
 from proofroll.engines.projection.method import Kinematics
 from proofroll.engines.projection.modes import DIFFERENCE, Exit, Pace, Survey
-from proofroll.surfaces import FloatArray
 
 # ε: the start of a slip ends where its direction relaxes more slowly than this part of T.
 START = 1e-3

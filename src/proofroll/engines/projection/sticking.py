@@ -6,10 +6,10 @@ import math
 
 import numpy as np
 
+from proofroll.elements.ball_on_surface.surfaces import FloatArray
 from proofroll.engines.projection.friction import Friction
 from proofroll.engines.projection.method import ProjectedBall
 from proofroll.engines.projection.modes import DIFFERENCE, Exit, Pace, Survey, time_left
-from proofroll.surfaces import FloatArray
 
 # While the cone leaves more than this part of itself, the needed friction cannot leave it and be back within one step:
 # a crest that high is many steps wide.

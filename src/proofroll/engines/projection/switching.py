@@ -8,14 +8,14 @@ from typing import NamedTuple
 import numpy as np
 from scipy.optimize import brentq
 
+from proofroll.core.errors import Diverged
+from proofroll.core.events import Event, EventKind
+from proofroll.elements.ball_on_surface.surfaces import FloatArray
 from proofroll.engines.projection.friction import Friction
 from proofroll.engines.projection.modes import Exit, Mode, Pace, Survey
 from proofroll.engines.projection.slipping import FreeSlip, SlavedSlip
 from proofroll.engines.projection.stepping import Stepper
 from proofroll.engines.projection.sticking import Rest, Stick
-from proofroll.errors import Diverged
-from proofroll.events import Event, EventKind
-from proofroll.surfaces import FloatArray
 
 # Times are located to this part of the time scale of the motion, or to round-off of the time itself.
 _LOCATED = 1e-12

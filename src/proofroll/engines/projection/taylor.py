@@ -6,13 +6,13 @@ from collections.abc import Callable
 
 import numpy as np
 
-from proofroll.compiled.library import require_heyoka
-from proofroll.compiled.projection import Formulation, parameters, projected, structure
-from proofroll.compiled.rolling import supports
-from proofroll.compiled.series import Renewed, Series, still_moving
-from proofroll.errors import Refused
-from proofroll.scene import RollingBall
-from proofroll.surfaces import FloatArray
+from proofroll.core.errors import Refused
+from proofroll.core.scene import RollingBall
+from proofroll.elements.ball_on_surface.compiled.library import require_heyoka
+from proofroll.elements.ball_on_surface.compiled.projection import Formulation, parameters, projected, structure
+from proofroll.elements.ball_on_surface.compiled.rolling import supports
+from proofroll.elements.ball_on_surface.compiled.series import Renewed, Series, still_moving
+from proofroll.elements.ball_on_surface.surfaces import FloatArray
 
 
 class TaylorSeries:
@@ -39,7 +39,7 @@ class TaylorSeries:
             x: initial state.
             rtol: relative tolerance of a step [-].
             check: called with the time [s] and state after each step; raises Diverged if it is not to be trusted.
-            accepted: the state from which the motion goes on, see :data:`proofroll.compiled.series.Renewed`.
+            accepted: the state from which the motion goes on, see :data:`series.Renewed`.
 
         Raises:
             Refused: heyoka is missing, or the scene is not one of its equations.

@@ -13,9 +13,9 @@ from abc import ABC, abstractmethod
 
 import numpy as np
 
+from proofroll.core.scene import RollingBall
+from proofroll.elements.ball_on_surface.surfaces import FloatArray
 from proofroll.engines.projection.geometry import Uniform
-from proofroll.scene import RollingBall
-from proofroll.surfaces import FloatArray
 
 
 class Closed(ABC):

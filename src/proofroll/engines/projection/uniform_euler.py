@@ -6,10 +6,10 @@ import math
 
 import numpy as np
 
+from proofroll.core.scene import RollingBall
+from proofroll.elements.ball_on_surface.surfaces import FloatArray
 from proofroll.engines.projection.geometry import Uniform
 from proofroll.engines.projection.uniform import Closed
-from proofroll.scene import RollingBall
-from proofroll.surfaces import FloatArray
 
 # A turning axis whose horizontal components are smaller than this is vertical.
 _VERTICAL = 1e-15

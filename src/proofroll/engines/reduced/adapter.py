@@ -8,19 +8,19 @@ from typing import ClassVar, Self
 import numpy as np
 
 import proofroll
-from proofroll.compiled.library import with_heyoka
-from proofroll.engine import Built, Level, Sample, Term
+from proofroll.core.engine import Built, Level, Sample, Term
+from proofroll.core.scene import Capability, RollingBall, Scene
+from proofroll.elements.ball_on_surface.compiled.library import with_heyoka
+from proofroll.elements.ball_on_surface.surfaces import FloatArray
 from proofroll.engines.reduced.models import ClosedForm, Compiled, Integrated, Model
 from proofroll.engines.reduced.settings import PRESETS, ReducedSettings
-from proofroll.scene import Capability, RollingBall, Scene
-from proofroll.surfaces import FloatArray
 
 
 class Reduced:
     """The scene's least model: a closed form, or five equations of motion with no constraint left.
 
-    It shares the closed form and the equations with the truth's first route (:mod:`proofroll.rolling_equations`), so
-    agreement with the truth is news only as far as the truth's second route, which shares neither, agrees too.
+    It shares the closed form and the equations with the truth's first route (:mod:`rolling_equations`), so agreement
+    with the truth is news only as far as the truth's second route, which shares neither, agrees too.
     """
 
     name: ClassVar[str] = "reduced"
@@ -39,7 +39,7 @@ class Reduced:
 
     @classmethod
     def build(cls, scene: Scene, settings: ReducedSettings) -> Self:
-        """See :class:`proofroll.engine.Engine`."""
+        """See :class:`proofroll.core.engine.Engine`."""
         return cls(scene.rolling, settings)
 
     def __init__(self, body: RollingBall, settings: ReducedSettings) -> None:
@@ -53,11 +53,11 @@ class Reduced:
             self._model = Integrated(body, settings.rtol)
 
     def advance(self, t: float) -> None:
-        """See :class:`proofroll.engine.Engine`."""
+        """See :class:`proofroll.core.engine.Engine`."""
         self._model.advance(t)
 
     def sample(self) -> Sample:
-        """See :class:`proofroll.engine.Engine`. The orientation is not followed: nothing needs it."""
+        """See :class:`proofroll.core.engine.Engine`. The orientation is not followed: nothing needs it."""
         motion = self._model.motion()
         return Sample(
             p_WB=motion.p_WB[0].copy(),
@@ -67,7 +67,7 @@ class Reduced:
         )
 
     def built(self) -> Built:
-        """See :class:`proofroll.engine.Engine`."""
+        """See :class:`proofroll.core.engine.Engine`."""
         body, motion = self._body, self._model.motion()
         ball, f = body.ball, body.contact.rolling_resistance
         acceleration = motion.force[0] / ball.mass + body.gravity

@@ -9,8 +9,8 @@ from typing import Annotated, Literal
 import numpy as np
 from annotated_types import Gt
 
-from proofroll.compiled.library import TIGHTEST
-from proofroll.errors import InputError
+from proofroll.core.errors import InputError
+from proofroll.elements.ball_on_surface.compiled.library import TIGHTEST
 
 # What double precision, and scipy (it accepts nothing below 100 machine epsilons), leave of each method.
 _TIGHTEST: Mapping[str, float] = {"dop853": 100 * float(np.finfo(float).eps), "taylor": TIGHTEST}

@@ -9,18 +9,18 @@ from typing import Any
 import mujoco
 import numpy as np
 
+from proofroll.core.errors import Refused
+from proofroll.core.scene import RollingBall
+from proofroll.elements.ball_on_surface.reproducer_source import assigned, ball_numbers, normal_rate_source, wall_source
+from proofroll.elements.ball_on_surface.surfaces import FloatArray
 from proofroll.engines.mujoco.friction import NEAR_CONE, corrects
 from proofroll.engines.mujoco.reproducer import text
 from proofroll.engines.mujoco.settings import PRELOAD, MujocoSettings, normal_lead, own_share, velocity_lag
 from proofroll.engines.mujoco.start import EVALUATIONS
-from proofroll.errors import Refused
-from proofroll.reproducing import assigned, ball_numbers, normal_rate_source, wall_source
-from proofroll.scene import RollingBall
-from proofroll.surfaces import FloatArray
 
 
 def source(xml: str, model: Any, data: Any, body: RollingBall, settings: MujocoSettings) -> str:
-    """See :class:`proofroll.engine.Reproduces`.
+    """See :class:`proofroll.core.engine.Reproduces`.
 
     Args:
         xml: the model as MuJoCo writes it.

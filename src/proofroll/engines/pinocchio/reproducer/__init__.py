@@ -8,16 +8,16 @@ from __future__ import annotations
 
 import math
 
+from proofroll.core.errors import Refused
+from proofroll.core.scene import RollingBall
+from proofroll.elements.ball_on_surface.reproducer_source import assigned, ball_numbers, normal_rate_source, wall_source
 from proofroll.engines.pinocchio.reproducer import composite, contact, free_flyer, stepping
 from proofroll.engines.pinocchio.rows_run import RowsRun
 from proofroll.engines.pinocchio.settings import PinocchioSettings
-from proofroll.errors import Refused
-from proofroll.reproducing import assigned, ball_numbers, normal_rate_source, wall_source
-from proofroll.scene import RollingBall
 
 
 def source(body: RollingBall, settings: PinocchioSettings) -> str:
-    """See :class:`proofroll.engine.Reproduces`.
+    """See :class:`proofroll.core.engine.Reproduces`.
 
     Args:
         body: the scene's.

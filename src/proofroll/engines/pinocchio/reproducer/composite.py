@@ -4,8 +4,8 @@ from __future__ import annotations
 
 import numpy as np
 
-from proofroll.reproducing import assigned
-from proofroll.scene import RollingBall
+from proofroll.core.scene import RollingBall
+from proofroll.elements.ball_on_surface.reproducer_source import assigned
 
 SOURCE = '''
 model = pin.Model()

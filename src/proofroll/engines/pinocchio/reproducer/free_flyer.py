@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from proofroll.scene import RollingBall
+from proofroll.core.scene import RollingBall
 
 SOURCE = '''
 model = pin.Model()

@@ -2,10 +2,10 @@
 
 from __future__ import annotations
 
+from proofroll.elements.ball_on_surface.reproducer_source import assigned
 from proofroll.engines.pinocchio.integrators import PATIENCE, SHORT
 from proofroll.engines.pinocchio.mechanism import Mechanism
 from proofroll.engines.pinocchio.settings import PinocchioSettings
-from proofroll.reproducing import assigned
 
 _FIXED = '''
 MOVING = np.array([1.0] * (model.nv - 3) + [float(ORIENTATION)] * 3)  # what moves the configuration

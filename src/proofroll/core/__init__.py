@@ -1,0 +1,1 @@
+"""What everything speaks: scenes, the engine protocol, events, verdicts, claims."""

@@ -1,0 +1,203 @@
+"""A claim about engines on a scene: what is run, what is compared, how closely, and what is expected."""
+
+from __future__ import annotations
+
+import itertools
+import math
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+
+from proofroll.core.errors import InputError
+from proofroll.core.verdict import Verdict
+
+
+@dataclass(frozen=True)
+class Tolerance:
+    """How far an observable may be from the truth.
+
+    Attributes:
+        value: in the unit of the observable, or as a fraction of its scale.
+        relative: whether it is a fraction.
+        unit: as it is written; ``%`` for a fraction.
+    """
+
+    value: float
+    relative: bool
+    unit: str = "%"
+
+    def absolute(self, scale: float) -> float:
+        """In the unit of the observable."""
+        return self.value * scale if self.relative else self.value
+
+    @classmethod
+    def parse(cls, field_name: str, text: object) -> Tolerance:
+        """Reads ``"6e-5 m"`` or ``"0.1 %"``.
+
+        Raises:
+            InputError: the text has another form.
+        """
+        number, _, unit = str(text).partition(" ")
+        try:
+            value = float(number)
+        except ValueError:
+            raise InputError(field_name, text, 'write a number and a unit, "6e-5 m", or "0.1 %" of the scale') from None
+        if not (math.isfinite(value) and value > 0 and unit.strip()):
+            raise InputError(field_name, text, 'write a positive number and a unit, "6e-5 m", or "0.1 %" of the scale')
+        return cls(value / 100, True) if unit.strip() == "%" else cls(value, False, unit.strip())
+
+
+@dataclass(frozen=True)
+class Band:
+    """A set of tolerances by observable, with the reason for them."""
+
+    because: str
+    bounds: dict[str, Tolerance]
+
+
+@dataclass(frozen=True)
+class ExceptAt:
+    """Points at which something else is expected of a row.
+
+    Attributes:
+        where: parameter -> values; the points that have one of them for each.
+        expect: expected verdicts there.
+    """
+
+    where: dict[str, list[float]]
+    expect: list[Verdict]
+
+
+@dataclass(frozen=True)
+class Row:
+    """One engine with settings, and what is expected of it.
+
+    Attributes:
+        engine: ``name[key=value,…]``.
+        tolerance: name of a band of tolerances.
+        expect: expected verdicts on the row as a whole, which is the worst of its observables.
+        except_at: points at which something else is expected; the first that fits counts.
+        expect_for: observable -> expected verdicts on it alone.
+        because: why something else than agreement is expected.
+        ladder: factors on the step, coarse first; 1 is the run itself. [1]: no ladder, so no limit of small steps.
+        only: parameter -> values for which this row is run (all if absent).
+        order: observable -> lowest and highest order that is expected.
+        limit: observable -> largest expected distance of the limit of small steps from the truth.
+        bound: observable -> tolerance that replaces the band's.
+    """
+
+    engine: str
+    tolerance: str
+    expect: list[Verdict] = field(default_factory=lambda: [Verdict.AGREES])
+    except_at: list[ExceptAt] = field(default_factory=list)
+    expect_for: dict[str, list[Verdict]] = field(default_factory=dict)
+    because: str = ""
+    ladder: list[float] = field(default_factory=lambda: [4.0, 2.0, 1.0])
+    only: dict[str, list[float]] = field(default_factory=dict)
+    order: dict[str, tuple[float, float]] = field(default_factory=dict)
+    limit: dict[str, Tolerance] = field(default_factory=dict)
+    bound: dict[str, Tolerance] = field(default_factory=dict)
+
+    def expected(self, point: dict[str, float]) -> list[Verdict]:
+        """Verdicts that do not contradict the claim at a point of the parameters."""
+        for exception in self.except_at:
+            if _fits(point, exception.where):
+                return exception.expect
+        return self.expect
+
+
+@dataclass(frozen=True)
+class Edge:
+    """A value of a parameter at which the time of the first slip jumps, to be found between two others.
+
+    Attributes:
+        edge_between: the two values.
+    """
+
+    edge_between: tuple[float, float]
+
+
+@dataclass(frozen=True)
+class Axis:
+    """Equally spaced values.
+
+    Attributes:
+        low, high: first and last.
+        count: how many.
+    """
+
+    low: float
+    high: float
+    count: int
+
+
+@dataclass(frozen=True)
+class Regimes:
+    """A map of what becomes of the ball.
+
+    Attributes:
+        speed, mu_static: the axes.
+        rolling_resistance: f [m]; one map for each.
+        until: length of each run [s].
+    """
+
+    speed: Axis
+    mu_static: Axis
+    rolling_resistance: list[float]
+    until: float
+
+    @property
+    def count(self) -> int:
+        """Number of runs of all maps."""
+        return self.speed.count * self.mu_static.count * len(self.rolling_resistance)
+
+
+@dataclass(frozen=True)
+class Comparison:
+    """A claim about engines on a scene.
+
+    Attributes:
+        name: of the file, without ending.
+        title, question: for a person.
+        scene: name of the scene.
+        until, every: last time and sampling interval [s].
+        vary: parameter -> values; every combination is run.
+        points: further combinations, each with parameters of its own.
+        bands: tolerances by name.
+        rows: engines with settings.
+        time_limit: wall seconds a case may take [s].
+        timed: whether the speed of every run is measured, in clean runs of its own.
+        regimes: a map that goes with the comparison, or None.
+        order: place in a report, the smallest first; those without come last, by name.
+    """
+
+    name: str
+    title: str
+    question: str
+    scene: str
+    until: float
+    every: float
+    vary: dict[str, list[float]] = field(default_factory=dict)
+    points: list[dict[str, float | Edge]] = field(default_factory=list)
+    bands: dict[str, Band] = field(default_factory=dict)
+    rows: list[Row] = field(default_factory=list)
+    time_limit: float = 120.0
+    timed: bool = True
+    regimes: Regimes | None = None
+    order: float = math.inf
+
+    def combinations(self, only: Mapping[str, list[float]] | None = None) -> list[dict[str, float | Edge]]:
+        """Every combination of parameters, or those that fit ``only``; the scene as it is if nothing varies."""
+        found: list[dict[str, float | Edge]] = [*self.points]
+        if self.vary or not found:
+            for values in itertools.product(*self.vary.values()):
+                found.append(dict(zip(self.vary, values, strict=True)))
+        return [point for point in found if _fits(point, only or {})]
+
+    def variations(self, row: Row) -> list[dict[str, float]]:
+        """The combinations of parameters for which the row is run, once every edge has been found."""
+        found = self.combinations(row.only)
+        return [{key: value for key, value in point.items() if isinstance(value, float)} for point in found]
+
+
+def _fits(point: Mapping[str, object], allowed: Mapping[str, list[float]]) -> bool:
+    return all(point.get(key) in values for key, values in allowed.items())

@@ -1,0 +1,116 @@
+"""Engines are plug-ins: entry points of the group ``proofroll.engines``, loaded when they are needed."""
+
+from __future__ import annotations
+
+import dataclasses
+import re
+from collections.abc import Mapping
+from importlib.metadata import EntryPoint, entry_points
+from typing import Any
+
+from proofroll.core.errors import InputError, Missing
+
+GROUP = "proofroll.engines"
+
+
+def engine_names() -> list[str]:
+    """Names of all engines that some installed package announces, sorted."""
+    return sorted({point.name for point in entry_points(group=GROUP)})
+
+
+def load_engine(name: str) -> Any:
+    """The engine's class.
+
+    Raises:
+        InputError: no installed package announces such an engine.
+        Missing: it is announced, but what it needs is not installed.
+    """
+    point = _entry_point(name)
+    try:
+        return point.load()
+    except ModuleNotFoundError as error:
+        module = error.name or str(error)
+        how = f"pip install 'proofroll[{name}]'" if point.value.startswith("proofroll.") else f"pip install {module}"
+        raise Missing(f"{name} is not installed here ({module} is missing): {how}") from None
+
+
+def require_engine(name: str) -> None:
+    """Raises InputError if no installed package announces such an engine; nothing is loaded."""
+    _entry_point(name)
+
+
+def _entry_point(name: str) -> EntryPoint:
+    for point in entry_points(group=GROUP):
+        if point.name == name:
+            return point
+    raise InputError("engine", name, f"there is no such engine; choose one of {', '.join([*engine_names(), 'truth'])}")
+
+
+@dataclasses.dataclass(frozen=True)
+class EngineSpec:
+    """An engine as the user writes it, ``mujoco[formulation=chart,dt=1e-4]``.
+
+    Attributes:
+        name: of the engine.
+        options: the settings that were given, as text or numbers.
+    """
+
+    name: str
+    options: Mapping[str, Any]
+
+    def __str__(self) -> str:
+        """The same text again."""
+        inner = ",".join(f"{key}={value}" for key, value in self.options.items())
+        return f"{self.name}[{inner}]" if inner else self.name
+
+
+def parse_engine(text: str) -> EngineSpec:
+    """Reads ``name`` or ``name[key=value,…]``.
+
+    Raises:
+        InputError: the text has another form.
+    """
+    match = re.fullmatch(r"\s*([\w-]+)\s*(?:\[(.*)\])?\s*", text, flags=re.DOTALL)
+    if match is None:
+        raise InputError("engine", text, "write name or name[key=value,key=value]")
+    options: dict[str, str] = {}
+    for part in filter(None, (piece.strip() for piece in (match[2] or "").split(","))):
+        key, equals, value = part.partition("=")
+        if not equals:
+            raise InputError("engine", text, f"write key=value instead of {part!r}")
+        if key.strip() in options:
+            raise InputError("engine", text, f"{key.strip()} is given twice; give it once")
+        options[key.strip()] = value.strip()
+    return EngineSpec(match[1], options)
+
+
+def resolve_settings(engine: Any, options: Mapping[str, Any]) -> Any:
+    """Complete settings: the preset of the formulation, with the given options put over it.
+
+    Raises:
+        InputError: unknown or ill-typed option.
+    """
+    from pydantic import ConfigDict, TypeAdapter, ValidationError
+
+    fields = [field.name for field in dataclasses.fields(engine.settings)]
+    for key, value in options.items():
+        if key not in fields:
+            raise InputError(
+                f"{engine.name}: {key}", value, f"there is no such setting; choose from {', '.join(fields)}"
+            )
+    formulation = options.get("formulation", next(iter(engine.presets)))
+    if formulation not in engine.presets:
+        raise InputError(f"{engine.name}: formulation", formulation, f"choose one of {', '.join(engine.presets)}")
+    presets = engine.presets[formulation]
+    preset = options.get("preset", "matched" if "matched" in presets else next(iter(presets)))
+    if preset not in presets:
+        raise InputError(f"{engine.name}: preset", preset, f"{formulation} has {', '.join(presets)}")
+    values = {**dataclasses.asdict(presets[preset]), **options}
+    engine.settings.__pydantic_config__ = ConfigDict(extra="forbid", allow_inf_nan=False)
+    try:
+        return TypeAdapter(engine.settings).validate_python(values)
+    except ValidationError as error:
+        problem = error.errors()[0]
+        key = ".".join(str(part) for part in problem["loc"])
+        message = problem["msg"][0].lower() + problem["msg"][1:]
+        raise InputError(f"{engine.name}: {key}", problem["input"], message) from None

@@ -1,0 +1,1 @@
+"""What a scene can hold, one folder per kind of element."""

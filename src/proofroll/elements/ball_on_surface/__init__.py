@@ -1,0 +1,1 @@
+"""A ball that rolls or slips on a surface."""

@@ -1,0 +1,32 @@
+"""heyoka, where it is installed."""
+
+from __future__ import annotations
+
+from importlib import metadata, util
+
+import numpy as np
+
+from proofroll.core.errors import Refused
+
+# A step's error relative to the state: no tolerance below can be told from it.
+TIGHTEST = float(np.finfo(float).eps)
+
+
+def available() -> bool:
+    """Whether heyoka is installed."""
+    return util.find_spec("heyoka") is not None
+
+
+def require_heyoka(what: str) -> None:
+    """Refuses ``what`` in one line where heyoka is missing.
+
+    Raises:
+        Refused: it is not installed.
+    """
+    if not available():
+        raise Refused(f"{what} needs heyoka, which is not installed here: pip install 'proofroll[fast]' (Linux)")
+
+
+def with_heyoka(version: str) -> str:
+    """A version of something that may run on heyoka: stored answers, refusals too, end where heyoka comes or goes."""
+    return f"{version}, heyoka {metadata.version('heyoka')}" if available() else version

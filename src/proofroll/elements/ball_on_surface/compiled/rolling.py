@@ -1,0 +1,183 @@
+"""Rolling without slip of a ball on a cylinder or plane in five states, as symbolic expressions and compiled series.
+
+Surfaces are those along which gravity turns with the arc length q and which bend only that way: curvature k = 1/c on
+a cylinder, 0 on a plane. State: arc length q and height h [m], velocities v2, v3 of the centre [m/s], ω1 [rad/s]; all
+forces are divided by the mass. With κ = J/(m a²), A = (1 + κ)/κ and the drive
+
+    b = g_t + a ω1 e1 × ė1 + (f N / (κ a)) v/V
+
+the slip velocity u obeys u̇ = A F + b, whether the ball slips (F = -μk N u/|u|) or sticks (F = -b/A).
+
+The truth's Taylor route and the engine ``reduced`` both rest on these expressions: only routes that do not, check them.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from functools import lru_cache
+from typing import Any
+
+import numpy as np
+
+from proofroll.core.scene import RollingBall
+from proofroll.elements.ball_on_surface.surfaces import Cylinder, FloatArray, Plane
+
+# Order of the run-time parameters that every expression shares. A product of parameters is one itself, for a series
+# would form it anew in every step.
+PARAMETERS = ("k", "g_x", "g_y", "g_z", "k/a", "k a", "A", "1/A", "f/(kappa a)")
+STATES = ("q", "h", "v2", "v3", "w1")
+
+
+@dataclass(frozen=True)
+class Expressions:
+    """The equations in symbols.
+
+    Attributes:
+        state: q, h, v2, v3, ω1.
+        swing: k/a [1/m²].
+        A, per_A: (1 + κ)/κ [-] and its inverse.
+        g2, g3: gravity along the surface [m/s²].
+        b2, b3: drive [m/s²].
+        N: normal force over mass [m/s²].
+    """
+
+    state: tuple[Any, ...]
+    swing: Any
+    A: Any
+    per_A: Any
+    g2: Any
+    g3: Any
+    b2: Any
+    b3: Any
+    N: Any
+
+    def rates(self, F2: Any, F3: Any, u3: Any = 0.0) -> list[tuple[Any, Any]]:
+        """Equations under the friction F [m/s²], where the contact point slips along e3 with ``u3`` [m/s]."""
+        q, h, v2, v3, w1 = self.state
+        turning = self.swing * (v3 - u3) * v2
+        return [(q, v2), (h, v3), (v2, self.g2 + F2), (v3, self.g3 + F3), (w1, turning)]
+
+    def rolling(self) -> list[tuple[Any, Any]]:
+        """Equations of rolling without slip."""
+        return self.rates(-self.per_A * self.b2, -self.per_A * self.b3)
+
+    def excess(self, mu: Any) -> Any:
+        """Zero where the needed friction is ``mu`` times the normal force, positive where it is more."""
+        return self.b2**2 + self.b3**2 - (self.A * mu * self.N) ** 2
+
+    @staticmethod
+    def along(expression: Any, flow: Sequence[tuple[Any, Any]]) -> Any:
+        """Rate of an expression along a flow."""
+        import heyoka as hy
+
+        return hy.sum([hy.diff(expression, x) * rate for x, rate in flow])
+
+
+def expressions(resistance: bool, uniform: bool) -> Expressions:
+    """The equations in symbols.
+
+    Args:
+        resistance: with rolling resistance; without it the speed may pass through zero.
+        uniform: gravity's local components do not change along the surface.
+    """
+    import heyoka as hy
+
+    q, h, v2, v3, w1 = hy.make_vars(*STATES)
+    k, gx, gy, gz, swing, back, A, per_A, lever = (hy.par[i] for i in range(len(PARAMETERS)))
+    angle = k * q
+    g1, g2 = (gx, gy) if uniform else (gx * hy.cos(angle) + gy * hy.sin(angle), gy * hy.cos(angle) - gx * hy.sin(angle))
+    N = g1 + k * v2**2
+    per_speed = lever * N / hy.sqrt(v2**2 + v3**2) if resistance else hy.expression(0.0)
+    return Expressions(
+        state=(q, h, v2, v3, w1),
+        swing=swing,
+        A=A,
+        per_A=per_A,
+        g2=g2,
+        g3=gz,
+        b2=g2 + per_speed * v2,
+        b3=gz + back * w1 * v2 + per_speed * v3,
+        N=N,
+    )
+
+
+class Function:
+    """A compiled function of states, shape (k,) or (k, n), and as many of the parameters as it uses."""
+
+    def __init__(self, outputs: Sequence[Any], variables: Sequence[Any]) -> None:
+        import heyoka as hy
+
+        self._call = hy.cfunc(list(outputs), list(variables))
+        names = [str(par) for output in outputs for par in hy.get_params(output)]
+        self._count = 1 + max((int(name.strip("par[]")) for name in names), default=-1)
+
+    def __call__(self, states: FloatArray, pars: Sequence[float] | FloatArray) -> FloatArray:
+        """Values, shape (outputs,) or (outputs, n); ``pars`` may also differ from state to state, shape (p, n)."""
+        used = np.asarray(pars[: self._count], dtype=np.float64)
+        if states.ndim == 2 and used.ndim == 1:
+            used = np.repeat(used[:, None], states.shape[1], axis=1)
+        return np.asarray(self._call(np.ascontiguousarray(states), pars=np.ascontiguousarray(used)), dtype=np.float64)
+
+
+@dataclass(frozen=True)
+class Reduced:
+    """Rolling without slip, compiled.
+
+    Attributes:
+        integrator: of (q, h, v2, v3, ω1); copy it, for it holds a state.
+        evaluate: (q, h, v2, v3, ω1) -> their rates, and b2/A, b3/A, N [m/s²]: what friction must hold, and the press.
+    """
+
+    integrator: Any
+    evaluate: Function
+
+
+@lru_cache(maxsize=16)
+def reduced(resistance: bool, uniform: bool, tolerance: float) -> Reduced:
+    """The equations compiled for a tolerance of each step, relative to the state [-]; it also decides the order."""
+    import heyoka as hy
+
+    found = expressions(resistance, uniform)
+    system = found.rolling()
+    outputs = [*(rate for _, rate in system), found.per_A * found.b2, found.per_A * found.b3, found.N]
+    return Reduced(
+        integrator=hy.taylor_adaptive(system, [1.0] * len(system), tol=tolerance),
+        evaluate=Function(outputs, found.state),
+    )
+
+
+def supports(body: RollingBall) -> bool:
+    """Whether the expressions hold on the scene's surface."""
+    return isinstance(body.surface, (Cylinder, Plane))
+
+
+def is_uniform(body: RollingBall) -> bool:
+    """Whether gravity's local components do not change along the surface."""
+    return not isinstance(body.surface, Cylinder) or not np.any(local_gravity(body)[:2])
+
+
+def parameters(body: RollingBall) -> list[float]:
+    """Values of :data:`PARAMETERS`."""
+    surface, ball, f = body.surface, body.ball, body.contact.rolling_resistance
+    curvature = 1 / surface.radius if isinstance(surface, Cylinder) else 0.0
+    gravity = local_gravity(body).tolist()
+    return [float(value) for value in parameters_of(curvature, gravity, ball.radius, ball.inertia_ratio, f)]
+
+
+def parameters_of(curvature: Any, gravity: Sequence[Any], radius: Any, kappa: Any, f: Any) -> list[Any]:
+    """Values of :data:`PARAMETERS` from numbers or arrays: k [1/m], g along the axes [m/s²], a [m], κ [-], f [m]."""
+    A = (1 + kappa) / kappa
+    return [curvature, *gravity, curvature / radius, curvature * radius, A, 1 / A, f / (kappa * radius)]
+
+
+def start(body: RollingBall) -> FloatArray:
+    """(q, h, v2, v3, ω1) at time 0."""
+    frame = body.surface.frame(body.u0)
+    scales = np.array(body.surface.length_scales)
+    return np.concatenate([body.u0 * scales, frame[:, 1:].T @ body.v0, [body.w0 @ frame[:, 0]]])
+
+
+def local_gravity(body: RollingBall) -> FloatArray:
+    """Gravity along the local axes at the coordinates (0, 0) [m/s²], shape (3,)."""
+    return np.asarray(body.surface.frame(np.zeros(2)).T @ body.gravity)

@@ -1,0 +1,131 @@
+"""Lines, arrows and letters of a drawing: points in space go in, marks of an SVG picture come out."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterable, Sequence
+from dataclasses import dataclass, field
+from typing import Any
+
+import numpy as np
+import numpy.typing as npt
+
+from proofroll.elements.ball_on_surface.surfaces import FloatArray
+
+# Points along a whole circle: as smooth as a screen can show.
+_ROUND = 72
+_HEAD = 8.0  # length of an arrow's head [px]
+_LETTER = 8.0  # width of a letter [px]
+_MARGIN = 4.0  # around a drawing [px]
+
+
+@dataclass(frozen=True)
+class View:
+    """A parallel projection.
+
+    Attributes:
+        viewer: direction towards the viewer, any length, shape (3,).
+        up: direction that is upright in the picture, any length, shape (3,).
+        scale: pixels per metre.
+    """
+
+    viewer: npt.ArrayLike
+    up: npt.ArrayLike
+    scale: float
+
+    def __call__(self, point: npt.ArrayLike) -> FloatArray:
+        """Place of points in the picture [px], y downwards, the point zero at zero, shape (..., 2)."""
+        back = _unit(self.viewer)
+        right = _unit(np.cross(np.asarray(self.up, dtype=np.float64), back))
+        upright = np.cross(back, right)
+        p = np.asarray(point, dtype=np.float64)
+        return np.stack([self.scale * p @ right, -self.scale * p @ upright], axis=-1)
+
+    def towards(self, direction: npt.ArrayLike) -> FloatArray:
+        """How far a direction points to the viewer, shape (...)."""
+        return np.asarray(np.asarray(direction, dtype=np.float64) @ _unit(self.viewer))
+
+
+@dataclass
+class Drawing:
+    """Marks in the order in which they are drawn.
+
+    A mark is a line through ``points``, ``closed`` or not; a circle with ``centre`` and ``radius``; or a text with
+    ``x``, ``y`` and ``parts``, each with ``text`` and ``sub``, whether it is an index. ``look`` names how it looks:
+    ``line``, ``thin``, ``hidden``, ``axis``, ``wall``, ``ball``, ``ghost``, ``faint``, ``motion``, ``force``,
+    ``frame``, the same with ``-head`` for the filled heads of arrows, and ``letter``, ``motion-letter``, ….
+    """
+
+    marks: list[dict[str, Any]] = field(default_factory=list)
+    _bounds: list[FloatArray] = field(default_factory=list)
+
+    def content(self) -> dict[str, Any]:
+        """As plain data: ``box``, the x, y, width and height that hold everything [px], and ``marks``."""
+        places = np.concatenate(self._bounds)
+        low, high = np.floor(places.min(axis=0)) - _MARGIN, np.ceil(places.max(axis=0)) + _MARGIN
+        return {"box": [*low.tolist(), *(high - low).tolist()], "marks": self.marks}
+
+    def path(self, points: npt.ArrayLike, look: str, closed: bool = False) -> None:
+        """A line through places of the picture, shape (n, 2)."""
+        places = np.asarray(points, dtype=np.float64)
+        self._bounds.append(places)
+        self.marks.append({"points": np.round(places, 1).tolist(), "closed": closed, "look": look})
+
+    def disc(self, centre: Sequence[float], radius: float, look: str) -> None:
+        """A circle of the picture; a ball looks so from everywhere."""
+        (x, y), r = centre, radius
+        self._bounds.append(np.array([[x - r, y - r], [x + r, y + r]]))
+        self.marks.append({"centre": [round(x, 1), round(y, 1)], "radius": round(r, 1), "look": look})
+
+    def arrow(self, points: npt.ArrayLike, look: str) -> None:
+        """A line through places of the picture, straight or curved, with a head at its end; shape (n, 2)."""
+        places = np.asarray(points, dtype=np.float64)
+        self.path(places, look)
+        tip = places[-1]
+        along = _unit(tip - places[-2])
+        across = 0.36 * np.array([-along[1], along[0]])
+        self.path([tip, tip - _HEAD * (along + across), tip - _HEAD * (along - across)], f"{look}-head", closed=True)
+
+    def text(
+        self, place: npt.ArrayLike, symbol: str, look: str = "letter", beside: tuple[float, float] = (0.0, 0.0)
+    ) -> None:
+        """Letters around a place of the picture, or so many pixels ``beside`` it.
+
+        ``_`` begins an index of one character: ``V_0``, ``c = b − a``.
+        """
+        x, y = (np.asarray(place, dtype=np.float64) + beside).tolist()
+        parts: list[dict[str, Any]] = []
+        for number, piece in enumerate(symbol.split("_")):
+            if number:
+                parts.append({"text": piece[:1], "sub": True})
+            rest = piece[1:] if number else piece
+            if rest:
+                parts.append({"text": rest, "sub": False})
+        # Letters are about so wide and high; where they are a little more, the margin holds them.
+        width = _LETTER * sum(len(part["text"]) for part in parts)
+        left = x - width / 2
+        self._bounds.append(np.array([[left, y - 1.5 * _LETTER], [left + width, y + 0.5 * _LETTER]]))
+        place_of = {"x": round(x, 1), "y": round(y, 1)}
+        self.marks.append({**place_of, "parts": parts, "look": look})
+
+
+def beyond(ends: npt.ArrayLike, by: float = 11.0) -> FloatArray:
+    """The place past the tip of an arrow where its letter stands; ``ends`` of shape (2, 2)."""
+    a, b = np.asarray(ends, dtype=np.float64)
+    return np.asarray(b + by * _unit(b - a) + [0.0, 4.5])
+
+
+def turn(start: float, end: float) -> FloatArray:
+    """Angles from one to the other [rad], so close that a circle through them looks round."""
+    return np.linspace(start, end, max(2, round(_ROUND * abs(end - start) / (2 * math.pi)) + 1))
+
+
+def circle(centre: npt.ArrayLike, one: npt.ArrayLike, other: npt.ArrayLike, angles: Iterable[float]) -> FloatArray:
+    """Points of a circle in space at angles from its radius ``one`` to its radius ``other``, shape (n, 3)."""
+    phi = np.asarray(list(angles), dtype=np.float64)[:, None]
+    return np.asarray(np.asarray(centre) + np.cos(phi) * np.asarray(one) + np.sin(phi) * np.asarray(other))
+
+
+def _unit(vector: npt.ArrayLike) -> FloatArray:
+    v = np.asarray(vector, dtype=np.float64)
+    return np.asarray(v / (np.linalg.norm(v) or 1.0))

@@ -1,0 +1,113 @@
+"""Vector formulas of a ball rolling on a surface that hold in every regime and on every surface.
+
+Signs as in Blajer (2006), with the frame of :mod:`ball_on_surface.surfaces`: the contact point is at ``p_WB + a e1``.
+Array arguments may carry leading dimensions.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+import numpy.typing as npt
+
+from proofroll.core.scene import RollingBall
+from proofroll.elements.ball_on_surface.resting import setting_off, stands, stays
+from proofroll.elements.ball_on_surface.surfaces import FloatArray
+
+
+def slip_velocity(radius: float, e1: FloatArray, v_WB: FloatArray, w_WB: FloatArray) -> FloatArray:
+    """Velocity of the ball's contact point in the world [m/s], shape (..., 3): v + ω × a e1."""
+    return np.asarray(v_WB + radius * np.cross(w_WB, e1))
+
+
+def resistance_moment(f: float, N: npt.ArrayLike, e1: FloatArray, v_WB: FloatArray) -> FloatArray:
+    """Moment of the rolling resistance about the centre [N m], shape (..., 3).
+
+    The normal force -N e1 is shifted by ``f`` [m] along the direction of the centre's velocity (Blajer 2006,
+    section 2.4), which gives f (v/V) × (-N e1). At V = 0 the direction does not exist and the moment is zero.
+    """
+    speed = np.linalg.norm(v_WB, axis=-1, keepdims=True)
+    direction = np.divide(v_WB, speed, out=np.zeros_like(v_WB), where=speed > 0)
+    return np.asarray(-f * np.asarray(N)[..., None] * np.cross(direction, e1))
+
+
+def energy(body: RollingBall, p_WB: FloatArray, v_WB: FloatArray, w_WB: FloatArray) -> FloatArray:
+    """Kinetic plus potential energy [J], shape (...); the potential is zero at the world's origin."""
+    m, J = body.ball.mass, body.ball.inertia
+    kinetic = 0.5 * m * np.sum(v_WB**2, axis=-1) + 0.5 * J * np.sum(w_WB**2, axis=-1)
+    return np.asarray(kinetic - m * p_WB @ body.gravity)
+
+
+def natural_acceleration(body: RollingBall) -> float:
+    """What accelerations, and times the mass forces, are measured by at time 0: max(g, |p̈|) [m/s²], never zero.
+
+    The certificate's relative differences of acceleration, N, F2 and F3 refer to it.
+    """
+    acceleration = initial_response(body)[0]
+    return max(float(np.linalg.norm(body.gravity)), float(np.linalg.norm(acceleration))) or 1.0
+
+
+def initial_response(body: RollingBall) -> tuple[FloatArray, FloatArray]:
+    """Acceleration of the centre [m/s²] and force of the wall on the ball [N] at time 0, each shape (3,).
+
+    Newton-Euler with rolling without slip, solved for the nine unknowns p̈, ω̇, (N, F2, F3) together; the rows of
+    the last three equations are the constraints differentiated, using the signed distance and its derivatives.
+    Where that needs more friction than there is, the ball begins to slip against it: N is the same, for friction
+    along the wall does not change it. A ball at rest stays so where rolling resistance and friction can hold it.
+    """
+    if stands(body, body.v0) and stays(body, body.p0):
+        return np.zeros(3), -body.ball.mass * body.gravity
+    acceleration, _, force = newton_euler(body, body.p0, _way(body), body.w0)
+    e1 = body.surface.normal(body.p0)
+    normal = (force @ e1) * e1
+    friction, press = force - normal, float(np.linalg.norm(normal))
+    needed = float(np.linalg.norm(friction))
+    if needed <= body.contact.mu_static * press * (1 + 1e-12):
+        return acceleration, force
+    force = normal + friction * (body.contact.mu_kinetic * press / needed)
+    return force / body.ball.mass + body.gravity, force
+
+
+def initial_angular_acceleration(body: RollingBall) -> FloatArray:
+    """ω̇ at time 0 in the world [rad/s²], shape (3,): moments of the wall's force and of the resistance, over J."""
+    if stands(body, body.v0) and stays(body, body.p0):
+        return np.zeros(3)
+    _, force = initial_response(body)
+    e1 = body.surface.normal(body.p0)
+    moment = body.ball.radius * np.cross(e1, force)
+    moment += resistance_moment(body.contact.rolling_resistance, -force @ e1, e1, _way(body))
+    return np.asarray(moment / body.ball.inertia)
+
+
+def _way(body: RollingBall) -> FloatArray:
+    """Velocity at time 0 [m/s], or, of a ball at rest that does not stay, the one with which it sets off."""
+    return setting_off(body, body.p0) if stands(body, body.v0) else body.v0
+
+
+def newton_euler(
+    body: RollingBall, p_WB: FloatArray, v_WB: FloatArray, w_WB: FloatArray
+) -> tuple[FloatArray, FloatArray, FloatArray]:
+    """p̈ [m/s²], ω̇ [rad/s²] and the wall's force on the ball [N] while rolling without slip, each shape (3,).
+
+    Unreduced: six equations of motion and three acceleration constraints, in the world frame, with no
+    parametrisation of the surface.
+    """
+    a, m, J, f = body.ball.radius, body.ball.mass, body.ball.inertia, body.contact.rolling_resistance
+    e1 = body.surface.normal(p_WB)
+    e1_rate = body.surface.normal_gradient(p_WB) @ v_WB
+    # Unknowns: p̈, ω̇ and the force R of the wall in world components, so the rolling constraint has three rows:
+    #   p̈ + a ω̇ × e1 = -a ω × ė1 along the tangents,  e1 · p̈ = -ė1 · v along the normal.
+    # v + a ω × e1 = 0 holds along the tangents only by rolling, along e1 by the wall: both are one vector equation,
+    # since (ω × e1) · e1 = 0. Its derivative is the last block.
+    cross_e1 = np.array([[0, -e1[2], e1[1]], [e1[2], 0, -e1[0]], [-e1[1], e1[0], 0]])  # [e1]× y = e1 × y
+    # -N = R · e1, and the resistance is linear in N: M = f (v/V) × (R·e1) e1.
+    resistance = np.outer(resistance_moment(f, -1.0, e1, v_WB), e1) if f else np.zeros((3, 3))
+    matrix = np.zeros((9, 9))
+    matrix[:3, :3] = m * np.eye(3)
+    matrix[:3, 6:] = -np.eye(3)
+    matrix[3:6, 3:6] = J * np.eye(3)
+    matrix[3:6, 6:] = -a * cross_e1 - resistance
+    matrix[6:, :3] = np.eye(3)
+    matrix[6:, 3:6] = -a * cross_e1
+    right = np.concatenate([m * body.gravity, np.zeros(3), -a * np.cross(w_WB, e1_rate)])
+    solution = np.linalg.solve(matrix, right)
+    return solution[:3], solution[3:6], solution[6:]

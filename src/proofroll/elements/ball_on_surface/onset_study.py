@@ -1,0 +1,180 @@
+"""When the first slip comes: in the truth with its conditioning, and in every engine with its bracket."""
+
+from __future__ import annotations
+
+import dataclasses
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, Any
+
+from proofroll.core.errors import InputError, ProofrollError
+from proofroll.core.events import Event, events_of
+from proofroll.core.plugins import engine_names, parse_engine
+from proofroll.core.scene import Capability, Scene
+from proofroll.elements.ball_on_surface.trajectory import read
+from proofroll.files.scene_file import load_scene
+from proofroll.running.case import Case, EngineFacts, Result, Status
+from proofroll.running.runner import Runner, WorkerDied, describe, resolve
+from proofroll.running.worker_pool import Workers
+
+if TYPE_CHECKING:
+    from proofroll.truth.onset import Onset
+
+_EVERY = 0.01  # interval between samples [s]; engines that locate events do better than this
+
+
+@dataclass(frozen=True)
+class EngineOnset:
+    """The first slip in one engine.
+
+    Attributes:
+        engine: the engine with the settings that were asked for.
+        facts: complete settings, or None if it could not be asked.
+        result: how the run ended.
+        first: the first slip with its bracket, or None.
+        verdict: ``agree``, ``disagree``, ``ill-posed``, ``refused`` or ``failed``.
+    """
+
+    engine: str
+    facts: EngineFacts | None
+    result: Result
+    first: Event | None
+    verdict: str
+
+
+@dataclass(frozen=True)
+class OnsetStudy:
+    """The truth's onset with its conditioning, and every engine's."""
+
+    scene: Scene
+    until: float
+    truth: Onset
+    engines: list[EngineOnset]
+
+    def content(self) -> dict[str, Any]:
+        """As plain data."""
+        return {
+            "scene": self.scene.name,
+            "parameters": dict(self.scene.parameters),
+            "until": self.until,
+            "truth": dataclasses.asdict(self.truth),
+            "engines": [
+                {
+                    "engine": item.engine,
+                    "name": parse_engine(item.engine).name,
+                    "settings": item.facts.settings if item.facts else {},
+                    "status": item.result.status,
+                    "message": item.result.message,
+                    "onset": None if item.first is None else dataclasses.asdict(item.first),
+                    "difference": self._difference(item),
+                    "verdict": item.verdict,
+                }
+                for item in self.engines
+            ],
+        }
+
+    def _difference(self, item: EngineOnset) -> float | None:
+        return None if item.first is None or self.truth.time is None else item.first.time - self.truth.time
+
+
+def default_engines(workers: Workers | None = None) -> list[str]:
+    """Every formulation of every installed engine that provides bounded friction, with its matched settings."""
+    found: list[str] = []
+    for name in engine_names():
+        try:
+            described = describe(name, workers)
+        except ProofrollError:
+            found.append(name)  # the row says why it cannot run
+            continue
+        if Capability.BOUNDED_FRICTION in described["provides"]:
+            found += [f"{name}[formulation={formulation}]" for formulation in described["presets"]]
+    return found
+
+
+def onset_study(
+    scene: str,
+    parameters: dict[str, Any],
+    runner: Runner,
+    *,
+    engines: Sequence[str] = (),
+    until: float = 4.0,
+    uncertainty: float = 1e-3,
+    progress: Callable[[Case, Result], None] | None = None,
+) -> OnsetStudy:
+    """Runs the truth and the engines until ``until`` [s] and compares their first slips.
+
+    Args:
+        scene: name of the scene.
+        parameters: its parameters; friction must be bounded.
+        runner: where the cases are run.
+        engines: engines with settings; all that can slip if empty.
+        until: how long to look [s].
+        uncertainty: relative uncertainty of μ and f for which the verdicts hold [-].
+        progress: called with each case that is finished.
+
+    Raises:
+        InputError: friction is unbounded, or something that does not exist.
+    """
+    from proofroll.truth.onset import onset
+
+    loaded = load_scene(scene, **parameters)
+    if Capability.BOUNDED_FRICTION not in loaded.requires:
+        raise InputError("mu_static", "inf", "without bounded friction the ball never slips; give --set mu_static=…")
+    truth = onset(loaded, until, uncertainty)
+    names = list(engines) or default_engines(runner.workers)
+    specs = [parse_engine(name) for name in names]
+    facts = resolve([(spec.name, spec.options) for spec in specs], runner.workers)
+    for found in facts:
+        if isinstance(found, InputError):
+            raise found
+    given = {name: loaded.parameters[name] for name in parameters}
+    cases = [
+        Case(scene, given, loaded.digest, found, until, _EVERY) if isinstance(found, EngineFacts) else None
+        for found in facts
+    ]
+    results = runner.run([case for case in cases if case is not None], progress)
+    rows = []
+    for name, found, case in zip(names, facts, cases, strict=True):
+        if case is None or not isinstance(found, EngineFacts):
+            status = found.status if isinstance(found, WorkerDied) else Status.MISSING
+            rows.append(EngineOnset(name, None, Result(status, str(found)), None, "failed"))
+            continue
+        result = results[case.key]
+        first = None
+        if result.trajectory is not None:
+            events = events_of(read(runner.store.trajectory(case)))
+            first = next((event for event in events if event.kind == "slip"), None)
+        rows.append(EngineOnset(name, found, result, first, onset_verdict(truth, result, first)))
+    return OnsetStudy(loaded, until, truth, rows)
+
+
+def onset_verdict(truth: Onset, result: Result, first: Event | None) -> str:
+    """Agreement: the engine's bracket meets the times that the uncertainty of μ and f leaves to the truth."""
+    if result.status == Status.REFUSED:
+        return "refused"
+    if result.status != Status.DONE:
+        return "failed"
+    if truth.verdict == "ill-posed":
+        return "ill-posed"
+    if truth.time is None or first is None:
+        return "agree" if truth.time is None and first is None else "disagree"
+    times = [time for time in (truth.time, truth.earliest, truth.latest) if time is not None]
+    return "agree" if first.time_low <= max(times) and first.time_high >= min(times) else "disagree"
+
+
+def summary(content: dict[str, Any]) -> str:
+    """The conditioning of the truth in one paragraph."""
+    truth = content["truth"]
+    if truth["time"] is None:
+        return f"In the truth the ball does not slip within {content['until']:g} s."
+    said = f"In the truth the ball first slips at {truth['time']:.9g} s; "
+    said += f"d ln t / d ln mu = {_number(truth['by_mu'])}, d ln t / d ln f = {_number(truth['by_f'])}. "
+    edges = [f"{truth[key]:.6g}" for key in ("edge_below", "edge_above") if truth[key] is not None]
+    if edges:
+        said += f"The time jumps at mu = {' and '.join(edges)}, the nearest {100 * truth['distance']:.3g} % away; "
+    said += f"for mu and f known to {100 * truth['uncertainty']:g} % the question is {truth['verdict']}."
+    return said
+
+
+def _number(value: float | None) -> str:
+    return "none" if value is None else f"{value:.4g}"

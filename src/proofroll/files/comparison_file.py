@@ -1,0 +1,200 @@
+"""Reads ``comparisons/*.toml``: what is claimed about engines on a scene, with a reason for every tolerance."""
+
+from __future__ import annotations
+
+import itertools
+import math
+from collections.abc import Mapping
+from pathlib import Path
+from typing import Any
+
+from pydantic import ConfigDict, TypeAdapter, ValidationError
+
+from proofroll.core.comparison import Band, Comparison, ExceptAt, Row, Tolerance
+from proofroll.core.errors import InputError
+from proofroll.core.verdict import Verdict
+from proofroll.elements.ball_on_surface.observables import WITHOUT_SCALE, units
+from proofroll.files.data_folders import data_folder
+from proofroll.files.scene_file import first_problem, load_scene
+from proofroll.files.toml import read_toml, study_of
+from proofroll.running.recording import time_grid
+
+_LADDER_RUNGS = 3
+
+
+def comparison_names() -> list[str]:
+    """Names of all comparisons in the order of a report; files of other studies say which with ``study = "…"``."""
+    paths = [path for path in data_folder("comparisons").glob("*.toml") if study_of(path) is None]
+    return [path.stem for path in sorted(paths, key=lambda path: (_order(path), path.stem))]
+
+
+def _order(path: Path) -> float:
+    """The place that a file asks for; of a broken one its reader is told."""
+    try:
+        order = read_toml(path).get("order", math.inf)
+    except InputError:
+        return math.inf
+    return order if isinstance(order, (int, float)) else math.inf
+
+
+def load_comparison(name: str) -> Comparison:
+    """Reads a comparison.
+
+    Args:
+        name: path of a file, or name of one under ``comparisons/``, with or without ``.toml``.
+
+    Raises:
+        InputError: no such file, or it is broken.
+    """
+    path = next(
+        (p for p in (Path(name), data_folder("comparisons") / f"{name}.toml", data_folder("comparisons") / name)
+         if p.is_file()),
+        None,
+    )  # fmt: skip
+    if path is None:
+        raise InputError(
+            "comparison", name, f"there is no such comparison; choose one of {', '.join(comparison_names())} or a file"
+        )
+    content = read_toml(path)
+    if "study" in content:
+        advice = f"this file is for another command: proofroll {content['study']} {content.get('scene', '')}".strip()
+        raise InputError(str(path), f"study = {content['study']!r}", advice)
+    return _comparison(path, content)
+
+
+def _comparison(path: Path, content: dict[str, Any]) -> Comparison:
+    where = path.name
+    tolerances = _table(f"{where}: tolerances", content.pop("tolerances", {}))
+    bands = {name: _band(f"{where}: tolerances.{name}", table) for name, table in tolerances.items()}
+    given = content.pop("rows", None)
+    if not isinstance(given, list) or not given:
+        raise InputError(f"{where}: rows", given, "give at least one engine; write [[rows]] before each")
+    rows = [_prepared(f"{where}: rows.{index}", row) for index, row in enumerate(given)]
+    try:
+        comparison = TypeAdapter(Comparison).validate_python(
+            {**content, "name": path.stem, "bands": bands, "rows": rows}
+        )
+    except ValidationError as error:
+        raise first_problem(error, where) from None
+    for name, band in comparison.bands.items():
+        _check_bounds(f"{where}: tolerances.{name}", comparison, band.bounds)
+    for index, row in enumerate(comparison.rows):
+        _check(f"{where}: rows.{index}", row, comparison)
+    _check_times(where, comparison)
+    return comparison
+
+
+def _check_times(where: str, comparison: Comparison) -> None:
+    time_grid(comparison.until, comparison.every)
+    lengths = {"time_limit": comparison.time_limit}
+    if comparison.regimes is not None:
+        lengths["regimes.until"] = comparison.regimes.until
+        if not comparison.regimes.rolling_resistance:
+            raise InputError(f"{where}: regimes.rolling_resistance", [], "give at least one value in m")
+    for name, value in lengths.items():
+        if not (math.isfinite(value) and value > 0):
+            raise InputError(f"{where}: {name}", value, "give a positive, finite time in s")
+
+
+def _table(where: str, value: object) -> dict[str, Any]:
+    if not isinstance(value, dict):
+        raise InputError(where, value, "this must be a table of names and values")
+    return dict(value)
+
+
+def _band(where: str, content: object) -> Band:
+    table = _table(where, content)
+    because = table.pop("because", "")
+    if not because:
+        raise InputError(f"{where}.because", "nothing", "every tolerance needs its reason; add it")
+    return Band(because, {name: Tolerance.parse(f"{where}.{name}", text) for name, text in table.items()})
+
+
+def _prepared(where: str, content: object) -> dict[str, Any]:
+    """The row's table in the form that the typed check wants."""
+    row = _table(where, content)
+    for key in ("limit", "bound"):
+        if key in row:
+            bounds = _table(f"{where}.{key}", row[key])
+            row[key] = {name: Tolerance.parse(f"{where}.{key}.{name}", text) for name, text in bounds.items()}
+    if isinstance(row.get("expect"), str):
+        row["expect"] = [row["expect"]]
+    exceptions = row.get("except_at", [])
+    for exception in exceptions if isinstance(exceptions, list) else []:
+        if isinstance(exception, dict) and isinstance(exception.get("expect"), str):
+            exception["expect"] = [exception["expect"]]
+    if "expect_for" in row:
+        expected = _table(f"{where}.expect_for", row["expect_for"])
+        row["expect_for"] = {k: [v] if isinstance(v, str) else v for k, v in expected.items()}
+    return row
+
+
+def _check(where: str, row: Row, comparison: Comparison) -> None:
+    """What types cannot say."""
+    if row.tolerance not in comparison.bands:
+        raise InputError(f"{where}.tolerance", row.tolerance, f"choose one of {', '.join(comparison.bands)}")
+    if row.ladder != [1.0]:
+        _check_ladder(where, row.ladder)
+    _check_expectations(where, row)
+    _check_bounds(where, comparison, dict.fromkeys([*row.expect_for, *row.order]))
+    _check_bounds(where, comparison, row.limit)
+    _check_bounds(where, comparison, row.bound)
+    _check_points(f"{where}.only", comparison, row.only)
+    for exception in row.except_at:
+        _check_points(f"{where}.except_at", comparison, exception.where)
+        if not exception.where or not comparison.combinations(exception.where):
+            raise InputError(f"{where}.except_at", exception.where, "name values that some point of the comparison has")
+    if not comparison.combinations(row.only):
+        raise InputError(f"{where}.only", row.only, "no point of the comparison fits, so the row would never be run")
+
+
+def _check_expectations(where: str, row: Row) -> None:
+    claims = [row.expect, *row.expect_for.values(), *(exception.expect for exception in row.except_at)]
+    for claim in claims:
+        if {Verdict.AGREES, Verdict.DIFFERS} <= set(claim):
+            advice = "that holds for any engine; say with except_at where it agrees and where it differs"
+            raise InputError(f"{where}.expect", " or ".join(claim), advice)
+    if {*itertools.chain.from_iterable(claims)} - {Verdict.AGREES} and not row.because:
+        raise InputError(f"{where}.because", "nothing", "an expectation other than agreement needs its reason; add it")
+
+
+def _check_points(where: str, comparison: Comparison, chosen: Mapping[str, list[float]]) -> None:
+    """Every value that is chosen is one that the comparison has."""
+    given: dict[str, list[float]] = {}
+    for point in comparison.combinations():
+        for key, value in point.items():
+            if isinstance(value, float):
+                given.setdefault(key, []).append(value)
+    for key, values in chosen.items():
+        if key not in given:
+            raise InputError(f"{where}.{key}", values, f"the comparison varies {', '.join(given)}")
+        for value in values:
+            if value not in given[key]:
+                known = ", ".join(f"{item:g}" for item in dict.fromkeys(given[key]))
+                raise InputError(f"{where}.{key}", value, f"the comparison has only {known}")
+
+
+def _check_ladder(where: str, ladder: list[float]) -> None:
+    falling = all(0 < finer < coarser < math.inf for coarser, finer in itertools.pairwise(ladder))
+    if len(ladder) != _LADDER_RUNGS or not falling or 1.0 not in ladder:
+        raise InputError(f"{where}.ladder", ladder, "give three positive factors, largest first, one of them 1; or [1]")
+    if not math.isclose(ladder[0] / ladder[1], ladder[1] / ladder[2]):
+        raise InputError(f"{where}.ladder", ladder, "neighbouring factors must have the same ratio")
+
+
+def _check_bounds(where: str, comparison: Comparison, bounds: Mapping[str, Tolerance | None]) -> None:
+    """Every name is an observable of the scene, and every tolerance is in its unit."""
+    known = units(load_scene(comparison.scene).rolling)
+    for name, bound in bounds.items():
+        if name not in known:
+            raise InputError(
+                f"{where}: observable", name, f"there is no such observable; choose from {', '.join(known)}"
+            )
+        if bound is not None and bound.relative and name in WITHOUT_SCALE:
+            raise InputError(f"{where}: {name}", "%", f"it has no size of its own; give a number in {known[name]}")
+        if bound is not None and not bound.relative and bound.unit != known[name]:
+            raise InputError(f"{where}: {name}", bound.unit, f"its unit is {known[name]}")
+
+
+for _typed in (Comparison, Row, ExceptAt):
+    setattr(_typed, "__pydantic_config__", ConfigDict(extra="forbid"))  # noqa: B010 -- the name is pydantic's, not the class's

@@ -1,0 +1,148 @@
+"""The content of a report as plain data; the HTML page and the terminal show nothing that is not in it."""
+
+from __future__ import annotations
+
+import dataclasses
+import platform
+from typing import Any
+
+import proofroll
+from proofroll.core.plugins import parse_engine
+from proofroll.core.verdict import Judgement, Verdict
+from proofroll.files.json_data import plain
+from proofroll.running.case import Status
+from proofroll.running.timing import machine
+from proofroll.studies.compare import Outcome, Run
+from proofroll.studies.planning import point_name
+
+
+def outcome_content(outcome: Outcome) -> dict[str, Any]:
+    """A comparison's findings.
+
+    ``rows`` holds a summary for each engine with settings over all points of the parameters; ``runs`` everything
+    about each single run.
+    """
+    comparison = outcome.comparison
+    numbers = {key: number for number, key in enumerate(by_row(outcome))}
+    content = {
+        "name": comparison.name,
+        "title": comparison.title,
+        "question": comparison.question,
+        "scene": comparison.scene,
+        "until": comparison.until,
+        "every": comparison.every,
+        "vary": comparison.vary,
+        "points": comparison.points,
+        "as_expected": not outcome.contradictions,
+        "contradictions": outcome.contradictions,
+        "tolerances": {
+            name: {
+                "because": band.because,
+                "bounds": {key: _tolerance(bound.value, bound.relative) for key, bound in band.bounds.items()},
+            }
+            for name, band in comparison.bands.items()
+        },
+        "rows": [_row(runs) for runs in by_row(outcome).values()],
+        "runs": [{"row": numbers[id(run.row)], **_run(run)} for run in outcome.runs],
+    }
+    return dict(plain(content))
+
+
+def by_row(outcome: Outcome) -> dict[int, list[Run]]:
+    """The runs of each row of the comparison file, in the file's order."""
+    rows: dict[int, list[Run]] = {}
+    for run in outcome.runs:
+        rows.setdefault(id(run.row), []).append(run)
+    return rows
+
+
+def environment(command: str, versions: dict[str, str]) -> dict[str, Any]:
+    """Where and with what the report was made."""
+    facts = machine()
+    return {
+        "command": command,
+        "machine": f"{facts['system']}, {facts['processor']}",
+        "versions": {"proofroll": proofroll.__version__, "python": platform.python_version(), **versions},
+    }
+
+
+def _tolerance(value: float, relative: bool) -> str:
+    return f"{100 * value:g} % of its scale" if relative else f"{value:g}"
+
+
+def _row(runs: list[Run]) -> dict[str, Any]:
+    """Summary over the points of the parameters: the worst of everything."""
+    first = runs[0]
+    # A point at which the question is ill-posed says nothing about an engine.
+    judged = [run for run in runs if run.verdict != Verdict.ILL_POSED] or runs
+    names = list(dict.fromkeys(judgement.observable for run in judged for judgement in run.judgements))
+    timings = [run.result.seconds_per_second for run in runs if run.result.seconds_per_second is not None]
+    order = list(Verdict)
+    return {
+        "engine": first.row.engine,
+        **_settings(first),
+        "verdict": max((run.verdict for run in judged), key=order.index),
+        "verdicts": {verdict.value: sum(run.verdict == verdict for run in runs) for verdict in Verdict},
+        "expected": first.row.expect,
+        "expected_for": first.row.expect_for,
+        "because": first.row.because,
+        "tolerance": first.row.tolerance,
+        "as_expected": not any(run.contradictions for run in runs),
+        "observables": {name: _worst(judged, name) for name in names},
+        "seconds_per_second": max(timings, default=None),
+        "message": next((run.result.message for run in runs if run.result.status != Status.DONE), ""),
+    }
+
+
+def _judgement_of(run: Run, name: str) -> Judgement | None:
+    return next((judgement for judgement in run.judgements if judgement.observable == name), None)
+
+
+def _worst(runs: list[Run], name: str) -> dict[str, Any]:
+    """The judgement with the worst verdict, among equals the one furthest beyond its tolerance, and its point."""
+    order = list(Verdict)
+    judged = [(run, judgement) for run in runs if (judgement := _judgement_of(run, name)) is not None]
+    where, worst = max(judged, key=lambda pair: (order.index(pair[1].verdict), pair[1].error / pair[1].tolerance))
+    return {**dataclasses.asdict(worst), "point": point_name(where.parameters)}
+
+
+def _setting(run: Run, preset: str | None, resolution: str | None) -> str:
+    """The preset, and whatever else the comparison file chose besides the step: ``cone=pyramidal``."""
+    usual = {"formulation", "preset", resolution}
+    chosen = [f"{key}={value}" for key, value in parse_engine(run.row.engine).options.items() if key not in usual]
+    shown = [] if preset is None or (chosen and preset == "matched") else [preset]
+    return " ".join([*shown, *chosen])
+
+
+def _settings(run: Run) -> dict[str, Any]:
+    settings = run.facts.settings if run.facts else {}
+    resolution = run.facts.resolution if run.facts else None
+    return {
+        "name": run.facts.name if run.facts else run.row.engine.partition("[")[0],
+        "formulation": settings.get("formulation"),
+        "preset": settings.get("preset"),
+        "setting": _setting(run, settings.get("preset"), resolution),
+        "resolution": resolution,
+        "resolution_value": settings.get(resolution) if resolution else None,
+        "declared_order": run.facts.order if run.facts else None,
+    }
+
+
+def _run(run: Run) -> dict[str, Any]:
+    return {
+        "engine": run.row.engine,
+        **_settings(run),
+        "settings": run.facts.settings if run.facts else {},
+        "point": point_name(run.parameters),
+        "parameters": run.parameters,
+        "status": run.result.status,
+        "message": run.result.message,
+        "verdict": run.verdict,
+        "contradictions": run.contradictions,
+        "judgements": [dataclasses.asdict(judgement) for judgement in run.judgements],
+        "certificate": run.result.certificate,
+        "seconds_per_second": run.result.seconds_per_second,
+        "timings": run.result.timings,
+        "versions": run.result.versions,
+        "trajectory": run.result.trajectory,
+    }

@@ -1,0 +1,165 @@
+"""A report while it grows: written after the comparisons, and again after each further study."""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Sequence
+from dataclasses import dataclass, field
+from functools import partial
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+from proofroll.core.errors import ProofrollError
+from proofroll.files.json_data import plain
+from proofroll.report.html import page
+from proofroll.report.plots import point_curves
+from proofroll.report.regime_map import inline
+from proofroll.report.replay import described, replay_content
+from proofroll.report.report_content import report_content
+from proofroll.report.study_parts import KEYS, Part, absent, attempt, entry
+from proofroll.report.summary import three_sentences
+from proofroll.running.store import Store, write_text
+
+if TYPE_CHECKING:
+    from collections.abc import Callable
+
+    import xarray as xr
+
+    from proofroll.studies.compare import Outcome
+
+
+@dataclass
+class Report:
+    """What the files are written from.
+
+    Attributes:
+        content: plain data, as :func:`proofroll.report.report_content.report_content` has it.
+        curves: of each comparison, for the figures.
+        pictures: markup by name.
+        replay: of the comparisons, from :func:`proofroll.report.replay.replay_content`.
+        parts: the further studies, in the order of the content's lists.
+    """
+
+    content: dict[str, Any]
+    curves: list[list[dict[str, Any]]]
+    pictures: dict[str, str]
+    replay: dict[str, Any]
+    parts: list[Part] = field(default_factory=list)
+
+    def expect(self, parts: Sequence[Part], out: Path, *, fresh: bool = False) -> list[Part]:
+        """Lists further studies with what is kept of them.
+
+        Args:
+            parts: the studies.
+            out: folder of all results.
+            fresh: nothing that is kept counts.
+
+        Returns:
+            those that have to be made.
+        """
+        self.parts = sorted(parts, key=lambda part: KEYS.index(part.key))
+        missing = []
+        for part in self.parts:
+            said = attempt(part, partial(_kept, part, out)) if not fresh else None
+            if said is None:
+                missing.append(part)
+                said = absent(part, "It has not been made yet")
+            self._put(part, said)
+        return missing
+
+    def make(self, part: Part, how: Callable[[], None]) -> dict[str, Any]:
+        """Makes a further study; whatever happens to it, its entry says."""
+
+        def made() -> dict[str, Any]:
+            how()
+            return entry(part)
+
+        said = attempt(part, made)
+        assert said is not None  # it was made, or the entry says why not
+        self._put(part, said)
+        return said
+
+    def write(self, out: Path) -> None:
+        """Writes ``report.html`` and ``report.json``.
+
+        Raises:
+            ProofrollError: the folder cannot be written.
+        """
+        write_text(out / "report.json", json.dumps(self.content, indent=1, allow_nan=False) + "\n")
+        write_text(out / "report.html", page(self.content, self.curves, self.pictures, self.replay))
+
+    def _put(self, part: Part, said: dict[str, Any]) -> None:
+        """Gives a part its place in the content, and its pictures theirs."""
+        alike = [other for other in self.parts if other.key == part.key]
+        entries, index = self.content[part.key], next(i for i, other in enumerate(alike) if other is part)
+        entries[index : index + 1] = [plain(said)]
+        self.content["findings"] = {"sentences": three_sentences(self.content)}
+        self.content["environment"]["versions"] |= _versions(said["study"])
+        if said["study"] is not None:
+            prefix = f"{part.key}{index}-"
+            self.pictures |= _drawn(prefix, lambda: part.pictures(prefix))
+
+
+def begun(outcomes: list[Outcome], store: Store, command: str, maps: Sequence[Sequence[xr.Dataset]] = ()) -> Report:
+    """A report of comparisons, to which further studies can be added.
+
+    Args:
+        outcomes: what was compared.
+        store: where the trajectories are: a folder in that of the report.
+        command: that makes the report again.
+        maps: the regime maps of each comparison, empty where it has none.
+    """
+    pictures: dict[str, str] = {}
+    for index, found in enumerate(maps):
+        if found:
+            prefix = f"map{index}"
+            pictures |= _drawn(prefix, partial(_map, found, prefix))
+    replay = replay_content(outcomes, store)
+    content = report_content(outcomes, store, command, maps) | {"replay": described(replay)}
+    return Report(content, [point_curves(outcome, store) for outcome in outcomes], pictures, replay)
+
+
+def write_report(
+    outcomes: list[Outcome], store: Store, out: Path, command: str, maps: Sequence[Sequence[xr.Dataset]] = ()
+) -> dict[str, Any]:
+    """Writes ``report.html`` and ``report.json`` of comparisons alone.
+
+    Args:
+        outcomes: what was compared.
+        store: where the trajectories are: a folder in that of the report.
+        out: folder of the report.
+        command: that makes the report again.
+        maps: the regime maps of each comparison, empty where it has none.
+
+    Returns:
+        the content of both files as plain data, as :func:`report_content` has it.
+
+    Raises:
+        ProofrollError: the folder cannot be written.
+    """
+    report = begun(outcomes, store, command, maps)
+    report.write(out)
+    return report.content
+
+
+def _kept(part: Part, out: Path) -> dict[str, Any] | None:
+    return entry(part) if part.keeps(out) else None
+
+
+def _map(maps: Sequence[xr.Dataset], prefix: str) -> dict[str, str]:
+    return {"": inline(maps, f"{prefix}-")}
+
+
+def _drawn(prefix: str, draw: Callable[[], dict[str, str]]) -> dict[str, str]:
+    """Pictures by prefix and name; where they cannot be drawn, under ``problem`` a sentence that says why."""
+    try:
+        return {f"{prefix}{name}": markup for name, markup in draw().items()}
+    except ProofrollError as error:
+        return {f"{prefix}problem": str(error)}
+
+
+def _versions(study: Any) -> dict[str, str]:
+    """The versions that a study knows of; of a kept one they are those of now."""
+    if not study:
+        return {}
+    return dict(study.get("versions", {}))

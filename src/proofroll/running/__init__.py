@@ -1,0 +1,1 @@
+"""Runs cases: worker processes, the store, recording and timing."""

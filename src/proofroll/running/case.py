@@ -1,0 +1,121 @@
+"""One case: a scene with numbers, in an engine with settings, over a time grid; and what came of it."""
+
+from __future__ import annotations
+
+import hashlib
+import json
+from dataclasses import asdict, dataclass, field
+from enum import StrEnum
+from typing import Any
+
+
+class Status(StrEnum):
+    """How a case ended."""
+
+    DONE = "done"
+    DIVERGED = "diverged"
+    REFUSED = "refused"
+    MISSING = "missing"
+    CRASHED = "crashed"
+    TIMEOUT = "timeout"
+
+
+# A crash, a hang or a missing engine may be gone next time; these three are the engine's answer and stay.
+LASTING = frozenset({Status.DONE, Status.DIVERGED, Status.REFUSED})
+
+
+@dataclass(frozen=True)
+class EngineFacts:
+    """What an engine says of itself with some settings.
+
+    Attributes:
+        name: of the engine.
+        version: of the engine.
+        code: hash of the adapter and of everything that it runs on, so that stored results never outlive a change.
+        settings: complete settings, by name.
+        resolution: name of the setting that trades speed for accuracy, ``dt`` or ``rtol``.
+        order: declared order of convergence, or None.
+    """
+
+    name: str
+    version: str
+    code: str
+    settings: dict[str, Any]
+    resolution: str | None = None
+    order: int | None = None
+
+
+@dataclass(frozen=True)
+class Case:
+    """What one run needs to know.
+
+    Attributes:
+        scene: name of the scene.
+        parameters: values of its parameters that differ from the defaults.
+        scene_digest: hash of the scene with these parameters.
+        engine: the engine with complete settings.
+        until, every: last time and sampling interval [s].
+        timed: whether a second, clean run that only advances is timed.
+        time_limit: wall seconds after which the case is ended [s].
+        asks: what is wanted besides the motion; see :class:`proofroll.core.scene.Scene`.
+    """
+
+    scene: str
+    parameters: dict[str, float]
+    scene_digest: str
+    engine: EngineFacts
+    until: float
+    every: float
+    timed: bool = False
+    time_limit: float = 120.0
+    asks: tuple[str, ...] = ()
+
+    @property
+    def key(self) -> str:
+        """Hash of all that decides the result."""
+        left_out = {"time_limit"} | (set() if self.asks else {"asks"})
+        content = {name: value for name, value in asdict(self).items() if name not in left_out}
+        return hashlib.sha256(json.dumps(content, sort_keys=True).encode()).hexdigest()[:24]
+
+    @classmethod
+    def from_dict(cls, content: dict[str, Any]) -> Case:
+        """The case again from ``asdict``."""
+        asks = tuple(content.get("asks", ()))
+        return cls(**{**content, "engine": EngineFacts(**content["engine"]), "asks": asks})
+
+
+@dataclass(frozen=True)
+class Result:
+    """What came of a case.
+
+    Attributes:
+        status: how it ended.
+        message: one sentence about it.
+        wall_seconds: inside ``advance`` during the sampled run [s].
+        seconds_per_second: median wall seconds per simulated second of clean runs that only advance, or None.
+        timings: of the single clean runs, wall seconds per simulated second.
+        certificate: lines of the certificate, as dictionaries.
+        versions: of the engine, of proofroll and of Python.
+        trajectory: file of the trajectory in the store, or None if there is none.
+        checksum: sha256 of that file.
+        spent: where the wall time of the case went, by cause [s]; ``advance`` and ``clean runs`` are the engine's.
+            Empty in records from before it was measured.
+        processor: the same in seconds of the worker's processor, which others on the machine do not lengthen [s].
+    """
+
+    status: Status
+    message: str
+    wall_seconds: float = 0.0
+    seconds_per_second: float | None = None
+    timings: list[float] = field(default_factory=list)
+    certificate: list[dict[str, Any]] = field(default_factory=list)
+    versions: dict[str, str] = field(default_factory=dict)
+    trajectory: str | None = None
+    checksum: str | None = None
+    spent: dict[str, float] = field(default_factory=dict)
+    processor: dict[str, float] = field(default_factory=dict)
+
+    @classmethod
+    def from_dict(cls, content: dict[str, Any]) -> Result:
+        """The result again from ``asdict``."""
+        return cls(**{**content, "status": Status(content["status"])})

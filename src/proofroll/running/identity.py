@@ -1,0 +1,92 @@
+"""What an engine is, and what decides its results: its settings, its versions and the code that they rest on."""
+
+from __future__ import annotations
+
+import contextlib
+import dataclasses
+import hashlib
+import inspect
+from importlib import metadata
+from pathlib import Path
+from typing import Any
+
+import proofroll
+from proofroll.core.errors import InputError
+from proofroll.running.case import EngineFacts
+
+# Folders on which every result rests; reports and the command line are not among them.
+FOUNDATION = ("core", "elements", "files", "running")
+# Modules and folders that only show results, wherever they lie.
+ASIDE = frozenset({"reproducer", "reproducer_source", "drawings", "onset_study", "regimes_study"})
+
+
+def describe(engine: str) -> dict[str, Any]:
+    """What an engine is and provides, and where its formulations stand on the ladder of models."""
+    from proofroll.core.engine import CannotLeaveOut, TellsLevels
+    from proofroll.core.plugins import load_engine
+
+    kind = load_engine(engine)
+    presets = {
+        formulation: {preset: dataclasses.asdict(settings) for preset, settings in by_preset.items()}
+        for formulation, by_preset in kind.presets.items()
+    }
+    return {
+        "name": engine,
+        "version": kind.version(),
+        "provides": sorted(kind.provides),
+        "presets": presets,
+        "summary": (inspect.getdoc(kind) or "").split("\n", 1)[0],
+        "levels": dict(kind.levels) if isinstance(kind, TellsLevels) else {},
+        "terms": [dataclasses.asdict(term) for term in kind.terms] if isinstance(kind, TellsLevels) else [],
+        "inherent": {key: dict(terms) for key, terms in kind.inherent.items()}
+        if isinstance(kind, CannotLeaveOut)
+        else {},
+    }
+
+
+def resolve(engine: str, options: dict[str, Any]) -> dict[str, Any]:
+    """Complete settings of an engine, and what else decides its results."""
+    if engine == "truth":
+        if options:
+            raise InputError("truth", ", ".join(options), "the truth has no settings; leave them out")
+        code = digest([Path(proofroll.__file__).parent / "truth"])
+        return dataclasses.asdict(EngineFacts("truth", _truth_version(), code, {}))
+    from proofroll.core.plugins import load_engine, resolve_settings
+
+    kind = load_engine(engine)
+    settings = resolve_settings(kind, options)
+    source = Path(inspect.getfile(kind))
+    package = (source.parent / "__init__.py").is_file() and source.parent.name != "engines"
+    facts = EngineFacts(
+        name=engine,
+        version=kind.version(),
+        code=digest([source.parent if package else source]),
+        settings=dataclasses.asdict(settings),
+        resolution=settings.resolution,
+        order=settings.order,
+    )
+    return dataclasses.asdict(facts)
+
+
+def _truth_version() -> str:
+    """Of proofroll, and of the libraries by which the truth is integrated."""
+    found = [f"proofroll {proofroll.__version__}"]
+    for name in ("numpy", "scipy", "heyoka"):
+        with contextlib.suppress(metadata.PackageNotFoundError):
+            found.append(f"{name} {metadata.version(name)}")
+    return ", ".join(found)
+
+
+def digest(sources: list[Path]) -> str:
+    """Hash of the adapter's files and of the folders that every result rests on.
+
+    What only shows results (:data:`ASIDE`), as the bug reports of an adapter do, is left out: no result hangs on it.
+    """
+    root = Path(proofroll.__file__).parent
+    content = hashlib.sha256()
+    for source in [*(root / name for name in FOUNDATION), *sources]:
+        files = sorted(source.rglob("*.py")) if source.is_dir() else [source]
+        for file in files:
+            if not ASIDE & set(file.relative_to(source.parent).with_suffix("").parts):
+                content.update(file.read_bytes())
+    return content.hexdigest()[:16]

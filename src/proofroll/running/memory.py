@@ -1,0 +1,73 @@
+"""How much memory an engine may need: what the processes below a worker have, and where that ends.
+
+Resident memory is watched from outside. A limit on the address space would end engines that merely reserve it
+(just-in-time compilers, arenas, threads' stacks), and an allocation that fails ends a library anywhere, so that the
+row could not say why. The watch is as fine as the parent's tick; what is faster than that, the kernel ends: workers
+volunteer for it before anybody else (``oom_score_adj``).
+"""
+
+from __future__ import annotations
+
+import contextlib
+import math
+import os
+from pathlib import Path
+
+from proofroll.core.errors import InputError
+
+VARIABLE = "PROOFROLL_MEMORY"
+# More than ten times what the hungriest of our own engines needs: the truth with slip has 0.23 GB at most.
+_USUAL_GB = 4.0
+# One engine must leave a small machine to the others.
+_SHARE = 0.5
+GB = 1e9
+
+
+def memory_limit() -> float:
+    """Memory that one worker with its children may have [GB]: ``PROOFROLL_MEMORY``, or 4 and at most half the machine.
+
+    Raises:
+        InputError: the variable holds no positive number.
+    """
+    text = os.environ.get(VARIABLE)
+    if text is None:
+        return min(_USUAL_GB, _SHARE * os.sysconf("SC_PHYS_PAGES") * os.sysconf("SC_PAGE_SIZE") / GB)
+    try:
+        limit = float(text)
+    except ValueError:
+        limit = math.nan
+    if not limit > 0:
+        raise InputError(VARIABLE, text, "give a positive number of GB, or leave it out")
+    return limit
+
+
+def resident_gb(process: int) -> float:
+    """Resident memory of a process and its descendants [GB]; 0 where the system has no ``/proc``."""
+    pages = 0
+    for one in (process, *descendants(process)):
+        with contextlib.suppress(OSError, ValueError, IndexError):  # it has just ended
+            pages += int(Path(f"/proc/{one}/statm").read_text(encoding="ascii").split()[1])
+    return pages * os.sysconf("SC_PAGE_SIZE") / GB
+
+
+def descendants(process: int) -> list[int]:
+    """Children of a process, and theirs; none where the system has no ``/proc``."""
+    found: list[int] = []
+    queue = [process]
+    while queue:
+        with contextlib.suppress(OSError):
+            for task in Path(f"/proc/{queue.pop()}/task").iterdir():
+                children = (task / "children").read_text(encoding="ascii").split()
+                found += map(int, children)
+                queue += map(int, children)
+    return found
+
+
+def volunteer() -> None:
+    """Makes this process the first that the kernel ends when memory runs out, and lets it leave no core file."""
+    import resource
+
+    with contextlib.suppress(OSError):
+        Path("/proc/self/oom_score_adj").write_text("1000", encoding="ascii")
+    with contextlib.suppress(OSError, ValueError):
+        resource.setrlimit(resource.RLIMIT_CORE, (0, resource.getrlimit(resource.RLIMIT_CORE)[1]))

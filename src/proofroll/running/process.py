@@ -1,0 +1,244 @@
+"""The parent's side of a worker process: asks it, watches it, and ends it with whatever it started."""
+
+from __future__ import annotations
+
+import contextlib
+import json
+import os
+import select
+import signal
+import subprocess
+import sys
+import threading
+import time
+from collections.abc import Mapping
+from types import TracebackType
+from typing import Any, Self
+
+from proofroll.core.errors import InputError, Missing, ProofrollError
+from proofroll.running.case import Status
+from proofroll.running.memory import VARIABLE, descendants, memory_limit, resident_gb
+
+# One thread per worker, set before anything is imported there: workers run side by side.
+_ONE_THREAD = dict.fromkeys(
+    ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS", "NUMEXPR_NUM_THREADS", "VECLIB_MAXIMUM_THREADS"),
+    "1",
+)
+# How often memory and life are looked at [s]: a look costs less than 0.1 ms, and memory fills at some GB/s.
+_TICK = 0.1
+# How long a process that has closed its answers may take to end, with threads and exit handlers of its own [s].
+_GRACE = 5.0
+# Of what an engine prints only the end is kept [bytes]; it goes through a pipe, so that no flood fills a disk.
+_KEPT = 4096
+# Reads that empty the pipe, which holds 64 kB, even where each finds only a line.
+_DRAUGHTS = 64
+# An answer is a record of a few kB; what is longer without an end is none [bytes].
+_LONGEST_ANSWER = 1 << 22
+
+_living: set[Worker] = set()
+
+
+class WorkerDied(ProofrollError):  # noqa: N818 -- a fact about the worker, turned into a row of the report
+    """The worker process ended without an answer."""
+
+    def __init__(self, status: Status, message: str) -> None:
+        self.status = status
+        super().__init__(message)
+
+
+def end_all() -> None:
+    """Sends every worker of this process, and what it started, its end; for a signal handler, so it waits for none."""
+    for worker in list(_living):
+        worker.shoot()
+
+
+class Worker:
+    """A worker process; restarted by making a new one.
+
+    Args:
+        memory: how much it may have, its children included [GB]; by default :func:`memory.memory_limit`.
+
+    Attributes:
+        waited: wall seconds for the last answer; for the first one from the start of the process [s].
+    """
+
+    def __init__(self, memory: float | None = None) -> None:
+        self._began, self.waited = time.perf_counter(), 0.0
+        self._memory = memory or memory_limit()
+        self._ending = threading.Lock()
+        self._answers, writer = os.pipe()
+        self._words, log = os.pipe()
+        os.set_blocking(self._words, False)
+        self._open = [self._answers, self._words]
+        self._descriptors = list(self._open)
+        try:
+            self._process = subprocess.Popen(
+                [sys.executable, "-m", "proofroll.running.worker", str(writer), str(os.getpid())],
+                stdin=subprocess.PIPE,
+                stdout=log,
+                stderr=log,
+                pass_fds=(writer,),
+                env=os.environ | _ONE_THREAD,
+                text=True,
+                start_new_session=True,  # Ctrl-C reaches the parent alone, which then ends its workers
+            )
+        except OSError as error:
+            for descriptor in self._descriptors:
+                os.close(descriptor)
+            raise ProofrollError(f"a worker process cannot be started: {error.strerror or error}") from None
+        finally:
+            os.close(writer)
+            os.close(log)
+        _living.add(self)
+        self._pending = b""
+        self._said = b""
+        self._asked = 0
+
+    def ask(self, request: Mapping[str, Any], time_limit: float) -> dict[str, Any]:
+        """One request, one answer.
+
+        Raises:
+            WorkerDied: the process crashed, took longer than ``time_limit`` [s] or needed too much memory.
+        """
+        self._asked += 1
+        try:
+            assert self._process.stdin is not None  # it was opened with a pipe
+            self._process.stdin.write(json.dumps({**request, "number": self._asked}) + "\n")
+            self._process.stdin.flush()
+        except (OSError, ValueError):  # a broken pipe, or one that is closed already
+            raise WorkerDied(Status.CRASHED, self._last_words()) from None
+        asked = time.perf_counter()
+        line = self._line(time_limit)
+        self.waited = time.perf_counter() - (self._began or asked)
+        self._began = 0.0
+        with contextlib.suppress(ValueError):
+            answer = json.loads(line)
+            if isinstance(answer, dict) and answer.pop("number", None) == self._asked:
+                return answer
+        self.kill()
+        raise WorkerDied(Status.CRASHED, "the engine wrote into the answers of its process, which was ended")
+
+    def request(self, request: Mapping[str, Any], time_limit: float) -> dict[str, Any]:
+        """As :meth:`ask`, with the errors that the worker met raised here.
+
+        Raises:
+            InputError, Missing, WorkerDied: the worker says so, or it ended.
+        """
+        answer = self.ask(request, time_limit)
+        match answer.get("error"):
+            case "input":
+                raise InputError(answer["field"], answer["value"], answer["advice"])
+            case "missing":
+                raise Missing(answer["message"])
+            case "crashed":
+                raise WorkerDied(Status.CRASHED, answer["message"])
+        return answer
+
+    def _line(self, time_limit: float) -> bytes:
+        """The next line of the answers."""
+        deadline = time.monotonic() + time_limit
+        look = time.monotonic() + _TICK
+        while b"\n" not in self._pending:
+            now = time.monotonic()
+            if now >= deadline:
+                self.kill()
+                raise WorkerDied(Status.TIMEOUT, f"no result within {time_limit:g} s; it was ended")
+            if now >= look:
+                look = now + _TICK
+                self._watch_memory()
+            if self._answers in self._listen(min(deadline - now, _TICK)):
+                chunk = os.read(self._answers, 65536)
+                if not chunk:
+                    raise WorkerDied(Status.CRASHED, self._last_words())
+                self._pending += chunk
+                if len(self._pending) > _LONGEST_ANSWER:
+                    break
+            elif self._ended() and self._answers not in self._listen(0):  # a child of it may keep the pipe open
+                raise WorkerDied(Status.CRASHED, self._last_words())
+        line, _, self._pending = self._pending.partition(b"\n")
+        return line
+
+    def _watch_memory(self) -> None:
+        if resident_gb(self._process.pid) > self._memory:
+            self.kill()
+            said = f"needed more than {self._memory:g} GB of memory and was ended; {VARIABLE} allows more"
+            raise WorkerDied(Status.CRASHED, said)
+
+    def _listen(self, seconds: float) -> list[int]:
+        """Waits for answers or words, keeps the end of the words, and gives what there was."""
+        ready = select.select(self._open, [], [], seconds)[0]
+        if self._words in ready:
+            with contextlib.suppress(BlockingIOError):
+                heard = os.read(self._words, 65536)
+                self._said = (self._said + heard)[-_KEPT:]
+                if not heard:
+                    self._open.remove(self._words)
+        return ready
+
+    def _ended(self) -> bool:
+        """Whether the process has ended. It is not reaped yet, so that its group cannot become somebody else's."""
+        if self._process.returncode is not None:
+            return True
+        if not hasattr(os, "waitid"):  # macOS before Python 3.13: there what the process started outlives it
+            return self._process.poll() is not None
+        try:
+            return os.waitid(os.P_PID, self._process.pid, os.WEXITED | os.WNOHANG | os.WNOWAIT) is not None
+        except ChildProcessError:
+            return True
+
+    def _last_words(self) -> str:
+        """How the process ended, and the last line it wrote."""
+        self._open = [item for item in self._open if item == self._words]
+        deadline = time.monotonic() + _GRACE
+        while not (ended := self._ended()) and time.monotonic() < deadline:
+            self._listen(_TICK / 10)
+        code = self.kill()
+        for _ in range(_DRAUGHTS):
+            if not self._listen(0):
+                break
+        how = _how(code) if ended else "closed its answers without ending"
+        lines = self._said.decode(errors="replace").splitlines()
+        last = next((" ".join(line.split()) for line in reversed(lines) if line.strip()), "")
+        return f"the engine's process {how}" + (f": {last[:200]}" if last else "")
+
+    def shoot(self) -> None:
+        """Sends the process, and what it started, its end."""
+        if self._process.returncode is not None:
+            return  # its number may be somebody else's by now
+        for process in descendants(self._process.pid):  # one that left the group is found only here
+            with contextlib.suppress(ProcessLookupError, PermissionError):
+                os.kill(process, signal.SIGKILL)
+        with contextlib.suppress(ProcessLookupError, PermissionError):
+            os.killpg(self._process.pid, signal.SIGKILL)
+
+    def kill(self) -> int:
+        """Ends the process at once, with what it started; its exit code."""
+        with self._ending:
+            self.shoot()
+            _living.discard(self)
+            return self._process.wait()
+
+    def close(self) -> None:
+        """Ends the process."""
+        self.kill()
+        if self._process.stdin is not None:
+            with contextlib.suppress(BrokenPipeError):
+                self._process.stdin.close()
+        while self._descriptors:
+            os.close(self._descriptors.pop())
+
+    def __enter__(self) -> Self:
+        return self
+
+    def __exit__(
+        self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
+    ) -> None:
+        self.close()
+
+
+def _how(code: int) -> str:
+    """An exit code in words."""
+    if code >= 0:
+        return f"ended with exit code {code}"
+    name = signal.Signals(-code).name if -code in set(signal.Signals) else f"signal {-code}"
+    return f"was killed by {name}" + (", as by a system that runs out of memory" if -code == signal.SIGKILL else "")

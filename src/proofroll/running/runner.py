@@ -1,0 +1,304 @@
+"""Runs cases in worker processes and survives whatever happens there."""
+
+from __future__ import annotations
+
+import contextlib
+import dataclasses
+import os
+import queue
+import threading
+from collections import deque
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
+from concurrent.futures import ThreadPoolExecutor
+from pathlib import Path
+from typing import Any
+
+from proofroll.core.errors import InputError, Missing, ProofrollError
+from proofroll.running.case import Case, EngineFacts, Result, Status
+from proofroll.running.process import Worker, WorkerDied
+from proofroll.running.store import Store
+from proofroll.running.worker_pool import Workers
+
+__all__ = ["Runner", "Worker", "WorkerDied", "describe", "programs", "resolve", "run_one"]
+
+_START_UP_SECONDS = 60.0
+
+
+def describe(engine: str, workers: Workers | None = None) -> dict[str, Any]:
+    """What an engine is, provides and has as presets; asked in a process of its own.
+
+    Raises:
+        InputError, Missing, WorkerDied: it cannot be asked.
+    """
+    with _lent(workers) as lent, lent.lend(engine) as worker:
+        return worker.request({"do": "describe", "engine": engine}, _START_UP_SECONDS)
+
+
+def resolve(
+    engines: Sequence[tuple[str, Mapping[str, Any]]], workers: Workers | None = None
+) -> list[EngineFacts | ProofrollError]:
+    """Complete settings for engines with options, each or the reason why not, in the order given."""
+    found: list[EngineFacts | ProofrollError] = [ProofrollError("not asked")] * len(engines)
+
+    def ask(name: str, lent: Workers) -> None:
+        for index, (other, options) in enumerate(engines):
+            if other != name:
+                continue
+            request = {"do": "resolve", "engine": name, "options": dict(options)}
+            worker = lent.take(name)
+            try:
+                found[index] = EngineFacts(**worker.request(request, _START_UP_SECONDS))
+            except WorkerDied as error:
+                found[index] = error
+                worker.close()
+                continue
+            except ProofrollError as error:
+                found[index] = error
+            except BaseException:
+                worker.close()
+                raise
+            lent.keep(name, worker)
+
+    # Most of it is the start of the processes and the import of the engines.
+    with _lent(workers) as lent, ThreadPoolExecutor(os.cpu_count() or 1) as pool:
+        list(pool.map(lambda name: ask(name, lent), dict.fromkeys(name for name, _ in engines)))
+    return found
+
+
+def programs(cases: Sequence[Case], workers: Workers | None = None) -> list[tuple[str | None, str]]:
+    """The engines' own programs for cases (:class:`proofroll.core.engine.Reproduces`), each or None and why not."""
+    found: list[tuple[str | None, str]] = []
+    with _lent(workers) as lent:
+        for case in cases:
+            try:
+                with lent.lend(case.engine.name) as worker:
+                    request = {"do": "reproduce", "case": dataclasses.asdict(case)}
+                    answer = worker.request(request, _START_UP_SECONDS)
+                found.append((answer["program"], answer["message"]))
+            except ProofrollError as error:
+                found.append((None, str(error)))
+    return found
+
+
+@contextlib.contextmanager
+def _lent(workers: Workers | None) -> Iterator[Workers]:
+    """The workers that are given, or some that end with the block."""
+    if workers is not None:
+        yield workers
+        return
+    own = Workers()
+    try:
+        yield own
+    finally:
+        own.close()
+
+
+class _Waiting:
+    """Cases that wait. A worker goes on with its engine while it can: starting another costs more than many a case."""
+
+    def __init__(self) -> None:
+        self._changed = threading.Condition()
+        self._by_engine: dict[str, deque[Case]] = {}
+        self._begun: set[str] = set()
+        self._closed = False
+
+    def add(self, case: Case) -> None:
+        """Puts a case at the end."""
+        with self._changed:
+            self._by_engine.setdefault(case.engine.name, deque()).append(case)
+            self._changed.notify()
+
+    def close(self) -> None:
+        """Nothing more will come, and what waits is not to be begun."""
+        with self._changed:
+            self._closed = True
+            self._changed.notify_all()
+
+    def take(self, engine: str | None) -> Case | None:
+        """The next case, of this engine if there is one, else of one that nobody has begun; None: it is closed.
+
+        Where all are begun, the one with the most cases left is shared. Where there is none, it waits for one.
+        """
+        with self._changed:
+            while not self._closed:
+                group = self._by_engine.get(engine or "")
+                if not group:
+                    fresh = [cases for name, cases in self._by_engine.items() if cases and name not in self._begun]
+                    group = max(fresh or self._by_engine.values(), key=len, default=None)
+                if group:
+                    case = group.popleft()
+                    self._begun.add(case.engine.name)
+                    return case
+                self._changed.wait()
+            return None
+
+
+class Runner:
+    """Runs cases side by side, reuses stored results, and always returns one result per case.
+
+    Args:
+        store: where results are kept.
+        jobs: how many workers run at once.
+        fresh: run every case again, whatever is stored.
+        memory: how much each worker may have [GB]; by default :func:`proofroll.running.memory.memory_limit`.
+    """
+
+    def __init__(self, store: Store, jobs: int | None = None, fresh: bool = False, memory: float | None = None) -> None:
+        self.store = store
+        self.workers = Workers(memory)
+        """Idle workers, for whoever asks engines something on behalf of the same study."""
+        self.jobs = jobs or os.cpu_count() or 1
+        self.fresh = fresh
+        self.reused = 0
+        self.damaged: set[str] = set()
+        """Keys of the cases that were run again because what was stored is not what had been put there."""
+        self._busy: set[Worker] = set()
+        self._stopping = threading.Event()
+
+    def run(self, cases: Iterable[Case], progress: Callable[[Case, Result], None] | None = None) -> dict[str, Result]:
+        """Results by key of the case. ``progress`` is called in this thread as each arrives."""
+
+        def told(case: Case, result: Result) -> tuple[()]:
+            if progress:
+                progress(case, result)
+            return ()
+
+        return self.follow(cases, told)
+
+    def follow(self, cases: Iterable[Case], then: Callable[[Case, Result], Iterable[Case]]) -> dict[str, Result]:
+        """Like :meth:`run`, but each result may ask for further cases, which are begun at once.
+
+        Args:
+            cases: with which it begins.
+            then: called in this thread as each result arrives; returns cases that have not been asked for yet.
+        """
+        results: dict[str, Result] = {}
+        asked: set[str] = set()
+        arrived: queue.SimpleQueue[tuple[Case, Result] | Exception] = queue.SimpleQueue()
+        shared = _Waiting()
+        running = 0
+        ready: deque[tuple[Case, Result]] = deque()
+
+        def ask(case: Case) -> int:
+            """How many more answers will arrive: one, or none where the answer is there already."""
+            if case.key in asked:
+                return 0
+            asked.add(case.key)
+            stored = None if self.fresh else self.store.get(case)
+            if stored is None:
+                if not self.fresh and self.store.has(case):
+                    self.damaged.add(case.key)
+                shared.add(case)
+                return 1
+            self.reused += 1
+            ready.append((case, stored))
+            return 0
+
+        pool = ThreadPoolExecutor(self.jobs)
+        try:
+            running += sum([ask(case) for case in cases])
+            serving = False
+            while ready or running:
+                if running and not serving:
+                    serving = True
+                    for _ in range(self.jobs):
+                        pool.submit(self._serve, shared, arrived)
+                if ready:
+                    case, result = ready.popleft()
+                else:
+                    item = arrived.get()
+                    if isinstance(item, Exception):
+                        raise item
+                    running -= 1
+                    case, result = item
+                    if case.key in self.damaged:
+                        result = dataclasses.replace(result, message=f"{result.message}; what was stored was damaged")
+                results[case.key] = result
+                running += sum([ask(further) for further in then(case, result)])
+        except BaseException:
+            self._stopping.set()
+            for worker in list(self._busy):
+                worker.kill()
+            raise
+        finally:
+            shared.close()
+            pool.shutdown(wait=True, cancel_futures=True)
+            self._stopping.clear()
+        return results
+
+    def _serve(self, waiting: _Waiting, arrived: queue.SimpleQueue[tuple[Case, Result] | Exception]) -> None:
+        """Serves cases one after another, in a new worker for another engine and after each crash."""
+        worker: Worker | None = None
+        engine: str | None = None
+        try:
+            while not self._stopping.is_set() and (case := waiting.take(engine)) is not None:
+                if worker is not None and engine is not None and case.engine.name != engine:
+                    self._busy.discard(worker)
+                    self.workers.keep(engine, worker)
+                    worker = None
+                engine = case.engine.name
+                if worker is None:
+                    worker = self.workers.take(engine)
+                    self._busy.add(worker)
+                    if self._stopping.is_set():  # whoever stops us may not have seen this worker
+                        break
+                try:
+                    result = self._result(worker, case)
+                except WorkerDied as error:
+                    result = _lost(case, error)
+                    self._drop(worker)
+                    worker = None
+                    if self._stopping.is_set():
+                        break
+                except ProofrollError as error:  # a full disk, say, which costs this case alone
+                    result = _lost(case, WorkerDied(Status.CRASHED, str(error)))
+                arrived.put((case, result))
+        except Exception as error:
+            arrived.put(error)
+            self._stopping.set()
+        if worker is None or engine is None:
+            return
+        if self._stopping.is_set():
+            self._drop(worker)
+        else:
+            self._busy.discard(worker)
+            self.workers.keep(engine, worker)
+
+    def _result(self, worker: Worker, case: Case) -> Result:
+        """The result of a case, stored."""
+        with self.store.incoming(case) as written:
+            try:
+                result = _ask(worker, case, written)
+            except InputError as error:  # a step that does not divide the grid, say: this case's own affair
+                result = Result(Status.REFUSED, str(error), versions={case.engine.name: case.engine.version})
+            except WorkerDied as error:  # where the disk is full the name for a while means nothing to a person
+                said = str(error).replace(str(written.absolute()), str(self.store.trajectory(case)))
+                raise WorkerDied(error.status, said) from None
+            return self.store.put(case, result, written)
+
+    def _drop(self, worker: Worker) -> None:
+        self._busy.discard(worker)
+        worker.close()
+
+
+def _ask(worker: Worker, case: Case, out: Path) -> Result:
+    request = {"do": "run", "case": dataclasses.asdict(case), "out": str(out.absolute())}  # an engine may change folder
+    try:
+        found = Result.from_dict(worker.request(request, case.time_limit))
+        waited = worker.waited - sum(found.spent.values())  # a new process starts, and messages go to and fro
+        return dataclasses.replace(found, spent=found.spent | {"process start": waited})
+    except Missing as error:
+        return Result(Status.MISSING, str(error))
+
+
+def _lost(case: Case, error: WorkerDied) -> Result:
+    return Result(error.status, str(error), versions={case.engine.name: case.engine.version})
+
+
+def run_one(case: Case, out: Path) -> Result:
+    """Runs a single case, its trajectory going to ``out``, with nothing stored or reused."""
+    with Worker() as worker:
+        try:
+            return _ask(worker, case, out)
+        except WorkerDied as error:
+            return _lost(case, error)

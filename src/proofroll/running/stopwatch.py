@@ -1,0 +1,57 @@
+"""Measures the speed of cases in worker processes, one at a time, so that nothing of ours runs beside them."""
+
+from __future__ import annotations
+
+import dataclasses
+from types import TracebackType
+from typing import Self
+
+from proofroll.running.case import Case
+from proofroll.running.process import Worker, WorkerDied
+from proofroll.running.worker_pool import Workers
+
+# Long enough for the clock and for caches to settle, short enough for many rounds.
+SECONDS = 0.05
+_LIMIT = 60.0
+
+
+class Stopwatch:
+    """Keeps one worker per engine, which stays warm between the rounds of :func:`proofroll.running.timing.interleaved`.
+
+    Args:
+        workers: where they come from and go back to.
+    """
+
+    def __init__(self, workers: Workers | None = None) -> None:
+        self._lent = workers or Workers()
+        self._workers: dict[str, Worker] = {}
+
+    def __call__(self, case: Case, seconds: float = SECONDS) -> float | None:
+        """Wall seconds per simulated second of a case, from clean runs that only advance; None: it did not run."""
+        name = case.engine.name
+        if name not in self._workers:
+            self._workers[name] = self._lent.take(name)
+        request = {"do": "time", "case": dataclasses.asdict(case), "seconds": seconds}
+        try:
+            rate = self._workers[name].ask(request, _LIMIT).get("seconds_per_second")
+        except WorkerDied:
+            self._workers.pop(name).close()
+            return None
+        except BaseException:  # its answer is still to come, and would be taken for the next one's
+            self._workers.pop(name).close()
+            raise
+        return float(rate) if rate is not None else None
+
+    def close(self) -> None:
+        """Gives the workers back to whoever lent them, or ends them."""
+        for name, worker in self._workers.items():
+            self._lent.keep(name, worker)
+        self._workers.clear()
+
+    def __enter__(self) -> Self:
+        return self
+
+    def __exit__(
+        self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
+    ) -> None:
+        self.close()

@@ -1,0 +1,146 @@
+"""Results on disk: one trajectory and one record per case, each whole or not there, named by the case's key."""
+
+from __future__ import annotations
+
+import contextlib
+import dataclasses
+import fcntl
+import hashlib
+import json
+import os
+import shutil
+import tempfile
+import time
+from collections.abc import Iterator
+from pathlib import Path
+
+from proofroll.core.errors import ProofrollError
+from proofroll.files.atomic import replacing
+from proofroll.running.case import LASTING, Case, Result
+
+
+def write_text(path: Path, text: str) -> None:
+    """Writes a text file so that it is either whole or not there.
+
+    Raises:
+        ProofrollError: the place cannot be written.
+    """
+    with replacing(path) as temporary:
+        temporary.write_text(text, encoding="utf-8")
+
+
+# A trajectory that is being made lies in a folder of this kind, and does not take longer than this [s].
+_INCOMING = ".incoming-"
+_STALE = 7 * 86400.0
+
+
+class Store:
+    """Results under one folder."""
+
+    def __init__(self, folder: Path) -> None:
+        self.folder = folder
+        try:
+            folder.mkdir(parents=True, exist_ok=True)
+            probe, name = tempfile.mkstemp(dir=folder)
+            os.close(probe)
+            Path(name).unlink()
+            self._sweep()
+        except OSError as error:
+            raise ProofrollError(
+                f"{folder} cannot be written ({error.strerror or error}); choose another place with --out"
+            ) from None
+
+    def _sweep(self) -> None:
+        """Removes what processes left that were ended in the middle of a case, and nothing that may still be in use."""
+        for place in self.folder.glob(f"{_INCOMING}*"):
+            with contextlib.suppress(OSError):  # another run has just removed it
+                if time.time() - place.stat().st_mtime > _STALE:
+                    shutil.rmtree(place, ignore_errors=True)
+
+    def trajectory(self, case: Case) -> Path:
+        """File of the case's trajectory."""
+        return self.folder / f"{case.key}.nc"
+
+    @contextlib.contextmanager
+    def incoming(self, case: Case) -> Iterator[Path]:
+        """A file for a trajectory that is being made, in a folder of its own; what is left there is removed.
+
+        Raises:
+            ProofrollError: the place cannot be written.
+        """
+        try:
+            place = tempfile.mkdtemp(prefix=_INCOMING, dir=self.folder)
+        except OSError as error:
+            raise ProofrollError(f"{self.folder} cannot be written ({error.strerror or error})") from None
+        try:
+            yield Path(place) / self.trajectory(case).name
+        finally:
+            shutil.rmtree(place, ignore_errors=True)  # a process that ended while it wrote leaves a half
+
+    def has(self, case: Case) -> bool:
+        """Whether there is a record of the case, sound or not."""
+        return (self.folder / f"{case.key}.json").exists()
+
+    def put(self, case: Case, result: Result, written: Path | None = None) -> Result:
+        """Keeps a result, with its trajectory, if any, from the file ``written``; None: it is in place already.
+
+        Record and trajectory change together, and only when both are wholly on the disk.
+
+        Raises:
+            ProofrollError: the place cannot be written; what was stored before is still there.
+        """
+        if result.trajectory is not None:
+            path = written or self.trajectory(case)
+            try:
+                checksum = hashlib.sha256(path.read_bytes()).hexdigest()
+            except OSError as error:
+                raise ProofrollError(f"{path} cannot be read ({error.strerror or error})") from None
+            result = dataclasses.replace(result, checksum=checksum)
+        if result.status in LASTING:
+            content = {"case": dataclasses.asdict(case), "result": dataclasses.asdict(result)}
+            with self._locked(fcntl.LOCK_EX), replacing(self.folder / f"{case.key}.json") as record:
+                record.write_text(json.dumps(content | {"seal": _seal(content)}, indent=1), encoding="utf-8")
+                if written and result.trajectory is not None:
+                    written.replace(self.trajectory(case))
+        return result
+
+    @contextlib.contextmanager
+    def _locked(self, how: int) -> Iterator[None]:
+        """Keeps other processes from changing records meanwhile, where the file system can lock."""
+        with contextlib.ExitStack() as stack:
+            with contextlib.suppress(OSError):
+                folder = os.open(self.folder, os.O_RDONLY)
+                stack.callback(os.close, folder)
+                fcntl.flock(folder, how)
+            yield
+
+    def get(self, case: Case) -> Result | None:
+        """The stored result, or None if there is none or it is not what was stored."""
+        try:
+            with self._locked(fcntl.LOCK_SH):
+                record = json.loads((self.folder / f"{case.key}.json").read_text(encoding="utf-8"))
+                if record.pop("seal") != _seal(record):
+                    return None
+                result = Result.from_dict(record["result"])
+                if result.trajectory is not None:
+                    content = self.trajectory(case).read_bytes()
+                    if hashlib.sha256(content).hexdigest() != result.checksum:
+                        return None
+        except (OSError, ValueError, KeyError, TypeError, AttributeError):
+            return None  # absent, truncated or tampered with: the case is run again
+        return result
+
+
+def _seal(record: object) -> str:
+    """Hash of a record, so that one whose numbers were changed is not believed."""
+    return hashlib.sha256(json.dumps(record, sort_keys=True).encode()).hexdigest()
+
+
+def move(source: Path, target: Path) -> None:
+    """Puts a finished file in its place, whole or not at all, also across file systems.
+
+    Raises:
+        ProofrollError: the place cannot be written.
+    """
+    with replacing(target) as temporary:
+        temporary.write_bytes(source.read_bytes())

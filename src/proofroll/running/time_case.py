@@ -1,0 +1,87 @@
+"""How fast an engine is: runs that only advance it."""
+
+from __future__ import annotations
+
+import time
+from typing import Any
+
+from proofroll.core.errors import Diverged, Refused
+from proofroll.running.case import Case
+
+# A clean run shorter than this is repeated, up to three times, so that its median means something.
+_TIMED_SECONDS = 0.2
+_TIMED_RUNS = 3
+_ENOUGH_SECONDS = 0.3
+# A measurement builds a short case again and again until it has run long enough to mean something, but all of it, the
+# builds included, may last no more than this many times as long.
+_MOST_BUILDING = 5.0
+
+
+def time_once(case: dict[str, Any], seconds: float) -> dict[str, Any]:
+    """One measurement of a case's speed: clean runs for about this many wall seconds, one after another."""
+    from proofroll.core.plugins import load_engine, resolve_settings
+    from proofroll.files.scene_file import load_scene
+    from proofroll.running.recording import time_grid
+
+    wanted = Case.from_dict(case)
+    scene = load_scene(wanted.scene, asks=wanted.asks, **wanted.parameters)
+    times = time_grid(wanted.until, wanted.every)
+    if wanted.engine.name == "truth":
+        return _time_truth(scene, times, seconds)
+    kind = load_engine(wanted.engine.name)
+    settings = resolve_settings(kind, wanted.engine.settings)
+    elapsed = simulated = 0.0
+    start = time.perf_counter()
+    while elapsed < seconds and time.perf_counter() - start < _MOST_BUILDING * seconds:
+        try:
+            wall, t = _clean_run(kind.build(scene, settings), times, seconds - elapsed)
+        except (Refused, Diverged) as error:
+            return {"seconds_per_second": None, "message": str(error)}
+        elapsed, simulated = elapsed + wall, simulated + t
+    return {"seconds_per_second": elapsed / simulated, "message": f"{simulated:g} s simulated"}
+
+
+def _time_truth(scene: Any, times: Any, seconds: float) -> dict[str, Any]:
+    """As :func:`time_once`, of both routes of the truth together; at least one whole run."""
+    from proofroll.truth import truth
+
+    start, runs, elapsed = time.perf_counter(), 0, 0.0
+    while not runs or elapsed < seconds:
+        try:
+            truth(scene, times)
+        except (Refused, Diverged) as error:
+            return {"seconds_per_second": None, "message": str(error)}
+        runs, elapsed = runs + 1, time.perf_counter() - start
+    simulated = runs * float(times[-1])
+    return {"seconds_per_second": elapsed / simulated, "message": f"{simulated:g} s simulated"}
+
+
+def clean_runs(kind: Any, scene: Any, settings: Any, times: Any) -> tuple[list[float], tuple[float, float]]:
+    """Wall seconds per simulated second of runs that only advance, each on an engine built for it.
+
+    Besides, wall and processor seconds of all.
+    """
+    rates: list[float] = []
+    spent = processor = 0.0
+    while len(rates) < _TIMED_RUNS and spent < _TIMED_SECONDS:
+        engine, before = kind.build(scene, settings), time.process_time()
+        wall, t = _clean_run(engine, times, _ENOUGH_SECONDS)
+        processor += time.process_time() - before
+        rates.append(wall / t)
+        spent += wall
+    return rates, (spent, processor)
+
+
+def _clean_run(engine: Any, times: Any, enough: float) -> tuple[float, float]:
+    """Wall seconds and simulated seconds of a run that only advances.
+
+    It stops where the sampled run stopped, for an adaptive step that may run past a sample is another, cheaper one;
+    and it ends when ``enough`` wall seconds are over, which measure a rate as well as ten times as many do.
+    """
+    clock = time.perf_counter
+    start = clock()
+    for t in times[1:].tolist():
+        engine.advance(t)
+        if clock() - start > enough:
+            break
+    return clock() - start, t

@@ -1,0 +1,160 @@
+"""Timings that can be compared on a noisy machine: taken in turns, with an interval, in pyperf's data model.
+
+Whatever slows the machine for a while slows everything that is measured in that round, so a ratio of two timings is
+taken round by round.
+"""
+
+from __future__ import annotations
+
+import os
+import platform
+import random
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass
+from functools import cached_property
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from proofroll.files.atomic import replacing
+
+# With fewer than six values the whole range of them holds the median with less than 95 %.
+ROUNDS = 6
+# Of every interval.
+CONFIDENCE = 0.95
+
+
+@dataclass(frozen=True)
+class Interval:
+    """A measured number with its confidence interval of 95 %.
+
+    Attributes:
+        value: the median.
+        low, high: ends of the interval, by bootstrap of the median.
+    """
+
+    value: float
+    low: float
+    high: float
+
+
+@dataclass(frozen=True)
+class Timing:
+    """What repeated measurements of one thing gave.
+
+    Attributes:
+        values: one per round, in the order of the rounds [s].
+        warmups: those before, which do not count [s].
+    """
+
+    values: tuple[float, ...]
+    warmups: tuple[float, ...] = ()
+
+    @cached_property
+    def interval(self) -> Interval:
+        """Median of the values [s]."""
+        return _interval(np.array(self.values))
+
+
+def interleaved(
+    tasks: Mapping[str, Callable[[], float | None]],
+    rounds: int = ROUNDS,
+    progress: Callable[[str], None] | None = None,
+    once_above: float = np.inf,
+) -> dict[str, Timing]:
+    """Every task once per round, each round in another order; the first round only warms up.
+
+    Args:
+        tasks: measure something once and give seconds, or None where it cannot be measured: it is then left out.
+        rounds: how many rounds count.
+        progress: called with a task's name after each of its measurements.
+        once_above: what takes longer than this in the first round [s] is measured no more, and that value counts.
+    """
+    order = random.Random(0)
+    found: dict[str, list[float]] = {name: [] for name in tasks}
+    once: dict[str, Timing] = {}
+    for _ in range(rounds + 1):
+        names = [name for name in found if name not in once]
+        order.shuffle(names)
+        for name in names:
+            seconds = tasks[name]()
+            if progress:
+                progress(name)
+            if seconds is None:
+                del found[name]
+            else:
+                found[name].append(seconds)
+                if len(found[name]) == 1 and seconds > once_above:
+                    once[name] = Timing((seconds,))
+    return {name: once.get(name) or Timing(tuple(values[1:]), tuple(values[:1])) for name, values in found.items()}
+
+
+def ratio(numerator: Timing, denominator: Timing) -> Interval:
+    """How many times longer the one takes than the other, round by round; both from one call of :func:`interleaved`."""
+    return _interval(np.array(numerator.values) / np.array(denominator.values))
+
+
+def _interval(values: np.ndarray[Any, np.dtype[np.float64]]) -> Interval:
+    from scipy.stats import bootstrap
+
+    median = float(np.median(values))
+    if len(values) < 2 or np.ptp(values) == 0:
+        return Interval(median, float(values.min()), float(values.max()))
+    found = bootstrap(
+        (values,), np.median, confidence_level=CONFIDENCE, n_resamples=999, method="percentile", rng=0
+    ).confidence_interval
+    return Interval(median, float(found.low), float(found.high))
+
+
+def machine() -> dict[str, str]:
+    """What the machine is, as far as speed is concerned."""
+    return {
+        "processor": _processor(),
+        "cores": str(os.cpu_count()),
+        "system": f"{platform.system()} {platform.machine()}",
+        "python": platform.python_version(),
+    }
+
+
+def _processor() -> str:
+    """Name of the processor; the architecture where the system does not tell."""
+    try:
+        lines = Path("/proc/cpuinfo").read_text(encoding="utf-8").splitlines()
+    except OSError:
+        lines = []
+    named = (line.partition(":")[2].strip() for line in lines if line.startswith("model name"))
+    return next(named, platform.processor() or platform.machine())
+
+
+def write_benchmarks(timings: Mapping[str, Timing], path: Path) -> None:
+    """Writes all timings as a pyperf suite, for ``python -m pyperf stats`` and ``compare_to``.
+
+    Raises:
+        ProofrollError: the place cannot be written.
+    """
+    import pyperf
+
+    facts = machine()
+    metadata = {
+        "cpu_model_name": facts["processor"],
+        "cpu_count": int(facts["cores"]),
+        "platform": facts["system"],
+        "python_version": facts["python"],
+        "unit": "second",
+    }
+    benchmarks = [
+        pyperf.Benchmark(
+            [
+                pyperf.Run(
+                    timing.values,
+                    warmups=[(1, value) for value in timing.warmups],
+                    metadata={**metadata, "name": name},
+                    collect_metadata=False,
+                )
+            ]
+        )
+        for name, timing in timings.items()
+    ]
+    with replacing(path) as temporary:
+        pyperf.BenchmarkSuite(benchmarks).dump(str(temporary), replace=True)

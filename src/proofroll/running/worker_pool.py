@@ -1,0 +1,64 @@
+"""Worker processes that are kept for the engine they have loaded: starting another costs more than many a case."""
+
+from __future__ import annotations
+
+import threading
+import weakref
+from collections.abc import Iterator
+from contextlib import contextmanager
+
+from proofroll.running.process import Worker
+
+# Idle workers that are kept, some hundred MB each; of more, the one that has waited longest is ended.
+_MOST = 8
+
+
+class Workers:
+    """Idle workers by engine. They end with this object, and at the latest with this process.
+
+    Args:
+        memory: how much each may have [GB]; by default :func:`proofroll.running.memory.memory_limit`.
+    """
+
+    def __init__(self, memory: float | None = None) -> None:
+        self._memory = memory
+        self._lock = threading.Lock()
+        self._idle: list[tuple[str, Worker]] = []
+        self._end = weakref.finalize(self, _close, self._idle)
+
+    def take(self, engine: str) -> Worker:
+        """A worker that has this engine loaded, or a new one."""
+        with self._lock:
+            for index, (name, _) in enumerate(self._idle):
+                if name == engine:
+                    return self._idle.pop(index)[1]
+        return Worker(self._memory)
+
+    def keep(self, engine: str, worker: Worker) -> None:
+        """Takes back a worker that has answered all that it was asked."""
+        with self._lock:
+            self._idle.append((engine, worker))
+            surplus = [self._idle.pop(0)[1]] if len(self._idle) > _MOST else []
+        for old in surplus:
+            old.close()
+
+    @contextmanager
+    def lend(self, engine: str) -> Iterator[Worker]:
+        """A worker for this engine; it is kept unless something went wrong."""
+        worker = self.take(engine)
+        try:
+            yield worker
+        except BaseException:
+            worker.close()
+            raise
+        self.keep(engine, worker)
+
+    def close(self) -> None:
+        """Ends the idle workers."""
+        with self._lock:
+            _close(self._idle)
+
+
+def _close(idle: list[tuple[str, Worker]]) -> None:
+    while idle:
+        idle.pop()[1].close()

@@ -1,0 +1,46 @@
+"""One run, as the command line asks for it."""
+
+from __future__ import annotations
+
+import threading
+from collections.abc import Mapping, Sequence
+
+from proofroll.core.errors import InputError, ProofrollError
+from proofroll.core.plugins import parse_engine
+from proofroll.files.scene_file import load_scene
+from proofroll.running.case import Case
+from proofroll.running.runner import resolve
+
+
+def single_case(
+    scene: str,
+    parameters: Mapping[str, object],
+    engine: str,
+    *,
+    until: float,
+    every: float,
+    time_limit: float,
+    asks: Sequence[str] = (),
+) -> Case:
+    """The case of one run.
+
+    Raises:
+        InputError, Missing: something that was given does not exist or makes no sense.
+    """
+    if not 0 < time_limit <= threading.TIMEOUT_MAX:
+        raise InputError("time_limit", time_limit, "give a positive, finite time in s")
+    spec = parse_engine(engine)
+    loaded = load_scene(scene, asks=asks, **parameters)  # type: ignore[arg-type]  # text is checked and converted there
+    facts = resolve([(spec.name, spec.options)])[0]
+    if isinstance(facts, ProofrollError):
+        raise facts
+    return Case(
+        scene=scene,
+        parameters={name: loaded.parameters[name] for name in parameters},
+        scene_digest=loaded.digest,
+        engine=facts,
+        until=until,
+        every=every,
+        time_limit=time_limit,
+        asks=tuple(asks),
+    )

@@ -1,0 +1,119 @@
+"""The places of a stability map: the scene at the values of its axes, how long it runs there, and what is true."""
+
+from __future__ import annotations
+
+import dataclasses
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+
+from proofroll.core.errors import ProofrollError
+from proofroll.core.scene import Scene
+from proofroll.elements.ball_on_surface.trajectory import read
+from proofroll.files.scene_file import load_scene
+from proofroll.running.case import Case, EngineFacts, Status
+from proofroll.running.recording import time_grid
+from proofroll.running.runner import Runner, resolve
+from proofroll.studies.axes import Axis, thinned
+from proofroll.studies.failure import Yardstick
+from proofroll.studies.sweep import Question, case_of
+from proofroll.truth.natural import natural_time
+
+# Sampling intervals per natural time; the coarsest step is one of them, the finer ones divide it.
+PER_PERIOD = 8
+# More samples than these are not kept of a long run: the interval becomes an odd number of the above, so that the
+# samples still visit all phases of an oscillation.
+_MOST_SAMPLES = 400
+# The truth is computed by two routes at the tightest tolerance, once per place.
+_TRUTH_LIMIT = 60.0
+
+
+@dataclass(frozen=True)
+class Effort:
+    """How much a map may cost.
+
+    Attributes:
+        periods: length of every run in natural times; an axis may say otherwise.
+        values: largest number of values per axis, or None.
+        patience: a run that is expected to take longer is too slow [s].
+        limit: one that does take longer is ended [s]; a worker's start counts.
+    """
+
+    periods: float = 3.0
+    values: int | None = None
+    patience: float = 1.0
+    limit: float = 15.0
+
+
+QUICK = Effort(values=3, patience=0.5, limit=10.0)
+
+
+@dataclass
+class Place:
+    """A value of an axis: the scene there, and the truth.
+
+    Attributes:
+        axis, value: where.
+        parameters: of the scene, those that differ from the defaults.
+        scene: with them, or None if it does not exist; then ``problem`` says why.
+        period: natural time of the scene [s].
+        until, every: length and sampling interval of every run [s].
+        yardstick: what runs are measured by, or None if there is no scene.
+        problem: why there is no truth here.
+    """
+
+    axis: Axis
+    value: float
+    parameters: dict[str, float]
+    scene: Scene | None = None
+    period: float = 0.0
+    until: float = 0.0
+    every: float = 0.0
+    yardstick: Yardstick | None = None
+    problem: str | None = None
+
+
+def places_of(name: str, axes: Sequence[Axis], effort: Effort) -> list[Place]:
+    """Every value of every axis, without the truth yet."""
+    default = load_scene(name)
+    found = []
+    for axis in axes:
+        for value in thinned(axis.values, effort.values) if effort.values else axis.values:
+            place = Place(axis, value, axis.at(default, value))
+            found.append(place)
+            try:
+                scene = load_scene(name, **place.parameters)
+            except ProofrollError as error:
+                place.problem = str(error)
+                continue
+            place.scene, place.period = scene, natural_time(scene.rolling)
+            intervals = round(PER_PERIOD * (value if axis.horizon else effort.periods))
+            stride = 1 + 2 * (intervals // (2 * _MOST_SAMPLES))
+            place.every = stride * place.period / PER_PERIOD
+            place.until = place.every * max(1, intervals // stride)
+    return found
+
+
+def measure(name: str, places: Sequence[Place], runner: Runner, tell: Callable[[], None]) -> None:
+    """The truth of every place, or why there is none."""
+    (facts,) = resolve([("truth", {})], runner.workers)
+    if not isinstance(facts, EngineFacts):
+        raise facts
+    cases = {id(place): case_at(name, place, facts, _TRUTH_LIMIT) for place in places if place.scene is not None}
+    results = runner.run(cases.values(), lambda *_: tell())
+    for place in places:
+        if place.scene is None:
+            continue
+        case = cases[id(place)]
+        result = results[case.key]
+        truth = read(runner.store.trajectory(case)) if result.status == Status.DONE else None
+        if truth is None:
+            place.problem = f"there is no truth here: {result.message}"
+        times = time_grid(place.until, place.every)
+        place.yardstick = Yardstick.of(place.scene.rolling, times, truth)
+
+
+def case_at(name: str, place: Place, facts: EngineFacts, limit: float) -> Case:
+    """A run at a place with a limit of time [s]."""
+    assert place.scene is not None  # the caller looked
+    question = Question(name, place.parameters, place.until, place.scene.rolling.surface.coordinates[-1])
+    return dataclasses.replace(case_of(question, place.scene, facts, place.every), time_limit=limit)

@@ -1,0 +1,68 @@
+"""What decides the numbers of a stored study besides its question: told without importing a single engine."""
+
+from __future__ import annotations
+
+import datetime
+import hashlib
+import re
+from importlib.metadata import PackageNotFoundError, entry_points, requires, version
+from pathlib import Path
+
+import proofroll
+from proofroll.core.plugins import GROUP
+from proofroll.running.timing import machine
+
+# Folders of the package on which no result hangs.
+_ASIDE = frozenset({"cli", "conformance", "report", "bench"})
+
+
+def versions() -> dict[str, str]:
+    """Versions of proofroll, of what it can use, and of every package that announces an engine."""
+    # Requirements of all extras count, as far as they are installed.
+    names = {re.split(r"[\s;<>=!~\[(]", text, maxsplit=1)[0] for text in requires("proofroll") or []}
+    names |= {point.dist.name for point in entry_points(group=GROUP) if point.dist is not None}
+    found = {}
+    for name in sorted(names | {"proofroll"}, key=str.lower):
+        try:
+            found[name] = version(name)
+        except PackageNotFoundError:
+            continue
+    return found
+
+
+def code() -> str:
+    """Hash of everything in proofroll on which a result may hang."""
+    root = Path(proofroll.__file__).parent
+    content = hashlib.sha256()
+    for file in sorted(root.rglob("*.py")):
+        if file.relative_to(root).parts[0] not in _ASIDE:
+            content.update(file.read_bytes())
+    return content.hexdigest()[:16]
+
+
+def measured() -> dict[str, object]:
+    """When, on which machine and with which versions and code a study is being made."""
+    return {
+        "when": datetime.datetime.now(datetime.UTC).isoformat(timespec="seconds"),
+        "machine": machine(),
+        "versions": versions(),
+        "code": code(),
+    }
+
+
+def changes(measured: dict[str, object]) -> list[str]:
+    """What is another than when a study was measured, as short texts; empty if it still holds here.
+
+    Args:
+        measured: ``machine``, ``versions`` and ``code`` as they were then.
+    """
+    found = []
+    then, now = dict(measured.get("machine") or {}), machine()  # type: ignore[call-overload]
+    found += [f"{key} {then.get(key)} then, {value} now" for key, value in now.items() if then.get(key) != value]
+    then, now = dict(measured.get("versions") or {}), versions()  # type: ignore[call-overload]
+    for name in sorted(then.keys() | now.keys(), key=str.lower):
+        if then.get(name) != now.get(name):
+            found.append(f"{name} {then.get(name, 'absent')} then, {now.get(name, 'absent')} now")
+    if measured.get("code") != code():
+        found.append("proofroll's own code has changed")
+    return found

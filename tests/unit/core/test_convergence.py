@@ -1,0 +1,104 @@
+from __future__ import annotations
+
+import math
+
+import numpy as np
+import pytest
+
+from proofroll.core.convergence import richardson, tightest
+
+T = np.linspace(0, 2, 21)
+LIMIT = np.sin(3 * T)
+
+
+def curve(h: float, power: float, next_term: float = 0.3) -> np.ndarray:
+    """A curve with error h^p cos t plus a term one order smaller."""
+    return LIMIT + h**power * np.cos(T) + next_term * h ** (power + 1) * T
+
+
+@pytest.mark.parametrize("power", [1, 2, 4])
+@pytest.mark.parametrize("ratio", [2.0, 3.0])
+def test_richardson_recovers_order_and_limit(power: int, ratio: float) -> None:
+    """From three curves with errors h^p and h^(p+1) the order is seen, and the limit is exact to round-off."""
+    h = 1e-2
+    found = richardson([curve(h * ratio**k, power) for k in (2, 1, 0)], (ratio**2, ratio, 1))
+    assert found.order == pytest.approx(power, abs=0.05)
+    assert found.values == pytest.approx(LIMIT, abs=1e-12)
+    assert found.error_bar < 0.1 * np.max(np.abs(curve(h, power) - LIMIT))
+
+
+@pytest.mark.parametrize("power", [1, 2, 4])
+def test_steps_need_not_fall_evenly(power: int) -> None:
+    """Steps like 5, 2, 1 give the same order and limit as steps of one ratio."""
+    steps = (5e-2, 2e-2, 1e-2)
+    found = richardson([curve(h, power) for h in steps], steps)
+    assert found.order == pytest.approx(power, abs=0.1)
+    assert found.values == pytest.approx(LIMIT, abs=1e-12)
+
+
+def test_error_bar_covers_the_error() -> None:
+    """With terms beyond the two that are removed the limit is off by no more than its error bar."""
+    for power in (1, 2, 3, 4):
+        curves = [curve(h, power) + 5 * h ** (power + 2) * np.sin(7 * T) for h in (0.08, 0.04, 0.02)]
+        found = richardson(curves, (4, 2, 1))
+        assert 0 < np.max(np.abs(found.values - LIMIT)) <= found.error_bar
+
+
+@pytest.mark.parametrize("power", [0.5, 1.5, 2.5])
+def test_an_order_that_is_no_integer(power: float) -> None:
+    """An order between two integers is seen, and the error bar covers what is left of the error."""
+    found = richardson([curve(h, power, 0.0) for h in (0.04, 0.02, 0.01)], (4, 2, 1))
+    assert found.order == pytest.approx(power, abs=1e-9)
+    assert 0 < np.max(np.abs(found.values - LIMIT)) <= found.error_bar
+
+
+@pytest.mark.parametrize("declared", [1, None])
+def test_an_integer_order_in_disguise(declared: int | None) -> None:
+    """Where the next term makes an order 1 look like 1.3 nothing is extrapolated, and the error bar covers the rest."""
+    found = richardson([LIMIT + 0.01 * h + 0.001 * h**2 for h in (4, 2, 1)], (4, 2, 1), declared)
+    assert found.order == pytest.approx(1.3, abs=0.01)
+    assert np.max(np.abs(found.values - LIMIT)) <= found.error_bar
+
+
+def test_an_order_that_was_not_declared() -> None:
+    """Curves of the first order are not trusted more because the fourth was declared."""
+    found = richardson([curve(h, 1) for h in (0.04, 0.02, 0.01)], (4, 2, 1), 4)
+    assert found.order == pytest.approx(1, abs=0.05)
+    assert 5e-3 < np.max(np.abs(found.values - LIMIT)) <= found.error_bar
+
+
+def test_a_limit_that_is_not_the_truth_stays_wrong() -> None:
+    """Extrapolation finds the limit of the curves, whatever the truth is."""
+    found = richardson([curve(h, 2) + 0.01 for h in (0.04, 0.02, 0.01)], (4, 2, 1))
+    assert found.values == pytest.approx(LIMIT + 0.01, abs=1e-9)
+
+
+def test_curves_that_do_not_converge() -> None:
+    """Scattered curves have no order, and an error bar as large as the scatter."""
+    scatter = [LIMIT, LIMIT + 0.1 * np.cos(T), LIMIT - 0.1 * np.cos(T)]
+    found = richardson(scatter, (4, 2, 1))
+    assert math.isnan(found.order)
+    assert found.error_bar == pytest.approx(0.2)
+    assert found.values is scatter[-1]
+
+
+def test_equal_curves() -> None:
+    """Curves that do not depend on the step are their own limit, with no order."""
+    found = richardson([LIMIT, LIMIT, LIMIT], (4, 2, 1))
+    assert math.isnan(found.order)
+    assert found.error_bar == 0
+    assert math.isnan(richardson([LIMIT, LIMIT, LIMIT + 1e-3], (4, 2, 1)).order)
+
+
+def test_a_time_told_in_whole_steps() -> None:
+    """Where the last refinement changes nothing, the limit is as uncertain as the one before changed it."""
+    assert richardson([LIMIT + 0.2, LIMIT, LIMIT], (4, 2, 1)).error_bar == pytest.approx(0.2)
+
+
+def test_tightest() -> None:
+    """An adaptive method's limit is its tightest curve, as uncertain as the last tightening."""
+    found = tightest([LIMIT + 1e-3, LIMIT + 1e-5, LIMIT])
+    assert found.values is not None
+    assert np.array_equal(found.values, LIMIT)
+    assert found.error_bar == pytest.approx(1e-5)
+    assert math.isnan(found.order)

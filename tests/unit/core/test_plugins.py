@@ -1,0 +1,141 @@
+from __future__ import annotations
+
+import dataclasses
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass
+from typing import Annotated, Any, Literal
+
+import pytest
+from annotated_types import Gt
+
+from proofroll.core.errors import InputError, Missing
+from proofroll.core.plugins import EngineSpec, engine_names, load_engine, parse_engine, resolve_settings
+
+
+@dataclass(frozen=True)
+class ToySettings:
+    """Settings of every type that engines use."""
+
+    formulation: Literal["free", "chart"] = "free"
+    preset: Literal["default", "matched", "tuned"] = "matched"
+    dt: Annotated[float, Gt(0)] = 1e-3
+    iterations: int = 5
+    exact: bool = False
+
+
+class Toy:
+    """An engine that has nothing but settings."""
+
+    name = "toy"
+    settings = ToySettings
+    presets: Mapping[str, Mapping[str, ToySettings]] = {
+        "free": {"default": ToySettings("free", "default", 2e-3), "matched": ToySettings("free", "matched", 1e-3)},
+        "chart": {"default": ToySettings("chart", "default", 4e-3)},
+    }
+
+
+@pytest.mark.parametrize(
+    ("text", "name", "options"),
+    [
+        ("truth", "truth", {}),
+        ("mujoco[]", "mujoco", {}),
+        (" mujoco [ dt = 1e-4 , formulation=chart, ] ", "mujoco", {"dt": "1e-4", "formulation": "chart"}),
+        ("my-engine[label=a=b]", "my-engine", {"label": "a=b"}),
+    ],
+)
+def test_parse_engine(text: str, name: str, options: dict[str, str]) -> None:
+    """An engine is a name with settings in brackets, with or without blanks."""
+    assert parse_engine(text) == EngineSpec(name, options)
+
+
+def test_an_engine_is_written_as_it_is_read() -> None:
+    """The text of a parsed engine parses to the same again."""
+    for text in ("truth", "mujoco[formulation=chart,dt=1e-4]"):
+        assert str(parse_engine(text)) == text
+
+
+@pytest.mark.parametrize(
+    ("text", "advice"),
+    [
+        ("", "write name"),
+        ("mujoco[dt=1e-4", "write name"),
+        ("mujoco dt=1e-4", "write name"),
+        ("mujoco[dt]", "write key=value instead of 'dt'"),
+        ("mujoco[dt=1,dt=2]", "dt is given twice"),
+    ],
+)
+def test_engines_of_another_form(text: str, advice: str) -> None:
+    """A text that is no engine gets one line that shows the form."""
+    with pytest.raises(InputError, match="engine") as caught:
+        parse_engine(text)
+    assert advice in str(caught.value)
+    assert "\n" not in str(caught.value)
+
+
+def test_settings_without_options_are_matched() -> None:
+    """An engine without brackets takes its first formulation with the preset matched, or the first preset there is."""
+    assert resolve_settings(Toy, {}) == ToySettings("free", "matched", 1e-3)
+    assert resolve_settings(Toy, {"formulation": "chart"}) == ToySettings("chart", "default", 4e-3)
+
+
+def test_options_go_over_the_preset() -> None:
+    """A preset gives what is not given, and text becomes the type of its field."""
+    found = resolve_settings(Toy, {"preset": "default", "iterations": "7", "exact": "true"})
+    assert found == ToySettings("free", "default", 2e-3, 7, True)
+
+
+@pytest.mark.parametrize(
+    ("options", "field", "words"),
+    [
+        ({"step": "1"}, "toy: step", ["no such setting", "choose from formulation, preset, dt"]),
+        ({"formulation": "cubic"}, "toy: formulation", ["choose one of free, chart"]),
+        ({"preset": "best"}, "toy: preset", ["free has default, matched"]),
+        ({"formulation": "chart", "preset": "matched"}, "toy: preset", ["chart has default"]),
+        ({"dt": "0"}, "toy: dt", ["greater than 0"]),
+        ({"dt": "-1e-3"}, "toy: dt", ["greater than 0"]),
+        ({"dt": "nan"}, "toy: dt", ["nan"]),
+        ({"dt": "inf"}, "toy: dt", ["finite"]),
+        ({"dt": "small"}, "toy: dt", ["'small'", "number"]),
+        ({"iterations": "2.5"}, "toy: iterations", ["2.5", "integer"]),
+        ({"exact": "perhaps"}, "toy: exact", ["perhaps", "boolean"]),
+    ],
+    ids=str,
+)
+def test_bad_settings(options: dict[str, Any], field: str, words: list[str]) -> None:
+    """Each bad setting gives one line with engine, setting, value and what to do."""
+    with pytest.raises(InputError) as caught:
+        resolve_settings(Toy, options)
+    assert caught.value.field == field
+    assert "\n" not in str(caught.value)
+    for word in words:
+        assert word in str(caught.value)
+
+
+def test_settings_survive_json(install_engines: Callable[[Mapping[str, str]], None]) -> None:
+    """Complete settings given again as options give the same settings: that is how a worker gets them."""
+    del install_engines
+    for presets in Toy.presets.values():
+        for settings in presets.values():
+            assert resolve_settings(Toy, dataclasses.asdict(settings)) == settings
+
+
+def test_engines_of_other_packages_are_found(install_engines: Callable[[Mapping[str, str]], None]) -> None:
+    """An engine that any installed package announces is found beside our own."""
+    install_engines({"oracle": "hostile:Oracle"})
+    assert {"oracle", "projection"} <= set(engine_names())
+    assert load_engine("oracle").name == "oracle"
+
+
+def test_unknown_engine() -> None:
+    """An engine that nobody announces is answered with those that exist."""
+    with pytest.raises(
+        InputError, match=r"engine = 'adams': there is no such engine; choose one of .*projection.*truth"
+    ):
+        load_engine("adams")
+
+
+def test_missing_engine_says_what_is_missing(install_engines: Callable[[Mapping[str, str]], None]) -> None:
+    """An engine whose library is not installed says which, and how to get it."""
+    install_engines({"absent": "no_such_module_anywhere:Engine"})
+    with pytest.raises(Missing, match=r"absent is not installed here \(no_such_module_anywhere is missing\): pip"):
+        load_engine("absent")

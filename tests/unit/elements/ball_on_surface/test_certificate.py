@@ -1,0 +1,183 @@
+from __future__ import annotations
+
+import dataclasses
+from typing import Any
+
+import numpy as np
+import pytest
+
+from proofroll.core.engine import Built, Regularised, Sample
+from proofroll.core.scene import Scene
+from proofroll.elements.ball_on_surface.certificate import EXACT, Line, certify, first_difference
+from proofroll.elements.ball_on_surface.mechanics import (
+    initial_angular_acceleration,
+    initial_response,
+    natural_acceleration,
+)
+from proofroll.files.scene_file import load_scene
+
+
+class Stub:
+    """A built engine that holds the scene's own numbers, with some replaced."""
+
+    def __init__(self, scene: Scene, sample: dict[str, Any] | None = None, **built: Any) -> None:
+        body = scene.rolling
+        acceleration, force = initial_response(body)
+        right = Built(
+            mass=body.ball.mass,
+            inertia=np.full(3, body.ball.inertia),
+            gravity=body.gravity,
+            ball_radius=body.ball.radius,
+            rolling_resistance=body.contact.rolling_resistance,
+            acceleration=acceleration,
+        )
+        self._built = dataclasses.replace(right, **built)
+        state = Sample(body.p0, body.v0, body.w0, np.array([1.0, 0, 0, 0]), force)
+        self._sample = dataclasses.replace(state, **(sample or {}))
+
+    def built(self) -> Built:
+        """See :class:`proofroll.core.engine.Engine`."""
+        return self._built
+
+    def sample(self) -> Sample:
+        """See :class:`proofroll.core.engine.Engine`."""
+        return self._sample
+
+
+ALL = [
+    "mass", "inertia", "gravity", "ball radius", "rolling resistance", "position", "gap", "velocity", "spin", "slip",
+    "acceleration", "N", "F2", "F3",
+]  # fmt: skip
+
+
+def test_the_scene_itself_is_certified(scene: Scene) -> None:
+    """An engine that built what the scene says passes in every quantity."""
+    lines = certify(Stub(scene), scene)
+    assert [line.quantity for line in lines] == ALL
+    assert first_difference(lines) is None
+
+
+BODY = load_scene("sphere_in_cylinder").rolling
+PART = 1e-11  # relative; ten times what is allowed
+
+
+@pytest.mark.parametrize(
+    ("quantity", "built", "sample"),
+    [
+        ("mass", {"mass": 0.517 * (1 + PART)}, {}),
+        ("inertia", {"inertia": BODY.ball.inertia * np.array([1, 1, 1 + PART])}, {}),
+        ("gravity", {"gravity": np.array([0, 9.81 * PART, -9.81])}, {}),
+        ("gravity", {"gravity": np.array([0, 0, 9.81])}, {}),
+        ("ball radius", {"ball_radius": 0.025 * (1 - PART)}, {}),
+        ("rolling resistance", {"rolling_resistance": 0.025 * PART}, {}),
+        ("position", {}, {"p_WB": BODY.p0 + np.array([0, 0, 0.025 * PART])}),
+        ("gap", {}, {"p_WB": BODY.p0 - [0.025 * PART, 0, 0]}),
+        ("velocity", {}, {"v_WB": BODY.v0 * (1 + PART)}),
+        ("spin", {}, {"w_WB": BODY.w0 + np.array([160 * PART, 0, 0])}),
+        ("slip", {}, {"w_WB": BODY.w0 + np.array([0, 160 * PART, 0])}),
+        ("acceleration", {"acceleration": initial_response(BODY)[0] * (1 + PART)}, {}),
+        ("N", {}, {"force": initial_response(BODY)[1] * (1 + PART)}),
+        ("F2", {}, {"force": initial_response(BODY)[1] + [0, 50 * PART, 0]}),
+        ("F3", {}, {"force": initial_response(BODY)[1] + [0, 0, 50 * PART]}),
+        ("mass", {"mass": np.nan}, {}),
+        ("inertia", {"inertia": np.full(2, BODY.ball.inertia)}, {}),
+    ],
+)
+def test_each_quantity_is_watched(quantity: str, built: dict[str, Any], sample: dict[str, Any]) -> None:
+    """A relative difference of 1e-11 in any quantity, NaN or a wrong shape breaks the certificate, by name."""
+    scene = load_scene("sphere_in_cylinder")
+    lines = certify(Stub(scene, sample, **built), scene)
+    broken = [line.quantity for line in lines if not line.holds]
+    assert quantity in broken
+    sentence = first_difference(lines)
+    assert sentence is not None
+    assert broken[0] in sentence
+
+
+def test_a_silent_engine_is_judged_by_its_state_alone() -> None:
+    """What the engine cannot say is left out, not passed and not failed."""
+    scene = load_scene("sphere_in_cylinder")
+    silent = dict.fromkeys(("mass", "inertia", "gravity", "ball_radius", "rolling_resistance", "acceleration"))
+    lines = certify(Stub(scene, {"force": None}, **silent), scene)
+    assert [line.quantity for line in lines] == ["position", "gap", "velocity", "spin", "slip"]
+
+
+def test_a_softened_quantity_has_its_own_tolerance_and_reason() -> None:
+    """Only the quantity that the engine softens is judged by the engine's tolerance, and the reason is kept."""
+    scene = load_scene("sphere_in_cylinder")
+    force = initial_response(scene.rolling)[1]
+    soft = {"N": Regularised(1e-3, "the contact is a spring")}
+    stub = Stub(scene, {"force": force * (1 + 1e-4)}, regularised=soft)
+    lines = {line.quantity: line for line in certify(stub, scene)}
+    assert lines["N"].holds
+    assert lines["N"].because == "the contact is a spring"
+    assert not lines["F3"].holds
+    assert lines["F3"].tolerance == EXACT
+
+
+def test_the_sentence_names_the_first_difference() -> None:
+    """The refusal shows quantity, both values, unit and both differences."""
+    good = Line("mass", "kg", (1.0,), (1.0,), 0.0, EXACT)
+    bad = Line("gravity", "m/s^2", (0.0, 0.0, -9.81), (0.0, 0.0, -9.8), 1e-3, EXACT)
+    assert first_difference([good, bad, bad]) == (
+        "the engine's model differs from the scene: gravity is 0, 0, -9.8 instead of 0, 0, -9.81 m/s^2 "
+        "(relative difference 0.001, allowed 1e-12)"
+    )
+
+
+SLIPPING = load_scene("sphere_in_cylinder", rolling_resistance=5e-4, mu_static=0.35, mu_kinetic=0.25)
+FRICTION: dict[str, Any] = {
+    "mu_static": 0.35,
+    "mu_kinetic": 0.25,
+    "angular_acceleration": initial_angular_acceleration(SLIPPING.rolling),
+}
+
+
+def test_friction_and_angular_acceleration_are_certified() -> None:
+    """An engine that built the scene's friction and resistance passes, and each has its line."""
+    lines = certify(Stub(SLIPPING, **FRICTION), SLIPPING)
+    assert first_difference(lines) is None
+    named = {line.quantity for line in lines}
+    assert {"rolling resistance", "static friction", "kinetic friction", "angular acceleration"} <= named
+
+
+@pytest.mark.parametrize(
+    ("quantity", "built"),
+    [
+        ("static friction", {"mu_static": None}),
+        ("kinetic friction", {"mu_kinetic": None}),
+        ("rolling resistance", {"rolling_resistance": None}),
+        ("static friction", {"mu_static": 0.35 * (1 + PART)}),
+        ("static friction", {"mu_static": np.inf}),
+        ("kinetic friction", {"mu_kinetic": 0.35}),
+        ("rolling resistance", {"rolling_resistance": 0.0}),
+        (
+            "angular acceleration",
+            {
+                "angular_acceleration": FRICTION["angular_acceleration"]
+                + [0, 0, PART * natural_acceleration(SLIPPING.rolling) / 0.025]
+            },
+        ),
+        ("angular acceleration", {"angular_acceleration": -FRICTION["angular_acceleration"]}),
+    ],
+)
+def test_friction_and_resistance_are_watched(quantity: str, built: dict[str, Any]) -> None:
+    """What the scene requires and the engine does not read back, or reads back otherwise, fails in one sentence."""
+    lines = certify(Stub(SLIPPING, **(FRICTION | built)), SLIPPING)
+    assert [line.quantity for line in lines if not line.holds] == [quantity]
+    sentence = first_difference(lines)
+    assert sentence is not None
+    silent = any(value is None for value in built.values())
+    expected = f"does not say its {quantity}" if silent else f"differs from the scene: {quantity} is "
+    assert sentence.startswith(f"the engine's model {expected}")
+    assert "\n" not in sentence
+
+
+def test_friction_that_the_scene_does_not_bound() -> None:
+    """Where the scene has no bound, an engine without one passes, and one with a number of its own does not."""
+    scene = load_scene("sphere_in_cylinder")
+    assert first_difference(certify(Stub(scene, mu_static=np.inf, mu_kinetic=np.inf), scene)) is None
+    for mu in (0.0, 1.0, 1e9):
+        sentence = first_difference(certify(Stub(scene, mu_static=mu), scene))
+        assert sentence is not None
+        assert "1 / static friction" in sentence

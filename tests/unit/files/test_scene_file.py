@@ -1,0 +1,189 @@
+from __future__ import annotations
+
+import math
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any
+
+import pytest
+
+from proofroll.core.errors import InputError
+from proofroll.files.data_folders import data_folder
+from proofroll.files.scene_file import load_scene, read_scene_file, scene_names
+
+CYLINDER = "sphere_in_cylinder"
+
+
+@pytest.fixture
+def edited(tmp_path: Path) -> Callable[[str, str], str]:
+    """A copy of the sphere's scene with one text replaced; its folder."""
+
+    def edit(old: str, new: str) -> str:
+        text = (data_folder("models") / CYLINDER / "scene.toml").read_text(encoding="utf-8")
+        assert old in text
+        (tmp_path / "scene.toml").write_text(text.replace(old, new, 1), encoding="utf-8")
+        return str(tmp_path)
+
+    return edit
+
+
+def problem(name: str, **parameters: Any) -> InputError:
+    """The error of loading a scene, after a look at its form."""
+    with pytest.raises(InputError) as caught:
+        load_scene(name, **parameters)
+    text = str(caught.value)
+    assert "\n" not in text
+    assert text == f"{caught.value.field} = {text.partition(' = ')[2]}"
+    return caught.value
+
+
+def test_both_scenes_are_there() -> None:
+    """The scenes are found by name."""
+    assert scene_names() == sorted(scene_names())
+    assert {CYLINDER, "inclined_plane"} <= set(scene_names())
+
+
+@pytest.mark.parametrize("name", scene_names())
+def test_every_parameter_has_unit_meaning_and_source(name: str) -> None:
+    """No number of a scene is without unit, meaning and source, and each has a symbol of its own."""
+    parameters = read_scene_file(name).parameters
+    assert all(item.unit and item.meaning and item.source for item in parameters.values())
+    symbols = [item.symbol for item in parameters.values()]
+    assert all(symbols)
+    assert len(set(symbols)) == len(symbols)
+
+
+@pytest.mark.parametrize("name", scene_names())
+def test_every_parameter_reaches_the_mechanics(name: str) -> None:
+    """Changing any parameter changes the scene: none is decoration."""
+    file = read_scene_file(name)
+    for key, item in file.parameters.items():
+        value = 0.3 if isinstance(item.value, str) or math.isinf(item.value) else item.value * 1.01 + 1e-3
+        needed = {"mu_static": 0.5} if key == "mu_kinetic" else {}
+        assert load_scene(name, **needed, **{key: value}).digest != load_scene(name, **needed).digest, key
+
+
+@pytest.mark.parametrize(
+    ("parameters", "field", "advice"),
+    [
+        ({"wheels": 4}, "wheels", "no such parameter; choose from radius"),
+        ({"radius": 0.225}, "radius", "must be below cylinder_radius = 0.225"),
+        ({"radius": 0.3}, "radius", "must be below cylinder_radius = 0.225"),
+        ({"cylinder_radius": 0.02}, "radius", "must be below cylinder_radius = 0.02"),
+        ({"radius": 0.0}, "radius", "must be above 0"),
+        ({"radius": -0.01}, "radius", "must be above 0"),
+        ({"cylinder_radius": -1}, "cylinder_radius", "must be above 0"),
+        ({"mass": 0}, "mass", "must be above 0"),
+        ({"mass": -0.517}, "mass", "must be above 0"),
+        ({"gravity": -9.81}, "gravity", "must be at least 0"),
+        ({"rolling_resistance": -1e-9}, "rolling_resistance", "must be at least 0"),
+        ({"mu_static": -0.1}, "mu_static", "must be at least 0"),
+        ({"mu_static": 0.3, "mu_kinetic": 0.4}, "mu_kinetic", "must be at most mu_static = 0.3"),
+        ({"mass": math.nan}, "mass", "finite"),
+        ({"mu_static": math.nan}, "mu_static", "finite"),
+        ({"speed": math.inf}, "speed", "finite"),
+        ({"mu_static": -math.inf}, "mu_static", "finite"),
+        ({"speed": "fast"}, "speed", "not a number; give one in m/s"),
+        ({"speed": ""}, "speed", "not a number"),
+        ({"speed": None}, "speed", "not a number"),
+        ({"speed": True}, "speed", "not a number"),
+        ({"speed": [4]}, "speed", "not a number"),
+        ({"speed": 10**400}, "speed", "not a number"),
+        ({"mu_kinetic": "mu_static"}, "mu_kinetic", "not a number"),
+        ({"speed": 0}, "speed", "nothing to roll on"),
+        ({"speed": "-0.0"}, "speed", "nothing to roll on"),
+    ],
+    ids=str,
+)
+def test_bad_parameters(parameters: dict[str, Any], field: str, advice: str) -> None:
+    """Each bad value gives one line with its field, the value and what to do."""
+    error = problem(CYLINDER, **parameters)
+    assert error.field == field
+    assert advice in error.advice
+
+
+def test_the_value_that_was_given_is_blamed() -> None:
+    """A huge value is shown, and shown briefly."""
+    error = problem(CYLINDER, speed="x" * 500)
+    assert "xxxxx" in str(error)
+    assert len(str(error)) < 200
+
+
+def test_text_that_is_a_number_is_a_number() -> None:
+    """The command line gives text, which counts as the number it says."""
+    assert load_scene(CYLINDER, speed="3.3", mu_static="inf").digest == load_scene(CYLINDER, speed=3.3).digest  # type: ignore[arg-type]
+
+
+def test_kinetic_friction_follows_static_friction() -> None:
+    """mu_kinetic is mu_static unless it is given."""
+    assert load_scene(CYLINDER, mu_static=0.35).contacts[0].mu_kinetic == 0.35
+    assert load_scene(CYLINDER, mu_static=0.35, mu_kinetic=0.2).contacts[0].mu_kinetic == 0.2
+    assert load_scene(CYLINDER).contacts[0].mu_kinetic == math.inf
+
+
+@pytest.mark.parametrize("name", ["no_such_scene", "", "/", "..", "a" * 1000])
+def test_unknown_scene(name: str) -> None:
+    """An unknown scene is answered with those that exist."""
+    error = problem(name)
+    assert error.field == "scene"
+    assert CYLINDER in error.advice
+
+
+def test_a_scene_outside_models(edited: Callable[[str, str], str]) -> None:
+    """A scene may lie in any folder."""
+    scene = load_scene(edited("value = 4.0", "value = 5.0"))
+    assert scene.rolling.v0 == pytest.approx([0, 5, 0])
+
+
+@pytest.mark.parametrize(
+    ("old", "new", "words"),
+    [
+        ("[gravity]", "[gravity", ["broken", "line"]),
+        ("[gravity]", "[gravity]\nmagnitud = 3", ["magnitud", "no such key"]),
+        ("[gravity]", "[gravitation]", ["gravity", "required"]),
+        ('kind = "cylinder"', 'kind = "cone"', ["surfaces", "cylinder", "plane"]),
+        ('kind = "cylinder"', "", ["surfaces.0.kind", "'nothing'"]),
+        ('radius = "$radius"', 'radius = "wide"', ["balls.0.radius", "'wide'", "number"]),
+        ('radius = "$radius"', "", ["balls.0.radius", "required"]),
+        ("velocity = [", "velocity = [1, ", ["initial.0.velocity"]),
+        ("value = 0.517", "", ["parameters.mass.value", "required"]),
+        ("value = 0.517", 'valu = 0.517\nvalue = "x"', ["parameters.mass.valu", "no such key"]),
+    ],
+)
+def test_broken_scene_files(edited: Callable[[str, str], str], old: str, new: str, words: list[str]) -> None:
+    """A broken file gives one line with the file, the key and what to do."""
+    folder = edited(old, new)
+    text = str(problem(folder))
+    assert text.startswith(folder)
+    for word in words:
+        assert word in text
+
+
+@pytest.mark.parametrize(
+    ("old", "new", "name"),
+    [
+        ('radius = "$radius"', 'radius = "$raduis"', "raduis"),
+        ('below = "cylinder_radius"', 'below = "cylinder_raduis"', "cylinder_raduis"),
+        ('value = "mu_static"', 'value = "mu_statik"', "mu_statik"),
+        ('body = "ball"', 'body = "bowl"', "bowl"),
+        ('surface = "wall"', 'surface = "hall"', "hall"),
+    ],
+)
+def test_names_that_a_scene_file_does_not_define(
+    edited: Callable[[str, str], str], old: str, new: str, name: str
+) -> None:
+    """A name that leads nowhere gives one line that shows it."""
+    assert name in str(problem(edited(old, new)))
+
+
+def test_not_text(tmp_path: Path) -> None:
+    """A file that is not UTF-8 is broken, not a traceback."""
+    (tmp_path / "scene.toml").write_bytes(b"\xff\xfe\x00title")
+    assert "broken" in str(problem(str(tmp_path)))
+
+
+def test_a_scene_file_that_asks(edited: Callable[[str, str], str]) -> None:
+    """What the file asks for is required, together with what the caller asks for, and once."""
+    folder = edited('title = "', 'asks = ["orientation"]\ntitle = "')
+    for asks in ((), ("orientation",)):
+        assert load_scene(folder, asks=asks).asks == ("orientation",)

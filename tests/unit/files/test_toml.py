@@ -1,0 +1,41 @@
+"""TOML files: what is wrong with one is one line, and it costs no other."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import pytest
+
+from proofroll.core.errors import InputError
+from proofroll.files import toml as toml_file
+from proofroll.files.toml import read_toml, study_files, study_of
+from proofroll.studies.claims import claims_for
+from proofroll.studies.stability_claims import file_for
+
+
+@pytest.mark.parametrize("content", [b"a = = 1", b"\xff\xfe"])
+def test_a_broken_file(tmp_path: Path, content: bytes) -> None:
+    """A file that is not TOML, or not text, is one line that names it."""
+    path = tmp_path / "made.toml"
+    path.write_bytes(content)
+    with pytest.raises(InputError, match=r"made\.toml.*the file is broken") as raised:
+        read_toml(path)
+    assert "\n" not in str(raised.value)
+    assert study_of(path) is None
+
+
+def test_a_file_that_is_not_there(tmp_path: Path) -> None:
+    """A file that cannot be read is one line that says why."""
+    with pytest.raises(InputError, match="cannot be read: No such file"):
+        read_toml(tmp_path / "made.toml")
+
+
+def test_a_broken_neighbour_costs_nobody_else(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """Looking for the file of a scene goes past a broken one, whichever study it is for."""
+    (tmp_path / "a_broken.toml").write_text("a = = 1")
+    (tmp_path / "b.toml").write_text('study = "made"\nscene = "cone"')
+    monkeypatch.setattr(toml_file, "data_folder", lambda _: tmp_path)
+    assert [(path.name, content["scene"]) for path, content in study_files("made")] == [("b.toml", "cone")]
+    assert claims_for("sphere_in_cylinder") is None
+    with pytest.raises(InputError, match="no file under comparisons/"):
+        file_for("sphere_in_cylinder")

@@ -1,0 +1,131 @@
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+import pytest
+from hostile import GivesUp, HostileSettings, NotANumber, Oracle
+
+from proofroll.core.engine import Sample
+from proofroll.core.errors import Diverged, InputError
+from proofroll.core.scene import Scene
+from proofroll.files.scene_file import load_scene
+from proofroll.running.recording import record, time_grid
+
+
+@pytest.fixture
+def sphere() -> Scene:
+    """The paper's scene."""
+    return load_scene("sphere_in_cylinder")
+
+
+class Misshapen(Oracle):
+    """From 0.1 s on one quantity has a shape of its own."""
+
+    wrong: dict[str, Any] = {"w_WB": np.zeros(2)}  # noqa: RUF012 -- replaced by a subclass, never changed
+
+    def sample(self) -> Sample:
+        """See :class:`proofroll.core.engine.Engine`."""
+        right = super().sample()
+        values = {"p_WB": right.p_WB, "v_WB": right.v_WB, "w_WB": right.w_WB, "force": right.force}
+        return Sample(**(values | (self.wrong if self.t >= 0.1 else {})))
+
+
+@pytest.mark.parametrize(
+    ("until", "every", "times"),
+    [
+        (0.3, 0.1, [0, 0.1, 0.2, 0.3]),
+        (0.25, 0.1, [0, 0.1, 0.2, 0.25]),
+        (0, 0.1, [0]),
+        (0.05, 0.1, [0, 0.05]),
+        (1, 1 / 3, [0, 1 / 3, 2 / 3, 1]),
+    ],
+)
+def test_time_grid(until: float, every: float, times: list[float]) -> None:
+    """Samples are taken at every multiple of the interval and at the end, each once."""
+    grid = time_grid(until, every)
+    assert grid == pytest.approx(times, abs=1e-15)
+    assert grid[-1] == until
+
+
+def test_time_grid_ends_exactly() -> None:
+    """Two hundred steps of 0.01 s end at 2 s, not at 2.0000000000000004 s."""
+    grid = time_grid(2.0, 0.01)
+    assert (len(grid), grid[-1]) == (201, 2.0)
+
+
+@pytest.mark.parametrize(
+    ("until", "every", "field"),
+    [
+        (-1, 0.1, "until"), (np.nan, 0.1, "until"), (np.inf, 0.1, "until"),
+        (1, 0, "every"), (1, -0.1, "every"), (1, np.nan, "every"), (1, np.inf, "every"), (1e6, 1e-6, "every"),
+    ],
+)  # fmt: skip
+def test_bad_times(until: float, every: float, field: str) -> None:
+    """Times that make no sense, or more samples than any disk holds, are refused by name."""
+    with pytest.raises(InputError) as caught:
+        time_grid(until, every)
+    assert caught.value.field == field
+
+
+def test_record(sphere: Scene) -> None:
+    """A run that reaches the end has all samples, no failure and the time spent in advance."""
+    recording = record(Oracle.build(sphere, HostileSettings()), sphere, time_grid(0.5, 0.1))
+    assert recording.failure is None
+    assert recording.dataset["gamma"].to_numpy() == pytest.approx(20 * np.linspace(0, 0.5, 6), abs=1e-12)
+    assert recording.wall_seconds > 0
+
+
+@pytest.mark.parametrize(
+    ("kind", "samples", "words"),
+    [
+        (NotANumber, 2, ["v_WB", "not finite", "0.1 s"]),
+        (GivesUp, 2, ["step size fell to nothing at 0.1 s"]),
+        (Misshapen, 2, ["w_WB", "(2,) instead of (3,)", "0.1 s"]),
+        (type("Infinite", (Misshapen,), {"wrong": {"force": np.full(3, np.inf)}}), 2, ["force", "not finite"]),
+        (type("Five", (Misshapen,), {"wrong": {"q_WB": np.zeros(5)}}), 2, ["q_WB", "(5,) instead of (4,)"]),
+    ],
+)
+def test_a_run_that_ends_early(sphere: Scene, kind: Any, samples: int, words: list[str]) -> None:
+    """NaN, infinity, a wrong shape or an engine that gives up end the run with a sentence; what came before is kept."""
+    recording = record(kind.build(sphere, HostileSettings()), sphere, time_grid(0.5, 0.05))
+    assert recording.dataset.sizes["time"] == samples
+    assert recording.failure is not None
+    for word in words:
+        assert word in recording.failure
+    assert np.all(np.isfinite(recording.dataset["v_WB"]))
+
+
+def test_nan_at_the_start(sphere: Scene) -> None:
+    """An engine that starts with NaN has no trajectory at all."""
+
+    class FromTheStart(Misshapen):
+        wrong = {"p_WB": np.full(3, np.nan)}  # noqa: RUF012 -- never changed
+
+        def sample(self) -> Sample:
+            self.t = 1.0
+            return super().sample()
+
+    with pytest.raises(Diverged, match="p_WB is not finite"):
+        record(FromTheStart.build(sphere, HostileSettings()), sphere, time_grid(0.5, 0.1))
+
+
+def test_every_sample_is_taken_once_per_advance(sphere: Scene) -> None:
+    """The engine is advanced to each time in turn and never asked to go back."""
+    asked: list[float] = []
+
+    class Remembers(Oracle):
+        def advance(self, t: float) -> None:
+            asked.append(t)
+            super().advance(t)
+
+    times = time_grid(0.3, 0.1)
+    record(Remembers.build(sphere, HostileSettings()), sphere, times)
+    assert asked == times[1:].tolist()
+
+
+def test_an_orientation_that_was_asked_for() -> None:
+    """An engine that was asked for the orientation and does not give it has failed, and one sentence says so."""
+    asking = load_scene("sphere_in_cylinder", asks=("orientation",))
+    recording = record(Oracle(asking), asking, time_grid(0.1, 0.05))
+    assert recording.failure == "the engine does not give the ball's orientation"

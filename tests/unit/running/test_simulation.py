@@ -1,0 +1,104 @@
+from __future__ import annotations
+
+import subprocess
+import sys
+from collections.abc import Callable, Mapping
+
+import pytest
+from hostile import ENTRY_POINTS
+
+import proofroll
+from proofroll.core.errors import InputError, Missing, Refused
+from proofroll.files.data_folders import data_folder
+
+
+@pytest.fixture(autouse=True)
+def hostile_engines(install_engines: Callable[[Mapping[str, str]], None]) -> None:
+    """All engines of ``tests/plugins/hostile.py``."""
+    install_engines(ENTRY_POINTS)
+
+
+def test_three_lines() -> None:
+    """A scene, an engine and a time give a trajectory with units and a status."""
+    scene = proofroll.load_scene("sphere_in_cylinder", speed=5.0)
+    dataset = proofroll.simulate(scene, "oracle", until=0.2, every=0.1)
+    assert dataset.attrs["status"] == "done"
+    assert dataset["gamma"].attrs["units"] == "rad"
+    assert dataset["gamma"].to_numpy() == pytest.approx([0, 2.5, 5], abs=1e-12)
+
+
+def test_the_truth_is_an_engine_too() -> None:
+    """Without an engine the truth is given, with its error bars."""
+    dataset = proofroll.simulate(proofroll.load_scene("inclined_plane"), until=0.2, every=0.1)
+    assert dataset.attrs["status"] == "done"
+    assert dataset["down"].attrs["error_bar"] > 0
+
+
+def test_settings_in_brackets_and_by_name() -> None:
+    """Settings by name go over those in brackets."""
+    scene = proofroll.load_scene("sphere_in_cylinder")
+    with pytest.raises(InputError, match=r"oracle: dt = 'x'"):
+        proofroll.simulate(scene, "oracle[dt=1e-3]", dt="x")
+
+
+def test_a_run_that_diverges_is_given_as_far_as_it_went() -> None:
+    """A diverged run says so in its attributes and keeps what was right."""
+    dataset = proofroll.simulate(proofroll.load_scene("sphere_in_cylinder"), "not_a_number", until=0.3, every=0.05)
+    assert dataset.attrs["status"] == "diverged"
+    assert "not finite" in dataset.attrs["message"]
+    assert dataset.sizes["time"] == 2
+
+
+@pytest.mark.parametrize(
+    ("engine", "error", "words"),
+    [
+        ("unheard_of", InputError, "no such engine"),
+        ("absent", Missing, "not installed here"),
+        ("refuses", Refused, "no wheel, no ball"),
+    ],
+)
+def test_engines_that_cannot_run(engine: str, error: type[Exception], words: str) -> None:
+    """An unknown, a missing and a refusing engine are told apart."""
+    with pytest.raises(error, match=words):
+        proofroll.simulate(proofroll.load_scene("sphere_in_cylinder"), engine)
+
+
+def test_a_setting_for_the_truth() -> None:
+    """The truth has no settings, and says so rather than ignore them."""
+    with pytest.raises(InputError, match="truth"):
+        proofroll.simulate(proofroll.load_scene("inclined_plane"), "truth", until=0.1, dt=1e-3)
+
+
+def test_importing_proofroll_is_light() -> None:
+    """Importing proofroll loads no engine, no xarray, no plotly and no scipy."""
+    code = (
+        "import sys, proofroll;"
+        "heavy = {'xarray', 'scipy', 'plotly', 'pydantic', 'mujoco', 'pinocchio', 'exudyn', 'h5netcdf', 'numpy'};"
+        "print(sorted(heavy & set(sys.modules)))"
+    )
+    done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
+    assert done.stdout == "[]\n"
+
+
+def test_public_names() -> None:
+    """The public names are those that are announced, and no others are made up."""
+    assert proofroll.__all__ == ["load_scene", "simulate"]
+    assert all(callable(getattr(proofroll, name)) for name in proofroll.__all__)
+    with pytest.raises(AttributeError, match="no attribute 'simulat'"):
+        _ = proofroll.simulat  # type: ignore[attr-defined]  # that is the point
+
+
+def test_simulate_stays_a_function() -> None:
+    """The function's name is not taken over by a module that is imported later."""
+    code = (
+        "import proofroll; first = proofroll.simulate; from proofroll import simulate;"
+        "assert callable(first) and callable(simulate) and callable(proofroll.simulate)"
+    )
+    subprocess.run([sys.executable, "-c", code], check=True)
+
+
+def test_data_folders() -> None:
+    """Models and comparisons are found from wherever proofroll is used."""
+    assert (data_folder("models") / "sphere_in_cylinder" / "scene.toml").is_file()
+    with pytest.raises(proofroll.core.errors.ProofrollError, match="reinstall"):
+        data_folder("no_such_kind")

@@ -1,0 +1,73 @@
+"""The speed of cases."""
+
+from __future__ import annotations
+
+import dataclasses
+from collections.abc import Callable, Mapping
+from typing import Any
+
+import pytest
+
+from proofroll.running.process import Worker
+from proofroll.running.stopwatch import Stopwatch
+from proofroll.running.time_case import time_once
+from proofroll.running.worker_pool import Workers
+from proofroll.studies.run_once import single_case
+
+
+def test_a_finer_step_costs_more() -> None:
+    """A step a hundred times smaller takes several times longer per simulated second, however busy the machine is."""
+    with Stopwatch() as stopwatch:
+        coarse, fine = (
+            stopwatch(
+                single_case(
+                    "sphere_in_cylinder",
+                    {},
+                    f"exudyn[formulation=generic,dt={dt}]",
+                    until=0.2,
+                    every=0.02,
+                    time_limit=60,
+                ),
+                seconds=0.02,
+            )
+            for dt in (1e-3, 1e-5)
+        )
+    assert coarse is not None
+    assert fine is not None
+    assert fine > 3 * coarse
+
+
+def test_what_cannot_be_built_has_no_speed() -> None:
+    """An engine that refuses the scene gives None, and the stopwatch goes on with other cases."""
+    refused = single_case(
+        "sphere_in_cylinder", {"mu_static": 0.3}, "exudyn[formulation=carrier]", until=0.1, every=0.1, time_limit=60
+    )
+    good = single_case("sphere_in_cylinder", {}, "exudyn[formulation=carrier]", until=0.1, every=0.1, time_limit=60)
+    broken = dataclasses.replace(good, engine=dataclasses.replace(good.engine, name="nothing"))
+    with Stopwatch() as stopwatch:
+        assert [stopwatch(case, 0.01) is None for case in (refused, broken, good)] == [True, True, False]
+
+
+def test_a_fast_case_is_measured_as_long_as_a_slow_one(install_engines: Callable[[Mapping[str, str]], None]) -> None:
+    """A run of a fraction of a millisecond is repeated as often as it takes, not twenty times."""
+    install_engines({"tiny": "tiny:Tiny"})
+    case = single_case("sphere_in_cylinder", {}, "tiny[dt=0.01]", until=0.02, every=0.02, time_limit=60)
+    simulated = float(time_once(dataclasses.asdict(case), 0.2)["message"].split()[0])
+    assert simulated > 40 * case.until
+
+
+def test_an_interrupted_worker_is_not_lent_again() -> None:
+    """A worker that was left in the middle of a measurement is ended: its answer would be taken for the next one's."""
+    workers = Workers()
+    case = single_case("sphere_in_cylinder", {}, "truth", until=0.1, every=0.1, time_limit=60)
+
+    class Interrupted(Worker):
+        def ask(self, *_: Any) -> dict[str, Any]:
+            raise KeyboardInterrupt
+
+    workers.keep("truth", Interrupted())
+    with pytest.raises(KeyboardInterrupt), Stopwatch(workers) as stopwatch:
+        stopwatch(case)
+    with workers.lend("truth") as worker:
+        assert not isinstance(worker, Interrupted)
+    workers.close()

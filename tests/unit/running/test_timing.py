@@ -1,0 +1,79 @@
+"""Timings taken in turns."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import pyperf
+import pytest
+
+from proofroll.running.timing import Timing, interleaved, machine, ratio, write_benchmarks
+
+
+def test_every_task_once_per_round() -> None:
+    """Each round measures every task once before any is measured again, and the first round does not count."""
+    seen: list[str] = []
+
+    def task(name: str) -> float:
+        seen.append(name)
+        return float(len(seen))
+
+    timings = interleaved({name: lambda name=name: task(name) for name in "abc"}, rounds=3)  # type: ignore[misc]
+
+    assert len(seen) == 12
+    for start in range(0, 12, 3):
+        assert sorted(seen[start : start + 3]) == ["a", "b", "c"]
+    assert {len(timing.values) for timing in timings.values()} == {3}
+    assert all(timing.warmups[0] <= 3 for timing in timings.values())
+
+
+def test_what_cannot_be_measured_is_left_out() -> None:
+    """A task that gives nothing is not asked again and does not appear; the others do."""
+    asked = []
+
+    def broken() -> None:
+        asked.append(1)
+
+    timings = interleaved({"broken": broken, "good": lambda: 1.0}, rounds=2)
+
+    assert list(timings) == ["good"]
+    assert len(asked) == 1
+
+
+def test_what_takes_long_is_measured_once() -> None:
+    """Its first measurement counts and it is not asked again; what is short is measured as ever."""
+    asked: list[str] = []
+
+    def task(name: str, seconds: float) -> float:
+        asked.append(name)
+        return seconds
+
+    tasks = {"long": lambda: task("long", 2.0), "short": lambda: task("short", 0.1)}
+    timings = interleaved(tasks, rounds=3, once_above=0.5)
+
+    assert timings["long"] == Timing((2.0,))
+    assert timings["short"] == Timing((0.1,) * 3, (0.1,))
+    assert asked.count("long") == 1
+
+
+def test_a_ratio_is_taken_round_by_round() -> None:
+    """A machine that slows down by rounds does not change a ratio."""
+    slow, fast = Timing((2.0, 20.0, 200.0)), Timing((1.0, 10.0, 100.0))
+    found = ratio(slow, fast)
+    assert (found.value, found.low, found.high) == (2.0, 2.0, 2.0)
+
+
+def test_interval_encloses_the_median() -> None:
+    """The interval lies around the median and within what was measured."""
+    found = Timing((1.0, 1.1, 1.2, 1.3, 5.0)).interval
+    assert found.value == pytest.approx(1.2)
+    assert 1.0 <= found.low <= found.value <= found.high <= 5.0
+
+
+def test_pyperf_reads_what_is_written(tmp_path: Path) -> None:
+    """The file is a pyperf suite with the same values, and says on which machine they were taken."""
+    write_benchmarks({"one": Timing((1.0, 2.0, 3.0), (9.0,))}, tmp_path / "timings.json")
+    (benchmark,) = pyperf.BenchmarkSuite.load(str(tmp_path / "timings.json")).get_benchmarks()
+    assert benchmark.get_name() == "one"
+    assert benchmark.median() == 2.0
+    assert benchmark.get_metadata()["cpu_model_name"] == machine()["processor"]

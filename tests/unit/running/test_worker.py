@@ -1,0 +1,110 @@
+"""The worker process and its parent."""
+
+from __future__ import annotations
+
+import contextlib
+import dataclasses
+import json
+import os
+import re
+import signal
+import subprocess
+import sys
+import time
+from collections.abc import Callable, Mapping
+from pathlib import Path
+
+import pytest
+from hostile import ENTRY_POINTS
+
+import proofroll
+from proofroll.running import identity
+from proofroll.running.case import Case
+
+# A process between the test and the worker, in the middle of a case that hangs.
+PARENT = """
+import json, sys
+from proofroll.running.runner import Worker
+
+with Worker() as worker:
+    worker.ask({"do": "run", "case": json.loads(sys.argv[1]), "out": sys.argv[2]}, 600)
+"""
+
+
+def read_until(pipe: int, done: Callable[[bytes | None], bool], seconds: float) -> bytes | None:
+    """What the pipe gives first that is as wanted (empty: nobody has it open for writing), or None in time."""
+    end = time.monotonic() + seconds
+    while time.monotonic() < end:
+        try:
+            found: bytes | None = os.read(pipe, 100)
+        except BlockingIOError:
+            found = None
+        if done(found):
+            return found
+        time.sleep(0.05)
+    return None
+
+
+@pytest.mark.skipif(not hasattr(os, "mkfifo"), reason="named pipes are POSIX")
+def test_a_worker_ends_with_its_parent(
+    tmp_path: Path,
+    monkeypatch: pytest.MonkeyPatch,
+    make_case: Callable[..., Case],
+    install_engines: Callable[[Mapping[str, str]], None],
+) -> None:
+    """When the parent is killed in the middle of a case that hangs, the worker ends by itself."""
+    install_engines(ENTRY_POINTS)
+    name = tmp_path / "pipe"
+    os.mkfifo(name)
+    monkeypatch.setenv("HANGS_ALOUD", str(name))
+    pipe = os.open(name, os.O_RDONLY | os.O_NONBLOCK)
+    case = json.dumps(dataclasses.asdict(make_case("hangs_aloud", time_limit=600.0)))
+    parent = subprocess.Popen([sys.executable, "-c", PARENT, case, str(tmp_path / "run.nc")])
+    worker = 0
+    try:
+        said = read_until(pipe, bool, 60)
+        assert said, "the worker did not come to its case"
+        worker = int(said)
+        assert read_until(pipe, lambda found: found == b"", 1.0) is None, "the worker ended while its parent lived"
+        parent.kill()
+        parent.wait()
+        assert read_until(pipe, lambda found: found == b"", 20) == b"", "the worker lives on without its parent"
+        worker = 0
+    finally:
+        os.close(pipe)
+        parent.kill()
+        parent.wait()
+        if worker:
+            with contextlib.suppress(ProcessLookupError):
+                os.kill(worker, signal.SIGKILL)
+
+
+def test_whatever_a_result_rests_on_decides_its_key() -> None:
+    """What the foundation, our engines and the truth import is in the digest by which stored results are found."""
+    root = Path(proofroll.__file__).parent
+    decisive = {*identity.FOUNDATION, "engines", "truth"}
+    resting = [file for name in sorted(decisive) for file in (root / name).rglob("*.py")]
+    missing: dict[str, str] = {}
+    for file in resting:
+        if identity.ASIDE & set(file.with_suffix("").parts):
+            continue  # shows results, and decides none
+        for module in re.findall(
+            r"^\s*from proofroll\.([\w.]+) import", file.read_text(encoding="utf-8"), re.MULTILINE
+        ):
+            if module.split(".")[0] not in decisive:
+                missing.setdefault(module, file.name)
+    assert missing == {}
+
+
+def test_a_program_for_a_bug_report_outdates_no_result(tmp_path: Path) -> None:
+    """An adapter's digest changes with its code, but not with that which only writes reproducers."""
+    package = tmp_path / "adapter"
+    (package / "reproducer").mkdir(parents=True)
+    (package / "adapter.py").write_text("x = 1")
+    before = identity.digest([package])
+    (package / "reproducer" / "text.py").write_text("y = 1")
+    (package / "reproducer.py").write_text("y = 1")
+    assert identity.digest([package]) == before
+    (package / "adapter.py").write_text("x = 2")
+    assert identity.digest([package]) != before
+    assert identity.digest([package / "adapter.py"]) != before  # an adapter of one file

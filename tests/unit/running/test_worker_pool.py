@@ -1,0 +1,65 @@
+"""Worker processes that are kept."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import pytest
+
+from proofroll.running.process import Worker
+from proofroll.running.runner import Runner, resolve
+from proofroll.running.store import Store
+from proofroll.running.worker_pool import Workers
+from proofroll.studies.run_once import single_case
+
+ASK = {"do": "resolve", "engine": "truth", "options": {}}
+
+
+def process(worker: Worker) -> int:
+    """Number of a worker's process."""
+    return int(worker._process.pid)
+
+
+def test_a_worker_is_kept_for_its_engine() -> None:
+    """The same process answers for the same engine again, and never for another."""
+    workers = Workers()
+    with workers.lend("truth") as worker:
+        worker.request(ASK, 60)
+        first = process(worker)
+    with workers.lend("projection") as worker:
+        assert process(worker) != first
+    with workers.lend("truth") as worker:
+        assert process(worker) == first
+        worker.request(ASK, 60)
+    workers.close()
+
+
+def test_a_worker_with_which_something_went_wrong_is_ended() -> None:
+    """A worker is not kept when the block that borrowed it fails."""
+    workers = Workers()
+    with pytest.raises(RuntimeError), workers.lend("truth") as worker:
+        raise RuntimeError
+    assert worker._process.poll() is not None
+
+
+def test_idle_workers_are_bounded_and_end_with_their_owner() -> None:
+    """Of many idle workers the oldest are ended, and all are when nobody holds them any more."""
+    workers = Workers()
+    lent = [workers.take(str(number)) for number in range(10)]
+    for number, worker in enumerate(lent):
+        workers.keep(str(number), worker)
+    assert [worker._process.poll() is None for worker in lent] == [False] * 2 + [True] * 8
+    del workers
+    assert all(worker._process.poll() is not None for worker in lent)
+
+
+def test_a_study_starts_each_engine_once(tmp_path: Path) -> None:
+    """Settings, runs and further runs of one engine are asked of the processes that were started first."""
+    runner = Runner(Store(tmp_path), jobs=1)
+    resolve([("projection", {})], runner.workers)
+    ((_, worker),) = runner.workers._idle
+    for speed in (3.0, 4.0):
+        case = single_case("sphere_in_cylinder", {"speed": speed}, "projection", until=0.02, every=0.01, time_limit=60)
+        (result,) = runner.run([case]).values()
+        assert result.status == "done"
+        assert [idle for _, idle in runner.workers._idle] == [worker]
