@@ -5,13 +5,13 @@ from __future__ import annotations
 import os
 import signal
 import sys
+from importlib.metadata import entry_points
 from types import FrameType
 from typing import Annotated, Any
 
 import typer
 
 import proofroll
-from proofroll.cli.bench import bench
 from proofroll.cli.comparing import compare, regimes
 from proofroll.cli.drill import drill
 from proofroll.cli.figures import figures
@@ -34,8 +34,13 @@ app = typer.Typer(
 _STUDIES = (compare, report, onset, regimes, tradeoff, recommend, ladder, stability, figures)
 for _command in (scenes, engines, run, *_STUDIES):
     app.command()(_command)
-app.add_typer(bench, name="bench")
 app.add_typer(drill, name="drill")
+for _point in sorted(entry_points(group="proofroll.commands"), key=lambda point: point.name):
+    _added = _point.load()
+    if isinstance(_added, typer.Typer):
+        app.add_typer(_added, name=_point.name)
+    else:
+        app.command(_point.name)(_added)
 
 
 @app.callback(invoke_without_command=True)

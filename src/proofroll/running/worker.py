@@ -9,6 +9,7 @@ from __future__ import annotations
 import gc
 import json
 import os
+import pkgutil
 import sys
 import threading
 import time
@@ -52,7 +53,7 @@ def _answer(request: dict[str, Any]) -> dict[str, Any]:
         "run": run,
         "time": time_once,
         "reproduce": reproduce,
-        "bench": bench,
+        "call": call,
     }
     action = actions[request.pop("do")]
     try:
@@ -89,15 +90,14 @@ def reproduce(case: dict[str, Any]) -> dict[str, Any]:
     return {"program": program, "message": ""}
 
 
-def bench(**what: Any) -> dict[str, Any]:
-    """An adapter against a bare loop; see :func:`proofroll.bench.adapters.measure_adapter`."""
-    from proofroll.bench.adapters import measure_adapter
-
+def call(function: str, arguments: dict[str, Any]) -> dict[str, Any]:
+    """A function of another package in this process, ``module:name``, e.g. one that measures an engine."""
     gc.freeze()  # modules need not be looked at again in every collection
     try:
-        return measure_adapter(**what)
+        answer: dict[str, Any] = pkgutil.resolve_name(function)(**arguments)
     except (Refused, Diverged) as error:
         return {"message": str(error)}
+    return answer
 
 
 def one_line(error: BaseException) -> str:

@@ -13,7 +13,7 @@ from proofroll.core.plugins import GROUP
 from proofroll.running.timing import machine
 
 # Folders of the package on which no result hangs.
-_ASIDE = frozenset({"cli", "conformance", "report", "bench"})
+_ASIDE = frozenset({"cli", "conformance", "report"})
 
 
 def versions() -> dict[str, str]:

@@ -13,7 +13,6 @@ from typing import Any
 
 import numpy as np
 
-from proofroll.bench.bare import Bare, in_vertical_cylinder
 from proofroll.core.errors import Diverged
 from proofroll.core.scene import RollingBall, Scene
 from proofroll.elements.ball_on_surface.surfaces import FloatArray
@@ -22,12 +21,13 @@ from proofroll.engines.exudyn.contact import Contact
 from proofroll.engines.exudyn.integration import new_system, simulation_settings
 from proofroll.engines.exudyn.native import Output, exu, items
 from proofroll.engines.exudyn.rolling_disc import RollingDisc
+from proofroll_benchmarks.bare import Bare, in_vertical_cylinder
 
 Start = tuple[FloatArray, FloatArray]
 
 
 def prepare(scene: Scene, settings: Any) -> Bare:
-    """See :mod:`proofroll.bench.bare`; with bounded friction ``generic`` watches for slip, and ends there."""
+    """See :mod:`proofroll_benchmarks.bare`; with bounded friction ``generic`` watches for slip, and ends there."""
     body = in_vertical_cylinder(scene)
     loop = {"generic": _generic, "carrier": _carrier, "rolling_disc": _rolling_disc, "contact": _contact}
     tolerances = {

@@ -5,12 +5,12 @@ from __future__ import annotations
 from importlib.metadata import EntryPoint, entry_points
 from typing import Any
 
-from proofroll.bench.bare import GROUP
 from proofroll.core.errors import Refused
+from proofroll_benchmarks.bare import GROUP
 
 
 def load_bare_loop(engine: str) -> Any:
-    """The function that prepares bare loops of an engine; see :mod:`proofroll.bench.bare`.
+    """The function that prepares bare loops of an engine; see :mod:`proofroll_benchmarks.bare`.
 
     Raises:
         Refused: no installed package announces one.

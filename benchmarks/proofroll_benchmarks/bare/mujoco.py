@@ -13,18 +13,18 @@ from typing import Any
 import mujoco
 import numpy as np
 
-from proofroll.bench.bare import Bare, in_vertical_cylinder
 from proofroll.core.errors import Diverged, Refused
 from proofroll.core.scene import RollingBall, Scene
 from proofroll.elements.ball_on_surface.surfaces import FloatArray
 from proofroll.engines.mujoco import Mujoco
+from proofroll_benchmarks.bare import Bare, in_vertical_cylinder
 
 _ON_CONE = 1 - 1e-9
 _FATAL = (mujoco.mjtWarning.mjWARN_BADQPOS, mujoco.mjtWarning.mjWARN_BADQVEL, mujoco.mjtWarning.mjWARN_BADQACC)
 
 
 def prepare(scene: Scene, settings: Any) -> Bare:
-    """See :mod:`proofroll.bench.bare`; all formulations without edits of the contact's reference acceleration."""
+    """See :mod:`proofroll_benchmarks.bare`; all formulations without edits of the contact's reference acceleration."""
     body = in_vertical_cylinder(scene)
     if settings.curvature or settings.cone_correction:
         raise Refused("there is no bare loop with edits of the contact's reference acceleration")

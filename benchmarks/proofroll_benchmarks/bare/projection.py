@@ -14,16 +14,16 @@ import numpy as np
 from scipy.integrate import DOP853
 from scipy.linalg.lapack import dgesv
 
-from proofroll.bench.bare import Bare, in_vertical_cylinder
 from proofroll.core.errors import Diverged
 from proofroll.core.scene import RollingBall, Scene
 from proofroll.elements.ball_on_surface.surfaces import FloatArray
+from proofroll_benchmarks.bare import Bare, in_vertical_cylinder
 
 Equations = tuple[FloatArray, Callable[[float, FloatArray], FloatArray], Callable[[FloatArray], FloatArray], FloatArray]
 
 
 def prepare(scene: Scene, settings: Any) -> Bare:
-    """See :mod:`proofroll.bench.bare`; with bounded friction it watches for slip, and ends there."""
+    """See :mod:`proofroll_benchmarks.bare`; with bounded friction it watches for slip, and ends there."""
     body = in_vertical_cylinder(scene)
     equations = (_euler if settings.formulation == "euler" else _rotating_frame)(body)
     return Bare(

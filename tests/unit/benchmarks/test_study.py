@@ -7,10 +7,10 @@ from pathlib import Path
 
 import pytest
 
-from proofroll.bench.study import account, first_answer
 from proofroll.running.case import Case, Result, Status
 from proofroll.running.runner import Runner
 from proofroll.running.store import Store
+from proofroll_benchmarks.study import account, first_answer
 
 
 def test_shares_add_up() -> None:

@@ -11,18 +11,18 @@ import numpy as np
 import pytest
 from rich.console import Console
 
-from proofroll.bench import reference as bench
-from proofroll.bench import search as searching
-from proofroll.bench.compiled import Onsets, compiled, numeric
 from proofroll.core.errors import Refused
 from proofroll.elements.ball_on_surface.compiled import library
 from proofroll.files.scene_file import load_scene
-from proofroll.report.bench import reference_tables
 from proofroll.running.runner import Runner
 from proofroll.running.simulation import simulate
 from proofroll.running.store import Store
 from proofroll.running.timing import Timing
 from proofroll.truth.rolling import unreduced
+from proofroll_benchmarks import reference as bench
+from proofroll_benchmarks import search as searching
+from proofroll_benchmarks.compiled import Onsets, compiled, numeric
+from proofroll_benchmarks.tables import reference_tables
 
 needs_heyoka = pytest.mark.skipif(not library.available(), reason="heyoka is not installed")
 
@@ -82,7 +82,7 @@ def test_search_leaves_out_what_an_engine_can_do_without() -> None:
 @needs_heyoka
 def test_bulk_is_checked_against_one_at_a_time(monkeypatch: pytest.MonkeyPatch) -> None:
     """The error of the first slips in bulk is round-off, and a single wrong one shows."""
-    monkeypatch.setattr("proofroll.bench.compiled._CHECKED", 20)
+    monkeypatch.setattr("proofroll_benchmarks.compiled._CHECKED", 20)
     onsets = Onsets(SLIPPING, 4.0)
     assert onsets.error() < 1e-10
     index = int(np.flatnonzero(~np.isnan(onsets.found[:20]))[0])
@@ -106,7 +106,7 @@ def test_the_whole_without_engines(monkeypatch: pytest.MonkeyPatch) -> None:
     """The content is one JSON document with every ratio, and its tables fit the terminal."""
     monkeypatch.setattr(bench, "search", lambda *_: [])
     monkeypatch.setattr(bench, "numeric", lambda *_: None)
-    monkeypatch.setattr("proofroll.bench.compiled._CHECKED", 5)
+    monkeypatch.setattr("proofroll_benchmarks.compiled._CHECKED", 5)
     content: dict[str, Any] = bench.reference(2, lambda _: None)
     assert json.loads(json.dumps(content)) == content
     assert content["ratios"].keys() == bench.GOALS.keys()

@@ -13,17 +13,17 @@ import numpy as np
 import pinocchio as pin
 from scipy.integrate import DOP853
 
-from proofroll.bench.bare import Bare, in_vertical_cylinder
 from proofroll.core.errors import Diverged, Refused
 from proofroll.core.scene import Capability, RollingBall, Scene
 from proofroll.elements.ball_on_surface.surfaces import FloatArray
+from proofroll_benchmarks.bare import Bare, in_vertical_cylinder
 
 # What the adapter gives Pinocchio's cone where friction is unbounded.
 _UNBOUNDED = 1e6
 
 
 def prepare(scene: Scene, settings: Any) -> Bare:
-    """See :mod:`proofroll.bench.bare`; with bounded friction the rows watch for slip, and end there."""
+    """See :mod:`proofroll_benchmarks.bare`; with bounded friction the rows watch for slip, and end there."""
     body = in_vertical_cylinder(scene)
     if settings.formulation == "contact":
         if settings.solver != "pgs":

@@ -24,8 +24,8 @@ def adapters(
     as_json: Json = False,
 ) -> None:
     """Compare each adapter with the bare loop that a careful user of its engine would write."""
-    from proofroll.bench.adapters import bench_adapters, content
     from proofroll.core.plugins import engine_names, require_engine
+    from proofroll_benchmarks.adapters import bench_adapters, content
 
     for name in engine or ():
         require_engine(name)
@@ -34,8 +34,8 @@ def adapters(
     if as_json:
         write_json(found)
     else:
-        from proofroll.report.bench import adapter_table
         from proofroll.report.terminal import console
+        from proofroll_benchmarks.tables import adapter_table
 
         console().print(adapter_table(found))
         console().print(f"goal: at most {found['goal']:g}")
@@ -54,8 +54,8 @@ def study(
     as_json: Json = False,
 ) -> None:
     """Say what part of a study's wall time × workers is spent outside the engines, and on what."""
-    from proofroll.bench.study import bench_study
     from proofroll.core.plugins import engine_names, require_engine
+    from proofroll_benchmarks.study import bench_study
 
     for name in engine or ():
         require_engine(name)
@@ -64,8 +64,8 @@ def study(
     if as_json:
         write_json(found)
     else:
-        from proofroll.report.bench import study_lines, study_tables
         from proofroll.report.terminal import console
+        from proofroll_benchmarks.tables import study_lines, study_tables
 
         for part in (*study_tables(found), *study_lines(found)):
             console().print(part)
@@ -79,15 +79,15 @@ def reference(
     as_json: Json = False,
 ) -> None:
     """The compiled models against the engines: how many times faster, at how large an error."""
-    from proofroll.bench.reference import reference as measured
+    from proofroll_benchmarks.reference import reference as measured
 
     with spinner("reference") as sign:
         content: dict[str, Any] = measured(rounds, sign.update)
     if as_json:
         write_json(content)
     else:
-        from proofroll.report.bench import reference_tables
         from proofroll.report.terminal import console
+        from proofroll_benchmarks.tables import reference_tables
 
         out = console()
         for table in reference_tables(content):

@@ -14,8 +14,6 @@ from typing import Any
 
 import numpy as np
 
-from proofroll.bench.compiled import Onsets, Timed, compiled, numeric
-from proofroll.bench.search import SAMPLES, Found, search
 from proofroll.elements.ball_on_surface.compiled.first_slip import first_slip
 from proofroll.elements.ball_on_surface.compiled.library import require_heyoka
 from proofroll.elements.ball_on_surface.surfaces import FloatArray
@@ -27,6 +25,8 @@ from proofroll.running.store import Store
 from proofroll.running.timing import Interval, Timing, interleaved, machine, ratio
 from proofroll.truth.onset import first_slip as true_first_slip
 from proofroll.truth.rolling import unreduced
+from proofroll_benchmarks.compiled import Onsets, Timed, compiled, numeric
+from proofroll_benchmarks.search import SAMPLES, Found, search
 
 _SCENE = "sphere_in_cylinder"
 _PARAMETERS = {"speed": 4.0, "rolling_resistance": 5e-4}

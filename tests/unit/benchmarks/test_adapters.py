@@ -8,10 +8,10 @@ from typing import Any
 import numpy as np
 import pytest
 
-from proofroll.bench import loops
-from proofroll.bench.adapters import GOAL, Row, bench_adapters, content, measure_adapter
-from proofroll.bench.bare import Bare
 from proofroll.running.timing import Interval
+from proofroll_benchmarks import loops
+from proofroll_benchmarks.adapters import GOAL, Row, bench_adapters, content, measure_adapter
+from proofroll_benchmarks.bare import Bare
 
 
 def test_a_third_party_engine_without_a_bare_loop(

@@ -7,11 +7,11 @@ from collections.abc import Mapping
 import numpy as np
 import pytest
 
-from proofroll.bench.adapters import VARIANTS
-from proofroll.bench.loops import load_bare_loop
 from proofroll.core.errors import Diverged, Refused
 from proofroll.core.plugins import load_engine, resolve_settings
 from proofroll.files.scene_file import load_scene
+from proofroll_benchmarks.adapters import VARIANTS
+from proofroll_benchmarks.loops import load_bare_loop
 
 FORMULATIONS = [
     (engine, formulation)

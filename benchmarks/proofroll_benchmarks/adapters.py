@@ -73,9 +73,9 @@ def measure_adapter(
     Raises:
         Refused, Diverged: one of the two cannot be run.
     """
-    from proofroll.bench.loops import load_bare_loop
     from proofroll.core.plugins import load_engine, resolve_settings
     from proofroll.files.scene_file import load_scene
+    from proofroll_benchmarks.loops import load_bare_loop
 
     prepare = load_bare_loop(engine)
     kind = load_engine(engine)
@@ -137,8 +137,8 @@ def bench_adapters(
     progress: Callable[[str], None] | None = None,
 ) -> list[Row]:
     """All formulations of some engines, each with every variant, one worker process per engine."""
-    from proofroll.bench.loops import announced
     from proofroll.running.runner import Worker, WorkerDied
+    from proofroll_benchmarks.loops import announced
 
     rows: list[Row] = []
     for engine in engines:
@@ -164,14 +164,14 @@ def bench_adapters(
                 for variant, parameters in VARIANTS.items():
                     if progress:
                         progress(f"{engine} {formulation} {variant}")
-                    request = {
-                        "do": "bench",
+                    arguments = {
                         "engine": engine,
                         "options": {"formulation": formulation, "preset": found},
                         "parameters": dict(parameters),
                         "rounds": rounds,
                         "seconds": seconds,
                     }
+                    request = {"do": "call", "function": f"{__name__}:measure_adapter", "arguments": arguments}
                     try:
                         row = _row(worker.request(request, _LIMIT))
                     except WorkerDied as error:

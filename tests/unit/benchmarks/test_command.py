@@ -9,8 +9,8 @@ from collections.abc import Callable, Mapping
 import pytest
 
 from proofroll import cli
-from proofroll.report.bench import study_lines, study_tables
 from proofroll.report.terminal import console
+from proofroll_benchmarks.tables import study_lines, study_tables
 
 Proofroll = Callable[..., tuple[int, str, str]]
 QUICK = ("--rounds", "2", "--seconds", "0.005")
@@ -107,7 +107,7 @@ def test_reference_exits_as_its_goals_are_met(proofroll: Proofroll, monkeypatch:
     """A goal that is not met is exit code 1, as in the other benchmarks; the document is printed all the same."""
     ratio = {"value": 2.0, "low": 1.0, "high": 3.0, "goal": 2.0, "slow": "a", "fast": "b", "met": True}
     content = {"ratios": {"one": ratio, "other": {**ratio, "met": met}}, "onsets_per_second": ratio}
-    monkeypatch.setattr("proofroll.bench.reference.reference", lambda *_: content)
+    monkeypatch.setattr("proofroll_benchmarks.reference.reference", lambda *_: content)
     code, out, _ = proofroll("reference", "--json")
     assert code == (0 if met else 1)
     assert json.loads(out) == content
