@@ -160,7 +160,7 @@ def test_run_for_a_person(proofroll: Proofroll) -> None:
 
 def test_run_writes_netcdf(proofroll: Proofroll, tmp_path: Path) -> None:
     """``--out`` writes the trajectory over what was there, and leaves nothing else behind."""
-    from proofroll.elements.ball_on_surface.trajectory import read
+    from proofroll.files.netcdf import read
 
     target = tmp_path / "new" / "run.nc"
     target.parent.mkdir()
@@ -478,7 +478,7 @@ def test_a_reader_that_stops_reading() -> None:
 
 def test_run_with_orientation(proofroll: Proofroll, tmp_path: Path) -> None:
     """``--ask orientation`` makes an engine follow it that otherwise would not."""
-    from proofroll.elements.ball_on_surface.trajectory import read
+    from proofroll.files.netcdf import read
 
     arguments = with_option("--engine", "projection[formulation=rotating_frame]")
     for asked in ([], ["--ask", "orientation"]):

@@ -9,11 +9,12 @@ from typing import Any
 
 import numpy as np
 
+from proofroll.core.arrays import FloatArray
 from proofroll.core.scene import Scene
 from proofroll.elements.ball_on_surface.compiled.first_slip import FirstSlip, Model, first_slip
 from proofroll.elements.ball_on_surface.compiled.first_slips import first_slips
 from proofroll.elements.ball_on_surface.compiled.library import TIGHTEST
-from proofroll.elements.ball_on_surface.surfaces import FloatArray
+from proofroll.elements.ball_on_surface.element import rolling_ball
 from proofroll.files.scene_file import load_scene
 from proofroll.running.simulation import build
 
@@ -56,7 +57,7 @@ def compiled(scene: Scene, model: Model, times: FloatArray, true_p: FloatArray, 
     """
     for tolerance in _TOLERANCES:
         start = time.perf_counter()
-        run = FirstSlip(scene.rolling, model, tolerance)
+        run = FirstSlip(rolling_ball(scene), model, tolerance)
         spent = time.perf_counter() - start
         error = 0.0
         for t, p in zip(times.tolist(), true_p, strict=True):
@@ -133,7 +134,7 @@ class Onsets:
         self._balls = {
             "v2": random.uniform(2.5, 6.0, _BALLS),
             "mu": random.uniform(0.2, 0.5, _BALLS),
-            "f": random.uniform(0.0, 0.03, _BALLS) * scene.rolling.ball.radius,
+            "f": random.uniform(0.0, 0.03, _BALLS) * rolling_ball(scene).ball.radius,
         }
         start = time.perf_counter()
         self.found = first_slips(scene, until, **self._balls)

@@ -14,9 +14,10 @@ from typing import Any
 
 import numpy as np
 
+from proofroll.core.arrays import FloatArray
 from proofroll.elements.ball_on_surface.compiled.first_slip import first_slip
 from proofroll.elements.ball_on_surface.compiled.library import require_heyoka
-from proofroll.elements.ball_on_surface.surfaces import FloatArray
+from proofroll.elements.ball_on_surface.element import rolling_ball
 from proofroll.files.scene_file import load_scene
 from proofroll.running.runner import Runner
 from proofroll.running.simulation import simulate
@@ -68,7 +69,7 @@ def reference(rounds: int, progress: Callable[[str], None]) -> dict[str, Any]:
     grid = np.linspace(0.0, until, SAMPLES + 1)
     true_z = simulate(free, "truth", until=until, every=until / SAMPLES)["z"].to_numpy()
     times = np.append(grid[1:], slip)
-    true_p = unreduced(free.rolling, np.append(0.0, times)).p_WB[1:]  # shares nothing with what is judged
+    true_p = unreduced(rolling_ball(free), np.append(0.0, times)).p_WB[1:]  # shares nothing with what is judged
 
     progress("compiling")
     models = _models(scene, free, times, true_p)

@@ -8,12 +8,12 @@ from typing import Any
 
 import numpy as np
 
+from proofroll.core.arrays import FloatArray
 from proofroll.core.engine import Level
 from proofroll.core.errors import ProofrollError
 from proofroll.core.plugins import engine_names
 from proofroll.core.scene import Scene
-from proofroll.elements.ball_on_surface.surfaces import FloatArray
-from proofroll.elements.ball_on_surface.trajectory import read
+from proofroll.files.netcdf import read
 from proofroll.running.case import Case, EngineFacts, Result, Status
 from proofroll.running.runner import Runner, describe, resolve
 

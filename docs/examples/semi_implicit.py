@@ -9,8 +9,10 @@ from typing import Annotated, ClassVar, Literal
 from annotated_types import Gt
 
 from proofroll.core.engine import Built, Sample, whole_steps
-from proofroll.core.scene import Capability, RollingBall, Scene
+from proofroll.core.scene import Scene
+from proofroll.elements.ball_on_surface.element import rolling_ball
 from proofroll.elements.ball_on_surface.mechanics import newton_euler
+from proofroll.elements.ball_on_surface.model import ROLLS, RollingBall
 
 
 @dataclass(frozen=True)
@@ -27,9 +29,7 @@ class SemiImplicit:
     """Semi-implicit Euler on the unreduced equations."""
 
     name: ClassVar[str] = "semi_implicit"
-    provides: ClassVar[frozenset[Capability]] = frozenset(
-        {Capability.ROLLING, Capability.CURVED_SURFACE, Capability.ROLLING_RESISTANCE}
-    )
+    provides: ClassVar[Mapping[str, frozenset[str]]] = {"newton_euler": ROLLS}
     settings: ClassVar[type[Settings]] = Settings
     presets: ClassVar[Mapping[str, Mapping[str, Settings]]] = {"newton_euler": {"default": Settings()}}
 
@@ -39,7 +39,7 @@ class SemiImplicit:
 
     @classmethod
     def build(cls, scene: Scene, settings: Settings) -> SemiImplicit:
-        return cls(scene.rolling, settings.dt)
+        return cls(rolling_ball(scene), settings.dt)
 
     def __init__(self, body: RollingBall, dt: float) -> None:
         self.body, self.dt, self.t = body, dt, 0.0

@@ -11,28 +11,32 @@ from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from typing import ClassVar, Self
 
+from proofroll.core.arrays import FloatArray
 from proofroll.core.engine import Built, Sample
-from proofroll.core.scene import Capability, Gravity, Scene
-from proofroll.elements.ball_on_surface.surfaces import FloatArray
+from proofroll.core.gravity import Gravity
+from proofroll.core.scene import Scene
+from proofroll.elements.ball_on_surface.element import changed
 from proofroll.engines.projection import Projection
 
 
 def _ball(**factors: float) -> Callable[[Scene], Scene]:
     def change(scene: Scene) -> Scene:
-        ball = scene.balls[0]
+        ball = scene.elements[0].ball
         values = {name: getattr(ball, name) * factor for name, factor in factors.items()}
-        return dataclasses.replace(scene, balls=(dataclasses.replace(ball, **values),))
+        return changed(scene, ball=dataclasses.replace(ball, **values))
 
     return change
 
 
 def _gravity(scene: Scene) -> Scene:
-    return dataclasses.replace(scene, gravity=Gravity(scene.gravity.magnitude * 1.001, scene.gravity.direction))
+    return changed(
+        scene, gravity=Gravity(scene.elements[0].gravity.magnitude * 1.001, scene.elements[0].gravity.direction)
+    )
 
 
 def _resistance(scene: Scene) -> Scene:
-    contact = dataclasses.replace(scene.contacts[0], rolling_resistance=0.0)
-    return dataclasses.replace(scene, contacts=(contact,))
+    contact = dataclasses.replace(scene.elements[0].contact, rolling_resistance=0.0)
+    return changed(scene, contact=contact)
 
 
 def _same(scene: Scene) -> Scene:
@@ -75,7 +79,7 @@ class Broken:
     """The projection method with a defect."""
 
     name: ClassVar[str] = "broken"
-    provides: ClassVar[frozenset[Capability]] = Projection.provides
+    provides: ClassVar[Mapping[str, frozenset[str]]] = Projection.provides
     settings: ClassVar[type[BrokenSettings]] = BrokenSettings
     presets: ClassVar[Mapping[str, Mapping[str, BrokenSettings]]] = {
         name: {"matched": BrokenSettings(name)}

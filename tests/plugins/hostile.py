@@ -14,9 +14,11 @@ import numpy as np
 
 from proofroll.core.engine import Built, Sample
 from proofroll.core.errors import Diverged, Refused
-from proofroll.core.scene import Capability, Scene
+from proofroll.core.scene import Scene
 from proofroll.elements.ball_on_surface.closed_form import closed_form
+from proofroll.elements.ball_on_surface.element import rolling_ball
 from proofroll.elements.ball_on_surface.mechanics import initial_response
+from proofroll.elements.ball_on_surface.model import BallCapability
 
 
 @dataclass(frozen=True)
@@ -42,7 +44,7 @@ class Oracle:
     """Well behaved: answers with the closed form, and says so to standard output and standard error."""
 
     name: ClassVar[str] = "oracle"
-    provides: ClassVar[frozenset[Capability]] = frozenset({Capability.ROLLING, Capability.CURVED_SURFACE})
+    provides: ClassVar[frozenset[BallCapability]] = frozenset({BallCapability.ROLLING, BallCapability.CURVED_SURFACE})
     settings: ClassVar[type[HostileSettings]] = HostileSettings
     presets: ClassVar[Mapping[str, Mapping[str, HostileSettings]]] = {"only": {"matched": HostileSettings()}}
 
@@ -57,7 +59,7 @@ class Oracle:
         return cls(scene)
 
     def __init__(self, scene: Scene) -> None:
-        self.body = scene.rolling
+        self.body = rolling_ball(scene)
         self.t = 0.0
 
     def advance(self, t: float) -> None:

@@ -10,7 +10,8 @@ from tiny import Tiny, TinySettings
 
 from proofroll.core.engine import Level, Term, whole_steps
 from proofroll.core.errors import Refused
-from proofroll.core.scene import Capability, Scene
+from proofroll.core.scene import Scene
+from proofroll.elements.ball_on_surface.model import BallCapability
 
 
 @dataclass(frozen=True)
@@ -39,7 +40,7 @@ class Laddered(Tiny):
         Term("gale", ("heavier",), {"wind": "gale"}, {"wind": "none"}, "blows", rung=True),
         Term("storm", ("heavier",), {"wind": "storm"}, {"wind": "none"}, "blows it over", rung=True),
     )
-    inherent: ClassVar[Mapping[str, Mapping[Capability, str]]] = {"heavier": {Capability.ORIENTATION: "so it is"}}
+    inherent: ClassVar[Mapping[str, Mapping[str, str]]] = {"heavier": {BallCapability.ORIENTATION: "so it is"}}
 
     @classmethod
     def build(cls, scene: Scene, settings: Any) -> Self:

@@ -12,7 +12,9 @@ from tiny import Tiny, TinySettings
 
 from proofroll.core.engine import Built, Sample
 from proofroll.core.errors import Refused
-from proofroll.core.scene import Capability, Scene
+from proofroll.core.scene import Scene
+from proofroll.elements.ball_on_surface.element import changed
+from proofroll.elements.ball_on_surface.model import BallCapability
 
 
 class Unannounced(Tiny):
@@ -33,7 +35,7 @@ class Versionless(Tiny):
 class ProvidesText(Tiny):
     """Says what it provides in its own words."""
 
-    provides: ClassVar[Any] = frozenset({"rolling", Capability.ROLLING})
+    provides: ClassVar[Any] = frozenset({"rolling", BallCapability.ROLLING})
 
 
 @dataclass
@@ -97,7 +99,7 @@ class Boastful(Tiny):
     @classmethod
     def build(cls, scene: Scene, settings: Any) -> Self:
         """Refuses what it said it provides."""
-        if Capability.ROLLING_RESISTANCE in scene.requires:
+        if BallCapability.ROLLING_RESISTANCE in scene.requires:
             raise Refused("no resistance, after all")
         return super().build(scene, settings)
 
@@ -108,7 +110,7 @@ class Silent(Tiny):
     @classmethod
     def build(cls, scene: Scene, settings: Any) -> Self:
         """No reason given."""
-        if Capability.CURVED_SURFACE not in scene.requires:
+        if BallCapability.CURVED_SURFACE not in scene.requires:
             raise Refused("")
         return super().build(scene, settings)
 
@@ -117,9 +119,9 @@ class Heavy(Tiny):
     """Builds a ball of twice the inertia."""
 
     def __init__(self, scene: Scene, settings: Any) -> None:
-        ball = scene.balls[0]
+        ball = scene.elements[0].ball
         heavy = dataclasses.replace(ball, inertia_ratio=2 * ball.inertia_ratio)
-        super().__init__(dataclasses.replace(scene, balls=(heavy,)), settings)
+        super().__init__(changed(scene, ball=heavy), settings)
 
 
 class Wasteful(Tiny):
@@ -144,7 +146,7 @@ class Turning(Tiny):
     def built(self) -> Built:
         """Among its terms."""
         right = super().built()
-        return dataclasses.replace(right, terms=(right.terms or frozenset()) | {Capability.ORIENTATION})
+        return dataclasses.replace(right, terms=(right.terms or frozenset()) | {BallCapability.ORIENTATION})
 
     def sample(self) -> Sample:
         """With an orientation."""

@@ -9,11 +9,13 @@ from typing import Annotated, Any, ClassVar, Literal, Self
 import numpy as np
 from annotated_types import Gt
 
+from proofroll.core.arrays import FloatArray
 from proofroll.core.engine import Built, Sample, whole_steps
-from proofroll.core.scene import Capability, Scene
+from proofroll.core.scene import Scene
+from proofroll.elements.ball_on_surface.element import rolling_ball
 from proofroll.elements.ball_on_surface.mechanics import initial_response
+from proofroll.elements.ball_on_surface.model import ROLLS, BallCapability
 from proofroll.elements.ball_on_surface.rolling_equations import reduced_rates
-from proofroll.elements.ball_on_surface.surfaces import FloatArray
 
 
 @dataclass(frozen=True)
@@ -39,9 +41,7 @@ class Tiny:
     """The midpoint rule, of second order, on (u, u̇, ω1)."""
 
     name: ClassVar[str] = "tiny"
-    provides: ClassVar[frozenset[Capability]] = frozenset(
-        {Capability.ROLLING, Capability.CURVED_SURFACE, Capability.ROLLING_RESISTANCE}
-    )
+    provides: ClassVar[Mapping[str, frozenset[str]]] = {"midpoint": ROLLS}
     settings: ClassVar[type[Any]] = TinySettings
     presets: ClassVar[Mapping[str, Mapping[str, Any]]] = {"midpoint": {"matched": TinySettings()}}
 
@@ -56,9 +56,9 @@ class Tiny:
         return cls(scene, settings)
 
     def __init__(self, scene: Scene, settings: Any) -> None:
-        self.body, self.dt, self.t = scene.rolling, settings.dt, 0.0
+        self.body, self.dt, self.t = rolling_ball(scene), settings.dt, 0.0
         self.resists = self.body.contact.rolling_resistance > 0
-        self.x = np.array([*self.body.u0, *self.body.udot0, scene.initial[0].spin])
+        self.x = np.array([*self.body.u0, *self.body.udot0, scene.elements[0].start.spin])
 
     def rates(self, x: FloatArray) -> FloatArray:
         """ẋ."""
@@ -87,5 +87,5 @@ class Tiny:
             ball_radius=ball.radius,
             rolling_resistance=self.body.contact.rolling_resistance,
             acceleration=initial_response(self.body)[0],
-            terms=frozenset({Capability.ROLLING_RESISTANCE} if self.resists else ()),
+            terms=frozenset({BallCapability.ROLLING_RESISTANCE} if self.resists else ()),
         )

@@ -10,6 +10,7 @@ import pytest
 
 from proofroll.elements.ball_on_surface.closed_form import closed_form
 from proofroll.elements.ball_on_surface.compiled import library, rolling
+from proofroll.elements.ball_on_surface.element import rolling_ball
 from proofroll.elements.ball_on_surface.mechanics import energy
 from proofroll.files.scene_file import load_scene
 from proofroll.running.simulation import build
@@ -17,7 +18,7 @@ from proofroll.running.simulation import build
 needs_heyoka = pytest.mark.skipif(not library.available(), reason="heyoka is not installed")
 
 SCENE = load_scene("sphere_in_cylinder", axial_speed=0.3, radial_spin=7.0)
-BODY = SCENE.rolling
+BODY = rolling_ball(SCENE)
 RATE = float(np.sqrt(2 / 7) * BODY.udot0[0])  # ν [rad/s]
 PERIOD = 2 * np.pi / RATE
 KINETIC = 0.7 * BODY.ball.mass * float(BODY.v0 @ BODY.v0)
@@ -90,7 +91,7 @@ def test_without_elimination_a_coarse_step_adds_up() -> None:
 
 def test_phase_of_the_closed_form() -> None:
     """After a million oscillations z is as far from the exact value as round-off of νt lets it be, 4 ε νt."""
-    body = load_scene("sphere_in_cylinder").rolling
+    body = rolling_ball(load_scene("sphere_in_cylinder"))
     getcontext().prec = 60
     # V0 = 4, and the c of the scene: the exact values of the numbers in double precision
     c, omega = Decimal(body.surface.length_scales[0]), Decimal(float(body.udot0[0]))
@@ -114,7 +115,7 @@ def test_a_million_oscillations() -> None:
 
     4 of that is the closed form's own round-off, the rest that of some three million steps of the series.
     """
-    body = load_scene("sphere_in_cylinder").rolling
+    body = rolling_ball(load_scene("sphere_in_cylinder"))
     model = rolling.reduced(resistance=False, uniform=True, tolerance=EPS)
     series = copy.copy(model.integrator)
     series.time, series.state[:] = 0.0, rolling.start(body)

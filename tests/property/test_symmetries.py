@@ -12,10 +12,11 @@ import xarray as xr
 from hypothesis import given
 from hypothesis import strategies as st
 
+from proofroll.core.certificate import certify, first_difference
 from proofroll.core.scene import Scene
-from proofroll.elements.ball_on_surface.certificate import certify, first_difference
+from proofroll.elements.ball_on_surface.dataset import variables
+from proofroll.elements.ball_on_surface.element import changed, rolling_ball
 from proofroll.elements.ball_on_surface.observables import energy_balance
-from proofroll.elements.ball_on_surface.trajectory import trajectory
 from proofroll.files.scene_file import load_scene
 from proofroll.running.simulation import build, simulate
 from proofroll.truth.rolling import reduced, unreduced
@@ -41,8 +42,8 @@ def solve(way: str, scene: Scene, until: float, samples: int = 3) -> xr.Dataset:
     routes = {"reduced": reduced, "unreduced": unreduced}
     times = np.linspace(0, until, samples)
     if way in routes:
-        motion = routes[way](scene.rolling, times)
-        return trajectory(scene, times, motion.p_WB, motion.v_WB, motion.w_WB, force=motion.force)
+        motion = routes[way](rolling_ball(scene), times)
+        return variables(rolling_ball(scene), times, motion.p_WB, motion.v_WB, motion.w_WB, force=motion.force)
     return simulate(scene, way, until=until, every=until / (samples - 1))
 
 
@@ -56,8 +57,8 @@ def way(request: pytest.FixtureRequest) -> Any:
 
 def moved(scene: Scene, coordinates: tuple[float, float]) -> Scene:
     """The same scene with the ball starting somewhere else on the surface."""
-    start = dataclasses.replace(scene.initial[0], coordinates=coordinates)
-    return dataclasses.replace(scene, initial=(start,))
+    start = dataclasses.replace(scene.elements[0].start, coordinates=coordinates)
+    return changed(scene, start=start)
 
 
 # Size of each quantity, by which a difference is judged.
@@ -121,12 +122,12 @@ def test_one_run_in_two(way: str, motion: dict[str, float]) -> None:
     whole = solve(way, scene, 2 * UNTIL)
     middle = {name: float(whole[name][1]) for name in SIZES}
     start = dataclasses.replace(
-        scene.initial[0],
+        scene.elements[0].start,
         coordinates=(middle["gamma"], middle["z"]),
         velocity=(0.2 * middle["gamma_rate"], middle["z_rate"]),
         spin=middle["omega1"],
     )
-    rest = solve(way, dataclasses.replace(scene, initial=(start,)), UNTIL)
+    rest = solve(way, changed(scene, start=start), UNTIL)
     assert_same(rest.isel(time=[-1]), whole.isel(time=[-1]))
 
 
@@ -137,12 +138,12 @@ def test_reversal(way: str, motion: dict[str, float]) -> None:
     there = solve(way, scene, UNTIL)
     end = {name: float(there[name][-1]) for name in SIZES}
     start = dataclasses.replace(
-        scene.initial[0],
+        scene.elements[0].start,
         coordinates=(end["gamma"], end["z"]),
         velocity=(-0.2 * end["gamma_rate"], -end["z_rate"]),
         spin=-end["omega1"],
     )
-    back = solve(way, dataclasses.replace(scene, initial=(start,)), UNTIL)
+    back = solve(way, changed(scene, start=start), UNTIL)
     signs = dict.fromkeys(("gamma_rate", "z_rate", "omega1", "omega2", "omega3"), -1)
     assert_same(back.isel(time=[-1]), there.isel(time=[0]), factors=signs)
 
@@ -155,7 +156,7 @@ def test_energy_is_accounted_for(way: str, motion: dict[str, float]) -> None:
     kinetic = float(dataset["energy"][0])
     # a spline of degree 7 through 31 samples integrates the power to about 1e-9 of the work
     bound = 1e-9 if motion["rolling_resistance"] else 1e-11
-    assert np.max(np.abs(energy_balance(scene.rolling, dataset))) < bound * kinetic
+    assert np.max(np.abs(energy_balance(rolling_ball(scene), dataset))) < bound * kinetic
 
 
 @given(motion=MOTIONS, radius=st.floats(0.005, 0.2), mass=st.floats(1e-3, 1e3), gravity=st.floats(0, 50))

@@ -18,9 +18,9 @@ from browsing import Visit, launched, visiting
 from invented import figures_part, further
 
 from proofroll.core.comparison import Band, Comparison, Row, Tolerance
+from proofroll.core.dataset import observe, scales
 from proofroll.core.verdict import Verdict, judge
-from proofroll.elements.ball_on_surface.observables import observables, scales
-from proofroll.elements.ball_on_surface.trajectory import write
+from proofroll.files.netcdf import write
 from proofroll.files.scene_file import load_scene
 from proofroll.report.growing_report import begun, write_report
 from proofroll.report.html import page
@@ -77,8 +77,8 @@ def made(tmp_path_factory: pytest.TempPathFactory) -> tuple[Outcome, Store]:
 
         truths[point_name(point)] = case("truth")
         write(true, store.trajectory(truths[point_name(point)]))
-        sizes = scales(scene.rolling, true)
-        expected = observables(scene.rolling, true)
+        sizes = scales(scene, true)
+        expected = observe(scene, true)
         plans = [("matched", 1e-9, 0.2), ("default", 1e-3, 0.01), (None, 1e-7, 0.5)]
         for row, (preset, off, seconds) in zip(rows, plans, strict=False):
             settings = {"formulation": "fine" if preset else "only", "preset": preset, "dt": 1e-3}
@@ -100,7 +100,7 @@ def made(tmp_path_factory: pytest.TempPathFactory) -> tuple[Outcome, Store]:
                     scale=sizes[name],
                     limit=None,
                 )
-                for name, curve in observables(scene.rolling, dataset).items()
+                for name, curve in observe(scene, dataset).items()
                 if name in bounds
             ]
             line = {

@@ -13,9 +13,9 @@ import numpy as np
 import pytest
 
 from proofroll.core.comparison import ExceptAt, Row, Tolerance
+from proofroll.core.dataset import observe
 from proofroll.core.verdict import Verdict, judge
-from proofroll.elements.ball_on_surface.observables import observables
-from proofroll.elements.ball_on_surface.trajectory import read, write
+from proofroll.files.netcdf import read, write
 from proofroll.files.scene_file import load_scene
 from proofroll.report.evidence import add_evidence, cost
 from proofroll.report.html import page
@@ -63,12 +63,12 @@ def test_largest_error_that_is_drawn_is_the_judged_one(made: tuple[Outcome, Stor
         noise[rng.integers(10, times.size)] = -1.23456789e-4
         off[curve] = off[curve] + noise
     write(off, store.trajectory(run.case))
-    expected = observables(scene.rolling, fine)
+    expected = observe(scene, fine)
     judged = {
         key: judge(
             key, "", curve.values, expected[key].values, truth_error_bar=0.0, tolerance=1.0, scale=1.0, limit=None
         )
-        for key, curve in observables(scene.rolling, off).items()
+        for key, curve in observe(scene, off).items()
         if key in {"gamma", "z", "N", "F2", "F3"}
     }
     one = dataclasses.replace(outcome, runs=[run], truths={name: outcome.truths[name]})

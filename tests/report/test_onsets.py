@@ -15,7 +15,7 @@ import pytest
 from proofroll.core.comparison import Band, Comparison, Row, Tolerance
 from proofroll.core.events import Event, events_of, with_events
 from proofroll.core.verdict import Judgement, Verdict
-from proofroll.elements.ball_on_surface.trajectory import write
+from proofroll.files.netcdf import write
 from proofroll.files.scene_file import load_scene
 from proofroll.report.growing_report import write_report
 from proofroll.report.html import page

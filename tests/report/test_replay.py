@@ -17,7 +17,8 @@ from browsing import Visit
 from scipy.integrate import solve_ivp
 from scipy.spatial.transform import Rotation
 
-from proofroll.elements.ball_on_surface.trajectory import read, write
+from proofroll.elements.ball_on_surface.element import rolling_ball
+from proofroll.files.netcdf import read, write
 from proofroll.files.scene_file import load_scene
 from proofroll.report import replay_library
 from proofroll.report.html import page
@@ -41,7 +42,7 @@ def sampled(dataset: Any) -> dict[str, Any]:
 def rolling() -> tuple[Any, dict[str, Any]]:
     """The ball in the cylinder without resistance, and its truth, sampled as comparisons are."""
     scene = load_scene("sphere_in_cylinder", speed=SPEED)
-    return scene.rolling, sampled(truth(scene, np.linspace(0, UNTIL, round(UNTIL / EVERY) + 1)))
+    return rolling_ball(scene), sampled(truth(scene, np.linspace(0, UNTIL, round(UNTIL / EVERY) + 1)))
 
 
 def spin(body: Any, t: float) -> Any:
@@ -90,7 +91,7 @@ def test_an_engine_keeps_its_own_orientation(rolling: Any) -> None:
 @pytest.mark.parametrize("name", ["sphere_in_cylinder", "inclined_plane"])
 def test_the_contact_lies_on_the_wall(name: str) -> None:
     """Also where an engine's ball has sunk in or come out, and on every surface."""
-    body = load_scene(name).rolling
+    body = rolling_ball(load_scene(name))
     data = sampled(truth(load_scene(name), np.linspace(0, 0.2, 11)))
     for depth in (0.0, 2e-3, -2e-3):
         moved = {**data, "p_WB": data["p_WB"] + depth * body.surface.normal(data["p_WB"])}
@@ -151,7 +152,7 @@ def test_a_run_that_ends_early_is_shown_until_then(rolling: Any) -> None:
 @pytest.mark.parametrize("name", ["sphere_in_cylinder", "inclined_plane"])
 def test_the_drawn_wall_is_the_wall_around_the_path(name: str) -> None:
     """Its points lie on the wall and reach beyond the path; a camera that follows keeps to the axis or to the ball."""
-    body = load_scene(name).rolling
+    body = rolling_ball(load_scene(name))
     u = body.u0 + np.linspace(0, 1, 20)[:, None] * np.array([0.3, -0.5])
     built = wall(body, u)
     assert np.abs(body.wall.gap(built.points)).max() < 1e-12

@@ -11,9 +11,12 @@ from __future__ import annotations
 from collections.abc import Callable
 from dataclasses import dataclass
 
+from proofroll.core.arrays import FloatArray
 from proofroll.core.errors import Refused
-from proofroll.core.scene import RollingBall, Scene
-from proofroll.elements.ball_on_surface.surfaces import Cylinder, FloatArray
+from proofroll.core.scene import Scene
+from proofroll.elements.ball_on_surface.element import rolling_ball
+from proofroll.elements.ball_on_surface.model import RollingBall
+from proofroll.elements.ball_on_surface.surfaces import Cylinder
 
 GROUP = "proofroll.bare_loops"
 
@@ -40,7 +43,7 @@ def in_vertical_cylinder(scene: Scene) -> RollingBall:
     Raises:
         Refused: the scene is another one.
     """
-    body = scene.rolling
+    body = rolling_ball(scene)
     vertical = isinstance(body.surface, Cylinder) and body.surface.tilt == 0 and not body.gravity[:2].any()
     if not vertical or body.u0.any():
         raise Refused("the bare loop is written for a vertical cylinder and a start at its zero of angle and height")

@@ -13,9 +13,10 @@ from typing import Any
 
 import numpy as np
 
+from proofroll.core.arrays import FloatArray
 from proofroll.core.errors import Diverged
-from proofroll.core.scene import RollingBall, Scene
-from proofroll.elements.ball_on_surface.surfaces import FloatArray
+from proofroll.core.scene import Scene
+from proofroll.elements.ball_on_surface.model import RollingBall
 from proofroll.engines.exudyn.carrier import Carrier
 from proofroll.engines.exudyn.contact import Contact
 from proofroll.engines.exudyn.integration import new_system, simulation_settings

@@ -13,9 +13,10 @@ from typing import Any
 import mujoco
 import numpy as np
 
+from proofroll.core.arrays import FloatArray
 from proofroll.core.errors import Diverged, Refused
-from proofroll.core.scene import RollingBall, Scene
-from proofroll.elements.ball_on_surface.surfaces import FloatArray
+from proofroll.core.scene import Scene
+from proofroll.elements.ball_on_surface.model import RollingBall
 from proofroll.engines.mujoco import Mujoco
 from proofroll_benchmarks.bare import Bare, in_vertical_cylinder
 

@@ -13,9 +13,10 @@ import numpy as np
 import pinocchio as pin
 from scipy.integrate import DOP853
 
+from proofroll.core.arrays import FloatArray
 from proofroll.core.errors import Diverged, Refused
-from proofroll.core.scene import Capability, RollingBall, Scene
-from proofroll.elements.ball_on_surface.surfaces import FloatArray
+from proofroll.core.scene import Scene
+from proofroll.elements.ball_on_surface.model import BallCapability, RollingBall
 from proofroll_benchmarks.bare import Bare, in_vertical_cylinder
 
 # What the adapter gives Pinocchio's cone where friction is unbounded.
@@ -31,7 +32,7 @@ def prepare(scene: Scene, settings: Any) -> Bare:
         return Bare(_contact(body, settings), 1e-9, "the geometry is rounded otherwise, and the solver stops at 1e-12")
     if settings.integrator != "dop853" or not settings.projection:
         raise Refused("there is a bare loop only with dop853 and projection")
-    if settings.orientation or Capability.ORIENTATION in scene.requires:
+    if settings.orientation or BallCapability.ORIENTATION in scene.requires:
         raise Refused("there is no bare loop that follows the ball's orientation")
     rows = (_Composite if settings.formulation == "composite" else _FreeFlyer)(body)
     return Bare(

@@ -14,9 +14,10 @@ import numpy as np
 from scipy.integrate import DOP853
 from scipy.linalg.lapack import dgesv
 
+from proofroll.core.arrays import FloatArray
 from proofroll.core.errors import Diverged
-from proofroll.core.scene import RollingBall, Scene
-from proofroll.elements.ball_on_surface.surfaces import FloatArray
+from proofroll.core.scene import Scene
+from proofroll.elements.ball_on_surface.model import RollingBall
 from proofroll_benchmarks.bare import Bare, in_vertical_cylinder
 
 Equations = tuple[FloatArray, Callable[[float, FloatArray], FloatArray], Callable[[FloatArray], FloatArray], FloatArray]

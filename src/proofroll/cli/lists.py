@@ -67,7 +67,9 @@ def engines(as_json: Json = False) -> None:
             table.add_row(item["name"], item["status"], item["message"], "")
             continue
         formulations = "\n".join(f"{name} ({', '.join(presets)})" for name, presets in item["presets"].items())
-        table.add_row(item["name"], item["version"], formulations, "\n".join(item["provides"]))
+        table.add_row(
+            item["name"], item["version"], formulations, "\n".join(sorted(set().union(*item["provides"].values())))
+        )
     console().print(table)
 
 

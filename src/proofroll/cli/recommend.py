@@ -45,7 +45,6 @@ def recommend(
     told apart, unless --engine asks for them. Of the cheaper ones, which all fail, the most accurate is shown.
     """
     from proofroll.core.plugins import parse_engine, require_engine
-    from proofroll.elements.ball_on_surface.observables import units
     from proofroll.report.tradeoff_tables import answer_lines
     from proofroll.studies.recommend import Wish
     from proofroll.studies.recommend import recommend as answered
@@ -54,7 +53,7 @@ def recommend(
     require_observables(question, [question.quantity])  # before minutes are spent on measuring
     for text in engine or []:
         require_engine(parse_engine(text).name)
-    unit = units(question.loaded().rolling)[question.quantity]
+    unit = question.loaded().observables[question.quantity].unit
     wish = Wish(question.quantity, _tolerance(tolerance, unit), _positive("budget", budget), tuple(engine or ()))
     ranges = ranges_of(question, over) if over is not None else None
     study = _stored_study(question, engine or [], claims, ranges, out, jobs, measure_first=measure_first)

@@ -119,18 +119,15 @@ def question_of(
     time_grid(length, length or 1.0)
     if length <= 0:
         raise InputError("until", length, "give a positive time in s")
-    quantity = quantities[0] if quantities else loaded.rolling.surface.coordinates[-1]
+    quantity = quantities[0] if quantities else loaded.deciding
     return None, Question(name, {key: loaded.parameters[key] for key in given}, length, quantity)
 
 
 def require_observables(question: Question, names: list[str]) -> None:
     """Refuses what no run of the scene can be asked for."""
-    from proofroll.elements.ball_on_surface.observables import units
-
-    known = units(question.loaded().rolling)
+    scene = question.loaded()
     for name in names:
-        if name not in known:
-            raise InputError("quantity", name, f"there is no such observable; choose from {', '.join(known)}")
+        scene.observable(name)
 
 
 def ranges_of(question: Question, texts: list[str]) -> dict[str, list[float]]:

@@ -9,15 +9,16 @@ from unittest import SkipTest
 import numpy as np
 
 from proofroll.conformance.subject import Subject, bits, require, scenes
-from proofroll.core.engine import Sample
+from proofroll.core.certificate import certify, first_difference
+from proofroll.core.engine import Sample, require_provided
 from proofroll.core.errors import Refused
-from proofroll.core.scene import Capability, Scene
-from proofroll.elements.ball_on_surface.certificate import certify, first_difference
+from proofroll.core.scene import Scene
+from proofroll.elements.ball_on_surface.model import BallCapability
 
 
 def builds_or_refuses(subject: Subject) -> None:
     """The engine builds the scene, or refuses it in one line that says why."""
-    if subject.scene.requires - subject.engine.provides:
+    if subject.scene.requires - subject.engine.provides[subject.settings.formulation]:
         return
     try:
         subject.engine.build(subject.scene, subject.settings)
@@ -29,30 +30,28 @@ def builds_or_refuses(subject: Subject) -> None:
 
 
 def provides_what_it_says(engine: Any) -> None:
-    """For each capability that the engine provides some formulation builds a scene that needs it."""
-    for capability in sorted(engine.provides):
-        refusals: list[str] = []
-        if not any(
-            _some_builds(engine, scene, refusals) for scene in scenes().values() if capability in scene.requires
-        ):
-            raise AssertionError(f"provides {capability}, but builds no scene that needs it: {'; '.join(refusals)}")
+    """For each capability that a formulation provides it builds some scene that needs it, with some preset."""
+    for formulation, provides in engine.provides.items():
+        for capability in sorted(provides):
+            needing = [scene for scene in scenes().values() if capability in scene.requires]
+            refusals = [_refusal(engine, formulation, scene) for scene in needing]
+            if needing and all(refusals):
+                said = "; ".join(f"{scene.name}: {why}" for scene, why in zip(needing, refusals, strict=True))
+                raise AssertionError(f"{formulation} provides {capability}, but builds no scene that needs it: {said}")
 
 
-def _some_builds(engine: Any, scene: Scene, refusals: list[str]) -> bool:
-    """Whether any preset builds the scene; the reasons of those that do not go to ``refusals``."""
-    lacking = scene.requires - engine.provides
-    if lacking:
-        refusals.append(f"{scene.name} needs {', '.join(sorted(lacking))}")
-        return False
-    for presets in engine.presets.values():
-        for settings in presets.values():
-            try:
-                engine.build(scene, settings)
-            except Refused as refusal:
-                refusals.append(f"{settings.formulation} on {scene.name}: {refusal}")
-            else:
-                return True
-    return False
+def _refusal(engine: Any, formulation: str, scene: Scene) -> str:
+    """Why no preset of a formulation builds the scene; nothing if one does."""
+    why = "it has no preset"
+    for settings in engine.presets.get(formulation, {}).values():
+        try:
+            require_provided(engine, formulation, scene)
+            engine.build(scene, settings)
+        except Refused as refusal:
+            why = str(refusal)
+        else:
+            return ""
+    return why
 
 
 def certificate_holds(subject: Subject) -> None:
@@ -75,19 +74,19 @@ def builds_only_what_is_required(subject: Subject) -> None:
     require(not lacking, f"the scene requires {_listed(lacking)}, of which nothing was built")
     excused = set(getattr(subject.engine, "inherent", {}).get(subject.settings.formulation, {}))
     if getattr(subject.settings, "orientation", None) is True:
-        excused.add(Capability.ORIENTATION)
+        excused.add(BallCapability.ORIENTATION)
     wasted = terms - required - excused
     require(not wasted, f"{_listed(wasted)} is in the model, which the scene does not require")
     follows = engine.sample().q_WB is not None
-    told = Capability.ORIENTATION in terms
+    told = BallCapability.ORIENTATION in terms
     require(follows == told, f"the orientation is {'' if told else 'not '}in the model, yet a sample tells otherwise")
 
 
 # What a scene may require besides a ball that rolls on a surface.
-_OPTIONAL = frozenset({Capability.ROLLING_RESISTANCE, Capability.BOUNDED_FRICTION, Capability.ORIENTATION})
+_OPTIONAL = frozenset({BallCapability.ROLLING_RESISTANCE, BallCapability.BOUNDED_FRICTION, BallCapability.ORIENTATION})
 
 
-def _listed(capabilities: Iterable[Capability]) -> str:
+def _listed(capabilities: Iterable[BallCapability]) -> str:
     return ", ".join(sorted(capabilities))
 
 

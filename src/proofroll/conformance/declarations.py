@@ -5,13 +5,13 @@ from __future__ import annotations
 import dataclasses
 import json
 import math
+from collections.abc import Mapping
 from importlib.metadata import entry_points
 from typing import Any
 
 from proofroll.conformance.subject import require
 from proofroll.core.errors import InputError
 from proofroll.core.plugins import GROUP, resolve_settings
-from proofroll.core.scene import Capability
 
 
 def name_is_the_entry_point(engine: Any) -> None:
@@ -29,12 +29,19 @@ def version_is_told(engine: Any) -> None:
 
 
 def provides_capabilities(engine: Any) -> None:
-    """What the engine provides is a frozen set of capabilities with at least rolling in it."""
-    provides = engine.provides
-    require(isinstance(provides, frozenset), f"provides is a {type(provides).__name__}; make it a frozenset")
-    unknown = {item for item in provides if not isinstance(item, Capability)}
-    require(not unknown, f"provides holds {unknown}, which are not members of Capability")
-    require(Capability.ROLLING in provides, "every scene so far needs Capability.ROLLING, which is not provided")
+    """Each formulation says what it provides: a frozen set of texts, none of them empty."""
+    require(
+        isinstance(engine.provides, Mapping), "provides must be a mapping: formulation -> frozenset of capabilities"
+    )
+    missing = engine.presets.keys() ^ engine.provides.keys()
+    require(not missing, f"provides and presets must name the same formulations; only one has {sorted(missing)}")
+    for formulation, provides in engine.provides.items():
+        require(
+            isinstance(provides, frozenset), f"provides of {formulation} is a {type(provides).__name__}, no frozenset"
+        )
+        require(provides, f"{formulation} provides nothing, so it can represent no scene")
+        odd = {item for item in provides if not (isinstance(item, str) and item)}
+        require(not odd, f"provides of {formulation} holds {odd}, which are no texts")
 
 
 def settings_are_a_frozen_dataclass(engine: Any) -> None:

@@ -11,11 +11,12 @@ from unittest import SkipTest
 
 import numpy as np
 
-from proofroll.core.engine import Sample
+from proofroll.core.arrays import FloatArray
+from proofroll.core.engine import Sample, require_provided
 from proofroll.core.errors import Refused
+from proofroll.core.plugins import load_element_kinds
 from proofroll.core.scene import Scene
-from proofroll.elements.ball_on_surface.surfaces import FloatArray
-from proofroll.files.scene_file import load_scene
+from proofroll.elements.ball_on_surface.element import rolling_ball
 
 # Simulated time of a check of the motion [s]: the ball goes a sixth of a turn round the cylinder.
 _SPAN = 0.05
@@ -23,17 +24,8 @@ _SPAN = 0.05
 
 @cache
 def scenes() -> dict[str, Scene]:
-    """Scenes in which nothing is zero or symmetric: the smooth motions first, of these the most demanding first."""
-    cylinder = {"speed": 3.3, "axial_speed": 0.7, "radial_spin": 12.0}
-    plane = {"tilt": 0.35, "speed": 0.8, "cross_speed": 0.5, "normal_spin": 12.0}
-    return {
-        "cylinder-resisting": load_scene("sphere_in_cylinder", **cylinder, rolling_resistance=5e-4),
-        "cylinder": load_scene("sphere_in_cylinder", **cylinder),
-        "plane-resisting": load_scene("inclined_plane", **plane, rolling_resistance=5e-4),
-        "plane": load_scene("inclined_plane", **plane),
-        "cylinder-slipping": load_scene("sphere_in_cylinder", **cylinder, mu_static=0.35),
-        "cylinder-oriented": load_scene("sphere_in_cylinder", **cylinder, asks=("orientation",)),
-    }
+    """The scenes on which every kind of element has its engines checked; of each kind the most demanding first."""
+    return {name: scene for kind in load_element_kinds() for name, scene in kind.conformance_scenes().items()}
 
 
 def require(condition: object, message: str) -> None:
@@ -58,10 +50,8 @@ class Subject:
 
     def build(self) -> Any:
         """The engine at time 0; the check has nothing to look at if it refuses."""
-        lacking = self.scene.requires - self.engine.provides
-        if lacking:
-            raise SkipTest("does not provide " + ", ".join(sorted(lacking)))
         try:
+            require_provided(self.engine, self.settings.formulation, self.scene)
             return self.engine.build(self.scene, self.settings)
         except Refused as refusal:
             raise SkipTest(f"refused: {refusal}") from None
@@ -107,7 +97,7 @@ class Subject:
 
     def scaled(self, sample: Sample) -> FloatArray:
         """Position, velocity and spin of a sample in units of the scene."""
-        body = self.scene.rolling
+        body = rolling_ball(self.scene)
         a, speed = body.ball.radius, float(np.linalg.norm(body.v0))
         return np.concatenate([sample.p_WB / a, sample.v_WB / speed, sample.w_WB * a / speed])
 

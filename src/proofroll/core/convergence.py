@@ -7,7 +7,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from proofroll.elements.ball_on_surface.surfaces import FloatArray
+from proofroll.core.arrays import FloatArray
 
 # A ladder is asymptotic if its observed order is the scheme's to this much.
 _ASYMPTOTIC = 0.1

@@ -11,10 +11,10 @@ from dataclasses import dataclass, field
 from enum import StrEnum
 from typing import Any, ClassVar, Protocol, Self, runtime_checkable
 
-from proofroll.core.errors import InputError
+from proofroll.core.arrays import FloatArray
+from proofroll.core.errors import InputError, Refused
 from proofroll.core.events import Event
-from proofroll.core.scene import Capability, Scene
-from proofroll.elements.ball_on_surface.surfaces import FloatArray
+from proofroll.core.scene import Scene
 
 
 @dataclass(frozen=True, slots=True)
@@ -83,7 +83,7 @@ class Built:
     gap: float | None = None
     acceleration: FloatArray | None = None
     angular_acceleration: FloatArray | None = None
-    terms: frozenset[Capability] | None = None
+    terms: frozenset[str] | None = None
     regularised: Mapping[str, Regularised] = field(default_factory=dict)
 
 
@@ -112,13 +112,13 @@ class Engine(Protocol):
 
     Attributes:
         name: equal to the name of the entry point.
-        provides: what it can represent honestly.
+        provides: formulation -> what it can represent honestly, as elements name it.
         settings: frozen dataclass, see :class:`Settings`.
         presets: formulation -> preset -> complete settings; each formulation has at least ``matched`` or ``default``.
     """
 
     name: ClassVar[str]
-    provides: ClassVar[frozenset[Capability]]
+    provides: ClassVar[Mapping[str, frozenset[str]]]
     settings: ClassVar[type[Any]]
     presets: ClassVar[Mapping[str, Mapping[str, Any]]]
 
@@ -234,7 +234,7 @@ class CannotLeaveOut(Protocol):
         inherent: formulation -> what is always in its model -> why.
     """
 
-    inherent: ClassVar[Mapping[str, Mapping[Capability, str]]]
+    inherent: ClassVar[Mapping[str, Mapping[str, str]]]
 
 
 def whole_steps(start: float, end: float, dt: float) -> int:
@@ -250,3 +250,28 @@ def whole_steps(start: float, end: float, dt: float) -> int:
             "dt", dt, f"no whole number of steps reaches {end:g} s; choose a step that divides the interval"
         )
     return steps
+
+
+@runtime_checkable
+class SaysWhyNot(Protocol):
+    """What an engine has besides, if it can say why a formulation does not provide something.
+
+    Attributes:
+        lacking: formulation -> what it does not provide -> why, as the end of a sentence.
+    """
+
+    lacking: ClassVar[Mapping[str, Mapping[str, str]]]
+
+
+def require_provided(engine: Any, formulation: str, scene: Scene) -> None:
+    """Compares what a scene requires with what a formulation provides.
+
+    Raises:
+        Refused: it lacks something; the text says what, and why if the engine says it.
+    """
+    reasons = engine.lacking.get(formulation, {}) if isinstance(engine, SaysWhyNot) else {}
+    missing = sorted(scene.requires - engine.provides[formulation])
+    if missing:
+        raise Refused(
+            "needs " + ", ".join(f"{name}, and {reasons[name]}" if name in reasons else name for name in missing)
+        )

@@ -5,12 +5,15 @@ from __future__ import annotations
 import dataclasses
 import re
 from collections.abc import Mapping
+from functools import cache
 from importlib.metadata import EntryPoint, entry_points
 from typing import Any
 
+from proofroll.core.element import ElementKind
 from proofroll.core.errors import InputError, Missing
 
 GROUP = "proofroll.engines"
+ELEMENTS = "proofroll.elements"
 
 
 def engine_names() -> list[str]:
@@ -32,6 +35,13 @@ def load_engine(name: str) -> Any:
         module = error.name or str(error)
         how = f"pip install 'proofroll[{name}]'" if point.value.startswith("proofroll.") else f"pip install {module}"
         raise Missing(f"{name} is not installed here ({module} is missing): {how}") from None
+
+
+@cache
+def load_element_kinds() -> tuple[type[ElementKind], ...]:
+    """Every kind of element that some installed package announces, by name."""
+    points = sorted(entry_points(group=ELEMENTS), key=lambda point: point.name)
+    return tuple(point.load() for point in points)
 
 
 def require_engine(name: str) -> None:

@@ -1,132 +1,21 @@
-"""What is simulated: bodies, surfaces, contacts, gravity and initial motion, frozen and typed.
+"""What is simulated: elements, parameters and what is asked, frozen and typed.
 
-A scene knows nothing of engines. Engines ask it for :attr:`Scene.rolling` (a ball on a surface) and compare
-:attr:`Scene.requires` with what they provide.
+A scene knows nothing of engines, and nothing of what its elements are: :mod:`proofroll.core.element` says what all of
+them have. Engines compare :attr:`Scene.requires` with what their formulations provide.
 """
 
 from __future__ import annotations
 
 import hashlib
 import json
-import math
 from collections.abc import Mapping
 from dataclasses import asdict, dataclass, field
-from enum import StrEnum
 from functools import cached_property
 from pathlib import Path
-from typing import Literal
 
-import numpy as np
-
+from proofroll.core.element import Element
 from proofroll.core.errors import InputError
-from proofroll.elements.ball_on_surface.surfaces import AnySurface, FloatArray, Surface
-
-
-class Capability(StrEnum):
-    """What a scene may need and an engine may provide; the value is what a person reads."""
-
-    ROLLING = "rolling without slip"
-    CURVED_SURFACE = "a curved surface"
-    ROLLING_RESISTANCE = "rolling resistance"
-    BOUNDED_FRICTION = "bounded friction (slip)"
-    ORIENTATION = "the ball's orientation"
-
-
-# What may be asked for besides the motion, and what an engine must then be able to give.
-ASKED: Mapping[str, Capability] = {"orientation": Capability.ORIENTATION}
-
-
-@dataclass(frozen=True)
-class Ball:
-    """A rigid ball whose central inertia is the same about every axis.
-
-    Attributes:
-        radius: a [m].
-        mass: m [kg].
-        inertia_ratio: J / (m a²); 2/5 for a homogeneous ball, 2/3 for a thin shell.
-    """
-
-    name: str
-    radius: float
-    mass: float
-    inertia_ratio: float = 0.4
-    shape: Literal["ball"] = "ball"
-
-    @property
-    def inertia(self) -> float:
-        """J: central moment of inertia [kg m²]."""
-        return self.inertia_ratio * self.mass * self.radius**2
-
-
-@dataclass(frozen=True)
-class Contact:
-    """A ball that rolls on a surface.
-
-    Attributes:
-        rolling_resistance: f, distance by which the normal force is shifted forward [m].
-        mu_static: largest |F|/N while sticking [-]; inf: the ball never slips.
-        mu_kinetic: |F|/N while slipping [-].
-    """
-
-    body: str
-    surface: str
-    rolling_resistance: float = 0.0
-    mu_static: float = math.inf
-    mu_kinetic: float = math.inf
-
-
-@dataclass(frozen=True)
-class Gravity:
-    """Uniform gravity: magnitude [m/s²] and direction (any length)."""
-
-    magnitude: float
-    direction: tuple[float, float, float] = (0.0, 0.0, -1.0)
-
-
-@dataclass(frozen=True)
-class InitialMotion:
-    """Rolling without slip at time 0.
-
-    Attributes:
-        coordinates: where on the surface, in its coordinates.
-        velocity: of the centre along e2 and e3 [m/s]; the spin about e2 and e3 follows from rolling.
-        spin: ω1, about the normal e1 [rad/s].
-    """
-
-    body: str
-    coordinates: tuple[float, float] = (0.0, 0.0)
-    velocity: tuple[float, float] = (0.0, 0.0)
-    spin: float = 0.0
-
-
-@dataclass(frozen=True)
-class RollingBall:
-    """A ball on a surface as every engine needs it: one body, one contact, and where it starts.
-
-    Attributes:
-        ball: the body.
-        contact: the contact law.
-        surface: the surface on which the ball's *centre* moves.
-        wall: the surface that the ball touches.
-        gravity: acceleration of gravity in the world [m/s²], shape (3,).
-        u0: initial surface coordinates, shape (2,).
-        p0, v0, w0: initial centre [m], velocity [m/s] and angular velocity [rad/s] in the world, shape (3,).
-    """
-
-    ball: Ball
-    contact: Contact
-    surface: Surface
-    wall: Surface
-    gravity: FloatArray
-    u0: FloatArray
-    p0: FloatArray
-    v0: FloatArray
-    w0: FloatArray
-
-    @property
-    def udot0(self) -> FloatArray:
-        """Initial rates of the surface coordinates, shape (2,)."""
-        return np.asarray(np.linalg.pinv(self.surface.tangents(self.u0)) @ self.v0)
+from proofroll.core.observable import Observable
 
 
 @dataclass(frozen=True)
@@ -136,82 +25,83 @@ class Scene:
     Attributes:
         name: folder name under ``models/``.
         title: one line for a person.
-        balls, surfaces, contacts, gravity, initial: the mechanics.
+        elements: what it is made of.
         parameters: the numbers a user can set by name, SI units.
         folder: where the scene's file and its engine-native models lie.
-        asks: what is wanted besides the motion, names of :data:`ASKED`; what nobody asks for need not be modelled.
+        asks: what is wanted besides the motion; what nobody asks for need not be modelled.
+
+    Raises:
+        InputError: no elements, two of one name, or something is asked that no element has.
     """
 
     name: str
     title: str
-    balls: tuple[Ball, ...]
-    surfaces: tuple[AnySurface, ...]
-    contacts: tuple[Contact, ...]
-    gravity: Gravity
-    initial: tuple[InitialMotion, ...]
+    elements: tuple[Element, ...]
     parameters: Mapping[str, float] = field(default_factory=dict)
     folder: Path = Path()
     asks: tuple[str, ...] = ()
 
     def __post_init__(self) -> None:
-        """Refuses what cannot be asked for.
-
-        Raises:
-            InputError: something else than the names of :data:`ASKED`.
-        """
+        """Checks what concerns the scene as a whole."""
+        names = [element.name for element in self.elements]
+        if not names:
+            raise InputError("scene", self.name, "it holds no element; add what it is made of")
+        for name in names:
+            if names.count(name) > 1:
+                raise InputError("scene", name, "two elements have this name; give each its own")
         for name in self.asks:
-            if name not in ASKED:
-                raise InputError("asks", name, f"there is nothing of that name to ask for; choose {', '.join(ASKED)}")
-
-    @property
-    def requires(self) -> frozenset[Capability]:
-        """What an engine must be able to represent; no more than the scene needs."""
-        needs = {Capability.ROLLING, *(ASKED[name] for name in self.asks)}
-        for contact in self.contacts:
-            if contact.rolling_resistance > 0:
-                needs.add(Capability.ROLLING_RESISTANCE)
-            if math.isfinite(contact.mu_static):
-                needs.add(Capability.BOUNDED_FRICTION)
-        if any(surface.kind != "plane" for surface in self.surfaces):
-            needs.add(Capability.CURVED_SURFACE)
-        return frozenset(needs)
+            if not any(element.asked(name) for element in self.elements):
+                raise InputError("asks", name, "no element of the scene has anything of that name to ask for")
 
     @cached_property
-    def rolling(self) -> RollingBall:
-        """The scene's one ball on its one surface.
+    def requires(self) -> frozenset[str]:
+        """What a formulation must be able to represent; no more than the scene needs."""
+        needs = {need for element in self.elements for need in element.requires}
+        asked = {element.asked(name) for element in self.elements for name in self.asks}
+        if len(self.elements) > 1:
+            needs.add(SEVERAL)
+        return frozenset(needs | {need for need in asked if need})
+
+    def label(self, element: Element, name: str) -> str:
+        """Name of an element's variable or observable in the scene: with the element's where there are several."""
+        return f"{name}.{element.name}" if len(self.elements) > 1 else name
+
+    @cached_property
+    def observables(self) -> dict[str, Observable]:
+        """The tables of all elements, by name in the scene."""
+        return {self.label(element, item.name): item for element in self.elements for item in element.observables}
+
+    @property
+    def deciding(self) -> str:
+        """The observable by which a trade-off, a map and a recommendation go where nobody says by which."""
+        return next(name for name, item in self.observables.items() if item.decides)
+
+    def observable(self, name: str, field: str = "quantity") -> Observable:
+        """The observable of this name.
 
         Raises:
-            InputError: the scene is not one ball on one surface.
+            InputError: no element has it; ``field`` says where it was named.
         """
-        if not len(self.balls) == len(self.surfaces) == len(self.contacts) == len(self.initial) == 1:
-            raise InputError("scene", self.name, "so far a scene holds one ball on one surface")
-        ball, wall, contact, start = self.balls[0], self.surfaces[0], self.contacts[0], self.initial[0]
-        surface = wall.offset(ball.radius)
-        direction = np.asarray(self.gravity.direction, dtype=np.float64)
-        u0 = np.asarray(start.coordinates, dtype=np.float64)
-        frame = surface.frame(u0)
-        v0 = frame[:, 1:] @ np.asarray(start.velocity)
-        w0 = start.spin * frame[:, 0] - np.cross(frame[:, 0], v0) / ball.radius
-        return RollingBall(
-            ball=ball,
-            contact=contact,
-            surface=surface,
-            wall=wall,
-            gravity=self.gravity.magnitude * direction / np.linalg.norm(direction),
-            u0=u0,
-            p0=surface.position(u0),
-            v0=v0,
-            w0=w0,
-        )
+        if name not in self.observables:
+            raise InputError(field, name, f"there is no such observable; choose from {', '.join(self.observables)}")
+        return self.observables[name]
+
+    @property
+    def natural_time(self) -> float:
+        """Period of the slowest motion of any element [s]."""
+        return max(element.natural_time for element in self.elements)
 
     @cached_property
     def digest(self) -> str:
-        """Hash of everything that decides the result: the mechanics, what is asked, and the engine-native files."""
-        left_out = {"title", "folder", "parameters"} | (set() if self.asks else {"asks"})
-        content = {key: value for key, value in asdict(self).items() if key not in left_out}
-        found = hashlib.sha256(json.dumps(content, sort_keys=True, default=str).encode())
+        """Hash of everything that decides the result: the elements, what is asked, and the engine-native files."""
+        content = [[type(element).__name__, asdict(element)] for element in self.elements]  # type: ignore[call-overload]
+        found = hashlib.sha256(json.dumps([self.name, content, self.asks], sort_keys=True, default=str).encode())
         if self.folder != Path():
             for file in sorted(self.folder.iterdir()):
                 if file.is_file() and file.suffix not in {".toml", ".md"}:
                     found.update(file.name.encode() + file.read_bytes())
         return found.hexdigest()[:16]
+
+
+# What a formulation must provide for a scene of several elements.
+SEVERAL = "several elements in one scene"

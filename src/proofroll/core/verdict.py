@@ -7,8 +7,8 @@ from enum import StrEnum
 
 import numpy as np
 
+from proofroll.core.arrays import FloatArray
 from proofroll.core.convergence import Limit
-from proofroll.elements.ball_on_surface.surfaces import FloatArray
 
 
 class Verdict(StrEnum):

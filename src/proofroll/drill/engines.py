@@ -22,7 +22,7 @@ from typing import Any, ClassVar, Self
 import numpy as np
 
 from proofroll.core.engine import Built, Sample
-from proofroll.core.scene import Capability, Scene
+from proofroll.core.scene import Scene
 from proofroll.engines.projection import Projection
 
 FOLDER = "PROOFROLL_DRILL"
@@ -136,7 +136,7 @@ class Drill:
     """The projection method with a fault."""
 
     name: ClassVar[str] = "drill"
-    provides: ClassVar[frozenset[Capability]] = Projection.provides
+    provides: ClassVar[Mapping[str, frozenset[str]]] = Projection.provides
     settings: ClassVar[type[DrillSettings]] = DrillSettings
     presets: ClassVar[Mapping[str, Mapping[str, DrillSettings]]] = {
         name: {"matched": DrillSettings(name)} for name in DEEDS

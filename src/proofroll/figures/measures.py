@@ -10,7 +10,7 @@ import numpy.typing
 from scipy.optimize import minimize_scalar
 from scipy.signal import find_peaks
 
-from proofroll.elements.ball_on_surface.surfaces import FloatArray
+from proofroll.core.arrays import FloatArray
 
 Measure = Literal[
     "maximum",

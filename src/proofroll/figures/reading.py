@@ -10,12 +10,14 @@ from typing import Any
 from pydantic import TypeAdapter, ValidationError
 
 from proofroll.core.errors import InputError
+from proofroll.elements.ball_on_surface.element import rolling_ball
 from proofroll.figures.definition import CRITERIA, Figure, Figures, Statement
 from proofroll.figures.quantities import known
 from proofroll.files.comparison_file import load_comparison
 from proofroll.files.data_folders import data_folder
-from proofroll.files.scene_file import first_problem, load_scene
+from proofroll.files.scene_file import load_scene
 from proofroll.files.toml import read_toml, study_files
+from proofroll.files.validation import first_problem
 from proofroll.running.recording import time_grid
 
 STUDY = "figures"
@@ -65,7 +67,7 @@ def _check(where: str, found: Figures) -> None:
             raise InputError(f"{where}: runs.{name}.{error.field}", error.value, error.advice) from None
     if not found.runs:
         raise InputError(f"{where}: runs", "nothing", "give at least one run")
-    quantities = set(known(scene.rolling))
+    quantities = set(known(rolling_ball(scene)))
     for name in found.symbols:
         _choose(f"{where}: symbols", name, quantities)
     names = [figure.name for figure in found.figures]

@@ -6,13 +6,14 @@ from collections.abc import Callable
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
 
+from proofroll.core.arrays import FloatArray
 from proofroll.core.errors import ProofrollError
 from proofroll.core.plugins import parse_engine
-from proofroll.core.scene import ASKED, RollingBall
-from proofroll.elements.ball_on_surface.surfaces import FloatArray
-from proofroll.elements.ball_on_surface.trajectory import read
+from proofroll.elements.ball_on_surface.element import ASKED, rolling_ball
+from proofroll.elements.ball_on_surface.model import RollingBall
 from proofroll.figures.definition import Figures
 from proofroll.figures.quantities import TIME, known, quantity
+from proofroll.files.netcdf import read
 from proofroll.files.scene_file import load_scene
 from proofroll.running.case import Case, EngineFacts, Result, Status
 from proofroll.running.runner import Runner, describe, resolve
@@ -111,7 +112,8 @@ def run_figures(
     assert isinstance(facts, EngineFacts)  # for the type checker, as the next line
     assert isinstance(truth, EngineFacts)
     # Asked for only of an engine that has it: without it all but the angles can still be drawn.
-    follows = spec.name != TRUTH and ASKED[ORIENTATION] in describe(spec.name, runner.workers)["provides"]
+    formulation = facts.settings.get("formulation")
+    follows = spec.name != TRUTH and ASKED[ORIENTATION] in describe(spec.name, runner.workers)["provides"][formulation]
     asks = (ORIENTATION,) if follows and figures.wants_orientation else ()
     cases = {name: _case(figures, planned.parameters, facts, asks) for name, planned in figures.runs.items()}
     truths = {name: _case(figures, planned.parameters, truth, ()) for name, planned in figures.runs.items()}
@@ -141,7 +143,7 @@ def _case(figures: Figures, parameters: dict[str, float], facts: EngineFacts, as
 def _made(figures: Figures, case: Case, result: Result, runner: Runner) -> Made:
     path = runner.store.trajectory(case)
     dataset = read(path) if result.trajectory is not None and path.is_file() else None
-    return Made(load_scene(figures.scene, **case.parameters).rolling, result, dataset, figures.start_angles)
+    return Made(rolling_ball(load_scene(figures.scene, **case.parameters)), result, dataset, figures.start_angles)
 
 
 def study_content(study: Study) -> dict[str, Any]:

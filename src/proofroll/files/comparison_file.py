@@ -13,10 +13,10 @@ from pydantic import ConfigDict, TypeAdapter, ValidationError
 from proofroll.core.comparison import Band, Comparison, ExceptAt, Row, Tolerance
 from proofroll.core.errors import InputError
 from proofroll.core.verdict import Verdict
-from proofroll.elements.ball_on_surface.observables import WITHOUT_SCALE, units
 from proofroll.files.data_folders import data_folder
-from proofroll.files.scene_file import first_problem, load_scene
+from proofroll.files.scene_file import load_scene
 from proofroll.files.toml import read_toml, study_of
+from proofroll.files.validation import first_problem
 from proofroll.running.recording import time_grid
 
 _LADDER_RUNGS = 3
@@ -184,16 +184,16 @@ def _check_ladder(where: str, ladder: list[float]) -> None:
 
 def _check_bounds(where: str, comparison: Comparison, bounds: Mapping[str, Tolerance | None]) -> None:
     """Every name is an observable of the scene, and every tolerance is in its unit."""
-    known = units(load_scene(comparison.scene).rolling)
+    known = load_scene(comparison.scene).observables
     for name, bound in bounds.items():
         if name not in known:
             raise InputError(
                 f"{where}: observable", name, f"there is no such observable; choose from {', '.join(known)}"
             )
-        if bound is not None and bound.relative and name in WITHOUT_SCALE:
-            raise InputError(f"{where}: {name}", "%", f"it has no size of its own; give a number in {known[name]}")
-        if bound is not None and not bound.relative and bound.unit != known[name]:
-            raise InputError(f"{where}: {name}", bound.unit, f"its unit is {known[name]}")
+        if bound is not None and bound.relative and known[name].floor is None:
+            raise InputError(f"{where}: {name}", "%", f"it has no size of its own; give a number in {known[name].unit}")
+        if bound is not None and not bound.relative and bound.unit != known[name].unit:
+            raise InputError(f"{where}: {name}", bound.unit, f"its unit is {known[name].unit}")
 
 
 for _typed in (Comparison, Row, ExceptAt):

@@ -2,20 +2,22 @@
 
 from __future__ import annotations
 
+import dataclasses
 import math
 import operator
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
-from typing import Annotated, Any, TypeVar
+from typing import Any
 
-from pydantic import ConfigDict, Field, TypeAdapter, ValidationError
-
+from proofroll.core.element import Element
 from proofroll.core.errors import InputError
-from proofroll.core.scene import Ball, Contact, Gravity, InitialMotion, Scene
-from proofroll.elements.ball_on_surface.surfaces import AnySurface
+from proofroll.core.gravity import Gravity
+from proofroll.core.plugins import load_element_kinds
+from proofroll.core.scene import Scene
 from proofroll.files.data_folders import data_folder
 from proofroll.files.toml import read_toml
+from proofroll.files.validation import strict, validated
 
 
 @dataclass(frozen=True)
@@ -50,28 +52,13 @@ class SceneFile:
     title: str
     source: str
     parameters: dict[str, Parameter]
-    balls: list[dict[str, Any]]
-    surfaces: list[dict[str, Any]]
     gravity: dict[str, Any]
-    contacts: list[dict[str, Any]]
-    initial: list[dict[str, Any]]
     asks: list[str] = field(default_factory=list)
+    tables: dict[str, Any] = field(default_factory=dict)  # all others, which kinds of elements read
 
 
-@dataclass(frozen=True)
-class _Mechanics:
-    balls: tuple[Ball, ...]
-    surfaces: tuple[Annotated[AnySurface, Field(discriminator="kind")], ...]
-    gravity: Gravity
-    contacts: tuple[Contact, ...]
-    initial: tuple[InitialMotion, ...]
-
-
-_T = TypeVar("_T")
-
-_STRICT = ConfigDict(extra="forbid")
-for _typed in (Parameter, SceneFile, _Mechanics, Ball, Contact, Gravity, InitialMotion, *AnySurface.__args__):
-    _typed.__pydantic_config__ = _STRICT  # how pydantic is told about stdlib dataclasses
+strict(Parameter, SceneFile, Gravity)
+_OWN = frozenset(item.name for item in dataclasses.fields(SceneFile)) - {"tables"}
 
 
 def scene_names() -> list[str]:
@@ -122,27 +109,37 @@ def load_scene(name: str, /, *, asks: Any = (), **parameters: float) -> Scene:
     file = _parse(folder / "scene.toml")
     values = _values(file, parameters)
     where = str(folder / "scene.toml")
-    mechanics = _validated(
-        _Mechanics,
-        {
-            key: _substituted(getattr(file, key), values, f"{where}: {key}")
-            for key in ("balls", "surfaces", "gravity", "contacts", "initial")
-        },
-        where,
-    )
-    _check_names(mechanics, where)
+    gravity = validated(Gravity, _substituted(file.gravity, values, f"{where}: gravity"), f"{where}: gravity")
+    tables = {key: _substituted(table, values, f"{where}: {key}") for key, table in file.tables.items()}
     return Scene(
         name=folder.name,
         title=file.title,
-        balls=mechanics.balls,
-        surfaces=mechanics.surfaces,
-        contacts=mechanics.contacts,
-        gravity=mechanics.gravity,
-        initial=mechanics.initial,
+        elements=_elements(tables, gravity, where),
         parameters=values,
         folder=folder,
         asks=tuple(dict.fromkeys([*file.asks, *_names(asks)])),
     )
+
+
+def _elements(tables: Mapping[str, Any], gravity: Gravity, where: str) -> tuple[Element, ...]:
+    """What the tables of a file hold, each read by the kind of element that it belongs to.
+
+    Raises:
+        InputError: a table that no kind reads.
+    """
+    kinds = load_element_kinds()
+    known = [name for kind in kinds for name in kind.tables]
+    for name in tables:
+        if name not in known:
+            raise InputError(
+                f"{where}: {name}", "this key", f"no kind of element reads it; choose from {', '.join(known)}"
+            )
+    found: list[Element] = []
+    for kind in kinds:
+        own = {name: tables[name] for name in kind.tables if name in tables}
+        if own:
+            found += kind.read(own, gravity, where)
+    return tuple(found)
 
 
 def _names(asks: object) -> list[str]:
@@ -156,7 +153,9 @@ def _names(asks: object) -> list[str]:
 
 def _parse(path: Path) -> SceneFile:
     content = read_toml(path)
-    file = _validated(SceneFile, content, str(path))
+    own = {key: value for key, value in content.items() if key in _OWN}
+    tables = {key: value for key, value in content.items() if key not in _OWN}
+    file = validated(SceneFile, own | {"tables": tables}, str(path))
     for name, parameter in file.parameters.items():
         for key in ("value", "above", "at_least", "below", "at_most"):
             other = getattr(parameter, key)
@@ -165,46 +164,6 @@ def _parse(path: Path) -> SceneFile:
                 advice = f"there is no such parameter to refer to; choose from {known}"
                 raise InputError(f"{path}: parameters.{name}.{key}", other, advice)
     return file
-
-
-def _check_names(mechanics: _Mechanics, where: str) -> None:
-    """Contacts and initial motions name what there is.
-
-    Raises:
-        InputError: the first name that leads nowhere.
-    """
-    balls, surfaces = [ball.name for ball in mechanics.balls], [surface.name for surface in mechanics.surfaces]
-    for kind, items in (("contacts", mechanics.contacts), ("initial", mechanics.initial)):
-        for index, item in enumerate(items):
-            for key, known in (("body", balls), ("surface", surfaces)):
-                name = getattr(item, key, None)
-                if name is not None and name not in known:
-                    raise InputError(f"{where}: {kind}.{index}.{key}", name, f"choose one of {', '.join(known)}")
-
-
-def _validated(kind: type[_T], content: object, where: str) -> _T:
-    try:
-        return TypeAdapter(kind).validate_python(content)
-    except ValidationError as error:
-        raise first_problem(error, where) from None
-
-
-def first_problem(error: ValidationError, where: str) -> InputError:
-    """One line about the first thing that pydantic found wrong in ``where``."""
-    problem = error.errors()[0]
-    location = ".".join(str(part) for part in problem["loc"])
-    if problem["type"] in {"unexpected_keyword_argument", "extra_forbidden"}:
-        return InputError(f"{where}: {location}", problem["input"], "there is no such key here; remove it")
-    if problem["type"] in {"missing", "missing_argument"}:
-        return InputError(f"{where}: {location}", "nothing", "this key is required; add it")
-    if problem["type"] in {"union_tag_invalid", "union_tag_not_found"}:
-        key = problem["ctx"]["discriminator"].strip("'")
-        if problem["type"] == "union_tag_not_found":
-            return InputError(f"{where}: {location}.{key}", "nothing", "this key is required; add it")
-        return InputError(
-            f"{where}: {location}.{key}", problem["ctx"]["tag"], f"choose one of {problem['ctx']['expected_tags']}"
-        )
-    return InputError(f"{where}: {location}", problem["input"], problem["msg"][0].lower() + problem["msg"][1:])
 
 
 def _values(file: SceneFile, given: Mapping[str, object]) -> dict[str, float]:

@@ -10,6 +10,7 @@ import proofroll
 from proofroll.core.plugins import parse_engine
 from proofroll.core.verdict import Judgement, Verdict
 from proofroll.files.json_data import plain
+from proofroll.files.scene_file import load_scene
 from proofroll.running.case import Status
 from proofroll.running.timing import machine
 from proofroll.studies.compare import Outcome, Run
@@ -29,6 +30,10 @@ def outcome_content(outcome: Outcome) -> dict[str, Any]:
         "title": comparison.title,
         "question": comparison.question,
         "scene": comparison.scene,
+        "observables": {
+            name: {"unit": item.unit, "symbol": item.shown, "role": item.role, "headline": item.headline}
+            for name, item in load_scene(comparison.scene).observables.items()
+        },
         "until": comparison.until,
         "every": comparison.every,
         "vary": comparison.vary,

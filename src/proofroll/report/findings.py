@@ -4,8 +4,7 @@ from __future__ import annotations
 
 from typing import Any
 
-from proofroll.elements.ball_on_surface.observables import OBSERVABLES
-from proofroll.report.labels import names, number, symbol, unit
+from proofroll.report.labels import headlines, names, number, symbol, unit
 from proofroll.report.scores import Score, cheapest, recommendation, scores
 
 # The accuracy for which the first paragraph names a setting: a line in a figure.
@@ -108,7 +107,8 @@ def _obvious(content: dict[str, Any], found: list[Score]) -> str:
 def _off(content: dict[str, Any], index: int) -> str:
     """A row's largest error of a coordinate, in its unit, where it can be judged."""
     judged = [judgement for run in content["runs"] if run["row"] == index for judgement in run["judgements"]]
-    errors = [j for j in judged if j["observable"] not in OBSERVABLES and j["verdict"] != "ill-posed"]
+    motion = headlines(content, "motion")
+    errors = [j for j in judged if j["observable"] in motion and j["verdict"] != "ill-posed"]
     worst = max(errors, key=lambda judgement: judgement["error"] / judgement["scale"])
     return f"its {symbol(worst['observable'])} is off by {number(worst['error'])} {unit(worst['unit'])}".rstrip()
 

@@ -15,7 +15,6 @@ from proofroll.report.compression import packed
 from proofroll.report.onsets import mark
 from proofroll.report.styles import OUTLINES, styles
 from proofroll.report.tradeoff_tables import name_of
-from proofroll.studies.step_numbers import SYMBOLS
 
 if TYPE_CHECKING:
     import jinja2
@@ -95,7 +94,6 @@ def _templates() -> jinja2.Environment:
         "between": onset_tables.between,
         "name_of": name_of,
         "unbroken": _unbroken,
-        "dimensionless": lambda name: SYMBOLS.get(name, name),
     }
     made.globals |= {
         "tables": tables,

@@ -75,3 +75,8 @@ def settings_text(settings: dict[str, Any]) -> str:
 def values(found: list[float | None]) -> str:
     """One number, or the components of a vector."""
     return ", ".join(number(value, 8, none="not finite") for value in found)
+
+
+def headlines(content: dict[str, Any], role: str) -> list[str]:
+    """Names of the observables of a comparison that summaries show, of a role (:class:`Role`)."""
+    return [name for name, item in content["observables"].items() if item["role"] == role and item["headline"]]

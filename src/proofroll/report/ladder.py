@@ -10,8 +10,8 @@ from typing import Any
 from rich.table import Table
 from rich.text import Text
 
+from proofroll.core.dataset import scales
 from proofroll.core.errors import ProofrollError
-from proofroll.elements.ball_on_surface.observables import scales
 from proofroll.report.terminal import number, step
 from proofroll.running.case import Status
 from proofroll.running.timing import Interval, machine, ratio
@@ -46,7 +46,7 @@ def ladder_content(study: Ladder) -> dict[str, Any]:
         "parameters": dict(study.scene.parameters),
         "quantity": study.quantity,
         "unit": study.unit,
-        "scale": scales(study.scene.rolling, truth.dataset).get(study.quantity),
+        "scale": scales(study.scene, truth.dataset).get(study.quantity),
         "tolerance": study.tolerance,
         "until": study.until,
         "truth": {"route": truth.dataset.attrs.get("route"), "error_bar": truth.error_bar},
@@ -114,7 +114,7 @@ def _term(study: Ladder, switch: Switch) -> dict[str, Any]:
         cost,
         tolerance=study.tolerance,
         bar=study.truths[str(point)].error_bar,
-        scale=scales(study.scene.rolling, study.truths[str({})].dataset).get(study.quantity, 1.0),
+        scale=scales(study.scene, study.truths[str({})].dataset).get(study.quantity, 1.0),
     )
     return content | {
         **{

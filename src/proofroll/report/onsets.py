@@ -7,6 +7,7 @@ import json
 from typing import TYPE_CHECKING, Any
 
 from proofroll.core.events import Event, events_of
+from proofroll.elements.ball_on_surface.element import rolling_ball
 from proofroll.elements.ball_on_surface.onset_study import onset_verdict as judged_onset
 from proofroll.files.json_data import plain
 from proofroll.report.plots import stored
@@ -29,7 +30,7 @@ def truth_facts(dataset: xr.Dataset, scene: Scene) -> dict[str, Any]:
     """What the report says of the truth's slips; nothing where friction has no bound."""
     if "onset" not in dataset.attrs:
         return {}
-    contact = scene.rolling.contact
+    contact = rolling_ball(scene).contact
     return {
         "mu_static": contact.mu_static,
         "mu_kinetic": contact.mu_kinetic,

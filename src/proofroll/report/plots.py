@@ -8,9 +8,10 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 import numpy.typing
 
-from proofroll.elements.ball_on_surface.observables import scales
-from proofroll.elements.ball_on_surface.surfaces import FloatArray
-from proofroll.elements.ball_on_surface.trajectory import read
+from proofroll.core.arrays import FloatArray
+from proofroll.core.dataset import scales
+from proofroll.core.observable import Observable, Role
+from proofroll.files.netcdf import read
 from proofroll.files.scene_file import load_scene
 from proofroll.report.labels import symbol, unit
 from proofroll.studies.compare import Outcome, Run
@@ -26,11 +27,12 @@ if TYPE_CHECKING:
 Curves = dict[str, FloatArray]
 
 # Drawn besides the surface's coordinates. A reaction at time 0 belongs to the certificate, not to the curve.
-REACTIONS = ("N", "F2", "F3", "needed_friction")
 # More points than this are not seen in a figure 500 pixels wide.
 MOST_POINTS = 400
 # Digits of a curve, and of its difference from the truth: enough for a figure, and small in the file.
 CURVE_DIGITS, DIFFERENCE_DIGITS = 6, 3
+
+_DRAWN = (Role.MOTION, Role.REACTION)
 
 
 def point_curves(outcome: Outcome, store: Store) -> list[dict[str, Any]]:
@@ -47,15 +49,17 @@ def point_curves(outcome: Outcome, store: Store) -> list[dict[str, Any]]:
         if not path.is_file():
             continue
         truth = read(path)
-        body = load_scene(outcome.comparison.scene, **case.parameters).rolling
-        sizes = scales(body, truth)
-        drawn = [key for key in (*body.surface.coordinates, *REACTIONS) if key in truth]
-        engines = _engines(outcome, store, name, drawn)
+        scene = load_scene(outcome.comparison.scene, **case.parameters)
+        sizes = scales(scene, truth)
+        drawn = {key: item for key, item in scene.observables.items() if item.role in _DRAWN and key in truth}
+        engines = _engines(outcome, store, name, list(drawn))
         entries.append(
             {
                 "point": name,
                 "time": rounded(truth["time"].to_numpy(), CURVE_DIGITS),
-                "observables": [_observable(key, truth, engines, sizes.get(key, 1.0)) for key in drawn],
+                "observables": [
+                    _observable(item, key, truth, engines, sizes.get(key, 1.0)) for key, item in drawn.items()
+                ],
             }
         )
     return entries
@@ -108,8 +112,10 @@ def _has_trajectory(run: Run, store: Store) -> bool:
     return run.case is not None and run.result.trajectory is not None and store.trajectory(run.case).is_file()
 
 
-def _observable(name: str, truth: xr.Dataset, engines: list[tuple[int, Run, Curves]], scale: float) -> dict[str, Any]:
-    first = 1 if name in REACTIONS else 0
+def _observable(
+    item: Observable, name: str, truth: xr.Dataset, engines: list[tuple[int, Run, Curves]], scale: float
+) -> dict[str, Any]:
+    first = 1 if item.role == Role.REACTION else 0
     true = truth[name].to_numpy()
     curves = []
     for row, run, said in engines:

@@ -8,8 +8,9 @@ from typing import Any
 
 import numpy as np
 
-from proofroll.core.scene import RollingBall
-from proofroll.elements.ball_on_surface.surfaces import FloatArray
+from proofroll.core.arrays import FloatArray
+from proofroll.elements.ball_on_surface.element import rolling_ball
+from proofroll.elements.ball_on_surface.model import RollingBall
 from proofroll.files.json_data import plain
 from proofroll.files.scene_file import load_scene
 from proofroll.report.comparison_content import by_row, outcome_content
@@ -99,7 +100,7 @@ def _case(
 ) -> tuple[dict[str, Any], bytes]:
     """What a case is called and holds, and its numbers."""
     scene = load_scene(case.scene, **case.parameters)
-    body = scene.rolling
+    body = rolling_ball(scene)
     coordinates = body.surface.coordinates
     sampled = stored(store.trajectory(case), [*NEEDED, *coordinates])
     # The comparison that has most to show at this point names the case.

@@ -14,8 +14,9 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 
-from proofroll.core.scene import RollingBall
-from proofroll.elements.ball_on_surface.surfaces import FloatArray, Surface
+from proofroll.core.arrays import FloatArray
+from proofroll.elements.ball_on_surface.model import RollingBall
+from proofroll.elements.ball_on_surface.surfaces import Surface
 
 # Variables of a trajectory, by their names there; "time" among them.
 Sampled = Mapping[str, npt.NDArray[Any]]

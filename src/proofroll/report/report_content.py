@@ -5,8 +5,8 @@ from __future__ import annotations
 from datetime import UTC, datetime
 from typing import TYPE_CHECKING, Any
 
-from proofroll.elements.ball_on_surface.trajectory import read
 from proofroll.files.json_data import plain
+from proofroll.files.netcdf import read
 from proofroll.files.scene_file import load_scene
 from proofroll.report.comparison_content import environment, outcome_content
 from proofroll.report.evidence import add_evidence

@@ -7,7 +7,7 @@ from pathlib import Path
 from typing import Any
 
 from proofroll.core.events import events_of
-from proofroll.elements.ball_on_surface.trajectory import read
+from proofroll.files.netcdf import read
 from proofroll.running.case import Case, Result
 
 

@@ -6,6 +6,7 @@ import math
 from typing import TYPE_CHECKING, Any
 
 from proofroll.elements.ball_on_surface.drawings import overview
+from proofroll.elements.ball_on_surface.element import rolling_ball
 from proofroll.files.scene_file import load_scene, read_scene_file
 from proofroll.report.labels import symbol, unit
 
@@ -30,7 +31,7 @@ def scene_sheet(scene: str, points: Sequence[dict[str, float]]) -> dict[str, Any
     file = read_scene_file(scene)
     drawn = [load_scene(scene, **point) for point in points] or [load_scene(scene)]
     # One drawing for all cases: with rolling resistance where any has it.
-    shown = max((made.rolling for made in drawn), key=lambda body: body.contact.rolling_resistance)
+    shown = max((rolling_ball(made) for made in drawn), key=lambda body: body.contact.rolling_resistance)
     drawings = overview(shown.wall, shown)
     parameters = []
     for name, parameter in file.parameters.items():

@@ -5,10 +5,8 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import Any
 
-from proofroll.elements.ball_on_surface.observables import OBSERVABLES
-from proofroll.report.labels import names
+from proofroll.report.labels import headlines, names
 
-FORCES = ("N", "F2", "F3")
 DECADES = range(1, 14)
 
 
@@ -39,13 +37,16 @@ class Score:
 
 def scores(content: dict[str, Any]) -> list[Score]:
     """One score per row of the comparison."""
-    coordinates = [name for name in _judged(content) if name not in OBSERVABLES]
+    judged = _judged(content)
+    coordinates, forces_of = (
+        [name for name in headlines(content, role) if name in judged] for role in ("motion", "reaction")
+    )
     points = {run["point"] for run in content["runs"]}
     found = []
     for index, (name, row) in enumerate(zip(names(content["rows"]), content["rows"], strict=True)):
         runs = [run for run in content["runs"] if run["row"] == index]
         everywhere = {run["point"] for run in runs} == points
-        motion, forces = (_relative(runs, group) if everywhere else None for group in (coordinates, FORCES))
+        motion, forces = (_relative(runs, group) if everywhere else None for group in (coordinates, forces_of))
         found.append(Score(index, name, motion, forces, row["seconds_per_second"]))
     return found
 

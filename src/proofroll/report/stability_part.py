@@ -77,7 +77,7 @@ class StabilityPart:
             contradictions += against
             untested = "" if against else claim.untested(study["points"])
             claims.append(
-                {"says": _says(claim), "because": claim.because, "against": against, "untested": untested,
+                {"says": _says(claim, study["step_symbols"]), "because": claim.because, "against": against, "untested": untested,
                  "holds": None if untested else not against}
             )  # fmt: skip
         points = [
@@ -102,10 +102,9 @@ def _programs(path: Path) -> str:
     return f"{path.parent.name}/{path.stem}"
 
 
-def _says(claim: Claim) -> str:
+def _says(claim: Claim, symbols: Mapping[str, str]) -> str:
     """A claim in one sentence."""
     from proofroll.report.labels import number
-    from proofroll.studies.step_numbers import SYMBOLS
 
     said = f"{claim.engine} is {claim.boundary}"
     if claim.never:
@@ -114,7 +113,7 @@ def _says(claim: Claim) -> str:
         said += " up to the same part of the natural time everywhere"
     elif claim.number is not None:
         low, high = claim.between
-        said += f" up to {SYMBOLS.get(claim.number, claim.number)} = {number(low)} … {number(high)}"
+        said += f" up to {symbols.get(claim.number, claim.number)} = {number(low)} … {number(high)}"
     else:
         said += " up to a boundary"
     if claim.axes:

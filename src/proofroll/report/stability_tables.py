@@ -11,7 +11,6 @@ from rich.text import Text
 
 from proofroll.report.labels import number
 from proofroll.studies.stability_content import silent_ranking
-from proofroll.studies.step_numbers import SYMBOLS
 
 
 def headline(study: Mapping[str, Any]) -> str:
@@ -33,8 +32,9 @@ def boundary_table(study: Mapping[str, Any]) -> Table:
 
     A ``+`` stands where nothing broke on the ladder, ``n!`` for n silent failures beyond the boundaries.
     """
-    turns = any("turn" in point["sides"]["stable"]["numbers"] for point in study["points"])
-    title = f"Largest {SYMBOLS['turn' if turns else 'spin']} (or tolerance) along each axis; n!: n times silent"
+    named = (name for point in study["points"] for name in point["sides"]["stable"]["numbers"])
+    symbol = study["step_symbols"].get(next(named, ""), "step in natural times")
+    title = f"Largest {symbol} (or tolerance) along each axis; n!: n times silent"
     table = Table(title=Text(title), title_justify="left", box=None, padding=(0, 1, 0, 0))
     table.add_column("engine formulation setting", no_wrap=True)
     table.add_column("axis", no_wrap=True, min_width=7)
@@ -55,7 +55,7 @@ def boundary_table(study: Mapping[str, Any]) -> Table:
             axis,
             _range(points, "stable"),
             _range(points, "accurate"),
-            Text(_explained(explained.get((curve, axis)))),
+            Text(_explained(explained.get((curve, axis)), study["step_symbols"])),
             Text(beyond),
         )
         before = name
@@ -77,11 +77,11 @@ def label(point: Mapping[str, Any]) -> str:
 
 
 def size(point: Mapping[str, Any], side: str) -> float | None:
-    """A boundary as Ωh where the path turns, else as the spin per step; a tolerance as it is."""
+    """A boundary as the first dimensionless number that the scene has of a step; a tolerance as it is."""
     found = point["sides"][side]
     if point["resolution"] != "dt":
         return found["largest"]  # type: ignore[no-any-return]  # JSON
-    return found["numbers"].get("turn", found["numbers"].get("spin"))  # type: ignore[no-any-return]  # JSON
+    return next(iter(found["numbers"].values()), None)
 
 
 def _range(points: Sequence[Mapping[str, Any]], side: str) -> str:
@@ -97,11 +97,11 @@ def _range(points: Sequence[Mapping[str, Any]], side: str) -> str:
     return low if low == high else f"{low}…{high}"
 
 
-def _explained(found: Mapping[str, Any] | None) -> str:
+def _explained(found: Mapping[str, Any] | None, symbols: Mapping[str, str]) -> str:
     """The number that stays the same while the axis moves the others."""
     if found is None or not found["explains"]:
         return ""
-    return f"{SYMBOLS[found['number']]} {number(found['low'])}…{number(found['high'])}"
+    return f"{symbols[found['number']]} {number(found['low'])}…{number(found['high'])}"
 
 
 def silent_lines(study: Mapping[str, Any], count: int = 8) -> Iterator[str]:

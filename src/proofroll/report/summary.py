@@ -4,8 +4,7 @@ from __future__ import annotations
 
 from typing import Any
 
-from proofroll.elements.ball_on_surface.observables import OBSERVABLES
-from proofroll.report.labels import names, number, symbol, unit
+from proofroll.report.labels import headlines, names, number, symbol, unit
 from proofroll.report.scores import cheapest, scores
 from proofroll.report.tradeoff_tables import name_of, step_of
 
@@ -75,7 +74,7 @@ def _wrong(comparison: dict[str, Any]) -> list[tuple[float, str, str]]:
             (judgement["error"] / judgement["scale"], judgement)
             for run in runs
             for judgement in run["judgements"]
-            if judgement["observable"] not in OBSERVABLES
+            if judgement["observable"] in headlines(comparison, "motion")
             and judgement["verdict"] != "ill-posed"
             and judgement["error"] is not None
         ]

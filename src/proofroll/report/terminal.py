@@ -9,8 +9,7 @@ from rich.console import Console
 from rich.table import Table
 from rich.text import Text
 
-from proofroll.elements.ball_on_surface.observables import OBSERVABLES
-from proofroll.report.labels import SYMBOLS
+from proofroll.report.labels import SYMBOLS, headlines
 
 if TYPE_CHECKING:
     from proofroll.drill.row import Drilled
@@ -116,13 +115,14 @@ def step(row: dict[str, Any]) -> str:
 
 
 def columns(content: dict[str, Any]) -> list[tuple[str, str]]:
-    """The observables that fit on the terminal: the coordinates of the surface and the normal force."""
+    """The observables that fit on the terminal: what moves, and the first reaction."""
     units: dict[str, str] = {}
     for row in content["rows"]:
         for name, judgement in row["observables"].items():
             units[name] = judgement["unit"]
-    coordinates = [name for name in units if name not in OBSERVABLES]
-    return [(name, units[name]) for name in (*coordinates, "N") if name in units]
+    shown = [name for name in headlines(content, "motion") if name in units]
+    shown += [name for name in headlines(content, "reaction") if name in units][:1]
+    return [(name, units[name]) for name in shown]
 
 
 def closing_lines(content: dict[str, Any]) -> list[str]:

@@ -33,7 +33,7 @@ def describe(engine: str) -> dict[str, Any]:
     return {
         "name": engine,
         "version": kind.version(),
-        "provides": sorted(kind.provides),
+        "provides": {formulation: sorted(names) for formulation, names in kind.provides.items()},
         "presets": presets,
         "summary": (inspect.getdoc(kind) or "").split("\n", 1)[0],
         "levels": dict(kind.levels) if isinstance(kind, TellsLevels) else {},

@@ -9,12 +9,12 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from proofroll.core.arrays import FloatArray
+from proofroll.core.dataset import from_samples
 from proofroll.core.engine import LocatesEvents, Sample, TellsRemarks
 from proofroll.core.errors import Diverged, InputError
 from proofroll.core.events import between_samples, with_events
-from proofroll.core.scene import Capability, Scene
-from proofroll.elements.ball_on_surface.surfaces import FloatArray
-from proofroll.elements.ball_on_surface.trajectory import from_samples
+from proofroll.core.scene import Scene
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -85,10 +85,8 @@ def record(engine: Any, scene: Scene, times: FloatArray) -> Recording:
             break
     processor += time.process_time()
     sampling = time.perf_counter() - began - wall, processor - inside
-    if Capability.BOUNDED_FRICTION in scene.requires and any(sample.sticking is None for sample in samples):
-        failure = failure or "the engine does not say whether the ball sticks or slips"
-    if Capability.ORIENTATION in scene.requires and any(sample.q_WB is None for sample in samples):
-        failure = failure or "the engine does not give the ball's orientation"
+    lacking = (element.lacks(samples, scene.asks) for element in scene.elements)
+    failure = failure or next(filter(None, lacking), None)
     dataset = from_samples(scene, times, samples)
     if "sticking" in dataset:
         located = isinstance(engine, LocatesEvents)

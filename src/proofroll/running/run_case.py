@@ -31,9 +31,10 @@ def run(case: dict[str, Any], out: str) -> dict[str, Any]:
 
 
 def _run(case: Case, out: Path, spent: Spent) -> Result:
+    from proofroll.core.certificate import certify, first_difference
+    from proofroll.core.engine import require_provided
     from proofroll.core.plugins import load_engine, resolve_settings
-    from proofroll.elements.ball_on_surface.certificate import certify, first_difference
-    from proofroll.elements.ball_on_surface.trajectory import write
+    from proofroll.files.netcdf import write
     from proofroll.files.scene_file import load_scene
     from proofroll.running.recording import record, time_grid
 
@@ -47,10 +48,8 @@ def _run(case: Case, out: Path, spent: Spent) -> Result:
     kind = load_engine(case.engine.name)
     settings = resolve_settings(kind, case.engine.settings)
     spent.on("loading")
-    lacking = scene.requires - kind.provides
-    if lacking:
-        return Result(Status.REFUSED, "needs " + ", ".join(sorted(lacking)), versions=versions)
     try:
+        require_provided(kind, settings.formulation, scene)
         engine = kind.build(scene, settings)
         spent.on("building")
         certificate = certify(engine, scene)
@@ -90,7 +89,7 @@ def _run(case: Case, out: Path, spent: Spent) -> Result:
 
 
 def _run_truth(case: Case, scene: Any, times: Any, out: Path, versions: dict[str, str]) -> Result:
-    from proofroll.elements.ball_on_surface.trajectory import write
+    from proofroll.files.netcdf import write
     from proofroll.truth import truth
 
     start = time.perf_counter()

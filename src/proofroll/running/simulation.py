@@ -4,10 +4,11 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING, Any
 
+from proofroll.core.certificate import certify, first_difference
+from proofroll.core.engine import require_provided
 from proofroll.core.errors import InputError, Refused
 from proofroll.core.plugins import load_engine, parse_engine, resolve_settings
 from proofroll.core.scene import Scene
-from proofroll.elements.ball_on_surface.certificate import certify, first_difference
 from proofroll.running.recording import record, time_grid
 
 if TYPE_CHECKING:
@@ -30,9 +31,7 @@ def build(scene: Scene, engine: str, **settings: Any) -> Any:
     spec = parse_engine(engine)
     kind = load_engine(spec.name)
     resolved = resolve_settings(kind, {**spec.options, **settings})
-    lacking = scene.requires - kind.provides
-    if lacking:
-        raise Refused("needs " + ", ".join(sorted(lacking)))
+    require_provided(kind, resolved.formulation, scene)
     return kind.build(scene, resolved)
 
 

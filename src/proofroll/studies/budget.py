@@ -14,8 +14,8 @@ from typing import NamedTuple
 
 import numpy as np
 
+from proofroll.core.arrays import FloatArray
 from proofroll.core.convergence import Limit, observed_order, richardson, size, tightest
-from proofroll.elements.ball_on_surface.surfaces import FloatArray
 from proofroll.studies.sweep import Curve, Point
 
 # Neighbouring local orders this near to each other belong to one power law.
@@ -113,7 +113,7 @@ def budget(curve: Curve, quantity: str, every: float, true: FloatArray) -> Budge
     if len(used) < 3:
         nothing = "too few runs reached the end" if curve.facts.resolution else NOTHING
         return Budget(quantity, None, None, None, None, None, declared, None, _bar(used, quantity), nothing, nothing)
-    values = [point.curves[quantity].values for point in used]
+    values = [point.curves[quantity] for point in used]
     steps = [point.step or 0.0 for point in used]
     differences = [size(a - b) for a, b in itertools.pairwise(values)]
     if curve.fixed_step:
@@ -211,7 +211,7 @@ def _coarse_end(curve: Curve, quantity: str, every: float, limit: Limit) -> tupl
     if point is None:
         return None
     stride, at_start = round(point.case.every / every), len(limit.values) > round(point.case.until / every)
-    values, common = point.curves[quantity].values, limit.values[0 if at_start else stride - 1 :: stride]
+    values, common = point.curves[quantity], limit.values[0 if at_start else stride - 1 :: stride]
     return (point, values - common) if values.shape == common.shape else None
 
 

@@ -12,9 +12,9 @@ from pydantic import ConfigDict, TypeAdapter, ValidationError
 from proofroll.core.comparison import Tolerance
 from proofroll.core.engine import Level
 from proofroll.core.errors import InputError
-from proofroll.elements.ball_on_surface.observables import units
-from proofroll.files.scene_file import first_problem, load_scene
+from proofroll.files.scene_file import load_scene
 from proofroll.files.toml import read_toml, study_files
+from proofroll.files.validation import first_problem
 from proofroll.studies.recommend import Wish, fits, recommend
 from proofroll.studies.sweep import Question
 
@@ -121,18 +121,14 @@ def _claims(path: Path, content: dict[str, Any]) -> TradeoffClaims:
 
 def _check(where: str, found: TradeoffClaims) -> None:
     scene = load_scene(found.scene, **found.parameters)
-    known = units(scene.rolling)
-    if found.quantity not in known:
-        advice = f"there is no such observable; choose from {', '.join(known)}"
-        raise InputError(f"{where}: quantity", found.quantity, advice)
+    unit = scene.observable(found.quantity, f"{where}: quantity").unit
     if not found.cheapest:
         advice = "the file claims nothing; add [[cheapest]] with tolerance, engine and because"
         raise InputError(f"{where}: cheapest", "nothing", advice)
     for index, claim in enumerate(found.cheapest):
         if not claim.because:
             raise InputError(f"{where}: cheapest.{index}.because", "nothing", "every claim needs its reason; add it")
-        if not claim.tolerance.relative and claim.tolerance.unit != known[found.quantity]:
-            unit = known[found.quantity]
+        if not claim.tolerance.relative and claim.tolerance.unit != unit:
             raise InputError(f"{where}: cheapest.{index}.tolerance", claim.tolerance.unit, f"its unit is {unit}")
     for name, values in found.over.items():
         for value in values:

@@ -9,17 +9,18 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from proofroll.core.arrays import FloatArray
 from proofroll.core.comparison import Band, Comparison, Row
 from proofroll.core.convergence import Limit, richardson, tightest
 from proofroll.core.errors import Missing, ProofrollError
+from proofroll.core.observable import Role
 from proofroll.core.verdict import Judgement, Verdict, judge
-from proofroll.elements.ball_on_surface.observables import Observable
-from proofroll.elements.ball_on_surface.trajectory import read
+from proofroll.files.netcdf import read
 from proofroll.files.scene_file import load_scene
 from proofroll.running.case import LASTING, Case, EngineFacts, Result, Status
 from proofroll.running.runner import Runner, WorkerDied
 from proofroll.studies.planning import Plan, Planned, plan, point_name
-from proofroll.studies.reference import OF_EVENTS, Reference
+from proofroll.studies.reference import Reference
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -79,10 +80,6 @@ class Outcome:
         broken = {Status.MISSING, Status.CRASHED, Status.TIMEOUT}
         lost = [run for run in self.runs if run.result.status in broken]
         return [run for run in lost if Verdict.FAILED not in run.row.expected(run.parameters)]
-
-
-# Observables that are judged even where the time of slip is ill-posed: they hold on every path.
-_EVERYWHERE = frozenset({"energy_balance", "force_audit", "gap", "creep"})
 
 
 def evaluate(planned: Plan, results: dict[str, Result], runner: Runner) -> Outcome:
@@ -159,29 +156,30 @@ def _judgements(
         if tolerance is None:
             continue
         true, bar = reference.true(name, curve)
+        item = reference.scene.observables[name]
         judgement = judge(
             name,
-            curve.unit,
-            curve.values,
+            item.unit,
+            curve,
             true,
             truth_error_bar=bar,
             tolerance=tolerance.absolute(reference.sizes.get(name, 1.0)),
             scale=reference.sizes.get(name, 1.0),
             limit=_limit(run, name, curves),
-            ill_posed=reference.ill_posed and name not in _EVERYWHERE,
+            ill_posed=reference.ill_posed and item.hangs_on_events,
         )
-        if reference.ill_posed and name in OF_EVENTS:
+        if reference.ill_posed and item.role == Role.EVENT:
             judgement = dataclasses.replace(judgement, verdict=Verdict.ILL_POSED)  # agreement would be luck
         judgements.append(judgement)
     return judgements
 
 
-def _limit(run: Planned, name: str, curves: dict[float, dict[str, Observable]]) -> Limit | None:
+def _limit(run: Planned, name: str, curves: dict[float, dict[str, FloatArray]]) -> Limit | None:
     """Limit of small steps, if every rung of the ladder gave the observable."""
     factors = run.row.ladder
     if len(factors) == 1 or not all(name in curves.get(factor, {}) for factor in factors):
         return None
-    values = [curves[factor][name].values for factor in factors]
+    values = [curves[factor][name] for factor in factors]
     if len({v.shape for v in values}) > 1 or not values[0].size or not all(np.all(np.isfinite(v)) for v in values):
         return None
     assert isinstance(run.facts, EngineFacts)  # there are curves

@@ -1,68 +1,50 @@
-"""What went wrong in a run, by its trajectory, and whether the engine said so: every threshold with its reason."""
+"""What went wrong in a run, by its trajectory, and whether the engine said so.
+
+Signs that only a kind of element has, as a ball off its wall, come from the elements.
+"""
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from dataclasses import dataclass
-from enum import StrEnum
-from typing import TYPE_CHECKING, Self
+from typing import TYPE_CHECKING
 
 import numpy as np
 
+from proofroll.core.arrays import FloatArray
+from proofroll.core.dataset import part
+from proofroll.core.element import ExplainsErrors
 from proofroll.core.events import events_of
-from proofroll.core.scene import RollingBall
-from proofroll.elements.ball_on_surface.surfaces import FloatArray
+from proofroll.core.scene import Scene
 from proofroll.running.case import Result, Status
 from proofroll.running.recording import noticed
 
 if TYPE_CHECKING:
     import xarray as xr
 
-# Accurate: the last coordinate (the height in a cylinder) is off by at most this part of its range.
+# Accurate: the deciding observable is off by at most this part of its range.
 ACCURATE = 0.01
 # Stable: by at most the whole range. Beyond, even a curve that stays at its start would be better.
 WRONG = 1.0
-# Part of the radius, or of the path's radius of curvature if that is less, by which a ball may be off its wall. The
-# lever of friction and the curvature of the path are then wrong by as much, so nothing accurate is left.
-OFF_SURFACE = 0.1
-# Part of the largest kinetic energy by which the energy may grow. Nothing in a scene drives the ball, so all of it is
-# the engine's; runs that hold 1 % of the path stay far below.
-GAIN = 0.1
-# Part of the initial speed with which a ball may move against the way that it last had, where rolling resistance has
-# to bring it to rest: a fixed step that ends beyond rest leaves the ball some speed, which is no motion yet.
-BACKWARDS = 0.01
-# A path is wrong because of slip where the way slipped while rolling makes up this part of the error or more.
-SLIPPED = 0.5
 
-
-class Failure(StrEnum):
-    """Kinds of failure; the value is what a person reads."""
-
-    DIVERGED = "diverged"
-    ENERGY_GAIN = "energy gain"
-    LEFT = "left the surface"
-    SANK = "sank in"
-    CREEP = "creep"
-    REVERSED = "reversed"
-    LOST_PHASE = "lost phase"
-    GAVE_UP = "solver gave up"
-    CRASHED = "crashed"
-    TOO_SLOW = "too slow"
-    REFUSED = "refused"
-
-
+DIVERGED, GAVE_UP, CRASHED = "diverged", "solver gave up", "crashed"
+LOST_PHASE, TOO_SLOW, REFUSED, LEFT = "lost phase", "too slow", "refused", "left the surface"
 MEANINGS = {
-    Failure.DIVERGED: "the state became NaN or overflowed",
-    Failure.ENERGY_GAIN: f"the energy grew by more than {GAIN:.0%} of the largest kinetic energy",
-    Failure.LEFT: f"the ball came off the wall by more than {OFF_SURFACE:.0%} of its radius",
-    Failure.SANK: f"the ball sank into the wall by more than {OFF_SURFACE:.0%} of its radius",
-    Failure.CREEP: f"the ball slipped while it should roll, which makes {SLIPPED:.0%} of the error or more",
-    Failure.REVERSED: f"rolling resistance drove the ball back, by more than {BACKWARDS:.0%} of the initial speed",
-    Failure.LOST_PHASE: "bounded, on the surface and without gain of energy, but wrong",
-    Failure.GAVE_UP: "the engine stopped and said why",
-    Failure.CRASHED: "the engine's process ended",
-    Failure.TOO_SLOW: "no result within the time that the map allows",
-    Failure.REFUSED: "the engine, or the check of what it built, refused before the run",
+    DIVERGED: "the state became NaN or overflowed",
+    LOST_PHASE: "bounded, with no other sign of failure, but wrong",
+    GAVE_UP: "the engine stopped and said why",
+    CRASHED: "the engine's process ended",
+    TOO_SLOW: "no result within the time that the map allows",
+    REFUSED: "the engine, or the check of what it built, refused before the run",
 }
+
+
+def meanings(scene: Scene) -> Mapping[str, str]:
+    """Every kind of failure that a run of the scene may show, with its meaning."""
+    found = dict(MEANINGS)
+    for element in scene.elements:
+        found |= element.failures
+    return found
 
 
 @dataclass(frozen=True)
@@ -70,18 +52,18 @@ class Outcome:
     """What a run gave.
 
     Attributes:
-        stable: it reached the end, on the surface, without gain of energy, and was not wrong by the whole range.
-        accurate: and the last coordinate held 1 % of its range; where there is no truth the same as stable.
+        stable: it reached the end without a sign of failure, and was not wrong by the whole range.
+        accurate: and the deciding observable held 1 % of its range; where there is no truth the same as stable.
         failure: what went wrong first, if it was not accurate.
         silent: it failed, and the engine did not say so.
-        error: largest error of the last coordinate in parts of its range; None if it is not known.
+        error: largest error of the deciding observable in parts of its range; None if it is not known.
         time: when the failure showed [s].
         message: how the run ended.
     """
 
     stable: bool
     accurate: bool
-    failure: Failure | None
+    failure: str | None
     silent: bool
     error: float | None
     time: float | None
@@ -93,57 +75,27 @@ class Yardstick:
     """What a run is measured by.
 
     Attributes:
-        body: the scene's.
-        times: of the samples [s].
-        coordinate: name of the last coordinate of the surface.
+        scene: what was run.
+        truth: the true run; None where there is none.
+        name: of the deciding observable.
         true: its values; None where there is no truth.
         scale: its range.
-        kinetic: largest kinetic energy [J].
-        fastest: largest angular velocity [rad/s]; None where there is no truth.
-        off_surface: allowed distance from the wall, and depth in it [m].
-        heading: direction of the true velocity, or of the last one where the ball rests, at each sample, shape (n, 3);
-            None where nothing resists rolling, or there is no truth.
-        rolls: where the true ball does not slip, at each sample; None where it never does, or there is no truth.
     """
 
-    body: RollingBall
-    times: FloatArray
-    coordinate: str
+    scene: Scene
+    truth: xr.Dataset | None
+    name: str
     true: FloatArray | None
     scale: float
-    kinetic: float
-    fastest: float | None
-    off_surface: float
-    heading: FloatArray | None = None
-    rolls: FloatArray | None = None
 
     @classmethod
-    def of(cls, body: RollingBall, times: FloatArray, truth: xr.Dataset | None) -> Self:
-        """From the truth, or, where there is none, from the start alone."""
-        ball, name = body.ball, body.surface.coordinates[-1]
-        bend = float(np.linalg.norm(body.surface.normal_gradient(body.p0), 2))
-        length = min(ball.radius, 1 / bend) if bend else ball.radius
-        kinetic = 0.5 * ball.mass * float(body.v0 @ body.v0) + 0.5 * ball.inertia * float(body.w0 @ body.w0)
-        true, scale, fastest, heading, rolls = None, 1.0, None, None, None
-        if truth is not None:
-            true = truth[name].to_numpy()
-            scale = float(np.ptp(true)) or 1.0
-            v, w = truth["v_WB"].to_numpy(), truth["w_WB"].to_numpy()
-            fastest = float(np.max(np.linalg.norm(w, axis=-1)))
-            kinetic = max(
-                kinetic, float(np.max(0.5 * ball.mass * (v**2).sum(-1) + 0.5 * ball.inertia * (w**2).sum(-1)))
-            )
-            heading = _heading(v) if body.contact.rolling_resistance > 0 else None
-            rolls = truth["sticking"].to_numpy() if "sticking" in truth else None
-        return cls(body, times, name, true, scale, kinetic, fastest, OFF_SURFACE * length, heading, rolls)
-
-
-def _heading(v: FloatArray) -> FloatArray:
-    """Directions of velocities, shape (n, 3); where one is below the threshold, that before it."""
-    speeds = np.linalg.norm(v, axis=-1)
-    moves = speeds > BACKWARDS * speeds[0]
-    last = np.maximum.accumulate(np.where(moves, np.arange(len(v)), 0))
-    return np.asarray(v[last] / np.where(speeds[last] > 0, speeds[last], 1.0)[:, None])
+    def of(cls, scene: Scene, truth: xr.Dataset | None) -> Yardstick:
+        """From the truth, or, where there is none, from the scene alone."""
+        name = scene.deciding
+        if truth is None:
+            return cls(scene, None, name, None, 1.0)
+        true = truth[name].to_numpy()
+        return cls(scene, truth, name, true, float(np.ptp(true)) or 1.0)
 
 
 def judge(result: Result, dataset: xr.Dataset | None, yardstick: Yardstick) -> Outcome:
@@ -154,19 +106,19 @@ def judge(result: Result, dataset: xr.Dataset | None, yardstick: Yardstick) -> O
         dataset: its trajectory as far as it went, if there is one.
         yardstick: of its place.
     """
-    early = {Status.CRASHED: Failure.CRASHED, Status.TIMEOUT: Failure.TOO_SLOW, Status.REFUSED: Failure.REFUSED}
+    early = {Status.CRASHED: CRASHED, Status.TIMEOUT: TOO_SLOW, Status.REFUSED: REFUSED}
     if result.status in early or dataset is None:
-        return _failed(early.get(result.status, Failure.GAVE_UP), result, None, None)
+        return _failed(early.get(result.status, GAVE_UP), result, None, None)
     errors = _errors(dataset, yardstick)
     error = None if errors is None else float(np.max(errors, initial=0.0))
     first = _first(dataset, yardstick, errors)
     if result.status == Status.DIVERGED:
         failure, time = first or (None, None)
         if noticed(result.message) or (failure is None and "finite" in result.message):
-            failure, time = Failure.DIVERGED, float(dataset["time"][-1])
+            failure, time = DIVERGED, float(dataset["time"][-1])
         elif failure is None:
             lifted = any(event.kind == "liftoff" for event in events_of(dataset))
-            failure, time = (Failure.LEFT if lifted else Failure.GAVE_UP), float(dataset["time"][-1])
+            failure, time = (LEFT if lifted else GAVE_UP), float(dataset["time"][-1])
         return _failed(failure, result, error, time, silent=noticed(result.message))
     if first is not None:
         return _failed(first[0], result, error, first[1], silent=True)
@@ -177,35 +129,32 @@ def judge(result: Result, dataset: xr.Dataset | None, yardstick: Yardstick) -> O
 
 
 def _failed(
-    failure: Failure, result: Result, error: float | None, time: float | None, *, silent: bool = False
+    failure: str | None, result: Result, error: float | None, time: float | None, *, silent: bool = False
 ) -> Outcome:
     return Outcome(False, False, failure, silent, error, time, result.message)
 
 
 def _errors(dataset: xr.Dataset, yardstick: Yardstick) -> FloatArray | None:
-    """Of the last coordinate at each sample, in parts of its range."""
+    """Of the deciding observable at each sample, in parts of its range."""
     if yardstick.true is None:
         return None
-    values = dataset[yardstick.coordinate].to_numpy()
+    values = dataset[yardstick.name].to_numpy()
     with np.errstate(over="ignore", invalid="ignore"):
         errors = np.abs(values - yardstick.true[: len(values)]) / yardstick.scale
     return np.where(np.isfinite(errors), errors, np.inf)
 
 
-def _first(dataset: xr.Dataset, yardstick: Yardstick, errors: FloatArray | None) -> tuple[Failure, float] | None:
+def _first(dataset: xr.Dataset, yardstick: Yardstick, errors: FloatArray | None) -> tuple[str, float] | None:
     """What makes the run unstable first, and when [s]; None: it is stable as far as it went."""
-    times, gap, energy = (dataset[name].to_numpy() for name in ("time", "gap", "energy"))
-    with np.errstate(over="ignore", invalid="ignore"):
-        signs = {
-            Failure.LEFT: gap > yardstick.off_surface,
-            Failure.SANK: gap < -yardstick.off_surface,
-            Failure.ENERGY_GAIN: energy - energy[0] > GAIN * yardstick.kinetic,
-        }
-    if yardstick.heading is not None:
-        v = dataset["v_WB"].to_numpy()
-        along = np.sum(v * yardstick.heading[: len(v)], axis=-1)
-        signs[Failure.REVERSED] = along < -BACKWARDS * float(np.linalg.norm(yardstick.body.v0))
-    shown = {failure: int(np.argmax(sign)) for failure, sign in signs.items() if np.any(sign)}
+    times = dataset["time"].to_numpy()
+    shown: dict[str, int] = {}
+    scene, truth = yardstick.scene, yardstick.truth
+    for element in scene.elements:
+        own = None if truth is None else part(scene, element, truth)
+        for sign in element.signs(part(scene, element, dataset), own):
+            if np.any(sign.shown):
+                index = int(np.argmax(sign.shown))
+                shown[sign.name] = min(index, shown.get(sign.name, index))
     if errors is not None and np.any(errors > WRONG):
         index = int(np.argmax(errors > WRONG))
         if not shown or index < min(shown.values()):
@@ -216,14 +165,15 @@ def _first(dataset: xr.Dataset, yardstick: Yardstick, errors: FloatArray | None)
     return failure, float(times[shown[failure]])
 
 
-def _wrong(dataset: xr.Dataset, yardstick: Yardstick, errors: FloatArray, index: int) -> Failure:
-    """Why a bounded path on the surface is wrong at a sample: by slip, or by anything else."""
-    times = dataset["time"].to_numpy()[: index + 1]
-    slip = np.hypot(dataset["slip2"].to_numpy(), dataset["slip3"].to_numpy())[: index + 1]
-    rolls = np.ones(len(times), dtype=bool)
-    if "sticking" in dataset:
-        rolls = dataset["sticking"].to_numpy().astype(bool)[: index + 1]
-    both = rolls[1:] & rolls[:-1]
-    slipped = float(np.sum(both * np.diff(times) * (slip[1:] + slip[:-1]) / 2))
-    metres = float(errors[index]) * yardstick.scale * yardstick.body.surface.length_scales[-1]
-    return Failure.CREEP if slipped >= SLIPPED * metres else Failure.LOST_PHASE
+def _wrong(dataset: xr.Dataset, yardstick: Yardstick, errors: FloatArray, index: int) -> str:
+    """Why a bounded path is wrong at a sample: what the element of the deciding observable knows, or lost phase."""
+    scene = yardstick.scene
+    reached = dataset.isel(time=slice(0, index + 1))
+    for element in scene.elements:
+        decides = any(
+            item.decides and scene.label(element, item.name) == yardstick.name for item in element.observables
+        )
+        if decides and isinstance(element, ExplainsErrors):
+            cause = element.cause(part(scene, element, reached), float(errors[index]) * yardstick.scale)
+            return cause or LOST_PHASE
+    return LOST_PHASE

@@ -10,10 +10,12 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from proofroll.core.arrays import FloatArray
+from proofroll.core.dataset import observe
 from proofroll.core.errors import InputError, ProofrollError, Refused
-from proofroll.elements.ball_on_surface.observables import observables, units
-from proofroll.elements.ball_on_surface.surfaces import FloatArray
-from proofroll.elements.ball_on_surface.trajectory import read
+from proofroll.core.observable import Role
+from proofroll.core.scene import Scene
+from proofroll.files.netcdf import read
 from proofroll.files.scene_file import load_scene
 from proofroll.running.case import Case, EngineFacts, Result, Status
 from proofroll.running.recording import time_grid
@@ -21,6 +23,7 @@ from proofroll.running.runner import Runner, WorkerDied, resolve
 from proofroll.running.stopwatch import Stopwatch
 from proofroll.running.timing import ROUNDS, Timing, interleaved
 from proofroll.studies.ladder_models import Model, Rung, Switch, described, rungs, switches
+from proofroll.studies.reference import Reference
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -28,7 +31,6 @@ if TYPE_CHECKING:
 _EVERY = 0.02  # interval between samples [s], as in the comparison files
 _TIME_LIMIT = 60.0  # wall seconds for one case
 # Observables that are not one curve over the samples.
-_NO_CURVES = frozenset({"first_slip", "event_times", "event_order"})
 
 
 @dataclass(frozen=True)
@@ -103,12 +105,11 @@ class Ladder:
         self.tolerance, self._rounds = tolerance, rounds or ROUNDS
         self.scene = load_scene(scene, **parameters)
         self._given = {name: self.scene.parameters[name] for name in parameters}
-        known = units(self.scene.rolling)
-        curves = [name for name in known if name not in _NO_CURVES]
-        self.quantity = quantity or ("z" if "z" in known else self.scene.rolling.surface.coordinates[0])
+        curves = [name for name, item in self.scene.observables.items() if item.role != Role.EVENT]
+        self.quantity = quantity or self.scene.deciding
         if self.quantity not in curves:
             raise InputError("quantity", self.quantity, f"choose one of {', '.join(curves)}")
-        self.unit = known[self.quantity]
+        self.unit = self.scene.observables[self.quantity].unit
         self.engines = described(engines)
         for error in self.engines.values():
             if isinstance(error, InputError):
@@ -125,8 +126,7 @@ class Ladder:
     def run(self, progress: Callable[[str], None] = lambda _: None) -> None:
         """Runs every model once, stored results where there are some, then times all of them in turns."""
         self._run_truths([{}], progress)
-        needed = float(np.nanmax(self.truths[str({})].dataset["needed_friction"].to_numpy()))
-        self.switches = switches(self.ladder, self.engines, self.scene, needed)
+        self.switches = switches(self.ladder, self.engines, self.scene, self.truths[str({})].dataset)
         wanted = [rung.model for rung in self.ladder] + [m for s in self.switches for m in (s.on, s.off)]
         models = {key_of(model): model for model in wanted if model is not None}
         self._run_truths([dict(s.on.parameters) for s in self.switches if s.on is not None], progress)
@@ -168,22 +168,18 @@ class Ladder:
             self.truths[str(point)] = self._truth(read(self._runner.store.trajectory(case)), point)
 
     def _truth(self, dataset: xr.Dataset, point: dict[str, float]) -> Truth:
-        values = self._curve(point, dataset)
-        if values is None:
+        reference = Reference.of(self._scene_at(point), dataset)
+        if self.quantity not in reference.curves:
             raise Refused(f"the truth of this scene has no {self.quantity}")
-        if self.quantity in dataset and self.quantity != "gap":
-            return Truth(dataset, values, float(dataset[self.quantity].attrs["error_bar"]))
-        if self.quantity == "slip" and "sticking" in dataset:
-            bars = (float(dataset[f"slip{index}"].attrs["error_bar"]) for index in (2, 3))
-            return Truth(dataset, values, math.hypot(*bars))
-        # Zero for a perfect run; what is found in the truth is what the measurement cannot resolve.
-        return Truth(dataset, np.zeros_like(values), float(np.max(np.abs(values), initial=0.0)))
+        values, bar = reference.true(self.quantity, reference.curves[self.quantity])
+        return Truth(dataset, values, bar)
+
+    def _scene_at(self, point: Mapping[str, float]) -> Scene:
+        return load_scene(self._name, **(self._given | dict(point)))
 
     def _curve(self, point: Mapping[str, float], dataset: xr.Dataset) -> FloatArray | None:
         """The quantity of a run of the scene with these parameters."""
-        body = load_scene(self._name, **(self._given | dict(point))).rolling
-        found = observables(body, dataset).get(self.quantity)
-        return None if found is None else found.values
+        return observe(self._scene_at(point), dataset).get(self.quantity)
 
     def _answer(self, model: Model, case: Case, result: Result) -> Answer:
         if result.status != Status.DONE:

@@ -4,18 +4,17 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
+from proofroll.core.dataset import part
 from proofroll.core.engine import Level
 from proofroll.core.errors import ProofrollError
 from proofroll.core.plugins import engine_names
-from proofroll.core.scene import Capability, Scene
+from proofroll.core.scene import Scene
 from proofroll.running.runner import describe
 
-# Rolling resistance that a scene without any is given to see what the term costs: f in radii (Blajer 2006, figure 5).
-_RESISTANCE = 0.02
-# Friction that is bounded far away from what rolling needs: this many times as much.
-_FAR = 10.0
+if TYPE_CHECKING:
+    import xarray as xr
 
 
 @dataclass(frozen=True)
@@ -122,7 +121,7 @@ def _written(options: Mapping[str, Any]) -> str:
 
 
 def switches(
-    ladder: Sequence[Rung], engines: Mapping[str, dict[str, Any] | ProofrollError], scene: Scene, needed: float
+    ladder: Sequence[Rung], engines: Mapping[str, dict[str, Any] | ProofrollError], scene: Scene, truth: xr.Dataset
 ) -> list[Switch]:
     """Every optional term: the scene's in one model of each engine and level, the engine's in each model that has it.
 
@@ -130,7 +129,7 @@ def switches(
         ladder: from :func:`rungs`.
         engines: from :func:`described`.
         scene: as it was given.
-        needed: friction that rolling needs in it, at most [-].
+        truth: of the scene.
     """
     found: list[Switch] = []
     models = [(rung.level, rung.model) for rung in ladder if rung.model is not None and not rung.variant]
@@ -139,7 +138,7 @@ def switches(
         told = engines[model.engine]
         assert isinstance(told, dict)  # it has a rung
         if (model.engine, level) not in seen:
-            found += _of_the_scene(model, scene, needed, told["inherent"].get(model.formulation, {}))
+            found += _of_the_scene(model, scene, truth, told["inherent"].get(model.formulation, {}))
         seen.add((model.engine, level))
     for _, model in models:
         told = engines[model.engine]
@@ -152,41 +151,15 @@ def switches(
     return found
 
 
-def _of_the_scene(model: Model, scene: Scene, needed: float, inherent: Mapping[str, str]) -> list[Switch]:
-    """Rolling resistance, bounded friction and orientation."""
-
-    def on(term: str, because: str, put: Mapping[str, float], taken: Mapping[str, float]) -> Switch:
-        return Switch(
-            term,
-            "scene",
-            model,
-            Model(model.engine, model.options, put),
-            Model(model.engine, model.options, taken),
-            because,
-        )
-
+def _of_the_scene(model: Model, scene: Scene, truth: xr.Dataset, inherent: Mapping[str, str]) -> list[Switch]:
+    """What the scene's elements can have or not."""
     found: list[Switch] = []
-    contact, ball = scene.rolling.contact, scene.rolling.ball
-    if "rolling_resistance" in scene.parameters:
-        f = contact.rolling_resistance or _RESISTANCE * ball.radius
-        because = "the scene has it" if contact.rolling_resistance else f"the scene has none; here with f = {f:g} m"
-        found.append(on("rolling resistance", because, {"rolling_resistance": f}, {"rolling_resistance": 0.0}))
-    if "mu_static" in scene.parameters:
-        unbounded = {"mu_static": float("inf")} | ({"mu_kinetic": float("inf")} if _has(scene, "mu_kinetic") else {})
-        if Capability.BOUNDED_FRICTION in scene.requires:
-            found.append(on("bounded friction", "the scene bounds it", {}, unbounded))
-        else:
-            far = _FAR * (needed or 1.0)
-            because = f"the scene has no bound; here one of {far:.3g}, {_FAR:g} times what rolling needs"
-            bounded = dict.fromkeys(unbounded, far)
-            found.append(on("bounded friction", because, bounded, {}))
-    if Capability.ORIENTATION in inherent:
-        found.append(Switch("orientation asked", "scene", model, None, None, inherent[Capability.ORIENTATION]))
-    elif not scene.asks:
-        asked = Model(model.engine, model.options, asks=("orientation",))
-        found.append(Switch("orientation asked", "scene", model, asked, model, "nothing else depends on it"))
+    for element in scene.elements:
+        for term in element.optional_terms(scene.parameters, part(scene, element, truth)):
+            if term.capability in inherent:
+                found.append(Switch(term.name, "scene", model, None, None, inherent[term.capability]))
+            elif not term.asks or not scene.asks:
+                on = Model(model.engine, model.options, term.put, term.asks)
+                off = Model(model.engine, model.options, term.taken)
+                found.append(Switch(term.name, "scene", model, on, off, term.because))
     return found
-
-
-def _has(scene: Scene, parameter: str) -> bool:
-    return parameter in scene.parameters

@@ -10,17 +10,15 @@ from typing import TYPE_CHECKING, Self
 
 import numpy as np
 
-from proofroll.core.events import events_of
+from proofroll.core.arrays import FloatArray
+from proofroll.core.dataset import observe, part, scales
+from proofroll.core.events import Event, events_of
+from proofroll.core.observable import Role
 from proofroll.core.scene import Scene
-from proofroll.elements.ball_on_surface.observables import Observable, observables, scales
-from proofroll.elements.ball_on_surface.surfaces import FloatArray
-from proofroll.elements.ball_on_surface.trajectory import read
+from proofroll.files.netcdf import read
 
 if TYPE_CHECKING:
     import xarray as xr
-
-# Observables that hang on when slip begins.
-OF_EVENTS = frozenset({"first_slip", "event_order", "event_times"})
 
 
 @dataclass(frozen=True)
@@ -30,20 +28,24 @@ class Reference:
     Attributes:
         scene: with its numbers.
         dataset: the true trajectory.
-        curves: its observables.
+        curves: values of its observables.
         sizes: scale of each observable.
     """
 
     scene: Scene
     dataset: xr.Dataset
-    curves: dict[str, Observable]
+    curves: dict[str, FloatArray]
     sizes: dict[str, float]
 
     @classmethod
     def read(cls, scene: Scene, path: Path) -> Self:
         """From a stored trajectory of the truth."""
-        dataset = read(path)
-        return cls(scene, dataset, observables(scene.rolling, dataset), scales(scene.rolling, dataset))
+        return cls.of(scene, read(path))
+
+    @classmethod
+    def of(cls, scene: Scene, dataset: xr.Dataset) -> Self:
+        """From a trajectory of the truth."""
+        return cls(scene, dataset, observe(scene, dataset), scales(scene, dataset))
 
     @property
     def ill_posed(self) -> bool:
@@ -52,35 +54,44 @@ class Reference:
         return bool(onset.get("verdict") == "ill-posed")
 
     def scale(self, name: str) -> float | None:
-        """What a percentage of an observable refers to: its size, for the first slip its time; None: nothing."""
-        if name == "first_slip" and name in self.curves:
-            return next((float(time) for time in self.curves[name].values), None)
+        """What a percentage of an observable refers to: its size, for an event its time; None: nothing."""
+        if self.scene.observables[name].role == Role.EVENT and name in self.curves:
+            return next((float(time) for time in self.curves[name]), None)
         return self.sizes.get(name)
 
-    def observed(self, dataset: xr.Dataset) -> dict[str, Observable]:
+    def observed(self, dataset: xr.Dataset) -> dict[str, FloatArray]:
         """The observables of an engine's trajectory of this scene."""
-        found = observables(self.scene.rolling, dataset)
-        if "sticking" in dataset:
-            found["event_order"] = event_order(dataset, self.dataset)
+        found = observe(self.scene, dataset)
+        for element in self.scene.elements:
+            own, true = part(self.scene, element, dataset), part(self.scene, element, self.dataset)
+            if "event_kind" in own:
+                found[self.scene.label(element, EVENT_ORDER)] = event_order(own, true)
         return found
 
-    def true(self, name: str, curve: Observable) -> tuple[FloatArray, float]:
-        """The true values of an observable, and their error bar."""
-        if name == "event_order":
+    def true(self, name: str, values: FloatArray) -> tuple[FloatArray, float]:
+        """The true values of an observable of which an engine gave ``values``, and their error bar."""
+        item = self.scene.observables[name]
+        if item.name == EVENT_ORDER:
             return np.zeros(1), 0.0
-        values = self.curves[name].values
-        if name in OF_EVENTS:
-            events = events_of(self.dataset)
-            return values, max((event.time_high - event.time_low for event in events), default=0.0)
-        if name == "slip" and "sticking" in self.dataset:
-            return values, float(np.hypot(*(self.dataset[f"slip{i}"].attrs["error_bar"] for i in (2, 3))))
-        if name not in self.dataset or name == "gap":
-            # Zero for a perfect run: what is left on the truth is what the measurement itself cannot resolve.
-            return np.zeros_like(curve.values), float(np.max(np.abs(values), initial=0.0))
-        return values, float(self.dataset[name].attrs["error_bar"])
+        if item.role == Role.EVENT:
+            return self.curves[name], max((event.time_high - event.time_low for event in self.events), default=0.0)
+        known = self.curves[name]
+        if item.role != Role.RESIDUAL:
+            return known, float(self.dataset[name].attrs["error_bar"])
+        # Zero for a perfect run: what is left on the truth is what the measurement itself cannot resolve.
+        return np.zeros_like(values), float(np.max(np.abs(known), initial=0.0))
+
+    @property
+    def events(self) -> list[Event]:
+        """Of all elements."""
+        return [event for item in self.scene.elements for event in events_of(part(self.scene, item, self.dataset))]
 
 
-def event_order(dataset: xr.Dataset, truth: xr.Dataset) -> Observable:
+# Observable of every element that has events: how many of them are of another kind, missing or too many.
+EVENT_ORDER = "event_order"
+
+
+def event_order(dataset: xr.Dataset, truth: xr.Dataset) -> FloatArray:
     """How many of the events are of another kind than the truth's, or missing, or too many."""
     kinds = itertools.zip_longest(*([event.kind for event in events_of(item)] for item in (dataset, truth)))
-    return Observable("event_order", "events", np.array([float(sum(a != b for a, b in kinds))]))
+    return np.array([float(sum(a != b for a, b in kinds))])

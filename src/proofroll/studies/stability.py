@@ -12,12 +12,12 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
-from proofroll.elements.ball_on_surface.trajectory import read
+from proofroll.files.netcdf import read
 from proofroll.running.case import Case, EngineFacts, Result, Status
 from proofroll.running.runner import Runner
 from proofroll.studies.axes import Axis
 from proofroll.studies.bisection import Found, search
-from proofroll.studies.failure import Failure, Outcome, judge
+from proofroll.studies.failure import TOO_SLOW, Outcome, judge
 from proofroll.studies.stability_places import PER_PERIOD, Effort, Place, case_at, measure, places_of
 from proofroll.studies.sweep import Curve, curves_of
 
@@ -225,5 +225,5 @@ def failure_beyond(point: MapPoint, rung: int | None) -> Outcome | None:
         return point.found.seen[rung]
     if not point.found.seen and point.found.limit == 0:
         message = "even the coarsest run is expected to take too long"
-        return Outcome(False, False, Failure.TOO_SLOW, False, None, None, message)
+        return Outcome(False, False, TOO_SLOW, False, None, None, message)
     return None

@@ -11,12 +11,13 @@ from pydantic import ConfigDict, TypeAdapter, ValidationError
 
 from proofroll.core.errors import InputError
 from proofroll.core.plugins import parse_engine
-from proofroll.files.scene_file import first_problem, load_scene
+from proofroll.files.scene_file import load_scene
 from proofroll.files.toml import read_toml, study_files
+from proofroll.files.validation import first_problem
 from proofroll.studies.axes import Axis, Term
-from proofroll.studies.failure import Failure
+from proofroll.studies.failure import meanings
 from proofroll.studies.stability_content import dependence
-from proofroll.studies.step_numbers import MEANINGS
+from proofroll.studies.step_numbers import step_numbers
 
 STUDY = "stability"
 # A dependence along an axis shows between as many values.
@@ -52,7 +53,7 @@ class Claim:
     same: bool = False
     number: str | None = None
     between: list[float] = field(default_factory=list)
-    failure: list[Failure] = field(default_factory=list)
+    failure: list[str] = field(default_factory=list)
     silent: bool | None = None
 
     def untested(self, points: Sequence[Mapping[str, Any]]) -> str:
@@ -181,6 +182,7 @@ def _check(where: str, found: StabilityFile) -> None:
             raise InputError(f"{where}: axes.{index}.values", "nothing", "an axis needs its values; add them")
         axis.at(scene, axis.values[0])
     known = [axis.name for axis in found.axes]
+    numbers = [item.name for item in step_numbers(scene)]
     for index, claim in enumerate(found.claims):
         at = f"{where}: claims.{index}"
         if not claim.because:
@@ -188,8 +190,11 @@ def _check(where: str, found: StabilityFile) -> None:
         for name in claim.axes:
             if name not in known:
                 raise InputError(f"{at}.axes", name, f"there is no such axis; choose from {', '.join(known)}")
-        if claim.number is not None and claim.number not in MEANINGS:
-            raise InputError(f"{at}.number", claim.number, f"choose one of {', '.join(MEANINGS)}")
+        for failure in claim.failure:
+            if failure not in meanings(scene):
+                raise InputError(f"{at}.failure", failure, f"choose one of {', '.join(meanings(scene))}")
+        if claim.number is not None and claim.number not in numbers:
+            raise InputError(f"{at}.number", claim.number, f"choose one of {', '.join(numbers)}")
         if (claim.number is None) != (not claim.between):
             raise InputError(f"{at}.between", claim.between, "number and between = [low, high] go together")
         for name in ("between", "values"):

@@ -7,9 +7,10 @@ from collections.abc import Callable, Mapping, Sequence
 from dataclasses import asdict
 from typing import Any
 
-from proofroll.studies.failure import ACCURATE, MEANINGS, Failure, Outcome
+from proofroll.files.scene_file import load_scene
+from proofroll.studies.failure import ACCURATE, REFUSED, Outcome, meanings
 from proofroll.studies.stability import MapPoint, StabilityMap, failure_beyond
-from proofroll.studies.step_numbers import explanation, numbers
+from proofroll.studies.step_numbers import explanation, step_numbers, values
 
 BOUNDARIES = ("stable", "accurate")
 # Boundaries this factor apart count as the same: two rungs of the ladder of steps, one of that of tolerances.
@@ -23,8 +24,9 @@ _PASSES: Mapping[str, Callable[[Outcome], bool]] = {
 def content(found: StabilityMap) -> dict[str, Any]:
     """Everything, with counts on top."""
     points = [_point(point) for point in found.points]
+    scene = load_scene(found.scene)
     # Who refuses before the run, or is refused by the certificate, has passed no boundary.
-    failing = [point for point in points if point["failure"] and point["failure"] != Failure.REFUSED]
+    failing = [point for point in points if point["failure"] and point["failure"] != REFUSED]
     return {
         "study": "stability",
         "scene": found.scene,
@@ -34,10 +36,11 @@ def content(found: StabilityMap) -> dict[str, Any]:
         "runs": found.runs,
         "boundaries": len(failing),
         "silent": sum(point["silent"] for point in failing),
-        "refused": sum(point["failure"] == Failure.REFUSED for point in points),
+        "refused": sum(point["failure"] == REFUSED for point in points),
         "failures": dict(Counter(point["failure"] for point in failing)),
         "never_accurate": sum(point["largest_accurate"] is None and not point["problem"] for point in points),
-        "meanings": {str(failure): meaning for failure, meaning in MEANINGS.items()},
+        "meanings": dict(meanings(scene)),
+        "step_symbols": {item.name: item.symbol for item in step_numbers(scene)},
         "points": points,
         "explanations": _explanations(points),
         "findings": _scale_findings(found, points),
@@ -98,9 +101,9 @@ def _side(point: MapPoint, name: str) -> dict[str, Any]:
     return {
         "largest": largest,
         "reached": beyond is not None and holding is not None,
-        "numbers": numbers(scene.rolling, largest, yardstick.fastest) if steps and largest is not None else {},
+        "numbers": values(scene, largest, yardstick.truth) if steps and largest is not None else {},
         "beyond": None if failing is None else point.ladder[failing],
-        "failure": None if beyond is None or beyond.failure is None else str(beyond.failure),
+        "failure": None if beyond is None else beyond.failure,
         "silent": beyond is not None and beyond.silent,
         "error": None if beyond is None else beyond.error,
         "time": None if beyond is None else beyond.time,

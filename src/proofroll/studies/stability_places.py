@@ -8,15 +8,13 @@ from dataclasses import dataclass
 
 from proofroll.core.errors import ProofrollError
 from proofroll.core.scene import Scene
-from proofroll.elements.ball_on_surface.trajectory import read
+from proofroll.files.netcdf import read
 from proofroll.files.scene_file import load_scene
 from proofroll.running.case import Case, EngineFacts, Status
-from proofroll.running.recording import time_grid
 from proofroll.running.runner import Runner, resolve
 from proofroll.studies.axes import Axis, thinned
 from proofroll.studies.failure import Yardstick
 from proofroll.studies.sweep import Question, case_of
-from proofroll.truth.natural import natural_time
 
 # Sampling intervals per natural time; the coarsest step is one of them, the finer ones divide it.
 PER_PERIOD = 8
@@ -85,7 +83,7 @@ def places_of(name: str, axes: Sequence[Axis], effort: Effort) -> list[Place]:
             except ProofrollError as error:
                 place.problem = str(error)
                 continue
-            place.scene, place.period = scene, natural_time(scene.rolling)
+            place.scene, place.period = scene, scene.natural_time
             intervals = round(PER_PERIOD * (value if axis.horizon else effort.periods))
             stride = 1 + 2 * (intervals // (2 * _MOST_SAMPLES))
             place.every = stride * place.period / PER_PERIOD
@@ -108,12 +106,11 @@ def measure(name: str, places: Sequence[Place], runner: Runner, tell: Callable[[
         truth = read(runner.store.trajectory(case)) if result.status == Status.DONE else None
         if truth is None:
             place.problem = f"there is no truth here: {result.message}"
-        times = time_grid(place.until, place.every)
-        place.yardstick = Yardstick.of(place.scene.rolling, times, truth)
+        place.yardstick = Yardstick.of(place.scene, truth)
 
 
 def case_at(name: str, place: Place, facts: EngineFacts, limit: float) -> Case:
     """A run at a place with a limit of time [s]."""
     assert place.scene is not None  # the caller looked
-    question = Question(name, place.parameters, place.until, place.scene.rolling.surface.coordinates[-1])
+    question = Question(name, place.parameters, place.until, place.scene.deciding)
     return dataclasses.replace(case_of(question, place.scene, facts, place.every), time_limit=limit)

@@ -6,18 +6,18 @@ import re
 from pathlib import Path
 from typing import Any
 
+from proofroll.core.element import FailedRun, WritesPrograms, imported
 from proofroll.running.case import Case
 from proofroll.running.runner import programs
 from proofroll.running.store import write_text
 from proofroll.running.worker_pool import Workers
-from proofroll.studies.failure import Failure
+from proofroll.studies.failure import ACCURATE, REFUSED, TOO_SLOW, WRONG
 from proofroll.studies.stability import MapPoint, StabilityMap
-from proofroll.studies.stability_programs import needs, program, through_proofroll
 
 # A run that did not begin, and one that nobody waited for, show nothing.
 _NOTHING_TO_SHOW = {
-    Failure.REFUSED: "the run was refused before it began",
-    Failure.TOO_SLOW: "the run was only too slow for the map",
+    REFUSED: "the run was refused before it began",
+    TOO_SLOW: "the run was only too slow for the map",
 }
 
 
@@ -36,18 +36,46 @@ def write_reproducers(found: StabilityMap, study: dict[str, Any], folder: Path, 
         if side is None or side["failure"] is None:
             continue
         if side["failure"] in _NOTHING_TO_SHOW:
-            entry["reproducer_note"] = _NOTHING_TO_SHOW[Failure(side["failure"])]
+            entry["reproducer_note"] = _NOTHING_TO_SHOW[side["failure"]]
             continue
         rung = point.ladder.index(side["beyond"])
         wanted.append((point, entry, side, point.cases[rung], name))
     for (point, entry, side, case, name), (engine, reason) in zip(
         wanted, programs([item[3] for item in wanted], workers), strict=True
     ):
-        path = folder / f"{_file_name(entry)}.py"
         entry["reproducer_note"] = None if engine is not None else reason
-        part = engine if engine is not None else through_proofroll(case, point.place)
-        write_text(path, program(point.place, entry, side, case, part, name))
-        entry["reproducer"], entry["reproducer_needs"] = str(path), needs(part)
+        element = point.place.scene.elements[0] if point.place.scene is not None else None
+        if not isinstance(element, WritesPrograms):
+            entry["reproducer_note"] = "elements of this kind offer no program"
+            continue
+        path = folder / f"{_file_name(entry)}.py"
+        text = element.failure_program(_failed(point, entry, side, case, name), engine)
+        write_text(path, text)
+        entry["reproducer"] = str(path)
+        entry["reproducer_needs"] = [name for name in imported(text) if name != "sys"]
+
+
+def _failed(point: MapPoint, entry: dict[str, Any], side: dict[str, Any], case: Case, boundary: str) -> FailedRun:
+    yardstick, facts = point.place.yardstick, case.engine
+    assert yardstick is not None  # a point has one
+    return FailedRun(
+        scene=case.scene,
+        parameters=point.place.parameters,
+        engine=facts.name,
+        version=facts.version,
+        settings=facts.settings,
+        resolution=str(facts.resolution),
+        until=case.until,
+        every=case.every,
+        where=f"{entry['axis']} = {entry['value']:g}",
+        boundary=boundary,
+        failure=side["failure"],
+        silent=side["silent"],
+        truth=yardstick.truth,
+        scale=yardstick.scale,
+        allowed=WRONG if boundary == "stable" else ACCURATE,
+        note=entry["reproducer_note"] or "",
+    )
 
 
 def _shown(entry: dict[str, Any]) -> tuple[str, dict[str, Any] | None]:

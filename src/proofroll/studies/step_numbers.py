@@ -2,46 +2,40 @@
 
 from __future__ import annotations
 
-import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
+from typing import TYPE_CHECKING
 
-import numpy as np
+from proofroll.core.dataset import part
+from proofroll.core.element import StepNumber
+from proofroll.core.scene import Scene
 
-from proofroll.core.scene import RollingBall
-from proofroll.truth.natural import natural_time, turning_rate
+if TYPE_CHECKING:
+    import xarray as xr
 
-MEANINGS = {
-    "turn": "Ωh: angle [rad] by which the wall's normal turns in a step",
-    "spin": "(V0/a)h: angle [rad] by which the ball turns in a step",
-    "rotation": "h·max|ω|: angle [rad] by which the ball turns in a step where it turns fastest",
-    "fall": "h√(g/a): step in parts of the time of a fall by the radius",
-}
-SYMBOLS = {"turn": "Ωh", "spin": "(V0/a)h", "rotation": "h|ω|", "fall": "h√(g/a)"}
+# The step in parts of the natural time: every scene has it, and it explains nothing.
+OSCILLATION = "oscillation"
 # A number explains a boundary that it keeps within this factor along an axis.
 _EXPLAINS = 2.0
 # Fewer boundaries than these say nothing about an axis.
 _ENOUGH = 3
 
 
-def numbers(body: RollingBall, h: float, fastest: float | None = None) -> dict[str, float]:
-    """The numbers of a step; those that are zero at every step, or not known, are left out.
+def step_numbers(scene: Scene, h: float = 1.0, truth: xr.Dataset | None = None) -> list[StepNumber]:
+    """The numbers of a step ``h`` [s], of all elements."""
+    found = []
+    for element in scene.elements:
+        own = None if truth is None else part(scene, element, truth)
+        found += [
+            StepNumber(scene.label(element, n.name), n.symbol, n.meaning, n.value) for n in element.step_numbers(h, own)
+        ]
+    return found
 
-    ``oscillation`` is the step in parts of the natural time.
 
-    Args:
-        body: the scene's.
-        h: step [s].
-        fastest: largest angular velocity of the ball during the run [rad/s], where the truth is known.
-    """
-    speed, gravity, a = float(np.linalg.norm(body.v0)), float(np.linalg.norm(body.gravity)), body.ball.radius
-    found = {
-        "turn": turning_rate(body) * h,
-        "spin": speed / a * h,
-        "rotation": (fastest or 0.0) * h,
-        "fall": math.sqrt(gravity / a) * h,
-    }
-    return {name: value for name, value in found.items() if value} | {"oscillation": h / natural_time(body)}
+def values(scene: Scene, h: float, truth: xr.Dataset | None = None) -> dict[str, float]:
+    """The numbers by name; those that are zero at every step, or not known, are left out."""
+    known = {number.name: number.value for number in step_numbers(scene, h, truth) if number.value}
+    return known | {OSCILLATION: h / scene.natural_time}
 
 
 @dataclass(frozen=True)
@@ -69,7 +63,7 @@ def explanation(boundaries: Sequence[Mapping[str, float]]) -> Explanation | None
     """Which number explains the boundaries of one engine along one axis; None: there are too few of them."""
     if len(boundaries) < _ENOUGH:
         return None
-    common = [name for name in MEANINGS if all(name in item for item in boundaries)]
+    common = [name for name in boundaries[0] if name != OSCILLATION and all(name in item for item in boundaries)]
     spreads = {}
     for name in common:
         values = [item[name] for item in boundaries]

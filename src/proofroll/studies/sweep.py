@@ -8,12 +8,12 @@ from typing import Any
 
 import numpy as np
 
+from proofroll.core.arrays import FloatArray
 from proofroll.core.engine import whole_steps
 from proofroll.core.errors import InputError, ProofrollError
 from proofroll.core.plugins import engine_names, parse_engine
 from proofroll.core.scene import Scene
-from proofroll.elements.ball_on_surface.observables import Observable
-from proofroll.elements.ball_on_surface.trajectory import read
+from proofroll.files.netcdf import read
 from proofroll.files.scene_file import load_scene
 from proofroll.running.case import Case, EngineFacts, Result, Status
 from proofroll.running.runner import Runner, describe, resolve
@@ -80,7 +80,7 @@ class Point:
 
     case: Case
     result: Result
-    curves: dict[str, Observable] = field(default_factory=dict)
+    curves: dict[str, FloatArray] = field(default_factory=dict)
     errors: dict[str, float] = field(default_factory=dict)
     bars: dict[str, float] = field(default_factory=dict)
 
@@ -292,7 +292,7 @@ def judged(point: Point, reference: Reference, runner: Runner) -> Point:
     errors, bars = {}, {}
     for name, curve in curves.items():
         true, bar = reference.true(name, curve)
-        same = curve.values.shape == true.shape
-        error = float(np.max(np.abs(curve.values - true), initial=0.0)) if same else np.inf
+        same = curve.shape == true.shape
+        error = float(np.max(np.abs(curve - true), initial=0.0)) if same else np.inf
         errors[name], bars[name] = error if np.isfinite(error) else np.inf, bar
     return replace(point, curves=curves, errors=errors, bars=bars)

@@ -16,8 +16,6 @@ from pathlib import Path
 
 import numpy as np
 
-from proofroll.core.errors import InputError
-from proofroll.elements.ball_on_surface.observables import units
 from proofroll.running.case import Case, Result, Status
 from proofroll.running.runner import Runner
 from proofroll.running.stopwatch import Stopwatch
@@ -119,11 +117,7 @@ def tradeoff(
         InputError: something that does not exist, or a quantity that the scene does not have.
     """
     scene = question.loaded()
-    known = units(scene.rolling)
-    if question.quantity not in known:
-        raise InputError("quantity", question.quantity, f"there is no such observable; choose from {', '.join(known)}")
-    if question.quantity == "first_slip" and not np.isfinite(scene.rolling.contact.mu_static):
-        raise InputError("quantity", "first_slip", "without bounded friction the ball never slips; --set mu_static=…")
+    scene.observable(question.quantity)
     curves, absent = curves_of(engines, runner.workers)
 
     def told(case: Case, _: Result) -> None:
@@ -211,7 +205,7 @@ def _corner(place: dict[str, float], point: Point, reference: Reference, runner:
 
 def judged_quantities(found: Tradeoff) -> list[str]:
     """The observables that a recommendation may be asked for."""
-    return [name for name in found.quantities if name not in {"event_times", "event_order", "force_audit"}]
+    return [name for name in found.quantities if found.reference.scene.observables[name].asked_for]
 
 
 def pareto_entries(

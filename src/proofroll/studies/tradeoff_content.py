@@ -8,8 +8,8 @@ from typing import Any
 
 import numpy as np
 
-from proofroll.elements.ball_on_surface.observables import units
-from proofroll.elements.ball_on_surface.surfaces import FloatArray
+from proofroll.core.arrays import FloatArray
+from proofroll.core.observable import Role
 from proofroll.files.json_data import plain
 from proofroll.running.case import Status
 from proofroll.running.timing import Timing
@@ -28,23 +28,24 @@ def budgets(found: Tradeoff) -> list[tuple[Curve, Budget]]:
     for curve in found.curves:
         for quantity in found.quantities:
             shown = [point.curves[quantity] for point in curve.points if quantity in point.curves]
-            if not shown or quantity in {"event_times", "event_order"}:
+            declared = found.reference.scene.observables[quantity]
+            if not shown or (declared.role == Role.EVENT and not declared.asked_for):
                 continue
             true: FloatArray = found.reference.true(quantity, shown[-1])[0]
-            if all(item.values.shape == true.shape for p in curve.points if p.case.every == every
-                   for item in [p.curves.get(quantity)] if item is not None):  # fmt: skip
+            if all(values.shape == true.shape for p in curve.points if p.case.every == every
+                   for values in [p.curves.get(quantity)] if values is not None):  # fmt: skip
                 made.append((curve, budget(curve, quantity, every, true)))
     return made
 
 
 def content(found: Tradeoff) -> dict[str, Any]:
     """Everything as plain data: what ``--json`` prints, what is stored, and what a recommendation is made from."""
-    reference, known = found.reference, units(found.reference.scene.rolling)
+    reference, known = found.reference, found.reference.scene.observables
     numbers = {point.case.key: number for number, point in enumerate(found.points)}
     made = budgets(found)
     quantities = {
         name: {
-            "unit": known.get(name, "1"),
+            "unit": known[name].unit,
             "scale": reference.scale(name),
             "truth_error_bar": reference.true(name, curve)[1],
         }
@@ -69,7 +70,7 @@ def content(found: Tradeoff) -> dict[str, Any]:
             for step, reason in curve.dropped.items()
         ],
         "absent": found.absent,
-        "budgets": [_budget(curve, item, known.get(item.quantity, "1")) for curve, item in made],
+        "budgets": [_budget(curve, entry, known[entry.quantity].unit) for curve, entry in made],
         "pareto": _fronts(found.curves, numbers, found),
         "pareto_engines": _fronts([curve for curve in found.curves if not by_hand(curve.level)], numbers, found),
         "truth": {**_cost(found.truth_timing), "route": reference.dataset.attrs.get("route", "")},
@@ -139,7 +140,7 @@ def findings(found: Tradeoff, made: Sequence[tuple[Curve, Budget]]) -> list[str]
     """What stands out, as sentences."""
     said = []
     quantity = found.question.quantity
-    scale, unit = found.reference.scale(quantity) or 1.0, units(found.reference.scene.rolling)[quantity]
+    scale, unit = found.reference.scale(quantity) or 1.0, found.reference.scene.observables[quantity].unit
     judged = judged_quantities(found)
     for curve in found.curves:
         other = [i for of, i in made if of is curve and i.quantity in judged and i.contradicts_declaration]

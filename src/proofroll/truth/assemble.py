@@ -6,8 +6,8 @@ from collections.abc import Callable
 
 import numpy as np
 
+from proofroll.core.arrays import FloatArray
 from proofroll.elements.ball_on_surface.motion import Motion
-from proofroll.elements.ball_on_surface.surfaces import FloatArray
 
 
 def joined(

@@ -8,8 +8,8 @@ from dataclasses import dataclass
 import numpy as np
 from scipy.integrate import DOP853
 
+from proofroll.core.arrays import FloatArray
 from proofroll.core.errors import Diverged
-from proofroll.elements.ball_on_surface.surfaces import FloatArray
 from proofroll.truth.crossing import first_rise
 
 _RTOL = 100 * np.finfo(float).eps  # the tightest that scipy accepts

@@ -8,10 +8,10 @@ from functools import partial
 
 import numpy as np
 
+from proofroll.core.arrays import FloatArray
 from proofroll.core.errors import Diverged
-from proofroll.core.scene import RollingBall
+from proofroll.elements.ball_on_surface.model import RollingBall
 from proofroll.elements.ball_on_surface.motion import Motion
-from proofroll.elements.ball_on_surface.surfaces import FloatArray
 from proofroll.truth.assemble import classic_step
 from proofroll.truth.collocation import Step, System, next_length, nodes, take
 from proofroll.truth.contact import Contact

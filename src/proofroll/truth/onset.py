@@ -8,7 +8,9 @@ from typing import Literal
 import numpy as np
 
 from proofroll.core.errors import InputError
-from proofroll.core.scene import RollingBall, Scene
+from proofroll.core.scene import Scene
+from proofroll.elements.ball_on_surface.element import rolling_ball
+from proofroll.elements.ball_on_surface.model import RollingBall
 from proofroll.truth.friction_curve import FrictionCurve, friction_curve
 from proofroll.truth.variants import with_contact
 
@@ -45,7 +47,7 @@ class Onset:
 
 def first_slip(scene: Scene, until: float) -> float | None:
     """When the ball first slips [s]; None: not until ``until`` [s]."""
-    body = scene.rolling
+    body = rolling_ball(scene)
     return friction_curve(body, until).onset(body.contact.mu_static)
 
 
@@ -62,7 +64,7 @@ def onset(scene: Scene, until: float, uncertainty: float = 1e-3) -> Onset:
     """
     if not 0 <= uncertainty < 1:
         raise InputError("uncertainty", uncertainty, "give a relative uncertainty of mu and f between 0 and 1")
-    body = scene.rolling
+    body = rolling_ball(scene)
     mu = body.contact.mu_static
     curve = friction_curve(body, until)
     time = curve.onset(mu)
@@ -102,7 +104,7 @@ def edge_between(scene: Scene, low: float, high: float, until: float, digits: in
     Returns:
         None where both ends slip on the same rise.
     """
-    curve = friction_curve(scene.rolling, until)
+    curve = friction_curve(rolling_ball(scene), until)
     lower, upper = _stair(curve, low)[1], _stair(curve, high)[1]
     if lower == upper:
         return None

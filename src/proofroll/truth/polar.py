@@ -12,11 +12,11 @@ from collections.abc import Callable
 
 import numpy as np
 
+from proofroll.core.arrays import FloatArray
 from proofroll.core.errors import Diverged
-from proofroll.core.scene import RollingBall
+from proofroll.elements.ball_on_surface.model import RollingBall
 from proofroll.elements.ball_on_surface.motion import Motion, world_motion
 from proofroll.elements.ball_on_surface.rolling_equations import reduced_rates
-from proofroll.elements.ball_on_surface.surfaces import FloatArray
 from proofroll.truth.assemble import classic_step, joined
 from proofroll.truth.explicit import Piece, Rates, at_clock, read, steps, stop
 from proofroll.truth.switching import End, Leg

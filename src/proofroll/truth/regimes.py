@@ -12,8 +12,11 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from proofroll.core.scene import RollingBall, Scene
-from proofroll.elements.ball_on_surface.surfaces import Cylinder, FloatArray
+from proofroll.core.arrays import FloatArray
+from proofroll.core.scene import Scene
+from proofroll.elements.ball_on_surface.element import rolling_ball
+from proofroll.elements.ball_on_surface.model import RollingBall
+from proofroll.elements.ball_on_surface.surfaces import Cylinder
 from proofroll.truth.stick_slip import first_route
 from proofroll.truth.switching import End, follow
 from proofroll.truth.variants import at_speed, with_contact
@@ -79,7 +82,7 @@ def regime_map(
     """
     import xarray as xr
 
-    body = scene.rolling
+    body = rolling_ball(scene)
     mus = np.asarray(frictions, dtype=np.float64)
     row = partial(_row, body, mus, until)
     rows = []

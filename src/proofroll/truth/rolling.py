@@ -17,13 +17,13 @@ from dataclasses import dataclass
 import numpy as np
 from scipy.integrate import DOP853
 
+from proofroll.core.arrays import FloatArray
 from proofroll.core.errors import Diverged
-from proofroll.core.scene import RollingBall
 from proofroll.elements.ball_on_surface.mechanics import newton_euler
+from proofroll.elements.ball_on_surface.model import RollingBall
 from proofroll.elements.ball_on_surface.motion import Motion
 from proofroll.elements.ball_on_surface.resting import setting_off, stands, stays
 from proofroll.elements.ball_on_surface.rolling_equations import placed, reduced_rates, start
-from proofroll.elements.ball_on_surface.surfaces import FloatArray
 
 # The tightest relative tolerance that scipy accepts is 100 machine epsilons.
 _RTOL = 100 * np.finfo(float).eps

@@ -6,11 +6,13 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from proofroll.core.arrays import FloatArray
 from proofroll.core.errors import Diverged
 from proofroll.core.events import Event, EventKind
-from proofroll.core.scene import RollingBall, Scene
-from proofroll.elements.ball_on_surface.surfaces import FloatArray
-from proofroll.elements.ball_on_surface.trajectory import trajectory
+from proofroll.core.scene import Scene
+from proofroll.elements.ball_on_surface.dataset import variables
+from proofroll.elements.ball_on_surface.element import rolling_ball
+from proofroll.elements.ball_on_surface.model import RollingBall
 from proofroll.truth import taylor
 from proofroll.truth.error_bars import put_error_bars
 from proofroll.truth.implicit import Implicit
@@ -45,7 +47,7 @@ def stick_slip(scene: Scene, times: FloatArray) -> tuple[xr.Dataset, list[Event]
         Diverged: the routes disagree about the order of events, which happens where it hangs on the last digits.
         Refused: the ball leaves the wall and lands on it again.
     """
-    body = scene.rolling
+    body = rolling_ball(scene)
     times = np.asarray(times, dtype=np.float64)
     until = float(times[-1])
     routes: tuple[Route[FloatArray], Route[FloatArray]] = (first_route(body), Implicit(body))
@@ -85,6 +87,6 @@ def _without_last(
 
 def _dataset(scene: Scene, times: FloatArray, path: Path[FloatArray], route: str) -> xr.Dataset:
     motion, sticking = path.motion(times, route)
-    result = trajectory(scene, times, motion.p_WB, motion.v_WB, motion.w_WB, force=motion.force)
+    result = variables(rolling_ball(scene), times, motion.p_WB, motion.v_WB, motion.w_WB, force=motion.force)
     attributes = {"units": "1", "long_name": "whether the ball sticks (rolls without slip)"}
     return result.assign(sticking=("time", sticking, attributes))

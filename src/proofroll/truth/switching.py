@@ -13,12 +13,12 @@ from typing import Generic, Protocol, TypeVar
 
 import numpy as np
 
+from proofroll.core.arrays import FloatArray
 from proofroll.core.errors import Diverged, Refused
 from proofroll.core.events import EventKind
-from proofroll.core.scene import RollingBall
+from proofroll.elements.ball_on_surface.model import RollingBall
 from proofroll.elements.ball_on_surface.motion import Motion
 from proofroll.elements.ball_on_surface.resting import setting_off, stands, stays
-from proofroll.elements.ball_on_surface.surfaces import FloatArray
 
 # Relative distance from the friction cone below which round-off decides on which side a state is.
 _ON_CONE = 1e-13

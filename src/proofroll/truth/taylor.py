@@ -6,12 +6,13 @@ from typing import Any
 
 import numpy as np
 
+from proofroll.core.arrays import FloatArray
 from proofroll.core.errors import Diverged
-from proofroll.core.scene import RollingBall
 from proofroll.elements.ball_on_surface.compiled import library
 from proofroll.elements.ball_on_surface.compiled.rolling import is_uniform, parameters, start
+from proofroll.elements.ball_on_surface.model import RollingBall
 from proofroll.elements.ball_on_surface.motion import Motion, world_motion
-from proofroll.elements.ball_on_surface.surfaces import Cylinder, FloatArray, Plane
+from proofroll.elements.ball_on_surface.surfaces import Cylinder, Plane
 from proofroll.truth.assemble import classic_step, joined
 from proofroll.truth.switching import End, Leg
 from proofroll.truth.taylor_model import Model, model

@@ -6,12 +6,14 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from proofroll.core.arrays import FloatArray
 from proofroll.core.events import with_events
-from proofroll.core.scene import Capability, RollingBall, Scene
+from proofroll.core.scene import Scene
 from proofroll.elements.ball_on_surface.closed_form import closed_form
+from proofroll.elements.ball_on_surface.dataset import variables
+from proofroll.elements.ball_on_surface.element import rolling_ball
+from proofroll.elements.ball_on_surface.model import BallCapability, RollingBall
 from proofroll.elements.ball_on_surface.motion import Motion
-from proofroll.elements.ball_on_surface.surfaces import FloatArray
-from proofroll.elements.ball_on_surface.trajectory import trajectory
 from proofroll.truth import rolling, unreduced_taylor
 from proofroll.truth.error_bars import put_error_bars
 
@@ -37,11 +39,11 @@ def truth(scene: Scene, times: FloatArray) -> xr.Dataset:
         Diverged: the routes disagree about the order of events.
         Refused: the ball leaves the wall and lands on it again.
     """
-    if Capability.BOUNDED_FRICTION in scene.requires:
+    if BallCapability.BOUNDED_FRICTION in scene.requires:
         from proofroll.truth.stick_slip import stick_slip
 
         return with_events(*stick_slip(scene, times))
-    body = scene.rolling
+    body = rolling_ball(scene)
     times = np.asarray(times, dtype=np.float64)
     first = closed_form(body, times) or rolling.reduced(body, times)
     second = _unreduced(body, times)
@@ -59,4 +61,4 @@ def _unreduced(body: RollingBall, times: FloatArray) -> Motion:
 
 
 def _dataset(scene: Scene, times: FloatArray, motion: Motion) -> xr.Dataset:
-    return trajectory(scene, times, motion.p_WB, motion.v_WB, motion.w_WB, force=motion.force)
+    return variables(rolling_ball(scene), times, motion.p_WB, motion.v_WB, motion.w_WB, force=motion.force)

@@ -18,12 +18,13 @@ from typing import Any
 
 import numpy as np
 
+from proofroll.core.arrays import FloatArray
 from proofroll.core.errors import Diverged
-from proofroll.core.scene import RollingBall
 from proofroll.elements.ball_on_surface.compiled import library
 from proofroll.elements.ball_on_surface.mechanics import newton_euler
+from proofroll.elements.ball_on_surface.model import RollingBall
 from proofroll.elements.ball_on_surface.motion import Motion
-from proofroll.elements.ball_on_surface.surfaces import Cylinder, FloatArray, Plane
+from proofroll.elements.ball_on_surface.surfaces import Cylinder, Plane
 
 _local = threading.local()
 

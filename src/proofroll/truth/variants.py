@@ -7,7 +7,7 @@ from dataclasses import replace
 
 import numpy as np
 
-from proofroll.core.scene import RollingBall
+from proofroll.elements.ball_on_surface.model import RollingBall
 
 
 def with_contact(

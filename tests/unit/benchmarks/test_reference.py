@@ -13,6 +13,7 @@ from rich.console import Console
 
 from proofroll.core.errors import Refused
 from proofroll.elements.ball_on_surface.compiled import library
+from proofroll.elements.ball_on_surface.element import rolling_ball
 from proofroll.files.scene_file import load_scene
 from proofroll.running.runner import Runner
 from proofroll.running.simulation import simulate
@@ -29,7 +30,7 @@ needs_heyoka = pytest.mark.skipif(not library.available(), reason="heyoka is not
 SLIPPING = load_scene("sphere_in_cylinder", rolling_resistance=5e-4, mu_static=0.35)
 FREE = load_scene("sphere_in_cylinder", rolling_resistance=5e-4)
 TIMES = np.array([0.2, 0.4])
-TRUE_P = unreduced(FREE.rolling, np.append(0.0, TIMES)).p_WB[1:]
+TRUE_P = unreduced(rolling_ball(FREE), np.append(0.0, TIMES)).p_WB[1:]
 
 
 @needs_heyoka

@@ -5,7 +5,7 @@ import pytest
 import xarray as xr
 
 from proofroll.core.events import Event, events_of, with_events
-from proofroll.elements.ball_on_surface.trajectory import read, write
+from proofroll.files.netcdf import read, write
 
 EVENTS = [Event("slip", 1.0, 0.9, 1.1), Event("stick", 2.0, 2.0, 2.0), Event("liftoff", 3.0, 2.5, 3.5)]
 

@@ -8,25 +8,28 @@ import numpy as np
 import pytest
 
 from proofroll.core.errors import InputError
-from proofroll.core.scene import Ball, Capability, Gravity, Scene
+from proofroll.core.gravity import Gravity
+from proofroll.core.scene import Scene
+from proofroll.elements.ball_on_surface.element import changed, rolling_ball
 from proofroll.elements.ball_on_surface.mechanics import slip_velocity
+from proofroll.elements.ball_on_surface.model import Ball, BallCapability
 from proofroll.files.scene_file import load_scene
 
 
 def test_paper_ball() -> None:
     """The defaults of the sphere in the cylinder are the steel ball of the paper."""
     scene = load_scene("sphere_in_cylinder")
-    ball = scene.rolling.ball
+    ball = rolling_ball(scene).ball
     assert (ball.radius, ball.mass) == (0.025, 0.517)
     assert ball.inertia == pytest.approx(0.4 * 0.517 * 0.025**2, rel=1e-15)
-    assert scene.rolling.wall.radius == 0.225
-    assert scene.rolling.surface.radius == pytest.approx(0.2, rel=1e-15)
-    assert scene.rolling.gravity.tolist() == [0, 0, -9.81]
+    assert rolling_ball(scene).wall.radius == 0.225
+    assert rolling_ball(scene).surface.radius == pytest.approx(0.2, rel=1e-15)
+    assert rolling_ball(scene).gravity.tolist() == [0, 0, -9.81]
 
 
 def test_start_of_the_sphere_in_the_cylinder() -> None:
     """At time 0 the centre is at (c, 0, 0), moves along y, and spins about -z by cγ̇/a."""
-    body = load_scene("sphere_in_cylinder").rolling
+    body = rolling_ball(load_scene("sphere_in_cylinder"))
     assert body.p0 == pytest.approx([0.2, 0, 0], abs=1e-15)
     assert body.v0 == pytest.approx([0, 4, 0], abs=1e-15)
     assert body.w0 == pytest.approx([0, 0, -160], abs=1e-12)
@@ -35,38 +38,38 @@ def test_start_of_the_sphere_in_the_cylinder() -> None:
 
 def test_start_has_no_slip_and_the_given_spin(scene: Scene) -> None:
     """The initial angular velocity makes the contact point rest and has the given component along e1."""
-    body = scene.rolling
+    body = rolling_ball(scene)
     e1 = body.surface.normal(body.p0)
     assert slip_velocity(body.ball.radius, e1, body.v0, body.w0) == pytest.approx(0.0, abs=1e-14)
-    assert body.w0 @ e1 == pytest.approx(scene.initial[0].spin, abs=1e-13)
+    assert body.w0 @ e1 == pytest.approx(scene.elements[0].start.spin, abs=1e-13)
     assert body.surface.gap(body.p0) == pytest.approx(0.0, abs=1e-16)
 
 
 def test_udot_gives_the_velocity(scene: Scene) -> None:
     """The initial rates of the coordinates give the initial velocity."""
-    body = scene.rolling
+    body = rolling_ball(scene)
     assert body.surface.tangents(body.u0) @ body.udot0 == pytest.approx(body.v0, abs=1e-14)
 
 
 def test_gravity_direction_has_any_length() -> None:
     """Only the direction of gravity's direction counts."""
     scene = load_scene("sphere_in_cylinder")
-    longer = dataclasses.replace(scene, gravity=Gravity(9.81, (0.0, 0.0, -7.0)))
-    assert longer.rolling.gravity == pytest.approx(scene.rolling.gravity, rel=1e-15)
+    longer = changed(scene, gravity=Gravity(9.81, (0.0, 0.0, -7.0)))
+    assert rolling_ball(longer).gravity == pytest.approx(rolling_ball(scene).gravity, rel=1e-15)
 
 
 @pytest.mark.parametrize(
     ("scene_name", "parameters", "needs"),
     [
-        ("inclined_plane", {}, {Capability.ROLLING}),
-        ("sphere_in_cylinder", {}, {Capability.ROLLING, Capability.CURVED_SURFACE}),
-        ("inclined_plane", {"rolling_resistance": 1e-9}, {Capability.ROLLING, Capability.ROLLING_RESISTANCE}),
-        ("inclined_plane", {"mu_static": 5.0}, {Capability.ROLLING, Capability.BOUNDED_FRICTION}),
-        ("inclined_plane", {"mu_static": math.inf}, {Capability.ROLLING}),
+        ("inclined_plane", {}, {BallCapability.ROLLING}),
+        ("sphere_in_cylinder", {}, {BallCapability.ROLLING, BallCapability.CURVED_SURFACE}),
+        ("inclined_plane", {"rolling_resistance": 1e-9}, {BallCapability.ROLLING, BallCapability.ROLLING_RESISTANCE}),
+        ("inclined_plane", {"mu_static": 5.0}, {BallCapability.ROLLING, BallCapability.BOUNDED_FRICTION}),
+        ("inclined_plane", {"mu_static": math.inf}, {BallCapability.ROLLING}),
     ],
 )
 def test_requires_no_more_than_the_scene_needs(
-    scene_name: str, parameters: dict[str, float], needs: set[Capability]
+    scene_name: str, parameters: dict[str, float], needs: set[BallCapability]
 ) -> None:
     """A scene requires exactly what its numbers make necessary."""
     assert load_scene(scene_name, **parameters).requires == needs
@@ -104,13 +107,13 @@ def test_two_balls_are_refused_by_name() -> None:
     scene = load_scene("sphere_in_cylinder")
     two = dataclasses.replace(scene, balls=scene.balls * 2)
     with pytest.raises(InputError, match="one ball on one surface"):
-        _ = two.rolling
+        _ = rolling_ball(two)
 
 
 def test_orientation_is_required_only_if_asked_for() -> None:
     """Asking adds the orientation to what is required and to the digest; a scene that asks nothing keeps its digest."""
     plain, asking = load_scene("sphere_in_cylinder"), load_scene("sphere_in_cylinder", asks=("orientation",))
-    assert asking.requires - plain.requires == {Capability.ORIENTATION}
+    assert asking.requires - plain.requires == {BallCapability.ORIENTATION}
     assert asking.digest != plain.digest
     # As it was before scenes could ask: results that were stored then are still those of this scene.
     assert dataclasses.replace(plain, folder=Path()).digest == "fc2cc22c733e01ac"

@@ -7,10 +7,11 @@ import numpy as np
 import pytest
 
 from proofroll import load_scene
+from proofroll.core.certificate import certify
 from proofroll.core.errors import Diverged, InputError, Refused
 from proofroll.core.plugins import resolve_settings
 from proofroll.core.scene import Scene
-from proofroll.elements.ball_on_surface.certificate import certify
+from proofroll.elements.ball_on_surface.element import changed, rolling_ball
 from proofroll.elements.ball_on_surface.surfaces import Cylinder
 from proofroll.running.simulation import build, simulate
 
@@ -101,8 +102,8 @@ def test_plane(formulation: str) -> None:
 
 def tilted(scene: Scene, angle: float) -> Scene:
     """The same scene with the wall tilted [rad]."""
-    (wall,) = scene.surfaces
-    return dataclasses.replace(scene, surfaces=(dataclasses.replace(wall, tilt=angle),))
+    wall = scene.elements[0].surface
+    return changed(scene, surface=dataclasses.replace(wall, tilt=angle))
 
 
 @pytest.mark.parametrize("formulation", FORMULATIONS)
@@ -130,8 +131,8 @@ class Foreign(Cylinder):
 def test_wall_without_generators() -> None:
     """Only the rolling disc can do without generators, and gives the same numbers; the others refuse with a reason."""
     scene = cylinder(rolling_resistance=5e-4)
-    foreign = dataclasses.replace(scene, surfaces=(Foreign("wall", 0.225),))
-    foreign.rolling.__dict__["surface"] = Foreign("wall", foreign.rolling.surface.radius)
+    foreign = changed(scene, surface=Foreign("wall", 0.225))
+    rolling_ball(foreign).__dict__["surface"] = Foreign("wall", rolling_ball(foreign).surface.radius)
     for formulation in ("generic", "carrier"):
         with pytest.raises(Refused, match="slide along itself"):
             build(foreign, "exudyn", formulation=formulation)

@@ -9,13 +9,14 @@ import numpy as np
 import pytest
 
 from proofroll import load_scene
+from proofroll.core.certificate import Line, certify
 from proofroll.core.errors import Refused
 from proofroll.core.scene import Scene
-from proofroll.elements.ball_on_surface.certificate import Line, certify
 from proofroll.running.simulation import build
 
 pytest.importorskip("exudyn")
 
+from proofroll.elements.ball_on_surface.element import rolling_ball
 from proofroll.engines.exudyn import PRESETS
 from proofroll.engines.exudyn import ball as ball_module
 from proofroll.engines.exudyn import generic as generic_module
@@ -133,7 +134,7 @@ def test_a_wrong_inertia_inside_the_engine_is_felt(
 def test_unbounded_friction(formulation: str, preset: str) -> None:
     """Rows that hold both ways have no coefficient; the contact's grip is named, with what it stands for."""
     true = load_scene("sphere_in_cylinder", speed=4)
-    assert math.isinf(true.rolling.contact.mu_static)
+    assert math.isinf(rolling_ball(true).contact.mu_static)
     engine = build(true, "exudyn", formulation=formulation, preset=preset)
     lines = {line.quantity: line for line in certify(engine, true)}
     assert not broken(list(lines.values()))

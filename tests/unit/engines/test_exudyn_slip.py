@@ -8,10 +8,11 @@ import pytest
 import xarray as xr
 
 from proofroll import load_scene
+from proofroll.core.certificate import certify
 from proofroll.core.errors import Diverged, InputError, Refused
 from proofroll.core.events import events_of
 from proofroll.core.scene import Scene
-from proofroll.elements.ball_on_surface.certificate import certify
+from proofroll.elements.ball_on_surface.element import changed, rolling_ball
 from proofroll.elements.ball_on_surface.mechanics import resistance_moment
 from proofroll.running.recording import record, time_grid
 from proofroll.running.simulation import build
@@ -172,7 +173,7 @@ def test_law_of_friction(formulation: str, law: float, beside: float, creep: flo
 def test_reported_friction_is_the_applied_one(settings: dict[str, Any], exact: float) -> None:
     """Through onset, slip and stick the reported force is the one that Exudyn's accelerations obey, step by step."""
     scene = paper()
-    body, engine = scene.rolling, build(scene, "exudyn", **settings)
+    body, engine = rolling_ball(scene), build(scene, "exudyn", **settings)
     m, J, a, f = body.ball.mass, body.ball.inertia, body.ball.radius, body.contact.rolling_resistance
     engine.advance(1.7)
     for t in [*np.arange(1701, 1760) / 1000, *np.arange(2000, 2020) / 1000]:
@@ -235,8 +236,8 @@ def test_no_friction(formulation: str) -> None:
 def test_leaving_the_wall_is_an_event(formulation: str) -> None:
     """Where the normal force vanishes the run ends with a sentence and an event, not with a wall that pulls."""
     scene = cylinder(speed=2.5, mu_static=3)
-    (wall,) = scene.surfaces
-    scene = dataclasses.replace(scene, surfaces=(dataclasses.replace(wall, tilt=1.4),))
+    wall = scene.elements[0].surface
+    scene = changed(scene, surface=dataclasses.replace(wall, tilt=1.4))
     dataset, failure = run(scene, 1.0, formulation=formulation, dt=1e-3)
     assert failure is not None
     assert "leaves the wall" in failure

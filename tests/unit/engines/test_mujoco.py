@@ -9,10 +9,11 @@ import mujoco
 import numpy as np
 import pytest
 
+from proofroll.core.certificate import certify, first_difference
 from proofroll.core.engine import Sample
 from proofroll.core.errors import Diverged, InputError, Refused
 from proofroll.core.scene import Scene
-from proofroll.elements.ball_on_surface.certificate import certify, first_difference
+from proofroll.elements.ball_on_surface.element import changed, rolling_ball
 from proofroll.elements.ball_on_surface.surfaces import Cylinder
 from proofroll.engines.mujoco import Mujoco
 from proofroll.engines.mujoco.settings import PRESETS
@@ -198,7 +199,7 @@ def mutated(mutation: str, parameters: dict[str, float]) -> Scene:
     """The scene in the cylinder with one thing wrong."""
     if mutation == "inertia x2":
         scene = load_scene(CYLINDER, **parameters)
-        return dataclasses.replace(scene, balls=(dataclasses.replace(scene.balls[0], inertia_ratio=0.8),))
+        return changed(scene, ball=dataclasses.replace(scene.elements[0].ball, inertia_ratio=0.8))
     name, factor = {
         "gravity x1.1": ("gravity", 1.1),
         "f x2": ("rolling_resistance", 2.0),
@@ -295,7 +296,7 @@ def test_tolerances_that_check_nothing_say_so() -> None:
 def test_tilted_cylinder_through_the_same_code(engine: str) -> None:
     """A cylinder whose axis leans is built and run by the same adapter from the same file."""
     scene = load_scene(CYLINDER, rolling_resistance=5e-4)
-    leaning = dataclasses.replace(scene, surfaces=(Cylinder("wall", scene.surfaces[0].radius, tilt=0.3),))
+    leaning = changed(scene, surface=Cylinder("wall", scene.elements[0].surface.radius, tilt=0.3))
     assert isinstance(leaning, Scene)
     built = build(leaning, f"mujoco[{engine}]")
     assert first_difference(certify(built, leaning)) is None
@@ -307,14 +308,14 @@ def test_tilted_cylinder_through_the_same_code(engine: str) -> None:
 def test_leaning_ring_of_boxes_stands_where_the_wall_is() -> None:
     """Each box of the facets touches the wall from outside, whatever the wall's tilt."""
     scene = load_scene(CYLINDER)
-    leaning = dataclasses.replace(scene, surfaces=(Cylinder("wall", scene.surfaces[0].radius, tilt=0.3),))
+    leaning = changed(scene, surface=Cylinder("wall", scene.elements[0].surface.radius, tilt=0.3))
     model = build(leaning, "mujoco[formulation=facets]")._model
     data = mujoco.MjData(model)
     mujoco.mj_kinematics(model, data)
     boxes = [index for index in range(model.ngeom) if model.geom_type[index] == mujoco.mjtGeom.mjGEOM_BOX]
     faces = np.array([data.geom_xpos[i] - model.geom_size[i, 0] * data.geom_xmat[i, 0::3] for i in boxes])
-    assert np.max(np.abs(leaning.rolling.wall.gap(faces))) < 1e-12
-    angles = np.sort(leaning.rolling.wall.locate(faces)[:, 0])
+    assert np.max(np.abs(rolling_ball(leaning).wall.gap(faces))) < 1e-12
+    angles = np.sort(rolling_ball(leaning).wall.locate(faces)[:, 0])
     np.testing.assert_allclose(np.diff(angles), 2 * np.pi / len(boxes), rtol=1e-9)
 
 

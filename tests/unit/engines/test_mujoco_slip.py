@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import dataclasses
 import functools
 import itertools
 
@@ -11,6 +10,7 @@ import pytest
 
 from proofroll.core.errors import InputError, Refused
 from proofroll.core.events import events_of
+from proofroll.elements.ball_on_surface.element import changed, rolling_ball
 from proofroll.elements.ball_on_surface.surfaces import Cylinder
 from proofroll.files.scene_file import load_scene
 from proofroll.running.recording import record, time_grid
@@ -94,7 +94,7 @@ def test_first_slip_at_a_fine_step_is_within_the_step() -> None:
 def test_law_of_friction(engine: str, case: str) -> None:
     """Friction is below mu_s N while the ball sticks; while it slips it is mu_k N, against the slip."""
     ds = run(case, engine)
-    contact = load_scene(CYLINDER, **CASES[case][0]).rolling.contact
+    contact = rolling_ball(load_scene(CYLINDER, **CASES[case][0])).contact
     sticks = ds.sticking.to_numpy() == 1
     mu = ds.needed_friction.to_numpy()
     assert sticks.any()
@@ -155,7 +155,7 @@ def test_sliding_down_a_plane_in_closed_form(engine: str, mu_kinetic: float) -> 
     scene = load_scene(PLANE, mu_static=0.05, mu_kinetic=mu_kinetic)
     recording = record(build(scene, f"mujoco[{engine}]"), scene, time_grid(0.5, 0.05))
     ds, t = recording.dataset, recording.dataset.time.to_numpy()
-    body = scene.rolling
+    body = rolling_ball(scene)
     along, into = body.gravity @ body.surface.frame(body.u0)[:, 1], body.gravity @ body.surface.frame(body.u0)[:, 0]
     assert [(event.kind, event.time) for event in events_of(ds)] == [("slip", 0.0)]
     assert not ds.sticking.any()
@@ -247,7 +247,7 @@ def test_sampling_and_rebuilding_change_nothing(engine: str) -> None:
 def test_flight_is_one_liftoff(engine: str) -> None:
     """A ball that falls off a leaning wall has one liftoff, no stick or slip in the air, and events after it lands."""
     scene = load_scene(CYLINDER, mu_static=0.8, speed=2.0)
-    leaning = dataclasses.replace(scene, surfaces=(Cylinder("wall", scene.surfaces[0].radius, tilt=1.2),))
+    leaning = changed(scene, surface=Cylinder("wall", scene.elements[0].surface.radius, tilt=1.2))
     true = events_of(simulate(leaning, "truth", until=0.3, every=0.05))
     assert [event.kind for event in true] == ["slip", "liftoff"]
     ds = record(build(leaning, f"mujoco[{engine}]"), leaning, time_grid(0.6, 0.01)).dataset

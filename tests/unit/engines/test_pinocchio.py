@@ -9,9 +9,11 @@ import pytest
 import xarray as xr
 from scipy.spatial.transform import Rotation
 
+from proofroll.core.certificate import certify
 from proofroll.core.errors import Diverged, InputError, Refused
-from proofroll.core.scene import Capability, Scene
-from proofroll.elements.ball_on_surface.certificate import certify
+from proofroll.core.scene import Scene
+from proofroll.elements.ball_on_surface.element import changed, rolling_ball
+from proofroll.elements.ball_on_surface.model import BallCapability
 from proofroll.files.scene_file import load_scene
 from proofroll.running.recording import record, time_grid
 from proofroll.running.simulation import build, simulate
@@ -37,7 +39,7 @@ def plane(**parameters: float) -> Scene:
 def leaning_cylinder(tilt: float, **parameters: float) -> Scene:
     """The cylinder with its axis leaning by ``tilt`` [rad]."""
     scene = cylinder(**parameters)
-    return dataclasses.replace(scene, surfaces=(dataclasses.replace(scene.surfaces[0], tilt=tilt),))
+    return changed(scene, surface=dataclasses.replace(scene.elements[0].surface, tilt=tilt))
 
 
 SCENES = {
@@ -336,7 +338,7 @@ def test_surface_without_generators() -> None:
             return getattr(self._surface, name)
 
     scene = cylinder()
-    scene.__dict__["rolling"] = dataclasses.replace(scene.rolling, surface=Bare(scene.rolling.surface))
+    scene.__dict__["rolling"] = dataclasses.replace(rolling_ball(scene), surface=Bare(rolling_ball(scene).surface))
     with pytest.raises(Refused, match="free_flyer"):
         build(scene, "pinocchio[formulation=composite]")
     engine = build(scene, "pinocchio[formulation=free_flyer,preset=tuned]")
@@ -347,7 +349,7 @@ def test_provides_names_what_is_modelled() -> None:
     """The capabilities are those of rolling and of slip."""
     from proofroll.engines.pinocchio import Pinocchio
 
-    assert Pinocchio.provides == set(Capability)
+    assert Pinocchio.provides == set(BallCapability)
     assert Pinocchio.version() == pin.__version__
 
 
@@ -424,7 +426,7 @@ DYNAMICS = {"acceleration", "angular acceleration", "N", "F2", "F3"}
 
 def changed(scene: Scene, parameters: dict[str, float]) -> Scene:
     """The scene with some of its numbers multiplied."""
-    ball, contact, gravity = scene.balls[0], scene.contacts[0], scene.gravity
+    ball, contact, gravity = scene.elements[0].ball, scene.elements[0].contact, scene.elements[0].gravity
     for name, factor in parameters.items():
         if name == "gravity":
             gravity = dataclasses.replace(gravity, magnitude=factor * gravity.magnitude)
@@ -432,7 +434,7 @@ def changed(scene: Scene, parameters: dict[str, float]) -> Scene:
             ball = dataclasses.replace(ball, inertia_ratio=factor * ball.inertia_ratio)
         else:
             contact = dataclasses.replace(contact, **{name: factor * getattr(contact, name)})
-    return dataclasses.replace(scene, balls=(ball,), contacts=(contact,), gravity=gravity)
+    return changed(scene, ball=ball, contact=contact, gravity=gravity)
 
 
 @pytest.mark.parametrize(

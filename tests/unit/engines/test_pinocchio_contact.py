@@ -8,11 +8,12 @@ import numpy as np
 import pytest
 import xarray as xr
 
+from proofroll.core.certificate import certify
 from proofroll.core.errors import Diverged, Refused
 from proofroll.core.events import events_of
 from proofroll.core.plugins import load_engine, resolve_settings
 from proofroll.core.scene import Scene
-from proofroll.elements.ball_on_surface.certificate import certify
+from proofroll.elements.ball_on_surface.element import changed
 from proofroll.files.scene_file import load_scene
 from proofroll.running.simulation import build, simulate
 
@@ -25,7 +26,7 @@ SOLVERS = ("pgs", "admm")
 def leaning_cylinder(tilt: float, **parameters: float) -> Scene:
     """The cylinder with its axis leaning by ``tilt`` [rad]."""
     scene = load_scene("sphere_in_cylinder", **parameters)
-    return dataclasses.replace(scene, surfaces=(dataclasses.replace(scene.surfaces[0], tilt=tilt),))
+    return changed(scene, surface=dataclasses.replace(scene.elements[0].surface, tilt=tilt))
 
 
 def errors(engine: str, until: float = 0.5, **parameters: float) -> dict[str, float]:

@@ -6,10 +6,11 @@ import numpy as np
 import pytest
 
 import proofroll
+from proofroll.core.certificate import certify, first_difference
 from proofroll.core.errors import Diverged, InputError
 from proofroll.core.plugins import resolve_settings
-from proofroll.core.scene import Capability
-from proofroll.elements.ball_on_surface.certificate import certify, first_difference
+from proofroll.elements.ball_on_surface.element import rolling_ball
+from proofroll.elements.ball_on_surface.model import BallCapability
 from proofroll.engines.projection import Projection
 from proofroll.engines.projection.orientation import EulerAngles
 from proofroll.engines.projection.settings import PRESETS
@@ -75,7 +76,7 @@ def test_matched_is_as_good_as_the_truth(engine, f):
 def test_matched_holds_on_every_scene(engine, scene):
     """Other initial motions and the plane run through the same code, as accurately."""
     difference = errors(load(**scene), engine, until=0.5)
-    surface = load(**scene).rolling.surface
+    surface = rolling_ball(load(**scene)).surface
     assert max(difference[name] for name in surface.coordinates) < 1e-12
     assert max(difference[name] for name in ("N", "F2", "F3")) < 2e-11
 
@@ -192,7 +193,7 @@ def test_certificate_holds(scene, f, engine):
 
 def test_unbounded_friction_builds_nothing_for_slip():
     """Where friction is unbounded the ball has no mode but rolling, says nothing of sticking and has no events."""
-    assert Capability.BOUNDED_FRICTION in Projection.provides
+    assert BallCapability.BOUNDED_FRICTION in Projection.provides
     engine = build(load("sphere_in_cylinder", speed=4), EXACT[1])
     engine.advance(0.1)
     assert not isinstance(engine._motion, Switching)

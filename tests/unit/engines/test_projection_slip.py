@@ -2,14 +2,13 @@
 
 from __future__ import annotations
 
-from dataclasses import replace
-
 import numpy as np
 import pytest
 
 import proofroll
 from proofroll.core.errors import Diverged, InputError
 from proofroll.core.events import events_of
+from proofroll.elements.ball_on_surface.element import changed, rolling_ball
 from proofroll.elements.ball_on_surface.mechanics import slip_velocity
 from proofroll.elements.ball_on_surface.surfaces import Cylinder
 from proofroll.engines.projection import slipping
@@ -56,8 +55,8 @@ def times(engine):
 
 def local(scene, sample):
     """N, friction and slip velocity in components along e2 and e3."""
-    frame = scene.rolling.surface.frame(scene.rolling.surface.locate(sample.p_WB))
-    slip = slip_velocity(scene.rolling.ball.radius, frame[:, 0], sample.v_WB, sample.w_WB)
+    frame = rolling_ball(scene).surface.frame(rolling_ball(scene).surface.locate(sample.p_WB))
+    slip = slip_velocity(rolling_ball(scene).ball.radius, frame[:, 0], sample.v_WB, sample.w_WB)
     force = frame.T @ sample.force
     return -force[0], force[1:], frame[:, 1:].T @ slip
 
@@ -173,7 +172,7 @@ def test_jump_of_friction():
     since = 0.1767 - times(engine)[0]
     N, friction, slip = local(scene, engine.sample())
     assert np.hypot(*friction) / N == pytest.approx(0.12, rel=1e-12)
-    ball = scene.rolling.ball
+    ball = rolling_ball(scene).ball
     growth = (1 / ball.mass + A**2 / ball.inertia) * (0.15 - 0.12) * N
     assert np.hypot(*slip) / since == pytest.approx(growth, rel=2e-3)  # it grows further as the needed friction does
 
@@ -189,7 +188,7 @@ def test_plane(mu):
     assert not np.any(ds.sticking)
     np.testing.assert_allclose(ds.down_rate, 0.5 + G * (np.sin(TILT) - mu * np.cos(TILT)) * t, rtol=1e-13)
     np.testing.assert_allclose(ds.slip2, G * (np.sin(TILT) - 3.5 * mu * np.cos(TILT)) * t, rtol=0, atol=1e-13)
-    np.testing.assert_allclose(ds.F2, -mu * scene.rolling.ball.mass * G * np.cos(TILT), rtol=1e-12)
+    np.testing.assert_allclose(ds.F2, -mu * rolling_ball(scene).ball.mass * G * np.cos(TILT), rtol=1e-12)
 
 
 def test_plane_that_is_rough_enough():
@@ -286,7 +285,7 @@ def test_the_singularity_in_slip():
 def test_leaving_the_wall(engine):
     """In a lying cylinder a ball too slow to pass the top slips and leaves the wall where N = 0; the run ends there."""
     scene = cylinder(speed=2.2, mu_static=0.3)
-    scene = replace(scene, surfaces=(Cylinder("wall", 0.225, 1.5),))
+    scene = changed(scene, surface=Cylinder("wall", 0.225, 1.5))
     built = build(scene, engine)
     recording = record(built, scene, np.linspace(0, 1, 11))
     assert kinds(built) == ["slip", "liftoff"]
@@ -336,10 +335,10 @@ def test_drive_is_the_needed_friction(orientation, seed):
     rng = np.random.default_rng(seed)
     scene = cylinder(rolling_resistance=5e-4, mu_static=0.3)
     describe = orientation()
-    ball = ProjectedBall(scene.rolling, geometry_of(scene.rolling.surface), describe)
+    ball = ProjectedBall(rolling_ball(scene), geometry_of(rolling_ball(scene).surface), describe)
     angles = np.array([0.3, 1.2, -0.7])[: describe.size]
     kin = ball.kinematics(np.concatenate([rng.uniform(-2, 2, 2), angles, rng.uniform(-1, 1, 5) * [20, 1, 90, 90, 90]]))
     needed = ball.contact_force(ball.response(kin))[1:]
-    m, J = scene.rolling.ball.mass, scene.rolling.ball.inertia
-    found = Friction(ball, scene.rolling.contact).drive(kin)
+    m, J = rolling_ball(scene).ball.mass, rolling_ball(scene).ball.inertia
+    found = Friction(ball, rolling_ball(scene).contact).drive(kin)
     np.testing.assert_allclose(found, -(1 / m + A**2 / J) * needed, rtol=0, atol=1e-9 * np.max(np.abs(found)))

@@ -9,8 +9,9 @@ import numpy as np
 import pytest
 
 from proofroll.core.errors import Refused
+from proofroll.core.gravity import Gravity
 from proofroll.core.plugins import resolve_settings
-from proofroll.core.scene import Gravity, Scene
+from proofroll.core.scene import Scene
 from proofroll.elements.ball_on_surface.compiled import library
 from proofroll.engines.projection import Projection
 from proofroll.files.scene_file import load_scene

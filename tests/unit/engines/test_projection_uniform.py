@@ -7,7 +7,8 @@ import dataclasses
 import numpy as np
 import pytest
 
-from proofroll.core.scene import RollingBall
+from proofroll.elements.ball_on_surface.element import rolling_ball
+from proofroll.elements.ball_on_surface.model import RollingBall
 from proofroll.engines.projection.geometry import General, Uniform, geometry_of
 from proofroll.engines.projection.method import ProjectedBall
 from proofroll.engines.projection.orientation import EulerAngles, Orientation, RotatingFrame
@@ -21,7 +22,7 @@ def bodies() -> list[RollingBall]:
     found = []
     for name in ("sphere_in_cylinder", "inclined_plane"):
         for f in (0.0, 5e-4):
-            body = load_scene(name, rolling_resistance=f).rolling
+            body = rolling_ball(load_scene(name, rolling_resistance=f))
             found += [body, dataclasses.replace(body, surface=dataclasses.replace(body.surface, tilt=0.4))]  # type: ignore[type-var]  # a dataclass
     return found
 
@@ -54,7 +55,7 @@ def test_they_are_the_projected_ones(orientation: Orientation) -> None:
 
 def test_states_that_are_not_finite() -> None:
     """A state that has overflowed is an arithmetic error, which the adapter reports, and not another kind."""
-    body = load_scene("sphere_in_cylinder").rolling
+    body = rolling_ball(load_scene("sphere_in_cylinder"))
     for orientation, place in ((EulerAngles(), 3), (EulerAngles(), 0)):
         ball = ProjectedBall(body, geometry_of(body.surface), orientation)
         x = state(orientation)

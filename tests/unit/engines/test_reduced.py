@@ -2,17 +2,18 @@
 
 from __future__ import annotations
 
-import dataclasses
-
 import numpy as np
 import pytest
 
 from proofroll.conformance.subject import scenes
 from proofroll.core.engine import Level, TellsLevels
 from proofroll.core.errors import Diverged, InputError, Refused
+from proofroll.core.gravity import Gravity
 from proofroll.core.plugins import resolve_settings
-from proofroll.core.scene import Capability, Gravity, Scene
+from proofroll.core.scene import Scene
 from proofroll.elements.ball_on_surface.compiled import library
+from proofroll.elements.ball_on_surface.element import changed, rolling_ball
+from proofroll.elements.ball_on_surface.model import BallCapability
 from proofroll.engines.reduced import Reduced
 from proofroll.files.scene_file import load_scene
 from proofroll.running.simulation import build, simulate
@@ -25,7 +26,7 @@ needs_heyoka = pytest.mark.skipif(not library.available(), reason="heyoka is not
 def tilted(**parameters: float) -> Scene:
     """The cylinder with gravity across its axis as well."""
     scene = load_scene("sphere_in_cylinder", speed=3.3, axial_speed=0.7, radial_spin=12.0, **parameters)
-    return dataclasses.replace(scene, gravity=Gravity(9.81, (0.2, -0.1, -0.9)))
+    return changed(scene, gravity=Gravity(9.81, (0.2, -0.1, -0.9)))
 
 
 SCENES = {name: scene for name, scene in scenes().items() if name not in {"cylinder-slipping", "cylinder-oriented"}} | {
@@ -40,7 +41,7 @@ SCENES = {name: scene for name, scene in scenes().items() if name not in {"cylin
 def test_equations_against_the_other_route(engine: str, scene: Scene) -> None:
     """Path and forces agree to round-off with the unreduced equations, which share nothing with the engine."""
     times = np.linspace(0, 0.5, 6)
-    truth = unreduced(scene.rolling, times)
+    truth = unreduced(rolling_ball(scene), times)
     built = build(scene, engine)
     for index, t in enumerate(times):
         built.advance(float(t))
@@ -55,7 +56,7 @@ def test_equations_against_the_other_route(engine: str, scene: Scene) -> None:
 def test_closed_form_against_the_other_route(name: str) -> None:
     """The closed form agrees with the unreduced equations."""
     times = np.linspace(0, 0.5, 3)
-    truth = unreduced(SCENES[name].rolling, times)
+    truth = unreduced(rolling_ball(SCENES[name]), times)
     engine = build(SCENES[name], "reduced[formulation=closed_form]")
     engine.advance(0.5)
     sample = engine.sample()
@@ -131,7 +132,7 @@ def test_levels_and_terms() -> None:
     assert {Reduced.levels[name] for name in Reduced.presets} == {Level.CLOSED_FORM, Level.REDUCED}
     assert build(SCENES["cylinder"], "reduced").built().terms == frozenset()
     terms = build(SCENES["cylinder-resisting"], "reduced").built().terms
-    assert terms == frozenset({Capability.ROLLING_RESISTANCE})
+    assert terms == frozenset({BallCapability.ROLLING_RESISTANCE})
 
 
 @needs_heyoka
@@ -147,7 +148,7 @@ def test_no_resistance_no_term() -> None:
 def test_a_loose_tolerance_is_looser_but_not_lost() -> None:
     """At a tolerance of 1e-6 the path is worse than at the tightest, and still good to a micrometre."""
     scene = SCENES["cylinder-resisting"]
-    true = unreduced(scene.rolling, np.array([0.0, 1.0])).p_WB[-1]
+    true = unreduced(rolling_ball(scene), np.array([0.0, 1.0])).p_WB[-1]
     found = {}
     for rtol in (1e-6, 1e-12):
         engine = build(scene, "reduced", rtol=rtol)

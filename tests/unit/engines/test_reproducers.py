@@ -10,6 +10,7 @@ import pytest
 from proofroll.core.engine import Reproduces
 from proofroll.core.errors import Refused
 from proofroll.core.plugins import load_engine, resolve_settings
+from proofroll.elements.ball_on_surface.element import rolling_ball
 from proofroll.files.scene_file import load_scene
 
 CYLINDER, PLANE = "sphere_in_cylinder", "inclined_plane"
@@ -88,7 +89,7 @@ def test_the_same_motion(
     made = program(engine, settings, loaded)
     times = [10 * step * (settings.dt or 1e-3) for step in range(6)]
     states = list(made["run"](times))
-    adapter, surface = kind.build(loaded, settings), loaded.rolling.surface
+    adapter, surface = kind.build(loaded, settings), rolling_ball(loaded).surface
     for t, state in zip(times, states, strict=True):
         adapter.advance(t)
         sample = adapter.sample()

@@ -8,7 +8,8 @@ import pytest
 from scipy.spatial.transform import Rotation
 
 from proofroll.core.errors import InputError, Refused
-from proofroll.core.scene import Capability, Scene
+from proofroll.core.scene import Scene
+from proofroll.elements.ball_on_surface.model import BallCapability
 from proofroll.engines.projection.modes import Exit
 from proofroll.files.scene_file import load_scene
 from proofroll.running.simulation import build, simulate
@@ -16,10 +17,10 @@ from proofroll.running.simulation import build, simulate
 RESISTANCE = 5e-4
 NEEDS = {
     "nothing": ({}, frozenset()),
-    "resistance": ({"rolling_resistance": RESISTANCE}, {Capability.ROLLING_RESISTANCE}),
-    "friction": ({"mu_static": 0.35}, {Capability.BOUNDED_FRICTION}),
+    "resistance": ({"rolling_resistance": RESISTANCE}, {BallCapability.ROLLING_RESISTANCE}),
+    "friction": ({"mu_static": 0.35}, {BallCapability.BOUNDED_FRICTION}),
 }
-TURNING = frozenset({Capability.ORIENTATION})
+TURNING = frozenset({BallCapability.ORIENTATION})
 
 
 def scene(*asks: str, **parameters: float) -> Scene:
@@ -43,7 +44,7 @@ def scene(*asks: str, **parameters: float) -> Scene:
     ],
 )
 @pytest.mark.parametrize("need", NEEDS)
-def test_terms_follow_the_scene(engine: str, always: frozenset[Capability], need: str) -> None:
+def test_terms_follow_the_scene(engine: str, always: frozenset[BallCapability], need: str) -> None:
     """Each term is told exactly where the scene requires it, but for an orientation that is always there."""
     parameters, terms = NEEDS[need]
     assert build(scene(**parameters), engine).built().terms == always | terms
@@ -146,7 +147,7 @@ def test_mujoco_contact_of_more_dimensions(formulation: str, condim: int, coeffi
     contact = engine._evaluated().contact[0]
     assert contact.dim == condim
     assert contact.friction[2 : 2 + len(coefficients)].tolist() == coefficients
-    assert (Capability.ROLLING_RESISTANCE in engine.built().terms) == (condim == 6)
+    assert (BallCapability.ROLLING_RESISTANCE in engine.built().terms) == (condim == 6)
     run, truth = (simulate(scene(), name, until=1.0, every=0.1) for name in (options, "truth"))
     assert run.status == "done"
     assert float(np.max(np.abs(run.z - truth.z))) > 0.02  # of a range of 0.12 m

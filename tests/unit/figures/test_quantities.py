@@ -7,6 +7,7 @@ import math
 import numpy as np
 import pytest
 
+from proofroll.elements.ball_on_surface.element import rolling_ball
 from proofroll.engines.projection.orientation import EulerAngles
 from proofroll.figures.quantities import euler_angles, known, quantity
 from proofroll.files.scene_file import load_scene
@@ -29,8 +30,8 @@ def test_every_known_quantity_has_values_or_is_the_engines_to_tell() -> None:
     scene = load_scene("inclined_plane")
     dataset = truth(scene, np.linspace(0.0, 0.2, 5))
     missing = []
-    for name in known(scene.rolling):
-        values = quantity(name, scene.rolling, dataset, (0.0, math.pi / 2, 0.0))
+    for name in known(rolling_ball(scene)):
+        values = quantity(name, rolling_ball(scene), dataset, (0.0, math.pi / 2, 0.0))
         if values is None:
             missing.append(name)
         else:

@@ -8,6 +8,7 @@ from typing import Any
 import pytest
 
 from proofroll.core.errors import InputError
+from proofroll.elements.ball_on_surface.element import rolling_ball
 from proofroll.files.data_folders import data_folder
 from proofroll.files.scene_file import load_scene, read_scene_file, scene_names
 
@@ -132,7 +133,7 @@ def test_unknown_scene(name: str) -> None:
 def test_a_scene_outside_models(edited: Callable[[str, str], str]) -> None:
     """A scene may lie in any folder."""
     scene = load_scene(edited("value = 4.0", "value = 5.0"))
-    assert scene.rolling.v0 == pytest.approx([0, 5, 0])
+    assert rolling_ball(scene).v0 == pytest.approx([0, 5, 0])
 
 
 @pytest.mark.parametrize(

@@ -14,7 +14,7 @@ import pytest
 from hostile import ENTRY_POINTS
 
 from proofroll.core.errors import InputError, Missing
-from proofroll.elements.ball_on_surface.trajectory import read
+from proofroll.files.netcdf import read
 from proofroll.running.case import Case, EngineFacts, Result, Status
 from proofroll.running.runner import Runner, WorkerDied, describe, resolve, run_one
 from proofroll.running.store import Store

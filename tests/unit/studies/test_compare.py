@@ -12,9 +12,10 @@ import xarray as xr
 from hostile import ENTRY_POINTS
 
 from proofroll.core.comparison import Band, Comparison, ExceptAt, Row, Tolerance
-from proofroll.core.scene import Capability, Scene
+from proofroll.core.scene import Scene
 from proofroll.core.verdict import Verdict
-from proofroll.elements.ball_on_surface.trajectory import write
+from proofroll.elements.ball_on_surface.model import BallCapability
+from proofroll.files.netcdf import write
 from proofroll.files.scene_file import load_scene
 from proofroll.running.case import Case, EngineFacts, Result, Status
 from proofroll.running.recording import time_grid
@@ -58,7 +59,7 @@ def judged(folder: Path, comparison: Comparison, answer: Answer, true: Mapping[f
         for point in comparison.variations(row):
             scene = load_scene(comparison.scene, **point)
             dataset = truth(scene, time_grid(comparison.until, comparison.every))
-            if Capability.BOUNDED_FRICTION in scene.requires:
+            if BallCapability.BOUNDED_FRICTION in scene.requires:
                 dataset.attrs["onset"] = json.dumps(dataclasses.asdict(onset(scene, comparison.until)))
             facts = dataclasses.replace(FACTS, name=row.engine)
             given = (comparison.scene, point, scene.digest)

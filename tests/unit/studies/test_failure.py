@@ -7,19 +7,20 @@ from typing import Any
 
 import numpy as np
 import pytest
-
-from proofroll.core.events import Event, with_events
-from proofroll.elements.ball_on_surface.trajectory import trajectory
-from proofroll.files.scene_file import load_scene
-from proofroll.running.case import Result, Status
-from proofroll.studies.failure import MEANINGS, Failure, Yardstick, judge
-from proofroll.truth import truth
 from proofroll.truth.natural import natural_time
 
+from proofroll.core.events import Event, with_events
+from proofroll.elements.ball_on_surface.dataset import variables
+from proofroll.elements.ball_on_surface.element import rolling_ball
+from proofroll.files.scene_file import load_scene
+from proofroll.running.case import Result, Status
+from proofroll.studies.failure import Yardstick, judge
+from proofroll.truth import truth
+
 SCENE = load_scene("sphere_in_cylinder")
-TIMES = np.linspace(0.0, 3 * natural_time(SCENE.rolling), 25)
+TIMES = np.linspace(0.0, 3 * natural_time(rolling_ball(SCENE)), 25)
 TRUE = truth(SCENE, TIMES)
-YARDSTICK = Yardstick.of(SCENE.rolling, TIMES, TRUE)
+YARDSTICK = Yardstick.of(rolling_ball(SCENE), TIMES, TRUE)
 DONE = Result(Status.DONE, "reached the end")
 P, V, W = (TRUE[name].to_numpy() for name in ("p_WB", "v_WB", "w_WB"))
 LATE = (np.arange(len(TIMES)) >= 12)[:, None]
@@ -27,7 +28,7 @@ LATE = (np.arange(len(TIMES)) >= 12)[:, None]
 
 def run(p: Any = P, v: Any = V, w: Any = W, upto: int = 25) -> Any:
     """A trajectory of these states."""
-    return trajectory(SCENE, TIMES[:upto], p[:upto], v[:upto], w[:upto])
+    return variables(rolling_ball(SCENE), TIMES[:upto], p[:upto], v[:upto], w[:upto])
 
 
 def drifting(speed: float) -> Any:
@@ -51,8 +52,8 @@ def test_the_truth_is_accurate() -> None:
 @pytest.mark.parametrize(
     ("dataset", "failure", "stable"),
     [
-        (run(P + LATE * 0.005 * SCENE.rolling.surface.normal(P)), Failure.SANK, False),
-        (run(P - LATE * 0.005 * SCENE.rolling.surface.normal(P)), Failure.LEFT, False),
+        (run(P + LATE * 0.005 * rolling_ball(SCENE).surface.normal(P)), Failure.SANK, False),
+        (run(P - LATE * 0.005 * rolling_ball(SCENE).surface.normal(P)), Failure.LEFT, False),
         (run(v=V * (1 + 0.2 * LATE)), Failure.ENERGY_GAIN, False),
         (drifting(-0.01), Failure.CREEP, True),
         (drifting(-0.2), Failure.CREEP, False),
@@ -69,7 +70,7 @@ def test_a_bad_run_that_says_it_is_done(dataset: Any, failure: Failure, stable: 
 def test_what_came_first() -> None:
     """Of two failures the earlier one counts, for the later may be its consequence."""
     later = (np.arange(len(TIMES)) >= 18)[:, None]
-    normal = SCENE.rolling.surface.normal(P)
+    normal = rolling_ball(SCENE).surface.normal(P)
     outcome = judge(DONE, run(P + later * 0.005 * normal, V * (1 + 0.2 * LATE)), YARDSTICK)
     assert outcome.failure == Failure.ENERGY_GAIN
     assert outcome.time == pytest.approx(TIMES[12])
@@ -102,7 +103,7 @@ def test_a_liftoff_that_ends_a_run() -> None:
 
 def test_without_a_truth() -> None:
     """Without a truth a run is judged by what needs none: surface and energy."""
-    alone = Yardstick.of(SCENE.rolling, TIMES, None)
+    alone = Yardstick.of(rolling_ball(SCENE), TIMES, None)
     assert judge(DONE, slower(0.5), alone).stable
     assert judge(DONE, run(v=V * (1 + 0.2 * LATE)), alone).failure == Failure.ENERGY_GAIN
     assert judge(DONE, slower(0.5), alone).error is None
@@ -115,8 +116,8 @@ def test_every_kind_has_a_meaning() -> None:
 
 def test_the_natural_time() -> None:
     """In a cylinder it is the period 2π/(√(2/7) V0/c) of z; on a plane it is a turn of the ball or longer."""
-    assert natural_time(SCENE.rolling) == pytest.approx(2 * math.pi / (math.sqrt(2 / 7) * 20.0))
-    plane = load_scene("inclined_plane").rolling
+    assert natural_time(rolling_ball(SCENE)) == pytest.approx(2 * math.pi / (math.sqrt(2 / 7) * 20.0))
+    plane = rolling_ball(load_scene("inclined_plane"))
     assert natural_time(plane) >= 2 * math.pi * plane.ball.radius / float(np.linalg.norm(plane.v0)) * (1 - 1e-12)
 
 
@@ -125,7 +126,7 @@ RESISTED = load_scene("inclined_plane", rolling_resistance=0.05, cross_speed=0.0
 
 def rolling_down(after_rest: float) -> tuple[Any, Yardstick]:
     """A ball that resistance brings to rest, and what it does then [m/s along its way]; with its yardstick."""
-    body = RESISTED.rolling
+    body = rolling_ball(RESISTED)
     times = np.linspace(0.0, 1.0, 21)
     speed = float(np.linalg.norm(body.v0))
     along = body.v0 / speed
@@ -135,7 +136,7 @@ def rolling_down(after_rest: float) -> tuple[Any, Yardstick]:
         way = np.concatenate([[0.0], np.cumsum((slowing[1:] + slowing[:-1]) / 2 * np.diff(times))])
         v = slowing[:, None] * along
         w = -np.cross(body.surface.normal(body.p0), v) / body.ball.radius
-        return trajectory(RESISTED, times, body.p0 + way[:, None] * along, v, w)
+        return variables(rolling_ball(RESISTED), times, body.p0 + way[:, None] * along, v, w)
 
     return path(after_rest), Yardstick.of(body, times, path(0.0))
 

@@ -12,6 +12,7 @@ from typing import Any
 import pytest
 
 from proofroll.core.errors import InputError
+from proofroll.elements.ball_on_surface.element import rolling_ball
 from proofroll.files.json_data import plain
 from proofroll.files.scene_file import load_scene
 from proofroll.report.stability_map import LETTERS, legend, svg
@@ -189,7 +190,7 @@ def test_scale_free_axes() -> None:
     scene = load_scene("sphere_in_cylinder")
     for name in ("mass", "size"):
         assert axes[name].scale_free
-        found = [load_scene("sphere_in_cylinder", **axes[name].at(scene, value)).rolling for value in (1e-6, 1e6)]
+        found = [rolling_ball(load_scene("sphere_in_cylinder", **axes[name].at(scene, value))) for value in (1e-6, 1e6)]
         periods = [1 / numbers(body, 1.0)["oscillation"] for body in found]
         first, second = (numbers(body, 0.01 * period) for body, period in zip(found, periods, strict=True))
         assert first == pytest.approx(second)

@@ -6,6 +6,7 @@ import pytest
 from proofroll import load_scene
 from proofroll.core.errors import InputError
 from proofroll.core.scene import Scene
+from proofroll.elements.ball_on_surface.element import rolling_ball
 from proofroll.truth.friction_curve import friction_curve
 from proofroll.truth.onset import edge_between, first_slip, onset
 from proofroll.truth.stick_slip import stick_slip
@@ -93,7 +94,7 @@ def test_no_slip_and_slip_at_once() -> None:
 
 def test_curve_against_closed_form() -> None:
     """Without resistance the needed friction is (g c / V0²)(1 - (5/7) cos νt) and its only edge is its crest."""
-    body = cylinder(rolling_resistance=0.0).rolling
+    body = rolling_ball(cylinder(rolling_resistance=0.0))
     curve = friction_curve(body, 2.0)
     times = np.linspace(0, 2, 50)
     expected = 9.81 * 0.2 / 16 * (1 - 5 / 7 * np.cos(np.sqrt(2 / 7) * 20 * times))

@@ -4,6 +4,7 @@ import numpy as np
 import pytest
 
 from proofroll import load_scene
+from proofroll.elements.ball_on_surface.element import rolling_ball
 from proofroll.truth import taylor
 from proofroll.truth.regimes import Regime, classify, regime_map
 from proofroll.truth.variants import at_speed, with_contact
@@ -26,7 +27,7 @@ def test_map_follows_the_analytic_boundaries() -> None:
 
 def test_the_paper_falls_after_its_second_slip() -> None:
     """With resistance the paper's case slips twice and falls; shortly after it has stuck again it has recovered."""
-    body = load_scene("sphere_in_cylinder", rolling_resistance=5e-4, mu_static=0.35).rolling
+    body = rolling_ball(load_scene("sphere_in_cylinder", rolling_resistance=5e-4, mu_static=0.35))
     regime, slips, first = classify(body, 4.0)
     assert (regime, slips) == (Regime.FALLS, 2)
     assert first == pytest.approx(1.720183172, abs=1e-7)
@@ -42,7 +43,7 @@ def test_processes_change_nothing() -> None:
 
 def test_variants_keep_rolling_and_ratio() -> None:
     """Another speed still rolls without slip, and another μs keeps the ratio μk/μs."""
-    body = load_scene("sphere_in_cylinder", mu_static=0.4, mu_kinetic=0.3, radial_spin=7.0).rolling
+    body = rolling_ball(load_scene("sphere_in_cylinder", mu_static=0.4, mu_kinetic=0.3, radial_spin=7.0))
     faster = at_speed(body, 5.0)
     e1 = body.surface.normal(body.p0)
     np.testing.assert_allclose(faster.v0 + body.ball.radius * np.cross(faster.w0, e1), 0, atol=1e-14)

@@ -7,7 +7,8 @@ import pytest
 
 from proofroll.core.errors import Refused
 from proofroll.core.events import events_of
-from proofroll.core.scene import RollingBall
+from proofroll.elements.ball_on_surface.element import rolling_ball
+from proofroll.elements.ball_on_surface.model import RollingBall
 from proofroll.elements.ball_on_surface.observables import energy_balance
 from proofroll.elements.ball_on_surface.resting import setting_off, stays
 from proofroll.files.scene_file import load_scene
@@ -94,7 +95,7 @@ def test_the_energy_of_a_ball_that_stops() -> None:
     worst = []
     for every in (0.02, 0.005):
         found = simulate(scene, "truth", until=1.0, every=every)
-        worst.append(np.max(np.abs(energy_balance(scene.rolling, found))) / np.ptp(found["energy"].to_numpy()))
+        worst.append(np.max(np.abs(energy_balance(rolling_ball(scene), found))) / np.ptp(found["energy"].to_numpy()))
     assert worst[0] < 1e-3
     assert worst[1] < worst[0] / 2
 
@@ -117,7 +118,7 @@ def test_what_holds_a_ball_at_rest() -> None:
     """Both the resistance's moment and the friction must suffice; a ball that nothing must hold needs neither."""
 
     def body(**parameters: float) -> RollingBall:
-        return load_scene("inclined_plane", **parameters).rolling
+        return rolling_ball(load_scene("inclined_plane", **parameters))
 
     steep = A * np.tan(0.35)
     for f, mu, expected in (

@@ -11,6 +11,7 @@ from proofroll import load_scene
 from proofroll.core.errors import Diverged, Refused
 from proofroll.core.events import events_of
 from proofroll.core.scene import Scene
+from proofroll.elements.ball_on_surface.element import changed, rolling_ball
 from proofroll.truth import stick_slip as module
 from proofroll.truth import taylor, truth
 from proofroll.truth.implicit import Implicit
@@ -34,12 +35,12 @@ KNOWN: dict[str, tuple[dict[str, float], float, list[float], float | None]] = {
 def cylinder(tilt: float = 0.0, **parameters: float) -> Scene:
     """The paper's scene with other parameters, its axis tilted from the vertical [rad]."""
     scene = load_scene("sphere_in_cylinder", **parameters)
-    return replace(scene, surfaces=(replace(scene.surfaces[0], tilt=tilt),))
+    return changed(scene, surface=replace(scene.elements[0].surface, tilt=tilt))
 
 
 def events(route: Any, scene: Scene, until: float) -> list[tuple[str, float]]:
     """Kind and time [s] of the events that a route finds."""
-    return list(follow(scene.rolling, route, until).events)
+    return list(follow(rolling_ball(scene), route, until).events)
 
 
 @pytest.mark.parametrize("name", KNOWN)
@@ -69,7 +70,7 @@ def test_state_at_the_events_of_the_paper() -> None:
 def test_start_of_slip_does_not_matter() -> None:
     """No event and no end point moves when what takes the place of a start of slip varies over a decade or more."""
     scene = cylinder(**PAPER)
-    body = scene.rolling
+    body = rolling_ball(scene)
     routes: list[Any] = [Implicit(body, first_step=length) for length in (0.02, 0.2)]
     routes += [Polar(body, handover=1e-4)]
     if taylor.available():
@@ -87,7 +88,7 @@ def test_the_same_answer_with_scipy_alone(monkeypatch: pytest.MonkeyPatch) -> No
     scene, times = cylinder(mu_static=0.15, mu_kinetic=0.14), np.linspace(0.0, 0.75, 7)
     with_any, found = stick_slip(scene, times)
     monkeypatch.setattr(taylor, "available", lambda: False)
-    assert isinstance(first_route(scene.rolling), Polar)
+    assert isinstance(first_route(rolling_ball(scene)), Polar)
     with_scipy, again = stick_slip(scene, times)
     assert [event.time for event in again] == pytest.approx([event.time for event in found], abs=1e-10, rel=0)
     np.testing.assert_allclose(with_scipy.p_WB, with_any.p_WB, atol=1e-10)
@@ -97,17 +98,17 @@ def test_heyoka_is_chosen_only_where_its_equations_hold() -> None:
     """Taylor series are used on the vertical cylinder, and not where the resistance changes direction by a jump."""
     if not taylor.available():
         pytest.skip("heyoka is not installed")
-    assert isinstance(first_route(cylinder(**PAPER).rolling), taylor.Taylor)
-    assert isinstance(first_route(cylinder(tilt=1.2, mu_static=0.3).rolling), taylor.Taylor)
-    assert isinstance(first_route(cylinder(tilt=1.2, **PAPER).rolling), Polar)
+    assert isinstance(first_route(rolling_ball(cylinder(**PAPER))), taylor.Taylor)
+    assert isinstance(first_route(rolling_ball(cylinder(tilt=1.2, mu_static=0.3))), taylor.Taylor)
+    assert isinstance(first_route(rolling_ball(cylinder(tilt=1.2, **PAPER))), Polar)
     plane = load_scene("inclined_plane", rolling_resistance=1e-3, mu_static=0.3)
-    assert isinstance(first_route(plane.rolling), Polar)
+    assert isinstance(first_route(rolling_ball(plane)), Polar)
 
 
 def test_compiled_case_is_fast() -> None:
     """With heyoka the paper's case of 4 s and three events costs less than 5 ms."""
     pytest.importorskip("heyoka")
-    body = cylinder(**PAPER).rolling
+    body = rolling_ball(cylinder(**PAPER))
     route = taylor.Taylor(body)
     costs = []
     for _ in range(20):
@@ -122,13 +123,13 @@ def test_many_short_slips_settle() -> None:
     """Between the two boundaries every oscillation slips once, ever more briefly, and the sequence is never cut."""
     pytest.importorskip("heyoka")
     scene = cylinder(mu_static=0.15)
-    found = events(first_route(scene.rolling), scene, 30.0)
+    found = events(first_route(rolling_ball(scene)), scene, 30.0)
     slips, sticks = ([t for kind, t in found if kind == wanted] for wanted in ("slip", "stick"))
     lengths = np.diff(np.stack([slips[: len(sticks)], sticks]), axis=0)[0]
     assert len(slips) > 45
     assert np.all(np.diff(lengths) < 0)
     assert lengths[-1] < 0.1 * lengths[0]
-    second = events(Implicit(scene.rolling), scene, 3.0)
+    second = events(Implicit(rolling_ball(scene)), scene, 3.0)
     assert [t for _, t in second] == pytest.approx([t for _, t in found[: len(second)]], abs=1e-9, rel=0)
 
 
@@ -179,7 +180,7 @@ def test_without_friction_the_ball_falls_freely() -> None:
 def test_slip_passes_through_zero_without_sticking() -> None:
     """Where |u| comes to zero but the needed force is outside the cone, the ball goes on slipping, the other way."""
     scene = cylinder(speed=4.6, mu_static=0.07, radial_spin=320.0)
-    body = scene.rolling
+    body = rolling_ball(scene)
     path = follow(body, first_route(body), 1.5)
     turns = [leg.end for leg in path.legs[:-1]]
     assert [kind for kind, _ in path.events] == ["slip"]

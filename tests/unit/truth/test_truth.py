@@ -8,11 +8,13 @@ import numpy as np
 import pytest
 import xarray as xr
 
-from proofroll.core.scene import Ball, Scene
+from proofroll.core.scene import Scene
 from proofroll.elements.ball_on_surface.closed_form import closed_form
+from proofroll.elements.ball_on_surface.dataset import variables
+from proofroll.elements.ball_on_surface.element import changed, rolling_ball
+from proofroll.elements.ball_on_surface.model import Ball
 from proofroll.elements.ball_on_surface.motion import Motion
 from proofroll.elements.ball_on_surface.surfaces import Cylinder
-from proofroll.elements.ball_on_surface.trajectory import trajectory
 from proofroll.files.scene_file import load_scene
 from proofroll.truth import rolling, truth, unreduced_taylor
 from proofroll.truth.rolling import reduced, unreduced
@@ -38,9 +40,9 @@ def test_closed_form_of_the_paper(speed: float) -> None:
     """For f = 0 the curves are those of the closed form, written out here a second time."""
     scene = load_scene("sphere_in_cylinder", speed=speed)
     t = np.linspace(0, 2, 41)
-    motion = closed_form(scene.rolling, t)
+    motion = closed_form(rolling_ball(scene), t)
     assert motion is not None
-    found = trajectory(scene, t, motion.p_WB, motion.v_WB, motion.w_WB, force=motion.force)
+    found = variables(rolling_ball(scene), t, motion.p_WB, motion.v_WB, motion.w_WB, force=motion.force)
     rate = speed / C
     nu = np.sqrt(2 / 7) * abs(rate)
     z = -5 * G / (2 * rate**2) * (1 - np.cos(nu * t))
@@ -131,7 +133,7 @@ def test_plane_with_resistance() -> None:
 )
 def test_all_routes_agree_without_resistance(parameters: dict[str, float]) -> None:
     """Closed form, reduced and unreduced equations agree to 1e-11 for general initial motion."""
-    body = load_scene("sphere_in_cylinder", **parameters).rolling
+    body = rolling_ball(load_scene("sphere_in_cylinder", **parameters))
     t = np.linspace(0, 0.5, 6)
     motion = closed_form(body, t)
     assert motion is not None
@@ -142,9 +144,9 @@ def test_all_routes_agree_without_resistance(parameters: dict[str, float]) -> No
 @pytest.mark.parametrize("speed", [2.0, 4.0])
 def test_both_routes_agree_with_resistance(speed: float) -> None:
     """Reduced and unreduced equations agree to 1e-11 with rolling resistance, as far as the comparisons go."""
-    body = load_scene(
-        "sphere_in_cylinder", speed=speed, axial_speed=0.4, radial_spin=5.0, rolling_resistance=5e-4
-    ).rolling
+    body = rolling_ball(
+        load_scene("sphere_in_cylinder", speed=speed, axial_speed=0.4, radial_spin=5.0, rolling_resistance=5e-4)
+    )
     t = np.linspace(0, 2, 3)
     assert max(difference(reduced(body, t), unreduced(body, t)).values()) <= 1e-11
 
@@ -155,7 +157,7 @@ def test_other_balls_and_surfaces() -> None:
     shell = dataclasses.replace(
         scene, balls=(Ball("ball", A, M, inertia_ratio=2 / 3),), surfaces=(Cylinder("wall", 0.225, tilt=0.5),)
     )
-    body, t = shell.rolling, np.linspace(0, 0.5, 3)
+    body, t = rolling_ball(shell), np.linspace(0, 0.5, 3)
     assert closed_form(body, t) is None
     assert max(difference(reduced(body, t), unreduced(body, t)).values()) <= 1e-11
 
@@ -163,7 +165,7 @@ def test_other_balls_and_surfaces() -> None:
 def test_closed_form_of_a_thin_shell() -> None:
     """The closed form holds for any ratio of inertias."""
     scene = load_scene("sphere_in_cylinder", axial_speed=0.3, radial_spin=2.0)
-    body = dataclasses.replace(scene, balls=(Ball("ball", A, M, inertia_ratio=2 / 3),)).rolling
+    body = rolling_ball(changed(scene, ball=Ball("ball", A, M, inertia_ratio=2 / 3)))
     t = np.linspace(0, 0.5, 3)
     motion = closed_form(body, t)
     assert motion is not None
@@ -173,16 +175,16 @@ def test_closed_form_of_a_thin_shell() -> None:
 def test_closed_form_only_where_it_holds() -> None:
     """With resistance or a tilted cylinder there is no closed form."""
     t = np.zeros(1)
-    assert closed_form(load_scene("sphere_in_cylinder", rolling_resistance=1e-6).rolling, t) is None
-    assert closed_form(load_scene("inclined_plane", rolling_resistance=1e-6).rolling, t) is None
+    assert closed_form(rolling_ball(load_scene("sphere_in_cylinder", rolling_resistance=1e-6)), t) is None
+    assert closed_form(rolling_ball(load_scene("inclined_plane", rolling_resistance=1e-6)), t) is None
     tilted = dataclasses.replace(load_scene("sphere_in_cylinder"), surfaces=(Cylinder("wall", 0.225, tilt=0.1),))
-    assert closed_form(tilted.rolling, t) is None
+    assert closed_form(rolling_ball(tilted), t) is None
 
 
 def test_every_value_has_an_error_bar(scene: Scene) -> None:
     """No error bar is zero, and none exceeds 1e-11 of the sizes in the scene."""
     found = truth(scene, np.linspace(0, 0.1, 3))
-    body = scene.rolling
+    body = rolling_ball(scene)
     sizes = {"rad": 1.0, "m": 1.0, "N": 50.0, "J": 10.0, "m/s": 5.0, "rad/s": 200.0, "1": 1.0}
     assert body.ball.mass == M
     for name, values in found.data_vars.items():
@@ -218,7 +220,7 @@ def test_routes_are_named(times: np.ndarray) -> None:
 
 def test_samples_do_not_change_the_truth() -> None:
     """The values at a time do not depend on how many samples come before it."""
-    body = load_scene("sphere_in_cylinder", rolling_resistance=5e-4).rolling
+    body = rolling_ball(load_scene("sphere_in_cylinder", rolling_resistance=5e-4))
     often, once = reduced(body, np.linspace(0, 0.4, 41)), reduced(body, np.array([0, 0.4]))
     assert often.p_WB[-1] == pytest.approx(once.p_WB[-1], abs=1e-13)
     assert often.force[-1] == pytest.approx(once.force[-1], abs=1e-10)
@@ -234,7 +236,7 @@ def test_friction_that_is_never_needed_changes_nothing() -> None:
 
 def test_routes_share_no_geometry(monkeypatch: pytest.MonkeyPatch) -> None:
     """A wrong second derivative of the surface spoils one route and leaves the other: they are independent."""
-    body = load_scene("sphere_in_cylinder").rolling
+    body = rolling_ball(load_scene("sphere_in_cylinder"))
     t = np.array([0, 0.1])
     right = unreduced(body, t).p_WB
     second = Cylinder.second
@@ -259,15 +261,17 @@ needs_heyoka = pytest.mark.skipif(not unreduced_taylor.library.available(), reas
 )
 def test_the_compiled_unreduced_route(scene: Scene) -> None:
     """In Taylor series the unreduced equations give what they give by DOP853, to the latter's 1e-11."""
-    assert unreduced_taylor.available(scene.rolling)
+    assert unreduced_taylor.available(rolling_ball(scene))
     times = np.linspace(0, 1, 11)
-    for value in difference(unreduced(scene.rolling, times), unreduced_taylor.unreduced(scene.rolling, times)).values():
+    for value in difference(
+        unreduced(rolling_ball(scene), times), unreduced_taylor.unreduced(rolling_ball(scene), times)
+    ).values():
         assert value < 1e-11
 
 
 def test_where_the_compiled_route_is_not_taken(monkeypatch: pytest.MonkeyPatch) -> None:
     """With resistance, and without heyoka, the second route is the one that needs neither."""
-    assert not unreduced_taylor.available(load_scene("sphere_in_cylinder", rolling_resistance=1e-4).rolling)
+    assert not unreduced_taylor.available(rolling_ball(load_scene("sphere_in_cylinder", rolling_resistance=1e-4)))
     monkeypatch.setattr(unreduced_taylor.library, "available", lambda: False)
     assert truth(load_scene("sphere_in_cylinder"), np.array([0.0, 0.1])).attrs["second_route"].endswith("DOP853")
 

@@ -3,61 +3,29 @@
 from __future__ import annotations
 
 import dataclasses
-from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
 
-from proofroll.core.engine import Built
-from proofroll.core.scene import RollingBall, Scene
+from proofroll.core.arrays import FloatArray
+from proofroll.core.certificate import EXACT, Line
+from proofroll.core.engine import Built, Sample
 from proofroll.elements.ball_on_surface.mechanics import (
     initial_angular_acceleration,
     initial_response,
     natural_acceleration,
     slip_velocity,
 )
+from proofroll.elements.ball_on_surface.model import RollingBall
 from proofroll.elements.ball_on_surface.resting import stands
-from proofroll.elements.ball_on_surface.surfaces import FloatArray
-
-# Engines that compute in double precision reproduce the scene's numbers to this relative difference.
-EXACT = 1e-12
 
 
-@dataclass(frozen=True)
-class Line:
-    """One quantity of the certificate.
-
-    Attributes:
-        quantity: what is compared.
-        unit: its unit.
-        expected, found: from the scene, and read back from the engine.
-        difference: relative to the quantity's scale.
-        tolerance: largest difference that is accepted.
-        because: why the tolerance is not round-off; empty if it is.
-    """
-
-    quantity: str
-    unit: str
-    expected: tuple[float, ...]
-    found: tuple[float, ...]
-    difference: float
-    tolerance: float
-    because: str = ""
-
-    @property
-    def holds(self) -> bool:
-        """Whether the engine built what the scene says."""
-        return bool(self.difference <= self.tolerance)
-
-
-def certify(engine: Any, scene: Scene) -> list[Line]:
-    """Compares a freshly built engine with the scene.
+def certify(body: RollingBall, built: Built, sample: Sample) -> list[Line]:
+    """Compares what was built, and the sample at time 0, with the ball on its surface.
 
     Quantities about which the engine is silent are left out, except those that the scene requires it to have:
     rolling resistance and bounded friction.
     """
-    body = scene.rolling
-    built, sample = engine.built(), engine.sample()
     acceleration, force, turning = _expected(body, built)
     natural = natural_acceleration(body)
     frame = body.surface.frame(body.u0)
@@ -133,21 +101,3 @@ def _expected(body: RollingBall, built: Built) -> tuple[FloatArray, FloatArray, 
         free = dataclasses.replace(body, contact=dataclasses.replace(body.contact, rolling_resistance=0.0))
         meant = min((body, free), key=lambda one: float(np.linalg.norm(initial_response(one)[0] - said)))
     return *initial_response(meant), initial_angular_acceleration(meant)
-
-
-def first_difference(lines: list[Line]) -> str | None:
-    """One sentence about the first quantity that differs, or None if the certificate holds."""
-    for line in lines:
-        if not line.holds and all(np.isnan(line.found)):
-            return f"the engine's model does not say its {line.quantity}, which the scene requires"
-        if not line.holds:
-            return (
-                f"the engine's model differs from the scene: {line.quantity} is {_shown(line.found)} instead of "
-                f"{_shown(line.expected)} {line.unit} (relative difference {line.difference:.2g}, "
-                f"allowed {line.tolerance:.2g})"
-            )
-    return None
-
-
-def _shown(values: tuple[float, ...]) -> str:
-    return ", ".join(f"{value:.6g}" for value in values)

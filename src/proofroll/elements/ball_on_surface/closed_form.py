@@ -4,9 +4,10 @@ from __future__ import annotations
 
 import numpy as np
 
-from proofroll.core.scene import RollingBall
+from proofroll.core.arrays import FloatArray
+from proofroll.elements.ball_on_surface.model import RollingBall
 from proofroll.elements.ball_on_surface.motion import Motion
-from proofroll.elements.ball_on_surface.surfaces import Cylinder, FloatArray, Plane
+from proofroll.elements.ball_on_surface.surfaces import Cylinder, Plane
 
 
 def closed_form(body: RollingBall, times: FloatArray) -> Motion | None:

@@ -9,9 +9,9 @@ from __future__ import annotations
 import numpy as np
 import numpy.typing as npt
 
-from proofroll.core.scene import RollingBall
+from proofroll.core.arrays import FloatArray
+from proofroll.elements.ball_on_surface.model import RollingBall
 from proofroll.elements.ball_on_surface.resting import setting_off, stands, stays
-from proofroll.elements.ball_on_surface.surfaces import FloatArray
 
 
 def slip_velocity(radius: float, e1: FloatArray, v_WB: FloatArray, w_WB: FloatArray) -> FloatArray:

@@ -6,8 +6,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from proofroll.core.scene import RollingBall
-from proofroll.elements.ball_on_surface.surfaces import FloatArray
+from proofroll.core.arrays import FloatArray
+from proofroll.elements.ball_on_surface.model import RollingBall
 
 
 @dataclass(frozen=True)

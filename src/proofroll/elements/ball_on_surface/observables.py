@@ -6,38 +6,18 @@ Everything here sees a trajectory and the scene's ball, never an engine.
 from __future__ import annotations
 
 import itertools
-from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
 import numpy as np
 
+from proofroll.core.arrays import FloatArray
 from proofroll.core.events import events_of
-from proofroll.core.scene import RollingBall
-from proofroll.elements.ball_on_surface.mechanics import resistance_moment
-from proofroll.elements.ball_on_surface.surfaces import FloatArray
+from proofroll.core.observable import Observable, Role
+from proofroll.elements.ball_on_surface.mechanics import natural_acceleration, resistance_moment
+from proofroll.elements.ball_on_surface.model import RollingBall
 
 if TYPE_CHECKING:
     import xarray as xr
-
-# Observables besides the coordinates of the scene's surface.
-_UNITS = {
-    "N": "N",
-    "F2": "N",
-    "F3": "N",
-    "needed_friction": "1",
-    "energy_balance": "J",
-    "force_audit": "N",
-    "gap": "m",
-    "slip": "m/s",
-    "creep": "m",
-    "first_slip": "s",
-    "event_times": "s",
-    "event_order": "events",
-}
-OBSERVABLES = tuple(_UNITS)
-# Observables that have no size of their own to which a percentage could refer.
-WITHOUT_SCALE = frozenset({"first_slip", "event_times", "event_order"})
-
 
 # Degree of the splines through the samples. Sampled twenty times per oscillation of z, a derivative of degree 7 is
 # good to about 1e-6 of its size; what is left is measured on the truth and reported as the error bar.
@@ -46,54 +26,96 @@ _DEGREE = 7
 _ENDS = 5
 
 
-@dataclass(frozen=True)
-class Observable:
-    """A curve that can be held against the truth.
+def table(body: RollingBall) -> tuple[Observable, ...]:
+    """The observables of a ball on a surface; the last coordinate, the height in a cylinder, decides.
 
-    Attributes:
-        name: as in the comparison file.
-        unit: of its values.
-        values: over time, shape (time,); zero is perfect where the truth is zero by definition.
+    The floors of sizes are parts of what the ball and its start set: its radius, its weight or centrifugal force, its
+    initial speed and energy.
     """
+    a = body.ball.radius
+    force = body.ball.mass * natural_acceleration(body)
+    speed, energy = _speed(body), _kinetic(body)
+    last = body.surface.coordinates[-1]
+    coordinates = tuple(
+        Observable(
+            name,
+            unit,
+            f"surface coordinate {name}",
+            Role.MOTION,
+            floor=1e-3 * a / scale,
+            headline=True,
+            decides=name == last,
+        )
+        for name, unit, scale in zip(
+            body.surface.coordinates, body.surface.units, body.surface.length_scales, strict=True
+        )
+    )
 
-    name: str
-    unit: str
-    values: FloatArray
+    def residual(name: str, unit: str, meaning: str, floor: float, *, asked_for: bool = True) -> Observable:
+        kind = Role.RESIDUAL
+        return Observable(name, unit, meaning, kind, floor=floor, asked_for=asked_for, hangs_on_events=False)
+
+    return (
+        *coordinates,
+        Observable("N", "N", "normal force", Role.REACTION, floor=force, headline=True),
+        Observable("F2", "N", "friction on the ball along e2", Role.REACTION, floor=force, headline=True),
+        Observable("F3", "N", "friction on the ball along e3", Role.REACTION, floor=force, headline=True),
+        Observable("needed_friction", "1", "friction needed, |F|/N", Role.REACTION, "|F|/N", floor=1.0),
+        residual("energy_balance", "J", "energy that is not accounted for", energy),
+        residual("force_audit", "N", "reported minus recomputed contact force", force, asked_for=False),
+        residual("gap", "m", "distance of the ball from the wall", a),
+        # Without a bound on friction nothing slips; with one the true ball does, and is followed.
+        Observable(
+            "slip",
+            "m/s",
+            "speed of the contact point along the wall",
+            Role.MOTION if np.isfinite(body.contact.mu_static) else Role.RESIDUAL,
+            floor=speed,
+        ),
+        residual("creep", "m", "way slipped while sticking", a),
+        Observable("first_slip", "s", "time of the first slip", Role.EVENT),
+        Observable("event_times", "s", "times of all events", Role.EVENT, asked_for=False),
+        Observable("event_order", "events", "events of another kind than the truth's", Role.EVENT, asked_for=False),
+    )
 
 
-def observables(body: RollingBall, dataset: xr.Dataset) -> dict[str, Observable]:
-    """All curves that the trajectory allows, by name; what the engine cannot say is absent.
+def _speed(body: RollingBall) -> float:
+    """Initial speed, or, of a ball at rest, that after falling by its radius [m/s]; never zero."""
+    fall = float(np.sqrt(body.ball.radius * np.linalg.norm(body.gravity)))
+    return float(np.linalg.norm(body.v0)) or fall or 1.0
 
-    Coordinates of the surface, ``N``, ``F2``, ``F3`` [N] and ``needed_friction`` [-] as they are, without time 0,
-    where the certificate judges reactions; ``energy_balance`` [J], ``gap`` [m], ``slip`` [m/s] and ``force_audit``
-    [N], which are zero for a perfect run. With bounded friction ``slip`` is not zero; ``creep`` [m] is, the way
-    slipped while sticking, and ``first_slip`` [s] is one value, or none if the ball never slips.
+
+def _kinetic(body: RollingBall) -> float:
+    """Kinetic energy at the start, or that of the speed that stands for it [J]; never zero."""
+    spin = 0.5 * body.ball.inertia * float(body.w0 @ body.w0)
+    return 0.5 * body.ball.mass * _speed(body) ** 2 + spin
+
+
+def observe(body: RollingBall, dataset: xr.Dataset) -> dict[str, FloatArray]:
+    """All observables that a run allows, by name; what the engine cannot say is absent.
+
+    Coordinates of the surface as they are; ``N``, ``F2``, ``F3`` [N] and ``needed_friction`` [-] without time 0, where
+    the certificate judges reactions; ``energy_balance`` [J], ``gap`` [m], ``slip`` [m/s] and ``force_audit`` [N], which
+    are zero for a perfect run. With bounded friction ``slip`` is not zero; ``creep`` [m] is, the way slipped while
+    sticking, and ``first_slip`` [s] is one value, or none if the ball never slips.
     """
-    curves: dict[str, Observable] = {}
-
-    def put(name: str, unit: str, values: FloatArray) -> None:
-        curves[name] = Observable(name, unit, values)
-
-    for name, unit in zip(body.surface.coordinates, body.surface.units, strict=True):
-        put(name, unit, dataset[name].to_numpy())
+    curves = {name: dataset[name].to_numpy() for name in body.surface.coordinates}
     if "N" in dataset:
-        for name in ("N", "F2", "F3", "needed_friction"):
-            put(name, dataset[name].attrs["units"], dataset[name].to_numpy()[1:])
-    put("gap", "m", dataset["gap"].to_numpy())
-    put("slip", "m/s", np.hypot(dataset["slip2"].to_numpy(), dataset["slip3"].to_numpy()))
+        curves |= {name: dataset[name].to_numpy()[1:] for name in ("N", "F2", "F3", "needed_friction")}
+    curves["gap"] = dataset["gap"].to_numpy()
+    curves["slip"] = dataset["slip"].to_numpy()
     if dataset.sizes["time"] > 2 * (_DEGREE + 1) + 2 * _ENDS:
         if "N" in dataset or not body.contact.rolling_resistance:
-            put("energy_balance", "J", energy_balance(body, dataset))
+            curves["energy_balance"] = energy_balance(body, dataset)
         if "N" in dataset:
             audited = force_audit(body, dataset)
             if audited.size:
-                put("force_audit", "N", audited)
+                curves["force_audit"] = audited
     if "sticking" in dataset:
         events = events_of(dataset)
-        slips = [event.time for event in events if event.kind == "slip"]
-        put("first_slip", "s", np.array(slips[:1]))
-        put("event_times", "s", np.array([event.time for event in events]))
-        put("creep", "m", np.array([_creep(curves["slip"].values, dataset)]))
+        curves["first_slip"] = np.array([event.time for event in events if event.kind == "slip"][:1])
+        curves["event_times"] = np.array([event.time for event in events])
+        curves["creep"] = np.array([_creep(curves["slip"], dataset)])
     return curves
 
 
@@ -104,25 +126,14 @@ def _creep(slip: FloatArray, dataset: xr.Dataset) -> float:
     return float(np.sum(both * np.diff(t) * (slip[1:] + slip[:-1]) / 2))
 
 
-def units(body: RollingBall) -> dict[str, str]:
-    """Unit of every observable that a comparison may name."""
-    return dict(zip(body.surface.coordinates, body.surface.units, strict=True)) | _UNITS
-
-
 def scales(body: RollingBall, truth: xr.Dataset) -> dict[str, float]:
-    """Size of each observable in this case, to which a relative tolerance refers.
-
-    A coordinate's range; the largest normal force for every force; the largest needed friction; the initial kinetic
-    energy; the ball's radius for the gap; the initial speed for slip. Never zero.
-    """
+    """Size of each observable in the truth: ranges of coordinates and the largest normal force and needed friction."""
     normal = float(np.max(np.abs(truth["N"].to_numpy())))
-    speed = float(np.linalg.norm(body.v0))
-    kinetic = 0.5 * body.ball.mass * speed**2 + 0.5 * body.ball.inertia * float(body.w0 @ body.w0)
     sizes = {name: float(np.ptp(truth[name].to_numpy())) for name in body.surface.coordinates}
     sizes |= dict.fromkeys(("N", "F2", "F3", "force_audit"), normal)
     sizes["needed_friction"] = float(np.nanmax(truth["needed_friction"].to_numpy()))
-    sizes |= {"energy_balance": kinetic, "gap": body.ball.radius, "slip": speed, "creep": body.ball.radius}
-    return {name: size if np.isfinite(size) and size > 0 else 1.0 for name, size in sizes.items()}
+    a = body.ball.radius
+    return sizes | {"energy_balance": _kinetic(body), "gap": a, "slip": _speed(body), "creep": a}
 
 
 def energy_balance(body: RollingBall, dataset: xr.Dataset) -> FloatArray:

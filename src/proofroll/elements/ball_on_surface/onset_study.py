@@ -10,8 +10,9 @@ from typing import TYPE_CHECKING, Any
 from proofroll.core.errors import InputError, ProofrollError
 from proofroll.core.events import Event, events_of
 from proofroll.core.plugins import engine_names, parse_engine
-from proofroll.core.scene import Capability, Scene
-from proofroll.elements.ball_on_surface.trajectory import read
+from proofroll.core.scene import Scene
+from proofroll.elements.ball_on_surface.model import BallCapability
+from proofroll.files.netcdf import read
 from proofroll.files.scene_file import load_scene
 from proofroll.running.case import Case, EngineFacts, Result, Status
 from proofroll.running.runner import Runner, WorkerDied, describe, resolve
@@ -86,8 +87,8 @@ def default_engines(workers: Workers | None = None) -> list[str]:
         except ProofrollError:
             found.append(name)  # the row says why it cannot run
             continue
-        if Capability.BOUNDED_FRICTION in described["provides"]:
-            found += [f"{name}[formulation={formulation}]" for formulation in described["presets"]]
+        provided = described["provides"].items()
+        found += [f"{name}[formulation={key}]" for key, texts in provided if BallCapability.BOUNDED_FRICTION in texts]
     return found
 
 
@@ -118,7 +119,7 @@ def onset_study(
     from proofroll.truth.onset import onset
 
     loaded = load_scene(scene, **parameters)
-    if Capability.BOUNDED_FRICTION not in loaded.requires:
+    if BallCapability.BOUNDED_FRICTION not in loaded.requires:
         raise InputError("mu_static", "inf", "without bounded friction the ball never slips; give --set mu_static=…")
     truth = onset(loaded, until, uncertainty)
     names = list(engines) or default_engines(runner.workers)

@@ -8,8 +8,8 @@ from __future__ import annotations
 
 import numpy as np
 
-from proofroll.core.scene import RollingBall
-from proofroll.elements.ball_on_surface.surfaces import FloatArray
+from proofroll.core.arrays import FloatArray
+from proofroll.elements.ball_on_surface.model import RollingBall
 
 # A ball sets off with this part of the speed of a fall by one radius: enough for a direction, too little to matter.
 _SETTING_OFF = 1e-12

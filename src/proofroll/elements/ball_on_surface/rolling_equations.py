@@ -10,8 +10,8 @@ import math
 
 import numpy as np
 
-from proofroll.core.scene import RollingBall
-from proofroll.elements.ball_on_surface.surfaces import FloatArray
+from proofroll.core.arrays import FloatArray
+from proofroll.elements.ball_on_surface.model import RollingBall
 
 
 def start(body: RollingBall) -> FloatArray:

@@ -13,9 +13,10 @@ from importlib.metadata import version
 from typing import ClassVar, Self
 
 from proofroll.core.engine import Built, Level, Sample, Term
-from proofroll.core.errors import Refused
 from proofroll.core.events import Event
-from proofroll.core.scene import Capability, Scene
+from proofroll.core.scene import Scene
+from proofroll.elements.ball_on_surface.element import rolling_ball
+from proofroll.elements.ball_on_surface.model import ALL_OF_A_BALL, ROLLS, BallCapability
 from proofroll.engines.exudyn.carrier import Carrier
 from proofroll.engines.exudyn.contact import Contact
 from proofroll.engines.exudyn.generic import Generic
@@ -35,15 +36,17 @@ class Exudyn:
     """Exudyn's implicit integration of multibody systems with constraints, or with its penalty contact."""
 
     name: ClassVar[str] = "exudyn"
-    provides: ClassVar[frozenset[Capability]] = frozenset(
-        {
-            Capability.ROLLING,
-            Capability.CURVED_SURFACE,
-            Capability.ROLLING_RESISTANCE,
-            Capability.BOUNDED_FRICTION,
-            Capability.ORIENTATION,
-        }
-    )
+    provides: ClassVar[Mapping[str, frozenset[str]]] = {
+        "generic": ROLLS | {BallCapability.BOUNDED_FRICTION},
+        "carrier": ROLLS | {BallCapability.ORIENTATION},
+        "rolling_disc": ROLLS | {BallCapability.ORIENTATION},
+        "contact": ALL_OF_A_BALL,
+    }
+    lacking: ClassVar[Mapping[str, Mapping[str, str]]] = {
+        "generic": {BallCapability.ORIENTATION: "the spin of generic is a quasi-velocity, the rate of no orientation"},
+        "carrier": {BallCapability.BOUNDED_FRICTION: "its joint rolls without slip; use generic or contact"},
+        "rolling_disc": {BallCapability.BOUNDED_FRICTION: "its joint rolls without slip; use generic or contact"},
+    }
     settings: ClassVar[type[ExudynSettings]] = ExudynSettings
     presets: ClassVar[Mapping[str, Mapping[str, ExudynSettings]]] = PRESETS
     levels: ClassVar[Mapping[str, Level]] = {
@@ -68,8 +71,8 @@ class Exudyn:
             "goes on where Newton's method fails at the edge of the friction zone",
         ),
     )
-    inherent: ClassVar[Mapping[str, Mapping[Capability, str]]] = {
-        formulation: {Capability.ORIENTATION: "the rigid body's Euler parameters are coordinates of its node"}
+    inherent: ClassVar[Mapping[str, Mapping[str, str]]] = {
+        formulation: {BallCapability.ORIENTATION: "the rigid body's Euler parameters are coordinates of its node"}
         for formulation in ("carrier", "rolling_disc", "contact")
     }
 
@@ -84,19 +87,14 @@ class Exudyn:
     @classmethod
     def build(cls, scene: Scene, settings: ExudynSettings) -> Self:
         """See :class:`proofroll.core.engine.Engine`."""
-        if Capability.ORIENTATION in scene.requires and settings.formulation == "generic":
-            raise Refused(
-                f"needs {Capability.ORIENTATION}, and the spin of generic is a quasi-velocity, the rate of no "
-                "orientation; use carrier, rolling_disc or contact"
-            )
-        return cls(MODELS[settings.formulation](scene.rolling, settings))
+        return cls(MODELS[settings.formulation](rolling_ball(scene), settings))
 
     @classmethod
     def reproducer(cls, scene: Scene, settings: ExudynSettings) -> str:
         """See :class:`proofroll.core.engine.Reproduces`."""
         from proofroll.engines.exudyn.reproducer import source
 
-        body = scene.rolling
+        body = rolling_ball(scene)
         return source(MODELS[settings.formulation](body, settings), body, settings)
 
     def advance(self, t: float) -> None:

@@ -9,9 +9,10 @@ from typing import Any
 
 import numpy as np
 
+from proofroll.core.arrays import FloatArray
 from proofroll.core.engine import Built, Sample
-from proofroll.core.scene import Capability, RollingBall
-from proofroll.elements.ball_on_surface.surfaces import FloatArray, Surface
+from proofroll.elements.ball_on_surface.model import BallCapability, RollingBall
+from proofroll.elements.ball_on_surface.surfaces import Surface
 from proofroll.engines.exudyn.local_frame import curvature
 from proofroll.engines.exudyn.native import Output, items, loads
 
@@ -64,12 +65,12 @@ class RigidBall:
             terms=frozenset(self._terms()),
         )
 
-    def _terms(self) -> Iterator[Capability]:
+    def _terms(self) -> Iterator[BallCapability]:
         """What Exudyn's items hold besides rolling."""
         if "TorqueVector" in loads(self.system):
-            yield Capability.ROLLING_RESISTANCE
+            yield BallCapability.ROLLING_RESISTANCE
         if self.system.GetNode(self.node)["nodeType"] == "RigidBodyEP":
-            yield Capability.ORIENTATION
+            yield BallCapability.ORIENTATION
 
 
 def add_body(system: Any, mass: float, inertia: float, p: FloatArray, v: FloatArray, w: FloatArray) -> tuple[Any, Any]:

@@ -15,12 +15,12 @@ from typing import Any
 
 import numpy as np
 
+from proofroll.core.arrays import FloatArray
 from proofroll.core.engine import Built, Regularised, Sample
 from proofroll.core.errors import Refused
 from proofroll.core.events import Event, EventKind
-from proofroll.core.scene import Capability, RollingBall
 from proofroll.elements.ball_on_surface.mechanics import natural_acceleration, newton_euler
-from proofroll.elements.ball_on_surface.surfaces import FloatArray
+from proofroll.elements.ball_on_surface.model import BallCapability, RollingBall
 from proofroll.engines.exudyn.ball import add_ball
 from proofroll.engines.exudyn.integration import Integration, new_system
 from proofroll.engines.exudyn.local_frame import curvature
@@ -149,7 +149,7 @@ class Contact:
         mu = float(contact["dynamicFriction"])
         terms = built.terms or frozenset()
         if mu != self._grip:
-            terms |= {Capability.BOUNDED_FRICTION}
+            terms |= {BallCapability.BOUNDED_FRICTION}
         return dataclasses.replace(built, mu_static=mu, mu_kinetic=mu, terms=terms, regularised=self._softened)
 
 

@@ -12,7 +12,7 @@ from dataclasses import dataclass
 from typing import NamedTuple
 
 from proofroll.core.errors import Refused
-from proofroll.core.scene import RollingBall
+from proofroll.elements.ball_on_surface.model import RollingBall
 from proofroll.engines.exudyn.local_frame import curvature
 from proofroll.engines.exudyn.resistance import resistance_moment
 

@@ -13,11 +13,11 @@ from typing import Any
 
 import numpy as np
 
+from proofroll.core.arrays import FloatArray
 from proofroll.core.engine import Built, Sample
 from proofroll.core.errors import Refused
 from proofroll.core.events import Event
-from proofroll.core.scene import Capability, RollingBall
-from proofroll.elements.ball_on_surface.surfaces import FloatArray
+from proofroll.elements.ball_on_surface.model import BallCapability, RollingBall
 from proofroll.engines.exudyn.friction import Sliding, Touch, needed_function
 from proofroll.engines.exudyn.generic_forces import (
     SIZE,
@@ -228,9 +228,9 @@ class Generic:
             terms=frozenset(self._terms()),
         )
 
-    def _terms(self) -> Iterator[Capability]:
+    def _terms(self) -> Iterator[BallCapability]:
         """What there is besides rolling; rolling resistance if Exudyn computed its moment."""
         if self._resistance:
-            yield Capability.ROLLING_RESISTANCE
+            yield BallCapability.ROLLING_RESISTANCE
         if isinstance(self.integration, StickSlip):
-            yield Capability.BOUNDED_FRICTION
+            yield BallCapability.BOUNDED_FRICTION

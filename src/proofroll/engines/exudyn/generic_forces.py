@@ -7,9 +7,9 @@ from typing import Any
 
 import numpy as np
 
+from proofroll.core.arrays import FloatArray
 from proofroll.core.errors import Refused
-from proofroll.core.scene import RollingBall
-from proofroll.elements.ball_on_surface.surfaces import FloatArray
+from proofroll.elements.ball_on_surface.model import RollingBall
 from proofroll.engines.exudyn.friction import Sliding
 from proofroll.engines.exudyn.local_frame import LocalGeometry
 from proofroll.engines.exudyn.resistance import resistance_moment

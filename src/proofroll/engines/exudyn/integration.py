@@ -7,9 +7,9 @@ from typing import Any
 
 import numpy as np
 
+from proofroll.core.arrays import FloatArray
 from proofroll.core.engine import whole_steps
 from proofroll.core.errors import Diverged, Refused
-from proofroll.elements.ball_on_surface.surfaces import FloatArray
 from proofroll.engines.exudyn.native import exu
 from proofroll.engines.exudyn.settings import ExudynSettings
 

@@ -6,8 +6,9 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from proofroll.core.arrays import FloatArray
 from proofroll.core.errors import Refused
-from proofroll.elements.ball_on_surface.surfaces import FloatArray, Generator, Surface
+from proofroll.elements.ball_on_surface.surfaces import Generator, Surface
 
 
 @dataclass(frozen=True)

@@ -13,11 +13,11 @@ from typing import Any, NamedTuple, Protocol
 
 from scipy.optimize import brentq
 
+from proofroll.core.arrays import FloatArray
 from proofroll.core.engine import whole_steps
 from proofroll.core.errors import Diverged
 from proofroll.core.events import Event, EventKind
-from proofroll.core.scene import RollingBall
-from proofroll.elements.ball_on_surface.surfaces import FloatArray
+from proofroll.elements.ball_on_surface.model import RollingBall
 from proofroll.engines.exudyn.friction import Touch, mobility, slip_direction
 from proofroll.engines.exudyn.integration import Integration
 from proofroll.engines.exudyn.native import exu

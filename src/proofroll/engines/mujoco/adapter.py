@@ -13,8 +13,10 @@ import numpy as np
 from proofroll.core.engine import Built, Level, Sample, Term, whole_steps
 from proofroll.core.errors import Diverged, Refused
 from proofroll.core.events import Event
-from proofroll.core.scene import Capability, RollingBall, Scene
+from proofroll.core.scene import Scene
+from proofroll.elements.ball_on_surface.element import rolling_ball
 from proofroll.elements.ball_on_surface.mechanics import natural_acceleration
+from proofroll.elements.ball_on_surface.model import ALL_OF_A_BALL, BallCapability, RollingBall
 from proofroll.engines.mujoco.chart import Chart
 from proofroll.engines.mujoco.contact import Resistance, contact_coefficient, contact_force
 from proofroll.engines.mujoco.free import Facets, Free
@@ -73,15 +75,17 @@ class Mujoco:
     """
 
     name: ClassVar[str] = "mujoco"
-    provides: ClassVar[frozenset[Capability]] = frozenset(
-        {
-            Capability.ROLLING,
-            Capability.CURVED_SURFACE,
-            Capability.ROLLING_RESISTANCE,
-            Capability.BOUNDED_FRICTION,
-            Capability.ORIENTATION,
+    provides: ClassVar[Mapping[str, frozenset[str]]] = {
+        "chart": ALL_OF_A_BALL,
+        "free": ALL_OF_A_BALL,
+        "facets": ALL_OF_A_BALL - {BallCapability.BOUNDED_FRICTION},
+    }
+    lacking: ClassVar[Mapping[str, Mapping[str, str]]] = {
+        "facets": {
+            BallCapability.BOUNDED_FRICTION: "each edge between two boxes throws the ball off the wall, so facets "
+            "cannot tell when it slips"
         }
-    )
+    }
     settings: ClassVar[type[Any]] = MujocoSettings
     presets: ClassVar[Mapping[str, Mapping[str, Any]]] = PRESETS
     levels: ClassVar[Mapping[str, Level]] = {
@@ -90,8 +94,8 @@ class Mujoco:
         "facets": Level.FACETS,
     }
     terms: ClassVar[Sequence[Term]] = TERMS
-    inherent: ClassVar[Mapping[str, Mapping[Capability, str]]] = {
-        formulation: {Capability.ORIENTATION: "the ball's joint, a ball or free joint, has it in qpos"}
+    inherent: ClassVar[Mapping[str, Mapping[str, str]]] = {
+        formulation: {BallCapability.ORIENTATION: "the ball's joint, a ball or free joint, has it in qpos"}
         for formulation in ("chart", "free", "facets")
     }
 
@@ -124,7 +128,7 @@ class Mujoco:
     @classmethod
     def build(cls, scene: Scene, settings: MujocoSettings) -> Self:
         """See :class:`proofroll.core.engine.Engine`."""
-        body = scene.rolling
+        body = rolling_ball(scene)
         bounded = math.isfinite(body.contact.mu_static)
         check(settings, bounded=bounded)
         if bounded:
@@ -140,7 +144,7 @@ class Mujoco:
         """See :class:`proofroll.core.engine.Reproduces`."""
         from proofroll.engines.mujoco.reproducer import source
 
-        body = scene.rolling
+        body = rolling_ball(scene)
         built = cls.build(scene, settings)
         spec = read_spec(scene, settings.formulation)
         write_physics(spec, body, settings)
@@ -212,14 +216,14 @@ class Mujoco:
             regularised=softness(self._body, self._settings),
         )
 
-    def _terms(self) -> Iterator[Capability]:
+    def _terms(self) -> Iterator[BallCapability]:
         """What the model and the steps hold besides rolling; a contact of six dimensions resists rolling by itself."""
         if self._formulation.resists or int(self._model.geom_condim[self._geom]) >= ROLLS:
-            yield Capability.ROLLING_RESISTANCE
+            yield BallCapability.ROLLING_RESISTANCE
         if self._friction is not None:
-            yield Capability.BOUNDED_FRICTION
+            yield BallCapability.BOUNDED_FRICTION
         if int(self._model.joint("spin").type[0]) in _TURNING_JOINTS:
-            yield Capability.ORIENTATION
+            yield BallCapability.ORIENTATION
 
     def _coefficients(self) -> tuple[float, float]:
         """Static and kinetic coefficient of friction that MuJoCo's contact has, or will have."""

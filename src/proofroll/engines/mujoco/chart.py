@@ -10,7 +10,7 @@ import mujoco
 import numpy as np
 
 from proofroll.core.errors import Refused
-from proofroll.core.scene import RollingBall
+from proofroll.elements.ball_on_surface.model import RollingBall
 from proofroll.engines.mujoco.contact import Resistance, foreseen_normal_force
 from proofroll.engines.mujoco.friction import BoundedFriction, corrects
 from proofroll.engines.mujoco.model import pose, quaternion_of, tangent_plane

@@ -10,7 +10,7 @@ from typing import Any
 import mujoco
 import numpy as np
 
-from proofroll.elements.ball_on_surface.surfaces import FloatArray
+from proofroll.core.arrays import FloatArray
 
 # Numbers of user data that foreseen_normal_force keeps.
 MEMORY = 4

@@ -11,7 +11,7 @@ import numpy as np
 
 from proofroll.core.errors import Refused
 from proofroll.core.events import Event, EventKind
-from proofroll.core.scene import Contact, RollingBall
+from proofroll.elements.ball_on_surface.model import Contact, RollingBall
 from proofroll.engines.mujoco.settings import LARGEST_PYRAMIDAL_FRICTION, PRELOAD, MujocoSettings
 
 # MuJoCo raises a smaller coefficient to this without a word (mjMINMU), unless the contact has no friction at all.
@@ -38,10 +38,8 @@ def check_coefficients(contact: Contact, settings: MujocoSettings) -> None:
     """Rejects what MuJoCo would silently change or cannot hold.
 
     Raises:
-        Refused: the first such coefficient, or the formulation cannot tell sticking from slipping.
+        Refused: the first such coefficient.
     """
-    if settings.formulation == "facets":
-        raise Refused("each edge between two boxes throws the ball off the wall, so facets cannot tell when it slips")
     for mu in (contact.mu_static, contact.mu_kinetic):
         if 0 < mu < SMALLEST_FRICTION:
             raise Refused(f"MuJoCo raises a coefficient of friction of {mu:g} to {SMALLEST_FRICTION:g}; 0 is exact")

@@ -8,9 +8,10 @@ from typing import Any
 import mujoco
 import numpy as np
 
+from proofroll.core.arrays import FloatArray
 from proofroll.core.errors import Refused
-from proofroll.core.scene import RollingBall, Scene
-from proofroll.elements.ball_on_surface.surfaces import FloatArray
+from proofroll.core.scene import Scene
+from proofroll.elements.ball_on_surface.model import RollingBall
 from proofroll.engines.mujoco.contact import MEMORY
 from proofroll.engines.mujoco.friction import MEMORY as SLIP_MEMORY
 from proofroll.engines.mujoco.friction import condim, corrects

@@ -8,8 +8,8 @@ from collections.abc import Iterator, Mapping
 import numpy as np
 
 from proofroll.core.engine import Regularised
-from proofroll.core.scene import RollingBall
 from proofroll.elements.ball_on_surface.mechanics import initial_response, natural_acceleration, newton_euler
+from proofroll.elements.ball_on_surface.model import RollingBall
 from proofroll.engines.mujoco.friction import corrects
 from proofroll.engines.mujoco.settings import (
     PRELOAD,

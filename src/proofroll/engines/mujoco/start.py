@@ -10,9 +10,9 @@ import mujoco
 import numpy as np
 from scipy.optimize import brentq
 
+from proofroll.core.arrays import FloatArray
 from proofroll.core.errors import Refused
-from proofroll.core.scene import RollingBall
-from proofroll.elements.ball_on_surface.surfaces import FloatArray
+from proofroll.elements.ball_on_surface.model import RollingBall
 from proofroll.engines.mujoco.friction import corrects
 from proofroll.engines.mujoco.settings import MujocoSettings, impedance, time_constant, velocity_lag
 

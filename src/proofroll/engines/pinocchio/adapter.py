@@ -11,7 +11,9 @@ import pinocchio as pin
 from proofroll.core.engine import Built, Level, Sample, Term
 from proofroll.core.errors import Refused
 from proofroll.core.events import Event
-from proofroll.core.scene import Capability, Scene
+from proofroll.core.scene import Scene
+from proofroll.elements.ball_on_surface.element import rolling_ball
+from proofroll.elements.ball_on_surface.model import ALL_OF_A_BALL, BallCapability
 from proofroll.engines.pinocchio.contact_run import ContactRun
 from proofroll.engines.pinocchio.rows_run import RowsRun
 from proofroll.engines.pinocchio.settings import PRESETS, PinocchioSettings
@@ -21,15 +23,7 @@ class Pinocchio:
     """Pinocchio's equations of motion with rows of rolling put to them, or its own solver of contact with friction."""
 
     name: ClassVar[str] = "pinocchio"
-    provides: ClassVar[frozenset[Capability]] = frozenset(
-        {
-            Capability.ROLLING,
-            Capability.CURVED_SURFACE,
-            Capability.ROLLING_RESISTANCE,
-            Capability.BOUNDED_FRICTION,
-            Capability.ORIENTATION,
-        }
-    )
+    provides: ClassVar[Mapping[str, frozenset[str]]] = dict.fromkeys(PRESETS, ALL_OF_A_BALL)
     settings: ClassVar[type[Any]] = PinocchioSettings
     presets: ClassVar[Mapping[str, Mapping[str, PinocchioSettings]]] = PRESETS
     levels: ClassVar[Mapping[str, Level]] = {
@@ -60,8 +54,8 @@ class Pinocchio:
             "tells the solver how fast the contact's plane turns during a step",
         ),
     )
-    inherent: ClassVar[Mapping[str, Mapping[Capability, str]]] = {
-        "contact": {Capability.ORIENTATION: "the spherical joint's configuration is the ball's orientation"}
+    inherent: ClassVar[Mapping[str, Mapping[str, str]]] = {
+        "contact": {BallCapability.ORIENTATION: "the spherical joint's configuration is the ball's orientation"}
     }
 
     def __init__(self, run: ContactRun | RowsRun) -> None:
@@ -77,14 +71,14 @@ class Pinocchio:
     def build(cls, scene: Scene, settings: PinocchioSettings) -> Self:
         """See :class:`proofroll.core.engine.Engine`."""
         settings = _decided(scene, settings)
-        return cls((ContactRun if settings.formulation == "contact" else RowsRun)(scene.rolling, settings))
+        return cls((ContactRun if settings.formulation == "contact" else RowsRun)(rolling_ball(scene), settings))
 
     @classmethod
     def reproducer(cls, scene: Scene, settings: PinocchioSettings) -> str:
         """See :class:`proofroll.core.engine.Reproduces`."""
         from proofroll.engines.pinocchio.reproducer import source
 
-        return source(scene.rolling, _decided(scene, settings))
+        return source(rolling_ball(scene), _decided(scene, settings))
 
     def advance(self, t: float) -> None:
         """See :class:`proofroll.core.engine.Engine`."""
@@ -112,7 +106,7 @@ def _decided(scene: Scene, settings: PinocchioSettings) -> PinocchioSettings:
     """
     if settings.formulation == "contact":
         return settings
-    asked = Capability.ORIENTATION in scene.requires
+    asked = BallCapability.ORIENTATION in scene.requires
     if asked and settings.orientation is False:
-        raise Refused(f"needs {Capability.ORIENTATION}, which orientation=false leaves out")
+        raise Refused(f"needs {BallCapability.ORIENTATION}, which orientation=false leaves out")
     return dataclasses.replace(settings, orientation=asked) if settings.orientation is None else settings

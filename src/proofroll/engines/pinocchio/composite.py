@@ -8,9 +8,10 @@ from typing import Any, NamedTuple
 import numpy as np
 import pinocchio as pin
 
+from proofroll.core.arrays import FloatArray
 from proofroll.core.errors import Refused
-from proofroll.core.scene import RollingBall
-from proofroll.elements.ball_on_surface.surfaces import FloatArray, Generator
+from proofroll.elements.ball_on_surface.model import RollingBall
+from proofroll.elements.ball_on_surface.surfaces import Generator
 from proofroll.engines.pinocchio.mechanism import Mechanism, Sliding
 from proofroll.engines.pinocchio.rows import (
     BallTerms,

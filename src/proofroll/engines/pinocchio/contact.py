@@ -13,11 +13,11 @@ from typing import Any, NamedTuple
 import numpy as np
 import pinocchio as pin
 
+from proofroll.core.arrays import FloatArray
 from proofroll.core.engine import whole_steps
 from proofroll.core.errors import Diverged, Refused
 from proofroll.core.events import Event, EventKind
-from proofroll.core.scene import RollingBall
-from proofroll.elements.ball_on_surface.surfaces import FloatArray
+from proofroll.elements.ball_on_surface.model import RollingBall
 from proofroll.engines.pinocchio.plane_contact import PlaneContact
 from proofroll.engines.pinocchio.settings import PinocchioSettings
 

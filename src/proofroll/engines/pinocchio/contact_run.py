@@ -7,10 +7,10 @@ from collections.abc import Iterator
 import numpy as np
 import pinocchio as pin
 
+from proofroll.core.arrays import FloatArray
 from proofroll.core.engine import Built, Sample
 from proofroll.core.events import Event
-from proofroll.core.scene import Capability, RollingBall
-from proofroll.elements.ball_on_surface.surfaces import FloatArray
+from proofroll.elements.ball_on_surface.model import BallCapability, RollingBall
 from proofroll.engines.pinocchio.contact import UNBOUNDED_FRICTION, ContactSteps
 from proofroll.engines.pinocchio.contact_tolerances import softened
 from proofroll.engines.pinocchio.settings import PinocchioSettings
@@ -90,15 +90,15 @@ class ContactRun:
         torque: FloatArray = self.steps.resistance(triad, triad[3:6], 1.0)
         return float(np.linalg.norm(torque))
 
-    def _terms(self, lever: float) -> Iterator[Capability]:
+    def _terms(self, lever: float) -> Iterator[BallCapability]:
         """What there is besides rolling: the torque's lever [m], the cone, and a joint that turns the ball."""
         contact = self.steps.contact
         if lever:
-            yield Capability.ROLLING_RESISTANCE
+            yield BallCapability.ROLLING_RESISTANCE
         if contact.friction(self.steps.mu_static) != self._unbounded:
-            yield Capability.BOUNDED_FRICTION
+            yield BallCapability.BOUNDED_FRICTION
         if contact.model.joints[contact.ball].nq == _QUATERNION:
-            yield Capability.ORIENTATION
+            yield BallCapability.ORIENTATION
 
     def events(self) -> tuple[Event, ...]:
         """See :class:`proofroll.core.engine.LocatesEvents`; none with unbounded friction."""

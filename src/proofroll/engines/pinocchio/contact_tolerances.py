@@ -7,13 +7,13 @@ from dataclasses import replace
 import numpy as np
 
 from proofroll.core.engine import Regularised
-from proofroll.core.scene import RollingBall
 from proofroll.elements.ball_on_surface.mechanics import (
     initial_angular_acceleration,
     initial_response,
     natural_acceleration,
     newton_euler,
 )
+from proofroll.elements.ball_on_surface.model import RollingBall
 
 # Errors that the solver's tolerance and round-off explain, over what was measured at most on either scene.
 _MARGIN = 10.0

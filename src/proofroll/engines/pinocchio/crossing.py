@@ -9,7 +9,7 @@ import numpy as np
 from scipy.integrate import DOP853
 from scipy.optimize import brentq, minimize_scalar
 
-from proofroll.elements.ball_on_surface.surfaces import FloatArray
+from proofroll.core.arrays import FloatArray
 
 # Between the ends of an interval the function is looked at so many times, enough for one crest.
 _LOOKS = 4

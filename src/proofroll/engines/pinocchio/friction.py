@@ -4,9 +4,9 @@ from __future__ import annotations
 
 from typing import Any, Protocol, runtime_checkable
 
+from proofroll.core.arrays import FloatArray
 from proofroll.core.events import Event
-from proofroll.core.scene import Contact
-from proofroll.elements.ball_on_surface.surfaces import FloatArray
+from proofroll.elements.ball_on_surface.model import Contact
 from proofroll.engines.pinocchio.integrators import Integrator
 from proofroll.engines.pinocchio.mechanism import Mechanism
 from proofroll.engines.pinocchio.settings import PinocchioSettings

@@ -8,9 +8,9 @@ import numpy as np
 import pinocchio as pin
 from scipy.integrate import DOP853
 
+from proofroll.core.arrays import FloatArray
 from proofroll.core.engine import whole_steps
 from proofroll.core.errors import Diverged
-from proofroll.elements.ball_on_surface.surfaces import FloatArray
 from proofroll.engines.pinocchio.mechanism import Mechanism, left_the_wall
 from proofroll.engines.pinocchio.settings import PinocchioSettings
 

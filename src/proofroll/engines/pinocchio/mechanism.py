@@ -10,9 +10,9 @@ from typing import Any
 import numpy as np
 import pinocchio as pin
 
+from proofroll.core.arrays import FloatArray
 from proofroll.core.errors import Diverged
-from proofroll.core.scene import RollingBall
-from proofroll.elements.ball_on_surface.surfaces import FloatArray
+from proofroll.elements.ball_on_surface.model import RollingBall
 from proofroll.engines.pinocchio.rows import BallTerms, resistance
 
 # A pull of the wall smaller than this part of the ball's weight, and of the force that turns its path by a radius, is

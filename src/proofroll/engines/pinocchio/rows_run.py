@@ -9,10 +9,10 @@ from typing import Any
 import numpy as np
 import pinocchio as pin
 
+from proofroll.core.arrays import FloatArray
 from proofroll.core.engine import Built, Sample
 from proofroll.core.events import Event
-from proofroll.core.scene import Capability, RollingBall
-from proofroll.elements.ball_on_surface.surfaces import FloatArray
+from proofroll.elements.ball_on_surface.model import BallCapability, RollingBall
 from proofroll.engines.pinocchio.composite import Composite
 from proofroll.engines.pinocchio.free_flyer import FreeFlyer
 from proofroll.engines.pinocchio.friction import StickSlip, stick_slip
@@ -88,14 +88,14 @@ class RowsRun:
             terms=frozenset(self._terms(torque)),
         )
 
-    def _terms(self, torque: FloatArray | None) -> Iterator[Capability]:
+    def _terms(self, torque: FloatArray | None) -> Iterator[BallCapability]:
         """What there is besides rolling, with the torque of rolling resistance as it is put to the joints."""
         if torque is not None:
-            yield Capability.ROLLING_RESISTANCE
+            yield BallCapability.ROLLING_RESISTANCE
         if isinstance(self.motion, StickSlip):
-            yield Capability.BOUNDED_FRICTION
+            yield BallCapability.BOUNDED_FRICTION
         if self.motion.turns:
-            yield Capability.ORIENTATION
+            yield BallCapability.ORIENTATION
 
     def _reaction(self, data: Any) -> tuple[FloatArray, FloatArray]:
         """Joint acceleration, and force of the wall on the ball in the world [N], now."""

@@ -16,10 +16,10 @@ from typing import Any
 
 import numpy as np
 
+from proofroll.core.arrays import FloatArray
 from proofroll.core.errors import Diverged
 from proofroll.core.events import Event, EventKind
-from proofroll.core.scene import Contact
-from proofroll.elements.ball_on_surface.surfaces import FloatArray
+from proofroll.elements.ball_on_surface.model import Contact
 from proofroll.engines.pinocchio.crossing import located
 from proofroll.engines.pinocchio.integrators import Adaptive
 from proofroll.engines.pinocchio.mechanism import Mechanism, Sliding, left_the_wall

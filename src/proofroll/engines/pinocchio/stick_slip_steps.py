@@ -7,9 +7,9 @@ from typing import Any
 
 import numpy as np
 
+from proofroll.core.arrays import FloatArray
 from proofroll.core.events import Event
-from proofroll.core.scene import Contact
-from proofroll.elements.ball_on_surface.surfaces import FloatArray
+from proofroll.elements.ball_on_surface.model import Contact
 from proofroll.engines.pinocchio.integrators import FixedStep, RungeKutta4, SemiImplicitEuler
 from proofroll.engines.pinocchio.mechanism import Mechanism, Sliding, left_the_wall
 from proofroll.engines.pinocchio.settings import PinocchioSettings

@@ -9,12 +9,14 @@ from typing import ClassVar, Self
 import numpy as np
 
 import proofroll
+from proofroll.core.arrays import FloatArray
 from proofroll.core.engine import Built, Level, Sample, Term
 from proofroll.core.errors import Diverged, Refused
 from proofroll.core.events import Event
-from proofroll.core.scene import Capability, RollingBall, Scene
+from proofroll.core.scene import Scene
 from proofroll.elements.ball_on_surface.compiled.library import with_heyoka
-from proofroll.elements.ball_on_surface.surfaces import FloatArray
+from proofroll.elements.ball_on_surface.element import rolling_ball
+from proofroll.elements.ball_on_surface.model import ALL_OF_A_BALL, BallCapability, RollingBall
 from proofroll.engines.projection.friction import Friction
 from proofroll.engines.projection.geometry import geometry_of
 from proofroll.engines.projection.integrators import INTEGRATORS, Integrator
@@ -35,15 +37,7 @@ class Projection:
     """Blajer's projection method on any surface that guides a ball."""
 
     name: ClassVar[str] = "projection"
-    provides: ClassVar[frozenset[Capability]] = frozenset(
-        {
-            Capability.ROLLING,
-            Capability.CURVED_SURFACE,
-            Capability.ROLLING_RESISTANCE,
-            Capability.BOUNDED_FRICTION,
-            Capability.ORIENTATION,
-        }
-    )
+    provides: ClassVar[Mapping[str, frozenset[str]]] = dict.fromkeys(PRESETS, ALL_OF_A_BALL)
     settings: ClassVar[type[ProjectionSettings]] = ProjectionSettings
     presets: ClassVar[Mapping[str, Mapping[str, ProjectionSettings]]] = PRESETS
     levels: ClassVar[Mapping[str, Level]] = {"euler": Level.PROJECTION, "rotating_frame": Level.PROJECTION}
@@ -64,8 +58,8 @@ class Projection:
             "carries out the method's projections at every evaluation, as on a surface that looks different everywhere",
         ),
     )
-    inherent: ClassVar[Mapping[str, Mapping[Capability, str]]] = {
-        "euler": {Capability.ORIENTATION: "the Euler angles are coordinates of the equations of motion"}
+    inherent: ClassVar[Mapping[str, Mapping[str, str]]] = {
+        "euler": {BallCapability.ORIENTATION: "the Euler angles are coordinates of the equations of motion"}
     }
 
     @staticmethod
@@ -76,10 +70,10 @@ class Projection:
     @classmethod
     def build(cls, scene: Scene, settings: ProjectionSettings) -> Self:
         """See :class:`proofroll.core.engine.Engine`."""
-        follow = Capability.ORIENTATION in scene.requires
+        follow = BallCapability.ORIENTATION in scene.requires
         if follow and settings.integrator == "taylor" and settings.formulation == "rotating_frame":
             raise Refused("the compiled series do not follow the orientation; use integrator=dop853")
-        return cls(scene.rolling, settings, follow=follow)
+        return cls(rolling_ball(scene), settings, follow=follow)
 
     def __init__(self, body: RollingBall, settings: ProjectionSettings, *, follow: bool = False) -> None:
         """The ball at time 0; ``follow`` its orientation too where the formulation does not need it."""
@@ -213,14 +207,14 @@ class Projection:
             terms=frozenset(self._terms()),
         )
 
-    def _terms(self) -> Iterator[Capability]:
+    def _terms(self) -> Iterator[BallCapability]:
         """What the equations hold besides rolling."""
         if self._ball.rolling_resistance:
-            yield Capability.ROLLING_RESISTANCE
+            yield BallCapability.ROLLING_RESISTANCE
         if self._bounded:
-            yield Capability.BOUNDED_FRICTION
+            yield BallCapability.BOUNDED_FRICTION
         if len(self._motion.x) > _WITHOUT_ORIENTATION:
-            yield Capability.ORIENTATION
+            yield BallCapability.ORIENTATION
 
 
 def _speed(body: RollingBall) -> float:

@@ -14,8 +14,8 @@ from typing import NamedTuple
 
 import numpy as np
 
-from proofroll.core.scene import Contact
-from proofroll.elements.ball_on_surface.surfaces import FloatArray
+from proofroll.core.arrays import FloatArray
+from proofroll.elements.ball_on_surface.model import Contact
 from proofroll.engines.projection.method import Kinematics, ProjectedBall, Response
 
 # Needed friction is compared with the cone to this part of both and of the weight: below lies round-off.

@@ -10,7 +10,8 @@ from typing import NamedTuple, Protocol
 
 import numpy as np
 
-from proofroll.elements.ball_on_surface.surfaces import FloatArray, Generator, Surface
+from proofroll.core.arrays import FloatArray
+from proofroll.elements.ball_on_surface.surfaces import Generator, Surface
 
 
 class Local(NamedTuple):

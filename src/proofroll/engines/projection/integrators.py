@@ -8,9 +8,9 @@ from typing import ClassVar, Literal, Protocol
 import numpy as np
 from scipy.integrate import DOP853
 
+from proofroll.core.arrays import FloatArray
 from proofroll.core.engine import whole_steps
 from proofroll.core.errors import Diverged
-from proofroll.elements.ball_on_surface.surfaces import FloatArray
 
 Rates = Callable[[FloatArray], FloatArray]
 # Called after each step with its time and state; returns the state to go on from, the very same object if unchanged.

@@ -19,8 +19,8 @@ from typing import NamedTuple
 import numpy as np
 from scipy.linalg.lapack import dgesv
 
-from proofroll.core.scene import RollingBall
-from proofroll.elements.ball_on_surface.surfaces import FloatArray
+from proofroll.core.arrays import FloatArray
+from proofroll.elements.ball_on_surface.model import RollingBall
 from proofroll.engines.projection.geometry import Geometry, Local, Uniform
 from proofroll.engines.projection.orientation import EulerAngles, Orientation, RotatingFrame
 from proofroll.engines.projection.uniform import AlongAxes, Closed

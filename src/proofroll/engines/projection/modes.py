@@ -6,7 +6,7 @@ import math
 from enum import Enum, auto
 from typing import NamedTuple, Protocol
 
-from proofroll.elements.ball_on_surface.surfaces import FloatArray
+from proofroll.core.arrays import FloatArray
 
 # Slower than this part of the pace of the motion, a contact point or a centre stands still: 1e-14 s before it does.
 _STILL = 1e-13

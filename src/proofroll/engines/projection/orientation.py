@@ -12,8 +12,8 @@ from typing import ClassVar, Protocol
 import numpy as np
 from scipy.spatial.transform import Rotation
 
+from proofroll.core.arrays import FloatArray
 from proofroll.core.errors import Diverged
-from proofroll.elements.ball_on_surface.surfaces import FloatArray
 from proofroll.engines.projection.geometry import Geometry
 
 # The condition of M̄ grows like 1/sin²θ as θ nears 0 or π. Here, at 30 degrees, nothing is lost yet; the paper's own

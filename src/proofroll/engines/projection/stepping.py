@@ -13,9 +13,9 @@ from typing import ClassVar, Protocol
 import numpy as np
 from scipy.integrate import DOP853
 
+from proofroll.core.arrays import FloatArray
 from proofroll.core.engine import whole_steps
 from proofroll.core.errors import Diverged
-from proofroll.elements.ball_on_surface.surfaces import FloatArray
 from proofroll.engines.projection.integrators import Accept, Rates, classical_step
 
 # Part of a fixed step that is not worth a step of its own.

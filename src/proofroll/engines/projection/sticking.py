@@ -6,7 +6,7 @@ import math
 
 import numpy as np
 
-from proofroll.elements.ball_on_surface.surfaces import FloatArray
+from proofroll.core.arrays import FloatArray
 from proofroll.engines.projection.friction import Friction
 from proofroll.engines.projection.method import ProjectedBall
 from proofroll.engines.projection.modes import DIFFERENCE, Exit, Pace, Survey, time_left

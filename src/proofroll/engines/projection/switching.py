@@ -8,9 +8,9 @@ from typing import NamedTuple
 import numpy as np
 from scipy.optimize import brentq
 
+from proofroll.core.arrays import FloatArray
 from proofroll.core.errors import Diverged
 from proofroll.core.events import Event, EventKind
-from proofroll.elements.ball_on_surface.surfaces import FloatArray
 from proofroll.engines.projection.friction import Friction
 from proofroll.engines.projection.modes import Exit, Mode, Pace, Survey
 from proofroll.engines.projection.slipping import FreeSlip, SlavedSlip

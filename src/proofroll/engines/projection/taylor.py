@@ -6,13 +6,13 @@ from collections.abc import Callable
 
 import numpy as np
 
+from proofroll.core.arrays import FloatArray
 from proofroll.core.errors import Refused
-from proofroll.core.scene import RollingBall
 from proofroll.elements.ball_on_surface.compiled.library import require_heyoka
 from proofroll.elements.ball_on_surface.compiled.projection import Formulation, parameters, projected, structure
 from proofroll.elements.ball_on_surface.compiled.rolling import supports
 from proofroll.elements.ball_on_surface.compiled.series import Renewed, Series, still_moving
-from proofroll.elements.ball_on_surface.surfaces import FloatArray
+from proofroll.elements.ball_on_surface.model import RollingBall
 
 
 class TaylorSeries:

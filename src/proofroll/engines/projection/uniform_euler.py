@@ -6,8 +6,8 @@ import math
 
 import numpy as np
 
-from proofroll.core.scene import RollingBall
-from proofroll.elements.ball_on_surface.surfaces import FloatArray
+from proofroll.core.arrays import FloatArray
+from proofroll.elements.ball_on_surface.model import RollingBall
 from proofroll.engines.projection.geometry import Uniform
 from proofroll.engines.projection.uniform import Closed
 

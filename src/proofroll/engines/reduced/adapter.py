@@ -8,10 +8,12 @@ from typing import ClassVar, Self
 import numpy as np
 
 import proofroll
+from proofroll.core.arrays import FloatArray
 from proofroll.core.engine import Built, Level, Sample, Term
-from proofroll.core.scene import Capability, RollingBall, Scene
+from proofroll.core.scene import Scene
 from proofroll.elements.ball_on_surface.compiled.library import with_heyoka
-from proofroll.elements.ball_on_surface.surfaces import FloatArray
+from proofroll.elements.ball_on_surface.element import rolling_ball
+from proofroll.elements.ball_on_surface.model import ROLLS, BallCapability, RollingBall
 from proofroll.engines.reduced.models import ClosedForm, Compiled, Integrated, Model
 from proofroll.engines.reduced.settings import PRESETS, ReducedSettings
 
@@ -24,9 +26,7 @@ class Reduced:
     """
 
     name: ClassVar[str] = "reduced"
-    provides: ClassVar[frozenset[Capability]] = frozenset(
-        {Capability.ROLLING, Capability.CURVED_SURFACE, Capability.ROLLING_RESISTANCE}
-    )
+    provides: ClassVar[Mapping[str, frozenset[str]]] = dict.fromkeys(PRESETS, ROLLS)
     settings: ClassVar[type[ReducedSettings]] = ReducedSettings
     presets: ClassVar[Mapping[str, Mapping[str, ReducedSettings]]] = PRESETS
     levels: ClassVar[Mapping[str, Level]] = {"equations": Level.REDUCED, "closed_form": Level.CLOSED_FORM}
@@ -40,7 +40,7 @@ class Reduced:
     @classmethod
     def build(cls, scene: Scene, settings: ReducedSettings) -> Self:
         """See :class:`proofroll.core.engine.Engine`."""
-        return cls(scene.rolling, settings)
+        return cls(rolling_ball(scene), settings)
 
     def __init__(self, body: RollingBall, settings: ReducedSettings) -> None:
         self._body = body
@@ -79,7 +79,7 @@ class Reduced:
             rolling_resistance=f,
             acceleration=acceleration,
             angular_acceleration=self._turning(motion.p_WB[0], motion.v_WB[0], motion.w_WB[0], acceleration),
-            terms=frozenset({Capability.ROLLING_RESISTANCE} if f else ()),
+            terms=frozenset({BallCapability.ROLLING_RESISTANCE} if f else ()),
         )
 
     def _turning(self, p: FloatArray, v: FloatArray, w: FloatArray, acceleration: FloatArray) -> FloatArray | None:

@@ -11,16 +11,16 @@ from typing import Protocol
 import numpy as np
 from scipy.integrate import DOP853
 
+from proofroll.core.arrays import FloatArray
 from proofroll.core.errors import Diverged, Refused
-from proofroll.core.scene import RollingBall
 from proofroll.elements.ball_on_surface.closed_form import closed_form
 from proofroll.elements.ball_on_surface.compiled.library import require_heyoka
 from proofroll.elements.ball_on_surface.compiled.rolling import is_uniform, parameters, reduced, supports
 from proofroll.elements.ball_on_surface.compiled.rolling import start as start_along_arc
 from proofroll.elements.ball_on_surface.compiled.series import Series, still_moving
+from proofroll.elements.ball_on_surface.model import RollingBall
 from proofroll.elements.ball_on_surface.motion import Motion, world_motion
 from proofroll.elements.ball_on_surface.rolling_equations import placed, reduced_rates, start
-from proofroll.elements.ball_on_surface.surfaces import FloatArray
 
 # A step shorter than this part of the way to the next sample leads nowhere.
 _STUCK = 1e-12

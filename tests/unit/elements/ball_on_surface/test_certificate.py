@@ -6,9 +6,10 @@ from typing import Any
 import numpy as np
 import pytest
 
+from proofroll.core.certificate import EXACT, Line, certify, first_difference
 from proofroll.core.engine import Built, Regularised, Sample
 from proofroll.core.scene import Scene
-from proofroll.elements.ball_on_surface.certificate import EXACT, Line, certify, first_difference
+from proofroll.elements.ball_on_surface.element import rolling_ball
 from proofroll.elements.ball_on_surface.mechanics import (
     initial_angular_acceleration,
     initial_response,
@@ -21,7 +22,7 @@ class Stub:
     """A built engine that holds the scene's own numbers, with some replaced."""
 
     def __init__(self, scene: Scene, sample: dict[str, Any] | None = None, **built: Any) -> None:
-        body = scene.rolling
+        body = rolling_ball(scene)
         acceleration, force = initial_response(body)
         right = Built(
             mass=body.ball.mass,
@@ -57,7 +58,7 @@ def test_the_scene_itself_is_certified(scene: Scene) -> None:
     assert first_difference(lines) is None
 
 
-BODY = load_scene("sphere_in_cylinder").rolling
+BODY = rolling_ball(load_scene("sphere_in_cylinder"))
 PART = 1e-11  # relative; ten times what is allowed
 
 
@@ -105,7 +106,7 @@ def test_a_silent_engine_is_judged_by_its_state_alone() -> None:
 def test_a_softened_quantity_has_its_own_tolerance_and_reason() -> None:
     """Only the quantity that the engine softens is judged by the engine's tolerance, and the reason is kept."""
     scene = load_scene("sphere_in_cylinder")
-    force = initial_response(scene.rolling)[1]
+    force = initial_response(rolling_ball(scene))[1]
     soft = {"N": Regularised(1e-3, "the contact is a spring")}
     stub = Stub(scene, {"force": force * (1 + 1e-4)}, regularised=soft)
     lines = {line.quantity: line for line in certify(stub, scene)}
@@ -129,7 +130,7 @@ SLIPPING = load_scene("sphere_in_cylinder", rolling_resistance=5e-4, mu_static=0
 FRICTION: dict[str, Any] = {
     "mu_static": 0.35,
     "mu_kinetic": 0.25,
-    "angular_acceleration": initial_angular_acceleration(SLIPPING.rolling),
+    "angular_acceleration": initial_angular_acceleration(rolling_ball(SLIPPING)),
 }
 
 
@@ -155,7 +156,7 @@ def test_friction_and_angular_acceleration_are_certified() -> None:
             "angular acceleration",
             {
                 "angular_acceleration": FRICTION["angular_acceleration"]
-                + [0, 0, PART * natural_acceleration(SLIPPING.rolling) / 0.025]
+                + [0, 0, PART * natural_acceleration(rolling_ball(SLIPPING)) / 0.025]
             },
         ),
         ("angular acceleration", {"angular_acceleration": -FRICTION["angular_acceleration"]}),

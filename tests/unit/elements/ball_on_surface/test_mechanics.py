@@ -4,6 +4,7 @@ import numpy as np
 import pytest
 
 from proofroll.core.scene import Scene
+from proofroll.elements.ball_on_surface.element import rolling_ball
 from proofroll.elements.ball_on_surface.mechanics import (
     energy,
     initial_response,
@@ -32,7 +33,7 @@ def test_resistance_in_the_local_frame() -> None:
 
 def test_resistance_takes_power() -> None:
     """On a rolling ball the moment of the resistance does the work -N f V / a per second."""
-    body = load_scene("sphere_in_cylinder", axial_speed=1.5, radial_spin=9.0).rolling
+    body = rolling_ball(load_scene("sphere_in_cylinder", axial_speed=1.5, radial_spin=9.0))
     moment = resistance_moment(5e-4, 30.0, body.surface.normal(body.p0), body.v0)
     assert moment @ body.w0 == pytest.approx(-30 * 5e-4 * np.hypot(4, 1.5) / 0.025, rel=1e-13)
 
@@ -52,7 +53,7 @@ def test_resistance_over_time() -> None:
 
 def test_energy() -> None:
     """Energy is ½mv² + ½Jω² + mgz."""
-    body = load_scene("sphere_in_cylinder").rolling
+    body = rolling_ball(load_scene("sphere_in_cylinder"))
     m, J = body.ball.mass, body.ball.inertia
     found = energy(body, np.array([0.2, 0, 3.0]), np.array([0, 4.0, 0]), np.array([0, 0, -160.0]))
     assert found == pytest.approx(0.5 * m * 16 + 0.5 * J * 160**2 + m * G * 3, rel=1e-15)
@@ -60,7 +61,7 @@ def test_energy() -> None:
 
 def test_initial_response_of_the_paper_case() -> None:
     """At time 0 the paper's ball feels N = m V0²/c, F3 = (2/7) m g and falls with (5/7) g."""
-    acceleration, force = initial_response(load_scene("sphere_in_cylinder").rolling)
+    acceleration, force = initial_response(rolling_ball(load_scene("sphere_in_cylinder")))
     assert acceleration == pytest.approx([-(4**2) / 0.2, 0, -5 / 7 * G], rel=1e-13, abs=1e-13)
     assert force == pytest.approx([-0.517 * 16 / 0.2, 0, 2 / 7 * 0.517 * G], rel=1e-13, abs=1e-13)
 
@@ -69,7 +70,7 @@ def test_initial_response_with_resistance_and_spin() -> None:
     """With spin and resistance the initial accelerations are those of the reduced equations."""
     f, a, c, speed, axial, spin = 5e-4, 0.025, 0.2, 3.3, 0.7, 12.0
     scene = load_scene("sphere_in_cylinder", speed=speed, axial_speed=axial, radial_spin=spin, rolling_resistance=f)
-    acceleration, _ = initial_response(scene.rolling)
+    acceleration, _ = initial_response(rolling_ball(scene))
     rate = speed / c
     k = 5 / 7 * f / a * c * rate**2 / np.hypot(speed, axial)
     expected = [-c * rate**2, -k * c * rate, -5 / 7 * G - 2 / 7 * a * rate * spin - k * axial]
@@ -78,7 +79,7 @@ def test_initial_response_with_resistance_and_spin() -> None:
 
 def test_newton_euler_obeys_its_equations(scene: Scene) -> None:
     """The solution satisfies Newton, Euler with the resistance, and keeps the contact point at rest."""
-    body = scene.rolling
+    body = rolling_ball(scene)
     acceleration, w_rate, force = newton_euler(body, body.p0, body.v0, body.w0)
     a, m, J, f = body.ball.radius, body.ball.mass, body.ball.inertia, body.contact.rolling_resistance
     e1 = body.surface.normal(body.p0)

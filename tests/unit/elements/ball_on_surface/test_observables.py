@@ -4,9 +4,11 @@ import numpy as np
 import pytest
 import xarray as xr
 
+from proofroll.core.dataset import observe, scales
 from proofroll.core.scene import Scene
-from proofroll.elements.ball_on_surface.observables import energy_balance, force_audit, observables, scales
-from proofroll.elements.ball_on_surface.trajectory import trajectory
+from proofroll.elements.ball_on_surface.dataset import variables
+from proofroll.elements.ball_on_surface.element import rolling_ball
+from proofroll.elements.ball_on_surface.observables import energy_balance, force_audit
 from proofroll.files.scene_file import load_scene
 from proofroll.truth.rolling import reduced
 
@@ -17,8 +19,8 @@ TIMES = np.linspace(0, 0.6, 61)
 def case() -> tuple[Scene, xr.Dataset]:
     """A run with resistance, general initial motion and nothing wrong."""
     scene = load_scene("sphere_in_cylinder", axial_speed=0.7, radial_spin=12.0, rolling_resistance=5e-4)
-    motion = reduced(scene.rolling, TIMES)
-    return scene, trajectory(scene, TIMES, motion.p_WB, motion.v_WB, motion.w_WB, force=motion.force)
+    motion = reduced(rolling_ball(scene), TIMES)
+    return scene, variables(rolling_ball(scene), TIMES, motion.p_WB, motion.v_WB, motion.w_WB, force=motion.force)
 
 
 def largest(values: np.ndarray) -> float:
@@ -31,25 +33,25 @@ def test_energy_balance_of_the_truth(case: tuple[Scene, xr.Dataset]) -> None:
     scene, dataset = case
     lost = float(dataset["energy"][0] - dataset["energy"][-1])
     assert lost > 0.1
-    assert largest(energy_balance(scene.rolling, dataset)) < 1e-9 * lost
+    assert largest(energy_balance(rolling_ball(scene), dataset)) < 1e-9 * lost
 
 
 def test_energy_balance_sees_lost_energy(case: tuple[Scene, xr.Dataset]) -> None:
     """Energy that vanishes, and a resistance twice too strong or absent, show in the balance by their size."""
     scene, dataset = case
     leak = dataset.assign(energy=dataset["energy"] - 1e-4 * dataset["time"])
-    assert energy_balance(scene.rolling, leak)[-1] == pytest.approx(-1e-4 * TIMES[-1], rel=1e-4)
+    assert energy_balance(rolling_ball(scene), leak)[-1] == pytest.approx(-1e-4 * TIMES[-1], rel=1e-4)
     lost = float(dataset["energy"][0] - dataset["energy"][-1])
     other = load_scene("sphere_in_cylinder", axial_speed=0.7, radial_spin=12.0, rolling_resistance=1e-3)
-    assert energy_balance(other.rolling, dataset)[-1] == pytest.approx(lost, rel=1e-6)
+    assert energy_balance(rolling_ball(other), dataset)[-1] == pytest.approx(lost, rel=1e-6)
     without = load_scene("sphere_in_cylinder", axial_speed=0.7, radial_spin=12.0)
-    assert energy_balance(without.rolling, dataset)[-1] == pytest.approx(-lost, rel=1e-6)
+    assert energy_balance(rolling_ball(without), dataset)[-1] == pytest.approx(-lost, rel=1e-6)
 
 
 def test_force_audit_of_the_truth(case: tuple[Scene, xr.Dataset]) -> None:
     """Forces recomputed from a right motion are those that were reported, within 1e-6 of the normal force."""
     scene, dataset = case
-    audit = force_audit(scene.rolling, dataset)
+    audit = force_audit(rolling_ball(scene), dataset)
     assert len(audit) == len(TIMES) - 10
     assert largest(audit) < 1e-6 * float(dataset["N"].max())
 
@@ -59,9 +61,9 @@ def test_force_audit_sees_a_wrong_force(case: tuple[Scene, xr.Dataset], name: st
     """A force that does not belong to the motion shows by its size, whichever component it is."""
     scene, dataset = case
     wrong = dataset.assign({name: dataset[name] + 0.01})
-    assert force_audit(scene.rolling, wrong) == pytest.approx(0.01, abs=1e-4)
+    assert force_audit(rolling_ball(scene), wrong) == pytest.approx(0.01, abs=1e-4)
     reversed_sign = dataset.assign({name: -dataset[name]})
-    assert largest(force_audit(scene.rolling, reversed_sign)) == pytest.approx(
+    assert largest(force_audit(rolling_ball(scene), reversed_sign)) == pytest.approx(
         2 * largest(dataset[name][5:-5]), rel=1e-3
     )
 
@@ -70,14 +72,14 @@ def test_force_audit_sees_a_wrong_mass(case: tuple[Scene, xr.Dataset]) -> None:
     """Reported forces of a ball twice as heavy do not fit the motion of this one."""
     scene, dataset = case
     heavy = load_scene("sphere_in_cylinder", axial_speed=0.7, radial_spin=12.0, rolling_resistance=5e-4, mass=1.034)
-    assert largest(force_audit(heavy.rolling, dataset)) > 0.9 * float(dataset["N"].min())
-    assert scene.rolling.ball.mass == 0.517
+    assert largest(force_audit(rolling_ball(heavy), dataset)) > 0.9 * float(dataset["N"].min())
+    assert rolling_ball(scene).ball.mass == 0.517
 
 
 def test_observables(case: tuple[Scene, xr.Dataset]) -> None:
     """Every observable has its unit; what is zero by definition is zero for a right run."""
     scene, dataset = case
-    curves = observables(scene.rolling, dataset)
+    curves = observe(scene, dataset)
     assert {name: curve.unit for name, curve in curves.items()} == {
         "gamma": "rad", "z": "m", "N": "N", "F2": "N", "F3": "N", "needed_friction": "1", "gap": "m", "slip": "m/s",
         "energy_balance": "J", "force_audit": "N",
@@ -90,15 +92,15 @@ def test_observables_without_forces(case: tuple[Scene, xr.Dataset]) -> None:
     """An engine that cannot say forces is not judged by them, nor by a balance that would need them."""
     scene, dataset = case
     silent = dataset.drop_vars(["N", "F2", "F3", "needed_friction"])
-    assert set(observables(scene.rolling, silent)) == {"gamma", "z", "gap", "slip"}
-    free = load_scene("sphere_in_cylinder").rolling
+    assert set(observe(scene, silent)) == {"gamma", "z", "gap", "slip"}
+    free = rolling_ball(load_scene("sphere_in_cylinder"))
     assert "energy_balance" in observables(free, silent)
 
 
 def test_observables_of_few_samples(case: tuple[Scene, xr.Dataset]) -> None:
     """Too few samples for a spline are no error; what needs the spline is left out."""
     scene, dataset = case
-    curves = observables(scene.rolling, dataset.isel(time=slice(0, 10)))
+    curves = observe(scene, dataset.isel(time=slice(0, 10)))
     assert "z" in curves
     assert not {"energy_balance", "force_audit"} & set(curves)
 
@@ -107,17 +109,17 @@ def test_slip_is_the_length_of_the_slip_velocity(case: tuple[Scene, xr.Dataset])
     """Slip counts in both directions."""
     scene, dataset = case
     slipping = dataset.assign(slip2=dataset["slip2"] + 0.3, slip3=dataset["slip3"] - 0.4)
-    assert observables(scene.rolling, slipping)["slip"].values == pytest.approx(0.5, abs=1e-12)
+    assert observe(scene, slipping)["slip"].values == pytest.approx(0.5, abs=1e-12)
 
 
 def test_scales(case: tuple[Scene, xr.Dataset]) -> None:
     """Each observable's scale is a size of this case and never zero."""
     scene, dataset = case
-    sizes = scales(scene.rolling, dataset)
+    sizes = scales(scene, dataset)
     assert sizes["z"] == pytest.approx(float(np.ptp(dataset["z"].to_numpy())))
     assert sizes["F2"] == sizes["N"] == pytest.approx(float(dataset["N"].max()))
-    assert set(observables(scene.rolling, dataset)) <= set(sizes)
+    assert set(observe(scene, dataset)) <= set(sizes)
     resting = load_scene("inclined_plane", tilt=0.0, speed=0.0, cross_speed=0.0)
-    motion = reduced(resting.rolling, TIMES[:3])
-    still = trajectory(resting, TIMES[:3], motion.p_WB, motion.v_WB, motion.w_WB, force=motion.force)
-    assert all(size > 0 for size in scales(resting.rolling, still).values())
+    motion = reduced(rolling_ball(resting), TIMES[:3])
+    still = variables(rolling_ball(resting), TIMES[:3], motion.p_WB, motion.v_WB, motion.w_WB, force=motion.force)
+    assert all(size > 0 for size in scales(resting, still).values())

@@ -7,20 +7,23 @@ import numpy as np
 import pytest
 import xarray as xr
 
+from proofroll.core.dataset import from_samples
 from proofroll.core.engine import Sample
 from proofroll.core.errors import ProofrollError
 from proofroll.core.scene import Scene
 from proofroll.elements.ball_on_surface.closed_form import closed_form
-from proofroll.elements.ball_on_surface.trajectory import from_samples, read, trajectory, write
+from proofroll.elements.ball_on_surface.dataset import variables
+from proofroll.elements.ball_on_surface.element import changed, rolling_ball
+from proofroll.files.netcdf import read, write
 from proofroll.files.scene_file import load_scene
 from proofroll.truth import truth
 
 
 def exact(scene: Scene, times: np.ndarray) -> xr.Dataset:
     """The closed form alone, which costs nothing."""
-    motion = closed_form(scene.rolling, times)
+    motion = closed_form(rolling_ball(scene), times)
     assert motion is not None
-    return trajectory(scene, times, motion.p_WB, motion.v_WB, motion.w_WB, force=motion.force)
+    return variables(rolling_ball(scene), times, motion.p_WB, motion.v_WB, motion.w_WB, force=motion.force)
 
 
 @pytest.mark.parametrize("every", [0.01, 0.25, 0.7, 1.3])
@@ -35,8 +38,8 @@ def test_angle_is_unwrapped(every: float, speed: float) -> None:
 def test_angle_starts_on_the_branch_of_the_scene() -> None:
     """An initial γ beyond half a turn stays what it is."""
     scene = load_scene("sphere_in_cylinder")
-    start = dataclasses.replace(scene.initial[0], coordinates=(40.0, 0.1))
-    found = exact(dataclasses.replace(scene, initial=(start,)), np.array([0, 0.1]))["gamma"]
+    start = dataclasses.replace(scene.elements[0].start, coordinates=(40.0, 0.1))
+    found = exact(changed(scene, start=start), np.array([0, 0.1]))["gamma"]
     assert found.to_numpy() == pytest.approx([40.0, 42.0], abs=1e-12)
 
 
@@ -44,7 +47,7 @@ def test_derived_variables(scene: Scene) -> None:
     """Rates, slip, local forces and needed friction follow from the state and the force by their definitions."""
     times = np.linspace(0, 0.1, 5)
     dataset = truth(scene, times)
-    body = scene.rolling
+    body = rolling_ball(scene)
     names = body.surface.coordinates
     u = np.stack([dataset[name].to_numpy() for name in names], axis=-1)
     rates = np.stack([dataset[f"{name}_rate"].to_numpy() for name in names], axis=-1)
@@ -63,9 +66,9 @@ def test_derived_variables(scene: Scene) -> None:
 def test_slip_has_sign_and_size() -> None:
     """A ball that spins too fast slips by the surplus."""
     scene = load_scene("sphere_in_cylinder")
-    body = scene.rolling
+    body = rolling_ball(scene)
     surplus = np.array([0.0, 3.0, 2.0])
-    dataset = trajectory(scene, np.zeros(1), body.p0[None], body.v0[None], (body.w0 + surplus)[None])
+    dataset = variables(rolling_ball(scene), np.zeros(1), body.p0[None], body.v0[None], (body.w0 + surplus)[None])
     assert float(dataset["slip2"][0]) == pytest.approx(0.025 * 2, rel=1e-12)
     assert float(dataset["slip3"][0]) == pytest.approx(-0.025 * 3, rel=1e-12)
 
@@ -85,7 +88,7 @@ def test_what_the_engine_cannot_say_is_absent() -> None:
     """Without forces and orientation there are none in the result; with them they are there."""
     scene = load_scene("sphere_in_cylinder")
     times = np.linspace(0, 0.1, 3)
-    motion = closed_form(scene.rolling, times)
+    motion = closed_form(rolling_ball(scene), times)
     assert motion is not None
     states = list(zip(motion.p_WB, motion.v_WB, motion.w_WB, motion.force, strict=True))
     silent = from_samples(scene, times, [Sample(p, v, w) for p, v, w, _ in states])
@@ -99,7 +102,7 @@ def test_what_the_engine_cannot_say_is_absent() -> None:
 def test_a_run_that_ended_early_has_fewer_times() -> None:
     """The time axis is as long as the samples."""
     scene = load_scene("sphere_in_cylinder")
-    body = scene.rolling
+    body = rolling_ball(scene)
     dataset = from_samples(scene, np.linspace(0, 1, 11), [Sample(body.p0, body.v0, body.w0)] * 2)
     assert dataset["time"].to_numpy() == pytest.approx([0, 0.1])
 

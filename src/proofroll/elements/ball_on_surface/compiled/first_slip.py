@@ -13,11 +13,14 @@ from typing import Any, Literal
 
 import numpy as np
 
+from proofroll.core.arrays import FloatArray
 from proofroll.core.errors import Diverged, Refused
-from proofroll.core.scene import RollingBall, Scene
+from proofroll.core.scene import Scene
 from proofroll.elements.ball_on_surface.compiled import projection, rolling
 from proofroll.elements.ball_on_surface.compiled.library import TIGHTEST, require_heyoka
-from proofroll.elements.ball_on_surface.surfaces import Cylinder, FloatArray
+from proofroll.elements.ball_on_surface.element import rolling_ball
+from proofroll.elements.ball_on_surface.model import RollingBall
+from proofroll.elements.ball_on_surface.surfaces import Cylinder
 
 Model = Literal["reduced", "rotating_frame", "euler"]
 
@@ -41,7 +44,7 @@ def first_slip(scene: Scene, until: float, model: Model = "reduced") -> float | 
     Raises:
         Refused: heyoka is missing, or the scene is not one of the compiled equations.
     """
-    return FirstSlip(scene.rolling, model).run(until)
+    return FirstSlip(rolling_ball(scene), model).run(until)
 
 
 class FirstSlip:

@@ -16,6 +16,7 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 
+from proofroll.core.arrays import FloatArray
 from proofroll.core.errors import Diverged, InputError
 from proofroll.core.scene import Scene
 from proofroll.elements.ball_on_surface.compiled import rolling
@@ -25,7 +26,8 @@ from proofroll.elements.ball_on_surface.compiled.first_slip import (
     require_supported,
     slips_at_once,
 )
-from proofroll.elements.ball_on_surface.surfaces import Cylinder, FloatArray
+from proofroll.elements.ball_on_surface.element import rolling_ball
+from proofroll.elements.ball_on_surface.surfaces import Cylinder
 
 # What may differ from ball to ball: parameters of the equations, and the start.
 _PARAMETERS = (*rolling.PARAMETERS, "mu")
@@ -77,7 +79,7 @@ def first_slips(
     """
     given = dict(zip(_VARIED, (v2, v3, w1, f, mu, radius, kappa, c), strict=True))
     values, shape = _broadcast(scene, until, given)
-    require_supported(scene.rolling, resistance=bool(np.any(values["f"] > 0)))
+    require_supported(rolling_ball(scene), resistance=bool(np.any(values["f"] > 0)))
     found = np.full(values["mu"].shape, np.nan)
     for resistance in (False, True):
         members = np.flatnonzero((values["f"] > 0) == resistance)
@@ -89,7 +91,7 @@ def first_slips(
 
 def _broadcast(scene: Scene, until: float, given: dict[str, Any]) -> tuple[dict[str, FloatArray], tuple[int, ...]]:
     """Every varied quantity as an array of one dimension, and the shape of the result."""
-    body = scene.rolling
+    body = rolling_ball(scene)
     if not np.isfinite(until) or until < 0:
         raise InputError("until", until, "give a finite time in s that is not negative")
     if given["c"] is not None and not isinstance(body.surface, Cylinder):
@@ -134,7 +136,7 @@ class _Lanes:
     """Balls of one kind, waiting for the lanes of one integrator."""
 
     def __init__(self, scene: Scene, values: dict[str, FloatArray], resistance: bool) -> None:
-        body, count = scene.rolling, len(values["mu"])
+        body, count = rolling_ball(scene), len(values["mu"])
         uniform = rolling.is_uniform(body)
         curvature = 1 / values["c"] if "c" in values else 0.0
         gravity = rolling.local_gravity(body).tolist()

@@ -20,9 +20,10 @@ from typing import Any, Literal
 import numpy as np
 import numpy.typing as npt
 
-from proofroll.core.scene import RollingBall
+from proofroll.core.arrays import FloatArray
 from proofroll.elements.ball_on_surface.compiled.rolling import Function
-from proofroll.elements.ball_on_surface.surfaces import Cylinder, FloatArray
+from proofroll.elements.ball_on_surface.model import RollingBall
+from proofroll.elements.ball_on_surface.surfaces import Cylinder
 
 Formulation = Literal["euler", "rotating_frame"]
 _Symbols = npt.NDArray[np.object_]

@@ -20,8 +20,9 @@ from typing import Any
 
 import numpy as np
 
-from proofroll.core.scene import RollingBall
-from proofroll.elements.ball_on_surface.surfaces import Cylinder, FloatArray, Plane
+from proofroll.core.arrays import FloatArray
+from proofroll.elements.ball_on_surface.model import RollingBall
+from proofroll.elements.ball_on_surface.surfaces import Cylinder, Plane
 
 # Order of the run-time parameters that every expression shares. A product of parameters is one itself, for a series
 # would form it anew in every step.

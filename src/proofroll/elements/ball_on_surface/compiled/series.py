@@ -8,8 +8,8 @@ from typing import Any
 
 import numpy as np
 
+from proofroll.core.arrays import FloatArray
 from proofroll.core.errors import Diverged
-from proofroll.elements.ball_on_surface.surfaces import FloatArray
 
 # Called with the state where the step began, and with a time in that step and the state there; raises Diverged if the
 # state is not to be trusted.

@@ -10,7 +10,7 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 
-from proofroll.elements.ball_on_surface.surfaces import FloatArray
+from proofroll.core.arrays import FloatArray
 
 # Points along a whole circle: as smooth as a screen can show.
 _ROUND = 72

@@ -6,10 +6,11 @@ from functools import singledispatch
 
 import numpy as np
 
-from proofroll.core.scene import RollingBall
+from proofroll.core.arrays import FloatArray
 from proofroll.elements.ball_on_surface.drawings.contact import contact
 from proofroll.elements.ball_on_surface.drawings.pen import Drawing, View, beyond, turn
-from proofroll.elements.ball_on_surface.surfaces import Cylinder, FloatArray, Plane, Surface
+from proofroll.elements.ball_on_surface.model import RollingBall
+from proofroll.elements.ball_on_surface.surfaces import Cylinder, Plane, Surface
 
 _SIZE = 128.0  # half the width of what is drawn of a wall [px]
 _LEVEL = 0.02  # angles below this have no arc [rad]

@@ -9,10 +9,10 @@ from typing import Any
 import mujoco
 import numpy as np
 
+from proofroll.core.arrays import FloatArray
 from proofroll.core.errors import Refused
-from proofroll.core.scene import RollingBall
+from proofroll.elements.ball_on_surface.model import RollingBall
 from proofroll.elements.ball_on_surface.reproducer_source import assigned, ball_numbers, normal_rate_source, wall_source
-from proofroll.elements.ball_on_surface.surfaces import FloatArray
 from proofroll.engines.mujoco.friction import NEAR_CONE, corrects
 from proofroll.engines.mujoco.reproducer import text
 from proofroll.engines.mujoco.settings import PRELOAD, MujocoSettings, normal_lead, own_share, velocity_lag

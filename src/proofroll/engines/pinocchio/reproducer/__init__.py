@@ -9,7 +9,7 @@ from __future__ import annotations
 import math
 
 from proofroll.core.errors import Refused
-from proofroll.core.scene import RollingBall
+from proofroll.elements.ball_on_surface.model import RollingBall
 from proofroll.elements.ball_on_surface.reproducer_source import assigned, ball_numbers, normal_rate_source, wall_source
 from proofroll.engines.pinocchio.reproducer import composite, contact, free_flyer, stepping
 from proofroll.engines.pinocchio.rows_run import RowsRun

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from proofroll.core.scene import RollingBall
+from proofroll.elements.ball_on_surface.model import RollingBall
 from proofroll.elements.ball_on_surface.reproducer_source import assigned
 
 SOURCE = '''

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from proofroll.core.scene import RollingBall
+from proofroll.elements.ball_on_surface.model import RollingBall
 
 SOURCE = '''
 model = pin.Model()

@@ -9,12 +9,14 @@ from typing import Any
 import numpy as np
 import pytest
 
+from proofroll.core.arrays import FloatArray
 from proofroll.core.errors import InputError, Refused
-from proofroll.core.scene import Gravity, Scene
+from proofroll.core.gravity import Gravity
+from proofroll.core.scene import Scene
 from proofroll.elements.ball_on_surface.compiled import library
 from proofroll.elements.ball_on_surface.compiled.first_slip import FirstSlip, first_slip
 from proofroll.elements.ball_on_surface.compiled.first_slips import first_slips
-from proofroll.elements.ball_on_surface.surfaces import FloatArray
+from proofroll.elements.ball_on_surface.element import changed, rolling_ball
 from proofroll.files.scene_file import load_scene
 from proofroll.truth import taylor
 from proofroll.truth.friction_curve import friction_curve
@@ -53,7 +55,7 @@ def random_balls(count: int) -> dict[str, FloatArray]:
 @pytest.mark.parametrize("model", ["reduced", "rotating_frame", "euler"])
 def test_the_papers_case(model: Any) -> None:
     """Every model finds the paper's first slip, and the place where it happens."""
-    run = FirstSlip(PAPER.rolling, model)
+    run = FirstSlip(rolling_ball(PAPER), model)
     assert run.run(UNTIL) == pytest.approx(1.720183172, abs=1e-9)
     assert run.p_WB[2] == pytest.approx(-0.15342234, abs=1e-8)
     assert run.run(1.72) is None
@@ -91,7 +93,7 @@ def test_random_balls_against_the_other_route(monkeypatch: pytest.MonkeyPatch) -
 @pytest.mark.parametrize("f", [0.0, 3e-4, 5e-4])
 def test_on_either_side_of_every_stair(f: float, distance: float) -> None:
     """With μ just below a crest the ball slips on that crest, with μ just above it on a later one or never."""
-    curve = friction_curve(cylinder(speed=4.0, rolling_resistance=f).rolling, UNTIL)
+    curve = friction_curve(rolling_ball(cylinder(speed=4.0, rolling_resistance=f)), UNTIL)
     edges = curve.edges()
     assert len(edges) >= 1
     crests = np.array([curve.crest_times[np.argmin(np.abs(curve.crest_values - edge))] for edge in edges])
@@ -143,7 +145,7 @@ def test_other_parameters_of_the_model() -> None:
         assert time == pytest.approx(true_time(own), abs=1e-10, nan_ok=True)
     shell, wide = first_slips(cylinder(mu_static=0.15), UNTIL, kappa=[2 / 3, 0.4], c=[0.2, 0.25])
     scene = cylinder(mu_static=0.15)
-    hollow = dataclasses.replace(scene, balls=(dataclasses.replace(scene.balls[0], inertia_ratio=2 / 3),))
+    hollow = changed(scene, ball=dataclasses.replace(scene.elements[0].ball, inertia_ratio=2 / 3))
     assert shell == pytest.approx(true_time(hollow), abs=1e-10)
     assert wide == pytest.approx(true_time(cylinder(mu_static=0.15, cylinder_radius=0.275)), abs=1e-10)
 

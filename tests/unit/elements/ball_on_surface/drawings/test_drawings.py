@@ -10,12 +10,13 @@ import pytest
 from proofroll.elements.ball_on_surface.drawings import Drawing, overview
 from proofroll.elements.ball_on_surface.drawings.pen import View, circle, turn
 from proofroll.elements.ball_on_surface.drawings.surfaces import overview as by_kind
+from proofroll.elements.ball_on_surface.element import rolling_ball
 from proofroll.files.scene_file import load_scene
 
 
 def drawn(scene: str, **parameters: float) -> list[dict[str, Any]]:
     """The drawings of a scene as plain data."""
-    body = load_scene(scene, **parameters).rolling
+    body = rolling_ball(load_scene(scene, **parameters))
     return [item.content() for item in overview(body.wall, body)]
 
 
@@ -103,7 +104,7 @@ def test_any_parameters_give_a_picture_that_holds_all_its_marks(scene: str, para
 
 def test_a_surface_that_nobody_has_drawn_has_no_drawing() -> None:
     """The kinds are told apart by type, so another type gets nothing rather than a wrong picture."""
-    body = load_scene("sphere_in_cylinder").rolling
+    body = rolling_ball(load_scene("sphere_in_cylinder"))
     assert by_kind(object(), body) == []  # type: ignore[arg-type]  # that is the point
 
 

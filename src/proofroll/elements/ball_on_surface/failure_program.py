@@ -2,14 +2,19 @@
 
 from __future__ import annotations
 
-from typing import Any
-
 import numpy as np
 
+from proofroll.core.element import FailedRun
+from proofroll.elements.ball_on_surface.failure import (
+    BACKWARDS,
+    GAIN,
+    SLIPPED,
+    heading,
+    largest_kinetic_energy,
+    off_surface,
+)
+from proofroll.elements.ball_on_surface.model import RollingBall
 from proofroll.elements.ball_on_surface.reproducer_source import ball_numbers, literal
-from proofroll.running.case import Case
-from proofroll.studies.failure import ACCURATE, BACKWARDS, GAIN, SLIPPED, WRONG
-from proofroll.studies.stability_places import Place
 
 _CHECK = '''
 
@@ -67,7 +72,7 @@ if __name__ == "__main__":
 
 _THROUGH = """
 SCENE = load_scene({scene!r}, **{parameters!r})
-BODY = SCENE.rolling
+BODY = rolling_ball(SCENE)
 
 
 def frame(p):
@@ -89,78 +94,44 @@ def run(times):
 """
 
 
-def through_proofroll(case: Case, place: Place) -> str:
+def through_proofroll(body: RollingBall, failed: FailedRun) -> str:
     """An engine's part that asks proofroll to run it, where what fails is, in part or as a whole, proofroll's."""
-    assert place.scene is not None  # a point has one
-    head = "import numpy as np\nfrom proofroll import load_scene, simulate\n\n"
-    numbers = "".join(f"{name} = {literal(value)}\n" for name, value in ball_numbers(place.scene.rolling).items())
-    return (
-        head
-        + numbers
-        + _THROUGH.format(
-            scene=case.scene, parameters=dict(place.parameters), engine=case.engine.name, settings=case.engine.settings
-        )
-    )
+    head = "import numpy as np\nfrom proofroll import load_scene, simulate\n"
+    head += "from proofroll.elements.ball_on_surface.element import rolling_ball\n\n"
+    numbers = "".join(f"{name} = {literal(value)}\n" for name, value in ball_numbers(body).items())
+    run = {"scene": failed.scene, "parameters": dict(failed.parameters)}
+    return head + numbers + _THROUGH.format(**run, engine=failed.engine, settings=dict(failed.settings))
 
 
-def needs(engine: str) -> list[str]:
-    """What a program imports besides the standard library, by the first lines of the engine's part."""
-    head = engine.partition("\n\n")[0]
-    return list(dict.fromkeys(line.split()[1].partition(".")[0] for line in head.splitlines()))
-
-
-def program(place: Place, entry: dict[str, Any], side: dict[str, Any], case: Case, engine: str, boundary: str) -> str:
-    """The whole file.
-
-    Args:
-        place: of the point.
-        entry: the point, as the study has it.
-        side: its boundary, likewise.
-        case: the run beyond the boundary.
-        engine: the engine's part.
-        boundary: name of the boundary.
-    """
-    yardstick, facts = place.yardstick, case.engine
-    assert yardstick is not None  # a point has one
-    body = yardstick.body
-    resolution = str(facts.resolution)
-    where = ", ".join(f"{name} = {value:g}" for name, value in entry["parameters"].items()) or "default parameters"
-    settings = ", ".join(f"{key}={value}" for key, value in facts.settings.items())
-    silent = "The engine does not say so." if side["silent"] else "The engine says so."
-    lines = [
-        f"{facts.name} {facts.version}: {side['failure']} ({entry['axis']} = {entry['value']:g}).",
-        "",
-        f"A ball rolls on a wall ({case.scene}, {where}).",
-        f"Beyond the largest {resolution} that is {boundary}. {silent}",
-        f"Settings: {settings}.",
-        f"Needs {' and '.join(needs(engine))} alone. Exit code 1: the failure shows.",
-    ]
-    if entry["reproducer_note"]:
-        lines.insert(-1, f"Why proofroll: {entry['reproducer_note']}.")
+def program(body: RollingBall, failed: FailedRun, engine: str | None) -> str:
+    """The whole file; see :class:`proofroll.core.element.WritesPrograms`."""
+    truth, part = failed.truth, engine if engine is not None else through_proofroll(body, failed)
     generators = body.surface.generators
     along = None if generators is None else generators[-1]
-    true = (
-        [] if yardstick.true is None or along is None or along.kind != "translation" else yardstick.true - body.u0[-1]
-    )
+    true: list[float] = []
+    if truth is not None and along is not None and along.kind == "translation":
+        true = (truth[body.surface.coordinates[-1]].to_numpy() - body.u0[-1]).tolist()
     numbers = {
-        "EVERY": case.every,
-        "STEP": facts.settings[resolution],
-        "OFF": yardstick.off_surface,
-        "KINETIC": yardstick.kinetic,
+        "EVERY": failed.every,
+        "STEP": failed.settings[failed.resolution],
+        "OFF": off_surface(body),
+        "KINETIC": largest_kinetic_energy(body, truth),
         "GAIN": GAIN,
         "SLIPPED": SLIPPED,
         "BACKWARDS": BACKWARDS,
-        "RANGE": yardstick.scale,
-        "ALLOWED": WRONG if boundary == "stable" else ACCURATE,
+        "RANGE": failed.scale,
+        "ALLOWED": failed.allowed,
     }
-    head, _, rest = engine.partition("\n\n")
-    text = ['"""' + "\n".join(lines) + '\n"""\n', "import sys\n" + head + "\n", rest]
-    text.append("\n# What the run is held against.\n")
+    head, _, rest = part.partition("\n\n")
+    text = ['"""' + "\n".join(failed.lines("A ball rolls on a wall", head)) + '\n"""\n', "import sys\n" + head + "\n"]
+    text += [rest, "\n# What the run is held against.\n"]
     text += [f"{name} = {literal(value)}\n" for name, value in numbers.items()]
-    text.append(f"SAMPLES = {round(case.until / case.every)}\nFAILURE = {side['failure']!r}\n")
+    text.append(f"SAMPLES = {round(failed.until / failed.every)}\nFAILURE = {failed.failure!r}\n")
     text.append(f"ALONG = {list(along.axis) if along else [0.0, 0.0, 0.0]!r}\n")
-    text.append(f"TRUE = {[float(value) for value in true]!r}  # by two independent routes\n")
-    rolls, heading = yardstick.rolls, yardstick.heading
-    text.append(f"ROLLS = {[] if rolls is None else [int(value) for value in rolls]!r}\n")
-    text.append(f"HEADING = {[] if heading is None else np.round(heading, 4).tolist()!r}\n")
+    text.append(f"TRUE = {true!r}  # by two independent routes\n")
+    rolls = [] if truth is None or "sticking" not in truth else [int(value) for value in truth["sticking"].to_numpy()]
+    text.append(f"ROLLS = {rolls!r}\n")
+    resists = truth is not None and body.contact.rolling_resistance > 0
+    ways = np.round(heading(truth["v_WB"].to_numpy()), 4).tolist() if resists and truth is not None else []
+    text.append(f"HEADING = {ways!r}\n")
     return "".join(text) + _CHECK

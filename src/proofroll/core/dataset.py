@@ -1,0 +1,96 @@
+"""The result of a run: one xarray.Dataset with units on every variable, made of the parts that its elements give."""
+
+from __future__ import annotations
+
+import dataclasses
+from collections.abc import Mapping, Sequence
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from proofroll.core.arrays import FloatArray
+from proofroll.core.element import Element
+from proofroll.core.engine import Sample
+from proofroll.core.scene import Scene
+
+if TYPE_CHECKING:
+    import xarray as xr
+
+# Dimensions that the variables of all elements share; every other is an element's own.
+_SHARED = frozenset({"time", "xyz", "wxyz"})
+
+
+def from_samples(scene: Scene, times: FloatArray, samples: Sequence[Sample]) -> xr.Dataset:
+    """The trajectory of a run.
+
+    Args:
+        scene: the scene that was run.
+        times: of the samples [s], shape (time,).
+        samples: one per time; fewer if the run ended early.
+    """
+    reached = np.asarray(times[: len(samples)], dtype=np.float64)
+    parts = {
+        element.name: element.dataset(reached, [sample_of(scene, element, sample) for sample in samples])
+        for element in scene.elements
+    }
+    return joined(scene, parts)
+
+
+def sample_of(scene: Scene, element: Element, sample: Sample) -> Sample:
+    """The part of a sample that belongs to one element; each of several has a contact for each body."""
+    if len(scene.elements) == 1:
+        return sample
+    first = 0
+    for other in scene.elements:
+        if other is element:
+            break
+        first += len(other.bodies)
+    own = slice(first, first + len(element.bodies))
+    cut: dict[str, Any] = {
+        item.name: None if getattr(sample, item.name) is None else np.asarray(getattr(sample, item.name))[own]
+        for item in dataclasses.fields(sample)
+    }
+    return Sample(**cut)
+
+
+def joined(scene: Scene, parts: Mapping[str, xr.Dataset]) -> xr.Dataset:
+    """One dataset of those of the scene's elements, by their names."""
+    import xarray as xr
+
+    named = []
+    for element in scene.elements:
+        part = parts[element.name]
+        own = [name for name in (*part.variables, *part.dims) if name not in _SHARED]
+        named.append(part.rename({name: scene.label(element, str(name)) for name in dict.fromkeys(own)}))
+    whole = xr.merge(named, combine_attrs="drop_conflicts") if len(named) > 1 else named[0]
+    return whole.assign_attrs(scene=scene.name, scene_digest=scene.digest)
+
+
+def part(scene: Scene, element: Element, dataset: xr.Dataset) -> xr.Dataset:
+    """The variables of one element, under the names that it gave them."""
+    if len(scene.elements) == 1:
+        return dataset
+    ending = f".{element.name}"
+    own = [name for name in dataset.variables if str(name).endswith(ending)]
+    found = dataset[[name for name in own if name in dataset.data_vars]]
+    return found.rename({name: str(name).removesuffix(ending) for name in (*own, *found.dims) if name not in _SHARED})
+
+
+def observe(scene: Scene, dataset: xr.Dataset) -> dict[str, FloatArray]:
+    """Values of every observable that the run allows, by name in the scene."""
+    return {
+        scene.label(element, name): values
+        for element in scene.elements
+        for name, values in element.observe(part(scene, element, dataset)).items()
+    }
+
+
+def scales(scene: Scene, truth: xr.Dataset) -> dict[str, float]:
+    """Size of each observable in the truth, never below its floor, to which a relative tolerance refers."""
+    sizes = {
+        scene.label(element, name): size
+        for element in scene.elements
+        for name, size in element.scales(part(scene, element, truth)).items()
+    }
+    floors = {name: item.floor or 0.0 for name, item in scene.observables.items()}
+    return {name: max(size, floors[name]) if np.isfinite(size) else floors[name] for name, size in sizes.items()}

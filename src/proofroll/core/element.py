@@ -1,0 +1,246 @@
+"""What the harness knows of the parts of a scene. Each kind of element is a plug-in, as engines are.
+
+An element is a part of a scene that no force couples to the rest: a ball on a surface, a mechanism. It brings its data
+and their bounds, what a formulation must provide to represent it, its observables with their scales, the lines of its
+certificate and its signs of failure. The harness holds nothing of that, so a new kind of element needs no line there.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field
+from typing import TYPE_CHECKING, Any, ClassVar, Protocol, runtime_checkable
+
+import numpy as np
+import numpy.typing as npt
+
+from proofroll.core.arrays import FloatArray
+from proofroll.core.gravity import Gravity
+from proofroll.core.observable import Observable
+
+if TYPE_CHECKING:
+    import xarray as xr
+
+    from proofroll.core.certificate import Line
+    from proofroll.core.engine import Sample
+    from proofroll.core.scene import Scene
+
+
+@dataclass(frozen=True)
+class Sign:
+    """A way in which a run of such an element fails, and where a run shows it.
+
+    Attributes:
+        name: as people and files write it, e.g. ``left the surface``.
+        shown: for each sample of the run whether it shows, shape (time,).
+    """
+
+    name: str
+    shown: npt.NDArray[np.bool_]
+
+
+@dataclass(frozen=True)
+class StepNumber:
+    """A dimensionless number of a step, which may explain where it breaks.
+
+    Attributes:
+        name: as claims write it.
+        symbol, meaning: for a person.
+        value: None or 0 where it is not known or does not exist.
+    """
+
+    name: str
+    symbol: str
+    meaning: str
+    value: float | None
+
+
+@dataclass(frozen=True)
+class OptionalTerm:
+    """A part of the model that the scene can have or not, for the ladder of models.
+
+    Attributes:
+        name: for a person, e.g. ``rolling resistance``.
+        because: what it is for, or with which numbers it is tried.
+        put, taken: parameters of the scene with it and without.
+        asks: what is asked for with it, besides the motion.
+        capability: of an engine that cannot leave it out (:class:`proofroll.core.engine.CannotLeaveOut`).
+    """
+
+    name: str
+    because: str
+    put: Mapping[str, float] = field(default_factory=dict)
+    taken: Mapping[str, float] = field(default_factory=dict)
+    asks: tuple[str, ...] = ()
+    capability: str = ""
+
+
+class Element(Protocol):
+    """A part of a scene, as the harness sees it: a frozen dataclass that validates itself.
+
+    Attributes:
+        name: unique in the scene; it tells the variables of several elements apart.
+        bodies: names of its rigid bodies, in the order in which a sample holds them.
+    """
+
+    @property
+    def name(self) -> str: ...  # noqa: D102 -- see the class
+
+    @property
+    def bodies(self) -> tuple[str, ...]: ...  # noqa: D102 -- see the class
+
+    @property
+    def requires(self) -> frozenset[str]:
+        """What a formulation must provide to represent it with these numbers; each is a text for a person."""
+
+    def asked(self, name: str) -> str | None:
+        """What a formulation must provide where ``name`` is asked for besides the motion; None: nothing of the kind."""
+
+    @property
+    def observables(self) -> tuple[Observable, ...]:
+        """Its table of observables, the only place that lists them."""
+
+    @property
+    def natural_time(self) -> float:
+        """Period of its slowest motion [s]: what the length of a run and a step are measured by."""
+
+    def step_numbers(self, h: float, truth: xr.Dataset | None) -> Sequence[StepNumber]:
+        """Dimensionless numbers of a step ``h`` [s]; always the same names."""
+
+    def dataset(self, times: FloatArray, samples: Sequence[Sample]) -> xr.Dataset:
+        """All variables of a run at ``times`` [s], with ``units`` and ``long_name``."""
+
+    def lacks(self, samples: Sequence[Sample], asks: Sequence[str]) -> str | None:
+        """One sentence about what samples do not say though the scene requires it, or None."""
+
+    def observe(self, dataset: xr.Dataset) -> dict[str, FloatArray]:
+        """Values of each observable that a run allows; a reaction without time 0."""
+
+    def scales(self, truth: xr.Dataset) -> dict[str, float]:
+        """Size of each observable in the truth, to which a relative tolerance refers."""
+
+    def certify(self, built: Any, sample: Sample) -> list[Line]:
+        """What the engine built and how it starts, held against the element."""
+
+    @property
+    def failures(self) -> Mapping[str, str]:
+        """Names of its signs of failure, and of causes of errors, with their meaning: threshold and reason."""
+
+    def signs(self, dataset: xr.Dataset, truth: xr.Dataset | None) -> list[Sign]:
+        """Signs of failure besides a wrong path."""
+
+    def optional_terms(self, parameters: Mapping[str, float], truth: xr.Dataset) -> list[OptionalTerm]:
+        """Parts of the model that the scene's parameters put in or take out."""
+
+
+@runtime_checkable
+class ExplainsErrors(Protocol):
+    """What an element has besides, if it can say why a bounded path is wrong."""
+
+    def cause(self, dataset: xr.Dataset, error: float) -> str | None:
+        """What an ``error`` of the deciding observable, in its unit, comes from at the end of a run.
+
+        A name that ``meanings`` has; None: nothing that the element knows of.
+        """
+
+
+@dataclass(frozen=True)
+class FailedRun:
+    """A run beyond a boundary of a stability map, for a program that shows its failure.
+
+    Attributes:
+        scene, parameters, engine, version, settings, resolution, until, every: the case.
+        where: the point of the map, for a person.
+        boundary: ``stable`` or ``accurate``.
+        failure: its name.
+        silent: whether the engine does not say so.
+        truth: the true run, or None.
+        scale, allowed: range of the deciding observable, and part of it that its error may be.
+        note: why the program asks proofroll, or nothing.
+    """
+
+    scene: str
+    parameters: Mapping[str, float]
+    engine: str
+    version: str
+    settings: Mapping[str, Any]
+    resolution: str
+    until: float
+    every: float
+    where: str
+    boundary: str
+    failure: str
+    silent: bool
+    truth: xr.Dataset | None
+    scale: float
+    allowed: float
+    note: str
+
+    def lines(self, what: str, head: str) -> list[str]:
+        """The first words of the program: what fails where, and what it needs.
+
+        Args:
+            what: happens, in a few words.
+            head: the program's lines of imports.
+        """
+        numbers = ", ".join(f"{name} = {value:g}" for name, value in self.parameters.items()) or "default parameters"
+        settings = ", ".join(f"{key}={value}" for key, value in self.settings.items())
+        needs = " and ".join(imported(head))
+        return [
+            f"{self.engine} {self.version}: {self.failure} ({self.where}).",
+            "",
+            f"{what} ({self.scene}, {numbers}).",
+            f"Beyond the largest {self.resolution} that is {self.boundary}. "
+            + ("The engine does not say so." if self.silent else "The engine says so."),
+            f"Settings: {settings}.",
+            *([f"Why proofroll: {self.note}."] if self.note else []),
+            f"Needs {needs} alone. Exit code 1: the failure shows.",
+        ]
+
+
+def imported(head: str) -> list[str]:
+    """Packages that lines of imports name."""
+    lines = [line.split() for line in head.splitlines() if line.startswith(("import ", "from "))]
+    return list(dict.fromkeys(words[1].partition(".")[0] for words in lines))
+
+
+@runtime_checkable
+class WritesPrograms(Protocol):
+    """What an element has besides, if it can write a program that shows the failure of a run."""
+
+    def failure_program(self, failed: FailedRun, engine: str | None) -> str:
+        """Source of the program, which exits with 1 if the failure shows.
+
+        Args:
+            failed: the run.
+            engine: the engine's own part (:class:`proofroll.core.engine.Reproduces`); None: it asks proofroll.
+        """
+
+
+class ElementKind(Protocol):
+    """A kind of element: how a scene file holds it, and on which scenes engines are checked.
+
+    Attributes:
+        name: of the entry point.
+        tables: names of the tables of a scene file that it reads.
+    """
+
+    name: ClassVar[str]
+    tables: ClassVar[tuple[str, ...]]
+
+    @staticmethod
+    def read(tables: Mapping[str, Any], gravity: Gravity, where: str) -> Sequence[Element]:
+        """The elements that the tables of a scene file hold, their numbers filled in.
+
+        Args:
+            tables: the file's tables of this kind.
+            gravity: of the scene.
+            where: the file, for messages.
+
+        Raises:
+            InputError: the first thing that is wrong, with its place.
+        """
+
+    @staticmethod
+    def conformance_scenes() -> Mapping[str, Scene]:
+        """Scenes on which every engine is checked, by name; the most demanding first."""

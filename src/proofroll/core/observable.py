@@ -1,0 +1,50 @@
+"""What a kind of element declares about each of its observables, once; all that lists, judges or plots reads it."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from enum import StrEnum
+
+
+class Role(StrEnum):
+    """What an observable is, which decides how it is held against the truth."""
+
+    MOTION = "motion"  # a variable of the dataset, true to its error bar
+    REACTION = "reaction"  # as motion, but without time 0, where the certificate judges it
+    RESIDUAL = "residual"  # zero for a perfect run; what the truth leaves is what the measurement cannot resolve
+    EVENT = "event"  # times or kinds of events, with the brackets of the truth as error bar
+
+
+@dataclass(frozen=True)
+class Observable:
+    """A quantity of a run that can be held against the truth.
+
+    Attributes:
+        name: as files and commands write it.
+        unit: of its values; ``1`` for a number.
+        meaning: one line for a person.
+        role: see :class:`Role`.
+        symbol: as an equation writes it; by default the name.
+        floor: least size to which a relative tolerance refers, in its unit; None: it has no size of its own, so that a
+            tolerance must be absolute.
+        headline: whether summaries show it: the motion, and the forces that a person asks for first.
+        decides: whether a trade-off, a stability map and a recommendation go by it where nobody says by what.
+        asked_for: whether a person may ask for a recommendation by it.
+        hangs_on_events: whether it is a matter of luck where the time of an event is ill-posed.
+    """
+
+    name: str
+    unit: str
+    meaning: str
+    role: Role
+    symbol: str = ""
+    floor: float | None = None
+    headline: bool = False
+    decides: bool = False
+    asked_for: bool = True
+    hangs_on_events: bool = True
+
+    @property
+    def shown(self) -> str:
+        """Symbol, or the name where there is none."""
+        return self.symbol or self.name.replace("_", " ")

@@ -1,0 +1,219 @@
+"""A ball on a surface as an element of a scene: its data, and what the harness asks of it."""
+
+from __future__ import annotations
+
+import dataclasses
+import math
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from functools import cached_property
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from proofroll.core.arrays import FloatArray
+from proofroll.core.element import FailedRun, OptionalTerm, Sign, StepNumber
+from proofroll.core.engine import Sample
+from proofroll.core.errors import Refused
+from proofroll.core.gravity import Gravity
+from proofroll.core.observable import Observable
+from proofroll.core.scene import Scene
+from proofroll.elements.ball_on_surface.model import (
+    Ball,
+    BallCapability,
+    Contact,
+    InitialMotion,
+    RollingBall,
+)
+from proofroll.elements.ball_on_surface.surfaces import AnySurface
+
+if TYPE_CHECKING:
+    import xarray as xr
+
+    from proofroll.core.certificate import Line
+
+# What may be asked for besides the motion, and what a formulation must then be able to give.
+ASKED: Mapping[str, BallCapability] = {"orientation": BallCapability.ORIENTATION}
+# Rolling resistance that a scene without any is given to see what the term costs: f in radii (Blajer 2006, figure 5).
+_RESISTANCE = 0.02
+# Friction that is bounded far away from what rolling needs: this many times as much.
+_FAR = 10.0
+
+
+@dataclass(frozen=True)
+class BallOnSurface:
+    """A ball that rolls or slips on a surface. See :class:`proofroll.core.element.Element`.
+
+    Attributes:
+        ball, surface, contact, start, gravity: the mechanics.
+    """
+
+    ball: Ball
+    surface: AnySurface
+    contact: Contact
+    start: InitialMotion
+    gravity: Gravity
+
+    @property
+    def name(self) -> str:
+        """Name of the ball."""
+        return self.ball.name
+
+    @property
+    def bodies(self) -> tuple[str, ...]:
+        """The ball."""
+        return (self.ball.name,)
+
+    @cached_property
+    def requires(self) -> frozenset[str]:
+        """See the protocol."""
+        needs = {BallCapability.ROLLING}
+        if self.contact.rolling_resistance > 0:
+            needs.add(BallCapability.ROLLING_RESISTANCE)
+        if math.isfinite(self.contact.mu_static):
+            needs.add(BallCapability.BOUNDED_FRICTION)
+        if self.surface.kind != "plane":
+            needs.add(BallCapability.CURVED_SURFACE)
+        return frozenset(needs)
+
+    def asked(self, name: str) -> str | None:
+        """See the protocol."""
+        return ASKED.get(name)
+
+    @cached_property
+    def rolling(self) -> RollingBall:
+        """The ball as every engine needs it."""
+        surface = self.surface.offset(self.ball.radius)
+        u0 = np.asarray(self.start.coordinates, dtype=np.float64)
+        frame = surface.frame(u0)
+        v0 = frame[:, 1:] @ np.asarray(self.start.velocity)
+        w0 = self.start.spin * frame[:, 0] - np.cross(frame[:, 0], v0) / self.ball.radius
+        return RollingBall(
+            ball=self.ball,
+            contact=self.contact,
+            surface=surface,
+            wall=self.surface,
+            gravity=self.gravity.vector,
+            u0=u0,
+            p0=surface.position(u0),
+            v0=v0,
+            w0=w0,
+        )
+
+    @cached_property
+    def observables(self) -> tuple[Observable, ...]:
+        """See the protocol."""
+        from proofroll.elements.ball_on_surface.observables import table
+
+        return table(self.rolling)
+
+    @property
+    def natural_time(self) -> float:
+        """See the protocol."""
+        from proofroll.elements.ball_on_surface.natural import natural_time
+
+        return natural_time(self.rolling)
+
+    def step_numbers(self, h: float, truth: xr.Dataset | None) -> Sequence[StepNumber]:
+        """See the protocol."""
+        from proofroll.elements.ball_on_surface.natural import step_numbers
+
+        return step_numbers(self.rolling, h, truth)
+
+    def dataset(self, times: FloatArray, samples: Sequence[Sample]) -> xr.Dataset:
+        """See the protocol; the variables are those of :func:`proofroll.elements.ball_on_surface.dataset.dataset`."""
+        from proofroll.elements.ball_on_surface.dataset import from_samples
+
+        return from_samples(self.rolling, times, samples)
+
+    def lacks(self, samples: Sequence[Sample], asks: Sequence[str]) -> str | None:
+        """See the protocol."""
+        if BallCapability.BOUNDED_FRICTION in self.requires and any(sample.sticking is None for sample in samples):
+            return "the engine does not say whether the ball sticks or slips"
+        if "orientation" in asks and any(sample.q_WB is None for sample in samples):
+            return "the engine does not give the ball's orientation"
+        return None
+
+    def observe(self, dataset: xr.Dataset) -> dict[str, FloatArray]:
+        """See the protocol."""
+        from proofroll.elements.ball_on_surface.observables import observe
+
+        return observe(self.rolling, dataset)
+
+    def scales(self, truth: xr.Dataset) -> dict[str, float]:
+        """See the protocol."""
+        from proofroll.elements.ball_on_surface.observables import scales
+
+        return scales(self.rolling, truth)
+
+    def certify(self, built: Any, sample: Sample) -> list[Line]:
+        """See the protocol."""
+        from proofroll.elements.ball_on_surface.certificate import certify
+
+        return certify(self.rolling, built, sample)
+
+    @property
+    def failures(self) -> Mapping[str, str]:
+        """See the protocol."""
+        from proofroll.elements.ball_on_surface.failure import MEANINGS
+
+        return MEANINGS
+
+    def signs(self, dataset: xr.Dataset, truth: xr.Dataset | None) -> list[Sign]:
+        """See the protocol."""
+        from proofroll.elements.ball_on_surface.failure import signs
+
+        return signs(self.rolling, dataset, truth)
+
+    def cause(self, dataset: xr.Dataset, error: float) -> str | None:
+        """See :class:`proofroll.core.element.ExplainsErrors`."""
+        from proofroll.elements.ball_on_surface.failure import cause
+
+        return cause(self.rolling, dataset, error)
+
+    def failure_program(self, failed: FailedRun, engine: str | None) -> str:
+        """See :class:`proofroll.core.element.WritesPrograms`."""
+        from proofroll.elements.ball_on_surface.failure_program import program
+
+        return program(self.rolling, failed, engine)
+
+    def optional_terms(self, parameters: Mapping[str, float], truth: xr.Dataset) -> list[OptionalTerm]:
+        """See the protocol: rolling resistance, bounded friction and orientation."""
+        found: list[OptionalTerm] = []
+        if "rolling_resistance" in parameters:
+            f = self.contact.rolling_resistance or _RESISTANCE * self.ball.radius
+            because = (
+                "the scene has it" if self.contact.rolling_resistance else f"the scene has none; here with f = {f:g} m"
+            )
+            put, taken = {"rolling_resistance": f}, {"rolling_resistance": 0.0}
+            found.append(OptionalTerm("rolling resistance", because, put, taken))
+        if "mu_static" in parameters:
+            unbounded = dict.fromkeys((n for n in ("mu_static", "mu_kinetic") if n in parameters), math.inf)
+            if math.isfinite(self.contact.mu_static):
+                found.append(OptionalTerm("bounded friction", "the scene bounds it", {}, unbounded))
+            else:
+                far = _FAR * (float(np.nanmax(truth["needed_friction"].to_numpy())) or 1.0)
+                because = f"the scene has no bound; here one of {far:.3g}, {_FAR:g} times what rolling needs"
+                found.append(OptionalTerm("bounded friction", because, dict.fromkeys(unbounded, far)))
+        because, need = "nothing else depends on it", BallCapability.ORIENTATION
+        return [*found, OptionalTerm("orientation asked", because, asks=("orientation",), capability=need)]
+
+
+def rolling_ball(scene: Scene) -> RollingBall:
+    """The scene's one ball on its one surface.
+
+    Raises:
+        Refused: the scene is not one ball on one surface.
+    """
+    (element,) = scene.elements if len(scene.elements) == 1 else (None,)
+    if not isinstance(element, BallOnSurface):
+        what = ", ".join(f"{item.name} ({type(item).__name__})" for item in scene.elements)
+        raise Refused(f"represents one ball on one surface, and the scene holds {what}")
+    return element.rolling
+
+
+def changed(scene: Scene, **parts: Any) -> Scene:
+    """The scene with other ``ball``, ``surface``, ``contact``, ``start`` or ``gravity``."""
+    (element,) = scene.elements
+    assert isinstance(element, BallOnSurface)
+    return dataclasses.replace(scene, elements=(dataclasses.replace(element, **parts),))

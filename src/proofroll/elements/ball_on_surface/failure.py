@@ -1,0 +1,88 @@
+"""Signs that a run of a ball on a surface has failed: every threshold with its reason."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from proofroll.core.arrays import FloatArray
+from proofroll.core.element import Sign
+from proofroll.elements.ball_on_surface.model import RollingBall
+
+if TYPE_CHECKING:
+    import xarray as xr
+
+# Part of the radius, or of the path's radius of curvature if that is less, by which a ball may be off its wall. The
+# lever of friction and the curvature of the path are then wrong by as much, so nothing accurate is left.
+OFF_SURFACE = 0.1
+# Part of the largest kinetic energy by which the energy may grow. Nothing in a scene drives the ball, so all of it is
+# the engine's; runs that hold 1 % of the path stay far below.
+GAIN = 0.1
+# Part of the initial speed with which a ball may move against the way that it last had, where rolling resistance has
+# to bring it to rest: a fixed step that ends beyond rest leaves the ball some speed, which is no motion yet.
+BACKWARDS = 0.01
+# A path is wrong because of slip where the way slipped while rolling makes up this part of the error or more.
+SLIPPED = 0.5
+
+LEFT, SANK, ENERGY_GAIN = "left the surface", "sank in", "energy gain"
+REVERSED, CREEP = "reversed", "creep"
+MEANINGS = {
+    LEFT: f"the ball came off the wall by more than {OFF_SURFACE:.0%} of its radius",
+    SANK: f"the ball sank into the wall by more than {OFF_SURFACE:.0%} of its radius",
+    ENERGY_GAIN: f"the energy grew by more than {GAIN:.0%} of the largest kinetic energy",
+    REVERSED: f"rolling resistance drove the ball back, by more than {BACKWARDS:.0%} of the initial speed",
+    CREEP: f"the ball slipped while it should roll, which makes {SLIPPED:.0%} of the error or more",
+}
+
+
+def off_surface(body: RollingBall) -> float:
+    """Allowed distance from the wall, and depth in it [m]."""
+    bend = float(np.linalg.norm(body.surface.normal_gradient(body.p0), 2))
+    return OFF_SURFACE * (min(body.ball.radius, 1 / bend) if bend else body.ball.radius)
+
+
+def largest_kinetic_energy(body: RollingBall, truth: xr.Dataset | None) -> float:
+    """Of the start, or of the whole true run [J]."""
+    m, J = body.ball.mass, body.ball.inertia
+    v, w = body.v0[None, :], body.w0[None, :]
+    if truth is not None:
+        v, w = np.vstack([v, truth["v_WB"].to_numpy()]), np.vstack([w, truth["w_WB"].to_numpy()])
+    return float(np.max(0.5 * m * (v**2).sum(-1) + 0.5 * J * (w**2).sum(-1)))
+
+
+def signs(body: RollingBall, dataset: xr.Dataset, truth: xr.Dataset | None) -> list[Sign]:
+    """See :class:`proofroll.core.element.Element`."""
+    gap, energy = dataset["gap"].to_numpy(), dataset["energy"].to_numpy()
+    allowed = off_surface(body)
+    with np.errstate(over="ignore", invalid="ignore"):
+        shown = {
+            LEFT: gap > allowed,
+            SANK: gap < -allowed,
+            ENERGY_GAIN: energy - energy[0] > GAIN * largest_kinetic_energy(body, truth),
+        }
+    if truth is not None and body.contact.rolling_resistance > 0:
+        v = dataset["v_WB"].to_numpy()
+        along = np.sum(v * heading(truth["v_WB"].to_numpy())[: len(v)], axis=-1)
+        shown[REVERSED] = along < -BACKWARDS * float(np.linalg.norm(body.v0))
+    return [Sign(name, values) for name, values in shown.items()]
+
+
+def heading(v: FloatArray) -> FloatArray:
+    """Directions of velocities, shape (n, 3); where one is below the threshold, that before it."""
+    speeds = np.linalg.norm(v, axis=-1)
+    moves = speeds > BACKWARDS * speeds[0]
+    last = np.maximum.accumulate(np.where(moves, np.arange(len(v)), 0))
+    return np.asarray(v[last] / np.where(speeds[last] > 0, speeds[last], 1.0)[:, None])
+
+
+def cause(body: RollingBall, dataset: xr.Dataset, error: float) -> str | None:
+    """Creep, where the way slipped while rolling is a large part of the ``error`` of the last coordinate."""
+    times = dataset["time"].to_numpy()
+    slip = np.hypot(dataset["slip2"].to_numpy(), dataset["slip3"].to_numpy())
+    rolls = np.ones(len(times), dtype=bool)
+    if "sticking" in dataset:
+        rolls = dataset["sticking"].to_numpy().astype(bool)
+    both = rolls[1:] & rolls[:-1]
+    slipped = float(np.sum(both * np.diff(times) * (slip[1:] + slip[:-1]) / 2))
+    return CREEP if slipped >= SLIPPED * error * body.surface.length_scales[-1] else None

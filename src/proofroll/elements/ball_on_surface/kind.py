@@ -1,0 +1,96 @@
+"""How a scene file holds balls on surfaces, and on which scenes engines are checked."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field
+from typing import Annotated, Any, ClassVar
+
+from pydantic import Field
+
+from proofroll.core.errors import InputError
+from proofroll.core.gravity import Gravity
+from proofroll.core.scene import Scene
+from proofroll.elements.ball_on_surface.element import BallOnSurface
+from proofroll.elements.ball_on_surface.model import Ball, Contact, InitialMotion
+from proofroll.elements.ball_on_surface.surfaces import AnySurface
+from proofroll.files.validation import strict, validated
+
+
+@dataclass(frozen=True)
+class BallTables:
+    """The tables of a scene file that hold balls on surfaces."""
+
+    balls: tuple[Ball, ...]
+    contacts: tuple[Contact, ...]
+    initial: tuple[InitialMotion, ...]
+    surfaces: tuple[Annotated[AnySurface, Field(discriminator="kind")], ...] = field(default=())
+
+
+strict(BallTables, Ball, Contact, InitialMotion, *AnySurface.__args__)
+
+
+class BallOnSurfaceKind:
+    """See :class:`proofroll.core.element.ElementKind`."""
+
+    name: ClassVar[str] = "ball_on_surface"
+    tables: ClassVar[tuple[str, ...]] = ("balls", "surfaces", "contacts", "initial")
+
+    @staticmethod
+    def read(tables: Mapping[str, Any], gravity: Gravity, where: str) -> Sequence[BallOnSurface]:
+        """One element for each contact, with the ball, the surface and the start that it names."""
+        found = validated(BallTables, dict(tables), where)
+        balls = {ball.name: ball for ball in found.balls}
+        surfaces = {surface.name: surface for surface in found.surfaces}
+        _check_names(found, where)
+        starts = {start.body: start for start in found.initial}
+        elements = []
+        for index, contact in enumerate(found.contacts):
+            if contact.body not in starts:
+                raise InputError(
+                    f"{where}: initial", contact.body, "say how this ball starts; add an [[initial]] of it"
+                )
+            if any(contact.body == other.body for other in found.contacts[:index]):
+                raise InputError(f"{where}: contacts.{index}.body", contact.body, "a ball touches one surface")
+            ball = balls[contact.body]
+            elements.append(BallOnSurface(ball, surfaces[contact.surface], contact, starts[ball.name], gravity))
+        for name in balls.keys() - {contact.body for contact in found.contacts}:
+            raise InputError(
+                f"{where}: contacts", name, "this ball touches no surface; add a contact or remove the ball"
+            )
+        return elements
+
+    @staticmethod
+    def conformance_scenes() -> Mapping[str, Scene]:
+        """Scenes in which nothing is zero or symmetric: the smooth motions first, of these the most demanding first."""
+        from proofroll.files.scene_file import load_scene
+
+        cylinder = {"speed": 3.3, "axial_speed": 0.7, "radial_spin": 12.0}
+        plane = {"tilt": 0.35, "speed": 0.8, "cross_speed": 0.5, "normal_spin": 12.0}
+        return {
+            "cylinder-resisting": load_scene("sphere_in_cylinder", **cylinder, rolling_resistance=5e-4),
+            "cylinder": load_scene("sphere_in_cylinder", **cylinder),
+            "plane-resisting": load_scene("inclined_plane", **plane, rolling_resistance=5e-4),
+            "plane": load_scene("inclined_plane", **plane),
+            "cylinder-slipping": load_scene("sphere_in_cylinder", **cylinder, mu_static=0.35),
+            "cylinder-oriented": load_scene("sphere_in_cylinder", **cylinder, asks=("orientation",)),
+        }
+
+
+def _check_names(found: BallTables, where: str) -> None:
+    """Contacts and initial motions name what there is.
+
+    Raises:
+        InputError: the first name that leads nowhere, or that two things have.
+    """
+    balls, surfaces = [ball.name for ball in found.balls], [surface.name for surface in found.surfaces]
+    for kind, names in (("balls", balls), ("surfaces", surfaces)):
+        for index, name in enumerate(names):
+            if name in names[:index]:
+                raise InputError(f"{where}: {kind}.{index}.name", name, "two have this name; give each its own")
+    for kind, items in (("contacts", found.contacts), ("initial", found.initial)):
+        for index, item in enumerate(items):
+            for key, known in (("body", balls), ("surface", surfaces)):
+                named = getattr(item, key, None)
+                if named is not None and named not in known:
+                    raise InputError(f"{where}: {kind}.{index}.{key}", named, f"choose one of {', '.join(known)}")

@@ -1,0 +1,114 @@
+"""A ball, the surface that it touches, the law of their contact, and how the ball starts."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+from enum import StrEnum
+from typing import Literal
+
+import numpy as np
+
+from proofroll.core.arrays import FloatArray
+from proofroll.elements.ball_on_surface.surfaces import Surface
+
+
+class BallCapability(StrEnum):
+    """What a ball on a surface may need and a formulation may provide; the value is what a person reads."""
+
+    ROLLING = "rolling without slip"
+    CURVED_SURFACE = "a curved surface"
+    ROLLING_RESISTANCE = "rolling resistance"
+    BOUNDED_FRICTION = "bounded friction (slip)"
+    ORIENTATION = "the ball's orientation"
+
+
+ROLLS: frozenset[str] = frozenset(
+    {BallCapability.ROLLING, BallCapability.CURVED_SURFACE, BallCapability.ROLLING_RESISTANCE}
+)
+ALL_OF_A_BALL: frozenset[str] = frozenset(BallCapability)
+
+
+@dataclass(frozen=True)
+class Ball:
+    """A rigid ball whose central inertia is the same about every axis.
+
+    Attributes:
+        radius: a [m].
+        mass: m [kg].
+        inertia_ratio: J / (m a²); 2/5 for a homogeneous ball, 2/3 for a thin shell.
+    """
+
+    name: str
+    radius: float
+    mass: float
+    inertia_ratio: float = 0.4
+    shape: Literal["ball"] = "ball"
+
+    @property
+    def inertia(self) -> float:
+        """J: central moment of inertia [kg m²]."""
+        return self.inertia_ratio * self.mass * self.radius**2
+
+
+@dataclass(frozen=True)
+class Contact:
+    """A ball that rolls on a surface.
+
+    Attributes:
+        rolling_resistance: f, distance by which the normal force is shifted forward [m].
+        mu_static: largest |F|/N while sticking [-]; inf: the ball never slips.
+        mu_kinetic: |F|/N while slipping [-].
+    """
+
+    body: str
+    surface: str
+    rolling_resistance: float = 0.0
+    mu_static: float = math.inf
+    mu_kinetic: float = math.inf
+
+
+@dataclass(frozen=True)
+class InitialMotion:
+    """Rolling without slip at time 0.
+
+    Attributes:
+        coordinates: where on the surface, in its coordinates.
+        velocity: of the centre along e2 and e3 [m/s]; the spin about e2 and e3 follows from rolling.
+        spin: ω1, about the normal e1 [rad/s].
+    """
+
+    body: str
+    coordinates: tuple[float, float] = (0.0, 0.0)
+    velocity: tuple[float, float] = (0.0, 0.0)
+    spin: float = 0.0
+
+
+@dataclass(frozen=True)
+class RollingBall:
+    """A ball on a surface as every engine needs it: one body, one contact, and where it starts.
+
+    Attributes:
+        ball: the body.
+        contact: the contact law.
+        surface: the surface on which the ball's *centre* moves.
+        wall: the surface that the ball touches.
+        gravity: acceleration of gravity in the world [m/s²], shape (3,).
+        u0: initial surface coordinates, shape (2,).
+        p0, v0, w0: initial centre [m], velocity [m/s] and angular velocity [rad/s] in the world, shape (3,).
+    """
+
+    ball: Ball
+    contact: Contact
+    surface: Surface
+    wall: Surface
+    gravity: FloatArray
+    u0: FloatArray
+    p0: FloatArray
+    v0: FloatArray
+    w0: FloatArray
+
+    @property
+    def udot0(self) -> FloatArray:
+        """Initial rates of the surface coordinates, shape (2,)."""
+        return np.asarray(np.linalg.pinv(self.surface.tangents(self.u0)) @ self.v0)

@@ -1,0 +1,47 @@
+"""Checks what a file says against typed dataclasses, with one line about the first thing that is wrong."""
+
+from __future__ import annotations
+
+from typing import TypeVar
+
+from pydantic import ConfigDict, TypeAdapter, ValidationError
+
+from proofroll.core.errors import InputError
+
+_T = TypeVar("_T")
+
+
+def strict(*types: type) -> None:
+    """Makes unknown keys of these dataclasses an error; it is how pydantic is told about stdlib dataclasses."""
+    for kind in types:
+        setattr(kind, "__pydantic_config__", ConfigDict(extra="forbid"))  # noqa: B010 -- the name is pydantic's
+
+
+def validated(kind: type[_T], content: object, where: str) -> _T:
+    """The content as this type.
+
+    Raises:
+        InputError: the first problem, with its place in ``where``.
+    """
+    try:
+        return TypeAdapter(kind).validate_python(content)
+    except ValidationError as error:
+        raise first_problem(error, where) from None
+
+
+def first_problem(error: ValidationError, where: str) -> InputError:
+    """One line about the first thing that pydantic found wrong in ``where``."""
+    problem = error.errors()[0]
+    location = ".".join(str(part) for part in problem["loc"])
+    if problem["type"] in {"unexpected_keyword_argument", "extra_forbidden"}:
+        return InputError(f"{where}: {location}", problem["input"], "there is no such key here; remove it")
+    if problem["type"] in {"missing", "missing_argument"}:
+        return InputError(f"{where}: {location}", "nothing", "this key is required; add it")
+    if problem["type"] in {"union_tag_invalid", "union_tag_not_found"}:
+        key = problem["ctx"]["discriminator"].strip("'")
+        if problem["type"] == "union_tag_not_found":
+            return InputError(f"{where}: {location}.{key}", "nothing", "this key is required; add it")
+        return InputError(
+            f"{where}: {location}.{key}", problem["ctx"]["tag"], f"choose one of {problem['ctx']['expected_tags']}"
+        )
+    return InputError(f"{where}: {location}", problem["input"], problem["msg"][0].lower() + problem["msg"][1:])
