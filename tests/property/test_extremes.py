@@ -14,9 +14,9 @@ from hypothesis import strategies as st
 
 from proofroll.core.errors import Diverged, Refused
 from proofroll.core.scene import Scene
+from proofroll.core.truth import truth
 from proofroll.files.scene_file import load_scene
 from proofroll.running.simulation import simulate
-from proofroll.truth import truth
 
 FRAME, EULER = "projection[formulation=rotating_frame]", "projection[formulation=euler]"
 G = 9.81

@@ -19,6 +19,7 @@ from invented import figures_part, further
 
 from proofroll.core.comparison import Band, Comparison, Row, Tolerance
 from proofroll.core.dataset import observe, scales
+from proofroll.core.truth import truth
 from proofroll.core.verdict import Verdict, judge
 from proofroll.files.netcdf import write
 from proofroll.files.scene_file import load_scene
@@ -28,7 +29,6 @@ from proofroll.running.case import Case, EngineFacts, Result, Status
 from proofroll.running.store import Store
 from proofroll.studies.compare import Outcome, Run
 from proofroll.studies.planning import point_name
-from proofroll.truth import truth
 from proofroll.truth.regimes import regime_map
 
 

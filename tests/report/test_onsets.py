@@ -14,6 +14,7 @@ import pytest
 
 from proofroll.core.comparison import Band, Comparison, Row, Tolerance
 from proofroll.core.events import Event, events_of, with_events
+from proofroll.core.truth import truth
 from proofroll.core.verdict import Judgement, Verdict
 from proofroll.files.netcdf import write
 from proofroll.files.scene_file import load_scene
@@ -31,7 +32,6 @@ from proofroll.running.case import Case, EngineFacts, Result, Status
 from proofroll.running.store import Store
 from proofroll.studies.compare import Outcome, Run
 from proofroll.studies.planning import point_name
-from proofroll.truth import truth
 from proofroll.truth.onset import onset
 
 UNTIL, EVERY = 2.1, 0.05

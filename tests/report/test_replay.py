@@ -17,6 +17,7 @@ from browsing import Visit
 from scipy.integrate import solve_ivp
 from scipy.spatial.transform import Rotation
 
+from proofroll.core.truth import truth
 from proofroll.elements.ball_on_surface.element import rolling_ball
 from proofroll.files.netcdf import read, write
 from proofroll.files.scene_file import load_scene
@@ -28,7 +29,6 @@ from proofroll.report.replay_library import thinned, three
 from proofroll.report.replay_poses import AWAY, SLIPS, STICKS, WIDEST_TURN, frame_times, poses
 from proofroll.report.replay_wall import middle, wall
 from proofroll.report.report_content import report_content
-from proofroll.truth import truth
 
 SPEED, UNTIL, EVERY = 4.0, 1.0, 0.02
 

@@ -12,6 +12,7 @@ from typing import Any
 
 import proofroll
 from proofroll.core.errors import InputError
+from proofroll.core.truth import load_truths
 from proofroll.running.case import EngineFacts
 
 # Folders on which every result rests; reports and the command line are not among them.
@@ -49,7 +50,7 @@ def resolve(engine: str, options: dict[str, Any]) -> dict[str, Any]:
     if engine == "truth":
         if options:
             raise InputError("truth", ", ".join(options), "the truth has no settings; leave them out")
-        code = digest([Path(proofroll.__file__).parent / "truth"])
+        code = digest([Path(inspect.getfile(truth)).parent for truth in load_truths()])
         return dataclasses.asdict(EngineFacts("truth", _truth_version(), code, {}))
     from proofroll.core.plugins import load_engine, resolve_settings
 

@@ -89,13 +89,11 @@ def _run(case: Case, out: Path, spent: Spent) -> Result:
 
 
 def _run_truth(case: Case, scene: Any, times: Any, out: Path, versions: dict[str, str]) -> Result:
+    from proofroll.core.truth import truth
     from proofroll.files.netcdf import write
-    from proofroll.truth import truth
 
     start = time.perf_counter()
     try:
-        if case.asks:
-            raise Refused(f"the truth is that of the motion and gives no {', '.join(case.asks)}; ask an engine for it")
         dataset = truth(scene, times)
     except Refused as error:
         return Result(Status.REFUSED, str(error), versions=versions)
@@ -103,9 +101,5 @@ def _run_truth(case: Case, scene: Any, times: Any, out: Path, versions: dict[str
         return Result(Status.DIVERGED, str(error), versions=versions)
     wall = time.perf_counter() - start
     message = f"{dataset.attrs['route']}, checked by {dataset.attrs['second_route']}"
-    if "sticking" in dataset:
-        from proofroll.truth.onset import onset
-
-        dataset.attrs["onset"] = json.dumps(dataclasses.asdict(onset(scene, float(times[-1]))))
     write(dataset.assign_attrs(status="done", message=message, engine="truth", wall_seconds=wall), out)
     return Result(Status.DONE, message, wall_seconds=wall, versions=versions, trajectory=out.name)

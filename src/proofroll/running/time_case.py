@@ -43,7 +43,7 @@ def time_once(case: dict[str, Any], seconds: float) -> dict[str, Any]:
 
 def _time_truth(scene: Any, times: Any, seconds: float) -> dict[str, Any]:
     """As :func:`time_once`, of both routes of the truth together; at least one whole run."""
-    from proofroll.truth import truth
+    from proofroll.core.truth import truth
 
     start, runs, elapsed = time.perf_counter(), 0, 0.0
     while not runs or elapsed < seconds:

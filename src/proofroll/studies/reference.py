@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import itertools
-import json
 from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Self
@@ -49,9 +48,8 @@ class Reference:
 
     @property
     def ill_posed(self) -> bool:
-        """Whether the time of the first slip hangs on less than the parameters are known to."""
-        onset = json.loads(self.dataset.attrs.get("onset", "{}"))
-        return bool(onset.get("verdict") == "ill-posed")
+        """Whether the answer hangs on less than the parameters are known to."""
+        return bool(self.dataset.attrs.get("ill_posed"))
 
     def scale(self, name: str) -> float | None:
         """What a percentage of an observable refers to: its size, for an event its time; None: nothing."""

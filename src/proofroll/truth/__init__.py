@@ -1,5 +1,1 @@
-"""The truth of a scene, by two independent routes that must agree; their difference is its error bar."""
-
-from proofroll.truth.truth import truth
-
-__all__ = ["truth"]
+"""Routes to the truth, for each kind of element two that share nothing."""

@@ -7,11 +7,11 @@ import math
 import numpy as np
 import pytest
 
+from proofroll.core.truth import truth
 from proofroll.elements.ball_on_surface.element import rolling_ball
 from proofroll.engines.projection.orientation import EulerAngles
 from proofroll.figures.quantities import euler_angles, known, quantity
 from proofroll.files.scene_file import load_scene
-from proofroll.truth import truth
 
 
 def test_euler_angles_come_back_over_many_turns() -> None:

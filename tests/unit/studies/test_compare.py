@@ -13,6 +13,7 @@ from hostile import ENTRY_POINTS
 
 from proofroll.core.comparison import Band, Comparison, ExceptAt, Row, Tolerance
 from proofroll.core.scene import Scene
+from proofroll.core.truth import truth
 from proofroll.core.verdict import Verdict
 from proofroll.elements.ball_on_surface.model import BallCapability
 from proofroll.files.netcdf import write
@@ -24,7 +25,6 @@ from proofroll.running.simulation import simulate
 from proofroll.running.store import Store
 from proofroll.studies.compare import Outcome, compare, evaluate
 from proofroll.studies.planning import Plan, Planned, point_name
-from proofroll.truth import truth
 from proofroll.truth.onset import onset
 
 FACTS = EngineFacts("alpha", "1", "code", {"dt": 1e-3}, "dt", 2)

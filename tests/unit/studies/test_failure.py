@@ -10,12 +10,12 @@ import pytest
 from proofroll.truth.natural import natural_time
 
 from proofroll.core.events import Event, with_events
+from proofroll.core.truth import truth
 from proofroll.elements.ball_on_surface.dataset import variables
 from proofroll.elements.ball_on_surface.element import rolling_ball
 from proofroll.files.scene_file import load_scene
 from proofroll.running.case import Result, Status
 from proofroll.studies.failure import Yardstick, judge
-from proofroll.truth import truth
 
 SCENE = load_scene("sphere_in_cylinder")
 TIMES = np.linspace(0.0, 3 * natural_time(rolling_ball(SCENE)), 25)

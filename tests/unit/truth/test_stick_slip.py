@@ -11,9 +11,10 @@ from proofroll import load_scene
 from proofroll.core.errors import Diverged, Refused
 from proofroll.core.events import events_of
 from proofroll.core.scene import Scene
+from proofroll.core.truth import truth
 from proofroll.elements.ball_on_surface.element import changed, rolling_ball
 from proofroll.truth import stick_slip as module
-from proofroll.truth import taylor, truth
+from proofroll.truth import taylor
 from proofroll.truth.implicit import Implicit
 from proofroll.truth.polar import Polar
 from proofroll.truth.stick_slip import first_route, stick_slip

@@ -9,6 +9,7 @@ import pytest
 import xarray as xr
 
 from proofroll.core.scene import Scene
+from proofroll.core.truth import truth
 from proofroll.elements.ball_on_surface.closed_form import closed_form
 from proofroll.elements.ball_on_surface.dataset import variables
 from proofroll.elements.ball_on_surface.element import changed, rolling_ball
@@ -16,7 +17,7 @@ from proofroll.elements.ball_on_surface.model import Ball
 from proofroll.elements.ball_on_surface.motion import Motion
 from proofroll.elements.ball_on_surface.surfaces import Cylinder
 from proofroll.files.scene_file import load_scene
-from proofroll.truth import rolling, truth, unreduced_taylor
+from proofroll.truth import rolling, unreduced_taylor
 from proofroll.truth.rolling import reduced, unreduced
 
 A, C, G, M = 0.025, 0.2, 9.81, 0.517

@@ -11,12 +11,12 @@ from proofroll.core.dataset import from_samples
 from proofroll.core.engine import Sample
 from proofroll.core.errors import ProofrollError
 from proofroll.core.scene import Scene
+from proofroll.core.truth import truth
 from proofroll.elements.ball_on_surface.closed_form import closed_form
 from proofroll.elements.ball_on_surface.dataset import variables
 from proofroll.elements.ball_on_surface.element import changed, rolling_ball
 from proofroll.files.netcdf import read, write
 from proofroll.files.scene_file import load_scene
-from proofroll.truth import truth
 
 
 def exact(scene: Scene, times: np.ndarray) -> xr.Dataset:

@@ -1,0 +1,42 @@
+"""The truth of a ball on a surface, as the harness asks for it."""
+
+from __future__ import annotations
+
+import dataclasses
+import json
+from collections.abc import Sequence
+from typing import TYPE_CHECKING
+
+from proofroll.core.arrays import FloatArray
+from proofroll.core.element import Element
+from proofroll.core.errors import Refused
+from proofroll.core.scene import Scene
+from proofroll.elements.ball_on_surface.element import BallOnSurface
+from proofroll.truth.onset import onset
+from proofroll.truth.truth import truth
+
+if TYPE_CHECKING:
+    import xarray as xr
+
+
+class BallOnSurfaceTruth:
+    """See :class:`proofroll.core.truth.ElementTruth`."""
+
+    @staticmethod
+    def covers(element: Element) -> bool:
+        """Every ball on a surface."""
+        return isinstance(element, BallOnSurface)
+
+    @staticmethod
+    def truth(element: Element, times: FloatArray, asks: Sequence[str]) -> xr.Dataset:
+        """See :func:`proofroll.truth.truth.truth`; with bounded friction also the conditioning of the first slip."""
+        if asks:
+            raise Refused(f"the truth is that of the motion and gives no {', '.join(asks)}; ask an engine for it")
+        scene = Scene(element.name, "", (element,), asks=tuple(asks))
+        found = truth(scene, times)
+        if "sticking" in found:
+            first = onset(scene, float(times[-1]))
+            found.attrs["onset"] = json.dumps(dataclasses.asdict(first))
+            if first.verdict == "ill-posed":
+                found.attrs["ill_posed"] = "the time of the first slip hangs on less than the parameters are known to"
+        return found
