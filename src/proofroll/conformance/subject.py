@@ -5,7 +5,7 @@ from __future__ import annotations
 import dataclasses
 import math
 from dataclasses import dataclass
-from functools import cache
+from functools import cache, cached_property
 from typing import Any
 from unittest import SkipTest
 
@@ -16,7 +16,6 @@ from proofroll.core.engine import Sample, require_provided
 from proofroll.core.errors import Refused
 from proofroll.core.plugins import load_element_kinds
 from proofroll.core.scene import Scene
-from proofroll.elements.ball_on_surface.element import rolling_ball
 
 # Simulated time of a check of the motion [s]: the ball goes a sixth of a turn round the cylinder.
 _SPAN = 0.05
@@ -97,9 +96,17 @@ class Subject:
 
     def scaled(self, sample: Sample) -> FloatArray:
         """Position, velocity and spin of a sample in units of the scene."""
-        body = rolling_ball(self.scene)
-        a, speed = body.ball.radius, float(np.linalg.norm(body.v0))
-        return np.concatenate([sample.p_WB / a, sample.v_WB / speed, sample.w_WB * a / speed])
+        length = max(element.length for element in self.scene.elements)
+        start = float(np.max(np.abs(self.start.v_WB)))
+        speed = start or length / self.scene.natural_time
+        parts = (sample.p_WB / length, sample.v_WB / speed, sample.w_WB * length / speed)
+        return np.concatenate([np.ravel(part) for part in parts])
+
+    @cached_property
+    def start(self) -> Sample:
+        """The sample at time 0."""
+        sample: Sample = self.build().sample()
+        return sample
 
 
 def bits(sample: Sample) -> bytes:

@@ -101,6 +101,10 @@ class Element(Protocol):
         """Its table of observables, the only place that lists them."""
 
     @property
+    def length(self) -> float:
+        """Size by which positions are compared [m]; never zero."""
+
+    @property
     def natural_time(self) -> float:
         """Period of its slowest motion [s]: what the length of a run and a step are measured by."""
 

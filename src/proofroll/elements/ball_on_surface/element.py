@@ -108,6 +108,11 @@ class BallOnSurface:
         return table(self.rolling)
 
     @property
+    def length(self) -> float:
+        """The radius [m]."""
+        return self.ball.radius
+
+    @property
     def natural_time(self) -> float:
         """See the protocol."""
         from proofroll.elements.ball_on_surface.natural import natural_time

@@ -1,0 +1,183 @@
+"""The smallest kind of element: a point mass on a spring along x, with its truth and an engine."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from typing import Any, ClassVar
+
+import numpy as np
+import xarray as xr
+from tiny import TinySettings
+
+from proofroll.core.arrays import FloatArray
+from proofroll.core.certificate import Line
+from proofroll.core.element import Element, OptionalTerm, Sign, StepNumber
+from proofroll.core.engine import Level, Sample, Term, whole_steps
+from proofroll.core.gravity import Gravity
+from proofroll.core.observable import Observable, Role
+from proofroll.core.scene import Scene
+
+SPRUNG = "a mass on a spring"
+
+
+@dataclass(frozen=True)
+class Spring:
+    """m ẍ = -k x from x0 at rest."""
+
+    name: str
+    mass: float
+    stiffness: float
+    x0: float
+
+    bodies = ("mass",)
+    requires = frozenset({SPRUNG})
+    observables = (
+        Observable("x", "m", "elongation", Role.MOTION, floor=1e-9, headline=True, decides=True),
+        Observable("pull", "N", "force of the spring", Role.REACTION, floor=1e-9, headline=True),
+        Observable("energy_error", "J", "energy now minus energy at the start", Role.RESIDUAL, floor=1e-9),
+    )
+    failures: ClassVar[Mapping[str, str]] = {"far out": "the mass is ten times farther than at the start"}
+
+    @property
+    def rate(self) -> float:
+        """ω [rad/s]."""
+        return float(np.sqrt(self.stiffness / self.mass))
+
+    @property
+    def length(self) -> float:
+        """Elongation at the start [m]."""
+        return abs(self.x0)
+
+    @property
+    def natural_time(self) -> float:
+        """One oscillation [s]."""
+        return 2 * np.pi / self.rate
+
+    def asked(self, name: str) -> str | None:
+        """Nothing can be asked for."""
+        return None
+
+    def step_numbers(self, h: float, truth: xr.Dataset | None) -> Sequence[StepNumber]:
+        """The phase of a step."""
+        return (StepNumber("phase", "ωh", "angle of the oscillation in a step", self.rate * h),)
+
+    def dataset(self, times: FloatArray, samples: Sequence[Sample]) -> xr.Dataset:
+        """Elongation, speed, pull and energy."""
+        x, v = (np.array([getattr(s, key)[..., 0] for s in samples]).reshape(-1) for key in ("p_WB", "v_WB"))
+        energy = 0.5 * self.mass * v**2 + 0.5 * self.stiffness * x**2
+        columns = {"x": (x, "m"), "v": (v, "m/s"), "pull": (-self.stiffness * x, "N")}
+        columns["energy_error"] = (energy - energy[0], "J")
+        variables = {k: ("time", values, {"units": u, "long_name": k}) for k, (values, u) in columns.items()}
+        return xr.Dataset(variables, {"time": ("time", times, {"units": "s"})})
+
+    def lacks(self, samples: Sequence[Sample], asks: Sequence[str]) -> str | None:
+        """Nothing."""
+        return None
+
+    def observe(self, dataset: xr.Dataset) -> dict[str, FloatArray]:
+        """As they are; the pull without time 0."""
+        found = {item.name: dataset[item.name].to_numpy() for item in self.observables}
+        return found | {"pull": found["pull"][1:]}
+
+    def scales(self, truth: xr.Dataset) -> dict[str, float]:
+        """Of the start."""
+        pull = self.stiffness * abs(self.x0)
+        return {"x": abs(self.x0), "pull": pull, "energy_error": 0.5 * pull * abs(self.x0)}
+
+    def certify(self, built: Any, sample: Sample) -> list[Line]:
+        """Mass and start."""
+        pairs = {"mass": (self.mass, built["mass"], "kg"), "x": (self.x0, float(np.ravel(sample.p_WB)[0]), "m")}
+        return [Line(k, u, (a,), (b,), abs(a - b) / abs(a), 1e-12) for k, (a, b, u) in pairs.items()]
+
+    def signs(self, dataset: xr.Dataset, truth: xr.Dataset | None) -> list[Sign]:
+        """Far out."""
+        return [Sign("far out", np.abs(dataset["x"].to_numpy()) > 10 * abs(self.x0))]
+
+    def optional_terms(self, parameters: Mapping[str, float], truth: xr.Dataset) -> list[OptionalTerm]:
+        """None."""
+        return []
+
+
+class SpringKind:
+    """Reads ``[[masses]]``."""
+
+    name: ClassVar[str] = "spring"
+    tables: ClassVar[tuple[str, ...]] = ("masses",)
+
+    @staticmethod
+    def read(tables: Mapping[str, Any], gravity: Gravity, where: str) -> Sequence[Spring]:
+        """One element for each."""
+        return [Spring(**table) for table in tables["masses"]]
+
+    @staticmethod
+    def conformance_scenes() -> Mapping[str, Scene]:
+        """One scene."""
+        return {"spring": Scene("spring", "", (Spring("m", 2.0, 50.0, 0.3),), {"mass": 2.0})}
+
+
+class SpringTruth:
+    """Cosine, and the exponential of the matrix."""
+
+    @staticmethod
+    def covers(element: Element) -> bool:
+        """Springs."""
+        return isinstance(element, Spring)
+
+    @staticmethod
+    def truth(element: Spring, times: FloatArray, asks: Sequence[str]) -> xr.Dataset:
+        """Both routes."""
+        from scipy.linalg import expm
+
+        w, A = element.rate, np.array([[0, 1], [-element.stiffness / element.mass, 0]])
+        first = [(element.x0 * np.cos(w * t), -element.x0 * w * np.sin(w * t)) for t in times]
+        second = [tuple(expm(A * t) @ [element.x0, 0.0]) for t in times]
+        one, two = (element.dataset(times, [at(*state) for state in states]) for states in (first, second))
+        for name in one.data_vars:
+            one[name].attrs["error_bar"] = 3 * float(np.max(np.abs(one[name] - two[name]))) + 1e-15
+        return one.assign_attrs(route="cosine", second_route="exponential of the matrix")
+
+
+def at(x: float, v: float) -> Sample:
+    """The state as a sample."""
+    return Sample(np.array([x, 0.0, 0.0]), np.array([v, 0.0, 0.0]), np.zeros(3))
+
+
+class Sprung:
+    """Explicit midpoint for springs, each of several by itself."""
+
+    name: ClassVar[str] = "sprung"
+    provides: ClassVar[Mapping[str, frozenset[str]]] = {"midpoint": frozenset({SPRUNG})}
+    settings: ClassVar[type[Any]] = TinySettings
+    presets: ClassVar[Mapping[str, Mapping[str, Any]]] = {"midpoint": {"matched": TinySettings()}}
+    levels: ClassVar[Mapping[str, Level]] = {"midpoint": Level.REDUCED}
+    terms: ClassVar[Sequence[Term]] = ()
+
+    @staticmethod
+    def version() -> str:
+        """See the protocol."""
+        return "1.0"
+
+    @classmethod
+    def build(cls, scene: Scene, settings: Any) -> Sprung:
+        """See the protocol."""
+        return cls(scene, settings.dt)
+
+    def __init__(self, scene: Scene, dt: float) -> None:
+        (self.spring,) = scene.elements
+        self.x, self.dt, self.t = np.array([self.spring.x0, 0.0]), dt, 0.0
+
+    def advance(self, t: float) -> None:
+        """See the protocol."""
+        A = np.array([[0, 1], [-(self.spring.rate**2), 0]])
+        for _ in range(whole_steps(self.t, t, self.dt)):
+            self.x = self.x + self.dt * A @ (self.x + self.dt / 2 * A @ self.x)
+        self.t = t
+
+    def sample(self) -> Sample:
+        """See the protocol."""
+        return at(*self.x.tolist())
+
+    def built(self) -> Mapping[str, float]:
+        """See the protocol."""
+        return {"mass": self.spring.mass}

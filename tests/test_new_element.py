@@ -1,0 +1,164 @@
+"""A kind of element that nobody here knows goes through every verb: the harness has no line for any kind."""
+
+from __future__ import annotations
+
+import json
+import os
+from collections.abc import Callable, Iterator
+from pathlib import Path
+
+import pytest
+
+from proofroll.core import plugins, truth
+
+PLUGINS = Path(__file__).parent / "plugins"
+Proofroll = Callable[..., tuple[int, str, str]]
+SCENE = """
+title = "A mass on a spring"
+source = "invented"
+
+[parameters.mass]
+value = 2.0
+unit = "kg"
+meaning = "mass"
+source = "invented"
+above = 0
+
+[parameters.stiffness]
+value = 50.0
+unit = "N/m"
+meaning = "stiffness"
+source = "invented"
+above = 0
+
+[gravity]
+magnitude = 0.0
+
+[[masses]]
+name = "m"
+mass = "$mass"
+stiffness = "$stiffness"
+x0 = 0.3
+"""
+COMPARISON = """
+title = "Springs"
+question = "Does it swing?"
+scene = {scene!r}
+until = 1.0
+every = 0.02
+
+[vary]
+mass = [1.0, 2.0]
+
+[tolerances.fine]
+because = "of second order"
+x = "1e-3 m"
+pull = "1 %"
+energy_error = "1e-3 J"
+
+[[rows]]
+engine = "sprung[dt=1e-3]"
+tolerance = "fine"
+"""
+STABILITY = """
+study = "stability"
+title = "Springs at the extremes"
+question = "Where does it break?"
+scene = {scene!r}
+
+[[axes]]
+name = "stiffness"
+unit = "N/m"
+meaning = "stiffer"
+values = [50.0, 5000.0]
+parameters = {{ stiffness = {{}} }}
+"""
+
+
+@pytest.fixture
+def springs(proofroll: Proofroll, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Iterator[Path]:
+    """A folder with a scene of the new kind; kind, truth and engine are announced as an installed package would."""
+    site = tmp_path / "site2"
+    info = site / "springs-1.0.dist-info"
+    info.mkdir(parents=True)
+    (info / "METADATA").write_text("Metadata-Version: 2.1\nName: springs\nVersion: 1.0\n")
+    groups = {"elements": "spring = spring:SpringKind", "truths": "spring = spring:SpringTruth"}
+    groups["engines"] = "sprung = spring:Sprung"
+    (info / "entry_points.txt").write_text("".join(f"[proofroll.{k}]\n{v}\n" for k, v in groups.items()))
+    monkeypatch.setenv("PYTHONPATH", os.pathsep.join([str(site), str(PLUGINS), os.environ.get("PYTHONPATH", "")]))
+    monkeypatch.syspath_prepend(str(site))
+    plugins.load_element_kinds.cache_clear()
+    truth.load_truths.cache_clear()
+    folder = tmp_path / "swing"
+    folder.mkdir()
+    (folder / "scene.toml").write_text(SCENE)
+    (tmp_path / "springs.toml").write_text(COMPARISON.format(scene=str(folder)))
+    (tmp_path / "hard.toml").write_text(STABILITY.format(scene=str(folder)))
+    monkeypatch.chdir(tmp_path)
+    yield folder
+    plugins.load_element_kinds.cache_clear()
+    truth.load_truths.cache_clear()
+
+
+def test_run(proofroll: Proofroll, springs: Path) -> None:
+    """run gives the truth with its error bars, and the engine's end near it."""
+    ends = {}
+    for engine in ("truth", "sprung"):
+        code, out, err = proofroll("run", str(springs), "--engine", engine, "--until", "1", "--json")
+        assert code == 0, err
+        ends[engine] = json.loads(out)["final"]["x"]
+    assert ends["sprung"] == pytest.approx(ends["truth"], abs=1e-4)
+
+
+def test_compare(proofroll: Proofroll, springs: Path) -> None:
+    """compare judges every observable of the new kind."""
+    code, out, err = proofroll("compare", "springs.toml", "--json")
+    assert code == 0, err
+    document = json.loads(out)
+    content = document.get("comparisons", [document])[0]
+    assert {j["observable"] for run in content["runs"] for j in run["judgements"]} == {"x", "pull", "energy_error"}
+
+
+def test_tradeoff_and_recommend(proofroll: Proofroll, springs: Path) -> None:
+    """tradeoff goes by the deciding observable, and recommend answers from it."""
+    code, out, err = proofroll("tradeoff", str(springs), "--engine", "sprung", "--until", "0.5", "--json")
+    assert code == 0, err
+    assert json.loads(out)["quantity"] == "x"
+    arguments = ("--until", "0.5", "--tolerance", "1e-3", "--engine", "sprung", "--json")
+    code, out, err = proofroll("recommend", str(springs), *arguments)
+    assert code == 0, err
+    assert json.loads(out)["choice"]["engine"].startswith("sprung")
+
+
+def test_stability(proofroll: Proofroll, springs: Path) -> None:
+    """stability finds boundaries, measures them by the kind's own number and names its own sign of failure."""
+    code, out, err = proofroll("stability", "hard.toml", "--engine", "sprung", "--quick", "--json")
+    assert code == 0, err
+    study = json.loads(out)
+    assert study["step_symbols"] == {"phase": "ωh"}
+    assert "far out" in study["meanings"]
+    assert all(point["sides"]["accurate"]["largest"] for point in study["points"])
+
+
+def test_ladder(proofroll: Proofroll, springs: Path) -> None:
+    """ladder puts the engine on its rung."""
+    code, out, err = proofroll("ladder", str(springs), "--engine", "sprung", "--until", "0.5", "--json")
+    assert code == 0, err
+    assert [rung["engine"] for rung in json.loads(out)["rungs"] if rung["engine"]] == ["sprung"]
+
+
+def test_report(proofroll: Proofroll, springs: Path, tmp_path: Path) -> None:
+    """report writes a page about it."""
+    code, _, err = proofroll("report", "springs.toml", "--out", str(tmp_path / "out"))
+    assert code == 0, err
+    assert "A mass on a spring" in (tmp_path / "out" / "report.html").read_text(encoding="utf-8")
+
+
+def test_conformance(springs: Path) -> None:
+    """Its engine is checked on the scenes of the new kind."""
+    from spring import Sprung
+
+    from proofroll.conformance import run_check
+
+    for name in ("certificate_holds[midpoint-matched-spring]", "order_is_as_declared[midpoint-matched]"):
+        run_check(Sprung, name)
