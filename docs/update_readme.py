@@ -16,12 +16,12 @@ from made_from import facts, restamped, stamp
 from screenshot import screenshot
 
 from proofroll.elements.ball_on_surface.regimes_study import regime_maps
+from proofroll.elements.ball_on_surface.report.regime_map import draw as draw_regimes
 from proofroll.files.comparison_file import load_comparison
 from proofroll.files.netcdf import read
 from proofroll.report.comparison_content import outcome_content
 from proofroll.report.growing_report import write_report
 from proofroll.report.markdown import cheapest_table, verdict_table
-from proofroll.report.regime_map import draw as draw_regimes
 from proofroll.report.work_precision import draw as draw_work_precision
 from proofroll.running.runner import Runner
 from proofroll.running.store import Store

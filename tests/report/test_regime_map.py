@@ -8,9 +8,9 @@ from typing import Any
 import pytest
 import xarray as xr
 
+from proofroll.elements.ball_on_surface.report.regime_map import boundaries, counts, draw, inline
 from proofroll.files.scene_file import load_scene
 from proofroll.report.growing_report import write_report
-from proofroll.report.regime_map import boundaries, counts, draw, inline
 from proofroll.running.store import Store
 from proofroll.studies.compare import Outcome
 from proofroll.truth.regimes import regime_map

@@ -19,15 +19,15 @@ from scipy.spatial.transform import Rotation
 
 from proofroll.core.truth import truth
 from proofroll.elements.ball_on_surface.element import rolling_ball
+from proofroll.elements.ball_on_surface.report.poses import AWAY, SLIPS, STICKS, WIDEST_TURN, frame_times, poses
+from proofroll.elements.ball_on_surface.report.replay import LENGTH, described, replay_content
+from proofroll.elements.ball_on_surface.report.wall import middle, wall
 from proofroll.files.netcdf import read, write
 from proofroll.files.scene_file import load_scene
 from proofroll.report import replay_library
 from proofroll.report.html import page
 from proofroll.report.plots import point_curves
-from proofroll.report.replay import LENGTH, described, replay_content
 from proofroll.report.replay_library import thinned, three
-from proofroll.report.replay_poses import AWAY, SLIPS, STICKS, WIDEST_TURN, frame_times, poses
-from proofroll.report.replay_wall import middle, wall
 from proofroll.report.report_content import report_content
 
 SPEED, UNTIL, EVERY = 4.0, 1.0, 0.02

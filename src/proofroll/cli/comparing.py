@@ -57,8 +57,8 @@ def regimes(
     as_json: Json = False,
 ) -> None:
     """Draw the map over speed and friction: never slips, slips and recovers, falls."""
+    from proofroll.elements.ball_on_surface.report.regime_map import draw, regime_content
     from proofroll.files.comparison_file import load_comparison
-    from proofroll.report.regime_map import draw, regime_content
     from proofroll.running.store import Store, write_text
 
     loaded = load_comparison(study)

@@ -10,6 +10,8 @@ from typing import TYPE_CHECKING, Any
 from rich.table import Table
 from rich.text import Text
 
+from proofroll.elements.ball_on_surface.report.regime_map import counts
+from proofroll.elements.ball_on_surface.report.regime_map import picture as map_picture
 from proofroll.figures import style
 from proofroll.figures.drawing import looks, picture
 from proofroll.figures.judging import judged
@@ -17,8 +19,6 @@ from proofroll.figures.study import Study, study_content
 from proofroll.files.atomic import replacing
 from proofroll.files.json_data import plain
 from proofroll.report.labels import number, unit
-from proofroll.report.regime_map import counts
-from proofroll.report.regime_map import picture as map_picture
 from proofroll.running.store import write_text
 
 if TYPE_CHECKING:

@@ -62,8 +62,8 @@ class FiguresPart:
 
     def pictures(self, prefix: str) -> dict[str, str]:
         """One for each figure with panels; the maps are the comparison's."""
+        from proofroll.elements.ball_on_surface.report.regime_map import inline as inline_map
         from proofroll.figures.drawing import inline
-        from proofroll.report.regime_map import inline as inline_map
 
         assert self.study is not None  # it was made
         return {

@@ -10,11 +10,12 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from proofroll.core.errors import ProofrollError
+from proofroll.elements.ball_on_surface.report.regime_map import inline
 from proofroll.files.json_data import plain
+from proofroll.files.scene_file import load_scene
 from proofroll.report.html import page
+from proofroll.report.kinds import kind_of
 from proofroll.report.plots import point_curves
-from proofroll.report.regime_map import inline
-from proofroll.report.replay import described, replay_content
 from proofroll.report.report_content import report_content
 from proofroll.report.study_parts import KEYS, Part, absent, attempt, entry
 from proofroll.report.summary import three_sentences
@@ -36,7 +37,7 @@ class Report:
         content: plain data, as :func:`proofroll.report.report_content.report_content` has it.
         curves: of each comparison, for the figures.
         pictures: markup by name.
-        replay: of the comparisons, from :func:`proofroll.report.replay.replay_content`.
+        replay: of the comparisons, as their kind of element gives it.
         parts: the further studies, in the order of the content's lists.
     """
 
@@ -114,8 +115,8 @@ def begun(outcomes: list[Outcome], store: Store, command: str, maps: Sequence[Se
         if found:
             prefix = f"map{index}"
             pictures |= _drawn(prefix, partial(_map, found, prefix))
-    replay = replay_content(outcomes, store)
-    content = report_content(outcomes, store, command, maps) | {"replay": described(replay)}
+    replay = _replay(outcomes, store)
+    content = report_content(outcomes, store, command, maps) | {"replay": _described(replay)}
     return Report(content, [point_curves(outcome, store) for outcome in outcomes], pictures, replay)
 
 
@@ -140,6 +141,20 @@ def write_report(
     report = begun(outcomes, store, command, maps)
     report.write(out)
     return report.content
+
+
+def _replay(outcomes: list[Outcome], store: Store) -> dict[str, Any]:
+    """The replay of the comparisons whose kind of element has one: of the first such kind."""
+    kinds = {id(item): kind_of(load_scene(item.comparison.scene)) for item in outcomes}
+    first = next((kind for kind in kinds.values() if kind is not None), None)
+    if first is None:
+        return {"cases": []}
+    return first.replay([item for item in outcomes if kinds[id(item)] is first], store)
+
+
+def _described(replay: dict[str, Any]) -> list[dict[str, Any]]:
+    """The cases without their numbers, for ``report.json``; these follow from the trajectories that it names."""
+    return [{key: value for key, value in case.items() if key != "arrays"} for case in replay["cases"]]
 
 
 def _kept(part: Part, out: Path) -> dict[str, Any] | None:

@@ -10,9 +10,10 @@ from collections.abc import Mapping
 from types import MappingProxyType
 from typing import TYPE_CHECKING, Any
 
+from proofroll.files.scene_file import load_scene
 from proofroll.report import heat_map, labels, onset_tables, study_tables, tables
 from proofroll.report.compression import packed
-from proofroll.report.onsets import mark
+from proofroll.report.kinds import kind_of
 from proofroll.report.styles import OUTLINES, styles
 from proofroll.report.tradeoff_tables import name_of
 
@@ -36,11 +37,11 @@ def page(
         curves: from :func:`proofroll.report.plots.point_curves`, one list for each comparison.
         pictures: markup by name: ``map0`` are the regime maps of the first comparison, the others belong to
             further studies; what is not there is left out.
-        replay: from :func:`proofroll.report.replay.replay_content`; None: the page has none.
+        replay: from :func:`proofroll.elements.ball_on_surface.report.replay.replay_content`; None: the page has none.
     """
     drawn = {
         "rows": [_drawn_rows(comparison) for comparison in content["comparisons"]],
-        "points": [mark(*pair) for pair in zip(content["comparisons"], curves, strict=True)],
+        "points": [_marked(*pair) for pair in zip(content["comparisons"], curves, strict=True)],
     }
     text = (
         _templates()
@@ -56,6 +57,12 @@ def page(
         )
     )
     return text.encode("utf-8", "replace").decode("utf-8")  # a lone surrogate from an engine's message
+
+
+def _marked(comparison: dict[str, Any], curves: list[dict[str, Any]]) -> list[dict[str, Any]]:
+    """The curves with what the scene's kind of element marks on them."""
+    kind = kind_of(load_scene(comparison["scene"]))
+    return curves if kind is None else kind.mark(comparison, curves)
 
 
 @functools.cache

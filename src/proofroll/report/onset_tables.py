@@ -5,8 +5,8 @@ from __future__ import annotations
 import math
 from typing import Any
 
+from proofroll.elements.ball_on_surface.report.onsets import first_slip
 from proofroll.report.labels import names, number
-from proofroll.report.onsets import first_slip
 from proofroll.report.tables import anchor
 
 # Events that the table shows; the page says how many more there are.

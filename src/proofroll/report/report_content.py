@@ -5,14 +5,14 @@ from __future__ import annotations
 from datetime import UTC, datetime
 from typing import TYPE_CHECKING, Any
 
+from proofroll.elements.ball_on_surface.report.regime_map import counts
 from proofroll.files.json_data import plain
 from proofroll.files.netcdf import read
 from proofroll.files.scene_file import load_scene
 from proofroll.report.comparison_content import environment, outcome_content
 from proofroll.report.evidence import add_evidence
 from proofroll.report.findings import findings
-from proofroll.report.onsets import add_events, truth_facts
-from proofroll.report.regime_map import counts
+from proofroll.report.kinds import kind_of
 from proofroll.report.study_parts import KEYS
 from proofroll.report.summary import three_sentences
 
@@ -41,7 +41,9 @@ def report_content(outcomes: list[Outcome], store: Store, command: str, maps: Ma
         content["truths"] = _truths(outcome, store)
         content["findings"] = findings(content)
         content["regimes"] = counts(maps[index]) if index < len(maps) else []
-        add_events(content, outcome.runs, store)
+        kind = kind_of(load_scene(outcome.comparison.scene))
+        if kind is not None:
+            kind.add_to_runs(content, outcome.runs, store)
         add_evidence(content, outcome)
         comparisons.append(content)
     versions: dict[str, str] = {}
@@ -76,6 +78,8 @@ def _truths(outcome: Outcome, store: Store) -> list[dict[str, Any]]:
                 for key, curve in dataset.data_vars.items()
                 if curve.dims == ("time",) and "error_bar" in curve.attrs
             }
-            entry |= truth_facts(dataset, load_scene(case.scene, **case.parameters))
+            scene = load_scene(case.scene, **case.parameters)
+            kind = kind_of(scene)
+            entry |= kind.truth_facts(scene, dataset) if kind is not None else {}
         found.append(entry)
     return found

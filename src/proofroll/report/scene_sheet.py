@@ -5,9 +5,8 @@ from __future__ import annotations
 import math
 from typing import TYPE_CHECKING, Any
 
-from proofroll.elements.ball_on_surface.drawings import overview
-from proofroll.elements.ball_on_surface.element import rolling_ball
 from proofroll.files.scene_file import load_scene, read_scene_file
+from proofroll.report.kinds import kind_of
 from proofroll.report.labels import symbol, unit
 
 if TYPE_CHECKING:
@@ -26,13 +25,12 @@ def scene_sheet(scene: str, points: Sequence[dict[str, float]]) -> dict[str, Any
 
     Returns:
         ``title``, ``source``; ``parameters``: for each ``symbol``, ``values``, ``unit``, ``meaning``, ``source``,
-        ``varied``; ``drawings``: of :class:`drawings.Drawing`, empty with the reason in ``undrawn``.
+        ``varied``; ``drawings``: as the kind of scene draws them, empty with the reason in ``undrawn``.
     """
     file = read_scene_file(scene)
     drawn = [load_scene(scene, **point) for point in points] or [load_scene(scene)]
-    # One drawing for all cases: with rolling resistance where any has it.
-    shown = max((rolling_ball(made) for made in drawn), key=lambda body: body.contact.rolling_resistance)
-    drawings = overview(shown.wall, shown)
+    kind = kind_of(drawn[0])
+    drawings, undrawn = kind.drawings(drawn) if kind else ([], "There is no drawing for this kind of scene.")
     parameters = []
     for name, parameter in file.parameters.items():
         set_to = [point.get(name) for point in points]
@@ -53,8 +51,8 @@ def scene_sheet(scene: str, points: Sequence[dict[str, float]]) -> dict[str, Any
         "title": file.title,
         "source": file.source,
         "parameters": parameters,
-        "drawings": [item.content() for item in drawings],
-        "undrawn": "" if drawings else f"There is no drawing for a wall of the kind {type(shown.wall).__name__}.",
+        "drawings": drawings,
+        "undrawn": undrawn,
     }
 
 

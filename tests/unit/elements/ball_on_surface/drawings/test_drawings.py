@@ -7,10 +7,10 @@ from typing import Any
 import numpy as np
 import pytest
 
-from proofroll.elements.ball_on_surface.drawings import Drawing, overview
-from proofroll.elements.ball_on_surface.drawings.pen import View, circle, turn
-from proofroll.elements.ball_on_surface.drawings.surfaces import overview as by_kind
 from proofroll.elements.ball_on_surface.element import rolling_ball
+from proofroll.elements.ball_on_surface.report.drawings import Drawing, overview
+from proofroll.elements.ball_on_surface.report.drawings.pen import View, circle, turn
+from proofroll.elements.ball_on_surface.report.drawings.surfaces import overview as by_kind
 from proofroll.files.scene_file import load_scene
 
 

@@ -11,14 +11,14 @@ import numpy as np
 from proofroll.core.arrays import FloatArray
 from proofroll.elements.ball_on_surface.element import rolling_ball
 from proofroll.elements.ball_on_surface.model import RollingBall
+from proofroll.elements.ball_on_surface.report.poses import NEEDED, Poses, Sampled, frame_times, poses
+from proofroll.elements.ball_on_surface.report.wall import middle, wall
 from proofroll.files.json_data import plain
 from proofroll.files.scene_file import load_scene
 from proofroll.report.comparison_content import by_row, outcome_content
 from proofroll.report.labels import names, symbol, unit
 from proofroll.report.plots import stored
 from proofroll.report.replay_library import packed, thinned, three
-from proofroll.report.replay_poses import NEEDED, Poses, Sampled, frame_times, poses
-from proofroll.report.replay_wall import middle, wall
 from proofroll.report.styles import styles
 from proofroll.running.case import Case, Status
 from proofroll.running.store import Store
@@ -88,11 +88,6 @@ def replay_content(outcomes: list[Outcome], store: Store) -> dict[str, Any]:
         "cases": [case for case, _ in made],
         "packed": [packed(numbers) for _, numbers in made],
     }
-
-
-def described(content: dict[str, Any]) -> list[dict[str, Any]]:
-    """The cases without their numbers, for ``report.json``; these follow from the trajectories that it names."""
-    return [{key: value for key, value in case.items() if key != "arrays"} for case in content["cases"]]
 
 
 def _case(

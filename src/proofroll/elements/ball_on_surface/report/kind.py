@@ -1,0 +1,56 @@
+"""Balls on surfaces in the report of a comparison."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import TYPE_CHECKING, Any
+
+from proofroll.core.scene import Scene
+from proofroll.elements.ball_on_surface.element import BallOnSurface, rolling_ball
+from proofroll.elements.ball_on_surface.report import onsets
+
+if TYPE_CHECKING:
+    import xarray as xr
+
+    from proofroll.running.store import Store
+    from proofroll.studies.compare import Outcome, Run
+
+
+class BallReport:
+    """See :class:`proofroll.report.kinds.ReportKind`."""
+
+    @staticmethod
+    def covers(scene: Scene) -> bool:
+        """One ball on one surface."""
+        return len(scene.elements) == 1 and isinstance(scene.elements[0], BallOnSurface)
+
+    @staticmethod
+    def drawings(scenes: Sequence[Scene]) -> tuple[list[dict[str, Any]], str]:
+        """One for all cases: with rolling resistance where any has it."""
+        from proofroll.elements.ball_on_surface.report.drawings import overview
+
+        shown = max((rolling_ball(scene) for scene in scenes), key=lambda body: body.contact.rolling_resistance)
+        found = [item.content() for item in overview(shown.wall, shown)]
+        return found, "" if found else f"There is no drawing for a wall of the kind {type(shown.wall).__name__}."
+
+    @staticmethod
+    def truth_facts(scene: Scene, dataset: xr.Dataset) -> dict[str, Any]:
+        """Its slips."""
+        return onsets.truth_facts(dataset, scene)
+
+    @staticmethod
+    def add_to_runs(content: dict[str, Any], runs: Sequence[Run], store: Store) -> None:
+        """Their slips."""
+        onsets.add_events(content, list(runs), store)
+
+    @staticmethod
+    def mark(content: dict[str, Any], curves: list[dict[str, Any]]) -> list[dict[str, Any]]:
+        """First slips on the curve of needed friction."""
+        return onsets.mark(content, curves)
+
+    @staticmethod
+    def replay(outcomes: Sequence[Outcome], store: Store) -> dict[str, Any]:
+        """Balls rolling on their wall."""
+        from proofroll.elements.ball_on_surface.report.replay import replay_content
+
+        return replay_content(list(outcomes), store)

@@ -1,0 +1,56 @@
+"""What a kind of element adds to the report of a comparison. Each kind brings it as a plug-in, as it brings itself."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from functools import cache
+from importlib.metadata import entry_points
+from typing import TYPE_CHECKING, Any, Protocol
+
+if TYPE_CHECKING:
+    import xarray as xr
+
+    from proofroll.core.scene import Scene
+    from proofroll.running.store import Store
+    from proofroll.studies.compare import Outcome, Run
+
+GROUP = "proofroll.report_kinds"
+
+
+class ReportKind(Protocol):
+    """What a report shows of scenes of one kind of element besides verdicts and curves."""
+
+    @staticmethod
+    def covers(scene: Scene) -> bool:
+        """Whether it knows the scene's elements."""
+
+    @staticmethod
+    def drawings(scenes: Sequence[Scene]) -> tuple[list[dict[str, Any]], str]:
+        """Drawings of a comparison's scene as plain data, for all its cases; and why there are none, if so."""
+
+    @staticmethod
+    def truth_facts(scene: Scene, dataset: xr.Dataset) -> dict[str, Any]:
+        """What is told of a truth besides its route and error bars."""
+
+    @staticmethod
+    def add_to_runs(content: dict[str, Any], runs: Sequence[Run], store: Store) -> None:
+        """Gives the runs of a comparison's content what the kind knows of them."""
+
+    @staticmethod
+    def mark(content: dict[str, Any], curves: list[dict[str, Any]]) -> list[dict[str, Any]]:
+        """The curves of a comparison with its marks."""
+
+    @staticmethod
+    def replay(outcomes: Sequence[Outcome], store: Store) -> dict[str, Any]:
+        """What the replay draws of these comparisons: ``cases``, and the rest as its own part of the page wants it."""
+
+
+@cache
+def report_kinds() -> tuple[type[ReportKind], ...]:
+    """All that some installed package announces, by name."""
+    return tuple(point.load() for point in sorted(entry_points(group=GROUP), key=lambda point: point.name))
+
+
+def kind_of(scene: Scene) -> type[ReportKind] | None:
+    """The one that covers the scene, if any."""
+    return next((kind for kind in report_kinds() if kind.covers(scene)), None)
