@@ -7,7 +7,7 @@ from typing import Any
 
 import numpy as np
 import pytest
-from proofroll.truth.natural import natural_time
+from proofroll.elements.ball_on_surface.natural import natural_time
 
 from proofroll.core.events import Event, with_events
 from proofroll.core.truth import truth
@@ -20,7 +20,7 @@ from proofroll.studies.failure import Yardstick, judge
 SCENE = load_scene("sphere_in_cylinder")
 TIMES = np.linspace(0.0, 3 * natural_time(rolling_ball(SCENE)), 25)
 TRUE = truth(SCENE, TIMES)
-YARDSTICK = Yardstick.of(rolling_ball(SCENE), TIMES, TRUE)
+YARDSTICK = Yardstick.of(SCENE, TRUE)
 DONE = Result(Status.DONE, "reached the end")
 P, V, W = (TRUE[name].to_numpy() for name in ("p_WB", "v_WB", "w_WB"))
 LATE = (np.arange(len(TIMES)) >= 12)[:, None]
@@ -52,16 +52,16 @@ def test_the_truth_is_accurate() -> None:
 @pytest.mark.parametrize(
     ("dataset", "failure", "stable"),
     [
-        (run(P + LATE * 0.005 * rolling_ball(SCENE).surface.normal(P)), Failure.SANK, False),
-        (run(P - LATE * 0.005 * rolling_ball(SCENE).surface.normal(P)), Failure.LEFT, False),
-        (run(v=V * (1 + 0.2 * LATE)), Failure.ENERGY_GAIN, False),
-        (drifting(-0.01), Failure.CREEP, True),
-        (drifting(-0.2), Failure.CREEP, False),
-        (slower(0.97), Failure.LOST_PHASE, True),
+        (run(P + LATE * 0.005 * rolling_ball(SCENE).surface.normal(P)), "sank in", False),
+        (run(P - LATE * 0.005 * rolling_ball(SCENE).surface.normal(P)), "left the surface", False),
+        (run(v=V * (1 + 0.2 * LATE)), "energy gain", False),
+        (drifting(-0.01), "creep", True),
+        (drifting(-0.2), "creep", False),
+        (slower(0.97), "lost phase", True),
     ],
     ids=["sank", "left", "gain", "creeps a little", "creeps far", "phase"],
 )
-def test_a_bad_run_that_says_it_is_done(dataset: Any, failure: Failure, stable: bool) -> None:
+def test_a_bad_run_that_says_it_is_done(dataset: Any, failure: str, stable: bool) -> None:
     """A run that reached the end and is wrong is a silent failure of the kind that was put into it."""
     outcome = judge(DONE, dataset, YARDSTICK)
     assert (outcome.failure, outcome.stable, outcome.accurate, outcome.silent) == (failure, stable, False, True)
@@ -72,22 +72,22 @@ def test_what_came_first() -> None:
     later = (np.arange(len(TIMES)) >= 18)[:, None]
     normal = rolling_ball(SCENE).surface.normal(P)
     outcome = judge(DONE, run(P + later * 0.005 * normal, V * (1 + 0.2 * LATE)), YARDSTICK)
-    assert outcome.failure == Failure.ENERGY_GAIN
+    assert outcome.failure == "energy gain"
     assert outcome.time == pytest.approx(TIMES[12])
 
 
 @pytest.mark.parametrize(
     ("status", "message", "failure", "silent"),
     [
-        (Status.DIVERGED, "p_WB is not finite (NaN or overflow) at 0.3 s", Failure.DIVERGED, True),
-        (Status.DIVERGED, "the engine gave up: velocities are not finite or huge", Failure.DIVERGED, False),
-        (Status.DIVERGED, "Newton's method did not converge", Failure.GAVE_UP, False),
-        (Status.CRASHED, "was killed by SIGSEGV", Failure.CRASHED, False),
-        (Status.TIMEOUT, "no result within 8 s", Failure.TOO_SLOW, False),
-        (Status.REFUSED, "needs rolling resistance", Failure.REFUSED, False),
+        (Status.DIVERGED, "p_WB is not finite (NaN or overflow) at 0.3 s", "diverged", True),
+        (Status.DIVERGED, "the engine gave up: velocities are not finite or huge", "diverged", False),
+        (Status.DIVERGED, "Newton's method did not converge", "solver gave up", False),
+        (Status.CRASHED, "was killed by SIGSEGV", "crashed", False),
+        (Status.TIMEOUT, "no result within 8 s", "too slow", False),
+        (Status.REFUSED, "needs rolling resistance", "refused", False),
     ],
 )
-def test_runs_that_ended_early(status: Status, message: str, failure: Failure, silent: bool) -> None:
+def test_runs_that_ended_early(status: Status, message: str, failure: str, silent: bool) -> None:
     """A run that ended early is never stable; only a NaN that the engine did not mention is silent."""
     dataset = run(upto=6) if status == Status.DIVERGED else None
     outcome = judge(Result(status, message), dataset, YARDSTICK)
@@ -98,20 +98,20 @@ def test_a_liftoff_that_ends_a_run() -> None:
     """An engine that stops because the ball leaves the wall has said so, and that is what happened."""
     dataset = with_events(run(upto=6), [Event("liftoff", 0.3, 0.2, 0.3)])
     outcome = judge(Result(Status.DIVERGED, "the ball leaves the wall"), dataset, YARDSTICK)
-    assert (outcome.failure, outcome.silent) == (Failure.LEFT, False)
+    assert (outcome.failure, outcome.silent) == ("left the surface", False)
 
 
 def test_without_a_truth() -> None:
     """Without a truth a run is judged by what needs none: surface and energy."""
-    alone = Yardstick.of(rolling_ball(SCENE), TIMES, None)
+    alone = Yardstick.of(SCENE, None)
     assert judge(DONE, slower(0.5), alone).stable
-    assert judge(DONE, run(v=V * (1 + 0.2 * LATE)), alone).failure == Failure.ENERGY_GAIN
+    assert judge(DONE, run(v=V * (1 + 0.2 * LATE)), alone).failure == "energy gain"
     assert judge(DONE, slower(0.5), alone).error is None
 
 
 def test_every_kind_has_a_meaning() -> None:
     """A person finds the definition of every kind."""
-    assert set(MEANINGS) == set(Failure)
+    assert all(text and name == name.lower() for name, text in meanings(SCENE).items())
 
 
 def test_the_natural_time() -> None:
@@ -141,8 +141,8 @@ def rolling_down(after_rest: float) -> tuple[Any, Yardstick]:
     return path(after_rest), Yardstick.of(body, times, path(0.0))
 
 
-@pytest.mark.parametrize(("after", "failure"), [(0.0, None), (-0.002, None), (-0.2, Failure.REVERSED)])
-def test_resistance_stops_a_ball_and_does_not_drive_it_back(after: float, failure: Failure | None) -> None:
+@pytest.mark.parametrize(("after", "failure"), [(0.0, None), (-0.002, None), (-0.2, "reversed")])
+def test_resistance_stops_a_ball_and_does_not_drive_it_back(after: float, failure: str | None) -> None:
     """A ball that moves back where it should rest has been reversed; the little that a step goes too far has not."""
     dataset, yardstick = rolling_down(after)
     outcome = judge(DONE, dataset, yardstick)

@@ -1,0 +1,52 @@
+"""Data flows one way: the imports of every module lead only where its folder may lead."""
+
+from __future__ import annotations
+
+import ast
+from pathlib import Path
+
+import pytest
+
+import proofroll
+
+ROOT = Path(proofroll.__file__).parent
+# What may import what. The harness knows neither a kind of element nor an engine nor a truth; these are plug-ins.
+HARNESS = {"core", "files", "running", "studies", "report", "cli", "conformance"}
+MAY: dict[str, set[str]] = {
+    "core": {"core"},
+    "files": {"core", "files"},
+    "running": {"core", "files", "running"},
+    "studies": {"core", "files", "running", "studies"},
+    "conformance": {"core", "files", "conformance"},
+    "report": {"core", "files", "running", "studies", "report"},
+    "cli": {"core", "files", "running", "studies", "report", "cli"},
+    "elements": {"core", "files", "elements"},
+    "truth": {"core", "elements", "truth"},
+    "engines": {"core", "elements", "engines"},
+}
+# A kind's own studies, commands and parts of the report stand on the harness, as a plug-in of somebody else would.
+PLUGIN_PARTS = {"report", "onset_study", "regimes_study", "commands"}
+
+
+def _imported(file: Path) -> list[tuple[int, str]]:
+    found = []
+    for node in ast.walk(ast.parse(file.read_text(encoding="utf-8"))):
+        if isinstance(node, ast.ImportFrom) and node.module and node.module.startswith("proofroll."):
+            found.append((node.lineno, node.module))
+        elif isinstance(node, ast.Import):
+            found += [(node.lineno, alias.name) for alias in node.names if alias.name.startswith("proofroll.")]
+    return found
+
+
+@pytest.mark.parametrize("folder", sorted(MAY))
+def test_imports_lead_one_way(folder: str) -> None:
+    """No module imports from a folder that its own may not know."""
+    wrong = []
+    for file in (ROOT / folder).rglob("*.py"):
+        parts = set(file.relative_to(ROOT).with_suffix("").parts)
+        for line, module in _imported(file):
+            target = module.split(".")[1]
+            allowed = MAY[folder] | (HARNESS | {"truth"} if folder == "elements" and parts & PLUGIN_PARTS else set())
+            if target not in allowed:
+                wrong.append(f"{file.relative_to(ROOT)}:{line} imports {module}")
+    assert not wrong, "\n".join(wrong)
