@@ -10,15 +10,43 @@ import numpy as np
 from proofroll.convergence import Limit
 from proofroll.surfaces import FloatArray
 
+# A ladder whose rungs differ by less than this part of the tolerance needs no order: were the differences never to
+# shrink, twenty further halvings, a step a million times finer, would move the curve by the tolerance at most.
+_FLAT = 1 / 20
+# Error bars are estimates, and a limit is shown to be wrong only by several of its own.
+_SEVERAL = 3
+# Round-off of a curve, relative to its size: a thousand operations, each off by one machine epsilon.
+_ROUND_OFF = 1e3 * np.finfo(float).eps
+
 
 class Verdict(StrEnum):
-    """How a run stands to the truth."""
+    """How a run stands to the truth, from best to worst."""
 
-    AGREES = "agrees"  # within tolerance at this step
-    CONVERGES = "converges"  # not yet, but the limit of small steps is the truth
+    AGREES = "agrees"  # within tolerance at this step, and the ladder of steps, if there is one, confirms it
+    UNCONFIRMED = "unconfirmed"  # within tolerance at this step, but the ladder does not confirm the limit
+    INCOMPLETE = "incomplete"  # all that is reported agrees, but not all that is to be judged is reported
+    CONVERGES = "converges"  # not yet, but the limit of small steps is within tolerance
     ILL_POSED = "ill-posed"  # here the answer hangs on less than the parameters are known to; nobody can be judged
-    DIFFERS = "differs"  # the limit is something else, or no limit shows: not this model at this step
+    NOT_JUDGED = "not-judged"  # the tolerance is below the truth's own error bar; nobody can be judged
+    DIFFERS = "differs"  # not this model at this step; what the ladder says is in LimitFinding
     FAILED = "failed"  # there is no result
+
+
+class LimitFinding(StrEnum):
+    """What a ladder of steps says about the limit of small steps."""
+
+    NO_LADDER = "no ladder"  # only one step was run
+    WITHIN = "within tolerance"  # of the truth, and known to within the tolerance
+    ANOTHER = "another limit"  # it is beyond the tolerance by more than its error bar
+    NOT_SHOWN = "no limit shown"  # the runs do not settle, or too slowly to tell
+
+
+class Doubt(StrEnum):
+    """What an ill-posed question leaves to be judged."""
+
+    NONE = "none"  # the question is well posed
+    DIFFERENCES = "differences"  # who differs is not judged
+    EVERYTHING = "everything"  # nor who agrees, which would be luck
 
 
 @dataclass(frozen=True)
@@ -35,6 +63,9 @@ class Judgement:
         order: observed order, or None.
         limit_error: distance of the limit of small steps from the truth, or None without a ladder.
         limit_error_bar: uncertainty of that limit.
+        limit: what the ladder says, see :class:`LimitFinding`.
+        reason: why this verdict, as a clause with numbers.
+        remarks: what a reader must know though it does not change the verdict, one clause each.
     """
 
     observable: str
@@ -47,6 +78,9 @@ class Judgement:
     order: float | None = None
     limit_error: float | None = None
     limit_error_bar: float | None = None
+    limit: LimitFinding = LimitFinding.NO_LADDER
+    reason: str = ""
+    remarks: tuple[str, ...] = ()
 
 
 def judge(
@@ -59,20 +93,42 @@ def judge(
     tolerance: float,
     scale: float,
     limit: Limit | None,
-    ill_posed: bool = False,
+    ladder: bool = False,
+    doubt: Doubt = Doubt.NONE,
 ) -> Judgement:
-    """Holds a curve and its limit of small steps against the true curve.
+    """Holds a curve and its limit of small steps against the true curve. The only place that gives a verdict.
 
-    Where the question is ill-posed, a curve that would differ is not judged.
+    Args:
+        name, unit: of the observable.
+        values, true: the curve and the true one.
+        truth_error_bar, tolerance, scale: in that unit.
+        limit: of small steps, or None if there is none.
+        ladder: whether several steps were asked for; without a limit they then confirm nothing.
+        doubt: what an ill-posed question leaves to be judged.
     """
     error = _distance(values, true)
     limit_error = None if limit is None else _distance(limit.values, true)
-    if error <= tolerance:
-        verdict = Verdict.AGREES
-    elif np.isfinite(error) and limit is not None and _converges(tolerance, limit, limit_error, truth_error_bar):
-        verdict = Verdict.CONVERGES
-    else:
-        verdict = Verdict.ILL_POSED if ill_posed else Verdict.DIFFERS
+    bar = None if limit is None else limit.error_bar
+    # Below this nobody can tell a curve from the truth.
+    floor = truth_error_bar + _ROUND_OFF * max(scale, float(np.max(np.abs(true), initial=0.0)))
+    settled = limit is not None and (limit.shown or limit.error_bar <= max(_FLAT * tolerance, floor))
+    finding = _finding(limit_error, bar, tolerance, settled=settled, ladder=ladder)
+    beyond = limit_error is not None and bar is not None and limit_error - bar > tolerance
+    verdict = _verdict(error, tolerance, finding, beyond=beyond)
+    if doubt == Doubt.EVERYTHING or (doubt == Doubt.DIFFERENCES and verdict == Verdict.DIFFERS):
+        verdict = Verdict.ILL_POSED
+    if truth_error_bar > tolerance:
+        verdict = Verdict.NOT_JUDGED
+    order = None if limit is None or not np.isfinite(limit.order) else limit.order
+    shown_unit = "" if unit == "1" else f" {unit}"
+    said = ""
+    if limit_error is not None:
+        tells = "no order" if order is None else f"order {order:.3g}"
+        said = f"off by {limit_error:.2g} ± {bar:.1g}{shown_unit}, {tells}"
+    remarks: tuple[str, ...] = ()
+    if finding == LimitFinding.WITHIN and limit_error is not None and bar is not None:
+        if limit_error > _SEVERAL * bar + floor:
+            remarks = (f"within tolerance, but the limit of small steps is shown not to be the truth: {said}",)
     return Judgement(
         observable=name,
         unit=unit,
@@ -81,19 +137,54 @@ def judge(
         tolerance=tolerance,
         scale=scale,
         verdict=verdict,
-        order=None if limit is None or not np.isfinite(limit.order) else limit.order,
+        order=order,
         limit_error=limit_error,
-        limit_error_bar=None if limit is None else limit.error_bar,
+        limit_error_bar=bar,
+        limit=finding,
+        reason=_reason(verdict, error, tolerance, truth_error_bar, shown_unit, finding, said),
+        remarks=remarks,
     )
 
 
-def _converges(tolerance: float, limit: Limit, limit_error: float | None, truth_error_bar: float) -> bool:
-    """The limit is the truth within both error bars, and is known to within the tolerance.
+def _finding(
+    limit_error: float | None, bar: float | None, tolerance: float, *, settled: bool, ladder: bool
+) -> LimitFinding:
+    """What the ladder says. A scattered one, whose rungs differ by as much as its error, shows no limit."""
+    if limit_error is None or bar is None:
+        return LimitFinding.NOT_SHOWN if ladder else LimitFinding.NO_LADDER
+    if settled and limit_error <= tolerance and bar <= tolerance:
+        return LimitFinding.WITHIN
+    return LimitFinding.ANOTHER if settled and limit_error - bar > tolerance else LimitFinding.NOT_SHOWN
 
-    Without the second condition a scattered ladder, whose error bar is as large as its error, would pass.
-    """
-    near = limit_error is not None and limit_error <= limit.error_bar + truth_error_bar
-    return near and limit.error_bar <= tolerance
+
+def _verdict(error: float, tolerance: float, finding: LimitFinding, *, beyond: bool) -> Verdict:
+    """The verdict where truth and question allow one; ``beyond``: finer steps leave the tolerance, order or not."""
+    if error <= tolerance:
+        if beyond:
+            return Verdict.DIFFERS
+        known = finding in {LimitFinding.NO_LADDER, LimitFinding.WITHIN}
+        return Verdict.AGREES if known else Verdict.UNCONFIRMED
+    converges = finding == LimitFinding.WITHIN and np.isfinite(error)
+    return Verdict.CONVERGES if converges else Verdict.DIFFERS
+
+
+def _reason(
+    verdict: Verdict, error: float, tolerance: float, truth_bar: float, unit: str, finding: LimitFinding, said: str
+) -> str:
+    """Why the verdict, as a clause with numbers."""
+    if verdict == Verdict.NOT_JUDGED:
+        return f"not judged: the truth's error bar {truth_bar:.2g}{unit} exceeds the tolerance {tolerance:.2g}{unit}"
+    where = "within" if error <= tolerance else "beyond"
+    text = f"error {error:.2g}{unit} {where} {tolerance:.2g}{unit}"
+    if not np.isfinite(error):
+        text = "not finite, or not as many values as the truth"
+    if finding == LimitFinding.NO_LADDER:
+        text += "; one step only, so the limit is unknown"
+    elif not said:
+        text += "; no limit shown: not every step of the ladder gave such a curve"
+    else:
+        text += f"; {'limit ' if finding == LimitFinding.WITHIN else ''}{finding.value}: {said}"
+    return f"the question is ill-posed here; {text}" if verdict == Verdict.ILL_POSED else text
 
 
 def _distance(values: FloatArray, true: FloatArray) -> float:

@@ -2,8 +2,7 @@
 
 from __future__ import annotations
 
-import dataclasses
-from collections.abc import Callable, Iterable, Sequence
+from collections.abc import Callable, Collection, Iterable, Sequence
 from dataclasses import dataclass, field
 from typing import TYPE_CHECKING
 
@@ -18,17 +17,20 @@ from proofroll.metrics import Observable
 from proofroll.runner import Runner, WorkerDied
 from proofroll.scene_file import load_scene
 from proofroll.studies.planning import Plan, Planned, plan, point_name
-from proofroll.studies.reference import OF_EVENTS, Reference
+from proofroll.studies.reference import Reference
 from proofroll.trajectory import read
 
 if TYPE_CHECKING:
     import xarray as xr
 
 
-def worst(judgements: Sequence[Judgement]) -> Verdict:
-    """The worst verdict of any observable; failed if there is none."""
-    order = list(Verdict)
-    return max((judgement.verdict for judgement in judgements), key=order.index, default=Verdict.FAILED)
+_ORDER = list(Verdict)
+
+
+def worst(judgements: Sequence[Judgement], missing: Collection[str] = ()) -> Verdict:
+    """The worst verdict of any observable, those that are missing included; failed if there is no judgement."""
+    found = [judgement.verdict for judgement in judgements]
+    return max([*found, *([Verdict.INCOMPLETE] if found and missing else [])], key=_ORDER.index, default=Verdict.FAILED)
 
 
 @dataclass(frozen=True)
@@ -43,6 +45,8 @@ class Run:
         judgements: one per observable; empty if there is no trajectory.
         contradictions: sentences about what the claim did not expect.
         case: the run's case, or None.
+        missing: observables that the claim's tolerances judge and the run does not give.
+        remarks: what a reader must know about the run as a whole, one clause each.
     """
 
     row: Row
@@ -52,11 +56,15 @@ class Run:
     judgements: list[Judgement] = field(default_factory=list)
     contradictions: list[str] = field(default_factory=list)
     case: Case | None = None
+    missing: list[str] = field(default_factory=list)
+    remarks: list[str] = field(default_factory=list)
 
     @property
     def verdict(self) -> Verdict:
-        """The worst verdict of any observable."""
-        return worst(self.judgements) if self.result.status == Status.DONE else Verdict.FAILED
+        """The worst verdict of any observable; incomplete if all that is reported agrees but something is missing."""
+        if self.result.status != Status.DONE:
+            return Verdict.FAILED
+        return worst(self.judgements, self.missing)
 
 
 @dataclass(frozen=True)
@@ -81,8 +89,8 @@ class Outcome:
         return [run for run in lost if Verdict.FAILED not in run.row.expected(run.parameters)]
 
 
-# Observables that are judged even where the time of slip is ill-posed: they hold on every path.
-_EVERYWHERE = frozenset({"energy_balance", "force_audit", "gap", "creep"})
+# Where nobody can be judged; that contradicts no claim, and is expected of every engine.
+_NOBODY = frozenset({Verdict.ILL_POSED, Verdict.NOT_JUDGED})
 
 
 def evaluate(planned: Plan, results: dict[str, Result], runner: Runner) -> Outcome:
@@ -114,9 +122,11 @@ def evaluate(planned: Plan, results: dict[str, Result], runner: Runner) -> Outco
             for factor, case in run.ladder.items()
             if results[case.key].status == Status.DONE
         }
-        judgements = _judgements(run, comparison.bands[run.row.tolerance], references[name], trajectories)
-        contradictions = _contradictions(comparison, run, judgements)
-        judged.append(Run(run.row, run.parameters, run.facts, result, judgements, contradictions, main))
+        band = comparison.bands[run.row.tolerance]
+        judgements = _judgements(run, band, references[name], trajectories)
+        missing = sorted({*band.bounds, *run.row.bound} - {judgement.observable for judgement in judgements})
+        contradictions = _contradictions(comparison, run, judgements, missing)
+        judged.append(Run(run.row, run.parameters, run.facts, result, judgements, contradictions, main, missing))
     return Outcome(comparison, judged, planned.truths)
 
 
@@ -168,10 +178,9 @@ def _judgements(
             tolerance=tolerance.absolute(reference.sizes.get(name, 1.0)),
             scale=reference.sizes.get(name, 1.0),
             limit=_limit(run, name, curves),
-            ill_posed=reference.ill_posed and name not in _EVERYWHERE,
+            ladder=_has_ladder(run, curve),
+            doubt=reference.doubt(name),
         )
-        if reference.ill_posed and name in OF_EVENTS:
-            judgement = dataclasses.replace(judgement, verdict=Verdict.ILL_POSED)  # agreement would be luck
         judgements.append(judgement)
     return judgements
 
@@ -190,40 +199,49 @@ def _limit(run: Planned, name: str, curves: dict[float, dict[str, Observable]]) 
     return richardson(values, run.row.ladder, run.facts.order)
 
 
-def _contradictions(comparison: Comparison, run: Planned, judgements: list[Judgement]) -> list[str]:
+def _has_ladder(run: Planned, curve: Observable) -> bool:
+    """Whether small steps could confirm the curve: several were asked for, and there is something to converge."""
+    resolved = isinstance(run.facts, EngineFacts) and run.facts.resolution is not None
+    return resolved and len(run.row.ladder) > 1 and curve.values.size > 0
+
+
+def _contradictions(
+    comparison: Comparison, run: Planned, judgements: list[Judgement], missing: Collection[str]
+) -> list[str]:
     """What the claim did not expect, as sentences."""
     where = f"{run.row.engine} at {point_name(run.parameters)}"
     found = []
-    overall = worst(judgements)
-    # Only the truth makes a question ill-posed; where it does, that is expected of every engine.
-    expected = run.row.expected(run.parameters)
-    if overall not in {*expected, Verdict.ILL_POSED}:
+    row, expected = run.row, run.row.expected(run.parameters)
+    known = [judgement for judgement in judgements if judgement.verdict not in _NOBODY]
+    overall = worst(known, missing)
+    # Where something cannot be judged, the rest contradicts only by being worse than expected.
+    whole = len(known) == len(judgements)
+    worse = bool(known) and _ORDER.index(overall) > max(map(_ORDER.index, expected))
+    # What is missing is said below, name by name.
+    if overall not in {*expected, Verdict.INCOMPLETE} and (whole or worse):
         # Which observables make it so; where it is better than expected, all of them do.
-        guilty = [judgement for judgement in judgements if judgement.verdict == overall]
-        said = "; ".join(_said(judgement) for judgement in guilty)
+        guilty = [judgement for judgement in known if judgement.verdict == overall]
+        said = "; ".join(f"{item.observable} {item.verdict}: {item.reason}" for item in guilty)
         found.append(f"{where} {overall}, expected: {' or '.join(expected)} ({said})")
     for judgement in judgements:
-        name = judgement.observable
-        alone = run.row.expect_for.get(name)
-        if alone is not None and judgement.verdict not in alone:
-            found.append(f"{where}: {_said(judgement)}, expected: {' or '.join(alone)}")
-        if name in run.row.order and not _within(judgement.order, run.row.order[name]):
-            low, high = run.row.order[name]
+        name, verdict = judgement.observable, judgement.verdict
+        alone = row.expect_for.get(name)
+        if alone is not None and verdict not in {*alone, *_NOBODY}:
+            said = f"{name} {verdict}: {judgement.reason}"
+            found.append(f"{where}: {said}, expected: {' or '.join(alone)}")
+        if name in row.order and not _within(judgement.order, row.order[name]):
+            low, high = row.order[name]
             found.append(f"{where}: order of {name} is {judgement.order}, expected {low:g} to {high:g}")
-        if name in run.row.limit:
-            allowed = run.row.limit[name].absolute(judgement.scale)
+        if name in row.limit:
+            allowed = row.limit[name].absolute(judgement.scale)
             if judgement.limit_error is None or judgement.limit_error > allowed:
                 found.append(f"{where}: limit of {name} is off by {judgement.limit_error}, expected {allowed:.3g}")
-    row = run.row
-    claimed = {*comparison.bands[row.tolerance].bounds, *row.bound, *row.expect_for, *row.order, *row.limit}
+    claimed = {*row.bound, *row.expect_for, *row.order, *row.limit}
+    if Verdict.INCOMPLETE not in expected:
+        claimed |= {*missing}
     for name in sorted(claimed - {judgement.observable for judgement in judgements}):
         found.append(f"{where}: {name} is not reported, though {comparison.name} makes a claim about it")
     return found
-
-
-def _said(judgement: Judgement) -> str:
-    error, tolerance = f"{judgement.error:.3g} {judgement.unit}", f"{judgement.tolerance:.3g}"
-    return f"{judgement.observable} {judgement.verdict}, error {error} against {tolerance}"
 
 
 def _within(value: float | None, bounds: tuple[float, float]) -> bool:

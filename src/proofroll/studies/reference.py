@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING, Self
 
 import numpy as np
 
+from proofroll.agreement import Doubt
 from proofroll.events import events_of
 from proofroll.metrics import Observable, observables, scales
 from proofroll.scene import Scene
@@ -21,6 +22,8 @@ if TYPE_CHECKING:
 
 # Observables that hang on when slip begins.
 OF_EVENTS = frozenset({"first_slip", "event_order", "event_times"})
+# Observables that are judged even where the time of slip is ill-posed: they hold on every path.
+_EVERYWHERE = frozenset({"energy_balance", "force_audit", "gap", "creep"})
 
 
 @dataclass(frozen=True)
@@ -50,6 +53,12 @@ class Reference:
         """Whether the time of the first slip hangs on less than the parameters are known to."""
         onset = json.loads(self.dataset.attrs.get("onset", "{}"))
         return bool(onset.get("verdict") == "ill-posed")
+
+    def doubt(self, name: str) -> Doubt:
+        """What is left to be judged of an observable where the time of the first slip is ill-posed."""
+        if not self.ill_posed or name in _EVERYWHERE:
+            return Doubt.NONE
+        return Doubt.EVERYTHING if name in OF_EVENTS else Doubt.DIFFERENCES
 
     def scale(self, name: str) -> float | None:
         """What a percentage of an observable refers to: its size, for the first slip its time; None: nothing."""
