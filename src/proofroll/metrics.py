@@ -6,13 +6,14 @@ Everything here sees a trajectory and the scene's ball, never an engine.
 from __future__ import annotations
 
 import itertools
+import math
 from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
 import numpy as np
 
 from proofroll.events import events_of
-from proofroll.mechanics import resistance_moment
+from proofroll.mechanics import natural_acceleration, resistance_moment
 from proofroll.scene import RollingBall
 from proofroll.surfaces import FloatArray
 
@@ -42,6 +43,9 @@ WITHOUT_SCALE = frozenset({"first_slip", "event_times", "event_order"})
 # Degree of the splines through the samples. Sampled twenty times per oscillation of z, a derivative of degree 7 is
 # good to about 1e-6 of its size; what is left is measured on the truth and reported as the error bar.
 _DEGREE = 7
+# Least size of an observable over its natural one: a ball that moves by less than a hundredth of its radius (0.25 mm
+# inside the cylinder) stands still to the eye, and a range made of round-off is no size.
+_LEAST = 1e-2
 # The ends of an interpolating spline's derivative are worse than its middle; the audit leaves them out.
 _ENDS = 5
 
@@ -113,16 +117,22 @@ def scales(body: RollingBall, truth: xr.Dataset) -> dict[str, float]:
     """Size of each observable in this case, to which a relative tolerance refers.
 
     A coordinate's range; the largest normal force for every force; the largest needed friction; the initial kinetic
-    energy; the ball's radius for the gap; the initial speed for slip. Never zero.
+    energy; the ball's radius for the gap; the initial speed for slip. None is below a hundredth (:data:`_LEAST`) of
+    what is natural for the ball: its radius a, its largest force m max(g, |p̈|), √(g a), m g a, and a friction of 1.
     """
+    a, mass, weight = body.ball.radius, body.ball.mass, natural_acceleration(body)
     normal = float(np.max(np.abs(truth["N"].to_numpy())))
     speed = float(np.linalg.norm(body.v0))
-    kinetic = 0.5 * body.ball.mass * speed**2 + 0.5 * body.ball.inertia * float(body.w0 @ body.w0)
-    sizes = {name: float(np.ptp(truth[name].to_numpy())) for name in body.surface.coordinates}
-    sizes |= dict.fromkeys(("N", "F2", "F3", "force_audit"), normal)
-    sizes["needed_friction"] = float(np.nanmax(truth["needed_friction"].to_numpy()))
-    sizes |= {"energy_balance": kinetic, "gap": body.ball.radius, "slip": speed, "creep": body.ball.radius}
-    return {name: size if np.isfinite(size) and size > 0 else 1.0 for name, size in sizes.items()}
+    kinetic = 0.5 * mass * speed**2 + 0.5 * body.ball.inertia * float(body.w0 @ body.w0)
+    friction = truth["needed_friction"].to_numpy()
+    coordinates = zip(body.surface.coordinates, body.surface.length_scales, strict=True)
+    sizes_and_natural = {name: (float(np.ptp(truth[name].to_numpy())), a / metres) for name, metres in coordinates}
+    sizes_and_natural |= dict.fromkeys(("N", "F2", "F3", "force_audit"), (normal, mass * weight))
+    sizes_and_natural["needed_friction"] = (float(np.max(friction[np.isfinite(friction)], initial=0.0)), 1.0)
+    sizes_and_natural["energy_balance"] = (kinetic, mass * weight * a)
+    sizes_and_natural["slip"] = (speed, math.sqrt(weight * a))
+    sizes_and_natural |= dict.fromkeys(("gap", "creep"), (a, a))
+    return {name: max(_LEAST * natural, size) for name, (size, natural) in sizes_and_natural.items()}
 
 
 def energy_balance(body: RollingBall, dataset: xr.Dataset) -> FloatArray:

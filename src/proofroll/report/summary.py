@@ -30,6 +30,9 @@ def _agrees(comparisons: list[dict[str, Any]]) -> str:
     finer = sum(row["verdict"] == "converges" for row in rows)
     agree = "agrees" if count == 1 else "agree"
     said = f"Of {len(rows)} settings in {_comparisons(len(comparisons))}, {count} {agree} with the truth everywhere"
+    unconfirmed = sum(row["verdict"] == "unconfirmed" for row in rows)
+    if unconfirmed:
+        said += f", {unconfirmed} at this step with a limit that is not confirmed"
     if finer:
         said += f" and {finer} would with a finer step"
     complete = [score for score in scores(comparisons[0]) if score.worst is not None]

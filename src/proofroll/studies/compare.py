@@ -90,7 +90,7 @@ class Outcome:
 
 
 # Where nobody can be judged; that contradicts no claim, and is expected of every engine.
-_NOBODY = frozenset({Verdict.ILL_POSED, Verdict.NOT_JUDGED})
+NOBODY = frozenset({Verdict.ILL_POSED, Verdict.NOT_JUDGED})
 
 
 def evaluate(planned: Plan, results: dict[str, Result], runner: Runner) -> Outcome:
@@ -212,7 +212,7 @@ def _contradictions(
     where = f"{run.row.engine} at {point_name(run.parameters)}"
     found = []
     row, expected = run.row, run.row.expected(run.parameters)
-    known = [judgement for judgement in judgements if judgement.verdict not in _NOBODY]
+    known = [judgement for judgement in judgements if judgement.verdict not in NOBODY]
     overall = worst(known, missing)
     # Where something cannot be judged, the rest contradicts only by being worse than expected.
     whole = len(known) == len(judgements)
@@ -221,14 +221,15 @@ def _contradictions(
     if overall not in {*expected, Verdict.INCOMPLETE} and (whole or worse):
         # Which observables make it so; where it is better than expected, all of them do.
         guilty = [judgement for judgement in known if judgement.verdict == overall]
-        said = "; ".join(f"{item.observable} {item.verdict}: {item.reason}" for item in guilty)
+        guilty.sort(key=lambda item: item.error / item.tolerance, reverse=True)
+        said = "; ".join(f"{item.observable} {item.verdict}" for item in guilty)
+        said = f"{said}; {guilty[0].observable}: {guilty[0].reason}" if guilty else "nothing is judged"
         found.append(f"{where} {overall}, expected: {' or '.join(expected)} ({said})")
     for judgement in judgements:
         name, verdict = judgement.observable, judgement.verdict
         alone = row.expect_for.get(name)
-        if alone is not None and verdict not in {*alone, *_NOBODY}:
-            said = f"{name} {verdict}: {judgement.reason}"
-            found.append(f"{where}: {said}, expected: {' or '.join(alone)}")
+        if alone is not None and verdict not in {*alone, *NOBODY}:
+            found.append(f"{where}: {name} {verdict}, expected: {' or '.join(alone)} ({judgement.reason})")
         if name in row.order and not _within(judgement.order, row.order[name]):
             low, high = row.order[name]
             found.append(f"{where}: order of {name} is {judgement.order}, expected {low:g} to {high:g}")
