@@ -126,9 +126,9 @@ def judge(
         tells = "no order" if order is None else f"order {order:.3g}"
         said = f"off by {limit_error:.2g} ± {bar:.1g}{shown_unit}, {tells}"
     remarks: tuple[str, ...] = ()
-    if finding == LimitFinding.WITHIN and limit_error is not None and bar is not None:
-        if limit_error > _SEVERAL * bar + floor:
-            remarks = (f"within tolerance, but the limit of small steps is shown not to be the truth: {said}",)
+    within = finding == LimitFinding.WITHIN and limit_error is not None and bar is not None
+    if within and limit_error > _SEVERAL * bar + floor:
+        remarks = (f"within tolerance, but the limit of small steps is shown not to be the truth: {said}",)
     return Judgement(
         observable=name,
         unit=unit,
@@ -152,7 +152,8 @@ def _finding(
     """What the ladder says. A scattered one, whose rungs differ by as much as its error, shows no limit."""
     if limit_error is None or bar is None:
         return LimitFinding.NOT_SHOWN if ladder else LimitFinding.NO_LADDER
-    if settled and limit_error <= tolerance and bar <= tolerance:
+    far_inside = limit_error + _SEVERAL * bar <= tolerance  # scatter, but none that could leave the tolerance
+    if (settled and limit_error <= tolerance and bar <= tolerance) or far_inside:
         return LimitFinding.WITHIN
     return LimitFinding.ANOTHER if settled and limit_error - bar > tolerance else LimitFinding.NOT_SHOWN
 
