@@ -71,6 +71,7 @@ def resolve(engine: str, options: dict[str, Any]) -> dict[str, Any]:
             raise InputError("truth", ", ".join(options), "the truth has no settings; leave them out")
         code = digest([Path(proofroll.__file__).parent / "truth"])
         return dataclasses.asdict(EngineFacts("truth", _truth_version(), code, {}))
+    from proofroll.engine import SharesEquations
     from proofroll.registry import load_engine, resolve_settings
 
     kind = load_engine(engine)
@@ -84,6 +85,7 @@ def resolve(engine: str, options: dict[str, Any]) -> dict[str, Any]:
         settings=dataclasses.asdict(settings),
         resolution=settings.resolution,
         order=settings.order,
+        shares=list(kind.shares.get(settings.formulation, ())) if isinstance(kind, SharesEquations) else [],
     )
     return dataclasses.asdict(facts)
 

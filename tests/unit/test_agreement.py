@@ -119,6 +119,12 @@ def test_a_right_limit_is_not_remarked() -> None:
         assert (found.verdict, found.remarks) == (Verdict.AGREES, ())
 
 
+def test_an_extrapolation_that_is_off_by_a_few_of_its_bars_is_not_remarked() -> None:
+    """Error bars of limits are estimates; nobody is told to have another limit by eight of them."""
+    for bars, count in ((8, 0), (12, 1)):
+        assert len(verdict_of(1e-4, Limit(TRUE + bars * 1e-6, 1e-6, 2.0)).remarks) == count
+
+
 def test_converges_if_the_limit_is_the_truth() -> None:
     """Beyond the tolerance, with the truth as the limit of small steps, the step alone is too coarse."""
     found = verdict_of(0.011, ladder(1))

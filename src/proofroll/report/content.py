@@ -84,6 +84,7 @@ def _row(runs: list[Run]) -> dict[str, Any]:
         "verdict": max((run.verdict for run in judged), key=order.index),
         "verdicts": {verdict.value: sum(run.verdict == verdict for run in runs) for verdict in Verdict},
         **_why(judged),
+        "shared": next((run.shared for run in runs if run.shared), ""),
         "missing": sorted({name for run in runs for name in run.missing}),
         "remarks": _remarks(runs),
         "expected": first.row.expect,
@@ -115,7 +116,7 @@ def _why(runs: list[Run]) -> dict[str, str]:
 
 def _remarks(runs: list[Run]) -> list[str]:
     """What was remarked of the runs, and of the observable whose wrong limit is the largest part of its tolerance."""
-    found = list(dict.fromkeys(remark for run in runs for remark in run.remarks))
+    found = list(dict.fromkeys(run.shared for run in runs if run.shared))
     shown = [(run, item) for run in runs for item in run.judgements if item.remarks]
     if shown:
         run, item = max(shown, key=lambda pair: (pair[1].limit_error or 0.0) / pair[1].tolerance)
@@ -181,7 +182,7 @@ def _run(run: Run) -> dict[str, Any]:
         **_why([run]),
         "contradictions": run.contradictions,
         "missing": run.missing,
-        "remarks": run.remarks,
+        "shared": run.shared,
         "judgements": [dataclasses.asdict(judgement) for judgement in run.judgements],
         "certificate": run.result.certificate,
         "seconds_per_second": run.result.seconds_per_second,

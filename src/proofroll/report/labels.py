@@ -29,7 +29,7 @@ MEANINGS = {
 
 def verdict_text(row: dict[str, Any]) -> str:
     """The verdict of a row; where its cases have several, how many have which: ``failed 1/11 ✗2 ✓8``."""
-    counts = {word: count for word, count in row["verdicts"].items() if count}
+    counts = {word: row["verdicts"][word] for word in SYMBOLS if row["verdicts"].get(word)}
     if counts.keys() <= {row["verdict"]}:
         return str(row["verdict"])
     others = [f"{SYMBOLS[word]}{count}" for word, count in reversed(counts.items()) if word != row["verdict"]]

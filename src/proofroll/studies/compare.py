@@ -46,7 +46,7 @@ class Run:
         contradictions: sentences about what the claim did not expect.
         case: the run's case, or None.
         missing: observables that the claim's tolerances judge and the run does not give.
-        remarks: what a reader must know about the run as a whole, one clause each.
+        shared: which route of the truth rests on the same equations, as a clause; empty if none does.
     """
 
     row: Row
@@ -57,7 +57,7 @@ class Run:
     contradictions: list[str] = field(default_factory=list)
     case: Case | None = None
     missing: list[str] = field(default_factory=list)
-    remarks: list[str] = field(default_factory=list)
+    shared: str = ""
 
     @property
     def verdict(self) -> Verdict:
@@ -126,7 +126,10 @@ def evaluate(planned: Plan, results: dict[str, Result], runner: Runner) -> Outco
         judgements = _judgements(run, band, references[name], trajectories)
         missing = sorted({*band.bounds, *run.row.bound} - {judgement.observable for judgement in judgements})
         contradictions = _contradictions(comparison, run, judgements, missing)
-        judged.append(Run(run.row, run.parameters, run.facts, result, judgements, contradictions, main, missing))
+        shared = references[name].shared(run.facts.shares)
+        judged.append(
+            Run(run.row, run.parameters, run.facts, result, judgements, contradictions, main, missing, shared)
+        )
     return Outcome(comparison, judged, planned.truths)
 
 

@@ -4,6 +4,8 @@ from __future__ import annotations
 
 import itertools
 import json
+import re
+from collections.abc import Collection
 from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Self
@@ -53,6 +55,16 @@ class Reference:
         """Whether the time of the first slip hangs on less than the parameters are known to."""
         onset = json.loads(self.dataset.attrs.get("onset", "{}"))
         return bool(onset.get("verdict") == "ill-posed")
+
+    def shared(self, routes: Collection[str]) -> str:
+        """A sentence on which of the truth's two routes is among ``routes``, and what checks it; empty if none is."""
+        names = {key: str(self.dataset.attrs.get(key, "")) for key in ("route", "second_route")}
+        own = [key for key, name in names.items() if re.split(r"[,(]", name)[0].strip() in routes]
+        if not own:
+            return ""
+        others = [name for key, name in names.items() if key not in own]
+        checked = f"only {others[0]} checks both" if others else "nothing checks both"
+        return f"rests on the same equations as the truth itself ({names[own[0]]}): {checked}"
 
     def doubt(self, name: str) -> Doubt:
         """What is left to be judged of an observable where the time of the first slip is ill-posed."""
