@@ -110,28 +110,14 @@ def judge(
         doubt: what an ill-posed question leaves to be judged.
     """
     error = _distance(values, true)
-    limit_error = None if limit is None else _distance(limit.values, true)
-    bar = None if limit is None else limit.error_bar
     # Below this nobody can tell a curve from the truth.
     floor = truth_error_bar + _ROUND_OFF * max(scale, float(np.max(np.abs(true), initial=0.0)))
-    settled = limit is not None and (limit.shown or limit.error_bar <= max(_FLAT * tolerance, floor))
-    finding = _finding(limit_error, bar, tolerance, settled=settled, ladder=ladder)
-    beyond = limit_error is not None and bar is not None and limit_error - bar > tolerance
-    verdict = _verdict(error, tolerance, finding, beyond=beyond)
-    if doubt == Doubt.EVERYTHING or (doubt == Doubt.DIFFERENCES and verdict == Verdict.DIFFERS):
-        verdict = Verdict.ILL_POSED
-    if truth_error_bar > tolerance:
-        verdict = Verdict.NOT_JUDGED
-    order = None if limit is None or not np.isfinite(limit.order) else limit.order
     shown_unit = "" if unit == "1" else f" {unit}"
-    said = ""
-    if limit_error is not None:
-        tells = "no order" if order is None else f"order {order:.3g}"
-        said = f"off by {limit_error:.2g} ± {bar:.1g}{shown_unit}, {tells}"
-    remarks: tuple[str, ...] = ()
-    within = finding == LimitFinding.WITHIN and limit_error is not None and bar is not None
-    if within and limit_error > _SHOWN_WRONG * bar + floor:
-        remarks = (f"within tolerance, but the limit of small steps is shown not to be the truth: {said}",)
+    rungs = _Ladder(LimitFinding.NOT_SHOWN if ladder else LimitFinding.NO_LADDER)
+    if limit is not None:
+        rungs = _read(limit, _distance(limit.values, true), tolerance, floor, shown_unit)
+    verdict = Verdict.NOT_JUDGED if truth_error_bar > tolerance else _verdict(error, tolerance, rungs, doubt)
+    remark = f"within tolerance, but the limit of small steps is shown not to be the truth: {rungs.text}"
     return Judgement(
         observable=name,
         unit=unit,
@@ -140,54 +126,77 @@ def judge(
         tolerance=tolerance,
         scale=scale,
         verdict=verdict,
-        order=order,
-        limit_error=limit_error,
-        limit_error_bar=bar,
-        limit=finding,
-        reason=_reason(verdict, error, tolerance, truth_error_bar, shown_unit, finding, said),
-        remarks=remarks,
+        order=rungs.order,
+        limit_error=rungs.error,
+        limit_error_bar=rungs.bar,
+        limit=rungs.finding,
+        reason=_reason(verdict, error, tolerance, truth_error_bar, shown_unit, rungs),
+        remarks=(remark,) if rungs.wrong_within else (),
     )
 
 
-def _finding(
-    limit_error: float | None, bar: float | None, tolerance: float, *, settled: bool, ladder: bool
-) -> LimitFinding:
-    """What the ladder says. A scattered one, whose rungs differ by as much as its error, shows no limit."""
-    if limit_error is None or bar is None:
-        return LimitFinding.NOT_SHOWN if ladder else LimitFinding.NO_LADDER
-    far_inside = limit_error + _SEVERAL * bar <= tolerance  # scatter, but none that could leave the tolerance
-    if (settled and limit_error <= tolerance and bar <= tolerance) or far_inside:
-        return LimitFinding.WITHIN
-    return LimitFinding.ANOTHER if settled and limit_error - bar > tolerance else LimitFinding.NOT_SHOWN
+@dataclass(frozen=True)
+class _Ladder:
+    """What a ladder of steps tells.
+
+    Attributes:
+        finding: in one word.
+        error, bar, order: of the limit; None without one.
+        leaves: whether finer steps leave the tolerance, with or without an order.
+        wrong_within: whether the limit is within tolerance and yet shown not to be the truth.
+        text: the numbers, for a person.
+    """
+
+    finding: LimitFinding
+    error: float | None = None
+    bar: float | None = None
+    order: float | None = None
+    leaves: bool = False
+    wrong_within: bool = False
+    text: str = ""
 
 
-def _verdict(error: float, tolerance: float, finding: LimitFinding, *, beyond: bool) -> Verdict:
-    """The verdict where truth and question allow one; ``beyond``: finer steps leave the tolerance, order or not."""
-    if error <= tolerance:
-        if beyond:
-            return Verdict.DIFFERS
-        known = finding in {LimitFinding.NO_LADDER, LimitFinding.WITHIN}
+def _read(limit: Limit, error: float, tolerance: float, floor: float, unit: str) -> _Ladder:
+    """Reads a limit that is off by ``error``. Rungs that differ by as much as their error show no limit."""
+    bar, order = limit.error_bar, limit.order if np.isfinite(limit.order) else None
+    settled = limit.shown or bar <= max(_FLAT * tolerance, floor)
+    far_inside = error + _SEVERAL * bar <= tolerance  # scatter, but none that could leave the tolerance
+    finding, leaves = LimitFinding.NOT_SHOWN, error - bar > tolerance
+    if far_inside or (settled and error <= tolerance and bar <= tolerance):
+        finding = LimitFinding.WITHIN
+    elif settled and leaves:
+        finding = LimitFinding.ANOTHER
+    wrong = finding == LimitFinding.WITHIN and error > _SHOWN_WRONG * bar + floor
+    text = f"off by {error:.2g} ± {bar:.1g}{unit}, {'no order' if order is None else f'order {order:.3g}'}"
+    return _Ladder(finding, error, bar, order, leaves, wrong, text)
+
+
+def _verdict(error: float, tolerance: float, rungs: _Ladder, doubt: Doubt) -> Verdict:
+    """The verdict where the truth is known well enough for one."""
+    if doubt == Doubt.EVERYTHING:
+        return Verdict.ILL_POSED
+    if error <= tolerance and not rungs.leaves:
+        known = rungs.finding in {LimitFinding.NO_LADDER, LimitFinding.WITHIN}
         return Verdict.AGREES if known else Verdict.UNCONFIRMED
-    converges = finding == LimitFinding.WITHIN and np.isfinite(error)
-    return Verdict.CONVERGES if converges else Verdict.DIFFERS
+    if rungs.finding == LimitFinding.WITHIN and np.isfinite(error):
+        return Verdict.CONVERGES
+    return Verdict.DIFFERS if doubt == Doubt.NONE else Verdict.ILL_POSED
 
 
-def _reason(
-    verdict: Verdict, error: float, tolerance: float, truth_bar: float, unit: str, finding: LimitFinding, said: str
-) -> str:
+def _reason(verdict: Verdict, error: float, tolerance: float, truth_error_bar: float, unit: str, rungs: _Ladder) -> str:
     """Why the verdict, as a clause with numbers."""
     if verdict == Verdict.NOT_JUDGED:
-        return f"not judged: the truth's error bar {truth_bar:.2g}{unit} exceeds the tolerance {tolerance:.2g}{unit}"
-    where = "within" if error <= tolerance else "beyond"
-    text = f"error {error:.2g}{unit} {where} {tolerance:.2g}{unit}"
+        bar = f"{truth_error_bar:.2g}{unit}"
+        return f"not judged: the truth's error bar {bar} exceeds the tolerance {tolerance:.2g}{unit}"
+    text = f"error {error:.2g}{unit} {'within' if error <= tolerance else 'beyond'} {tolerance:.2g}{unit}"
     if not np.isfinite(error):
         text = "not finite, or not as many values as the truth"
-    if finding == LimitFinding.NO_LADDER:
+    if rungs.finding == LimitFinding.NO_LADDER:
         text += "; one step only, so the limit is unknown"
-    elif not said:
+    elif not rungs.text:
         text += "; no limit shown: not every step of the ladder gave such a curve"
     else:
-        text += f"; {'limit ' if finding == LimitFinding.WITHIN else ''}{finding.value}: {said}"
+        text += f"; {'limit ' if rungs.finding == LimitFinding.WITHIN else ''}{rungs.finding}: {rungs.text}"
     return f"the question is ill-posed here; {text}" if verdict == Verdict.ILL_POSED else text
 
 

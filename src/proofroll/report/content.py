@@ -102,7 +102,11 @@ def _why(runs: list[Run]) -> dict[str, str]:
     """Why the worst verdict: ``reason``, empty where everything agrees, and what the ladder says, ``limit``."""
     order = list(Verdict)
     worst = max((run.verdict for run in runs), key=order.index)
-    run, judgement = _furthest([(run, item) for run in runs if run.verdict == worst for item in run.judgements or [None]])
+    guilty: list[tuple[Run, Judgement | None]] = []
+    for run in runs:
+        if run.verdict == worst:
+            guilty += [(run, item) for item in run.judgements] or [(run, None)]
+    run, judgement = _furthest(guilty)
     where = f" at {point_name(run.parameters)}" if run.parameters else ""
     limit = judgement.limit.value if judgement else ""
     if worst == Verdict.AGREES:

@@ -210,8 +210,8 @@ def _limit(judgement: dict[str, Any]) -> str:
     """What the ladder of steps says, with its numbers; nothing where there is none."""
     if judgement["limit_error_bar"] is None:
         return ""
-    text = f"; {judgement['limit']}: off by {error(judgement['limit_error'])} ± {error(judgement['limit_error_bar'], 1)}"
-    return f"{text}, order {number(judgement['order'])}"
+    off = f"{error(judgement['limit_error'])} ± {error(judgement['limit_error_bar'], 1)}"
+    return f"; {judgement['limit']}: off by {off}, order {number(judgement['order'])}"
 
 
 def _cell(judgement: dict[str, Any], href: str) -> dict[str, Any]:
