@@ -102,9 +102,13 @@ def judge(
     """Holds a curve and its limit of small steps against the true curve. The only place that gives a verdict.
 
     Args:
-        name, unit: of the observable.
-        values, true: the curve and the true one.
-        truth_error_bar, tolerance, scale: in that unit.
+        name: of the observable.
+        unit: of everything below.
+        values: the curve.
+        true: the true curve.
+        truth_error_bar: of the true curve.
+        tolerance: largest error that counts as agreement.
+        scale: size of the observable in this case.
         limit: of small steps, or None if there is none.
         ladder: whether several steps were asked for; without a limit they then confirm nothing.
         doubt: what an ill-posed question leaves to be judged.

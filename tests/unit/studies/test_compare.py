@@ -159,6 +159,15 @@ def test_a_silent_engine_does_not_plainly_agree(tmp_path: Path) -> None:
     assert full.contradictions[0].startswith("alpha at speed=4 agrees, expected: incomplete")
 
 
+def test_who_shares_a_route_with_the_truth_is_marked(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """A run of an engine that declares the truth's own equations is marked; one of an engine that does not is not."""
+    (run,) = judged(tmp_path / "other", claim([ROW], [4.0]), the_truth).runs
+    assert run.shared == ""
+    monkeypatch.setattr(f"{__name__}.FACTS", dataclasses.replace(FACTS, shares=["closed form"]))
+    (run,) = judged(tmp_path / "same", claim([ROW], [4.0]), the_truth).runs
+    assert run.shared.startswith("rests on the same equations as the truth itself (closed form (Blajer 2006))")
+
+
 @pytest.mark.parametrize("expect", [Verdict.AGREES, Verdict.CONVERGES, Verdict.DIFFERS])
 def test_a_tolerance_below_the_truth_contradicts_nobody(tmp_path: Path, expect: Verdict) -> None:
     """Where the truth is known less well than the tolerance no run agrees, and none contradicts, right or wrong."""
