@@ -37,7 +37,7 @@ def answered(run: Run, error: float = 0.0, limit: Limit | None = None, **changes
     """The run with one judgement, of z to a millimetre."""
     item = judge("z", "m", TRUE + error, TRUE, truth_error_bar=1e-12, tolerance=1e-3, scale=1.0, limit=limit)
     done = Result(Status.DONE, "done", trajectory=run.result.trajectory)
-    return dataclasses.replace(run, result=done, judgements=[item], contradictions=[], **changes)
+    return dataclasses.replace(run, result=done, judgements=[item], contradictions=[], **{"missing": []} | changes)
 
 
 def with_runs(outcome: Outcome, runs: Mapping[int, list[Run]]) -> Outcome:

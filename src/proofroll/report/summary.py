@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections import Counter
 from typing import Any
 
 from proofroll.metrics import OBSERVABLES
@@ -26,15 +27,18 @@ def _agrees(comparisons: list[dict[str, Any]]) -> str:
     if not comparisons:
         return "Nothing was compared with the truth in this report."
     rows = [row for comparison in comparisons for row in comparison["rows"]]
-    count = sum(row["verdict"] == "agrees" for row in rows)
-    finer = sum(row["verdict"] == "converges" for row in rows)
-    agree = "agrees" if count == 1 else "agree"
-    said = f"Of {len(rows)} settings in {_comparisons(len(comparisons))}, {count} {agree} with the truth everywhere"
-    unconfirmed = sum(row["verdict"] == "unconfirmed" for row in rows)
-    if unconfirmed:
-        said += f", {unconfirmed} at this step with a limit that is not confirmed"
-    if finer:
-        said += f" and {finer} would with a finer step"
+    counts = Counter(row["verdict"] for row in rows)
+    agree = "agrees" if counts["agrees"] == 1 else "agree"
+    said = f"Of {len(rows)} settings in {_comparisons(len(comparisons))}, "
+    said += f"{counts['agrees']} {agree} with the truth everywhere"
+    rest = {
+        "unconfirmed": "at this step, with a limit that is not confirmed",
+        "incomplete": "without reporting all that is judged",
+        "converges": "with a finer step",
+    }
+    parts = [f"{counts[verdict]} {words}" for verdict, words in rest.items() if counts[verdict]]
+    if parts:
+        said += f", {' and '.join(parts)}"
     first_rows = comparisons[0]["rows"]
     # Who rests on the truth's own equations is close to it whatever they are.
     others = [score for score in scores(comparisons[0]) if not first_rows[score.index]["shared"]]
