@@ -46,7 +46,7 @@ def verdict_table(content: dict[str, Any]) -> Table:
     names = columns(content)
     table = Table(title=Text(content["title"]), title_justify="left", box=None, padding=(0, 1, 0, 0))
     # Where the window is narrow these break between words, and nothing is cut.
-    table.add_column("engine formulation setting", min_width=_WORD)
+    table.add_column("engine formulation setting", min_width=_WORD, overflow="fold")
     table.add_column("step", no_wrap=True)
     table.add_column("verdict", min_width=_WORD)
     for name, unit in names:
