@@ -116,7 +116,8 @@ def made(tmp_path_factory: pytest.TempPathFactory) -> tuple[Outcome, Store]:
                 versions={row.engine: "1.0"},
                 trajectory=store.trajectory(run_case).name,
             )
-            runs.append(Run(row, point, run_case.engine, result, judgements, [], run_case))
+            silent = sorted(bounds.keys() - {judgement.observable for judgement in judgements})
+            runs.append(Run(row, point, run_case.engine, result, judgements, [], run_case, silent))
         missing = Result(Status.MISSING, "gamma is not installed here", versions={})
         runs.append(Run(rows[3], point, None, missing, [], ["gamma at this point missing"]))
     return Outcome(comparison, runs, truths), store

@@ -212,7 +212,7 @@ def test_quantities_have_their_symbols() -> None:
 def test_findings_are_written_from_the_data(written: tuple[dict[str, Any], Path]) -> None:
     """The sentences name the right rows."""
     found = written[0]["comparisons"][0]["findings"]
-    assert found["answer"].startswith("Of 4 engine settings, 2 agree with the truth")
+    assert found["answer"].startswith("Of 4 engine settings, 1 agrees with the truth")
     assert found["sentences"][0].startswith("Closest to the truth is alpha fine matched")
     assert "costs most with alpha fine default" in found["sentences"][1]
     assert found["sentences"][2].startswith("Not expected: gamma at this point missing")

@@ -190,7 +190,7 @@ def test_every_verdict_can_be_said(content: dict[str, Any]) -> None:
     assert set(SYMBOLS) == set(MEANINGS) == {verdict.value for verdict in Verdict}
     assert len(set(SYMBOLS.values())) == len(SYMBOLS)
     changed = copy.deepcopy(content["comparisons"][0])
-    changed["rows"][0]["verdict"] = "ill-posed"
+    changed["rows"][0] |= {"verdict": "ill-posed", "verdicts": {"ill-posed": 1}}
     out = console()
     with out.capture() as capture:
         out.print(verdict_table(changed))

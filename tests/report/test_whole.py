@@ -80,7 +80,9 @@ def test_exactly_three_sentences_from_the_data(report: Report) -> None:
     """What agrees best, what is silent, what to use; other data give other sentences, none at all still give three."""
     found = report.content["findings"]["sentences"]
     assert len(found) == 3
-    assert found[0].startswith("Of 4 settings in one comparison, 2 agree with the truth everywhere")
+    assert found[0].startswith(
+        "Of 4 settings in one comparison, 1 agrees with the truth everywhere, 1 without reporting all"
+    )
     assert "closest is alpha fine matched" in found[0]
     assert found[1].startswith("1 differs from the truth and runs to the end without a word, worst alpha fine default")
     assert found[1].endswith("1 of 2 boundaries of stability and accuracy are passed without a word.")

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import itertools
 from collections.abc import Sequence
 from dataclasses import dataclass
 
@@ -25,12 +26,14 @@ class Limit:
         values: Richardson's extrapolation, shape (time,).
         error_bar: its uncertainty, largest over time: twice what the last extrapolation changed, or, where the order
             is no integer, how far two extrapolations differ.
-        order: observed order of convergence, NaN where the differences do not shrink.
+        order: observed order of convergence, NaN where there is none in (0, 20].
+        shown: whether the differences shrink, so that there is a limit to speak of.
     """
 
     values: FloatArray
     error_bar: float
     order: float
+    shown: bool = True
 
 
 def richardson(curves: Sequence[FloatArray], steps: Sequence[float], declared: int | None = None) -> Limit:
@@ -53,8 +56,8 @@ def richardson(curves: Sequence[FloatArray], steps: Sequence[float], declared: i
         return Limit(fine, first, float("nan"))
     order = observed_order(first, last, h)
     if not np.isfinite(order) or order < _NO_CONVERGENCE:
-        # The finest curve, as uncertain as the largest change seen.
-        return Limit(fine, max(first, last), float("nan"))
+        # The finest curve, as uncertain as the largest change seen; from one that vanishes at once no order follows.
+        return Limit(fine, max(first, last), float("nan"), shown=last < first * (h[1] / h[0]) ** _NO_CONVERGENCE)
     power = declared or max(1, round(order))
     if abs(order - power) > _ASYMPTOTIC:
         return Limit(fine, 2 * last * max(1.0, 1 / (h[1] ** order - 1)), order)
@@ -94,7 +97,8 @@ def _kept(coarse: float, fine: float, power: int) -> float:
 
 def tightest(curves: Sequence[FloatArray]) -> Limit:
     """Limit of an adaptive method: its tightest curve, as uncertain as the last tightening changed it."""
-    return Limit(curves[-1], size(curves[-1] - curves[-2]), float("nan"))
+    changes = [size(after - before) for before, after in itertools.pairwise(curves)]
+    return Limit(curves[-1], changes[-1], float("nan"), shown=len(changes) == 1 or changes[-1] < changes[-2])
 
 
 def size(values: FloatArray) -> float:

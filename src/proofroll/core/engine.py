@@ -237,6 +237,18 @@ class CannotLeaveOut(Protocol):
     inherent: ClassVar[Mapping[str, Mapping[str, str]]]
 
 
+@runtime_checkable
+class SharesEquations(Protocol):
+    """What an engine has besides, if some of its formulations rest on the equations of a route of the truth.
+
+    Attributes:
+        shares: formulation -> routes (the part of a route's name before the comma or bracket). Where the truth takes
+            such a route, agreement with it is news only as far as the other route agrees too, and is marked.
+    """
+
+    shares: ClassVar[Mapping[str, Sequence[str]]]
+
+
 def whole_steps(start: float, end: float, dt: float) -> int:
     """Number of steps of size ``dt`` [s] from ``start`` to ``end`` [s].
 

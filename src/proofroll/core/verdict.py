@@ -10,15 +10,46 @@ import numpy as np
 from proofroll.core.arrays import FloatArray
 from proofroll.core.convergence import Limit
 
+# A ladder whose rungs differ by less than this part of the tolerance needs no order: were the differences never to
+# shrink, twenty further halvings, a step a million times finer, would move the curve by the tolerance at most.
+_FLAT = 1 / 20
+# Scatter that may be this many times as large without leaving the tolerance is no doubt.
+_SEVERAL = 3
+# A limit is shown to be wrong by this many of its error bars: extrapolations of engines of second order that solve the
+# scene's own equations were off by up to 8 of theirs, those of softened contacts by 20 to 20,000.
+_SHOWN_WRONG = 10
+# Round-off of a curve, relative to its size: a thousand operations, each off by one machine epsilon.
+_ROUND_OFF = 1e3 * np.finfo(float).eps
+
 
 class Verdict(StrEnum):
-    """How a run stands to the truth."""
+    """How a run stands to the truth, from best to worst."""
 
-    AGREES = "agrees"  # within tolerance at this step
-    CONVERGES = "converges"  # not yet, but the limit of small steps is the truth
+    AGREES = "agrees"  # within tolerance at this step, and the ladder of steps, if there is one, confirms it
+    UNCONFIRMED = "unconfirmed"  # within tolerance at this step, but the ladder does not confirm the limit
+    INCOMPLETE = "incomplete"  # all that is reported agrees, but not all that is to be judged is reported
+    CONVERGES = "converges"  # not yet, but the limit of small steps is within tolerance
     ILL_POSED = "ill-posed"  # here the answer hangs on less than the parameters are known to; nobody can be judged
-    DIFFERS = "differs"  # the limit is something else, or no limit shows: not this model at this step
+    NOT_JUDGED = "not-judged"  # the tolerance is below the truth's own error bar; nobody can be judged
+    DIFFERS = "differs"  # not this model at this step; what the ladder says is in LimitFinding
     FAILED = "failed"  # there is no result
+
+
+class LimitFinding(StrEnum):
+    """What a ladder of steps says about the limit of small steps."""
+
+    NO_LADDER = "no ladder"  # only one step was run
+    WITHIN = "within tolerance"  # of the truth, and known to within the tolerance
+    ANOTHER = "another limit"  # it is beyond the tolerance by more than its error bar
+    NOT_SHOWN = "no limit shown"  # the runs do not settle, or too slowly to tell
+
+
+class Doubt(StrEnum):
+    """What an ill-posed question leaves to be judged."""
+
+    NONE = "none"  # the question is well posed
+    DIFFERENCES = "differences"  # who differs is not judged
+    EVERYTHING = "everything"  # nor who agrees, which would be luck
 
 
 @dataclass(frozen=True)
@@ -35,6 +66,9 @@ class Judgement:
         order: observed order, or None.
         limit_error: distance of the limit of small steps from the truth, or None without a ladder.
         limit_error_bar: uncertainty of that limit.
+        limit: what the ladder says, see :class:`LimitFinding`.
+        reason: why this verdict, as a clause with numbers.
+        remarks: what a reader must know though it does not change the verdict, one clause each.
     """
 
     observable: str
@@ -47,6 +81,9 @@ class Judgement:
     order: float | None = None
     limit_error: float | None = None
     limit_error_bar: float | None = None
+    limit: LimitFinding = LimitFinding.NO_LADDER
+    reason: str = ""
+    remarks: tuple[str, ...] = ()
 
 
 def judge(
@@ -59,20 +96,32 @@ def judge(
     tolerance: float,
     scale: float,
     limit: Limit | None,
-    ill_posed: bool = False,
+    ladder: bool = False,
+    doubt: Doubt = Doubt.NONE,
 ) -> Judgement:
-    """Holds a curve and its limit of small steps against the true curve.
+    """Holds a curve and its limit of small steps against the true curve. The only place that gives a verdict.
 
-    Where the question is ill-posed, a curve that would differ is not judged.
+    Args:
+        name: of the observable.
+        unit: of everything below.
+        values: the curve.
+        true: the true curve.
+        truth_error_bar: of the true curve.
+        tolerance: largest error that counts as agreement.
+        scale: size of the observable in this case.
+        limit: of small steps, or None if there is none.
+        ladder: whether several steps were asked for; without a limit they then confirm nothing.
+        doubt: what an ill-posed question leaves to be judged.
     """
     error = _distance(values, true)
-    limit_error = None if limit is None else _distance(limit.values, true)
-    if error <= tolerance:
-        verdict = Verdict.AGREES
-    elif np.isfinite(error) and limit is not None and _converges(tolerance, limit, limit_error, truth_error_bar):
-        verdict = Verdict.CONVERGES
-    else:
-        verdict = Verdict.ILL_POSED if ill_posed else Verdict.DIFFERS
+    # Below this nobody can tell a curve from the truth.
+    floor = truth_error_bar + _ROUND_OFF * max(scale, float(np.max(np.abs(true), initial=0.0)))
+    shown_unit = "" if unit == "1" else f" {unit}"
+    rungs = _Ladder(LimitFinding.NOT_SHOWN if ladder else LimitFinding.NO_LADDER)
+    if limit is not None:
+        rungs = _read(limit, _distance(limit.values, true), tolerance, floor, shown_unit)
+    verdict = Verdict.NOT_JUDGED if truth_error_bar > tolerance else _verdict(error, tolerance, rungs, doubt)
+    remark = f"within tolerance, but the limit of small steps is shown not to be the truth: {rungs.text}"
     return Judgement(
         observable=name,
         unit=unit,
@@ -81,19 +130,78 @@ def judge(
         tolerance=tolerance,
         scale=scale,
         verdict=verdict,
-        order=None if limit is None or not np.isfinite(limit.order) else limit.order,
-        limit_error=limit_error,
-        limit_error_bar=None if limit is None else limit.error_bar,
+        order=rungs.order,
+        limit_error=rungs.error,
+        limit_error_bar=rungs.bar,
+        limit=rungs.finding,
+        reason=_reason(verdict, error, tolerance, truth_error_bar, shown_unit, rungs),
+        remarks=(remark,) if rungs.wrong_within else (),
     )
 
 
-def _converges(tolerance: float, limit: Limit, limit_error: float | None, truth_error_bar: float) -> bool:
-    """The limit is the truth within both error bars, and is known to within the tolerance.
+@dataclass(frozen=True)
+class _Ladder:
+    """What a ladder of steps tells.
 
-    Without the second condition a scattered ladder, whose error bar is as large as its error, would pass.
+    Attributes:
+        finding: in one word.
+        error, bar, order: of the limit; None without one.
+        leaves: whether finer steps leave the tolerance, with or without an order.
+        wrong_within: whether the limit is within tolerance and yet shown not to be the truth.
+        text: the numbers, for a person.
     """
-    near = limit_error is not None and limit_error <= limit.error_bar + truth_error_bar
-    return near and limit.error_bar <= tolerance
+
+    finding: LimitFinding
+    error: float | None = None
+    bar: float | None = None
+    order: float | None = None
+    leaves: bool = False
+    wrong_within: bool = False
+    text: str = ""
+
+
+def _read(limit: Limit, error: float, tolerance: float, floor: float, unit: str) -> _Ladder:
+    """Reads a limit that is off by ``error``. Rungs that differ by as much as their error show no limit."""
+    bar, order = limit.error_bar, limit.order if np.isfinite(limit.order) else None
+    settled = limit.shown or bar <= max(_FLAT * tolerance, floor)
+    far_inside = error + _SEVERAL * bar <= tolerance  # scatter, but none that could leave the tolerance
+    finding, leaves = LimitFinding.NOT_SHOWN, error - bar > tolerance
+    if far_inside or (settled and error <= tolerance and bar <= tolerance):
+        finding = LimitFinding.WITHIN
+    elif settled and leaves:
+        finding = LimitFinding.ANOTHER
+    wrong = finding == LimitFinding.WITHIN and error > _SHOWN_WRONG * bar + floor
+    text = f"off by {error:.2g} ± {bar:.1g}{unit}, {'no order' if order is None else f'order {order:.3g}'}"
+    return _Ladder(finding, error, bar, order, leaves, wrong, text)
+
+
+def _verdict(error: float, tolerance: float, rungs: _Ladder, doubt: Doubt) -> Verdict:
+    """The verdict where the truth is known well enough for one."""
+    if doubt == Doubt.EVERYTHING:
+        return Verdict.ILL_POSED
+    if error <= tolerance and not rungs.leaves:
+        known = rungs.finding in {LimitFinding.NO_LADDER, LimitFinding.WITHIN}
+        return Verdict.AGREES if known else Verdict.UNCONFIRMED
+    if rungs.finding == LimitFinding.WITHIN and np.isfinite(error):
+        return Verdict.CONVERGES
+    return Verdict.DIFFERS if doubt == Doubt.NONE else Verdict.ILL_POSED
+
+
+def _reason(verdict: Verdict, error: float, tolerance: float, truth_error_bar: float, unit: str, rungs: _Ladder) -> str:
+    """Why the verdict, as a clause with numbers."""
+    if verdict == Verdict.NOT_JUDGED:
+        bar = f"{truth_error_bar:.2g}{unit}"
+        return f"not judged: the truth's error bar {bar} exceeds the tolerance {tolerance:.2g}{unit}"
+    text = f"error {error:.2g}{unit} {'within' if error <= tolerance else 'beyond'} {tolerance:.2g}{unit}"
+    if not np.isfinite(error):
+        text = "not finite, or not as many values as the truth"
+    if rungs.finding == LimitFinding.NO_LADDER:
+        text += "; one step only, so the limit is unknown"
+    elif not rungs.text:
+        text += "; no limit shown: not every step of the ladder gave such a curve"
+    else:
+        text += f"; {'limit ' if rungs.finding == LimitFinding.WITHIN else ''}{rungs.finding}: {rungs.text}"
+    return f"the question is ill-posed here; {text}" if verdict == Verdict.ILL_POSED else text
 
 
 def _distance(values: FloatArray, true: FloatArray) -> float:

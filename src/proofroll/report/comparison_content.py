@@ -88,6 +88,10 @@ def _row(runs: list[Run]) -> dict[str, Any]:
         **_settings(first),
         "verdict": max((run.verdict for run in judged), key=order.index),
         "verdicts": {verdict.value: sum(run.verdict == verdict for run in runs) for verdict in Verdict},
+        **_why(judged),
+        "shared": next((run.shared for run in runs if run.shared), ""),
+        "missing": sorted({name for run in runs for name in run.missing}),
+        "remarks": _remarks(runs),
         "expected": first.row.expect,
         "expected_for": first.row.expect_for,
         "because": first.row.because,
@@ -99,15 +103,56 @@ def _row(runs: list[Run]) -> dict[str, Any]:
     }
 
 
+def _why(runs: list[Run]) -> dict[str, str]:
+    """Why the worst verdict: ``reason``, empty where everything agrees, and what the ladder says, ``limit``."""
+    order = list(Verdict)
+    worst = max((run.verdict for run in runs), key=order.index)
+    guilty: list[tuple[Run, Judgement | None]] = []
+    for run in runs:
+        if run.verdict == worst:
+            guilty += [(run, item) for item in run.judgements] or [(run, None)]
+    run, judgement = _furthest(guilty)
+    where = f" at {point_name(run.parameters)}" if run.parameters else ""
+    limit = judgement.limit.value if judgement else ""
+    if worst == Verdict.AGREES:
+        return {"reason": "", "limit": limit}
+    if worst == Verdict.INCOMPLETE:
+        return {"reason": f"agrees, but does not report {', '.join(run.missing)}", "limit": limit}
+    if judgement is None or worst == Verdict.FAILED:
+        return {"reason": f"{run.result.status}{where}: {run.result.message}", "limit": ""}
+    return {"reason": f"{judgement.observable}{where}: {judgement.reason}", "limit": limit}
+
+
+def _remarks(runs: list[Run]) -> list[str]:
+    """What was remarked of the runs, and of the observable whose wrong limit is the largest part of its tolerance."""
+    found = list(dict.fromkeys(run.shared for run in runs if run.shared))
+    shown = [(run, item) for run in runs for item in run.judgements if item.remarks]
+    if shown:
+        run, item = max(shown, key=lambda pair: (pair[1].limit_error or 0.0) / pair[1].tolerance)
+        where = f" at {point_name(run.parameters)}" if run.parameters else ""
+        found += [f"{item.observable}{where}: {remark}" for remark in item.remarks]
+    return found
+
+
+def _furthest(judged: list[tuple[Run, Judgement | None]]) -> tuple[Run, Judgement | None]:
+    """The worst verdict, among equals the one furthest beyond its tolerance."""
+    order = list(Verdict)
+
+    def badness(pair: tuple[Run, Judgement | None]) -> tuple[int, float]:
+        item = pair[1]
+        return (order.index(item.verdict), item.error / item.tolerance) if item else (-1, 0.0)
+
+    return max(judged, key=badness)
+
+
 def _judgement_of(run: Run, name: str) -> Judgement | None:
     return next((judgement for judgement in run.judgements if judgement.observable == name), None)
 
 
 def _worst(runs: list[Run], name: str) -> dict[str, Any]:
     """The judgement with the worst verdict, among equals the one furthest beyond its tolerance, and its point."""
-    order = list(Verdict)
-    judged = [(run, judgement) for run in runs if (judgement := _judgement_of(run, name)) is not None]
-    where, worst = max(judged, key=lambda pair: (order.index(pair[1].verdict), pair[1].error / pair[1].tolerance))
+    where, worst = _furthest([(run, _judgement_of(run, name)) for run in runs])
+    assert worst is not None  # some run has it, or the name would not be asked for
     return {**dataclasses.asdict(worst), "point": point_name(where.parameters)}
 
 
@@ -143,7 +188,10 @@ def _run(run: Run) -> dict[str, Any]:
         "status": run.result.status,
         "message": run.result.message,
         "verdict": run.verdict,
+        **_why([run]),
         "contradictions": run.contradictions,
+        "missing": run.missing,
+        "shared": run.shared,
         "judgements": [dataclasses.asdict(judgement) for judgement in run.judgements],
         "certificate": run.result.certificate,
         "seconds_per_second": run.result.seconds_per_second,

@@ -17,7 +17,8 @@ def findings(content: dict[str, Any]) -> dict[str, Any]:
     return {
         "answer": _answer(content, found),
         "sentences": [
-            _closest(found),
+            # Who rests on the truth's own equations is close to it whatever they are.
+            _closest([score for score in found if not content["rows"][score.index]["shared"]]),
             _obvious(content, found),
             *_order(content),
             *_ill_posed(content),
@@ -32,8 +33,11 @@ def _answer(content: dict[str, Any], found: list[Score]) -> str:
     rows = content["rows"]
     said = {
         "agrees": ("agrees", "agree", "with the truth in every observable and every case"),
+        "unconfirmed": ("agrees", "agree", "at this step with a limit that is not confirmed"),
+        "incomplete": ("agrees", "agree", "without reporting all that is judged"),
         "converges": ("needs", "need", "a finer step"),
         "ill-posed": ("is", "are", "beyond judgement somewhere, where the question is ill-posed"),
+        "not-judged": ("is", "are", "held against a tolerance below the truth's own error bar, so not judged"),
         "differs": ("differs", "differ", "somewhere, with no limit of small steps at the truth"),
         "failed": ("gives", "give", "no result somewhere"),
     }
@@ -125,7 +129,7 @@ def _order(content: dict[str, Any]) -> list[str]:
         return []
     wrong: dict[int, int] = {}
     for run, judgement in judged:
-        if judgement["verdict"] != "agrees":
+        if judgement["verdict"] not in {"agrees", "unconfirmed"}:
             wrong[run["row"]] = wrong.get(run["row"], 0) + 1
     if not wrong:
         return ["Every setting slips and sticks in the truth's order, wherever that is well posed."]

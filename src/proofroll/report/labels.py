@@ -5,14 +5,48 @@ from __future__ import annotations
 import unicodedata
 from typing import Any
 
-SYMBOLS = {"agrees": "✓", "converges": "≈", "ill-posed": "?", "differs": "✗", "failed": "!"}
+SYMBOLS = {
+    "agrees": "✓",
+    "unconfirmed": "○",
+    "incomplete": "◐",
+    "converges": "≈",
+    "ill-posed": "?",
+    "not-judged": "□",
+    "differs": "✗",
+    "failed": "!",
+}
 MEANINGS = {
-    "agrees": "within tolerance at this step",
-    "converges": "not within tolerance yet, but the limit of small steps is the truth: right physics, step too coarse",
+    "agrees": "within tolerance at this step; where there is a ladder of steps, so is its limit",
+    "unconfirmed": "agrees at this step, limit not confirmed: the ladder of steps does not tell it that closely",
+    "incomplete": "agrees in all that it reports, but does not report all that is judged",
+    "converges": "not within tolerance yet, but the limit of small steps is: right physics, step too coarse",
     "ill-posed": "here the answer hangs on less than the parameters are known to: nobody is judged by it",
-    "differs": "the limit of small steps is something else, or no limit shows",
+    "not-judged": "the truth's own error bar exceeds the tolerance: nobody is judged by it",
+    "differs": "not within tolerance: another limit, no limit shown, or one step only; each says which",
     "failed": "there is no result; the row says why",
 }
+
+
+def verdict_text(row: dict[str, Any]) -> str:
+    """The verdict of a row; where its cases have several, how many have which: ``failed 1/11 ✗2 ✓8``."""
+    counts = {word: row["verdicts"][word] for word in SYMBOLS if row["verdicts"].get(word)}
+    if counts.keys() <= {row["verdict"]}:
+        return str(row["verdict"])
+    others = [f"{SYMBOLS[word]}{count}" for word, count in reversed(counts.items()) if word != row["verdict"]]
+    return " ".join([row["verdict"], f"{counts[row['verdict']]}/{sum(counts.values())}", *others])
+
+
+def detail(entry: dict[str, Any]) -> str:
+    """What a verdict leaves open, in few words; of a row, a run or a judgement."""
+    match entry["verdict"]:
+        case "differs":
+            return {"no ladder": "one step only"}.get(entry["limit"], str(entry["limit"]))
+        case "unconfirmed":
+            return "limit not confirmed"
+        case "incomplete":
+            return f"does not report {', '.join(symbol(name) for name in entry.get('missing', ()))}"
+        case _:
+            return ""
 
 
 def number(value: float | None, digits: int = 2, none: str = "–") -> str:

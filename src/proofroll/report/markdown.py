@@ -7,7 +7,7 @@ from typing import Any
 
 from proofroll.core.comparison import Tolerance
 from proofroll.core.engine import Level
-from proofroll.report.labels import SYMBOLS
+from proofroll.report.labels import SYMBOLS, verdict_text
 from proofroll.report.labels import number as short
 from proofroll.report.terminal import columns, number, step
 from proofroll.report.tradeoff_tables import name_of, step_of
@@ -22,7 +22,7 @@ def verdict_table(content: dict[str, Any]) -> str:
     for row in content["rows"]:
         errors = [row["observables"][name]["error"] if name in row["observables"] else None for name, _ in names]
         cells = [row["name"], row["formulation"] or "", row["setting"], step(row)]
-        cells.append(f"{SYMBOLS[row['verdict']]} {row['verdict']}")
+        cells.append(f"{SYMBOLS[row['verdict']]} {verdict_text(row)}")
         cells += [number(error) for error in errors]
         cells.append(number(row["seconds_per_second"]))
         lines.append("| " + " | ".join(cells) + " |")

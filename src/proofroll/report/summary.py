@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections import Counter
 from typing import Any
 
 from proofroll.report.labels import headlines, names, number, symbol, unit
@@ -25,13 +26,22 @@ def _agrees(comparisons: list[dict[str, Any]]) -> str:
     if not comparisons:
         return "Nothing was compared with the truth in this report."
     rows = [row for comparison in comparisons for row in comparison["rows"]]
-    count = sum(row["verdict"] == "agrees" for row in rows)
-    finer = sum(row["verdict"] == "converges" for row in rows)
-    agree = "agrees" if count == 1 else "agree"
-    said = f"Of {len(rows)} settings in {_comparisons(len(comparisons))}, {count} {agree} with the truth everywhere"
-    if finer:
-        said += f" and {finer} would with a finer step"
-    complete = [score for score in scores(comparisons[0]) if score.worst is not None]
+    counts = Counter(row["verdict"] for row in rows)
+    agree = "agrees" if counts["agrees"] == 1 else "agree"
+    said = f"Of {len(rows)} settings in {_comparisons(len(comparisons))}, "
+    said += f"{counts['agrees']} {agree} with the truth everywhere"
+    rest = {
+        "unconfirmed": "at this step, with a limit that is not confirmed",
+        "incomplete": "without reporting all that is judged",
+        "converges": "with a finer step",
+    }
+    parts = [f"{counts[verdict]} {words}" for verdict, words in rest.items() if counts[verdict]]
+    if parts:
+        said += f", {' and '.join(parts)}"
+    first_rows = comparisons[0]["rows"]
+    # Who rests on the truth's own equations is close to it whatever they are.
+    others = [score for score in scores(comparisons[0]) if not first_rows[score.index]["shared"]]
+    complete = [score for score in others if score.worst is not None]
     if not complete:
         return f"{said}; none gave motion and forces in every case of the first comparison."
     first = " in the first" if len(comparisons) > 1 else ""

@@ -4,7 +4,18 @@ from __future__ import annotations
 
 from typing import Any
 
-from proofroll.report.labels import SYMBOLS, error, names, number, setting, step, symbol, unit
+from proofroll.report.labels import (
+    SYMBOLS,
+    detail,
+    error,
+    names,
+    number,
+    setting,
+    step,
+    symbol,
+    unit,
+    verdict_text,
+)
 
 
 def anchor(comparison: int, row: int, point: int) -> str:
@@ -32,7 +43,8 @@ def overview(content: dict[str, Any], comparison: int) -> dict[str, Any]:
             {
                 **_head(row),
                 "verdict": row["verdict"],
-                "verdict_text": _verdict_text(row),
+                "verdict_text": verdict_text(row),
+                "detail": detail(row),
                 "href": anchor(comparison, index, points.index(worst["point"])),
                 "message": row["message"],
                 "as_expected": row["as_expected"],
@@ -66,6 +78,7 @@ def at_point(content: dict[str, Any], comparison: int, point: int, name: str) ->
                 **_head(run),
                 "verdict": run["verdict"],
                 "verdict_text": run["verdict"],
+                "detail": detail(run),
                 "href": href,
                 "message": run["message"] if run["status"] != "done" else "",
                 "as_expected": not run["contradictions"],
@@ -187,12 +200,18 @@ def _head(row: dict[str, Any]) -> dict[str, Any]:
     return {"engine": row["engine"], "name": row["name"], "setting": setting(row), "step": step(row)}
 
 
-def _verdict_text(row: dict[str, Any]) -> str:
-    """The verdict; with a count where only some of the points have it, or the question is ill-posed at some."""
-    count, total = row["verdicts"].get(row["verdict"], 0), sum(row["verdicts"].values())
-    text = str(row["verdict"]) if count == total else f"{row['verdict']} {count}/{total}"
-    beyond = row["verdicts"].get("ill-posed", 0)
-    return f"{text}, {SYMBOLS['ill-posed']} {beyond}" if beyond and row["verdict"] != "ill-posed" else text
+def remarks(content: dict[str, Any]) -> list[tuple[str, str]]:
+    """What was remarked of each row, with its name."""
+    shown = names(content["rows"])
+    return [(name, text) for name, row in zip(shown, content["rows"], strict=True) for text in row["remarks"]]
+
+
+def _limit(judgement: dict[str, Any]) -> str:
+    """What the ladder of steps says, with its numbers; nothing where there is none."""
+    if judgement["limit_error_bar"] is None:
+        return ""
+    off = f"{error(judgement['limit_error'])} ± {error(judgement['limit_error_bar'], 1)}"
+    return f"; {judgement['limit']}: off by {off}, order {number(judgement['order'])}"
 
 
 def _cell(judgement: dict[str, Any], href: str) -> dict[str, Any]:
@@ -204,7 +223,8 @@ def _cell(judgement: dict[str, Any], href: str) -> dict[str, Any]:
         "text": error(judgement["error"]),
         "href": href,
         "title": f"{symbol(judgement['observable'])} {judgement['verdict']}: error {error(judgement['error'])} ± "
-        f"{number(judgement['truth_error_bar'], 1)} {text}, tolerance {number(judgement['tolerance'])}{where}",
+        f"{number(judgement['truth_error_bar'], 1)} {text}, tolerance {number(judgement['tolerance'])}{where}"
+        f"{_limit(judgement)}",
     }
 
 

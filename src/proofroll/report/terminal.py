@@ -9,13 +9,23 @@ from rich.console import Console
 from rich.table import Table
 from rich.text import Text
 
-from proofroll.report.labels import SYMBOLS, headlines
+from proofroll.report.labels import SYMBOLS, headlines, names, verdict_text
 
 if TYPE_CHECKING:
     from proofroll.drill.row import Drilled
 
 WIDTH = 100
-_STYLES = {"agrees": "green", "converges": "yellow", "ill-posed": "cyan", "differs": "red", "failed": "bold red"}
+_WORD, _NUMBER = 14, 7  # characters of the longest word and of a number
+_STYLES = {
+    "agrees": "green",
+    "unconfirmed": "yellow",
+    "incomplete": "yellow",
+    "converges": "yellow",
+    "ill-posed": "cyan",
+    "not-judged": "cyan",
+    "differs": "red",
+    "failed": "bold red",
+}
 
 
 def console() -> Console:
@@ -34,11 +44,12 @@ def verdict_table(content: dict[str, Any]) -> Table:
     """One line per engine with settings: the worst over all points of the parameters."""
     names = columns(content)
     table = Table(title=Text(content["title"]), title_justify="left", box=None, padding=(0, 1, 0, 0))
-    table.add_column("engine formulation setting", no_wrap=True)
+    # Where the window is narrow these break between words, and nothing is cut.
+    table.add_column("engine formulation setting", min_width=_WORD, overflow="fold")
     table.add_column("step", no_wrap=True)
-    table.add_column("verdict", no_wrap=True)
+    table.add_column("verdict", min_width=_WORD)
     for name, unit in names:
-        table.add_column(Text(f"{name} [{unit}]"), justify="right", no_wrap=True)
+        table.add_column(Text(f"{name} [{unit}]"), justify="right", min_width=_NUMBER)
     table.add_column("order", justify="right", no_wrap=True)
     table.add_column("s/s", justify="right", no_wrap=True)
     table.add_column("", no_wrap=True)
@@ -50,7 +61,7 @@ def verdict_table(content: dict[str, Any]) -> Table:
         table.add_row(
             Text(" ".join(filter(None, (row["name"], row["formulation"], row["setting"])))),
             step(row),
-            Text(f"{SYMBOLS[verdict]} {verdict}", style=_STYLES[verdict]),
+            Text(f"{SYMBOLS[verdict]} {verdict_text(row)}{'*' if row['remarks'] else ''}", style=_STYLES[verdict]),
             *(number(observables[name]["error"] if name in observables else None) for name, _ in names),
             number(worst.get("order")),
             number(row["seconds_per_second"]),
@@ -131,6 +142,9 @@ def closing_lines(content: dict[str, Any]) -> list[str]:
     counts = {verdict: sum(row["verdict"] == verdict for row in rows) for verdict in SYMBOLS}
     said = ", ".join(f"{count} {verdict}" for verdict, count in counts.items() if count)
     lines = [f"{len(rows)} engine settings, {len(content['runs'])} runs in all: {said}."]
+    shown = list(zip(names(rows), rows, strict=True))
+    lines += [f"{SYMBOLS[row['verdict']]} {name}: {row['reason']}" for name, row in shown if row["reason"]]
+    lines += [f"* {name}: {remark}" for name, row in shown for remark in row["remarks"]]
     if content["contradictions"]:
         lines.append(
             f"{len(content['contradictions'])} findings contradict what {content['name']} expects (!! above); first:"

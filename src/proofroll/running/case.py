@@ -35,6 +35,7 @@ class EngineFacts:
         settings: complete settings, by name.
         resolution: name of the setting that trades speed for accuracy, ``dt`` or ``rtol``.
         order: declared order of convergence, or None.
+        shares: routes of the truth whose equations it rests on, see :class:`proofroll.core.engine.SharesEquations`.
     """
 
     name: str
@@ -43,6 +44,7 @@ class EngineFacts:
     settings: dict[str, Any]
     resolution: str | None = None
     order: int | None = None
+    shares: list[str] = field(default_factory=list)
 
 
 @dataclass(frozen=True)

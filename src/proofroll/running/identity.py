@@ -52,6 +52,7 @@ def resolve(engine: str, options: dict[str, Any]) -> dict[str, Any]:
             raise InputError("truth", ", ".join(options), "the truth has no settings; leave them out")
         code = digest([Path(inspect.getfile(truth)).parent for truth in load_truths()])
         return dataclasses.asdict(EngineFacts("truth", _truth_version(), code, {}))
+    from proofroll.core.engine import SharesEquations
     from proofroll.core.plugins import load_engine, resolve_settings
 
     kind = load_engine(engine)
@@ -65,6 +66,7 @@ def resolve(engine: str, options: dict[str, Any]) -> dict[str, Any]:
         settings=dataclasses.asdict(settings),
         resolution=settings.resolution,
         order=settings.order,
+        shares=list(kind.shares.get(settings.formulation, ())) if isinstance(kind, SharesEquations) else [],
     )
     return dataclasses.asdict(facts)
 

@@ -2,8 +2,7 @@
 
 from __future__ import annotations
 
-import dataclasses
-from collections.abc import Callable, Iterable, Sequence
+from collections.abc import Callable, Collection, Iterable, Sequence
 from dataclasses import dataclass, field
 from typing import TYPE_CHECKING
 
@@ -13,7 +12,6 @@ from proofroll.core.arrays import FloatArray
 from proofroll.core.comparison import Band, Comparison, Row
 from proofroll.core.convergence import Limit, richardson, tightest
 from proofroll.core.errors import Missing, ProofrollError
-from proofroll.core.observable import Role
 from proofroll.core.verdict import Judgement, Verdict, judge
 from proofroll.files.netcdf import read
 from proofroll.files.scene_file import load_scene
@@ -26,10 +24,13 @@ if TYPE_CHECKING:
     import xarray as xr
 
 
-def worst(judgements: Sequence[Judgement]) -> Verdict:
-    """The worst verdict of any observable; failed if there is none."""
-    order = list(Verdict)
-    return max((judgement.verdict for judgement in judgements), key=order.index, default=Verdict.FAILED)
+_ORDER = list(Verdict)
+
+
+def worst(judgements: Sequence[Judgement], missing: Collection[str] = ()) -> Verdict:
+    """The worst verdict of any observable, those that are missing included; failed if there is no judgement."""
+    found = [judgement.verdict for judgement in judgements]
+    return max([*found, *([Verdict.INCOMPLETE] if found and missing else [])], key=_ORDER.index, default=Verdict.FAILED)
 
 
 @dataclass(frozen=True)
@@ -44,6 +45,8 @@ class Run:
         judgements: one per observable; empty if there is no trajectory.
         contradictions: sentences about what the claim did not expect.
         case: the run's case, or None.
+        missing: observables that the claim's tolerances judge and the run does not give.
+        shared: which route of the truth rests on the same equations, as a clause; empty if none does.
     """
 
     row: Row
@@ -53,11 +56,15 @@ class Run:
     judgements: list[Judgement] = field(default_factory=list)
     contradictions: list[str] = field(default_factory=list)
     case: Case | None = None
+    missing: list[str] = field(default_factory=list)
+    shared: str = ""
 
     @property
     def verdict(self) -> Verdict:
-        """The worst verdict of any observable."""
-        return worst(self.judgements) if self.result.status == Status.DONE else Verdict.FAILED
+        """The worst verdict of any observable; incomplete if all that is reported agrees but something is missing."""
+        if self.result.status != Status.DONE:
+            return Verdict.FAILED
+        return worst(self.judgements, self.missing)
 
 
 @dataclass(frozen=True)
@@ -80,6 +87,10 @@ class Outcome:
         broken = {Status.MISSING, Status.CRASHED, Status.TIMEOUT}
         lost = [run for run in self.runs if run.result.status in broken]
         return [run for run in lost if Verdict.FAILED not in run.row.expected(run.parameters)]
+
+
+# Where nobody can be judged; that contradicts no claim, and is expected of every engine.
+NOBODY = frozenset({Verdict.ILL_POSED, Verdict.NOT_JUDGED})
 
 
 def evaluate(planned: Plan, results: dict[str, Result], runner: Runner) -> Outcome:
@@ -111,9 +122,14 @@ def evaluate(planned: Plan, results: dict[str, Result], runner: Runner) -> Outco
             for factor, case in run.ladder.items()
             if results[case.key].status == Status.DONE
         }
-        judgements = _judgements(run, comparison.bands[run.row.tolerance], references[name], trajectories)
-        contradictions = _contradictions(comparison, run, judgements)
-        judged.append(Run(run.row, run.parameters, run.facts, result, judgements, contradictions, main))
+        band = comparison.bands[run.row.tolerance]
+        judgements = _judgements(run, band, references[name], trajectories)
+        missing = sorted({*band.bounds, *run.row.bound} - {judgement.observable for judgement in judgements})
+        contradictions = _contradictions(comparison, run, judgements, missing)
+        shared = references[name].shared(run.facts.shares)
+        judged.append(
+            Run(run.row, run.parameters, run.facts, result, judgements, contradictions, main, missing, shared)
+        )
     return Outcome(comparison, judged, planned.truths)
 
 
@@ -166,10 +182,9 @@ def _judgements(
             tolerance=tolerance.absolute(reference.sizes.get(name, 1.0)),
             scale=reference.sizes.get(name, 1.0),
             limit=_limit(run, name, curves),
-            ill_posed=reference.ill_posed and item.hangs_on_events,
+            ladder=_has_ladder(run, curve),
+            doubt=reference.doubt(name),
         )
-        if reference.ill_posed and item.role == Role.EVENT:
-            judgement = dataclasses.replace(judgement, verdict=Verdict.ILL_POSED)  # agreement would be luck
         judgements.append(judgement)
     return judgements
 
@@ -188,40 +203,50 @@ def _limit(run: Planned, name: str, curves: dict[float, dict[str, FloatArray]]) 
     return richardson(values, run.row.ladder, run.facts.order)
 
 
-def _contradictions(comparison: Comparison, run: Planned, judgements: list[Judgement]) -> list[str]:
+def _has_ladder(run: Planned, curve: FloatArray) -> bool:
+    """Whether small steps could confirm the curve: several were asked for, and there is something to converge."""
+    resolved = isinstance(run.facts, EngineFacts) and run.facts.resolution is not None
+    return resolved and len(run.row.ladder) > 1 and curve.size > 0
+
+
+def _contradictions(
+    comparison: Comparison, run: Planned, judgements: list[Judgement], missing: Collection[str]
+) -> list[str]:
     """What the claim did not expect, as sentences."""
     where = f"{run.row.engine} at {point_name(run.parameters)}"
     found = []
-    overall = worst(judgements)
-    # Only the truth makes a question ill-posed; where it does, that is expected of every engine.
-    expected = run.row.expected(run.parameters)
-    if overall not in {*expected, Verdict.ILL_POSED}:
+    row, expected = run.row, run.row.expected(run.parameters)
+    known = [judgement for judgement in judgements if judgement.verdict not in NOBODY]
+    overall = worst(known, missing)
+    # Where something cannot be judged, the rest contradicts only by being worse than expected.
+    whole = len(known) == len(judgements)
+    worse = bool(known) and _ORDER.index(overall) > max(map(_ORDER.index, expected))
+    # What is missing is said below, name by name.
+    if overall not in {*expected, Verdict.INCOMPLETE} and (whole or worse):
         # Which observables make it so; where it is better than expected, all of them do.
-        guilty = [judgement for judgement in judgements if judgement.verdict == overall]
-        said = "; ".join(_said(judgement) for judgement in guilty)
+        guilty = [judgement for judgement in known if judgement.verdict == overall]
+        guilty.sort(key=lambda item: item.error / item.tolerance, reverse=True)
+        said = "; ".join(f"{item.observable} {item.verdict}" for item in guilty)
+        said = f"{said}; {guilty[0].observable}: {guilty[0].reason}" if guilty else "nothing is judged"
         found.append(f"{where} {overall}, expected: {' or '.join(expected)} ({said})")
     for judgement in judgements:
-        name = judgement.observable
-        alone = run.row.expect_for.get(name)
-        if alone is not None and judgement.verdict not in alone:
-            found.append(f"{where}: {_said(judgement)}, expected: {' or '.join(alone)}")
-        if name in run.row.order and not _within(judgement.order, run.row.order[name]):
-            low, high = run.row.order[name]
+        name, verdict = judgement.observable, judgement.verdict
+        alone = row.expect_for.get(name)
+        if alone is not None and verdict not in {*alone, *NOBODY}:
+            found.append(f"{where}: {name} {verdict}, expected: {' or '.join(alone)} ({judgement.reason})")
+        if name in row.order and not _within(judgement.order, row.order[name]):
+            low, high = row.order[name]
             found.append(f"{where}: order of {name} is {judgement.order}, expected {low:g} to {high:g}")
-        if name in run.row.limit:
-            allowed = run.row.limit[name].absolute(judgement.scale)
+        if name in row.limit:
+            allowed = row.limit[name].absolute(judgement.scale)
             if judgement.limit_error is None or judgement.limit_error > allowed:
                 found.append(f"{where}: limit of {name} is off by {judgement.limit_error}, expected {allowed:.3g}")
-    row = run.row
-    claimed = {*comparison.bands[row.tolerance].bounds, *row.bound, *row.expect_for, *row.order, *row.limit}
+    claimed = {*row.bound, *row.expect_for, *row.order, *row.limit}
+    if Verdict.INCOMPLETE not in expected:
+        claimed |= {*missing}
     for name in sorted(claimed - {judgement.observable for judgement in judgements}):
         found.append(f"{where}: {name} is not reported, though {comparison.name} makes a claim about it")
     return found
-
-
-def _said(judgement: Judgement) -> str:
-    error, tolerance = f"{judgement.error:.3g} {judgement.unit}", f"{judgement.tolerance:.3g}"
-    return f"{judgement.observable} {judgement.verdict}, error {error} against {tolerance}"
 
 
 def _within(value: float | None, bounds: tuple[float, float]) -> bool:

@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 import itertools
+import re
+from collections.abc import Collection
 from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Self
@@ -14,6 +16,7 @@ from proofroll.core.dataset import observe, part, scales
 from proofroll.core.events import Event, events_of
 from proofroll.core.observable import Role
 from proofroll.core.scene import Scene
+from proofroll.core.verdict import Doubt
 from proofroll.files.netcdf import read
 
 if TYPE_CHECKING:
@@ -50,6 +53,23 @@ class Reference:
     def ill_posed(self) -> bool:
         """Whether the answer hangs on less than the parameters are known to."""
         return bool(self.dataset.attrs.get("ill_posed"))
+
+    def shared(self, routes: Collection[str]) -> str:
+        """A sentence on which of the truth's two routes is among ``routes``, and what checks it; empty if none is."""
+        names = {key: str(self.dataset.attrs.get(key, "")) for key in ("route", "second_route")}
+        own = [key for key, name in names.items() if re.split(r"[,(]", name)[0].strip() in routes]
+        if not own:
+            return ""
+        others = [name for key, name in names.items() if key not in own]
+        checked = f"only {others[0]} checks both" if others else "nothing checks both"
+        return f"rests on the same equations as the truth itself ({names[own[0]]}): {checked}"
+
+    def doubt(self, name: str) -> Doubt:
+        """What is left to be judged of an observable where the time of the first slip is ill-posed."""
+        item = self.scene.observables[name]
+        if not self.ill_posed or not item.hangs_on_events:
+            return Doubt.NONE
+        return Doubt.EVERYTHING if item.role == Role.EVENT else Doubt.DIFFERENCES
 
     def scale(self, name: str) -> float | None:
         """What a percentage of an observable refers to: its size, for an event its time; None: nothing."""

@@ -80,6 +80,7 @@ def test_curves_that_do_not_converge() -> None:
     assert math.isnan(found.order)
     assert found.error_bar == pytest.approx(0.2)
     assert found.values is scatter[-1]
+    assert not found.shown
 
 
 def test_equal_curves() -> None:
@@ -87,12 +88,23 @@ def test_equal_curves() -> None:
     found = richardson([LIMIT, LIMIT, LIMIT], (4, 2, 1))
     assert math.isnan(found.order)
     assert found.error_bar == 0
-    assert math.isnan(richardson([LIMIT, LIMIT, LIMIT + 1e-3], (4, 2, 1)).order)
+    assert found.shown
+    growing = richardson([LIMIT, LIMIT, LIMIT + 1e-3], (4, 2, 1))
+    assert math.isnan(growing.order)
+    assert not growing.shown
 
 
 def test_a_time_told_in_whole_steps() -> None:
     """Where the last refinement changes nothing, the limit is as uncertain as the one before changed it."""
     assert richardson([LIMIT + 0.2, LIMIT, LIMIT], (4, 2, 1)).error_bar == pytest.approx(0.2)
+
+
+def test_a_difference_that_vanishes_at_once_shows_a_limit() -> None:
+    """Too fast for any order, but nothing that scatters: the limit is shown, as uncertain as the change before."""
+    found = richardson([LIMIT + 0.2, LIMIT + 1e-13, LIMIT], (4, 2, 1))
+    assert math.isnan(found.order)
+    assert found.shown
+    assert found.error_bar == pytest.approx(0.2)
 
 
 def test_tightest() -> None:
@@ -102,3 +114,5 @@ def test_tightest() -> None:
     assert np.array_equal(found.values, LIMIT)
     assert found.error_bar == pytest.approx(1e-5)
     assert math.isnan(found.order)
+    assert found.shown
+    assert not tightest([LIMIT, LIMIT + 1e-5, LIMIT - 1e-5]).shown

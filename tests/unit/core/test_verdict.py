@@ -1,20 +1,26 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Callable
 
 import numpy as np
 import pytest
 
-from proofroll.core.convergence import Limit, richardson
-from proofroll.core.verdict import Judgement, Verdict, judge
+from proofroll.core.convergence import Limit, richardson, tightest
+from proofroll.core.verdict import Doubt, Judgement, LimitFinding, Verdict, judge
 
 T = np.linspace(0, 2, 21)
 TRUE = np.sin(3 * T)
+MILLIMETRE = 1e-3
 
 
-def verdict_of(error: float, limit: Limit | None = None, *, bar: float = 1e-12, tolerance: float = 1e-3) -> Judgement:
+def verdict_of(
+    error: float, limit: Limit | None = None, *, bar: float = 1e-12, tolerance: float = MILLIMETRE, ladder: bool = False
+) -> Judgement:
     """The judgement of a curve that is off by ``error``."""
-    return judge("z", "m", TRUE + error, TRUE, truth_error_bar=bar, tolerance=tolerance, scale=1.0, limit=limit)
+    return judge(
+        "z", "m", TRUE + error, TRUE, truth_error_bar=bar, tolerance=tolerance, scale=1.0, limit=limit, ladder=ladder
+    )
 
 
 def ladder(power: float, offset: float = 0.0) -> Limit:
@@ -22,45 +28,200 @@ def ladder(power: float, offset: float = 0.0) -> Limit:
     return richardson([TRUE + offset + 0.01 * h**power * (1 + 0.01 * h) for h in (4, 2, 1)], (4, 2, 1))
 
 
+def errors(*off: float, declared: int | None = 1) -> Limit:
+    """The limit of three curves that are off by so much, each step half of the one before."""
+    return richardson([TRUE + value for value in off], (4, 2, 1), declared)
+
+
 def test_agrees_within_tolerance() -> None:
-    """An error up to the tolerance agrees, whatever the limit is."""
-    assert verdict_of(0.999e-3).verdict is Verdict.AGREES
-    assert verdict_of(1e-4, ladder(1, offset=5.0)).verdict is Verdict.AGREES
+    """An error up to the tolerance agrees where one step is all there is."""
+    found = verdict_of(0.999e-3)
+    assert (found.verdict, found.limit) == (Verdict.AGREES, LimitFinding.NO_LADDER)
+    assert "one step only" in found.reason
+
+
+@pytest.mark.parametrize("declared", [1, 2, None])
+def test_an_error_that_vanishes_by_luck_at_one_step_is_no_agreement(declared: int | None) -> None:
+    """A run that is off by 50 mm (1 - h/1 ms) hits the truth at 1 ms; its ladder shows another limit, so it differs."""
+    off = [50e-3 * (1 - h) for h in (1.0, 0.5, 0.25)]
+    found = verdict_of(off[0], errors(*off, declared=declared))
+    assert found.error < 1e-15
+    assert (found.verdict, found.limit) == (Verdict.DIFFERS, LimitFinding.ANOTHER)
+    assert "within 0.001 m" in found.reason
+    assert "another limit: off by" in found.reason
+
+
+def test_a_ladder_that_does_not_tell_the_limit_confirms_nothing() -> None:
+    """Within tolerance, with a limit known less well than the tolerance: agreement at this step, no more."""
+    found = verdict_of(0.5e-3, errors(0.5e-3, 4e-3, -2e-3))
+    assert (found.verdict, found.limit) == (Verdict.UNCONFIRMED, LimitFinding.NOT_SHOWN)
+    assert found.limit_error_bar is not None
+    assert found.limit_error_bar > MILLIMETRE
+
+
+def test_runs_that_walk_away_do_not_confirm() -> None:
+    """Each halving adds as much as the one before: no limit shows although the bar is below the tolerance."""
+    found = verdict_of(0.4e-3, errors(0.1e-3, 0.4e-3, 0.7e-3))
+    assert (found.verdict, found.limit) == (Verdict.UNCONFIRMED, LimitFinding.NOT_SHOWN)
+
+
+def test_a_ladder_that_was_asked_for_and_is_not_there_confirms_nothing() -> None:
+    """Where a rung of the ladder gave no such curve, agreement stays one of this step."""
+    found = verdict_of(0.5e-3, None, ladder=True)
+    assert (found.verdict, found.limit) == (Verdict.UNCONFIRMED, LimitFinding.NOT_SHOWN)
+    assert "not every step of the ladder" in found.reason
+
+
+def test_scatter_far_inside_the_tolerance_confirms() -> None:
+    """A ladder without an order whose curves all stay far inside the tolerance leaves no doubt."""
+    found = verdict_of(1e-5, errors(1e-5, -1e-5, 2e-5))
+    assert (found.verdict, found.limit, found.order) == (Verdict.AGREES, LimitFinding.WITHIN, None)
+
+
+def shifted_in_time(t: np.ndarray) -> np.ndarray:
+    """The motion a tenth of a millisecond late."""
+    return 0.1 * np.sin(3 * (t - 1e-4))
+
+
+def other_gravity(t: np.ndarray) -> np.ndarray:
+    """A fall with standard gravity instead of 9.81 m/s²."""
+    return 0.1 * np.sin(3 * t) - 0.05 * (9.80665 - 9.81) * t**2
+
+
+def other_inertia(t: np.ndarray) -> np.ndarray:
+    """A ball whose inertia is off by 0.1 %: its frequency by 0.02 %."""
+    return 0.1 * np.sin(3 * 1.0002 * t)
+
+
+@pytest.mark.parametrize("model", [shifted_in_time, other_gravity, other_inertia])
+def test_a_wrong_limit_within_tolerance_is_remarked(model: Callable[[np.ndarray], np.ndarray]) -> None:
+    """What stays within tolerance but whose limit is shown to be another agrees, and the judgement says so."""
+    true = 0.1 * np.sin(3 * T)
+    curves = [model(T) + 1e-6 * h**2 * np.cos(T) for h in (4, 2, 1)]
+    found = judge(
+        "z", "m", curves[-1], true, truth_error_bar=1e-12, tolerance=MILLIMETRE, scale=0.2,
+        limit=richardson(curves, (4, 2, 1), 2), ladder=True,
+    )  # fmt: skip
+    assert found.verdict is Verdict.AGREES
+    (remark,) = found.remarks
+    assert "limit of small steps is shown not to be the truth: off by" in remark
+    assert "order 2" in remark
+
+
+def test_a_right_limit_is_not_remarked() -> None:
+    """An engine of second order with the truth as its limit has no remark, at whatever step."""
+    for h in (1.0, 0.1, 1e-4):
+        curves = [TRUE + 1e-4 * (k * h) ** 2 * np.cos(T) for k in (4, 2, 1)]
+        limit = richardson(curves, (4, 2, 1), 2)
+        found = judge(
+            "z", "m", curves[-1], TRUE, truth_error_bar=1e-14, tolerance=MILLIMETRE, scale=1.0, limit=limit, ladder=True
+        )
+        assert (found.verdict, found.remarks) == (Verdict.AGREES, ())
+
+
+def test_an_extrapolation_that_is_off_by_a_few_of_its_bars_is_not_remarked() -> None:
+    """Error bars of limits are estimates; nobody is told to have another limit by eight of them."""
+    for bars, count in ((8, 0), (12, 1)):
+        assert len(verdict_of(1e-4, Limit(TRUE + bars * 1e-6, 1e-6, 2.0)).remarks) == count
 
 
 def test_converges_if_the_limit_is_the_truth() -> None:
     """Beyond the tolerance, with the truth as the limit of small steps, the step alone is too coarse."""
     found = verdict_of(0.011, ladder(1))
-    assert found.verdict is Verdict.CONVERGES
+    assert (found.verdict, found.limit) == (Verdict.CONVERGES, LimitFinding.WITHIN)
     assert found.order == pytest.approx(1, abs=0.1)
     assert found.limit_error is not None
     assert found.limit_error_bar is not None
     assert found.limit_error <= found.limit_error_bar * (1 + 1e-9) < 0.0055
 
 
-def test_differs_if_the_limit_is_something_else() -> None:
-    """A limit beyond both error bars means another model."""
-    assert verdict_of(0.061, ladder(1, offset=0.05)).verdict is Verdict.DIFFERS
+def test_a_ladder_is_never_too_clean() -> None:
+    """An order of 1 to ten digits with a limit off by round-off converges, though its bar is smaller than that."""
+    found = verdict_of(0.01, Limit(TRUE + 2.7e-14, 9.3e-15, 0.99999999994))
+    assert found.verdict is Verdict.CONVERGES
+    assert found.remarks == (), "round-off of a curve is no other limit"
+
+
+def test_a_limit_within_tolerance_is_convergence() -> None:
+    """A limit off by 7e-5 N under a tolerance of 0.41 N converges; that it is not quite the truth is remarked."""
+    found = verdict_of(1.0, Limit(TRUE + 7e-5, 1e-6, 2.0), tolerance=0.41)
+    assert found.verdict is Verdict.CONVERGES
+    assert len(found.remarks) == 1
+
+
+def test_an_adaptive_method_converges_by_its_tightest_curve() -> None:
+    """Tolerances that are tightened until nothing changes show a limit, without an order."""
+    limit = tightest([TRUE + 5e-3, TRUE + 2e-4, TRUE + 1e-5])
+    assert verdict_of(5e-3, limit).verdict is Verdict.CONVERGES
+    assert verdict_of(5e-3, tightest([TRUE + 4e-3, TRUE + 5e-3, TRUE + 0.9e-3])).verdict is Verdict.DIFFERS
+
+
+def test_another_limit_and_no_limit_are_two_answers() -> None:
+    """Both differ, and say which of the two it is, with order, limit error and bar."""
+    other = verdict_of(0.061, ladder(1, offset=0.05))
+    assert (other.verdict, other.limit) == (Verdict.DIFFERS, LimitFinding.ANOTHER)
+    assert other.reason.startswith("error 0.061 m beyond 0.001 m; another limit: off by 0.05 ± ")
+    assert other.reason.endswith("order 1.04")
+    scattered = verdict_of(0.05, errors(0.05, -0.04, 0.06))
+    assert (scattered.verdict, scattered.limit) == (Verdict.DIFFERS, LimitFinding.NOT_SHOWN)
+    assert scattered.reason.endswith("no limit shown: off by 0.06 ± 0.1 m, no order")
+
+
+def test_a_flat_ladder_far_away_shows_another_limit() -> None:
+    """Three equal curves, or ones that differ by round-off, are their own limit, order or not."""
+    for off in [(0.05, 0.05, 0.05), (0.05, 0.05 + 1e-14, 0.05 - 1e-14)]:
+        found = verdict_of(0.05, errors(*off))
+        assert (found.verdict, found.limit) == (Verdict.DIFFERS, LimitFinding.ANOTHER)
 
 
 def test_differs_without_a_ladder() -> None:
     """Without a limit nothing speaks for convergence."""
     found = verdict_of(0.01)
-    assert found.verdict is Verdict.DIFFERS
+    assert (found.verdict, found.limit) == (Verdict.DIFFERS, LimitFinding.NO_LADDER)
     assert (found.order, found.limit_error, found.limit_error_bar) == (None, None, None)
 
 
-def test_a_scattered_ladder_does_not_converge() -> None:
-    """A limit whose error bar is as large as the error says nothing and does not pass."""
-    scattered = Limit(TRUE + 0.01, 0.05, math.nan)
-    assert verdict_of(0.01, scattered).verdict is Verdict.DIFFERS
+@pytest.mark.parametrize(
+    "limit",
+    [
+        Limit(TRUE + 0.01, 0.05, math.nan, shown=False),
+        errors(1.5e-3, 1.2e-3, 0.9e-3),
+        errors(0.9e-3, -0.8e-3, 0.95e-3),
+    ],
+    ids=["wide", "walks through the truth", "jumps about the truth"],
+)
+def test_a_scattered_ladder_does_not_converge(limit: Limit) -> None:
+    """Runs that do not settle show no limit, even where the last of them is within tolerance."""
+    found = verdict_of(1.2e-3, limit)
+    assert (found.verdict, found.limit) == (Verdict.DIFFERS, LimitFinding.NOT_SHOWN)
 
 
-def test_the_error_bar_of_the_truth_counts() -> None:
-    """A limit that misses the truth by less than the truth's own error bar is the truth."""
-    limit = Limit(TRUE + 1e-3, 1e-6, 2.0)
-    assert verdict_of(0.01, limit, bar=2e-3).verdict is Verdict.CONVERGES
-    assert verdict_of(0.01, limit, bar=2e-4).verdict is Verdict.DIFFERS
+@pytest.mark.parametrize("error", [0.0, 1e-14, 1e-13, 1.0])
+def test_a_tolerance_below_the_error_bar_of_the_truth_judges_nobody(error: float) -> None:
+    """Where the truth is known to 3.8e-13 m, 1e-13 m is no tolerance: neither agreement nor difference counts."""
+    for limit in (None, Limit(TRUE + error, 1e-16, 2.0)):
+        found = verdict_of(error, limit, bar=3.8e-13, tolerance=1e-13)
+        assert found.verdict is Verdict.NOT_JUDGED
+        assert "truth's error bar 3.8e-13 m exceeds the tolerance 1e-13 m" in found.reason
+    assert verdict_of(0.0, bar=3.8e-13, tolerance=4e-13).verdict is Verdict.AGREES
+
+
+@pytest.mark.parametrize(
+    ("doubt", "agrees", "differs"),
+    [
+        (Doubt.NONE, Verdict.AGREES, Verdict.DIFFERS),
+        (Doubt.DIFFERENCES, Verdict.AGREES, Verdict.ILL_POSED),
+        (Doubt.EVERYTHING, Verdict.ILL_POSED, Verdict.ILL_POSED),
+    ],
+)
+def test_an_ill_posed_question(doubt: Doubt, agrees: Verdict, differs: Verdict) -> None:
+    """What an ill-posed question leaves open decides whether difference, or agreement too, is judged."""
+    for error, expected in ((0.0, agrees), (1.0, differs)):
+        found = judge(
+            "z", "m", TRUE + error, TRUE, truth_error_bar=0.0, tolerance=1e-3, scale=1.0, limit=None, doubt=doubt
+        )
+        assert found.verdict is expected
+        assert ("ill-posed" in found.reason) == (expected is Verdict.ILL_POSED)
 
 
 @pytest.mark.parametrize("value", [math.nan, math.inf])
@@ -69,8 +230,11 @@ def test_values_that_are_not_finite_differ(value: float) -> None:
     found = verdict_of(value, ladder(1))
     assert found.verdict is Verdict.DIFFERS
     assert found.error == math.inf
+    assert "not finite" in found.reason
 
 
 def test_verdicts_are_ordered_from_best_to_worst() -> None:
     """Summaries take the worst verdict by this order."""
-    assert list(Verdict) == ["agrees", "converges", "ill-posed", "differs", "failed"]
+    assert list(Verdict) == [
+        "agrees", "unconfirmed", "incomplete", "converges", "ill-posed", "not-judged", "differs", "failed",
+    ]  # fmt: skip

@@ -187,6 +187,7 @@ def test_tolerances_of_another_form(text: object) -> None:
         ('expect_for = { N = ["agrees", "converges"], F2 = "differs" }', "expect_for = 3", ["rows.1.expect_for"]),
         ("[tolerances.tight]", "[tolerances]\nloose = 3\n[tolerances.tight]", ["tolerances.loose"]),
         ('expect = "converges"', 'expect = ["agrees", "differs"]', ["rows.1.expect", "agrees or differs", "except_at"]),
+        ('F2 = "differs"', 'F2 = ["differs", "unconfirmed"]', ["rows.1.expect", "differs or unconfirmed", "except_at"]),
         ('F2 = "differs"', 'F2 = ["differs", "agrees"]', ["rows.1.expect", "differs or agrees", "except_at"]),
         (SOFT, excepted("speed = [4]", '["agrees", "differs"]'), ["rows.1.expect", "agrees or differs", "any engine"]),
         (SOFT, excepted("sped = [4]", '"differs"'), ["rows.1.except_at.sped", "varies speed, rolling_resistance"]),

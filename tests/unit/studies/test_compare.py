@@ -43,8 +43,17 @@ def claim(rows: list[Row], speeds: list[float], bounds: Mapping[str, Tolerance] 
     return dataclasses.replace(comparison, bands={"tight": band}, rows=rows)
 
 
-def judged(folder: Path, comparison: Comparison, answer: Answer, true: Mapping[float, Result] | None = None) -> Outcome:
-    """The outcome where every row's engine gives what ``answer`` makes of the truth; ``true``: speeds without one."""
+def judged(
+    folder: Path,
+    comparison: Comparison,
+    answer: Answer,
+    true: Mapping[float, Result] | None = None,
+    rungs: Mapping[float, Answer] | None = None,
+) -> Outcome:
+    """The outcome where every row's engine gives what ``answer`` makes of the truth.
+
+    ``true``: speeds without a truth; ``rungs``: what comes of other steps, by their factors.
+    """
     store, results = Store(folder), dict[str, Result]()
     runs, truths = list[Planned](), dict[str, Case]()
 
@@ -66,8 +75,11 @@ def judged(folder: Path, comparison: Comparison, answer: Answer, true: Mapping[f
             truths[point_name(point)] = put(
                 Case(*given, TRUTH, comparison.until, comparison.every), (true or {}).get(point["speed"], dataset)
             )
-            own = put(Case(*given, facts, comparison.until, comparison.every), answer(scene, dataset))
-            runs.append(Planned(row, point, facts, {1.0: own}))
+            ladder = {}
+            for factor, how in {1.0: answer, **(rungs or {})}.items():
+                scaled = dataclasses.replace(facts, settings={"dt": 1e-3 * factor})
+                ladder[factor] = put(Case(*given, scaled, comparison.until, comparison.every), how(scene, dataset))
+            runs.append(Planned(row, point, facts, ladder))
     return evaluate(Plan(comparison, truths, runs), results, Runner(store, jobs=1))
 
 
@@ -85,7 +97,7 @@ def test_a_claim_that_holds(tmp_path: Path) -> None:
     """An engine that gives the truth contradicts nothing, and one that is off contradicts once, by its observable."""
     assert judged(tmp_path / "right", claim([ROW], [4.0]), the_truth).contradictions == []
     (said,) = judged(tmp_path / "wrong", claim([ROW], [4.0]), off).contradictions
-    assert said.startswith("alpha at speed=4 differs, expected: agrees (z differs, error 0.001 m")
+    assert said.startswith("alpha at speed=4 differs, expected: agrees (z differs; z: error 0.001 m beyond 1e-09 m")
 
 
 @pytest.mark.parametrize(
@@ -103,6 +115,76 @@ def test_a_claim_about_what_is_not_reported(tmp_path: Path, row: Row, bounds: Ma
     """A claim about an observable that the run does not give is a contradiction, wherever the claim stands."""
     (said,) = judged(tmp_path, claim([row], [4.0], bounds), the_truth).contradictions
     assert said == "alpha at speed=4: first_slip is not reported, though claim makes a claim about it"
+
+
+def higher(metres: float) -> Answer:
+    """An engine whose ball is so much too high."""
+    return lambda _, dataset: dataset.assign(z=dataset["z"] + metres)
+
+
+def test_a_run_is_judged_by_its_own_ladder(tmp_path: Path) -> None:
+    """An engine that hits the truth at one step only differs; where a finer step gave nothing, nothing is confirmed."""
+    row = dataclasses.replace(ROW, ladder=[1.0, 0.5, 0.25])
+    comparison = claim([row], [4.0], TIGHT | {"z": Tolerance(1e-3, False, "m")})
+    lucky = {0.5: higher(25e-3), 0.25: higher(37.5e-3)}
+    (run,) = judged(tmp_path / "lucky", comparison, the_truth, rungs=lucky).runs
+    assert {item.observable: item.verdict for item in run.judgements} == {"gamma": "agrees", "z": "differs"}
+    assert "another limit" in run.contradictions[0]
+    crashed: dict[float, Answer] = {0.5: the_truth, 0.25: lambda *_: Result(Status.DIVERGED, "NaN")}
+    (run,) = judged(tmp_path / "crashed", comparison, the_truth, rungs=crashed).runs
+    assert run.verdict is Verdict.UNCONFIRMED
+    assert run.contradictions[0].startswith("alpha at speed=4 unconfirmed, expected: agrees (")
+
+
+def silent(_: Scene, dataset: xr.Dataset) -> xr.Dataset:
+    """An engine that cannot say forces."""
+    return dataset.drop_vars(["N", "F2", "F3", "needed_friction"])
+
+
+def test_a_silent_engine_does_not_plainly_agree(tmp_path: Path) -> None:
+    """Without forces that the tolerances judge a run is incomplete, and contradicts unless that is expected."""
+    bounds = TIGHT | {"N": Tolerance(1e-6, False, "N")}
+    (run,) = judged(tmp_path / "silent", claim([ROW], [4.0], bounds), silent).runs
+    assert (run.verdict, run.missing) == (Verdict.INCOMPLETE, ["N"])
+    assert run.contradictions == ["alpha at speed=4: N is not reported, though claim makes a claim about it"]
+    expected = dataclasses.replace(ROW, expect=[Verdict.INCOMPLETE])
+    assert judged(tmp_path / "expected", claim([expected], [4.0], bounds), silent).contradictions == []
+
+    def both_wrong(scene: Scene, dataset: xr.Dataset) -> xr.Dataset:
+        return silent(scene, dataset.assign(z=dataset["z"] + 1e-3))
+
+    both = judged(tmp_path / "wrong", claim([expected], [4.0], bounds), both_wrong)
+    assert both.runs[0].verdict is Verdict.DIFFERS
+    assert len(both.contradictions) == 1
+    full = judged(tmp_path / "full", claim([expected], [4.0], bounds), the_truth)
+    assert full.contradictions[0].startswith("alpha at speed=4 agrees, expected: incomplete")
+
+
+def test_who_shares_a_route_with_the_truth_is_marked(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """A run of an engine that declares the truth's own equations is marked; one of an engine that does not is not."""
+    (run,) = judged(tmp_path / "other", claim([ROW], [4.0]), the_truth).runs
+    assert run.shared == ""
+    monkeypatch.setattr(f"{__name__}.FACTS", dataclasses.replace(FACTS, shares=["closed form"]))
+    (run,) = judged(tmp_path / "same", claim([ROW], [4.0]), the_truth).runs
+    assert run.shared.startswith("rests on the same equations as the truth itself (closed form (Blajer 2006))")
+
+
+@pytest.mark.parametrize("expect", [Verdict.AGREES, Verdict.CONVERGES, Verdict.DIFFERS])
+def test_a_tolerance_below_the_truth_contradicts_nobody(tmp_path: Path, expect: Verdict) -> None:
+    """Where the truth is known less well than the tolerance no run agrees, and none contradicts, right or wrong."""
+    bounds = {"z": Tolerance(1e-30, False, "m")}
+    row = dataclasses.replace(ROW, expect=[expect])
+    for name, answer in {"right": the_truth, "wrong": off}.items():
+        (run,) = judged(tmp_path / name, claim([row], [4.0], bounds), answer).runs
+        assert (run.verdict, run.contradictions) == (Verdict.NOT_JUDGED, [])
+
+
+def test_what_cannot_be_judged_hides_nothing(tmp_path: Path) -> None:
+    """Beside an observable that nobody is judged by, another one that differs contradicts as ever."""
+    bounds = TIGHT | {"gamma": Tolerance(1e-30, False, "rad")}
+    (run,) = judged(tmp_path, claim([ROW], [4.0], bounds), off).runs
+    assert {item.observable: item.verdict for item in run.judgements} == {"gamma": "not-judged", "z": "differs"}
+    assert run.contradictions[0].startswith("alpha at speed=4 differs, expected: agrees (z differs")
 
 
 def test_exceptions_decide(tmp_path: Path) -> None:

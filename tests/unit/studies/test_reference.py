@@ -5,9 +5,13 @@ from __future__ import annotations
 from typing import Any
 
 import numpy as np
+from proofroll.core.truth import truth
 
+from proofroll.core.engine import SharesEquations
 from proofroll.elements.ball_on_surface.observables import Observable
+from proofroll.engines.reduced import Reduced
 from proofroll.files.scene_file import load_scene
+from proofroll.running.identity import resolve
 from proofroll.studies.reference import Reference
 
 
@@ -25,3 +29,30 @@ def test_a_percentage_of_the_first_slip_is_of_its_time() -> None:
     assert reference().scale("first_slip") is None
     assert reference().scale("z") == 0.2
     assert reference().scale("event_order") is None
+
+
+def against(formulation: str, **parameters: float) -> str:
+    """What is said of a formulation of the least model, held against the truth of a scene."""
+    scene = load_scene("sphere_in_cylinder", **parameters)
+    held = Reference(scene, truth(scene, np.linspace(0.0, 0.1, 3)), {}, {})
+    return held.shared(resolve("reduced", {"formulation": formulation})["shares"])
+
+
+def test_who_rests_on_a_route_of_the_truth_is_told() -> None:
+    """The least model shares the route that the truth takes in this case, or not, and the other route is named."""
+    said = against("equations", rolling_resistance=5e-4)
+    assert said.startswith(
+        "rests on the same equations as the truth itself (reduced equations, DOP853): only unreduced"
+    )
+    assert against("closed_form").startswith(
+        "rests on the same equations as the truth itself (closed form (Blajer 2006))"
+    )
+    assert against("equations") == "", "here the truth is the closed form"
+    assert against("closed_form", rolling_resistance=5e-4) == ""
+
+
+def test_routes_are_declared_for_formulations_that_there_are() -> None:
+    """The least model names formulations that it has; an engine that shares nothing need not say so."""
+    assert isinstance(Reduced, SharesEquations)
+    assert set(Reduced.shares) <= set(Reduced.presets)
+    assert resolve("projection", {})["shares"] == []

@@ -6,6 +6,7 @@ Everything here sees a trajectory and the scene's ball, never an engine.
 from __future__ import annotations
 
 import itertools
+import math
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -22,6 +23,9 @@ if TYPE_CHECKING:
 # Degree of the splines through the samples. Sampled twenty times per oscillation of z, a derivative of degree 7 is
 # good to about 1e-6 of its size; what is left is measured on the truth and reported as the error bar.
 _DEGREE = 7
+# Least size of an observable over its natural one: a ball that moves by less than a hundredth of its radius (0.25 mm
+# inside the cylinder) stands still to the eye, and a range made of round-off is no size.
+_LEAST = 1e-2
 # The ends of an interpolating spline's derivative are worse than its middle; the audit leaves them out.
 _ENDS = 5
 
@@ -29,12 +33,12 @@ _ENDS = 5
 def table(body: RollingBall) -> tuple[Observable, ...]:
     """The observables of a ball on a surface; the last coordinate, the height in a cylinder, decides.
 
-    The floors of sizes are parts of what the ball and its start set: its radius, its weight or centrifugal force, its
-    initial speed and energy.
+    No size is below a hundredth (:data:`_LEAST`) of what is natural for the ball: its radius a, its largest force
+    m max(g, |p̈|), √(g a), m g a, and a friction of 1.
     """
-    a = body.ball.radius
-    force = body.ball.mass * natural_acceleration(body)
-    speed, energy = _speed(body), _kinetic(body)
+    weight = natural_acceleration(body)
+    a, force = _LEAST * body.ball.radius, _LEAST * body.ball.mass * weight
+    speed, energy = _LEAST * math.sqrt(weight * body.ball.radius), force * body.ball.radius
     last = body.surface.coordinates[-1]
     coordinates = tuple(
         Observable(
@@ -42,7 +46,7 @@ def table(body: RollingBall) -> tuple[Observable, ...]:
             unit,
             f"surface coordinate {name}",
             Role.MOTION,
-            floor=1e-3 * a / scale,
+            floor=a / scale,
             headline=True,
             decides=name == last,
         )
@@ -60,7 +64,7 @@ def table(body: RollingBall) -> tuple[Observable, ...]:
         Observable("N", "N", "normal force", Role.REACTION, floor=force, headline=True),
         Observable("F2", "N", "friction on the ball along e2", Role.REACTION, floor=force, headline=True),
         Observable("F3", "N", "friction on the ball along e3", Role.REACTION, floor=force, headline=True),
-        Observable("needed_friction", "1", "friction needed, |F|/N", Role.REACTION, "|F|/N", floor=1.0),
+        Observable("needed_friction", "1", "friction needed, |F|/N", Role.REACTION, "|F|/N", floor=_LEAST),
         residual("energy_balance", "J", "energy that is not accounted for", energy),
         residual("force_audit", "N", "reported minus recomputed contact force", force, asked_for=False),
         residual("gap", "m", "distance of the ball from the wall", a),
@@ -77,18 +81,6 @@ def table(body: RollingBall) -> tuple[Observable, ...]:
         Observable("event_times", "s", "times of all events", Role.EVENT, asked_for=False),
         Observable("event_order", "events", "events of another kind than the truth's", Role.EVENT, asked_for=False),
     )
-
-
-def _speed(body: RollingBall) -> float:
-    """Initial speed, or, of a ball at rest, that after falling by its radius [m/s]; never zero."""
-    fall = float(np.sqrt(body.ball.radius * np.linalg.norm(body.gravity)))
-    return float(np.linalg.norm(body.v0)) or fall or 1.0
-
-
-def _kinetic(body: RollingBall) -> float:
-    """Kinetic energy at the start, or that of the speed that stands for it [J]; never zero."""
-    spin = 0.5 * body.ball.inertia * float(body.w0 @ body.w0)
-    return 0.5 * body.ball.mass * _speed(body) ** 2 + spin
 
 
 def observe(body: RollingBall, dataset: xr.Dataset) -> dict[str, FloatArray]:
@@ -127,13 +119,17 @@ def _creep(slip: FloatArray, dataset: xr.Dataset) -> float:
 
 
 def scales(body: RollingBall, truth: xr.Dataset) -> dict[str, float]:
-    """Size of each observable in the truth: ranges of coordinates and the largest normal force and needed friction."""
-    normal = float(np.max(np.abs(truth["N"].to_numpy())))
+    """Size of each observable in the truth: ranges of coordinates, the largest normal force and needed friction.
+
+    The kinetic energy and the speed of the start, and the ball's radius. Floors are those of the table.
+    """
+    normal, friction = float(np.max(np.abs(truth["N"].to_numpy()))), truth["needed_friction"].to_numpy()
+    speed = float(np.linalg.norm(body.v0))
+    kinetic = 0.5 * body.ball.mass * speed**2 + 0.5 * body.ball.inertia * float(body.w0 @ body.w0)
     sizes = {name: float(np.ptp(truth[name].to_numpy())) for name in body.surface.coordinates}
     sizes |= dict.fromkeys(("N", "F2", "F3", "force_audit"), normal)
-    sizes["needed_friction"] = float(np.nanmax(truth["needed_friction"].to_numpy()))
-    a = body.ball.radius
-    return sizes | {"energy_balance": _kinetic(body), "gap": a, "slip": _speed(body), "creep": a}
+    sizes["needed_friction"] = float(np.max(friction[np.isfinite(friction)], initial=0.0))
+    return sizes | {"energy_balance": kinetic, "slip": speed, "gap": body.ball.radius, "creep": body.ball.radius}
 
 
 def energy_balance(body: RollingBall, dataset: xr.Dataset) -> FloatArray:

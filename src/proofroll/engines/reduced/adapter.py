@@ -30,6 +30,10 @@ class Reduced:
     settings: ClassVar[type[ReducedSettings]] = ReducedSettings
     presets: ClassVar[Mapping[str, Mapping[str, ReducedSettings]]] = PRESETS
     levels: ClassVar[Mapping[str, Level]] = {"equations": Level.REDUCED, "closed_form": Level.CLOSED_FORM}
+    shares: ClassVar[Mapping[str, Sequence[str]]] = {
+        "equations": ("reduced equations",),
+        "closed_form": ("closed form",),
+    }
     terms: ClassVar[Sequence[Term]] = ()  # the least model has nothing left to switch off
 
     @staticmethod

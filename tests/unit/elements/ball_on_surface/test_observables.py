@@ -123,3 +123,24 @@ def test_scales(case: tuple[Scene, xr.Dataset]) -> None:
     motion = reduced(rolling_ball(resting), TIMES[:3])
     still = variables(rolling_ball(resting), TIMES[:3], motion.p_WB, motion.v_WB, motion.w_WB, force=motion.force)
     assert all(size > 0 for size in scales(resting, still).values())
+
+
+def test_scales_have_floors() -> None:
+    """A range of round-off is no size: where nothing moves, a scale is a hundredth of what is natural for the ball."""
+    scene = load_scene("inclined_plane", tilt=0.35, cross_speed=0.0)
+    body, motion = rolling_ball(scene), reduced(rolling_ball(scene), TIMES)
+    dataset = variables(rolling_ball(scene), TIMES, motion.p_WB, motion.v_WB, motion.w_WB, force=motion.force)
+    dataset["across"] = 3.5e-17 * np.sin(dataset["time"])
+    dataset["N"], dataset["needed_friction"] = 0 * dataset["N"], np.nan * dataset["N"]
+    sizes = scales(body, dataset)
+    assert sizes["across"] == pytest.approx(0.01 * body.ball.radius)
+    assert sizes["down"] == pytest.approx(float(np.ptp(dataset["down"].to_numpy())))
+    assert sizes["F2"] == pytest.approx(0.01 * body.ball.mass * 9.81)
+    assert sizes["needed_friction"] == 0.01
+    curved = load_scene("sphere_in_cylinder", speed=1e-9, axial_speed=0.0)
+    still = dataset.assign(gamma=0 * dataset["time"], z=0 * dataset["time"])
+    sizes = scales(curved, still)
+    turn = sizes["gamma"] * rolling_ball(curved).surface.length_scales[0]
+    assert sizes["z"] == pytest.approx(turn) == pytest.approx(0.01 * rolling_ball(curved).ball.radius)
+    assert 0 < sizes["energy_balance"] < 0.01
+    assert 0 < sizes["slip"] < 0.01

@@ -1,0 +1,164 @@
+"""What is shown of verdicts: rows with several answers, what ladders say, what is missing, and what is remarked."""
+
+from __future__ import annotations
+
+import copy
+import dataclasses
+import io
+from collections.abc import Mapping
+from typing import Any
+
+import numpy as np
+import pytest
+from rich.console import Console
+
+from proofroll.core.convergence import Limit, richardson
+from proofroll.core.verdict import judge
+from proofroll.report.comparison_content import outcome_content
+from proofroll.report.html import page
+from proofroll.report.labels import SYMBOLS, detail, verdict_text
+from proofroll.report.markdown import verdict_table as markdown_table
+from proofroll.report.plots import point_curves
+from proofroll.report.report_content import report_content
+from proofroll.report.summary import three_sentences
+from proofroll.report.tables import counted, overview
+from proofroll.report.terminal import closing_lines, verdict_table
+from proofroll.running.case import Result, Status
+from proofroll.running.store import Store
+from proofroll.studies.compare import Outcome, Run
+
+TRUE = np.sin(np.linspace(0, 2, 21))
+OTHER = Limit(TRUE + 0.05, 2e-4, 1.0)
+SCATTERED = richardson([TRUE + off for off in (0.05, -0.04, 0.06)], (4, 2, 1), 1)
+WRONG_WITHIN = Limit(TRUE + 4e-4, 1e-7, 2.0)
+
+
+def answered(run: Run, error: float = 0.0, limit: Limit | None = None, **changes: Any) -> Run:
+    """The run with one judgement, of z to a millimetre."""
+    item = judge("z", "m", TRUE + error, TRUE, truth_error_bar=1e-12, tolerance=1e-3, scale=1.0, limit=limit)
+    done = Result(Status.DONE, "done", trajectory=run.result.trajectory)
+    return dataclasses.replace(run, result=done, judgements=[item], contradictions=[], **{"missing": []} | changes)
+
+
+def with_runs(outcome: Outcome, runs: Mapping[int, list[Run]]) -> Outcome:
+    """The outcome with other runs of some rows, by their numbers."""
+    rows = outcome.comparison.rows
+    others = [run for run in outcome.runs if rows.index(run.row) not in runs]
+    return dataclasses.replace(outcome, runs=[*(run for found in runs.values() for run in found), *others])
+
+
+@pytest.fixture
+def outcome(made: tuple[Outcome, Store]) -> Outcome:
+    """Four rows: another limit; no limit; within tolerance with a wrong limit; incomplete on shared equations."""
+    runs: dict[int, list[Run]] = {number: [] for number in range(4)}
+    for run in made[0].runs:
+        number = made[0].comparison.rows.index(run.row)
+        runs[number].append(
+            [
+                answered(run, 0.05, OTHER),
+                answered(run, 0.05, SCATTERED),
+                answered(run, 5e-4, WRONG_WITHIN),
+                answered(run, missing=["F2", "N"], shared="rests on the same equations as the truth itself (alike)"),
+            ][number]
+        )
+    return with_runs(made[0], runs)
+
+
+def printed(content: dict[str, Any], width: int) -> str:
+    """The table and the lines under it as they stand on a terminal of this width."""
+    out = io.StringIO()
+    console = Console(file=out, width=width, highlight=False)
+    console.print(verdict_table(content))
+    for line in closing_lines(content):
+        console.print(line, markup=False)
+    return out.getvalue()
+
+
+def test_one_refused_case_of_eleven_shows_the_ten(made: tuple[Outcome, Store]) -> None:
+    """A row that failed at one point says how the other ten ended, on the terminal, in Markdown and in the matrix."""
+    run = made[0].runs[0]
+    points = [{"speed": 3.0 + number} for number in range(11)]
+    runs = [dataclasses.replace(answered(run), parameters=point) for point in points]
+    runs[3] = dataclasses.replace(runs[3], result=Result(Status.REFUSED, "one coefficient only"), judgements=[])
+    runs[5] = dataclasses.replace(answered(run, 0.05, OTHER), parameters=points[5])
+    content = outcome_content(with_runs(made[0], {0: runs}))
+    row = content["rows"][0]
+    assert row["verdict"] == "failed"
+    assert verdict_text(row) == "failed 1/11 ✗1 ✓9"
+    assert row["reason"] == "refused at speed=6: one coefficient only"
+    assert "failed 1/11 ✗1 ✓9" in printed(content, 100)
+    assert "failed 1/11 ✗1 ✓9" in markdown_table(content)
+    first = next(iter(overview(content, 0)["groups"].values()))[0]
+    assert (first["verdict_text"], first["judged"]["z"]["verdict"]) == ("failed 1/11 ✗1 ✓9", "differs")
+
+
+def test_another_limit_and_no_limit_are_two_answers_on_the_terminal(outcome: Outcome) -> None:
+    """Under the table each row that does not agree says which of the two it is, with order, limit error and bar."""
+    lines = closing_lines(outcome_content(outcome))
+    (other,) = (line for line in lines if "another limit" in line)
+    (none,) = (line for line in lines if "no limit shown" in line)
+    assert other.startswith("✗ alpha fine matched (dt 1e-3): z at speed=")
+    assert other.endswith("another limit: off by 0.05 ± 0.0002 m, order 1")
+    assert none.endswith("no limit shown: off by 0.06 ± 0.1 m, no order")
+
+
+@pytest.mark.parametrize("width", [80, 100])
+def test_nothing_is_cut_on_a_narrow_terminal(outcome: Outcome, width: int) -> None:
+    """No line is too long, no word ends in an ellipsis, and every verdict is whole."""
+    content = outcome_content(outcome)
+    text = printed(content, width)
+    assert "…" not in text
+    assert max(map(len, text.splitlines())) <= width
+    for row in content["rows"]:
+        assert f"{SYMBOLS[row['verdict']]} {row['verdict']}" in text
+
+
+def test_a_wrong_limit_within_tolerance_is_marked(outcome: Outcome) -> None:
+    """The row agrees, with a star that leads to the limit's error; JSON, terminal and page have it."""
+    content = outcome_content(outcome)
+    row = content["rows"][2]
+    assert row["verdict"] == "agrees"
+    assert "✓ agrees*" in printed(content, 100)
+    (remark,) = row["remarks"]
+    assert "shown not to be the truth: off by 0.0004 ± 1e-07 m, order 2" in remark
+    assert f"* beta only: {remark}" in [line.replace(" (dt 1e-3)", "") for line in closing_lines(content)]
+    assert content["runs"][content["rows"].index(row)]["judgements"][0]["remarks"] is not None
+
+
+def test_who_is_silent_or_shares_equations_is_marked(outcome: Outcome) -> None:
+    """A run without forces is incomplete by name; one on the truth's own equations is never the closest to it."""
+    content = outcome_content(outcome)
+    row = content["rows"][3]
+    assert (row["verdict"], row["missing"]) == ("incomplete", ["F2", "N"])
+    assert row["reason"] == "agrees, but does not report F2, N"
+    assert detail(row) == "does not report F2, N"
+    assert row["remarks"] == ["rests on the same equations as the truth itself (alike)"]
+    assert "◐ incomplete*" in printed(content, 100)
+    assert counted(content) == "4 settings: ✓ 1 agrees, ◐ 1 incomplete, ✗ 2 differs; as expected"
+    said = three_sentences({"comparisons": [content], "tradeoffs": [], "stability": []})[0]
+    assert said.startswith("Of 4 settings in one comparison, 1 agrees with the truth everywhere")
+
+
+def test_the_page_says_all_of_it(outcome: Outcome, made: tuple[Outcome, Store], parse: Any) -> None:
+    """Matrix, evidence and remarks name the kind of difference, its numbers, what is missing and what is shared."""
+    content = report_content([outcome], made[1], "proofroll report invented")
+    text = " ".join(parse(page(content, [point_curves(outcome, made[1])])).text.split())
+    for words in (
+        "✗ differs another limit",
+        "✗ differs no limit shown",
+        "another limit: off by 0.05 ± 0.0002 m, order 1",
+        "no limit shown: off by 0.06 ± 0.1 m, no order",
+        "within tolerance, but the limit of small steps is shown not to be the truth",
+        "◐ incomplete does not report F2, N",
+        "rests on the same equations as the truth itself (alike)",
+    ):
+        assert words in text, words
+
+
+def test_closest_is_nobody_who_rests_on_the_truth(made: tuple[Outcome, Store]) -> None:
+    """A row that shares the truth's equations is not named as the closest, however small its error is."""
+    content = copy.deepcopy(outcome_content(made[0]))
+    given = {"comparisons": [content], "tradeoffs": [], "stability": []}
+    assert "closest is alpha fine matched" in three_sentences(given)[0]
+    content["rows"][0]["shared"] = "rests on the same equations"
+    assert "closest is alpha fine default" in three_sentences(given)[0]
