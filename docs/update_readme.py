@@ -82,7 +82,7 @@ def measured(runner: Runner) -> dict[str, Any]:
     claims = claims_for("sphere_in_cylinder")
     assert claims is not None  # the file is part of this repository
     study = content(tradeoff(claims.swept, runner, over=claims.over))
-    for sentence in claims.contradictions(study):
+    for sentence in (*claims.contradictions(study), *claims.undecided(study)):
         sys.stderr.write(f"{sentence}\n")
     return study
 

@@ -23,7 +23,8 @@ def point(number: int, engine: str, error: float, seconds: float, **more: Any) -
         "settings": {"formulation": "only", "preset": "tuned", "dt": 1e-3}, "resolution": "dt", "step": 1e-3,
         "order": 2, "status": "done", "message": "reached 2 s", "error": {"z": error, "N": 10 * error},
         "envelope": {"z": error, "N": 10 * error}, "seconds_per_second": seconds,
-        "interval": [0.9 * seconds, 1.1 * seconds], "measurements": 3, "corners": None,
+        "interval": [0.9 * seconds, 1.1 * seconds], "confidence": 0.97, "rounds": 6 * [seconds],
+        "measurements": 3, "corners": None,
     }  # fmt: skip
     return values | more
 
@@ -32,7 +33,7 @@ def tradeoff_study() -> dict[str, Any]:
     """A trade-off of a rough and cheap engine, a good and dear one, and the scene's own equations."""
     points = [
         point(0, "rough", 3e-3, 1e-3),
-        point(1, "good", 1e-9, 0.5, interval=[0.5, 0.5], measurements=1),
+        point(1, "good", 1e-9, 0.5, interval=None, confidence=0.0, rounds=[0.5], measurements=1),
         point(2, "own", 1e-12, 0.01, level="reduced equations"),
     ]
     budget = {

@@ -151,20 +151,22 @@ def part_lines(content: dict[str, Any]) -> list[str]:
     for entry in content["tradeoffs"]:
         if entry["study"] is not None:
             held = [claim["holds"] for claim in entry["claims"]]
-            lines.append(
-                f"{entry['name']}: {len(entry['study']['points'])} points; {sum(held)} of {len(held)} claims hold."
-            )
+            lines.append(f"{entry['name']}: {len(entry['study']['points'])} points{_held(held)}.")
     for entry in content["stability"]:
         if entry["study"] is not None:
-            study, held = entry["study"], [claim["holds"] for claim in entry["claims"] if claim["holds"] is not None]
+            study, held = entry["study"], [claim["holds"] for claim in entry["claims"]]
             lines.append(
                 f"{entry['name']}: {study['silent']} of {study['boundaries']} boundaries are silent{_held(held)}."
             )
     return lines
 
 
-def _held(held: Sequence[bool]) -> str:
-    return f"; {sum(held)} of {len(held)} claims hold" if held else ""
+def _held(held: Sequence[bool | None]) -> str:
+    """How many claims hold, of those that are decided, and how many are not."""
+    if not held:
+        return ""
+    undecided = f", {held.count(None)} undecided" if None in held else ""
+    return f"; {held.count(True)} of {len(held) - held.count(None)} claims hold{undecided}"
 
 
 def first_lines(content: dict[str, Any]) -> list[str]:

@@ -117,10 +117,17 @@ def _point(curve: Curve, point: Point, number: int, held: dict[str, float], foun
 
 
 def _cost(timing: Timing | None) -> dict[str, Any]:
-    """Median and interval of wall seconds per simulated second, or None where nothing was measured."""
+    """Median of wall seconds per simulated second, its interval and confidence, and the rounds; None: not measured.
+
+    The rounds are those of all points, so that a ratio of two can be taken round by round. A single measurement has no
+    interval.
+    """
+    found = timing.interval if timing else None
     return {
-        "seconds_per_second": timing.interval.value if timing else None,
-        "interval": [timing.interval.low, timing.interval.high] if timing else None,
+        "seconds_per_second": found.value if found else None,
+        "interval": [found.low, found.high] if found and found.confidence else None,
+        "confidence": found.confidence if found else None,
+        "rounds": list(timing.values) if timing else [],
         "measurements": len(timing.values) if timing else 0,
     }
 

@@ -30,6 +30,8 @@ def point(  # noqa: D103 -- one measured point
         "envelope": {"z": error},
         "seconds_per_second": cost,
         "interval": [0.9 * cost, 1.1 * cost],
+        "confidence": 0.97,
+        "rounds": 6 * [cost],
         "corners": [corner(error)],
     } | more
 
