@@ -110,7 +110,7 @@ def test_no_two_rows_of_an_engine_look_alike_and_none_by_colour_alone() -> None:
 
 
 def test_cost_has_an_interval_where_there_is_one() -> None:
-    """Six runs: 95 % or more, by how many there are; three: their range, which holds the median in three cases of four; one: none."""
+    """Six runs or more: 95 % or more; three: their range, which holds the median in three cases of four; one: none."""
     assert cost([]) is None
     assert cost([2.0]) == {"median": 2.0, "low": None, "high": None, "confidence": None, "runs": 1}
     three = cost([3.0, 1.0, 2.0])

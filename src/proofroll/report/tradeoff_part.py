@@ -59,6 +59,7 @@ class TradeoffPart:
         """The study, what to use, and what was claimed."""
         from proofroll.report.advice import advice
         from proofroll.report.tradeoff_tables import default_quantities
+
         study = self.study
         assert study is not None  # it was made
         claims = [] if self.engines else self.asked.judged(study)

@@ -119,7 +119,9 @@ class Cheapest:
         """
         among = f" among {', '.join(self.levels)}" if self.levels else ""
         said = f"the cheapest that holds {_to(quantity, self.tolerance)}{among} is {' or '.join(self.engine)}"
-        return Judgement(said, self.because, *self._found(study, Wish(quantity, self.tolerance, levels=tuple(self.levels))))
+        return Judgement(
+            said, self.because, *self._found(study, Wish(quantity, self.tolerance, levels=tuple(self.levels)))
+        )
 
     def _found(self, study: _Study, wish: Wish) -> tuple[bool | None, str]:
         if unknown := _unknown(study, self.engine):

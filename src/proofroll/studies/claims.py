@@ -51,7 +51,8 @@ class TradeoffClaims:
 
     def judged(self, study: Mapping[str, Any]) -> list[Judgement]:
         """What a study says of each claim."""
-        return [claim.judged(study, self.quantity) for claim in (*self.holds, *self.converges, *self.cheapest)]
+        claims: list[Holds | Converges | Cheapest] = [*self.holds, *self.converges, *self.cheapest]
+        return [claim.judged(study, self.quantity) for claim in claims]
 
     def contradictions(self, study: Mapping[str, Any]) -> list[str]:
         """What a study contradicts, as sentences."""

@@ -170,8 +170,12 @@ def _same(value: object, text: str) -> bool:
 
 def _why_not(study: Mapping[str, Any], point: _Point, wish: Wish, absolute: float) -> str | None:
     """Why a point does not hold the tolerance, in one sentence; None if it does."""
-    return _why_not_here(study, point, wish.quantity, absolute) or (
-        _why_not_there(study, point, wish, absolute) if study["over"] else None
+    sparse = point.get("sparse")
+    lives = _lives_on_the_grid(study, sparse, wish.quantity, absolute) if sparse else None
+    return (
+        lives
+        or _why_not_here(study, point, wish.quantity, absolute)
+        or (_why_not_there(study, point, wish, absolute) if study["over"] else None)
     )
 
 
@@ -179,9 +183,6 @@ def _why_not_here(study: Mapping[str, Any], point: _Point, name: str, absolute: 
     """Why it does not hold it with margin at the scene's own parameters."""
     unit = study["quantities"][name]["unit"]
     error, held = point["error"].get(name), point["envelope"].get(name)
-    sparse = point.get("sparse")
-    if sparse is not None and (why := _lives_on_the_grid(study, sparse, name, absolute)):
-        return why
     if error is None or held is None:
         return f"{name} has no finite error: {point['message']}"
     if error > absolute:

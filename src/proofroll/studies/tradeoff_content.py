@@ -111,6 +111,14 @@ def _point(curve: Curve, point: Point, number: int, held: dict[str, float], foun
         "message": point.result.message,
         "error": point.errors,
         "envelope": {name: value for name, value in held.items() if name in point.errors},
+        "sparse": None
+        if point.sparse is None
+        else {
+            "every": point.sparse.case.every,
+            "error": point.sparse.errors,
+            "dense_error": point.dense,
+            "message": point.sparse.result.message,
+        },
         **_cost(timing),
         "corners": [dataclasses.asdict(corner) for corner in corners] if corners is not None else None,
     }
@@ -153,10 +161,12 @@ def findings(found: Tradeoff, made: Sequence[tuple[Curve, Budget]]) -> list[str]
         if other:
             shown = ", ".join(f"{i.quantity} {i.order:.2f} ({i.order_low:.2f} to {i.order_high:.2f})" for i in other)
             said.append(f"{curve.engine} declares order {other[0].declared}, but there show: {shown}.")
-    whole = [c for c in found.curves if c.saturated and c.points[0].errors.get(quantity, np.inf) < BROKEN * scale]
+    whole = [
+        c for c in found.curves if c.saturated(quantity) and c.points[0].errors.get(quantity, np.inf) < BROKEN * scale
+    ]
     if whole:
         names = ", ".join(curve.engine for curve in whole)
-        said.append(f"No tolerance breaks {names}: steps end at every sample, {found.question.every:g} s apart.")
+        said.append(f"No tolerance breaks {names}, sampled every {found.question.sparse:g} s either.")
     done = [point for point in found.points if point.result.status == Status.DONE]
     broken = [point for point in done if not point.errors.get(quantity, np.inf) < BROKEN * scale]
     refused = sum(point.result.status == Status.REFUSED for point in found.points)

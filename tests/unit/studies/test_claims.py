@@ -80,7 +80,7 @@ def measured(cost_of_fast: float, rounds: tuple[float, ...] = STEADY, *, brief: 
 
 
 def test_a_claim_is_held_against_the_points(tmp_path: Path) -> None:
-    """Where the claimed engine is the cheapest there is no contradiction; where it clearly is not, one sentence says so."""
+    """Where the claimed engine is the cheapest there is no contradiction; where it is far from it, there is one."""
     claims = load_claims(written(tmp_path))
     assert claims.contradictions(measured(0.1)) == claims.undecided(measured(0.1)) == []
     (sentence,) = claims.contradictions(measured(10.0))
