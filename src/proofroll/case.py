@@ -56,7 +56,7 @@ class Case:
         engine: the engine with complete settings.
         until, every: last time and sampling interval [s].
         timed: whether a second, clean run that only advances is timed.
-        time_limit: wall seconds after which the case is ended [s].
+        time_limit: seconds after which the case is ended, but for those in which others had the processor [s].
         asks: what is wanted besides the motion; see :class:`proofroll.scene.Scene`.
     """
 
