@@ -66,7 +66,8 @@ def stability_study() -> dict[str, Any]:
         "level": None, "resolution": "dt", "axis": "V0", "value": 4.0, "parameters": {"speed": 4.0}, "until": 2.0,
         "period": 0.6, "largest_stable": None, "largest_accurate": None, "boundary": "stable", "failure": "sank in",
         "silent": True, "message": "reached 2 s", "sides": {"stable": side, "accurate": side}, "least_error": 0.9,
-        "finest": 1e-4, "too_slow": None, "runs": 7, "problem": None, "reproducer": None, "reproducer_note": None,
+        "finest": 1e-4, "too_slow": None, "timed_out": False, "runs": 7,
+        "problem": None, "reproducer": None, "reproducer_note": None,
     }  # fmt: skip
     held = side | {"largest": 1e-3, "reached": True, "numbers": {"turn": 0.2}, "silent": False}
     other = base | {

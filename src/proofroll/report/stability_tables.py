@@ -114,7 +114,7 @@ def silent_lines(study: Mapping[str, Any], count: int = 8) -> Iterator[str]:
         side = point["sides"][point["boundary"]]
         wrong = "" if side["error"] is None else f", off by {number(100 * side['error'])} % of the range"
         if side["largest"] is None and point["too_slow"] is not None:
-            step = f"down to {point['resolution']} {number(point['finest'])}, finer ones are too slow"
+            step = f"down to {point['resolution']} {number(point['finest'])}, finer ones have too many steps"
         elif side["largest"] is None:
             step = f"at every {point['resolution']} down to {number(point['finest'])}"
         else:

@@ -78,6 +78,7 @@ def _point(point: MapPoint) -> dict[str, Any]:
         "least_error": min(errors, default=None),
         "finest": None if not point.found.seen else point.ladder[max(point.found.seen)],
         "too_slow": None if point.found.limit >= len(point.ladder) else point.ladder[point.found.limit],
+        "timed_out": point.timeouts > 0,
         "runs": len(point.results),
         "problem": place.problem,
         "reproducer": None,
@@ -140,7 +141,7 @@ def _scale_findings(found: StabilityMap, points: list[dict[str, Any]]) -> list[s
 def dependence(points: Sequence[Mapping[str, Any]], name: str) -> str:
     """How a boundary, in parts of the natural time, changes along an axis, if it does; else nothing.
 
-    Where the search was cut by its patience, a boundary that is missing says nothing.
+    Where the search was cut for its many steps, a boundary that is missing says nothing.
 
     Args:
         points: of one curve along one axis, as the study has them.
@@ -166,7 +167,7 @@ def dependence(points: Sequence[Mapping[str, Any]], name: str) -> str:
 def silent_ranking(study: Mapping[str, Any]) -> list[dict[str, Any]]:
     """The silent failures, the worst first: wrong at any step, then by how wrong the run beyond the boundary was.
 
-    Searches that were cut because finer runs take too long come last: a finer step might have been right.
+    Searches that were cut because finer runs have too many steps come last: a finer step might have been right.
     """
     silent = [point for point in study["points"] if point["silent"]]
 
