@@ -6,6 +6,7 @@ import re
 from collections.abc import Mapping
 from typing import Any
 
+from proofroll.figures.judging import count
 from proofroll.report.labels import error, number, symbol, unit
 from proofroll.report.tradeoff_tables import cost_of, name_of, step_of
 
@@ -114,6 +115,11 @@ def statements(study: Mapping[str, Any]) -> list[dict[str, Any]]:
         )
         before = item["says"]
     return lines
+
+
+def counted(study: Mapping[str, Any]) -> str:
+    """How many statements hold."""
+    return count(study["statements"])
 
 
 def _said(found: Any, of: str) -> str:

@@ -143,11 +143,12 @@ def closing_lines(content: dict[str, Any]) -> list[str]:
 
 def part_lines(content: dict[str, Any]) -> list[str]:
     """One line for each further study of a report."""
+    from proofroll.figures.judging import count
+
     lines = []
     for entry in content["figures"]:
         if entry["study"] is not None:
-            holds = [item["holds"] for item in entry["study"]["statements"]]
-            lines.append(f"{entry['name']}: {holds.count(True)} of {len(holds)} statements hold.")
+            lines.append(f"{entry['name']}: {count(entry['study']['statements'])}.")
     for entry in content["tradeoffs"]:
         if entry["study"] is not None:
             held = [claim["holds"] for claim in entry["claims"]]
