@@ -17,7 +17,7 @@ from screenshot import screenshot
 
 from proofroll.comparison_file import load_comparison
 from proofroll.report.content import outcome_content
-from proofroll.report.markdown import cheapest_table, verdict_table
+from proofroll.report.markdown import caveat_list, cheapest_table, verdict_table
 from proofroll.report.regime_map import draw as draw_regimes
 from proofroll.report.whole import write_report
 from proofroll.report.work_precision import draw as draw_work_precision
@@ -102,6 +102,7 @@ def main() -> None:
     text = readme.read_text(encoding="utf-8")
     for name, table in (
         ("verdicts", verdict_table(outcome_content(outcome))),
+        ("caveats", caveat_list(outcome_content(outcome))),
         ("cheapest", cheapest_table(study, TOLERANCES)),
     ):
         text = re.sub(

@@ -35,6 +35,7 @@ class EngineFacts:
         settings: complete settings, by name.
         resolution: name of the setting that trades speed for accuracy, ``dt`` or ``rtol``.
         order: declared order of convergence, or None.
+        caveat: what of these settings is not the engine's own, to be said wherever it is judged; empty: nothing.
     """
 
     name: str
@@ -43,6 +44,7 @@ class EngineFacts:
     settings: dict[str, Any]
     resolution: str | None = None
     order: int | None = None
+    caveat: str = ""
 
 
 @dataclass(frozen=True)

@@ -65,12 +65,13 @@ def describe(engine: str) -> dict[str, Any]:
 
 
 def resolve(engine: str, options: dict[str, Any]) -> dict[str, Any]:
-    """Complete settings of an engine, and what else decides its results."""
+    """Complete settings of an engine, what else decides its results, and what in them is not its own."""
     if engine == "truth":
         if options:
             raise InputError("truth", ", ".join(options), "the truth has no settings; leave them out")
         code = digest([Path(proofroll.__file__).parent / "truth"])
         return dataclasses.asdict(EngineFacts("truth", _truth_version(), code, {}))
+    from proofroll.engine import TellsCaveats
     from proofroll.registry import load_engine, resolve_settings
 
     kind = load_engine(engine)
@@ -84,6 +85,7 @@ def resolve(engine: str, options: dict[str, Any]) -> dict[str, Any]:
         settings=dataclasses.asdict(settings),
         resolution=settings.resolution,
         order=settings.order,
+        caveat=kind.caveat(settings) if isinstance(kind, TellsCaveats) else "",
     )
     return dataclasses.asdict(facts)
 

@@ -99,11 +99,15 @@ def _judgement_of(run: Run, name: str) -> Judgement | None:
 
 
 def _worst(runs: list[Run], name: str) -> dict[str, Any]:
-    """The judgement with the worst verdict, among equals the one furthest beyond its tolerance, and its point."""
+    """The judgement with the worst verdict, among equals the one furthest beyond its tolerance, and its point.
+
+    Its error need not be the largest of all points, for tolerances may differ: that is ``largest``.
+    """
     order = list(Verdict)
     judged = [(run, judgement) for run in runs if (judgement := _judgement_of(run, name)) is not None]
     where, worst = max(judged, key=lambda pair: (order.index(pair[1].verdict), pair[1].error / pair[1].tolerance))
-    return {**dataclasses.asdict(worst), "point": point_name(where.parameters)}
+    largest = max(judgement.error for _, judgement in judged)
+    return {**dataclasses.asdict(worst), "point": point_name(where.parameters), "largest": largest}
 
 
 def _setting(run: Run, preset: str | None, resolution: str | None) -> str:
@@ -125,6 +129,7 @@ def _settings(run: Run) -> dict[str, Any]:
         "resolution": resolution,
         "resolution_value": settings.get(resolution) if resolution else None,
         "declared_order": run.facts.order if run.facts else None,
+        "caveat": run.facts.caveat if run.facts else "",
     }
 
 

@@ -5,7 +5,7 @@ from __future__ import annotations
 from typing import Any
 
 from proofroll.metrics import OBSERVABLES
-from proofroll.report.labels import names, number, symbol, unit
+from proofroll.report.labels import names, number, symbol, unit, with_caveat
 from proofroll.report.scores import Score, cheapest, recommendation, scores
 
 # The accuracy for which the first paragraph names a setting: a line in a figure.
@@ -100,7 +100,7 @@ def _obvious(content: dict[str, Any], found: list[Score]) -> str:
         return "What the obvious model costs cannot be said: no default setting stands beside another one." + failed
     factor, score, best = worst
     return (
-        f"The obvious model costs most with {score.name}: {_off(content, score.index)}, which relative to the range is "
+        f"The obvious model costs most with {with_caveat(score.name, rows[score.index])}: {_off(content, score.index)}, which relative to the range is "
         f"{number(factor, 1)} times the error of {best.name}.{failed}"
     )
 

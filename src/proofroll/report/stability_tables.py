@@ -9,7 +9,7 @@ from typing import Any
 from rich.table import Table
 from rich.text import Text
 
-from proofroll.report.labels import number
+from proofroll.report.labels import number, with_caveat
 from proofroll.studies.numbers import SYMBOLS
 from proofroll.studies.stability_content import silent_ranking
 
@@ -119,4 +119,5 @@ def silent_lines(study: Mapping[str, Any], count: int = 8) -> Iterator[str]:
             step = f"at every {point['resolution']} down to {number(point['finest'])}"
         else:
             step = f"just beyond {point['resolution']} {number(side['largest'])}"
-        yield f"{label(point)} at {point['axis']} = {number(point['value'])}: {point['failure']} {step}{wrong}"
+        where = f"{with_caveat(label(point), point)} at {point['axis']} = {number(point['value'])}"
+        yield f"{where}: {point['failure']} {step}{wrong}"

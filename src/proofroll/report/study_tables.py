@@ -144,6 +144,7 @@ def _told(point: Mapping[str, Any] | None, of: str) -> dict[str, str] | None:
         return None
     return {
         "name": name_of(point),
+        "caveat": point.get("caveat", ""),
         "step": step_of(point),
         "cost": cost_of(point),
         "error": f"{error(point['error'])} {of}".strip(),

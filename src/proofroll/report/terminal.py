@@ -10,7 +10,7 @@ from rich.table import Table
 from rich.text import Text
 
 from proofroll.metrics import OBSERVABLES
-from proofroll.report.labels import SYMBOLS
+from proofroll.report.labels import SYMBOLS, caveat_lines
 
 if TYPE_CHECKING:
     from proofroll.drill.row import Drilled
@@ -138,7 +138,7 @@ def closing_lines(content: dict[str, Any]) -> list[str]:
         lines += [f"  {sentence}" for sentence in content["contradictions"][:5]]
     else:
         lines.append("Every verdict is as the comparison file expects.")
-    return lines
+    return [*lines, *caveat_lines(content["rows"])]
 
 
 def part_lines(content: dict[str, Any]) -> list[str]:

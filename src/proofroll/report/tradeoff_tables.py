@@ -235,7 +235,7 @@ def answer_lines(answer: Mapping[str, Any]) -> Iterator[str]:
 def _line(point: Mapping[str, Any], answer: Mapping[str, Any]) -> str:
     return (
         f"{', '.join(filter(None, (name_of(point), step_of(point))))}: error {error(point['error'])} {answer['unit']}, "
-        f"cost {cost_of(point)} s/s; {point['reason']}."
+        f"cost {cost_of(point)} s/s; {point['reason']}" + (f" ({point['caveat']})." if point["caveat"] else ".")
     )
 
 

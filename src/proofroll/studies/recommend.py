@@ -284,6 +284,7 @@ def _told(point: _Point | None, wish: Wish, reason: str) -> dict[str, Any] | Non
         "resolution": point["resolution"],
         "step": point["step"],
         "level": point["level"],
+        "caveat": point.get("caveat", ""),
         "error": point["error"].get(wish.quantity),
         "seconds_per_second": point["seconds_per_second"],
         "interval": point["interval"],

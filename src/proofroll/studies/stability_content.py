@@ -62,6 +62,7 @@ def _point(point: MapPoint) -> dict[str, Any]:
         "settings": {key: value for key, value in facts.settings.items() if key != facts.resolution},
         "curve": point.curve.engine,
         "level": point.curve.level,
+        "caveat": facts.caveat,
         "resolution": facts.resolution,
         "axis": place.axis.name,
         "value": place.value,

@@ -107,6 +107,7 @@ def _point(curve: Curve, point: Point, number: int, held: dict[str, float], foun
         "resolution": facts.resolution,
         "step": point.step,
         "order": facts.order,
+        "caveat": facts.caveat,
         "status": point.result.status,
         "message": point.result.message,
         "error": point.errors,
