@@ -34,7 +34,8 @@ def judged(study: Study) -> list[dict[str, Any]]:
     """One entry for each statement and run, or for each statement about the order of runs.
 
     Each has ``says``, ``source``, ``ours``, ``defined`` (what its measure means), ``because``, ``runs``, ``of``,
-    ``measure``, ``unit``, ``stated`` (text), ``found`` by the engine, ``truth`` (what the truth gives) and ``holds``; None where the engine cannot say, and ``why``.
+    ``measure``, ``unit``, ``stated`` (text), ``found`` by the engine, ``truth`` (what the truth gives)
+    and ``holds``; None where the engine cannot say, and ``why``.
     """
     return [
         _entry(study, item, runs)

@@ -99,8 +99,9 @@ def _obvious(content: dict[str, Any], found: list[Score]) -> str:
     if worst is None:
         return "What the obvious model costs cannot be said: no default setting stands beside another one." + failed
     factor, score, best = worst
+    blamed = with_caveat(score.name, rows[score.index])
     return (
-        f"The obvious model costs most with {with_caveat(score.name, rows[score.index])}: {_off(content, score.index)}, which relative to the range is "
+        f"The obvious model costs most with {blamed}: {_off(content, score.index)}, which relative to the range is "
         f"{number(factor, 1)} times the error of {best.name}.{failed}"
     )
 

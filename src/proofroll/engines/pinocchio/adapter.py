@@ -70,7 +70,7 @@ class Pinocchio:
 
     @staticmethod
     def caveat(settings: PinocchioSettings) -> str:
-        """See :class:`proofroll.engine.TellsCaveats`. Pinocchio computes terms and contact impulses; it has no steps."""
+        """See :class:`proofroll.engine.TellsCaveats`. Pinocchio computes terms and impulses; it has no steps."""
         terms = "contact solver" if settings.formulation == "contact" else "terms"
         return f"proofroll's own integrator on Pinocchio's {terms}, for Pinocchio brings none"
 
