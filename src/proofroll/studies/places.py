@@ -41,11 +41,11 @@ class Effort:
 
     periods: float = 3.0
     values: int | None = None
-    steps: int = 20_000
+    steps: int = 75_000
     limit: float = 15.0
 
 
-QUICK = Effort(values=3, steps=10_000, limit=10.0)
+QUICK = Effort(values=3, steps=30_000, limit=10.0)
 
 
 @dataclass
