@@ -21,7 +21,7 @@ from proofroll.files.comparison_file import load_comparison
 from proofroll.files.netcdf import read
 from proofroll.report.comparison_content import outcome_content
 from proofroll.report.growing_report import write_report
-from proofroll.report.markdown import cheapest_table, verdict_table
+from proofroll.report.markdown import caveat_list, cheapest_table, verdict_table
 from proofroll.report.work_precision import draw as draw_work_precision
 from proofroll.running.runner import Runner
 from proofroll.running.store import Store
@@ -82,7 +82,7 @@ def measured(runner: Runner) -> dict[str, Any]:
     claims = claims_for("sphere_in_cylinder")
     assert claims is not None  # the file is part of this repository
     study = content(tradeoff(claims.swept, runner, over=claims.over))
-    for sentence in claims.contradictions(study):
+    for sentence in (*claims.contradictions(study), *claims.undecided(study)):
         sys.stderr.write(f"{sentence}\n")
     return study
 
@@ -102,6 +102,7 @@ def main() -> None:
     text = readme.read_text(encoding="utf-8")
     for name, table in (
         ("verdicts", verdict_table(outcome_content(outcome))),
+        ("caveats", caveat_list(outcome_content(outcome))),
         ("cheapest", cheapest_table(study, TOLERANCES)),
     ):
         text = re.sub(

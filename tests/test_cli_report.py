@@ -84,7 +84,7 @@ def test_a_report_of_several_studies(proofroll: Proofroll, tmp_path: Path) -> No
     assert figures["study"]["statements"][0]["holds"] is True
     assert content["tradeoffs"] == content["stability"] == []
     html = (out / "report.html").read_text(encoding="utf-8")
-    assert "<b>1 of 1</b>" in html
+    assert "<b>1 of 1 statements hold</b>" in html
     assert 'id="figures0-height-' in html
     for run in content["comparisons"][0]["runs"]:
         assert (out / run["trajectory"]).is_file()

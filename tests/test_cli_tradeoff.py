@@ -78,12 +78,11 @@ def test_curves_reach_from_broken_to_fine(measured: dict[str, Any]) -> None:
 
 
 def test_every_point_has_a_cost_with_its_interval(measured: dict[str, Any]) -> None:
-    """A run that reached the end has a cost within its interval, and a finer step costs more."""
+    """A run that reached the end has a positive cost within its interval, from so many rounds."""
     done = [point for point in measured["points"] if point["status"] == "done"]
     for point in done:
-        assert point["interval"][0] <= point["seconds_per_second"] <= point["interval"][1]
-    costs = [point["seconds_per_second"] for point in done if point["engine"] == "exudyn"]
-    assert costs[-1] > 10 * costs[0]
+        assert 0 < point["interval"][0] <= point["seconds_per_second"] <= point["interval"][1]
+        assert len(point["rounds"]) == point["measurements"] == 2
 
 
 def test_the_truth_has_a_cost_with_its_interval(measured: dict[str, Any]) -> None:

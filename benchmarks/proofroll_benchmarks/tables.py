@@ -21,7 +21,7 @@ _MEANING = {
 def reference_tables(content: dict[str, Any]) -> Iterator[Table]:
     """What was run, how many times faster it is, and whether that is what was wanted."""
     slip = content["first_slip"]["seconds"]
-    runs = _table(f"To the first slip at {slip:.6f} s", "", "error [m]", "time [ms]", "95 %", "built in [s]")
+    runs = _table(f"To the first slip at {slip:.6f} s", "", "error [m]", "time [ms]", "interval", "built in [s]")
     for row in [*content["models"], *content["engines"]]:
         seconds = row["seconds"]
         runs.add_row(
@@ -32,7 +32,7 @@ def reference_tables(content: dict[str, Any]) -> Iterator[Table]:
             number(row.get("build_seconds")),
         )
     yield runs
-    ratios = _table("How many times faster", "", "ratio", "95 %", "goal", "")
+    ratios = _table("How many times faster", "", "ratio", "interval", "goal", "")
     for name, found in content["ratios"].items():
         ratios.add_row(_MEANING[name], *_measured(found))
     found = content["onsets_per_second"]
@@ -96,7 +96,7 @@ def study_lines(found: dict[str, Any]) -> Iterator[str]:
 def adapter_table(found: dict[str, Any]) -> Table:
     """One line per engine, formulation and variant of the scene."""
     table = Table(box=None, padding=(0, 1, 0, 0), title=Text("advance over bare loop"), title_justify="left")
-    for column in ("engine formulation setting", "variant", "ratio", "95 %"):
+    for column in ("engine formulation setting", "variant", "ratio", "interval"):
         table.add_column(column, no_wrap=True)
     table.add_column("")
     for name, item in found["engines"].items():

@@ -42,12 +42,12 @@ class Visit:
             AssertionError: it does not become so.
         """
         # Playwright's own way needs ``eval`` in the page, which the page's policy forbids.
-        end = time.monotonic() + 10
+        end = time.monotonic() + 120
         while not self.page.evaluate(condition):
             assert time.monotonic() < end, f"never: {condition}"
             self.page.wait_for_timeout(10)
 
-    def draw(self, which: str = "figure", *, patience: float = 20.0) -> list[str]:
+    def draw(self, which: str = "figure", *, patience: float = 120.0) -> list[str]:
         """Scrolls to figures and waits for their pictures.
 
         Args:

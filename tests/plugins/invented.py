@@ -23,7 +23,8 @@ def point(number: int, engine: str, error: float, seconds: float, **more: Any) -
         "settings": {"formulation": "only", "preset": "tuned", "dt": 1e-3}, "resolution": "dt", "step": 1e-3,
         "order": 2, "status": "done", "message": "reached 2 s", "error": {"z": error, "N": 10 * error},
         "envelope": {"z": error, "N": 10 * error}, "seconds_per_second": seconds,
-        "interval": [0.9 * seconds, 1.1 * seconds], "measurements": 3, "corners": None,
+        "interval": [0.9 * seconds, 1.1 * seconds], "confidence": 0.97, "rounds": 6 * [seconds],
+        "measurements": 3, "corners": None,
     }  # fmt: skip
     return values | more
 
@@ -32,7 +33,7 @@ def tradeoff_study() -> dict[str, Any]:
     """A trade-off of a rough and cheap engine, a good and dear one, and the scene's own equations."""
     points = [
         point(0, "rough", 3e-3, 1e-3),
-        point(1, "good", 1e-9, 0.5, interval=[0.5, 0.5], measurements=1),
+        point(1, "good", 1e-9, 0.5, interval=None, confidence=0.0, rounds=[0.5], measurements=1),
         point(2, "own", 1e-12, 0.01, level="reduced equations"),
     ]
     budget = {
@@ -65,7 +66,8 @@ def stability_study() -> dict[str, Any]:
         "level": None, "resolution": "dt", "axis": "V0", "value": 4.0, "parameters": {"speed": 4.0}, "until": 2.0,
         "period": 0.6, "largest_stable": None, "largest_accurate": None, "boundary": "stable", "failure": "sank in",
         "silent": True, "message": "reached 2 s", "sides": {"stable": side, "accurate": side}, "least_error": 0.9,
-        "finest": 1e-4, "too_slow": None, "runs": 7, "problem": None, "reproducer": None, "reproducer_note": None,
+        "finest": 1e-4, "too_slow": None, "timed_out": False, "runs": 7,
+        "problem": None, "reproducer": None, "reproducer_note": None,
     }  # fmt: skip
     held = side | {"largest": 1e-3, "reached": True, "numbers": {"turn": 0.2}, "silent": False}
     other = base | {

@@ -57,12 +57,13 @@ def test_each_further_study_has_its_line(written: tuple[dict[str, Any], Path]) -
     """How many statements and claims hold, how many boundaries are silent; nothing of a study that is not there."""
     content = dict(written[0])
     held = [{"holds": True}, {"holds": False}, {"holds": None}]
-    content["figures"] = [entry(study={"statements": held}, name="figs")]
-    content["tradeoffs"] = [entry(study={"points": [1, 2, 3]}, claims=held[:2], name="speed"), entry(name="absent")]
-    claims = [{"holds": True}, {"holds": None}]  # one that the map does not test counts for nothing
+    stated = [item | {"ours": item["holds"] is None} for item in held]
+    content["figures"] = [entry(study={"statements": stated}, name="figs")]
+    content["tradeoffs"] = [entry(study={"points": [1, 2, 3]}, claims=held, name="speed"), entry(name="absent")]
+    claims = [{"holds": True}, {"holds": None}]
     content["stability"] = [entry(study={"silent": 4, "boundaries": 9}, claims=claims, name="map")]
     assert part_lines(content) == [
-        "figs: 1 of 3 statements hold.",
-        "speed: 3 points; 1 of 2 claims hold.",
-        "map: 4 of 9 boundaries are silent; 1 of 1 claims hold.",
+        "figs: 1 of 2 statements and 0 of 1 of this project's own hold.",
+        "speed: 3 points; 1 of 2 claims hold, 1 undecided.",
+        "map: 4 of 9 boundaries are silent; 1 of 1 claims hold, 1 undecided.",
     ]

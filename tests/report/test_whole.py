@@ -105,7 +105,7 @@ def test_advice_names_the_cheapest_the_runner_up_and_the_first_failure(report: R
     assert answers[1e-2]["choice"]["engine"] == "rough"
     text = parse(page(report.content, report.curves)).text
     assert "0.5 (once)" in text
-    assert "1e-3 ± 10 %" in text
+    assert "1e-3 ±10%" in text
 
 
 def poisoned(value: Any) -> Any:

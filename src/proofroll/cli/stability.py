@@ -31,7 +31,7 @@ def stability(
     scene: _SceneOrFile,
     engine: Engines = None,
     axis: Annotated[list[str] | None, typer.Option(help="Axis of the map, e.g. V0; repeat. All by default.")] = None,
-    quick: Annotated[bool, typer.Option("--quick", help="Three values per axis, and less patience per run.")] = False,
+    quick: Annotated[bool, typer.Option("--quick", help="Three values per axis, and fewer steps per run.")] = False,
     out: Out = Path("out"),
     fresh: Fresh = False,
     jobs: Jobs = None,

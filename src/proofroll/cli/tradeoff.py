@@ -92,8 +92,9 @@ def tradeoff(
             terminal.print(line, markup=False)
         for name, reason in study["absent"].items():
             terminal.print(f"{name}: {reason}", markup=False)
-        for line in contradictions:
-            terminal.print(f"!! {line}", markup=False)
+        for sign, lines in (("??", study["claims"]["undecided"]), ("!!", contradictions)):
+            for line in lines:
+                terminal.print(f"{sign} {line}", markup=False)
         terminal.print(f"The diagram is in {path.with_suffix('.svg')}, everything in {path}.", markup=False)
     raise typer.Exit(CONTRADICTED if contradictions else OK)
 

@@ -209,6 +209,18 @@ class TellsLevels(Protocol):
 
 
 @runtime_checkable
+class TellsCaveats(Protocol):
+    """What an engine has besides, if some of its settings are not what the engine alone would do.
+
+    An integrator of proofroll's around an engine's terms, say: whoever reads a verdict must not blame the engine.
+    """
+
+    @staticmethod
+    def caveat(settings: Any) -> str:
+        """What is not the engine's own with these settings: one clause without a full stop; empty: nothing."""
+
+
+@runtime_checkable
 class Reproduces(Protocol):
     """What an engine has besides, if it can write a program that shows its behaviour without proofroll."""
 

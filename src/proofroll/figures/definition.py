@@ -100,6 +100,7 @@ class Statement:
     Attributes:
         says: for a person.
         source: where it is said.
+        ours: it is this project's, and not the article's.
         runs: each must fulfil it by itself; with ``order`` they are held against each other.
         of: quantity; not for ``events``.
         measure: of the quantity; ``every`` means all its samples.
@@ -115,6 +116,7 @@ class Statement:
     says: str
     source: str
     runs: list[str]
+    ours: bool = False
     of: str = ""
     measure: Measure | Literal["every", ""] = ""
     stated: str = ""

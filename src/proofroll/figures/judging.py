@@ -5,7 +5,7 @@ from __future__ import annotations
 import itertools
 import math
 import operator
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from decimal import Decimal
 from typing import TYPE_CHECKING, Any
 
@@ -13,7 +13,7 @@ import numpy as np
 
 from proofroll.core.events import events_of
 from proofroll.figures.definition import Statement
-from proofroll.figures.measures import measured, unit_of
+from proofroll.figures.measures import DEFINITIONS, measured, unit_of
 from proofroll.figures.quantities import TIME
 from proofroll.figures.study import Made, Study
 
@@ -33,14 +33,25 @@ _HALF = Decimal("0.5") * (1 + Decimal("1e-9"))
 def judged(study: Study) -> list[dict[str, Any]]:
     """One entry for each statement and run, or for each statement about the order of runs.
 
-    Each has ``says``, ``source``, ``because``, ``runs``, ``of``, ``measure``, ``unit``, ``stated`` (text), ``found``
-    by the engine, ``truth`` (what the truth gives) and ``holds``; None where the engine cannot say, and ``why``.
+    Each has ``says``, ``source``, ``ours``, ``defined`` (what its measure means), ``because``, ``runs``, ``of``,
+    ``measure``, ``unit``, ``stated`` (text), ``found`` by the engine, ``truth`` (what the truth gives)
+    and ``holds``; None where the engine cannot say, and ``why``.
     """
     return [
         _entry(study, item, runs)
         for item in study.figures.statements
         for runs in ([item.runs] if item.order else [[run] for run in item.runs])
     ]
+
+
+def count(statements: Sequence[Mapping[str, Any]]) -> str:
+    """How many statements hold, those of the article apart from this project's own."""
+    parts = []
+    for ours, whose in ((False, "statements"), (True, "of this project's own")):
+        verdicts = [item["holds"] for item in statements if item["ours"] is ours]
+        if verdicts:
+            parts.append(f"{verdicts.count(True)} of {len(verdicts)} {whose}")
+    return f"{' and '.join(parts)} hold"
 
 
 def rounds_to(value: float, stated: str) -> bool:
@@ -57,6 +68,8 @@ def _entry(study: Study, item: Statement, runs: list[str]) -> dict[str, Any]:
     return {
         "says": item.says,
         "source": item.source,
+        "ours": item.ours,
+        "defined": DEFINITIONS.get(item.measure, "") if item.measure and item.measure != "every" else "",
         "because": item.because,
         "runs": runs,
         "of": item.of,

@@ -29,6 +29,15 @@ Measure = Literal[
 ]
 # Measures without a unit; all others but the frequency keep the curve's.
 DIMENSIONLESS = frozenset({"variation", "misfit_of_sinusoid", "least_growth_of_amplitude", "growth_of_range"})
+# What a person has to know to find the same number.
+DEFINITIONS: Mapping[Measure, str] = {
+    "half_range": "the amplitude is half of maximum less minimum",
+    "misfit_of_sinusoid": "root mean square of what is left; the amplitude is that of the best sinusoid",
+    "least_growth_of_amplitude": "the amplitude of a swing is half the distance of a turning point from the mean of "
+    "its two neighbours",
+    "largest_step_of_mean_level": "the level of a swing lies in the middle between a turning point and the mean of its "
+    "two neighbours",
+}
 # A swing smaller than this part of the whole range is no oscillation of the path but noise of an engine.
 _PROMINENCE = 0.1
 _FREQUENCY_BAND = (0.8, 1.25)  # around the guess from the extremes, which is off by a few per cent

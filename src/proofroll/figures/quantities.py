@@ -52,10 +52,6 @@ def _slip(_: RollingBall, dataset: xr.Dataset) -> FloatArray:
     return np.asarray(np.hypot(dataset["slip2"].to_numpy(), dataset["slip3"].to_numpy()))
 
 
-def _inertia(body: RollingBall, dataset: xr.Dataset) -> FloatArray:
-    return np.full(dataset.sizes[TIME], body.ball.inertia)
-
-
 _DERIVED = {
     "x": Derived("m", _component("p_WB", 0)),
     "y": Derived("m", _component("p_WB", 1)),
@@ -66,7 +62,6 @@ _DERIVED = {
     "speed": Derived("m/s", _length("v_WB")),
     "angular_speed": Derived("rad/s", _length("w_WB")),
     "slip": Derived("m/s", _slip),
-    "inertia": Derived("kg m^2", _inertia),
 }
 
 

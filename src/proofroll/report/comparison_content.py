@@ -150,10 +150,15 @@ def _judgement_of(run: Run, name: str) -> Judgement | None:
 
 
 def _worst(runs: list[Run], name: str) -> dict[str, Any]:
-    """The judgement with the worst verdict, among equals the one furthest beyond its tolerance, and its point."""
-    where, worst = _furthest([(run, _judgement_of(run, name)) for run in runs])
+    """The judgement with the worst verdict, among equals the one furthest beyond its tolerance, and its point.
+
+    Its error need not be the largest of all points, for tolerances may differ: that is ``largest``.
+    """
+    judged = [(run, _judgement_of(run, name)) for run in runs]
+    where, worst = _furthest(judged)
     assert worst is not None  # some run has it, or the name would not be asked for
-    return {**dataclasses.asdict(worst), "point": point_name(where.parameters)}
+    largest = max(judgement.error for _, judgement in judged if judgement is not None)
+    return {**dataclasses.asdict(worst), "point": point_name(where.parameters), "largest": largest}
 
 
 def _setting(run: Run, preset: str | None, resolution: str | None) -> str:
@@ -175,6 +180,7 @@ def _settings(run: Run) -> dict[str, Any]:
         "resolution": resolution,
         "resolution_value": settings.get(resolution) if resolution else None,
         "declared_order": run.facts.order if run.facts else None,
+        "caveat": run.facts.caveat if run.facts else "",
     }
 
 

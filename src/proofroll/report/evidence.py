@@ -2,13 +2,12 @@
 
 from __future__ import annotations
 
-import statistics
 from typing import TYPE_CHECKING, Any
 
 from proofroll.files.json_data import plain
 from proofroll.report.comparison_content import by_row
 from proofroll.report.scene_sheet import scene_sheet
-from proofroll.running.timing import CONFIDENCE, ROUNDS, Timing
+from proofroll.running.timing import Timing
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
@@ -35,19 +34,15 @@ def add_evidence(content: dict[str, Any], outcome: Outcome) -> None:
 def cost(timings: Sequence[float]) -> dict[str, Any] | None:
     """Wall seconds per simulated second: ``median``, ``low`` and ``high``, their ``confidence``, and ``runs``.
 
-    With fewer than six clean runs the interval is their whole range, which holds the median with 1 - 2^(1-n); one
-    run has none: ``low``, ``high`` and ``confidence`` are None.
+    One run has no interval: ``low``, ``high`` and ``confidence`` are None.
     """
     if not timings:
         return None
-    count = len(timings)
-    found: dict[str, Any] = {"median": statistics.median(timings), "low": None, "high": None, "confidence": None}
-    if count >= ROUNDS:
-        interval = Timing(tuple(timings)).interval
-        found |= {"low": interval.low, "high": interval.high, "confidence": CONFIDENCE}
-    elif count > 1:
-        found |= {"low": min(timings), "high": max(timings), "confidence": 1 - 2.0 ** (1 - count)}
-    return {**found, "runs": count}
+    interval = Timing(tuple(timings)).interval
+    ends: dict[str, Any] = {"low": interval.low, "high": interval.high, "confidence": interval.confidence}
+    if not interval.confidence:
+        ends = dict.fromkeys(ends)
+    return {"median": interval.value, **ends, "runs": len(timings)}
 
 
 def _claims(row: Row) -> dict[str, Any]:

@@ -14,7 +14,7 @@ from proofroll.elements.ball_on_surface.report.regime_map import counts
 from proofroll.elements.ball_on_surface.report.regime_map import picture as map_picture
 from proofroll.figures import style
 from proofroll.figures.drawing import looks, picture
-from proofroll.figures.judging import judged
+from proofroll.figures.judging import count, judged
 from proofroll.figures.study import Study, study_content
 from proofroll.files.atomic import replacing
 from proofroll.files.json_data import plain
@@ -111,7 +111,7 @@ def _said(found: Any) -> str:
 def closing_lines(content: dict[str, Any], out: Path) -> list[str]:
     """How many statements hold, what is lost, and where the files are."""
     verdicts = [item["holds"] for item in content["statements"]]
-    lines = [f"{verdicts.count(True)} of {len(verdicts)} statements hold."]
+    lines = [f"{count(content['statements'])}."]
     if verdicts.count(None):
         why = dict.fromkeys(item["why"] for item in content["statements"] if item["holds"] is None)
         lines.append(f"{verdicts.count(None)} cannot be judged: {'; '.join(why)}.")

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from typing import Any
 
-from proofroll.report.labels import headlines, names, number, symbol, unit
+from proofroll.report.labels import headlines, names, number, symbol, unit, with_caveat
 from proofroll.report.scores import Score, cheapest, recommendation, scores
 
 # The accuracy for which the first paragraph names a setting: a line in a figure.
@@ -102,8 +102,9 @@ def _obvious(content: dict[str, Any], found: list[Score]) -> str:
     if worst is None:
         return "What the obvious model costs cannot be said: no default setting stands beside another one." + failed
     factor, score, best = worst
+    blamed = with_caveat(score.name, rows[score.index])
     return (
-        f"The obvious model costs most with {score.name}: {_off(content, score.index)}, which relative to the range is "
+        f"The obvious model costs most with {blamed}: {_off(content, score.index)}, which relative to the range is "
         f"{number(factor, 1)} times the error of {best.name}.{failed}"
     )
 

@@ -109,6 +109,7 @@ def _templates() -> jinja2.Environment:
         "told": heat_map.told,
         "onsets": onset_tables,
         "names": labels.names,
+        "caveats": labels.caveat_lines,
         "symbols": labels.SYMBOLS,
         "meanings": labels.MEANINGS,
         "outlines": OUTLINES,

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import unicodedata
+from collections.abc import Mapping, Sequence
 from typing import Any
 
 SYMBOLS = {
@@ -99,6 +100,21 @@ def names(rows: list[dict[str, Any]]) -> list[str]:
         words = [row["name"], row["formulation"], row["setting"]]
         short.append(" ".join([*(str(word) for word in words if word), *([f"({step(row)})"] if step(row) else [])]))
     return [name if short.count(name) == 1 else str(row["engine"]) for name, row in zip(short, rows, strict=True)]
+
+
+def with_caveat(name: str, row: Mapping[str, Any]) -> str:
+    """A name, and in brackets what of it is not the engine's own."""
+    return f"{name} ({row['caveat']})" if row.get("caveat") else name
+
+
+def caveat_lines(rows: Sequence[Mapping[str, Any]]) -> list[str]:
+    """What of some settings is not the engine's own: one sentence for each caveat, with the settings that have it."""
+    found: dict[str, list[str]] = {}
+    for row in rows:
+        if row.get("caveat"):
+            where = " ".join(str(part) for part in (row["formulation"], row["setting"]) if part)
+            found.setdefault(f"{row['caveat']}: {row['name']}", []).append(where)
+    return [f"{said[0].upper()}{said[1:]} {', '.join(dict.fromkeys(where))}." for said, where in found.items()]
 
 
 def settings_text(settings: dict[str, Any]) -> str:

@@ -7,7 +7,7 @@ from typing import Any
 
 from proofroll.core.comparison import Tolerance
 from proofroll.core.engine import Level
-from proofroll.report.labels import SYMBOLS, verdict_text
+from proofroll.report.labels import SYMBOLS, caveat_lines, verdict_text
 from proofroll.report.labels import number as short
 from proofroll.report.terminal import columns, number, step
 from proofroll.report.tradeoff_tables import name_of, step_of
@@ -15,18 +15,23 @@ from proofroll.studies.recommend import Wish, recommend
 
 
 def verdict_table(content: dict[str, Any]) -> str:
-    """One line per engine with settings: the worst over all points of the parameters."""
+    """One line per engine with settings: the worst verdict and the largest errors over all points of the parameters."""
     names = columns(content)
     head = ["engine", "formulation", "setting", "step", "verdict", *(f"{n} [{unit}]" for n, unit in names), "s/s"]
     lines = ["| " + " | ".join(head) + " |", "|" + "---|" * len(head)]
     for row in content["rows"]:
-        errors = [row["observables"][name]["error"] if name in row["observables"] else None for name, _ in names]
+        errors = [row["observables"][name]["largest"] if name in row["observables"] else None for name, _ in names]
         cells = [row["name"], row["formulation"] or "", row["setting"], step(row)]
         cells.append(f"{SYMBOLS[row['verdict']]} {verdict_text(row)}")
         cells += [number(error) for error in errors]
         cells.append(number(row["seconds_per_second"]))
         lines.append("| " + " | ".join(cells) + " |")
     return "\n".join(lines) + "\n"
+
+
+def caveat_list(content: dict[str, Any]) -> str:
+    """What of some settings is not the engine's own, a line each."""
+    return "".join(f"- {line}\n" for line in caveat_lines(content["rows"]))
 
 
 # Among what the cheapest is named: everything that is an engine's model, contact models, and the scene's own equations.

@@ -9,7 +9,7 @@ from typing import Any
 from rich.table import Table
 from rich.text import Text
 
-from proofroll.report.labels import number
+from proofroll.report.labels import number, with_caveat
 from proofroll.studies.stability_content import silent_ranking
 
 
@@ -114,9 +114,10 @@ def silent_lines(study: Mapping[str, Any], count: int = 8) -> Iterator[str]:
         side = point["sides"][point["boundary"]]
         wrong = "" if side["error"] is None else f", off by {number(100 * side['error'])} % of the range"
         if side["largest"] is None and point["too_slow"] is not None:
-            step = f"down to {point['resolution']} {number(point['finest'])}, finer ones are too slow"
+            step = f"down to {point['resolution']} {number(point['finest'])}, finer ones have too many steps"
         elif side["largest"] is None:
             step = f"at every {point['resolution']} down to {number(point['finest'])}"
         else:
             step = f"just beyond {point['resolution']} {number(side['largest'])}"
-        yield f"{label(point)} at {point['axis']} = {number(point['value'])}: {point['failure']} {step}{wrong}"
+        where = f"{with_caveat(label(point), point)} at {point['axis']} = {number(point['value'])}"
+        yield f"{where}: {point['failure']} {step}{wrong}"

@@ -6,8 +6,9 @@ import re
 from collections.abc import Mapping
 from typing import Any
 
+from proofroll.figures.judging import count
 from proofroll.report.labels import error, number, symbol, unit
-from proofroll.report.tradeoff_tables import name_of, step_of
+from proofroll.report.tradeoff_tables import cost_of, name_of, step_of
 
 
 def advice(entry: Mapping[str, Any]) -> list[dict[str, Any]]:
@@ -41,7 +42,7 @@ def front(entry: Mapping[str, Any], key: str = "pareto_engines") -> list[dict[st
         {
             "name": name_of(point),
             "step": step_of(point),
-            "cost": cost(point),
+            "cost": cost_of(point),
             "errors": [error(point["error"].get(name)) if name in point["error"] else "–" for name in entry["shown"]],
         }
         for point in (by_id[number] for number in study[key].get(study["quantity"], []))
@@ -78,23 +79,13 @@ def quantities(entry: Mapping[str, Any]) -> list[dict[str, str]]:
     ]
 
 
-def cost(point: Mapping[str, Any]) -> str:
-    """Wall seconds per simulated second, with the interval of 95 % to either side at most, if there is one."""
-    if point["seconds_per_second"] is None:
-        return "–"
-    value = number(point["seconds_per_second"])
-    if point["interval"] is None or (point.get("measurements") or 2) < 2:
-        return f"{value} (once)"
-    low, high = point["interval"]
-    spread = max(high - point["seconds_per_second"], point["seconds_per_second"] - low) / point["seconds_per_second"]
-    return f"{value} ± {100 * spread:.0f} %"
-
-
 def effort(study: Mapping[str, Any]) -> str:
     """How well speeds are known and where the choices hold, in a sentence or two."""
     said = ""
     if study.get("brief"):
-        said = "Speeds were measured briefly, three times at most and those of long runs once. "
+        said = (
+            "Speeds were measured briefly, three times at most and those of long runs once: they contradict no claim. "
+        )
     over = ", ".join(f"{name} {min(values):g} to {max(values):g}" for name, values in study["over"].items())
     at = ", ".join(f"{name} = {value:g}" for name, value in study["parameters"].items()) or "the default parameters"
     where = f"at {at} over {study['until']:g} s"
@@ -126,6 +117,11 @@ def statements(study: Mapping[str, Any]) -> list[dict[str, Any]]:
     return lines
 
 
+def counted(study: Mapping[str, Any]) -> str:
+    """How many statements hold."""
+    return count(study["statements"])
+
+
 def _said(found: Any, of: str) -> str:
     if found is None:
         return "–"
@@ -148,8 +144,9 @@ def _told(point: Mapping[str, Any] | None, of: str) -> dict[str, str] | None:
         return None
     return {
         "name": name_of(point),
+        "caveat": point.get("caveat", ""),
         "step": step_of(point),
-        "cost": cost(point),
+        "cost": cost_of(point),
         "error": f"{error(point['error'])} {of}".strip(),
         "reason": point["reason"],
     }

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections import Counter
 from typing import Any
 
-from proofroll.report.labels import headlines, names, number, symbol, unit
+from proofroll.report.labels import headlines, names, number, symbol, unit, with_caveat
 from proofroll.report.scores import cheapest, scores
 from proofroll.report.tradeoff_tables import name_of, step_of
 
@@ -93,7 +93,7 @@ def _wrong(comparison: dict[str, Any]) -> list[tuple[float, str, str]]:
         if worst is not None:
             size = f"{number(worst['error'])} {unit(worst['unit'])}".strip()
             text = f"its {symbol(worst['observable'])} is off by {size}"
-        found.append((relative, name, text))
+        found.append((relative, with_caveat(name, row), text))
     return found
 
 
@@ -107,7 +107,9 @@ def _use(content: dict[str, Any]) -> str:
         if answer is not None:
             choice, least = answer["choice"], answer["least_model"]
             wanted = f"{symbol(answer['quantity'])} to {number(answer['tolerance'])} {unit(answer['unit'])}".strip()
-            said = f"For {wanted} use {name_of(choice)}" + (f" at {step_of(choice)}" if step_of(choice) else "")
+            said = f"For {wanted} use {with_caveat(name_of(choice), choice)}" + (
+                f" at {step_of(choice)}" if step_of(choice) else ""
+            )
             said += f", at {number(choice['seconds_per_second'])} s of computing per simulated second"
             if least:
                 said += (

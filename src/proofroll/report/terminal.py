@@ -9,7 +9,7 @@ from rich.console import Console
 from rich.table import Table
 from rich.text import Text
 
-from proofroll.report.labels import SYMBOLS, headlines, names, verdict_text
+from proofroll.report.labels import SYMBOLS, caveat_lines, headlines, names, verdict_text
 
 if TYPE_CHECKING:
     from proofroll.drill.row import Drilled
@@ -152,33 +152,36 @@ def closing_lines(content: dict[str, Any]) -> list[str]:
         lines += [f"  {sentence}" for sentence in content["contradictions"][:5]]
     else:
         lines.append("Every verdict is as the comparison file expects.")
-    return lines
+    return [*lines, *caveat_lines(content["rows"])]
 
 
 def part_lines(content: dict[str, Any]) -> list[str]:
     """One line for each further study of a report."""
+    from proofroll.figures.judging import count
+
     lines = []
     for entry in content["figures"]:
         if entry["study"] is not None:
-            holds = [item["holds"] for item in entry["study"]["statements"]]
-            lines.append(f"{entry['name']}: {holds.count(True)} of {len(holds)} statements hold.")
+            lines.append(f"{entry['name']}: {count(entry['study']['statements'])}.")
     for entry in content["tradeoffs"]:
         if entry["study"] is not None:
             held = [claim["holds"] for claim in entry["claims"]]
-            lines.append(
-                f"{entry['name']}: {len(entry['study']['points'])} points; {sum(held)} of {len(held)} claims hold."
-            )
+            lines.append(f"{entry['name']}: {len(entry['study']['points'])} points{_held(held)}.")
     for entry in content["stability"]:
         if entry["study"] is not None:
-            study, held = entry["study"], [claim["holds"] for claim in entry["claims"] if claim["holds"] is not None]
+            study, held = entry["study"], [claim["holds"] for claim in entry["claims"]]
             lines.append(
                 f"{entry['name']}: {study['silent']} of {study['boundaries']} boundaries are silent{_held(held)}."
             )
     return lines
 
 
-def _held(held: Sequence[bool]) -> str:
-    return f"; {sum(held)} of {len(held)} claims hold" if held else ""
+def _held(held: Sequence[bool | None]) -> str:
+    """How many claims hold, of those that are decided, and how many are not."""
+    if not held:
+        return ""
+    undecided = f", {held.count(None)} undecided" if None in held else ""
+    return f"; {held.count(True)} of {len(held) - held.count(None)} claims hold{undecided}"
 
 
 def first_lines(content: dict[str, Any]) -> list[str]:

@@ -59,28 +59,15 @@ class TradeoffPart:
         """The study, what to use, and what was claimed."""
         from proofroll.report.advice import advice
         from proofroll.report.tradeoff_tables import default_quantities
-        from proofroll.studies.recommend import fits, recommend
 
         study = self.study
         assert study is not None  # it was made
-        claims = []
-        for claim in () if self.engines else self.asked.cheapest:
-            choice = recommend(study, self.asked.wish(claim))["choice"]
-            claims.append(
-                {
-                    "tolerance": f"{claim.tolerance.value:g} {claim.tolerance.unit}",
-                    "levels": list(claim.levels),
-                    "engine": claim.engine,
-                    "because": claim.because,
-                    "choice": choice,
-                    "holds": choice is not None and any(fits(choice, text) for text in claim.engine),
-                }
-            )
+        claims = [] if self.engines else self.asked.judged(study)
         return {
             "study": study,
             "shown": default_quantities(study),
             "advice": advice(study, self.asked),
-            "claims": claims,
+            "claims": [claim._asdict() for claim in claims],
             "contradictions": [] if self.engines else self.asked.contradictions(study),
             "lost": [],
         }

@@ -10,6 +10,7 @@ from rich.table import Table
 from rich.text import Text
 
 from proofroll.report.labels import error, number
+from proofroll.running.timing import CONFIDENCE
 from proofroll.studies.pareto import tied
 
 
@@ -33,12 +34,18 @@ def step_of(point: Mapping[str, Any]) -> str:
 
 
 def cost_of(point: Mapping[str, Any]) -> str:
-    """Seconds per second, and how far the interval of 95 % goes to either side at most."""
-    if point["interval"] is None:
-        return "–"
+    """Seconds per second, and how far its interval goes to either side at most.
+
+    The range of fewer than six values is no interval of 95 %, so its own confidence stands behind it.
+    """
     cost = point["seconds_per_second"]
+    if cost is None:
+        return "–"
+    confidence = point.get("confidence")
+    if point["interval"] is None or not confidence:
+        return f"{number(cost)} (once)"
     spread = max(point["interval"][1] - cost, cost - point["interval"][0]) / cost
-    return f"{number(cost)} ±{100 * spread:.0f}%"
+    return f"{number(cost)} ±{100 * spread:.0f}%" + (f" ({100 * confidence:.2g}%)" if confidence < CONFIDENCE else "")
 
 
 def point_table(
@@ -57,11 +64,13 @@ def point_table(
         title: of the table.
         ties: numbers of points on a front whose cost cannot be told from that of the next.
     """
-    caption = Text("≈ a tie: the cost cannot be told from that of the next line, which is more accurate")
+    caption = Text("cost: wall seconds per simulated second through this adapter")
+    if ties:
+        caption += Text("; ≈ a tie: the cost cannot be told from that of the next line, which is more accurate")
     table = Table(
         title=Text(title),
         title_justify="left",
-        caption=caption if ties else None,
+        caption=caption,
         caption_justify="left",
         box=None,
         padding=(0, 1, 0, 0),
@@ -218,6 +227,7 @@ def answer_lines(answer: Mapping[str, Any]) -> Iterator[str]:
     ):
         if answer[key]:
             yield f"{words}: {_line(answer[key], answer)}"
+    yield "Costs are those of an engine through this adapter; another way to drive it may cost more or less."
     yield _checked(answer)
     yield _measured(answer["measured"])
 
@@ -225,7 +235,7 @@ def answer_lines(answer: Mapping[str, Any]) -> Iterator[str]:
 def _line(point: Mapping[str, Any], answer: Mapping[str, Any]) -> str:
     return (
         f"{', '.join(filter(None, (name_of(point), step_of(point))))}: error {error(point['error'])} {answer['unit']}, "
-        f"cost {cost_of(point)} s/s; {point['reason']}."
+        f"cost {cost_of(point)} s/s; {point['reason']}" + (f" ({point['caveat']})." if point["caveat"] else ".")
     )
 
 

@@ -103,7 +103,7 @@ def _panel(panel: Any, study: Mapping[str, Any], quantity: str) -> None:
         panel.plot([cost], [bar], marker="*", color="black", markersize=9, linestyle="", label="truth: its error bar")
     unit = shown_unit(facts["unit"])
     panel.set(
-        xlabel="cost [wall seconds per simulated second]",
+        xlabel="cost through this adapter [wall seconds per simulated second]",
         ylabel=f"largest error of {symbol(quantity)}" + (f" [{unit}]" if unit else ""),
     )
     panel.grid(which="major", color="0.9", lw=0.6)

@@ -36,6 +36,7 @@ class EngineFacts:
         resolution: name of the setting that trades speed for accuracy, ``dt`` or ``rtol``.
         order: declared order of convergence, or None.
         shares: routes of the truth whose equations it rests on, see :class:`proofroll.core.engine.SharesEquations`.
+        caveat: what of these settings is not the engine's own, to be said wherever it is judged; empty: nothing.
     """
 
     name: str
@@ -45,6 +46,7 @@ class EngineFacts:
     resolution: str | None = None
     order: int | None = None
     shares: list[str] = field(default_factory=list)
+    caveat: str = ""
 
 
 @dataclass(frozen=True)
@@ -58,7 +60,7 @@ class Case:
         engine: the engine with complete settings.
         until, every: last time and sampling interval [s].
         timed: whether a second, clean run that only advances is timed.
-        time_limit: wall seconds after which the case is ended [s].
+        time_limit: seconds after which the case is ended, but for those in which others had the processor [s].
         asks: what is wanted besides the motion; see :class:`proofroll.core.scene.Scene`.
     """
 

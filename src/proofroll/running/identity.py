@@ -46,13 +46,13 @@ def describe(engine: str) -> dict[str, Any]:
 
 
 def resolve(engine: str, options: dict[str, Any]) -> dict[str, Any]:
-    """Complete settings of an engine, and what else decides its results."""
+    """Complete settings of an engine, what else decides its results, and what in them is not its own."""
     if engine == "truth":
         if options:
             raise InputError("truth", ", ".join(options), "the truth has no settings; leave them out")
         code = digest([Path(inspect.getfile(truth)).parent for truth in load_truths()])
         return dataclasses.asdict(EngineFacts("truth", _truth_version(), code, {}))
-    from proofroll.core.engine import SharesEquations
+    from proofroll.core.engine import SharesEquations, TellsCaveats
     from proofroll.core.plugins import load_engine, resolve_settings
 
     kind = load_engine(engine)
@@ -67,6 +67,7 @@ def resolve(engine: str, options: dict[str, Any]) -> dict[str, Any]:
         resolution=settings.resolution,
         order=settings.order,
         shares=list(kind.shares.get(settings.formulation, ())) if isinstance(kind, SharesEquations) else [],
+        caveat=kind.caveat(settings) if isinstance(kind, TellsCaveats) else "",
     )
     return dataclasses.asdict(facts)
 

@@ -18,6 +18,7 @@ from typing import Any, Self
 from proofroll.core.errors import InputError, Missing, ProofrollError
 from proofroll.running.case import Status
 from proofroll.running.memory import VARIABLE, descendants, memory_limit, resident_gb
+from proofroll.starving import starved
 
 # One thread per worker, set before anything is imported there: workers run side by side.
 _ONE_THREAD = dict.fromkeys(
@@ -98,7 +99,8 @@ class Worker:
         """One request, one answer.
 
         Raises:
-            WorkerDied: the process crashed, took longer than ``time_limit`` [s] or needed too much memory.
+            WorkerDied: the process crashed, took longer than ``time_limit`` [s], in which time that others had the
+                processor does not count, or needed too much memory.
         """
         self._asked += 1
         try:
@@ -136,11 +138,17 @@ class Worker:
 
     def _line(self, time_limit: float) -> bytes:
         """The next line of the answers."""
+        starved_before = starved(self._process.pid)
         deadline = time.monotonic() + time_limit
         look = time.monotonic() + _TICK
         while b"\n" not in self._pending:
             now = time.monotonic()
             if now >= deadline:
+                # What it waited for others is granted once more, until it had the time for itself.
+                starved_now = starved(self._process.pid)
+                if starved_now - starved_before > _TICK:
+                    deadline, starved_before = now + starved_now - starved_before, starved_now
+                    continue
                 self.kill()
                 raise WorkerDied(Status.TIMEOUT, f"no result within {time_limit:g} s; it was ended")
             if now >= look:

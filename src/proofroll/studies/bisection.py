@@ -28,7 +28,7 @@ class Found(Generic[V]):
 
     Attributes:
         seen: rung -> what a run on it gave.
-        limit: the first rung that takes too long, or the number of rungs.
+        limit: the first rung whose run is too long, or the number of rungs.
     """
 
     seen: dict[int, V] = field(default_factory=dict)
@@ -49,7 +49,7 @@ def search(size: int, stride: int) -> Generator[int, V | None, Found[V]]:
 
     It goes down by ``stride`` until two runs in a row are accurate, then bisects for either boundary, and last makes
     sure that the rung below each passes too, for right beside a boundary a pass may be luck. What is known is never
-    asked again. A rung for which None is sent, and all finer ones, are left out as too slow.
+    asked again. A rung for which None is sent, and all finer ones, are left out as too long.
     """
     found: Found[V] = Found(limit=size)
     seen = found.seen

@@ -10,32 +10,14 @@ from typing import Any
 from pydantic import ConfigDict, TypeAdapter, ValidationError
 
 from proofroll.core.comparison import Tolerance
-from proofroll.core.engine import Level
 from proofroll.core.errors import InputError
 from proofroll.files.scene_file import load_scene
 from proofroll.files.toml import read_toml, study_files
 from proofroll.files.validation import first_problem
-from proofroll.studies.recommend import Wish, fits, recommend
+from proofroll.studies.claimed import Cheapest, Converges, Holds, Judgement
 from proofroll.studies.sweep import Question
 
 STUDY = "tradeoff"
-
-
-@dataclass(frozen=True)
-class Cheapest:
-    """Which engine is claimed to be the cheapest at a tolerance.
-
-    Attributes:
-        tolerance: of the quantity.
-        engine: any of these, ``name[key=value,…]``.
-        because: why it is.
-        levels: among which rungs of the ladder; all engines proper if empty.
-    """
-
-    tolerance: Tolerance
-    engine: list[str]
-    because: str
-    levels: list[Level] = field(default_factory=list)
 
 
 @dataclass(frozen=True)
@@ -47,7 +29,7 @@ class TradeoffClaims:
         title, question: for a person.
         scene, parameters, until, quantity: what is swept.
         over: parameter -> values; the range over which the best points are checked.
-        cheapest: the claims.
+        holds, converges, cheapest: the claims; the first two are judged exactly.
     """
 
     name: str
@@ -59,29 +41,30 @@ class TradeoffClaims:
     parameters: dict[str, float] = field(default_factory=dict)
     over: dict[str, list[float]] = field(default_factory=dict)
     cheapest: list[Cheapest] = field(default_factory=list)
+    holds: list[Holds] = field(default_factory=list)
+    converges: list[Converges] = field(default_factory=list)
 
     @property
     def swept(self) -> Question:
         """What is to be swept."""
         return Question(self.scene, self.parameters, self.until, self.quantity)
 
-    def wish(self, claim: Cheapest) -> Wish:
-        """What a claim asks of the measured points."""
-        return Wish(self.quantity, claim.tolerance, levels=tuple(claim.levels))
+    def judged(self, study: Mapping[str, Any]) -> list[Judgement]:
+        """What a study says of each claim."""
+        claims: list[Holds | Converges | Cheapest] = [*self.holds, *self.converges, *self.cheapest]
+        return [claim.judged(study, self.quantity) for claim in claims]
 
     def contradictions(self, study: Mapping[str, Any]) -> list[str]:
-        """What the measured points do not confirm, as sentences."""
-        found = []
-        for claim in self.cheapest:
-            choice = recommend(study, self.wish(claim))["choice"]
-            among = f" among {', '.join(claim.levels)}" if claim.levels else ""
-            where = f"{self.name}: {self.quantity} to {claim.tolerance.value:g} {claim.tolerance.unit}{among}"
-            if choice is None:
-                found.append(f"{where}: nothing holds it, expected: {' or '.join(claim.engine)}")
-            elif not any(fits(choice, text) for text in claim.engine):
-                said = f"{choice['engine']} {choice['settings'].get('formulation', '')}"
-                found.append(f"{where}: the cheapest is {said}, expected: {' or '.join(claim.engine)}")
-        return found
+        """What a study contradicts, as sentences."""
+        return self._said(study, False, "contradicted")
+
+    def undecided(self, study: Mapping[str, Any]) -> list[str]:
+        """What a study neither confirms nor contradicts, as sentences."""
+        return self._said(study, None, "undecided")
+
+    def _said(self, study: Mapping[str, Any], verdict: bool | None, word: str) -> list[str]:
+        found = (item for item in self.judged(study) if item.holds is verdict)
+        return [f"{self.name}, {word}: {item.claim}; {item.found}" for item in found]
 
 
 def claims_for(scene: str) -> TradeoffClaims | None:
@@ -105,12 +88,13 @@ def load_claims(path: Path) -> TradeoffClaims:
 def _claims(path: Path, content: dict[str, Any]) -> TradeoffClaims:
     where = path.name
     given = {key: value for key, value in content.items() if key != "study"}
-    raw = given.get("cheapest", [])
-    for index, claim in enumerate(raw if isinstance(raw, list) else []):
-        if isinstance(claim, dict):
-            claim["tolerance"] = Tolerance.parse(f"{where}: cheapest.{index}.tolerance", claim.get("tolerance"))
-            if isinstance(claim.get("engine"), str):
-                claim["engine"] = [claim["engine"]]
+    for kind in ("cheapest", "holds"):
+        raw = given.get(kind, [])
+        for index, claim in enumerate(raw if isinstance(raw, list) else []):
+            if isinstance(claim, dict):
+                claim["tolerance"] = Tolerance.parse(f"{where}: {kind}.{index}.tolerance", claim.get("tolerance"))
+                if kind == "cheapest" and isinstance(claim.get("engine"), str):
+                    claim["engine"] = [claim["engine"]]
     try:
         found = TypeAdapter(TradeoffClaims).validate_python({**given, "name": path.stem})
     except ValidationError as error:
@@ -122,18 +106,20 @@ def _claims(path: Path, content: dict[str, Any]) -> TradeoffClaims:
 def _check(where: str, found: TradeoffClaims) -> None:
     scene = load_scene(found.scene, **found.parameters)
     unit = scene.observable(found.quantity, f"{where}: quantity").unit
-    if not found.cheapest:
+    if not (found.cheapest or found.holds or found.converges):
         advice = "the file claims nothing; add [[cheapest]] with tolerance, engine and because"
         raise InputError(f"{where}: cheapest", "nothing", advice)
-    for index, claim in enumerate(found.cheapest):
-        if not claim.because:
-            raise InputError(f"{where}: cheapest.{index}.because", "nothing", "every claim needs its reason; add it")
-        if not claim.tolerance.relative and claim.tolerance.unit != unit:
-            raise InputError(f"{where}: cheapest.{index}.tolerance", claim.tolerance.unit, f"its unit is {unit}")
+    for kind in ("cheapest", "holds", "converges"):
+        for index, claim in enumerate(getattr(found, kind)):
+            if not claim.because:
+                raise InputError(f"{where}: {kind}.{index}.because", "nothing", "every claim needs its reason; add it")
+            tolerance = getattr(claim, "tolerance", None)
+            if tolerance is not None and not tolerance.relative and tolerance.unit != unit:
+                raise InputError(f"{where}: {kind}.{index}.tolerance", tolerance.unit, f"its unit is {unit}")
     for name, values in found.over.items():
         for value in values:
             load_scene(found.scene, **{**found.parameters, name: value})
 
 
-for _typed in (TradeoffClaims, Cheapest):
+for _typed in (TradeoffClaims, Cheapest, Holds, Converges):
     setattr(_typed, "__pydantic_config__", ConfigDict(extra="forbid"))  # noqa: B010 -- the name is pydantic's, not the class's

@@ -58,13 +58,7 @@ def recommend(study: Mapping[str, Any], wish: Wish) -> dict[str, Any]:
         InputError: a quantity or an engine that was not measured, or a percentage of what has no size.
     """
     known = study["quantities"]
-    if wish.quantity not in known:
-        raise InputError("quantity", wish.quantity, f"measured are {', '.join(known)}")
-    scale = known[wish.quantity]["scale"]
-    if wish.tolerance.relative and scale is None:
-        advice = f"{wish.quantity} has no size here; give it in {known[wish.quantity]['unit']}"
-        raise InputError("tolerance", f"{100 * wish.tolerance.value:.3g} %", advice)
-    absolute = wish.tolerance.absolute(scale or 1.0)
+    absolute = _absolute(study, wish)
     timed = [p for p in study["points"] if p["seconds_per_second"] is not None and wish.quantity in p["envelope"]]
     timed.sort(key=lambda p: float(p["seconds_per_second"]))
     _require_measured(study, wish)
@@ -117,6 +111,32 @@ def recommend(study: Mapping[str, Any], wish: Wish) -> dict[str, Any]:
     return answer
 
 
+def holding(study: Mapping[str, Any], wish: Wish, *, here: bool = False) -> list[_Point]:
+    """Every point among those asked for that holds the tolerance with margin, the cheapest first, untimed ones last.
+
+    Args:
+        study: measured.
+        wish: what is asked for.
+        here: whether the scene's own parameters are enough, whatever happens at the corners of the range.
+    """
+    absolute = _absolute(study, wish)
+    within = {**study, "over": {}} if here else study
+    found = [p for p in study["points"] if _asked(p, wish) and _why_not(within, p, wish, absolute) is None]
+    return sorted(found, key=lambda p: float("inf") if p["seconds_per_second"] is None else p["seconds_per_second"])
+
+
+def _absolute(study: Mapping[str, Any], wish: Wish) -> float:
+    """The tolerance in the quantity's unit."""
+    known = study["quantities"]
+    if wish.quantity not in known:
+        raise InputError("quantity", wish.quantity, f"measured are {', '.join(known)}")
+    scale = known[wish.quantity]["scale"]
+    if wish.tolerance.relative and scale is None:
+        advice = f"{wish.quantity} has no size here; give it in {known[wish.quantity]['unit']}"
+        raise InputError("tolerance", f"{100 * wish.tolerance.value:.3g} %", advice)
+    return wish.tolerance.absolute(scale or 1.0)
+
+
 def _require_measured(study: Mapping[str, Any], wish: Wish) -> None:
     measured = list(dict.fromkeys(point["engine"] for point in study["points"]))
     for text in wish.engines:
@@ -150,8 +170,12 @@ def _same(value: object, text: str) -> bool:
 
 def _why_not(study: Mapping[str, Any], point: _Point, wish: Wish, absolute: float) -> str | None:
     """Why a point does not hold the tolerance, in one sentence; None if it does."""
-    return _why_not_here(study, point, wish.quantity, absolute) or (
-        _why_not_there(study, point, wish, absolute) if study["over"] else None
+    sparse = point.get("sparse")
+    lives = _lives_on_the_grid(study, sparse, wish.quantity, absolute) if sparse else None
+    return (
+        lives
+        or _why_not_here(study, point, wish.quantity, absolute)
+        or (_why_not_there(study, point, wish, absolute) if study["over"] else None)
     )
 
 
@@ -171,6 +195,18 @@ def _why_not_here(study: Mapping[str, Any], point: _Point, name: str, absolute: 
     if bar * MARGIN > absolute:
         return f"the truth itself is known only to {bar:.2g} {unit}, so nothing can be seen to hold it"
     return None
+
+
+def _lives_on_the_grid(study: Mapping[str, Any], sparse: Mapping[str, Any], name: str, absolute: float) -> str | None:
+    """Why a tolerance holds only because a step ends at each of many samples; None if that is not why."""
+    dense, rare, unit = sparse["dense_error"].get(name), sparse["error"].get(name), study["quantities"][name]["unit"]
+    if dense is None or dense * MARGIN > absolute or (rare is not None and rare * MARGIN <= absolute):
+        return None
+    seen = f"{name} is off by {rare:.2g} {unit}" if rare is not None else f"there is no {name}: {sparse['message']}"
+    return (
+        f"it holds only because its steps end at every sample: sampled every {sparse['every']:g} s instead of "
+        f"{study['every']:g} s, {seen}"
+    )
 
 
 def _why_not_there(study: Mapping[str, Any], point: _Point, wish: Wish, absolute: float) -> str | None:
@@ -248,9 +284,11 @@ def _told(point: _Point | None, wish: Wish, reason: str) -> dict[str, Any] | Non
         "resolution": point["resolution"],
         "step": point["step"],
         "level": point["level"],
+        "caveat": point.get("caveat", ""),
         "error": point["error"].get(wish.quantity),
         "seconds_per_second": point["seconds_per_second"],
         "interval": point["interval"],
+        "confidence": point.get("confidence"),
         "measurements": point.get("measurements"),
         "reason": reason,
     }

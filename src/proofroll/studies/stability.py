@@ -10,8 +10,6 @@ import dataclasses
 from collections.abc import Callable, Generator, Iterable, Sequence
 from dataclasses import dataclass, field
 
-import numpy as np
-
 from proofroll.files.netcdf import read
 from proofroll.running.case import Case, EngineFacts, Result, Status
 from proofroll.running.runner import Runner
@@ -27,10 +25,6 @@ _PARTS = [1, *(part for power in range(_FINEST) for part in (2 << power, 3 << po
 _TOLERANCES = [10.0**-power for power in range(1, 14)]
 # Rungs skipped on the way down: a factor of four in the step, three decades of tolerance.
 _STRIDE = {"dt": 4, "rtol": 3}
-# A run with an eighth-order method gets longer as this power of its tolerance.
-_PER_DECADE = 1 / 8
-# A single run foretells so badly that this many times the patience is allowed.
-_DOUBT = 4
 # After so many runs that met the limit of time a search goes no further: each finer one would too.
 _TIMEOUTS = 2
 
@@ -58,23 +52,14 @@ class MapPoint:
         facts = self.curve.facts
         return dataclasses.replace(facts, settings={**facts.settings, str(facts.resolution): self.ladder[rung]})
 
-    def expected(self, rung: int) -> float:
-        """Wall seconds that a run is expected to take, from the coarser runs that got somewhere; 0: unknown.
+    def too_long(self, rung: int, effort: Effort) -> bool:
+        """Whether a run is not made: it has too many steps, or coarser ones met the limit of time.
 
-        Their trend counts, for an engine that halves its own steps takes as long with a coarse one; a single run says
-        only that it will not be longer than in proportion to the steps.
+        The coarsest is always made: in a long run it may have more steps than are allowed to a finer one.
         """
-        known = sorted((item, result.wall_seconds) for item, result in self.results.items() if result.wall_seconds)
-        known = [item for item in known if item[0] < rung]
-        if not known:
-            return 0.0
-        last, seconds = known[-1]
-        power = 1.0 if self.curve.fixed_step else _PER_DECADE
-        if len(known) > 1 and self.curve.fixed_step:
-            before, earlier = known[-2]
-            steps = np.log(self.ladder[before] / self.ladder[last])
-            power = float(np.clip(np.log(seconds / earlier) / steps, 0.0, 1.0))
-        return float(seconds * (self.ladder[last] / self.ladder[rung]) ** power)
+        if self.timeouts >= _TIMEOUTS:
+            return True
+        return rung > 0 and self.curve.fixed_step and self.place.until / self.ladder[rung] > effort.steps * (1 + 1e-9)
 
     @property
     def timeouts(self) -> int:
@@ -168,7 +153,7 @@ def _search(name: str, points: Sequence[MapPoint], effort: Effort, runner: Runne
     def ask(point: MapPoint, searching: Searching, rung: int | None) -> list[Case]:
         """Goes on with a search until it needs a case that has not been run; that case, unless another asked for it."""
         while rung is not None:
-            if _too_slow(point, rung, effort):
+            if point.too_long(rung, effort):
                 rung = _send(point, searching, None)
                 continue
             case = point.cases[rung] = case_at(name, point.place, point.facts(rung), effort.limit)
@@ -182,6 +167,8 @@ def _search(name: str, points: Sequence[MapPoint], effort: Effort, runner: Runne
     def answer(point: MapPoint, searching: Searching, rung: int) -> int | None:
         case = point.cases[rung]
         point.results[rung] = result = known[case.key]
+        if result.status == Status.TIMEOUT:  # a faster machine would have seen what came of it
+            return _send(point, searching, None)
         dataset = None if result.trajectory is None else read(runner.store.trajectory(case))
         assert point.place.yardstick is not None  # points have a scene
         return _send(point, searching, judge(result, dataset, point.place.yardstick))
@@ -199,11 +186,6 @@ def _search(name: str, points: Sequence[MapPoint], effort: Effort, runner: Runne
         searching: Searching = search(len(point.ladder), _STRIDE["dt" if point.curve.fixed_step else "rtol"])
         first += ask(point, searching, next(searching))
     runner.follow(first, arrived)
-
-
-def _too_slow(point: MapPoint, rung: int, effort: Effort) -> bool:
-    allowed = effort.patience * (1 if len(point.results) > 1 else _DOUBT)
-    return point.timeouts >= _TIMEOUTS or point.expected(rung) > allowed
 
 
 def _send(point: MapPoint, searching: Searching, outcome: Outcome | None) -> int | None:
@@ -224,6 +206,6 @@ def failure_beyond(point: MapPoint, rung: int | None) -> Outcome | None:
     if rung is not None:
         return point.found.seen[rung]
     if not point.found.seen and point.found.limit == 0:
-        message = "even the coarsest run is expected to take too long"
+        message = "even the coarsest run takes too long"
         return Outcome(False, False, TOO_SLOW, False, None, None, message)
     return None

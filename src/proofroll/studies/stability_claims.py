@@ -61,19 +61,22 @@ class Claim:
         about = [point for point in points if self._about(point) and not point["problem"]]
         if not about:
             return "no point of this map is about it"
+        about = [point for point in about if not point["timed_out"]]
+        if not about:
+            return "runs met the limit of time, which a faster machine might not"
         sides = [(point, point["sides"][self.boundary]) for point in about]
         if self.same and sum(side["largest"] is not None for _, side in sides) < _FEWEST_ALIKE:
             return "nothing holds at two values of the axis"
         cut = [side["largest"] is None and point["too_slow"] is not None for point, side in sides]
         tried = max(point["runs"] for point in about)
         if all(cut) and not self.failure and not (self.never and tried >= _TRIED):
-            return "its searches were cut: finer runs are too slow for this map"
+            return "its searches were cut: finer runs have too many steps for this map"
         return ""
 
     def contradictions(self, points: Sequence[Mapping[str, Any]]) -> list[str]:
-        """What the points of a map do not confirm, as sentences."""
+        """What the points of a map do not confirm, as sentences; where a run met the limit of time, nothing."""
         found = []
-        about = [point for point in points if self._about(point) and not point["problem"]]
+        about = [p for p in points if self._about(p) and not p["problem"] and not p["timed_out"]]
         if self.same:
             for curve, axis in dict.fromkeys((point["curve"], point["axis"]) for point in about):
                 along = [p for p in about if (p["curve"], p["axis"]) == (curve, axis)]
@@ -99,7 +102,7 @@ class Claim:
         return not self.values or self.values[0] <= point["value"] <= self.values[1]
 
     def _wrong(self, side: Mapping[str, Any], cut: bool) -> list[str]:
-        """Of one boundary; where the search was ``cut`` by its patience, a boundary that is missing says nothing."""
+        """Of one boundary; where the search was ``cut`` for its many steps, a boundary that is missing says nothing."""
         found = []
         largest = side["largest"]
         if self.never and largest is not None:

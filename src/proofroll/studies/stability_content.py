@@ -65,6 +65,7 @@ def _point(point: MapPoint) -> dict[str, Any]:
         "settings": {key: value for key, value in facts.settings.items() if key != facts.resolution},
         "curve": point.curve.engine,
         "level": point.curve.level,
+        "caveat": facts.caveat,
         "resolution": facts.resolution,
         "axis": place.axis.name,
         "value": place.value,
@@ -81,6 +82,7 @@ def _point(point: MapPoint) -> dict[str, Any]:
         "least_error": min(errors, default=None),
         "finest": None if not point.found.seen else point.ladder[max(point.found.seen)],
         "too_slow": None if point.found.limit >= len(point.ladder) else point.ladder[point.found.limit],
+        "timed_out": point.timeouts > 0,
         "runs": len(point.results),
         "problem": place.problem,
         "reproducer": None,
@@ -143,7 +145,7 @@ def _scale_findings(found: StabilityMap, points: list[dict[str, Any]]) -> list[s
 def dependence(points: Sequence[Mapping[str, Any]], name: str) -> str:
     """How a boundary, in parts of the natural time, changes along an axis, if it does; else nothing.
 
-    Where the search was cut by its patience, a boundary that is missing says nothing.
+    Where the search was cut for its many steps, a boundary that is missing says nothing.
 
     Args:
         points: of one curve along one axis, as the study has them.
@@ -169,7 +171,7 @@ def dependence(points: Sequence[Mapping[str, Any]], name: str) -> str:
 def silent_ranking(study: Mapping[str, Any]) -> list[dict[str, Any]]:
     """The silent failures, the worst first: wrong at any step, then by how wrong the run beyond the boundary was.
 
-    Searches that were cut because finer runs take too long come last: a finer step might have been right.
+    Searches that were cut because finer runs have too many steps come last: a finer step might have been right.
     """
     silent = [point for point in study["points"] if point["silent"]]
 

@@ -32,17 +32,18 @@ class Effort:
     Attributes:
         periods: length of every run in natural times; an axis may say otherwise.
         values: largest number of values per axis, or None.
-        patience: a run that is expected to take longer is too slow [s].
-        limit: one that does take longer is ended [s]; a worker's start counts.
+        steps: a run of more fixed steps is too long. Steps are counted rather than seconds, so that every machine
+            looks for a boundary on the same rungs.
+        limit: a run that takes longer is ended [s]; a worker's start counts. What it would have shown is left open.
     """
 
     periods: float = 3.0
     values: int | None = None
-    patience: float = 1.0
+    steps: int = 75_000
     limit: float = 15.0
 
 
-QUICK = Effort(values=3, patience=0.5, limit=10.0)
+QUICK = Effort(values=3, steps=30_000, limit=10.0)
 
 
 @dataclass

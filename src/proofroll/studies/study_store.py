@@ -90,8 +90,12 @@ def make_tradeoff(
 
     found = tradeoff(question, runner, engines=engines, over=over, brief=brief, progress=progress)
     study = content(found)
-    contradictions = claims.contradictions(study) if claims and not engines else []
-    study["claims"] = {"file": claims.name if claims else None, "contradictions": contradictions}
+    judged = claims if not engines else None
+    study["claims"] = {
+        "file": claims.name if claims else None,
+        "contradictions": judged.contradictions(study) if judged else [],
+        "undecided": judged.undecided(study) if judged else [],
+    }
     path = stored(folder, question, engines, brief=brief)
     keep(study, path)
     names = {

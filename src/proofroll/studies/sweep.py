@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable, Mapping
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from typing import Any
 
@@ -20,9 +20,11 @@ from proofroll.running.runner import Runner, describe, resolve
 from proofroll.running.worker_pool import Workers
 from proofroll.studies.reference import Reference
 
-# Samples per run. An oscillation of the founding scene's z has a dozen of them, and an adaptive step, which ends at
-# each, is still as long as it likes to be.
+# Samples per run. An oscillation of the founding scene's z has a dozen of them.
 SAMPLES = 40
+# An adaptive step ends at each sample, so that with many of them no tolerance may be too loose. A run with so few is
+# made besides, and the larger of both errors counts.
+SPARSE = 2
 # Steps in sampling intervals: those that every curve starts with, and those by which it may be extended.
 _STEPS = (1.0, 1 / 2, 1 / 5, 1 / 10, 1 / 25, 1 / 50, 1 / 100, 1 / 250)
 _COARSER = (2.0, 4.0, 8.0)
@@ -31,10 +33,11 @@ _TOLERANCES = (1e-1, 1e-2, 1e-3, 1e-4, 1e-6, 1e-8, 1e-10, 1e-12)
 _LOOSER = (1.0, 10.0, 100.0)
 # A run is broken where its error is this part of the quantity's scale; a curve starts in the broken range.
 BROKEN = 0.1
-# A curve is refined while that still takes off this part of the error …
+# A curve is refined while that still takes off this part of the error; the finest step is short enough to end that,
+# and how fast the machine is must not.
 _GAIN = 0.4
-# … and the run is not expected to take longer than this [s].
-_PATIENCE = 4.0
+# Errors of runs that are the same but for round-off differ by less than this part.
+_SAME = 1e-6
 
 
 @dataclass(frozen=True)
@@ -58,6 +61,11 @@ class Question:
         """Sampling interval [s]."""
         return float(f"{self.until / SAMPLES:.12g}")
 
+    @property
+    def sparse(self) -> float:
+        """Sampling interval of the second run of an adaptive step [s]."""
+        return float(f"{self.until / SPARSE:.12g}")
+
     def step(self, factor: float) -> float:
         """So many sampling intervals [s], without the digits that multiplying leaves (0.005000000000000001)."""
         return float(f"{self.every * factor:.12g}")
@@ -74,8 +82,10 @@ class Point:
     Attributes:
         case, result: the run.
         curves: observables of its trajectory; empty if there is none.
-        errors: largest distance of each from the truth.
+        errors: largest distance of each from the truth; with an adaptive step also over few samples.
         bars: error bars of the truth, by observable.
+        dense: ``errors`` over the many samples alone.
+        sparse: the run over few samples, with its errors; None with a fixed step, which samples do not change.
     """
 
     case: Case
@@ -83,6 +93,8 @@ class Point:
     curves: dict[str, FloatArray] = field(default_factory=dict)
     errors: dict[str, float] = field(default_factory=dict)
     bars: dict[str, float] = field(default_factory=dict)
+    dense: dict[str, float] = field(default_factory=dict)
+    sparse: Point | None = None
 
     @property
     def step(self) -> float | None:
@@ -114,13 +126,16 @@ class Curve:
         """Whether it is swept over steps rather than over tolerances."""
         return self.facts.resolution == "dt"
 
-    @property
-    def saturated(self) -> bool:
-        """Whether the two loosest tolerances give the same run: what limits its steps is then the sampling interval."""
+    def saturated(self, quantity: str) -> bool:
+        """Whether the two loosest tolerances give the same run: something else than they limits its steps.
+
+        Where an array happens to lie in memory may change the round-off of a run, so equal is equal up to that.
+        """
         if self.fixed_step or len(self.points) < 2:
             return False
-        loosest, next_to_it = self.points[:2]
-        return bool(loosest.errors) and loosest.errors == next_to_it.errors
+        loosest, other = (point.errors.get(quantity, np.inf) for point in self.points[:2])
+        bar = self.points[0].bars.get(quantity, 0.0)
+        return bool(np.isfinite(loosest) and abs(loosest - other) <= max(bar, _SAME * loosest))
 
 
 def curves_of(engines: Iterable[str], workers: Workers | None = None) -> tuple[list[Curve], dict[str, str]]:
@@ -213,15 +228,14 @@ def _further(question: Question, curve: Curve, references: Mapping[float, Refere
     ladder = [question.step(factor) for factor in _COARSER] if curve.fixed_step else _LOOSER
     coarser = next((value for value in ladder if value not in asked), None)
     whole = coarsest.errors.get(question.quantity, np.inf) < BROKEN * scale
-    if coarser is not None and whole and not curve.saturated:
+    if coarser is not None and whole and not curve.saturated(question.quantity):
         found.append(coarser)
     if not curve.fixed_step:
         return found
     finer = next((step for step in map(question.step, _FINER) if step not in asked), None)
     if finer is not None and len(curve.points) > 1:
-        ratio = (finest.step or 0.0) / finer
         now, before = (point.errors.get(question.quantity, np.inf) for point in (finest, curve.points[-2]))
-        if now < (1 - _GAIN) * before and finest.result.wall_seconds * ratio < _PATIENCE:
+        if now < (1 - _GAIN) * before:
             found.append(finer)
     return found
 
@@ -243,7 +257,7 @@ def _run(
     truth_facts = resolved.pop()
     if not isinstance(truth_facts, EngineFacts):
         raise truth_facts
-    cases: list[tuple[int, Case]] = []
+    cases: list[tuple[int, tuple[Case, ...]]] = []
     for (index, value), found in zip(wanted, resolved, strict=True):
         if not isinstance(found, EngineFacts):
             curves[index].dropped[value] = str(found)
@@ -256,17 +270,16 @@ def _run(
         except InputError as error:
             curves[index].dropped[value] = str(error)
             continue
-        cases.append((index, case_of(question, scene, facts, every)))
-    intervals = {question.every, *(case.every for _, case in cases)} - references.keys()
+        cases.append((index, cases_of(question, scene, facts, every)))
+    intervals = {question.every, *(case.every for _, both in cases for case in both)} - references.keys()
     truths = {every: case_of(question, scene, truth_facts, every) for every in intervals}
-    results = runner.run([*truths.values(), *(case for _, case in cases)], progress)
+    results = runner.run([*truths.values(), *(case for _, both in cases for case in both)], progress)
     for every, case in truths.items():
         if results[case.key].status != Status.DONE:
             raise ProofrollError(f"there is no truth here: {results[case.key].message}")
         references[every] = Reference.read(scene, runner.store.trajectory(case))
-    for index, case in cases:
-        point = judged(Point(case, results[case.key]), references[case.every], runner)
-        curves[index].points.append(point)
+    for index, both in cases:
+        curves[index].points.append(judged([Point(case, results[case.key]) for case in both], references, runner))
     for curve in curves:
         curve.points.sort(key=lambda point: -(point.step or 0.0))
 
@@ -284,8 +297,36 @@ def case_of(question: Question, scene: Scene, facts: EngineFacts, every: float) 
     )
 
 
-def judged(point: Point, reference: Reference, runner: Runner) -> Point:
-    """The point with its observables and their errors, if it has a trajectory that reached the end."""
+def cases_of(question: Question, scene: Scene, facts: EngineFacts, every: float) -> tuple[Case, ...]:
+    """The run of the question, and with an adaptive step the one over few samples."""
+    adaptive = facts.resolution not in {None, "dt"}
+    return tuple(
+        case_of(question, scene, facts, interval) for interval in ((every, question.sparse) if adaptive else (every,))
+    )
+
+
+def judged(points: Sequence[Point], references: Mapping[float, Reference], runner: Runner) -> Point:
+    """The point with its observables and their errors, if it has a trajectory that reached the end.
+
+    Args:
+        points: the run, and the one over few samples if there is one.
+        references: the truth by sampling interval.
+        runner: where the trajectories are.
+    """
+    point, *others = (_measured(point, references[point.case.every], runner) for point in points)
+    if not others:
+        return point
+    (sparse,) = others
+    reference = references[sparse.case.every]
+    # What is derived from neighbouring samples, as an audit, is not compared where there are few.
+    errors = {
+        name: max(error, sparse.errors.get(name, np.inf)) if name in reference.dataset else error
+        for name, error in point.errors.items()
+    }
+    return replace(point, errors=errors, dense=point.errors, sparse=sparse)
+
+
+def _measured(point: Point, reference: Reference, runner: Runner) -> Point:
     if point.result.status != Status.DONE:
         return point
     curves = reference.observed(read(runner.store.trajectory(point.case)))

@@ -5,7 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 from enum import StrEnum
 
-from proofroll.running.timing import Interval
+from proofroll.running.timing import Interval, named
 
 # A ratio of costs below this is nothing to be saved.
 _FELT = 1.02
@@ -76,5 +76,7 @@ def worth(
     moved = f"without it the answer moves by {change:.2g}, no more than {allowed}"
     if cost is None:
         return Worth.FREE, f"{moved}; its price is not known"
-    price = f"it takes {cost.value:.2f} times as long with it ({cost.low:.2f} … {cost.high:.2f})"
+    price = (
+        f"it takes {cost.value:.2f} times as long with it ({cost.low:.2f} … {cost.high:.2f}, {named(cost.confidence)})"
+    )
     return (Worth.NOT_NEEDED if cost.low > _FELT else Worth.FREE), f"{moved}; {price}"

@@ -23,7 +23,7 @@ from proofroll.running.timing import ROUNDS, Timing, interleaved
 from proofroll.running.worker_pool import Workers
 from proofroll.studies.pareto import envelope, front
 from proofroll.studies.reference import Reference
-from proofroll.studies.sweep import Curve, Point, Question, case_of, curves_of, judged, sweep
+from proofroll.studies.sweep import Curve, Point, Question, case_of, cases_of, curves_of, judged, sweep
 
 # What makes up most of a study's time is the repetition of measurements. A brief one repeats less: in three rounds an
 # outlier does not decide the median; a run longer than this [s] warms itself up, and is measured once.
@@ -171,16 +171,17 @@ def _checked(found: Tradeoff, runner: Runner, told: Callable[[Case, Result], Non
         for point in front(pareto_entries(curves, quantity, found.timings))
     }
     base, truth_facts = found.question, _truth_case(found.question, found.references, runner).engine
-    intervals = {point.case.every for point in chosen.values()}
     places = [dict(zip(found.over, values, strict=True)) for values in itertools.product(*found.over.values())]
     asked = []
     for place in places:
         question = dataclasses.replace(base, parameters={**base.parameters, **place})
         scene = question.loaded()
+        runs = {key: cases_of(question, scene, point.case.engine, point.case.every) for key, point in chosen.items()}
+        intervals = {case.every for both in runs.values() for case in both}
         truths = {every: case_of(question, scene, truth_facts, every) for every in intervals}
-        runs = {key: case_of(question, scene, point.case.engine, point.case.every) for key, point in chosen.items()}
         asked.append((place, scene, truths, runs))
-    results = runner.run([case for _, _, truths, runs in asked for case in (*truths.values(), *runs.values())], told)
+    cases = [case for _, _, truths, runs in asked for case in (*truths.values(), *itertools.chain(*runs.values()))]
+    results = runner.run(cases, told)
     corners: dict[str, list[Corner]] = {key: [] for key in chosen}
     for place, scene, truths, runs in asked:
         references = {
@@ -188,19 +189,22 @@ def _checked(found: Tradeoff, runner: Runner, told: Callable[[Case, Result], Non
             for every, case in truths.items()
             if results[case.key].status == Status.DONE
         }
-        for key, case in runs.items():
-            if case.every in references:
-                corners[key].append(_corner(place, Point(case, results[case.key]), references[case.every], runner))
+        for key, both in runs.items():
+            lost = next((case.every for case in both if case.every not in references), None)
+            if lost is None:
+                point = judged([Point(case, results[case.key]) for case in both], references, runner)
+                corners[key].append(_corner(place, point, references[both[0].every]))
             else:
-                said = results[truths[case.every].key].message
+                said = results[truths[lost].key].message
                 corners[key].append(Corner(place, {}, {}, f"there is no truth: {said}"))
     return corners
 
 
-def _corner(place: dict[str, float], point: Point, reference: Reference, runner: Runner) -> Corner:
-    errors = judged(point, reference, runner).errors
+def _corner(place: dict[str, float], point: Point, reference: Reference) -> Corner:
+    errors = {name: error for name, error in point.errors.items() if np.isfinite(error)}
     relative = {name: error / (reference.scale(name) or 1.0) for name, error in errors.items()}
-    return Corner(place, errors, relative, point.result.message)
+    ended = point.sparse or point
+    return Corner(place, errors, relative, (point if not point.errors else ended).result.message)
 
 
 def judged_quantities(found: Tradeoff) -> list[str]:

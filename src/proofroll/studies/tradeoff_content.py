@@ -108,20 +108,36 @@ def _point(curve: Curve, point: Point, number: int, held: dict[str, float], foun
         "resolution": facts.resolution,
         "step": point.step,
         "order": facts.order,
+        "caveat": facts.caveat,
         "status": point.result.status,
         "message": point.result.message,
         "error": point.errors,
         "envelope": {name: value for name, value in held.items() if name in point.errors},
+        "sparse": None
+        if point.sparse is None
+        else {
+            "every": point.sparse.case.every,
+            "error": point.sparse.errors,
+            "dense_error": point.dense,
+            "message": point.sparse.result.message,
+        },
         **_cost(timing),
         "corners": [dataclasses.asdict(corner) for corner in corners] if corners is not None else None,
     }
 
 
 def _cost(timing: Timing | None) -> dict[str, Any]:
-    """Median and interval of wall seconds per simulated second, or None where nothing was measured."""
+    """Median of wall seconds per simulated second, its interval and confidence, and the rounds; None: not measured.
+
+    The rounds are those of all points, so that a ratio of two can be taken round by round. A single measurement has no
+    interval.
+    """
+    found = timing.interval if timing else None
     return {
-        "seconds_per_second": timing.interval.value if timing else None,
-        "interval": [timing.interval.low, timing.interval.high] if timing else None,
+        "seconds_per_second": found.value if found else None,
+        "interval": [found.low, found.high] if found and found.confidence else None,
+        "confidence": found.confidence if found else None,
+        "rounds": list(timing.values) if timing else [],
         "measurements": len(timing.values) if timing else 0,
     }
 
@@ -147,10 +163,12 @@ def findings(found: Tradeoff, made: Sequence[tuple[Curve, Budget]]) -> list[str]
         if other:
             shown = ", ".join(f"{i.quantity} {i.order:.2f} ({i.order_low:.2f} to {i.order_high:.2f})" for i in other)
             said.append(f"{curve.engine} declares order {other[0].declared}, but there show: {shown}.")
-    whole = [c for c in found.curves if c.saturated and c.points[0].errors.get(quantity, np.inf) < BROKEN * scale]
+    whole = [
+        c for c in found.curves if c.saturated(quantity) and c.points[0].errors.get(quantity, np.inf) < BROKEN * scale
+    ]
     if whole:
         names = ", ".join(curve.engine for curve in whole)
-        said.append(f"No tolerance breaks {names}: steps end at every sample, {found.question.every:g} s apart.")
+        said.append(f"No tolerance breaks {names}, sampled every {found.question.sparse:g} s either.")
     done = [point for point in found.points if point.result.status == Status.DONE]
     broken = [point for point in done if not point.errors.get(quantity, np.inf) < BROKEN * scale]
     refused = sum(point.result.status == Status.REFUSED for point in found.points)

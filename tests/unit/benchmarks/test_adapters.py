@@ -74,13 +74,13 @@ def test_the_bare_loop_runs_over_the_same_times(monkeypatch: pytest.MonkeyPatch)
 def test_the_worst_row_speaks_for_an_engine() -> None:
     """An engine's ratio is that of its slowest row, and the goal holds only if it does for each."""
     rows = [
-        Row("e", "one", "matched", "f = 0", Interval(1.05, 1.0, 1.1), ""),
-        Row("e", "two", "matched", "f > 0", Interval(1.4, 1.3, 1.5), ""),
+        Row("e", "one", "matched", "f = 0", Interval(1.05, 1.0, 1.1, 0.97), ""),
+        Row("e", "two", "matched", "f > 0", Interval(1.4, 1.3, 1.5, 0.97), ""),
         Row("e", "two", "matched", "bounded, slips", None, "refused"),
-        Row("good", "one", "matched", "f = 0", Interval(GOAL, 1.0, 1.2), ""),
+        Row("good", "one", "matched", "f = 0", Interval(GOAL, 1.0, 1.2, 0.97), ""),
     ]
     found = content(rows)
-    assert found["engines"]["e"]["ratio"] == {"value": 1.4, "low": 1.3, "high": 1.5}
+    assert found["engines"]["e"]["ratio"] == {"value": 1.4, "low": 1.3, "high": 1.5, "confidence": 0.97}
     assert found["engines"]["e"]["worst"] == "two, f > 0"
     assert found["engines"]["e"]["within_goal"] is False
     assert found["engines"]["good"]["within_goal"] is True

@@ -8,7 +8,7 @@ import sys
 import textwrap
 import threading
 import time
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
 from pathlib import Path
 
 import pytest
@@ -201,3 +201,37 @@ def test_no_process_can_be_started(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(process.subprocess, "Popen", refuse)
     with pytest.raises(ProofrollError, match="a worker process cannot be started: Resource temporarily unavailable"):
         Worker()
+
+
+@pytest.fixture
+def crowded() -> Iterator[int]:
+    """A processor on which three others compute all the time."""
+    core = min(os.sched_getaffinity(0))
+    code = f"import os\nos.sched_setaffinity(0, {{{core}}})\nwhile True: pass"
+    others = [subprocess.Popen([sys.executable, "-c", code], start_new_session=True) for _ in range(3)]
+    yield core
+    for other in others:
+        other.kill()
+        other.wait()
+
+
+@pytest.mark.skipif(not Path("/proc/self/schedstat").exists(), reason="the system does not count waiting")
+def test_time_in_which_others_had_the_processor_does_not_count(pretend: Pretend, crowded: int) -> None:
+    """A worker that needs half of its limit in seconds of the processor answers, however many compute beside it."""
+    pretend(
+        f"""
+        os.sched_setaffinity(0, {{{crowded}}})
+        began = time.monotonic()
+        while time.process_time() < 1.0: pass
+        answer(json.dumps({{"number": 1, "took": time.monotonic() - began}}).encode() + b"\\n")
+        """
+    )
+    with Worker() as worker:
+        assert worker.ask({"do": "nothing"}, 2.0)["took"] > 2.0
+
+
+@pytest.mark.skipif(not Path("/proc/self/schedstat").exists(), reason="the system does not count waiting")
+def test_who_computes_without_end_is_ended_beside_others_too(pretend: Pretend, crowded: int) -> None:
+    """The limit of time is met by a worker that shares its processor: it is only met later."""
+    pretend(f"os.sched_setaffinity(0, {{{crowded}}})\nwhile True: pass")
+    assert died(time_limit=0.5).status is Status.TIMEOUT

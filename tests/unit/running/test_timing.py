@@ -4,10 +4,11 @@ from __future__ import annotations
 
 from pathlib import Path
 
+import numpy as np
 import pyperf
 import pytest
 
-from proofroll.running.timing import Timing, interleaved, machine, ratio, write_benchmarks
+from proofroll.running.timing import ROUNDS, Timing, interleaved, machine, named, ratio, write_benchmarks
 
 
 def test_every_task_once_per_round() -> None:
@@ -68,6 +69,24 @@ def test_interval_encloses_the_median() -> None:
     found = Timing((1.0, 1.1, 1.2, 1.3, 5.0)).interval
     assert found.value == pytest.approx(1.2)
     assert 1.0 <= found.low <= found.value <= found.high <= 5.0
+
+
+@pytest.mark.parametrize("count", [1, 2, 3, 5, 6, 9, 20])
+def test_an_interval_encloses_the_true_median_as_often_as_it_says(count: int) -> None:
+    """Of many samples of a skewed distribution, so many intervals hold its median as their confidence says."""
+    rng = np.random.default_rng(0)
+    found = [Timing(tuple(rng.exponential(size=count).tolist())).interval for _ in range(4000)]
+    share = np.mean([item.low <= np.log(2) <= item.high for item in found])
+    # Four standard deviations of a share of 4000.
+    assert share == pytest.approx(found[0].confidence, abs=4 * 0.5 / np.sqrt(4000))
+    assert found[0].known == (count >= ROUNDS)
+
+
+def test_only_an_interval_of_95_percent_is_called_one() -> None:
+    """One value has no interval, that of three is called a range, and both say with how much they hold the median."""
+    confidences = {count: Timing((1.0,) * count).interval.confidence for count in (1, 3, ROUNDS)}
+    assert confidences == {1: 0.0, 3: 0.75, ROUNDS: 0.96875}
+    assert [named(value) for value in confidences.values()] == ["measured once", "range of 75 %", "interval of 96.9 %"]
 
 
 def test_pyperf_reads_what_is_written(tmp_path: Path) -> None:

@@ -30,6 +30,8 @@ def point(  # noqa: D103 -- one measured point
         "envelope": {"z": error},
         "seconds_per_second": cost,
         "interval": [0.9 * cost, 1.1 * cost],
+        "confidence": 0.97,
+        "rounds": 6 * [cost],
         "corners": [corner(error)],
     } | more
 
@@ -47,6 +49,7 @@ def study(*points: dict[str, Any], **more: Any) -> dict[str, Any]:
         "scene": "made",
         "parameters": {},
         "until": 2.0,
+        "every": 0.05,
         "quantity": "z",
         "quantities": {"z": {"unit": "m", "scale": 0.1, "truth_error_bar": 1e-13}},
         "points": list(points),
@@ -75,6 +78,23 @@ def test_the_cheapest_that_holds_with_margin() -> None:
     assert answer["choice"]["error"] == 1e-4
     assert answer["choice"]["seconds_per_second"] == 1e-2
     assert recommend(study(FAST, MIDDLE, SLOW), wish(1.5e-4))["choice"]["engine"] == "slow"
+
+
+def test_what_holds_only_on_the_grid_of_samples_is_excluded() -> None:
+    """A tolerance that many samples alone make good is no choice, and the reason names both intervals and the error."""
+    sparse = {"every": 1.0, "error": {"z": 3e-2}, "dense_error": {"z": 5e-10}, "message": "reached 2 s"}
+    lucky = point(1, "fast", 1e-3, 3e-2, sparse=sparse)
+    answer = recommend(study(lucky, MIDDLE), wish(1e-3))
+    assert answer["choice"]["engine"] == "middle"
+    said = answer["first_failure"]["reason"]
+    assert said.startswith(
+        "it holds only because its steps end at every sample: sampled every 1 s instead of 0.05 s, z"
+    )
+    assert "off by 0.03 m" in said
+    lost = lucky | {"sparse": sparse | {"error": {}, "message": "the steps became too short"}}
+    assert "the steps became too short" in recommend(study(lost, MIDDLE), wish(1e-3))["first_failure"]["reason"]
+    honest = point(1, "fast", 1e-3, 1e-5, sparse=sparse | {"error": {"z": 1e-5}})
+    assert recommend(study(honest, MIDDLE), wish(1e-3))["choice"]["engine"] == "fast"
 
 
 def test_costs_that_cannot_be_told_apart_are_ties() -> None:

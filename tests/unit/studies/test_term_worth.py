@@ -7,7 +7,7 @@ import pytest
 from proofroll.running.timing import Interval
 from proofroll.studies.term_worth import Side, Worth, worth
 
-CLEAR, NOISE = Interval(1.5, 1.4, 1.6), Interval(1.5, 0.9, 2.0)
+CLEAR, NOISE = Interval(1.5, 1.4, 1.6, 0.97), Interval(1.5, 0.9, 2.0, 0.97)
 
 
 @pytest.mark.parametrize(
@@ -17,7 +17,7 @@ CLEAR, NOISE = Interval(1.5, 1.4, 1.6), Interval(1.5, 0.9, 2.0)
         (1e-2, 1e-5, 1e-2, CLEAR, None, Worth.HARMFUL),  # though the change is no more than the error with it
         (1e-5, 1e-5, 1e-6, CLEAR, None, Worth.NOT_NEEDED),
         (1e-5, 1e-5, 1e-6, NOISE, None, Worth.FREE),
-        (1e-5, 1e-5, 1e-6, Interval(0.8, 0.7, 0.9), None, Worth.FREE),
+        (1e-5, 1e-5, 1e-6, Interval(0.8, 0.7, 0.9, 0.97), None, Worth.FREE),
         (1e-5, 1e-4, 9e-5, CLEAR, 1e-3, Worth.NOT_NEEDED),  # more than the error, less than the tolerance
         (1e-5, 1e-4, 9e-5, CLEAR, 1e-5, Worth.NEEDED),
         (0.0, 1e-11, 1e-11, CLEAR, None, Worth.NOT_NEEDED),  # round-off of a quantity of size 0.1

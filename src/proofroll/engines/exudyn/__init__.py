@@ -80,6 +80,13 @@ class Exudyn:
         self._model = model
 
     @staticmethod
+    def caveat(settings: ExudynSettings) -> str:
+        """See :class:`engine.TellsCaveats`. The order of a step that halves itself cannot be measured."""
+        if settings.preset != "default" or settings.halvings:
+            return ""
+        return "Exudyn's adaptive step, which it has on by default, is off, so that the step is the one given"
+
+    @staticmethod
     def version() -> str:
         """Version of the installed package; the extension module names another one on some platforms."""
         return version("exudyn")

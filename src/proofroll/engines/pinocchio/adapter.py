@@ -63,6 +63,12 @@ class Pinocchio:
         self._t = 0.0
 
     @staticmethod
+    def caveat(settings: PinocchioSettings) -> str:
+        """See :class:`proofroll.core.engine.TellsCaveats`. Pinocchio computes terms and impulses; it has no steps."""
+        terms = "contact solver" if settings.formulation == "contact" else "terms"
+        return f"proofroll's own integrator on Pinocchio's {terms}, for Pinocchio brings none"
+
+    @staticmethod
     def version() -> str:
         """See :class:`proofroll.core.engine.Engine`."""
         return str(pin.__version__)

@@ -1,0 +1,74 @@
+"""What of a setting is not the engine's own is said wherever the engine is judged or recommended by it."""
+
+from __future__ import annotations
+
+import pytest
+from invented import stability_study, tradeoff_study
+
+from proofroll.core.comparison import Tolerance
+from proofroll.core.engine import TellsCaveats
+from proofroll.core.plugins import engine_names, load_engine
+from proofroll.report.labels import caveat_lines, with_caveat
+from proofroll.report.stability_tables import silent_lines
+from proofroll.report.tradeoff_tables import answer_lines
+from proofroll.running.case import EngineFacts
+from proofroll.running.runner import resolve
+from proofroll.studies.recommend import Wish, recommend
+
+OURS = "proofroll's own integrator"
+
+
+@pytest.mark.parametrize(
+    ("engine", "words"),
+    [
+        ("pinocchio[formulation=free_flyer,preset=default]", OURS),
+        ("pinocchio[formulation=contact,preset=matched]", OURS),
+        ("exudyn[formulation=generic,preset=default]", "adaptive step"),
+        ("exudyn[formulation=generic,preset=matched]", ""),
+        ("exudyn[formulation=contact,preset=default]", ""),
+        ("mujoco[formulation=free,preset=default]", ""),
+    ],
+)
+def test_an_engine_says_what_is_not_its_own(engine: str, words: str) -> None:
+    """Where proofroll integrates, or where what is on by default is off, the settings say so; elsewhere nothing."""
+    name, _, options = engine.rstrip("]").partition("[")
+    (facts,) = resolve([(name, dict(option.split("=") for option in options.split(",")))])
+    assert isinstance(facts, EngineFacts)
+    assert words in facts.caveat
+    assert bool(facts.caveat) == bool(words)
+
+
+def test_a_caveat_is_one_clause() -> None:
+    """Whatever engine tells one, it fits into a sentence: one line without a full stop."""
+    told = 0
+    for name in engine_names():
+        kind = load_engine(name)
+        for settings in (item for presets in kind.presets.values() for item in presets.values()):
+            if isinstance(kind, TellsCaveats):
+                said = kind.caveat(settings)
+                told += bool(said)
+                assert "\n" not in said
+                assert not said.endswith(".")
+    assert told
+
+
+def test_a_caveat_stands_beside_verdicts_and_advice() -> None:
+    """Below the table once for all of its settings, beside a name that is blamed, and in a recommendation."""
+    row = {"name": "machine", "formulation": "free", "setting": "default", "caveat": "somebody else's steps"}
+    rows = [row, row | {"setting": "matched"}, row | {"caveat": ""}]
+    assert caveat_lines(rows) == ["Somebody else's steps: machine free default, free matched."]
+    assert with_caveat("machine free", row) == "machine free (somebody else's steps)"
+    assert with_caveat("machine free", rows[2]) == "machine free"
+
+
+def test_advice_and_silent_failures_carry_the_caveat() -> None:
+    """The line that recommends a setting and the one that blames it say what is not the engine's own."""
+    mine = {"caveat": "somebody else's steps"}
+    offered, mapped = tradeoff_study(), stability_study()
+    offered["points"] = [point | mine for point in offered["points"]]
+    mapped["points"] = [point | mine for point in mapped["points"]]
+    answer = recommend(offered, Wish("z", Tolerance(1e-2, False, "m")))
+    chosen = next(line for line in answer_lines(answer) if "use rough" in line)
+    assert "somebody else's steps" in chosen
+    (blamed,) = silent_lines(mapped)
+    assert "somebody else's steps" in blamed
