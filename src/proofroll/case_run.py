@@ -31,7 +31,9 @@ def run(case: dict[str, Any], out: str) -> dict[str, Any]:
 
 
 def _run(case: Case, out: Path, spent: Spent) -> Result:
-    from proofroll.certificate import certify, first_difference
+    from proofroll.certificate import Standing, certify, first_difference
+    from proofroll.engine import fixed_step
+    from proofroll.first_steps import DERIVED, derivable
     from proofroll.recording import record, time_grid
     from proofroll.registry import load_engine, resolve_settings
     from proofroll.scene_file import load_scene
@@ -54,12 +56,14 @@ def _run(case: Case, out: Path, spent: Spent) -> Result:
         engine = kind.build(scene, settings)
         spent.on("building")
         certificate = certify(engine, scene)
+        if any(line.standing is Standing.NOT_REPORTED for line in certificate if line.quantity in DERIVED):
+            certificate += derivable(kind, scene, settings)
         difference = first_difference(certificate)
         spent.on("certificate")
-        lines = [{**dataclasses.asdict(line), "holds": line.holds} for line in certificate]
+        lines = [line.as_dict() for line in certificate]
         if difference is not None:
             return Result(Status.REFUSED, difference, certificate=lines, versions=versions)
-        recording = record(engine, scene, times)
+        recording = record(engine, scene, times, fixed_step(settings))
         spent.on("trajectory", advance=recording.advancing, sampling=recording.sampling)
         del engine
     except Refused as error:

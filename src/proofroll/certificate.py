@@ -3,12 +3,14 @@
 from __future__ import annotations
 
 import dataclasses
+from collections.abc import Iterable, Mapping
 from dataclasses import dataclass
+from enum import StrEnum
 from typing import Any
 
 import numpy as np
 
-from proofroll.engine import Built
+from proofroll.engine import Built, Regularised
 from proofroll.mechanics import (
     initial_angular_acceleration,
     initial_response,
@@ -22,6 +24,31 @@ from proofroll.surfaces import FloatArray
 # Engines that compute in double precision reproduce the scene's numbers to this relative difference.
 EXACT = 1e-12
 
+_DEEP = "a ball that is sunk in by its radius has its centre in the wall"
+_LEVER = "a soft contact rolls about a point midway in its depth, and the depth is at most the radius"
+_UNLOADED = "a contact that is not loaded yet lacks the whole force, and no more than that"
+_NUMBER = "a number must stand for friction without bound; whether it is enough, the run tells (another_scene)"
+# What a model may soften: quantity -> largest relative difference that any reason explains, and why. What is not here
+# can never be softened: mass, inertia, gravity, radius, position along the wall, a coefficient that the scene gives.
+CAPS: Mapping[str, Regularised] = {
+    "gap": Regularised(1.0, _DEEP),
+    "gap in the engine": Regularised(1.0, _DEEP),
+    "slip": Regularised(0.5, _LEVER),
+    "spin": Regularised(0.5, _LEVER),
+    "velocity": Regularised(1e-5, "a velocity of half a step before is brought to time 0 by a sequence that converges"),
+    "rolling resistance": Regularised(1e-6, "its moment is read back by way of a normal force that a solver finds"),
+    **dict.fromkeys(("acceleration", "angular acceleration", "N", "F2", "F3"), Regularised(1.0, _UNLOADED)),
+    **dict.fromkeys(("1 / static friction", "1 / kinetic friction"), Regularised(float("inf"), _NUMBER)),
+}
+
+
+class Standing(StrEnum):
+    """How one quantity of an engine stands to the scene."""
+
+    HOLDS = "holds"
+    DIFFERS = "differs"
+    NOT_REPORTED = "not reported"  # the engine is silent, which is allowed and shown
+
 
 @dataclass(frozen=True)
 class Line:
@@ -30,8 +57,8 @@ class Line:
     Attributes:
         quantity: what is compared.
         unit: its unit.
-        expected, found: from the scene, and read back from the engine.
-        difference: relative to the quantity's scale.
+        expected, found: from the scene, and read back from the engine; nothing is found where the engine is silent.
+        difference: relative to the quantity's scale; None where the engine is silent.
         tolerance: largest difference that is accepted.
         because: why the tolerance is not round-off; empty if it is.
     """
@@ -40,21 +67,32 @@ class Line:
     unit: str
     expected: tuple[float, ...]
     found: tuple[float, ...]
-    difference: float
+    difference: float | None
     tolerance: float
     because: str = ""
 
     @property
+    def standing(self) -> Standing:
+        """Whether the engine built what the scene says, as far as it tells."""
+        if self.difference is None:
+            return Standing.NOT_REPORTED
+        return Standing.HOLDS if self.difference <= self.tolerance else Standing.DIFFERS
+
+    @property
     def holds(self) -> bool:
-        """Whether the engine built what the scene says."""
-        return bool(self.difference <= self.tolerance)
+        """Whether nothing that the engine says speaks against it; it may also say nothing (:attr:`standing`)."""
+        return self.standing is not Standing.DIFFERS
+
+    def as_dict(self) -> dict[str, Any]:
+        """For a result: all fields, ``holds`` and ``standing``."""
+        return {**dataclasses.asdict(self), "holds": self.holds, "standing": self.standing.value}
 
 
 def certify(engine: Any, scene: Scene) -> list[Line]:
     """Compares a freshly built engine with the scene.
 
-    Quantities about which the engine is silent are left out, except those that the scene requires it to have:
-    rolling resistance and bounded friction.
+    Quantities about which the engine is silent have a line that says so, except those that the scene requires it to
+    have, rolling resistance and bounded friction: there silence is a difference.
     """
     body = scene.rolling
     built, sample = engine.built(), engine.sample()
@@ -67,13 +105,13 @@ def certify(engine: Any, scene: Scene) -> list[Line]:
     lines: list[Line] = []
 
     def compare(quantity: str, unit: str, expected: Any, found: Any, scale: float, required: bool = False) -> None:
-        if found is None:
-            if not required:
-                return
-            found = np.nan
-        want, got = np.atleast_1d(np.asarray(expected, float)), np.atleast_1d(np.asarray(found, float))
+        want = np.atleast_1d(np.asarray(expected, float))
+        if found is None and not required:
+            lines.append(Line(quantity, unit, tuple(want.tolist()), (), None, EXACT))
+            return
+        got = np.atleast_1d(np.asarray(np.nan if found is None else found, float))
         difference = float(np.max(np.abs(got - want))) / scale if got.shape == want.shape else float("inf")
-        soft = built.regularised.get(quantity)
+        tolerance, because = _allowed(quantity, built.regularised)
         lines.append(
             Line(
                 quantity,
@@ -81,8 +119,8 @@ def certify(engine: Any, scene: Scene) -> list[Line]:
                 tuple(want.tolist()),
                 tuple(got.tolist()),
                 difference if np.isfinite(difference) else float("inf"),
-                soft.tolerance if soft else EXACT,
-                soft.because if soft else "",
+                tolerance,
+                because,
             )
         )
 
@@ -101,7 +139,9 @@ def certify(engine: Any, scene: Scene) -> list[Line]:
             compare(name, "1", expected, found, expected or 1.0, required=True)
         elif found is not None:  # a number that stands for no bound is the closer to it, the larger it is
             compare(f"1 / {name}", "1", 0.0, 1 / found if found else np.inf, 1.0)
-    compare("position", "m", body.p0, sample.p_WB, body.ball.radius)
+    # How far the ball is from the wall is the gap's business; along the wall it stands where the scene puts it.
+    below = body.surface.position(body.surface.locate(sample.p_WB))
+    compare("position", "m", body.p0, below, body.ball.radius)
     compare("gap", "m", 0.0, body.surface.gap(sample.p_WB), body.ball.radius)
     compare("gap in the engine", "m", 0.0, built.gap, body.ball.radius)
     compare("velocity", "m/s", body.v0, sample.v_WB, speed)
@@ -110,16 +150,22 @@ def certify(engine: Any, scene: Scene) -> list[Line]:
     compare("slip", "m/s", np.zeros(3), slip, speed)
     compare("acceleration", "m/s^2", acceleration, built.acceleration, natural)
     compare("angular acceleration", "rad/s^2", turning, built.angular_acceleration, natural / body.ball.radius)
-    if sample.force is not None:
-        for index, (name, sign) in enumerate((("N", -1.0), ("F2", 1.0), ("F3", 1.0))):
-            compare(
-                name,
-                "N",
-                sign * force @ frame[:, index],
-                sign * sample.force @ frame[:, index],
-                body.ball.mass * natural,
-            )
+    for index, (name, sign) in enumerate((("N", -1.0), ("F2", 1.0), ("F3", 1.0))):
+        found = None if sample.force is None else sign * sample.force @ frame[:, index]
+        compare(name, "N", sign * force @ frame[:, index], found, body.ball.mass * natural)
     return lines
+
+
+def _allowed(quantity: str, regularised: Mapping[str, Regularised]) -> tuple[float, str]:
+    """Tolerance of a quantity and its reason: what the engine softens, as far as that can be softened at all."""
+    soft, cap = regularised.get(quantity), CAPS.get(quantity)
+    if soft is None:
+        return EXACT, ""
+    if cap is None:
+        return EXACT, f"cannot be softened, though the engine asks for {soft.tolerance:.2g} ({soft.because})"
+    if soft.tolerance <= cap.tolerance:
+        return soft.tolerance, soft.because
+    return cap.tolerance, f"{soft.because}; of the {soft.tolerance:.2g} asked for this much is allowed: {cap.because}"
 
 
 def _expected(body: RollingBall, built: Built) -> tuple[FloatArray, FloatArray, FloatArray]:
@@ -138,14 +184,38 @@ def _expected(body: RollingBall, built: Built) -> tuple[FloatArray, FloatArray, 
 def first_difference(lines: list[Line]) -> str | None:
     """One sentence about the first quantity that differs, or None if the certificate holds."""
     for line in lines:
-        if not line.holds and all(np.isnan(line.found)):
+        if line.standing is not Standing.DIFFERS:
+            continue
+        if all(np.isnan(line.found)):
             return f"the engine's model does not say its {line.quantity}, which the scene requires"
-        if not line.holds:
-            return (
-                f"the engine's model differs from the scene: {line.quantity} is {_shown(line.found)} instead of "
-                f"{_shown(line.expected)} {line.unit} (relative difference {line.difference:.2g}, "
-                f"allowed {line.tolerance:.2g})"
-            )
+        refused = f"; {line.quantity} {line.because}" if line.quantity not in CAPS and line.because else ""
+        return (
+            f"the engine's model differs from the scene: {line.quantity} is {_shown(line.found)} instead of "
+            f"{_shown(line.expected)} {line.unit} (relative difference {line.difference:.2g}, "
+            f"allowed {line.tolerance:.2g}){refused}"
+        )
+    return None
+
+
+def not_reported(lines: Iterable[Mapping[str, Any]]) -> list[str]:
+    """Quantities about which the engine is silent, of a stored certificate (:meth:`Line.as_dict`)."""
+    return [str(line["quantity"]) for line in lines if line["standing"] == Standing.NOT_REPORTED]
+
+
+def another_scene(lines: Iterable[Mapping[str, Any]], needed: float) -> str | None:
+    """Why the engine's model is of another kind than the scene, as one clause; None: it is of the same.
+
+    A scene without bound on friction is built with a number for it. As long as the motion needs less friction than
+    that, the number changes nothing; where it needs more, the ball slips in the engine and cannot in the scene.
+
+    Args:
+        lines: of a stored certificate (:meth:`Line.as_dict`).
+        needed: largest friction |F|/N that the true motion needs [-].
+    """
+    for line in lines:
+        if line["quantity"] == "1 / static friction" and line["found"] and line["found"][0] * needed > 1:
+            bound = 1 / line["found"][0]
+            return f"another scene: a friction of {bound:.4g}, where the scene has no bound and needs {needed:.4g}"
     return None
 
 

@@ -27,6 +27,7 @@ FOUNDATION = (
     "compiled/series.py",
     "engine.py",
     "events.py",
+    "first_steps.py",
     "mechanics.py",
     "motion.py",
     "recording.py",

@@ -5,6 +5,7 @@ from __future__ import annotations
 from typing import TYPE_CHECKING, Any
 
 from proofroll.certificate import certify, first_difference
+from proofroll.engine import fixed_step
 from proofroll.errors import InputError, Refused
 from proofroll.recording import record, time_grid
 from proofroll.registry import load_engine, parse_engine, resolve_settings
@@ -72,11 +73,12 @@ def simulate(
         from proofroll.truth import truth
 
         return truth(scene, times).assign_attrs(status="done", message="two independent routes agree")
+    resolved = resolve_settings(load_engine(spec.name), {**spec.options, **settings})
     built = build(scene, engine, **settings)
     difference = first_difference(certify(built, scene))
     if difference is not None:
         raise Refused(difference)
-    recording = record(built, scene, times)
+    recording = record(built, scene, times, fixed_step(resolved))
     return recording.dataset.assign_attrs(
         status="done" if recording.failure is None else "diverged",
         message=recording.message(until),

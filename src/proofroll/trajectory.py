@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import io
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -25,11 +25,15 @@ def from_samples(scene: Scene, times: FloatArray, samples: Sequence[Sample]) -> 
     Args:
         scene: the scene that was run.
         times: of the samples [s], shape (time,).
-        samples: one per time; fewer if the run ended early.
+        samples: one per time; fewer if the run ended early. Where only the first has no force, it is NaN there.
     """
 
     def stacked(values: list[FloatArray | None]) -> FloatArray | None:
         return None if any(value is None for value in values) else np.asarray(values, dtype=np.float64)
+
+    forces = [s.force for s in samples]
+    if len(forces) > 1 and forces[0] is None:
+        forces[0] = np.full(3, np.nan)
 
     p, v, w = (np.array([getattr(s, key) for s in samples], dtype=np.float64) for key in ("p_WB", "v_WB", "w_WB"))
     dataset = trajectory(
@@ -38,13 +42,25 @@ def from_samples(scene: Scene, times: FloatArray, samples: Sequence[Sample]) -> 
         p,
         v,
         w,
-        force=stacked([s.force for s in samples]),
+        force=stacked(forces),
         q_WB=stacked([s.q_WB for s in samples]),
     )
     if any(s.sticking is None for s in samples):
         return dataset
     sticking = np.array([s.sticking for s in samples], dtype=np.int8)  # netCDF has no boolean
     return dataset.assign(sticking=("time", sticking, {"units": "1", "long_name": "1 sticks, 0 slips"}))
+
+
+def with_samples_between(dataset: xr.Dataset, samples: Mapping[float, Sample]) -> xr.Dataset:
+    """The trajectory with samples off its grid, by time [s]: ``p_between`` [m] and ``v_between`` [m/s]."""
+    if not samples:
+        return dataset
+    p, v = (np.array([getattr(sample, name) for sample in samples.values()]) for name in ("p_WB", "v_WB"))
+    of = "off the grid, in the world"
+    return dataset.assign(
+        p_between=(("between", "xyz"), p, {"units": "m", "long_name": f"centre of the ball {of}"}),
+        v_between=(("between", "xyz"), v, {"units": "m/s", "long_name": f"velocity of the centre {of}"}),
+    ).assign_coords(between=("between", list(samples), {"units": "s"}))
 
 
 def trajectory(

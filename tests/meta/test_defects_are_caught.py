@@ -31,6 +31,8 @@ HIDDEN = {
     "hidden_mass": ({"N", "F3", "energy_balance"}, {"gamma", "z", "gap", "slip"}),
     "hidden_resistance": ({"gamma", "F2", "energy_balance"}, {"gap", "slip"}),
     "hidden_friction": ({"F2", "F3", "force_audit"}, {"gamma", "z", "N", "energy_balance"}),
+    "hidden_rate": ({"rate_audit"}, {"gamma", "z", "N", "F2", "F3", "gap"}),
+    "hidden_period": ({"rate_audit"}, {"gamma", "z", "N", "F2", "F3", "energy_balance", "force_audit", "gap", "slip"}),
     "hidden_clock": ({"gamma", "z"}, {"gap", "slip"}),
 }
 SOUND = "hidden_none"
@@ -52,6 +54,7 @@ F2 = "1e-6 N"
 F3 = "1e-6 N"
 energy_balance = "1e-7 J"
 force_audit = "1e-3 N"
+rate_audit = "1e-6 m/s"
 gap = "1e-9 m"
 slip = "1e-9 m/s"
 """

@@ -82,7 +82,7 @@ class Outcome:
 
 
 # Observables that are judged even where the time of slip is ill-posed: they hold on every path.
-_EVERYWHERE = frozenset({"energy_balance", "force_audit", "gap", "creep"})
+_EVERYWHERE = frozenset({"energy_balance", "force_audit", "rate_audit", "gap", "creep"})
 
 
 def evaluate(planned: Plan, results: dict[str, Result], runner: Runner) -> Outcome:

@@ -211,7 +211,8 @@ def _corner(place: dict[str, float], point: Point, reference: Reference, runner:
 
 def judged_quantities(found: Tradeoff) -> list[str]:
     """The observables that a recommendation may be asked for."""
-    return [name for name in found.quantities if name not in {"event_times", "event_order", "force_audit"}]
+    left_out = {"event_times", "event_order", "force_audit", "rate_audit"}
+    return [name for name in found.quantities if name not in left_out]
 
 
 def pareto_entries(
