@@ -52,7 +52,7 @@ def first_steps(kind: Any, scene: Scene, settings: Any) -> list[Line]:
     h = step or _PART * body.ball.radius / (speed or 1.0)
     finer = dataclasses.replace(settings, dt=h / 2) if step else settings
     (_, coarse), (parabola, fine) = _derivatives(kind, scene, settings, h), _derivatives(kind, scene, finer, h / 2)
-    found = fine + ((fine - coarse) / (2**settings.order - 1) if step else 0.0)
+    found = fine + ((fine - coarse) / (2**settings.order - 1) if step and settings.order else 0.0)
     unknown = np.abs(fine - coarse) + np.abs(fine - parabola)
     natural = natural_acceleration(body)
     lines = []

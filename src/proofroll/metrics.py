@@ -71,8 +71,9 @@ def observables(body: RollingBall, dataset: xr.Dataset) -> dict[str, Observable]
 
     Coordinates of the surface, ``N``, ``F2``, ``F3`` [N] and ``needed_friction`` [-] as they are, without time 0,
     where the certificate judges reactions; ``energy_balance`` [J], ``gap`` [m], ``slip`` [m/s],
-    ``force_audit`` [N] and ``rate_audit`` [m/s], which are zero for a perfect run. With bounded friction ``slip`` is not zero; ``creep`` [m] is, the way
-    slipped while sticking, and ``first_slip`` [s] is one value, or none if the ball never slips.
+    ``force_audit`` [N] and ``rate_audit`` [m/s], which are zero for a perfect run. With bounded friction ``slip`` is
+    not zero; ``creep`` [m] is, the way slipped while sticking, and ``first_slip`` [s] is one value, or none if the ball
+    never slips.
     """
     curves: dict[str, Observable] = {}
 
@@ -129,13 +130,8 @@ def scales(body: RollingBall, truth: xr.Dataset) -> dict[str, float]:
     sizes = {name: float(np.ptp(truth[name].to_numpy())) for name in body.surface.coordinates}
     sizes |= dict.fromkeys(("N", "F2", "F3", "force_audit"), normal)
     sizes["needed_friction"] = float(np.nanmax(truth["needed_friction"].to_numpy()))
-    sizes |= {
-        "energy_balance": kinetic,
-        "gap": body.ball.radius,
-        "slip": speed,
-        "rate_audit": speed,
-        "creep": body.ball.radius,
-    }
+    sizes |= {"energy_balance": kinetic, "gap": body.ball.radius, "slip": speed, "creep": body.ball.radius}
+    sizes["rate_audit"] = speed
     return {name: size if np.isfinite(size) and size > 0 else 1.0 for name, size in sizes.items()}
 
 
@@ -143,8 +139,10 @@ def energy_balance(body: RollingBall, dataset: xr.Dataset) -> FloatArray:
     """Energy now plus what resistance and friction took, minus the energy at the start [J], shape (time,).
 
     Rolling resistance takes -M · ω from the ball per second (N f V / a while it rolls), friction -F · u; N, F, ω, V
-    and the slip u are the engine's own.
+    and the slip u are the engine's own. Where there is no force at time 0, work counts from the first sample that has
+    one; shape (time - 1,) then.
     """
+    dataset = _with_forces(dataset)
     balance = dataset["energy"].to_numpy() - float(dataset["energy"][0])
     t, f = dataset["time"].to_numpy(), body.contact.rolling_resistance
     bounded = "sticking" in dataset

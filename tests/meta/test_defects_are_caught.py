@@ -80,7 +80,7 @@ def check_the_sound_engine(outcome: Outcome) -> None:
     """Without a defect the same engine agrees in every observable, so that what is caught is the defect."""
     run = run_of(outcome, SOUND)
     assert run.verdict is Verdict.AGREES, [j for j in run.judgements if j.verdict is not Verdict.AGREES]
-    assert len(run.judgements) == 9
+    assert len(run.judgements) == 10
     assert not run.contradictions
 
 

@@ -11,6 +11,7 @@ import numpy as np
 
 from proofroll.agreement import Judgement, Verdict, judge
 from proofroll.case import LASTING, Case, EngineFacts, Result, Status
+from proofroll.certificate import another_scene
 from proofroll.comparison import Band, Comparison, Row
 from proofroll.convergence import Limit, richardson, tightest
 from proofroll.errors import Missing, ProofrollError
@@ -82,7 +83,7 @@ class Outcome:
 
 
 # Observables that are judged even where the time of slip is ill-posed: they hold on every path.
-_EVERYWHERE = frozenset({"energy_balance", "force_audit", "rate_audit", "gap", "creep"})
+_EVERYWHERE = frozenset({"energy_balance", "force_audit", "gap", "creep"})
 
 
 def evaluate(planned: Plan, results: dict[str, Result], runner: Runner) -> Outcome:
@@ -109,6 +110,10 @@ def evaluate(planned: Plan, results: dict[str, Result], runner: Runner) -> Outco
         if name not in references:
             scene = load_scene(comparison.scene, **run.parameters)
             references[name] = Reference.read(scene, runner.store.trajectory(planned.truths[name]))
+        other = another_scene(result.certificate, references[name].needed_friction)
+        if other is not None:
+            judged.append(_of_another_scene(run, run.facts, result, other))
+            continue
         trajectories = {
             factor: read(runner.store.trajectory(case))
             for factor, case in run.ladder.items()
@@ -146,6 +151,14 @@ def _failed(run: Planned, facts: EngineFacts, result: Result) -> Run:
     expected = Verdict.FAILED in run.row.expected(run.parameters)
     sentence = f"{run.row.engine} at {point_name(run.parameters)} {result.status}: {result.message}"
     return Run(run.row, run.parameters, facts, result, [], [] if expected else [sentence], run.ladder[1.0])
+
+
+def _of_another_scene(run: Planned, facts: EngineFacts, result: Result, sentence: str) -> Run:
+    """A row whose engine ran another scene: shown with its trajectory, and not judged."""
+    result = dataclasses.replace(result, status=Status.ANOTHER_SCENE, message=sentence)
+    expected = {Verdict.DIFFERS, Verdict.FAILED} & set(run.row.expected(run.parameters))
+    said = [] if expected else [f"{run.row.engine} at {point_name(run.parameters)}: {sentence}"]
+    return Run(run.row, run.parameters, facts, result, [], said, run.ladder[1.0])
 
 
 def _judgements(

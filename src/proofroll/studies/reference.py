@@ -46,6 +46,11 @@ class Reference:
         return cls(scene, dataset, observables(scene.rolling, dataset), scales(scene.rolling, dataset))
 
     @property
+    def needed_friction(self) -> float:
+        """Largest friction |F|/N that the true motion needs [-]."""
+        return float(np.nanmax(self.dataset["needed_friction"].to_numpy()))
+
+    @property
     def ill_posed(self) -> bool:
         """Whether the time of the first slip hangs on less than the parameters are known to."""
         onset = json.loads(self.dataset.attrs.get("onset", "{}"))

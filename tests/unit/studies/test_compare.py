@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import dataclasses
 import json
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Mapping, Sequence
 from pathlib import Path
 
 import pytest
@@ -13,6 +13,7 @@ from hostile import ENTRY_POINTS
 
 from proofroll.agreement import Verdict
 from proofroll.case import Case, EngineFacts, Result, Status
+from proofroll.certificate import Line
 from proofroll.comparison import Band, Comparison, ExceptAt, Row, Tolerance
 from proofroll.recording import time_grid
 from proofroll.runner import Runner
@@ -42,7 +43,13 @@ def claim(rows: list[Row], speeds: list[float], bounds: Mapping[str, Tolerance] 
     return dataclasses.replace(comparison, bands={"tight": band}, rows=rows)
 
 
-def judged(folder: Path, comparison: Comparison, answer: Answer, true: Mapping[float, Result] | None = None) -> Outcome:
+def judged(
+    folder: Path,
+    comparison: Comparison,
+    answer: Answer,
+    true: Mapping[float, Result] | None = None,
+    certificate: Sequence[Line] = (),
+) -> Outcome:
     """The outcome where every row's engine gives what ``answer`` makes of the truth; ``true``: speeds without one."""
     store, results = Store(folder), dict[str, Result]()
     runs, truths = list[Planned](), dict[str, Case]()
@@ -50,7 +57,8 @@ def judged(folder: Path, comparison: Comparison, answer: Answer, true: Mapping[f
     def put(case: Case, given: xr.Dataset | Result) -> Case:
         if isinstance(given, xr.Dataset):
             write(given, store.trajectory(case))
-            given = Result(Status.DONE, "reached the end", trajectory=store.trajectory(case).name)
+            lines = [line.as_dict() for line in certificate]
+            given = Result(Status.DONE, "reached the end", certificate=lines, trajectory=store.trajectory(case).name)
         results[case.key] = given
         return case
 
@@ -102,6 +110,23 @@ def test_a_claim_about_what_is_not_reported(tmp_path: Path, row: Row, bounds: Ma
     """A claim about an observable that the run does not give is a contradiction, wherever the claim stands."""
     (said,) = judged(tmp_path, claim([row], [4.0], bounds), the_truth).contradictions
     assert said == "alpha at speed=4: first_slip is not reported, though claim makes a claim about it"
+
+
+def test_another_scene_is_shown_and_not_judged(tmp_path: Path) -> None:
+    """An engine with a friction of 1 is not judged where the unbounded scene needs 1.5, though it be the truth's twin;
+    that contradicts whoever says it agrees, and nobody who says it differs.
+    """
+    number = Line("1 / static friction", "1", (0.0,), (1.0,), 1.0, 1.0, "the engine needs a number")
+    agrees = judged(tmp_path / "a", claim([ROW], [1.5, 4.0]), the_truth, certificate=[number])
+    slow, fast = agrees.runs
+    assert slow.result.status is Status.ANOTHER_SCENE
+    assert slow.result.message.startswith("another scene: a friction of 1, where the scene has no bound and needs 1.49")
+    assert slow.result.trajectory is not None
+    assert slow.judgements == []
+    assert fast.verdict is Verdict.AGREES
+    assert agrees.contradictions == [f"alpha at speed=1.5: {slow.result.message}"]
+    row = dataclasses.replace(ROW, except_at=[ExceptAt({"speed": [1.5]}, [Verdict.DIFFERS])])
+    assert judged(tmp_path / "b", claim([row], [1.5, 4.0]), the_truth, certificate=[number]).contradictions == []
 
 
 def test_exceptions_decide(tmp_path: Path) -> None:
