@@ -252,6 +252,15 @@ class Row(Tiny):
         return Sample(right.p_WB[None], right.v_WB, right.w_WB)
 
 
+class Hushed(Tiny):
+    """Gives a force at time 0, and none later."""
+
+    def sample(self) -> Sample:
+        """Falls silent."""
+        right = super().sample()
+        return right if self.t == 0 else dataclasses.replace(right, force=None)
+
+
 class Views(Tiny):
     """Gives the array that it goes on working with."""
 
@@ -386,6 +395,7 @@ FAILS: Mapping[type[Tiny], str] = {
     Thrifty: "builds_only_what_is_required",
     Turning: "builds_only_what_is_required",
     Row: "samples_are_well_formed",
+    Hushed: "samples_are_well_formed",
     Views: "reading_back_changes_nothing",
     Moody: "advance_is_repeatable",
     Forgetful: "advance_in_two_parts",
