@@ -34,7 +34,7 @@ def _run(case: Case, out: Path, spent: Spent) -> Result:
     from proofroll.certificate import Standing, certify, first_difference
     from proofroll.engine import fixed_step
     from proofroll.first_steps import DERIVED, derivable
-    from proofroll.recording import record, time_grid
+    from proofroll.recording import off_grid, record, time_grid
     from proofroll.registry import load_engine, resolve_settings
     from proofroll.scene_file import load_scene
     from proofroll.trajectory import write
@@ -63,7 +63,7 @@ def _run(case: Case, out: Path, spent: Spent) -> Result:
         lines = [line.as_dict() for line in certificate]
         if difference is not None:
             return Result(Status.REFUSED, difference, certificate=lines, versions=versions)
-        recording = record(engine, scene, times, fixed_step(settings))
+        recording = record(engine, scene, times, off_grid(times, fixed_step(settings)))
         spent.on("trajectory", advance=recording.advancing, sampling=recording.sampling)
         del engine
     except Refused as error:

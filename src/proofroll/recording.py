@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 import time
+from collections.abc import Iterable
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
 
@@ -97,14 +98,14 @@ class Recording:
         return self.failure or "; ".join([f"reached {until:g} s", *self.remarks])
 
 
-def record(engine: Any, scene: Scene, times: FloatArray, step: float | None = None) -> Recording:
+def record(engine: Any, scene: Scene, times: FloatArray, probes: Iterable[float] = ()) -> Recording:
     """Advances a freshly built engine over ``times`` and samples it at each, and at a few times off that grid.
 
     Args:
         engine: at time 0.
         scene: what it was built from.
         times: of the samples [s], shape (time,).
-        step: the engine's, if it is fixed [s].
+        probes: times off the grid at which it is sampled besides [s], from :func:`off_grid`.
     """
     began, processor = time.perf_counter(), -time.process_time()
     inside = 0.0
@@ -112,7 +113,7 @@ def record(engine: Any, scene: Scene, times: FloatArray, step: float | None = No
     failure: str | None = None
     wall = 0.0
     between: dict[float, Sample] = {}
-    off = set(off_grid(times, step).tolist())
+    off = set(map(float, probes))
     for t in sorted({*times[1:].tolist(), *off}):
         before, start = time.process_time(), time.perf_counter()
         try:

@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Any
 from proofroll.certificate import certify, first_difference
 from proofroll.engine import fixed_step
 from proofroll.errors import InputError, Refused
-from proofroll.recording import record, time_grid
+from proofroll.recording import off_grid, record, time_grid
 from proofroll.registry import load_engine, parse_engine, resolve_settings
 from proofroll.scene import Scene
 
@@ -78,7 +78,7 @@ def simulate(
     difference = first_difference(certify(built, scene))
     if difference is not None:
         raise Refused(difference)
-    recording = record(built, scene, times, fixed_step(resolved))
+    recording = record(built, scene, times, off_grid(times, fixed_step(resolved)))
     return recording.dataset.assign_attrs(
         status="done" if recording.failure is None else "diverged",
         message=recording.message(until),
