@@ -11,8 +11,8 @@ from typing import Any
 import numpy as np
 import pytest
 import xarray as xr
-from proofroll.elements.ball_on_surface.element import rolling_ball
 
+from proofroll.elements.ball_on_surface.element import rolling_ball
 from proofroll.figures.definition import Figures
 from proofroll.figures.drawing import drawn, inline, looks, picture
 from proofroll.figures.judging import count, judged, rounds_to

@@ -23,6 +23,7 @@ _STYLES = {
     "converges": "yellow",
     "ill-posed": "cyan",
     "not-judged": "cyan",
+    "another-scene": "cyan",
     "differs": "red",
     "failed": "bold red",
 }

@@ -31,12 +31,13 @@ def run(case: dict[str, Any], out: str) -> dict[str, Any]:
 
 
 def _run(case: Case, out: Path, spent: Spent) -> Result:
-    from proofroll.core.certificate import certify, first_difference
-    from proofroll.core.engine import require_provided
+    from proofroll.core.certificate import Standing, certify, first_difference
+    from proofroll.core.engine import fixed_step, require_provided
+    from proofroll.core.first_steps import DERIVED, derivable
     from proofroll.core.plugins import load_engine, resolve_settings
     from proofroll.files.netcdf import write
     from proofroll.files.scene_file import load_scene
-    from proofroll.running.recording import record, time_grid
+    from proofroll.running.recording import off_grid, record, time_grid
 
     versions = {case.engine.name: case.engine.version, "proofroll": proofroll.__version__}
     versions["python"] = platform.python_version()
@@ -53,12 +54,14 @@ def _run(case: Case, out: Path, spent: Spent) -> Result:
         engine = kind.build(scene, settings)
         spent.on("building")
         certificate = certify(engine, scene)
+        if any(line.standing is Standing.NOT_REPORTED for line in certificate if line.quantity in DERIVED):
+            certificate += derivable(kind, scene, settings)
         difference = first_difference(certificate)
         spent.on("certificate")
-        lines = [{**dataclasses.asdict(line), "holds": line.holds} for line in certificate]
+        lines = [line.as_dict() for line in certificate]
         if difference is not None:
             return Result(Status.REFUSED, difference, certificate=lines, versions=versions)
-        recording = record(engine, scene, times)
+        recording = record(engine, scene, times, off_grid(times, fixed_step(settings)))
         spent.on("trajectory", advance=recording.advancing, sampling=recording.sampling)
         del engine
     except Refused as error:

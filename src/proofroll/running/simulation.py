@@ -5,11 +5,11 @@ from __future__ import annotations
 from typing import TYPE_CHECKING, Any
 
 from proofroll.core.certificate import certify, first_difference
-from proofroll.core.engine import require_provided
+from proofroll.core.engine import fixed_step, require_provided
 from proofroll.core.errors import InputError, Refused
 from proofroll.core.plugins import load_engine, parse_engine, resolve_settings
 from proofroll.core.scene import Scene
-from proofroll.running.recording import record, time_grid
+from proofroll.running.recording import off_grid, record, time_grid
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -69,11 +69,12 @@ def simulate(
         from proofroll.core.truth import truth
 
         return truth(scene, times).assign_attrs(status="done", message="two independent routes agree")
+    resolved = resolve_settings(load_engine(spec.name), {**spec.options, **settings})
     built = build(scene, engine, **settings)
     difference = first_difference(certify(built, scene))
     if difference is not None:
         raise Refused(difference)
-    recording = record(built, scene, times)
+    recording = record(built, scene, times, off_grid(times, fixed_step(resolved)))
     return recording.dataset.assign_attrs(
         status="done" if recording.failure is None else "diverged",
         message=recording.message(until),

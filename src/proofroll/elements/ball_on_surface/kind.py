@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import dataclasses
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from typing import Annotated, Any, ClassVar
@@ -11,7 +12,7 @@ from pydantic import Field
 from proofroll.core.errors import InputError
 from proofroll.core.gravity import Gravity
 from proofroll.core.scene import Scene
-from proofroll.elements.ball_on_surface.element import BallOnSurface
+from proofroll.elements.ball_on_surface.element import BallOnSurface, changed
 from proofroll.elements.ball_on_surface.model import Ball, Contact, InitialMotion
 from proofroll.elements.ball_on_surface.surfaces import AnySurface
 from proofroll.files.validation import strict, validated
@@ -75,6 +76,24 @@ class BallOnSurfaceKind:
             "cylinder-slipping": load_scene("sphere_in_cylinder", **cylinder, mu_static=0.35),
             "cylinder-oriented": load_scene("sphere_in_cylinder", **cylinder, asks=("orientation",)),
         }
+
+    @staticmethod
+    def truth_scenes() -> Mapping[str, Scene]:
+        """Turned about the axis, tilted, spinning about e1; slow and fast."""
+        scenes = BallOnSurfaceKind.conformance_scenes()
+        return {
+            "plane": scenes["plane"],
+            "slow": _turned(scenes["cylinder-resisting"], -1.0, 0.05, velocity=(1.2, 0.2), spin=5.0),
+            "fast": _turned(scenes["cylinder"], 2.0, -0.2, velocity=(4.5, -0.7)),
+        }
+
+
+def _turned(scene: Scene, gamma: float, tilt: float, **motion: Any) -> Scene:
+    """A scene that starts at the angle ``gamma``, with the axis of its cylinder tilted, both in rad."""
+    (element,) = scene.elements
+    assert isinstance(element, BallOnSurface)
+    start = dataclasses.replace(element.start, coordinates=(gamma, 0.1), **motion)
+    return changed(scene, start=start, surface=dataclasses.replace(element.surface, tilt=tilt))
 
 
 def _check_names(found: BallTables, where: str) -> None:
