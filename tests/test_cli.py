@@ -415,7 +415,7 @@ def fresh(code: str) -> dict[str, Any]:
 def test_help_is_light(arguments: list[str]) -> None:
     """Help and version load no engine, no array library and no plots."""
     found = fresh(f"sys.argv = ['proofroll', *{arguments}]; from proofroll.cli import main; main()")
-    heavy = {"xarray", "plotly", "numpy", "scipy", "mujoco", "pinocchio", "exudyn", "h5netcdf", "heyoka"}
+    heavy = {"xarray", "plotly", "numpy", "scipy", "mujoco", "pinocchio", "exudyn", "heyoka"}
     assert found["code"] == 0
     assert heavy & set(found["modules"]) == set()
     assert not any(name.startswith("proofroll.engines.") for name in found["modules"])

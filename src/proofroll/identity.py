@@ -17,6 +17,7 @@ from proofroll.errors import InputError
 # Everything whose change may change a result; reports and command line are not among it.
 FOUNDATION = (
     "case.py",
+    "bounds.py",
     "case_run.py",
     "certificate.py",
     "clean_runs.py",

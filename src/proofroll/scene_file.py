@@ -5,13 +5,14 @@ from __future__ import annotations
 import math
 import operator
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, fields
 from pathlib import Path
 from typing import Annotated, Any, TypeVar
 
 from pydantic import ConfigDict, Field, TypeAdapter, ValidationError
 
-from proofroll.errors import InputError
+from proofroll.bounds import OutOfBounds
+from proofroll.errors import InputError, choices
 from proofroll.folders import data_folder
 from proofroll.scene import Ball, Contact, Gravity, InitialMotion, Scene
 from proofroll.surfaces import AnySurface
@@ -73,6 +74,15 @@ _STRICT = ConfigDict(extra="forbid")
 for _typed in (Parameter, SceneFile, _Mechanics, Ball, Contact, Gravity, InitialMotion, *AnySurface.__args__):
     _typed.__pydantic_config__ = _STRICT  # how pydantic is told about stdlib dataclasses
 
+# Unit of each number of the mechanics by its key; nothing is converted.
+_UNITS: dict[str, str] = {
+    item.name: item.metadata["unit"]
+    for kind in (Ball, Contact, Gravity, InitialMotion, *AnySurface.__args__)
+    for item in fields(kind)
+    if "unit" in item.metadata
+}
+_KNOWN_UNITS = dict.fromkeys([*_UNITS.values(), "s", "N"])
+
 
 def scene_names() -> list[str]:
     """Names of all scenes, sorted."""
@@ -125,12 +135,12 @@ def load_scene(name: str, /, *, asks: Any = (), **parameters: float) -> Scene:
     mechanics = _validated(
         _Mechanics,
         {
-            key: _substituted(getattr(file, key), values, f"{where}: {key}")
+            key: _substituted(getattr(file, key), file, values, f"{where}: {key}")
             for key in ("balls", "surfaces", "gravity", "contacts", "initial")
         },
         where,
     )
-    _check_names(mechanics, where)
+    _check_contacts(mechanics, where)
     return Scene(
         name=folder.name,
         title=file.title,
@@ -158,20 +168,43 @@ def _parse(path: Path) -> SceneFile:
     content = read_toml(path)
     file = _validated(SceneFile, content, str(path))
     for name, parameter in file.parameters.items():
+        where = f"{path}: parameters.{name}"
+        if parameter.unit not in _KNOWN_UNITS:
+            advice = f"this unit is not known, and nothing is converted; write the value in {choices(_KNOWN_UNITS)}"
+            raise InputError(f"{where}.unit", parameter.unit, advice)
         for key in ("value", "above", "at_least", "below", "at_most"):
             other = getattr(parameter, key)
-            if isinstance(other, str) and (other == name or other not in file.parameters):
-                known = ", ".join(sorted(file.parameters.keys() - {name}))
+            if not isinstance(other, str):
+                continue
+            if other == name or other not in file.parameters:
+                known = choices(item for item in file.parameters if item != name)
                 advice = f"there is no such parameter to refer to; choose from {known}"
-                raise InputError(f"{path}: parameters.{name}.{key}", other, advice)
+                raise InputError(f"{where}.{key}", other, advice)
+            if file.parameters[other].unit != parameter.unit:
+                advice = f"its unit is {file.parameters[other].unit}, that of {name} is {parameter.unit}"
+                raise InputError(f"{where}.{key}", other, advice)
+        _check_end(file, name, f"{where}.value")
     return file
 
 
-def _check_names(mechanics: _Mechanics, where: str) -> None:
-    """Contacts and initial motions name what there is.
+def _check_end(file: SceneFile, name: str, where: str) -> None:
+    """The defaults that follow one another end at a number.
 
     Raises:
-        InputError: the first name that leads nowhere.
+        InputError: they go round in a circle.
+    """
+    passed = [name]
+    while isinstance(following := file.parameters[passed[-1]].value, str) and following in file.parameters:
+        if following in passed:
+            raise InputError(where, " -> ".join([*passed, following]), "this goes round in a circle; give a number")
+        passed.append(following)
+
+
+def _check_contacts(mechanics: _Mechanics, where: str) -> None:
+    """Contacts and initial motions name what there is, and what touches fits together.
+
+    Raises:
+        InputError: the first name that leads nowhere, or a ball that has no room.
     """
     balls, surfaces = [ball.name for ball in mechanics.balls], [surface.name for surface in mechanics.surfaces]
     for kind, items in (("contacts", mechanics.contacts), ("initial", mechanics.initial)):
@@ -180,6 +213,12 @@ def _check_names(mechanics: _Mechanics, where: str) -> None:
                 name = getattr(item, key, None)
                 if name is not None and name not in known:
                     raise InputError(f"{where}: {kind}.{index}.{key}", name, f"choose one of {', '.join(known)}")
+    for index, contact in enumerate(mechanics.contacts):
+        ball, wall = mechanics.balls[balls.index(contact.body)], mechanics.surfaces[surfaces.index(contact.surface)]
+        try:
+            wall.offset(ball.radius)
+        except InputError as error:
+            raise error.within(f"{where}: contacts.{index}", contact.body) from None
 
 
 def _validated(kind: type[_T], content: object, where: str) -> _T:
@@ -197,6 +236,9 @@ def first_problem(error: ValidationError, where: str) -> InputError:
         return InputError(f"{where}: {location}", problem["input"], "there is no such key here; remove it")
     if problem["type"] in {"missing", "missing_argument"}:
         return InputError(f"{where}: {location}", "nothing", "this key is required; add it")
+    error_found = problem.get("ctx", {}).get("error")
+    if isinstance(error_found, OutOfBounds):
+        return InputError(f"{where}: {location}.{error_found.field}", error_found.value, error_found.advice)
     if problem["type"] in {"union_tag_invalid", "union_tag_not_found"}:
         key = problem["ctx"]["discriminator"].strip("'")
         if problem["type"] == "union_tag_not_found":
@@ -209,16 +251,15 @@ def first_problem(error: ValidationError, where: str) -> InputError:
 
 def _values(file: SceneFile, given: Mapping[str, object]) -> dict[str, float]:
     """Every parameter's number: given, or default, or that of the parameter it follows."""
-    known = ", ".join(file.parameters)
     for name, value in given.items():
         if name not in file.parameters:
-            raise InputError(name, value, f"there is no such parameter; choose from {known}")
+            raise InputError(name, value, f"there is no such parameter; choose from {choices(file.parameters)}")
     values: dict[str, float] = {}
     for name, parameter in file.parameters.items():
-        chosen = given.get(name, parameter.value)
-        if name not in given and isinstance(chosen, str):
-            chosen = values[chosen] if chosen in values else given.get(chosen, file.parameters[chosen].value)
-        values[name] = _number(name, chosen, parameter)
+        source = name
+        while source not in given and isinstance(following := file.parameters[source].value, str):
+            source = following
+        values[name] = _number(name, given.get(source, file.parameters[source].value), parameter)
     # Numbers first, then other parameters: a parameter is never blamed for the bad value of another.
     for kind in (float, str):
         for name, parameter in file.parameters.items():
@@ -261,13 +302,22 @@ def _check_bounds(name: str, parameter: Parameter, values: Mapping[str, float], 
             raise InputError(name, value, f"{parameter.meaning} must be {words} {shown}{unit}")
 
 
-def _substituted(content: Any, values: Mapping[str, float], where: str) -> Any:
+def _substituted(content: Any, file: SceneFile, values: Mapping[str, float], where: str, unit: str = "") -> Any:
+    """The content with each ``$name`` replaced by its number, which must have the unit of its place."""
     if isinstance(content, dict):
-        return {key: _substituted(value, values, f"{where}.{key}") for key, value in content.items()}
+        return {
+            key: _substituted(value, file, values, f"{where}.{key}", _UNITS.get(key, ""))
+            for key, value in content.items()
+        }
     if isinstance(content, list):
-        return [_substituted(value, values, f"{where}.{index}") for index, value in enumerate(content)]
+        return [_substituted(value, file, values, f"{where}.{index}", unit) for index, value in enumerate(content)]
+    if isinstance(content, bool):
+        raise InputError(where, content, "this is not a number; give one" + (f" in {unit}" if unit else ""))
     if isinstance(content, str) and content.startswith("$"):
         if content[1:] not in values:
-            raise InputError(where, content, f"there is no such parameter; choose from {', '.join(values)}")
+            raise InputError(where, content, f"there is no such parameter; choose from {choices(values)}")
+        given = file.parameters[content[1:]].unit
+        if unit and given != unit:
+            raise InputError(where, content, f"this number is in {unit}, that parameter in {given}")
         return values[content[1:]]
     return content

@@ -2,6 +2,7 @@ from __future__ import annotations
 
 import dataclasses
 import math
+from collections.abc import Callable
 from pathlib import Path
 
 import numpy as np
@@ -9,8 +10,9 @@ import pytest
 
 from proofroll.errors import InputError
 from proofroll.mechanics import slip_velocity
-from proofroll.scene import Ball, Capability, Gravity, Scene
+from proofroll.scene import Ball, Capability, Contact, Gravity, InitialMotion, Scene
 from proofroll.scene_file import load_scene
+from proofroll.surfaces import Cylinder, Plane
 
 
 def test_paper_ball() -> None:
@@ -123,3 +125,26 @@ def test_what_cannot_be_asked(asks: object, value: object) -> None:
         load_scene("sphere_in_cylinder", asks=asks)
     assert (caught.value.field, caught.value.value) == ("asks", value)
     assert "\n" not in str(caught.value)
+
+
+@pytest.mark.parametrize(
+    ("make", "field"),
+    [
+        (lambda: Ball("b", 0.0, 1.0), "radius"),
+        (lambda: Ball("b", 1.0, math.nan), "mass"),
+        (lambda: Ball("b", 1.0, 1.0, -0.4), "inertia_ratio"),
+        (lambda: Contact("b", "w", mu_static=-1.0, mu_kinetic=-1.0), "mu_static"),
+        (lambda: Contact("b", "w", mu_static=0.3), "mu_kinetic"),
+        (lambda: Contact("b", "w", -1e-9), "rolling_resistance"),
+        (lambda: Gravity(math.inf), "magnitude"),
+        (lambda: Gravity(9.81, (0.0, 0.0, 0.0)), "length of direction"),
+        (lambda: InitialMotion("b", velocity=(math.nan, 0.0)), "velocity"),
+        (lambda: Cylinder("w", -1.0), "radius"),
+        (lambda: Plane("w", math.nan), "tilt"),
+    ],
+)
+def test_parts_refuse_what_they_cannot_be(make: Callable[[], object], field: str) -> None:
+    """Whoever makes a part of a scene from a number that makes no sense is told which one it is."""
+    with pytest.raises(InputError) as caught:
+        make()
+    assert caught.value.field == field

@@ -73,7 +73,7 @@ def test_importing_proofroll_is_light() -> None:
     """Importing proofroll loads no engine, no xarray, no plotly and no scipy."""
     code = (
         "import sys, proofroll;"
-        "heavy = {'xarray', 'scipy', 'plotly', 'pydantic', 'mujoco', 'pinocchio', 'exudyn', 'h5netcdf', 'numpy'};"
+        "heavy = {'xarray', 'scipy', 'plotly', 'pydantic', 'mujoco', 'pinocchio', 'exudyn', 'numpy'};"
         "print(sorted(heavy & set(sys.modules)))"
     )
     done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
