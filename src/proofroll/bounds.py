@@ -7,7 +7,7 @@ import math
 from proofroll.errors import InputError
 
 
-class OutOfBounds(InputError, ValueError):
+class OutOfBounds(InputError, ValueError):  # noqa: N818 -- says what is wrong, as the other errors do
     """A number that a model cannot have; a ValueError too, so that pydantic says where in a file it stands."""
 
 

@@ -5,16 +5,16 @@ from __future__ import annotations
 import dataclasses
 import gc
 import json
-import platform
 import statistics
 import time
 from pathlib import Path
 from typing import Any
 
-import proofroll
 from proofroll.case import Case, Result, Status
 from proofroll.clean_runs import clean_runs
-from proofroll.errors import Diverged, Refused
+from proofroll.errors import Diverged, ProofrollError, Refused, lack_behind
+from proofroll.manifest import manifest
+from proofroll.manifest import versions as made_with
 from proofroll.spent import Spent
 
 
@@ -37,8 +37,7 @@ def _run(case: Case, out: Path, spent: Spent) -> Result:
     from proofroll.scene_file import load_scene
     from proofroll.trajectory import write
 
-    versions = {case.engine.name: case.engine.version, "proofroll": proofroll.__version__}
-    versions["python"] = platform.python_version()
+    versions = made_with(case.engine.name, case.engine.version)
     scene = load_scene(case.scene, asks=case.asks, **case.parameters)
     times = time_grid(case.until, case.every)
     if case.engine.name == "truth":
@@ -62,10 +61,8 @@ def _run(case: Case, out: Path, spent: Spent) -> Result:
         recording = record(engine, scene, times)
         spent.on("trajectory", advance=recording.advancing, sampling=recording.sampling)
         del engine
-    except Refused as error:
-        return Result(Status.REFUSED, str(error), versions=versions)
-    except Diverged as error:
-        return Result(Status.DIVERGED, str(error), versions=versions)
+    except (Refused, Diverged) as error:
+        return _answer(error, versions)
     timings: list[float] = []
     if recording.failure is None and case.timed and case.until > 0:
         timings, inside = clean_runs(kind, scene, settings, times)
@@ -80,13 +77,23 @@ def _run(case: Case, out: Path, spent: Spent) -> Result:
         versions=versions,
         trajectory=out.name,
     )
-    manifest = {"status": result.status.value, "message": result.message, "wall_seconds": result.wall_seconds}
-    manifest |= {"engine": case.engine.name, "settings": json.dumps(case.engine.settings, sort_keys=True)}
-    manifest |= {"parameters": json.dumps(dict(scene.parameters)), "versions": json.dumps(versions)}
-    manifest |= {"machine": f"{platform.machine()} {platform.system()}"}
-    write(recording.dataset.assign_attrs(manifest), out)
+    said = {"status": result.status.value, "message": result.message, "wall_seconds": result.wall_seconds}
+    said |= manifest(case.engine.name, case.engine.settings, scene, versions)
+    write(recording.dataset.assign_attrs(said), out)
     spent.on("writing")
     return result
+
+
+def _answer(error: Refused | Diverged, versions: dict[str, str]) -> Result:
+    """What an engine answers, unless the machine made it say so: then there is no answer.
+
+    Raises:
+        ProofrollError: memory, a file or time was lacking.
+    """
+    if lack := lack_behind(error):
+        raise ProofrollError(f"{error} ({type(lack).__name__})")
+    status = Status.REFUSED if isinstance(error, Refused) else Status.DIVERGED
+    return Result(status, str(error), versions=versions)
 
 
 def _run_truth(case: Case, scene: Any, times: Any, out: Path, versions: dict[str, str]) -> Result:
@@ -98,15 +105,14 @@ def _run_truth(case: Case, scene: Any, times: Any, out: Path, versions: dict[str
         if case.asks:
             raise Refused(f"the truth is that of the motion and gives no {', '.join(case.asks)}; ask an engine for it")
         dataset = truth(scene, times)
-    except Refused as error:
-        return Result(Status.REFUSED, str(error), versions=versions)
-    except Diverged as error:
-        return Result(Status.DIVERGED, str(error), versions=versions)
+    except (Refused, Diverged) as error:
+        return _answer(error, versions)
     wall = time.perf_counter() - start
     message = f"{dataset.attrs['route']}, checked by {dataset.attrs['second_route']}"
     if "sticking" in dataset:
         from proofroll.truth.onset import onset
 
         dataset.attrs["onset"] = json.dumps(dataclasses.asdict(onset(scene, float(times[-1]))))
-    write(dataset.assign_attrs(status="done", message=message, engine="truth", wall_seconds=wall), out)
+    said = {"status": "done", "message": message, "wall_seconds": wall}
+    write(dataset.assign_attrs(said | manifest("truth", {}, scene, versions)), out)
     return Result(Status.DONE, message, wall_seconds=wall, versions=versions, trajectory=out.name)

@@ -41,6 +41,14 @@ class Diverged(ProofrollError):  # noqa: N818 -- a finding about the engine
     """The engine gave up or produced a state that is not finite; the text says when."""
 
 
+def lack_behind(error: BaseException) -> BaseException | None:
+    """What the machine, not the engine, lacked where that is behind an error: memory, a file, or time (Ctrl-C)."""
+    found: BaseException | None = error
+    while found is not None and not isinstance(found, (MemoryError, OSError, KeyboardInterrupt)):
+        found = found.__cause__ or found.__context__
+    return found
+
+
 def choices(names: Iterable[str], most: int = 20) -> str:
     """Names to choose from, of many the first."""
     shown = list(names)

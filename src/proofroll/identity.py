@@ -28,6 +28,7 @@ FOUNDATION = (
     "compiled/series.py",
     "engine.py",
     "events.py",
+    "manifest.py",
     "mechanics.py",
     "motion.py",
     "recording.py",
@@ -71,7 +72,7 @@ def resolve(engine: str, options: dict[str, Any]) -> dict[str, Any]:
         if options:
             raise InputError("truth", ", ".join(options), "the truth has no settings; leave them out")
         code = digest([Path(proofroll.__file__).parent / "truth"])
-        return dataclasses.asdict(EngineFacts("truth", _truth_version(), code, {}))
+        return dataclasses.asdict(EngineFacts("truth", truth_version(), code, {}))
     from proofroll.registry import load_engine, resolve_settings
 
     kind = load_engine(engine)
@@ -89,7 +90,7 @@ def resolve(engine: str, options: dict[str, Any]) -> dict[str, Any]:
     return dataclasses.asdict(facts)
 
 
-def _truth_version() -> str:
+def truth_version() -> str:
     """Of proofroll, and of the libraries by which the truth is integrated."""
     found = [f"proofroll {proofroll.__version__}"]
     for name in ("numpy", "scipy", "heyoka"):

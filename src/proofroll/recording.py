@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from proofroll.engine import LocatesEvents, Sample, TellsRemarks
-from proofroll.errors import Diverged, InputError
+from proofroll.errors import Diverged, InputError, lack_behind
 from proofroll.events import between_samples, with_events
 from proofroll.scene import Capability, Scene
 from proofroll.surfaces import FloatArray
@@ -81,6 +81,8 @@ def record(engine: Any, scene: Scene, times: FloatArray) -> Recording:
             inside += time.process_time() - before
             samples.append(_finite(engine.sample(), float(t)))
         except Diverged as error:
+            if lack_behind(error):
+                raise
             failure = str(error)
             break
     processor += time.process_time()

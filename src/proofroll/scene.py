@@ -94,7 +94,9 @@ class Contact:
         bounded("mu_static", self.mu_static, at_least=0, unbounded=True)
         bounded("mu_kinetic", self.mu_kinetic, at_least=0, unbounded=True)
         if self.mu_kinetic > self.mu_static:
-            raise OutOfBounds("mu_kinetic", self.mu_kinetic, f"the value must be at most mu_static = {self.mu_static:g}")
+            raise OutOfBounds(
+                "mu_kinetic", self.mu_kinetic, f"the value must be at most mu_static = {self.mu_static:g}"
+            )
 
 
 @dataclass(frozen=True)

@@ -2,10 +2,13 @@
 
 from __future__ import annotations
 
+import dataclasses
 from typing import TYPE_CHECKING, Any
 
 from proofroll.certificate import certify, first_difference
 from proofroll.errors import InputError, Refused
+from proofroll.identity import truth_version
+from proofroll.manifest import manifest, versions
 from proofroll.recording import record, time_grid
 from proofroll.registry import load_engine, parse_engine, resolve_settings
 from proofroll.scene import Scene
@@ -20,20 +23,32 @@ def build(scene: Scene, engine: str, **settings: Any) -> Any:
     Args:
         scene: from :func:`proofroll.load_scene`.
         engine: ``name`` or ``name[key=value,…]``.
-        **settings: the engine's settings, put over those in brackets.
+        **settings: the engine's settings, besides those in brackets.
 
     Raises:
-        InputError: unknown engine or setting.
+        InputError: unknown engine or setting, or one that is given twice.
         Missing: the engine is not installed.
         Refused: the engine cannot represent the scene.
     """
+    kind, resolved = _resolved(engine, settings)
+    return _build(scene, kind, resolved)
+
+
+def _resolved(engine: str, settings: dict[str, Any]) -> tuple[Any, Any]:
+    """The engine's class, and its complete settings."""
     spec = parse_engine(engine)
+    for key, value in settings.items():
+        if key in spec.options:
+            raise InputError(f"{spec.name}: {key}", value, f"{spec.options[key]} is in the brackets; give it once")
     kind = load_engine(spec.name)
-    resolved = resolve_settings(kind, {**spec.options, **settings})
+    return kind, resolve_settings(kind, {**spec.options, **settings})
+
+
+def _build(scene: Scene, kind: Any, settings: Any) -> Any:
     lacking = scene.requires - kind.provides
     if lacking:
         raise Refused("needs " + ", ".join(sorted(lacking)))
-    return kind.build(scene, resolved)
+    return kind.build(scene, settings)
 
 
 def simulate(
@@ -54,7 +69,9 @@ def simulate(
         **settings: e.g. ``formulation="chart", dt=1e-4``.
 
     Returns:
-        Dataset with the attribute ``status`` (``done`` or ``diverged``) and ``message``, one sentence.
+        Dataset with the attributes ``status`` (``done`` or ``diverged``), ``message``, one sentence, and those of
+        :func:`proofroll.manifest.manifest`: engine, settings, parameters, versions. The truth's variables have an
+        attribute ``error_bar``, in their unit.
 
     Raises:
         InputError: a value that makes no sense.
@@ -71,8 +88,10 @@ def simulate(
             raise Refused(f"the truth is that of the motion and gives no {', '.join(scene.asks)}; ask an engine for it")
         from proofroll.truth import truth
 
-        return truth(scene, times).assign_attrs(status="done", message="two independent routes agree")
-    built = build(scene, engine, **settings)
+        found = truth(scene, times).assign_attrs(status="done", message="two independent routes agree")
+        return found.assign_attrs(manifest("truth", {}, scene, versions("truth", truth_version())))
+    kind, resolved = _resolved(engine, settings)
+    built = _build(scene, kind, resolved)
     difference = first_difference(certify(built, scene))
     if difference is not None:
         raise Refused(difference)
@@ -81,4 +100,5 @@ def simulate(
         status="done" if recording.failure is None else "diverged",
         message=recording.message(until),
         wall_seconds=recording.wall_seconds,
+        **manifest(spec.name, dataclasses.asdict(resolved), scene, versions(spec.name, kind.version())),
     )

@@ -10,7 +10,6 @@ from typing import Any
 from proofroll.errors import InputError
 from proofroll.folders import data_folder
 
-
 # Files of scenes and comparisons have some kB and tables some levels deep: what has more is a mistake, and would take
 # long to read or end what reads it.
 _MOST_BYTES = 1 << 18

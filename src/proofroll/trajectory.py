@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from proofroll.engine import Sample
-from proofroll.files import replacing
+from proofroll.files import content, replacing
 from proofroll.mechanics import energy, slip_velocity
 from proofroll.scene import RollingBall, Scene
 from proofroll.surfaces import FloatArray, Surface
@@ -141,9 +141,9 @@ def write(dataset: xr.Dataset, path: Path) -> None:
     """
     plain: dict[Any, dict[str, Any]] = {name: {"_FillValue": None} for name in dataset.variables}
     # Made in memory first: a disk that fills meanwhile gives one reason, and no half of a file.
-    content = dataset.to_netcdf(None, engine="scipy", encoding=plain)
+    made = dataset.to_netcdf(None, engine="scipy", encoding=plain)
     with replacing(path) as temporary:
-        temporary.write_bytes(content)
+        temporary.write_bytes(made)
 
 
 def read(path: Path) -> xr.Dataset:
@@ -155,5 +155,5 @@ def read(path: Path) -> xr.Dataset:
     import xarray as xr
 
     # Times stay numbers of seconds, and no number stands for an absent one.
-    found = xr.load_dataset(io.BytesIO(path.read_bytes()), engine="scipy", decode_times=False, mask_and_scale=False)
+    found = xr.load_dataset(io.BytesIO(content(path)), engine="scipy", decode_times=False, mask_and_scale=False)
     return found.assign({name: item.astype(str) for name, item in found.variables.items() if item.dtype == object})

@@ -9,15 +9,15 @@ from __future__ import annotations
 import gc
 import json
 import os
+import signal
 import sys
-import threading
-import time
 from collections.abc import Callable
 from typing import Any
 
 from proofroll.case import Case
 from proofroll.case_run import run
 from proofroll.clean_runs import time_once
+from proofroll.ending import end_with
 from proofroll.errors import Diverged, InputError, Missing, ProofrollError, Refused
 from proofroll.identity import describe, resolve
 from proofroll.memory import volunteer
@@ -25,7 +25,8 @@ from proofroll.memory import volunteer
 
 def main(answers: int, parent: int) -> None:
     """Serves requests; ``answers`` is the file descriptor for the answers, ``parent`` the process that asks."""
-    threading.Thread(target=_end_with, args=(parent,), daemon=True).start()
+    end_with(parent)
+    signal.signal(signal.SIGINT, signal.SIG_DFL)  # an engine that catches it would take it for its own failure
     volunteer()
     requests = os.fdopen(os.dup(0), encoding="utf-8")
     with open(os.devnull, "rb") as nothing:
@@ -36,13 +37,6 @@ def main(answers: int, parent: int) -> None:
             number = request.pop("number")
             pipe.write(json.dumps({**_answer(request), "number": number}) + "\n")
             pipe.flush()
-
-
-def _end_with(parent: int) -> None:
-    """Ends this process when its parent is gone, even in the middle of a case."""
-    while os.getppid() == parent:
-        time.sleep(0.5)
-    os._exit(1)
 
 
 def _answer(request: dict[str, Any]) -> dict[str, Any]:

@@ -23,6 +23,7 @@ import numpy as np
 
 from proofroll.engine import Built, Sample
 from proofroll.engines.projection import Projection
+from proofroll.errors import Diverged, Refused
 from proofroll.scene import Capability, Scene
 
 FOLDER = "PROOFROLL_DRILL"
@@ -85,9 +86,35 @@ def _asks() -> None:
 
 
 def _half() -> None:
-    """The process is ended by the system as soon as it has written the first 4 kB of its result."""
+    """The process is ended by the system as soon as it has written the first kB of its result."""
     signal.signal(signal.SIGXFSZ, signal.SIG_DFL)
-    resource.setrlimit(resource.RLIMIT_FSIZE, (4096, resource.getrlimit(resource.RLIMIT_FSIZE)[1]))
+    resource.setrlimit(resource.RLIMIT_FSIZE, (1024, resource.getrlimit(resource.RLIMIT_FSIZE)[1]))
+
+
+def _interrupted() -> None:
+    try:
+        os.kill(os.getpid(), signal.SIGINT)
+        time.sleep(_FOREVER)
+    except KeyboardInterrupt:
+        raise Diverged("it diverged") from None
+
+
+def _no_memory() -> None:
+    try:
+        np.ones(1 << 50)
+    except MemoryError:
+        raise Diverged("it diverged") from None
+
+
+def _no_file() -> None:
+    try:
+        Path("/no/such/licence").read_bytes()
+    except OSError as error:
+        raise Refused("it refuses") from error
+
+
+def _commands() -> None:
+    raise Diverged("\x1b]0;all is well\x07\x1b[2J\x9b31m\u202e")
 
 
 def _leaves_a_child() -> None:
@@ -118,6 +145,12 @@ DEEDS: Mapping[str, tuple[str, Callable[[], None]]] = {
     "writes_everywhere": ("advance", _writes_everywhere),
     "asks": ("advance", _asks),
     "leaves_a_child": ("advance", _leaves_a_child),
+    "interrupted": ("advance", _interrupted),
+    "no_memory": ("advance", _no_memory),
+    "no_file": ("build", _no_file),
+    "commands": ("advance", _commands),
+    "waits_for_its_parent": ("advance", _hangs),
+    "waits_for_its_terminal": ("advance", _hangs),
 }
 
 

@@ -6,12 +6,19 @@ from collections.abc import Callable
 from concurrent.futures import ThreadPoolExecutor
 from functools import partial
 
-from proofroll.drill import command_faults, engine_faults
+from proofroll.drill import command_faults, engine_faults, process_faults
 from proofroll.drill.row import Drilled
 from proofroll.drill.site import site
 
 # Faults wait rather than compute, so that two at once are no burden.
 _AT_ONCE = 2
+_OF_COMMANDS = (command_faults.drill_interrupt, command_faults.drill_full_disk, command_faults.drill_two_runs)
+_OF_PROCESSES = (
+    process_faults.drill_killed,
+    process_faults.drill_hung_up,
+    process_faults.drill_pool,
+    process_faults.drill_storing,
+)
 
 
 def fault_drill(progress: Callable[[str], None] | None = None) -> list[Drilled]:
@@ -26,9 +33,8 @@ def fault_drill(progress: Callable[[str], None] | None = None) -> list[Drilled]:
         compared = first.result()
         # The longest first.
         drills: list[Callable[[], Drilled]] = [
-            partial(command_faults.drill_interrupt, here, compared),
-            partial(command_faults.drill_full_disk, here, compared),
-            partial(command_faults.drill_two_runs, here, compared),
+            *(partial(drill, here, compared) for drill in _OF_COMMANDS),
+            *(partial(drill, here, sound) for drill in _OF_PROCESSES),
             *(partial(engine_faults.drill_engine, here, sound, fault) for fault in engine_faults.ENGINE_FAULTS),
             *(partial(engine_faults.drill_damage, here, sound, name) for name in engine_faults.DAMAGES),
         ]
@@ -40,4 +46,5 @@ def fault_drill(progress: Callable[[str], None] | None = None) -> list[Drilled]:
             return row
 
         rows = list(pool.map(run, drills))
-    return rows[3:] + rows[:3]
+    others = len(_OF_COMMANDS) + len(_OF_PROCESSES)
+    return rows[others:] + rows[:others]

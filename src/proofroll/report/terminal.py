@@ -5,12 +5,12 @@ from __future__ import annotations
 from collections.abc import Sequence
 from typing import TYPE_CHECKING, Any
 
-from rich.console import Console
 from rich.table import Table
 from rich.text import Text
 
 from proofroll.metrics import OBSERVABLES
 from proofroll.report.labels import SYMBOLS
+from proofroll.screen import Screen
 
 if TYPE_CHECKING:
     from proofroll.drill.row import Drilled
@@ -19,9 +19,9 @@ WIDTH = 100
 _STYLES = {"agrees": "green", "converges": "yellow", "ill-posed": "cyan", "differs": "red", "failed": "bold red"}
 
 
-def console() -> Console:
+def console() -> Screen:
     """The console for data, on standard output; never wider than 100 columns."""
-    out = Console(highlight=False)
+    out = Screen(highlight=False)
     out.width = min(out.width, WIDTH) if out.is_terminal else WIDTH
     return out
 

@@ -59,7 +59,9 @@ def plan(comparison: Comparison, engines: Iterable[str] = (), workers: Workers |
         InputError: an engine or setting that does not exist.
     """
     chosen = set(engines)
-    numbered = {i: row for i, row in enumerate(comparison.rows) if not chosen or parse_engine(row.engine).name in chosen}
+    numbered = {
+        i: row for i, row in enumerate(comparison.rows) if not chosen or parse_engine(row.engine).name in chosen
+    }
     rows = list(numbered.values())
     if not rows:
         known = ", ".join(dict.fromkeys(parse_engine(row.engine).name for row in comparison.rows))

@@ -12,6 +12,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from proofroll.ending import end_with_pool
 from proofroll.scene import RollingBall, Scene
 from proofroll.surfaces import Cylinder, FloatArray
 from proofroll.truth.stick_slip import first_route
@@ -140,7 +141,7 @@ def _mapped(
         yield from map(row, speeds)
         return
     # Not forked: a parent that shows progress has threads, and a fork copies their locks as they are.
-    with ProcessPoolExecutor(workers, mp_context=get_context("spawn")) as pool:
+    with ProcessPoolExecutor(workers, get_context("spawn"), initializer=end_with_pool) as pool:
         signal.pthread_sigmask(signal.SIG_BLOCK, {signal.SIGINT})  # inherited: Ctrl-C is the parent's affair
         try:
             # Not map, which cancels the rest when interrupted: a pool whose processes are then ended complains.

@@ -1,0 +1,43 @@
+"""A process that ends with the one that started it, however that one ends."""
+
+from __future__ import annotations
+
+import contextlib
+import multiprocessing
+import os
+import signal
+import threading
+import time
+
+from proofroll.memory import descendants
+
+# How often a process looks for its parent [s]; a look costs some microseconds.
+_TICK = 0.25
+
+
+def end_with(parent: int) -> None:
+    """From now on this process ends, with all that it started, soon after ``parent`` has, even in a long computation.
+
+    Args:
+        parent: number of the process that started this one.
+    """
+    threading.Thread(target=_watch, args=(parent,), daemon=True).start()
+
+
+def end_with_pool() -> None:
+    """As :func:`end_with`, for a process of a :class:`concurrent.futures.ProcessPoolExecutor`.
+
+    Such a process waits on a pipe that all of them hold open, and so for ever when their parent is killed.
+    """
+    owner = multiprocessing.parent_process()
+    if owner is not None and owner.pid is not None:
+        end_with(owner.pid)
+
+
+def _watch(parent: int) -> None:
+    while os.getppid() == parent:
+        time.sleep(_TICK)
+    for process in descendants(os.getpid()):
+        with contextlib.suppress(ProcessLookupError, PermissionError):
+            os.kill(process, signal.SIGKILL)
+    os._exit(1)
