@@ -175,7 +175,7 @@ def test_a_disk_that_is_really_full(tmp_path: Path, make_case: MakeCase) -> None
     """On a full disk what fits is stored, each other row says why not, and running all again loses nothing."""
     cases = [dataclasses.asdict(make_case("oracle", parameters={"speed": speed})) for speed in (3.0, 4.0, 5.0)]
     (tmp_path / "disk").mkdir()
-    mount = 'mount -t tmpfs -o size=64k tmpfs "$1" && shift && exec "$@"'
+    mount = 'mount -t tmpfs -o size=32k tmpfs "$1" && shift && exec "$@"'
     command = ["unshare", "--user", "--map-root-user", "--mount", "sh", "-c", mount, "sh", str(tmp_path / "disk")]
     if not shutil.which("unshare") or subprocess.run([*command, "true"], check=False, capture_output=True).returncode:
         pytest.skip("this system lets nobody mount a small disk")

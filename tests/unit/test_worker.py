@@ -80,7 +80,7 @@ def test_a_worker_ends_with_its_parent(
 
 
 # Modules that foundation modules import and on which no number of a result hangs: errors, files and the process itself.
-NO_NUMBERS = {"__init__.py", "errors.py", "files.py", "folders.py", "memory.py", "registry.py", "spent.py"}
+NO_NUMBERS = {"__init__.py", "ending.py", "errors.py", "files.py", "folders.py", "memory.py", "registry.py", "spent.py"}
 
 
 def test_whatever_a_result_rests_on_decides_its_key() -> None:

@@ -2,15 +2,13 @@
 
 from __future__ import annotations
 
-import json
 import os
 import shutil
 import signal
 import time
 from pathlib import Path
 
-from proofroll.case import Case
-from proofroll.drill.processes import LIMIT, command, end, wait_until
+from proofroll.drill.processes import LIMIT, command, end, run, wait_until
 from proofroll.drill.row import Drilled, drilled
 from proofroll.drill.site import BEFORE, BESIDE, Site, contents, scraps
 
@@ -18,39 +16,28 @@ from proofroll.drill.site import BEFORE, BESIDE, Site, contents, scraps
 _ROOM = 1024
 
 
-def _compare(claim: Path, out: Path, *more: str) -> list[str | Path]:
-    return ["compare", claim, "--out", out, "--json", *more]
-
-
-def prepare(site: Site) -> Path:
-    """A folder of the comparison's results that are there before anything goes wrong."""
-    folder = site.folder / "compared"
-    site.compare(site.claim("before", BEFORE[:1]), folder)
-    return folder
-
-
 def drill_full_disk(site: Site, sound: Path) -> Drilled:
-    """A disk without room: a limit on the size of every file, which stops root too."""
-    out = site.folder / "full_disk"
-    shutil.copytree(sound, out)
-    before = contents(out / "cases")
-    claim = site.claim("full_disk", [BEFORE[0], BESIDE[0]])
-    full = end(command(*_compare(claim, out, "--jobs", "1"), room=_ROOM))
-    after, left = contents(out / "cases"), scraps(out / "cases")
-    site.compare(claim, out)
-    runs = {run["parameters"]["speed"]: run for run in full.runs}
-    message = runs[BESIDE[0]]["message"]
+    """A disk without room while results are made anew: a limit on the size of every file, which stops root too."""
+    folder = site.folder / "full_disk"
+    shutil.copytree(sound, folder)
+    before = contents(folder)
+    cases = [*site.sound_cases(), site.case("well", BESIDE[0])]
+    full = end(run(folder, cases, _ROOM))
+    after, left = contents(folder), scraps(folder)
+    said = [message.replace(str(folder), "…") for _, message in full.results.values()]
+    mended = site.runner(folder).run(cases)
     return drilled(
         "full disk",
-        message.replace(str(site.folder), "…"),
+        said[0] if said else full.said,
         expected="cannot be written (File too large)",
-        others=[runs[BEFORE[0]]["status"] == "done"],
+        others=[result.status == "done" for result in mended.values()],
         before=before,
         after=after,
-        again=contents(out / "cases"),
-        missing=2,  # the truth at the other point, and the engine
+        again=contents(folder),
+        missing=1,
         problems={
-            f"the exit code was {full.code}": full.code != 3,
+            full.said: full.code != 0,
+            "some case did not say so": {status for status, _ in full.results.values()} != {"crashed"},
             f"{', '.join(left)} was left in the folder": bool(left),
         },
     )
@@ -59,12 +46,12 @@ def drill_full_disk(site: Site, sound: Path) -> Drilled:
 def drill_interrupt(site: Site, sound: Path) -> Drilled:
     """Ctrl-C while one engine hangs and the others have finished: to the whole group, as a terminal sends it."""
     out = site.folder / "interrupt"
-    shutil.copytree(sound, out)
+    shutil.copytree(sound, out / "cases")
     before = contents(out / "cases")
     claim = site.claim("interrupt", [BEFORE[0], BESIDE[0]], faulty="waits_for_ctrl_c")
-    process = command(*_compare(claim, out, "--jobs", "2"))
+    process = command("compare", claim, "--out", out, "--json", "--jobs", "2")
     begun = site.folder / "alive-waits_for_ctrl_c"
-    expected = len(before) + 2  # the truth at the other point, and the engine
+    expected = len(before) + 3  # the truth at both points, and the engine at the other
     wait_until(lambda: (begun.exists() and len(contents(out / "cases")) == expected) or process.poll() is not None)
     os.killpg(process.pid, signal.SIGINT)
     start = time.monotonic()
@@ -92,27 +79,22 @@ def drill_interrupt(site: Site, sound: Path) -> Drilled:
 
 
 def drill_two_runs(site: Site, sound: Path) -> Drilled:
-    """Two commands that make the same results anew in one folder, at once."""
-    out = site.folder / "two_runs"
-    shutil.copytree(sound, out)
-    claim = site.claim("two_runs", [BEFORE[0], *BESIDE])
-    both = [end(process) for process in [command(*_compare(claim, out, "--fresh", "--jobs", "1")) for _ in range(2)]]
-    after, left = contents(out / "cases"), scraps(out / "cases")
-    records = [json.loads(path.read_text(encoding="utf-8")) for path in (out / "cases").glob("[!.]*.json")]
-    site.runner(out / "cases").run([Case.from_dict(record["case"]) for record in records])
-    ends = [[(run["parameters"], run["verdict"]) for run in ended.runs] if ended.out else [] for ended in both]
-    codes = " and ".join(str(ended.code) for ended in both)
+    """Two programs that make the same results anew in one folder, at once."""
+    folder = site.folder / "two_runs"
+    shutil.copytree(sound, folder)
+    cases = [*site.sound_cases(), *(site.case("well", speed) for speed in BESIDE)]
+    both = [end(process) for process in [run(folder, cases) for _ in range(2)]]
+    after, left = contents(folder), scraps(folder)
+    site.runner(folder).run(cases)
+    same = both[0].results == both[1].results
     return drilled(
         "two runs in one folder",
-        f"they ended with the exit codes {codes}, and {'the same' if ends[0] == ends[1] else 'other'} verdicts",
-        expected="0 and 0, and the same verdicts",
-        others=[run["status"] == "done" for ended in both if ended.out for run in ended.runs],
+        f"{both[0].said} and {both[1].said}, {'the same' if same else 'other'} results",
+        expected="exit code 0 and exit code 0, the same results",
+        others=[status == "done" for ended in both for status, _ in ended.results.values()],
         before={},  # every result is made anew
         after=after,
-        again=contents(out / "cases"),
+        again=contents(folder),
         missing=0,
-        problems={
-            "something was said besides": any(ended.err for ended in both),
-            f"{', '.join(left)} was left in the folder": bool(left),
-        },
+        problems={f"{', '.join(left)} was left in the folder": bool(left)},
     )

@@ -12,8 +12,10 @@ from proofroll.drill.site import site
 
 # Faults wait rather than compute, so that two at once are no burden.
 _AT_ONCE = 2
-_OF_COMMANDS = (command_faults.drill_interrupt, command_faults.drill_full_disk, command_faults.drill_two_runs)
-_OF_PROCESSES = (
+_OTHERS = (
+    command_faults.drill_interrupt,
+    command_faults.drill_full_disk,
+    command_faults.drill_two_runs,
     process_faults.drill_killed,
     process_faults.drill_hung_up,
     process_faults.drill_pool,
@@ -28,13 +30,10 @@ def fault_drill(progress: Callable[[str], None] | None = None) -> list[Drilled]:
         progress: called with the name of each fault when it is over.
     """
     with site() as here, ThreadPoolExecutor(_AT_ONCE) as pool:
-        first = pool.submit(command_faults.prepare, here)
         sound = engine_faults.prepare(here)
-        compared = first.result()
         # The longest first.
         drills: list[Callable[[], Drilled]] = [
-            *(partial(drill, here, compared) for drill in _OF_COMMANDS),
-            *(partial(drill, here, sound) for drill in _OF_PROCESSES),
+            *(partial(drill, here, sound) for drill in _OTHERS),
             *(partial(engine_faults.drill_engine, here, sound, fault) for fault in engine_faults.ENGINE_FAULTS),
             *(partial(engine_faults.drill_damage, here, sound, name) for name in engine_faults.DAMAGES),
         ]
@@ -46,5 +45,4 @@ def fault_drill(progress: Callable[[str], None] | None = None) -> list[Drilled]:
             return row
 
         rows = list(pool.map(run, drills))
-    others = len(_OF_COMMANDS) + len(_OF_PROCESSES)
-    return rows[others:] + rows[:others]
+    return rows[len(_OTHERS) :] + rows[: len(_OTHERS)]

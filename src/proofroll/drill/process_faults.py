@@ -2,39 +2,20 @@
 
 from __future__ import annotations
 
-import dataclasses
-import json
 import os
 import shutil
 import signal
-import subprocess
 from collections.abc import Mapping
 from pathlib import Path
 
 from proofroll.case import Case
-from proofroll.drill.processes import alive, command, end, start, wait_until
+from proofroll.drill.processes import alive, command, end, run, start, wait_until
 from proofroll.drill.row import Drilled, drilled
 from proofroll.drill.site import BEFORE, SCENE, Site, contents
 from proofroll.memory import descendants
 
 # How long the processes of a pool may take to end [s].
 _GONE = 10.0
-# Makes a case anew. Where there is a limit on the size of a file it is the parent's alone: its worker was there before.
-_RUN = """
-import json, resource, signal, sys
-from pathlib import Path
-from proofroll.case import Case
-from proofroll.process import Worker
-from proofroll.runner import Runner
-from proofroll.store import Store
-
-runner = Runner(Store(Path(sys.argv[1])), jobs=1, fresh=True)
-if room := int(sys.argv[3]):
-    runner.workers.keep("drill", Worker())
-    signal.signal(signal.SIGXFSZ, signal.SIG_DFL)
-    resource.setrlimit(resource.RLIMIT_FSIZE, (room, room))
-runner.run([Case.from_dict(json.loads(sys.argv[2]))])
-"""
 # Two processes compute for longer than they are left alone.
 _MAP = """
 from proofroll.scene_file import load_scene
@@ -44,10 +25,6 @@ if __name__ == "__main__":
     frictions = [0.1 + 1e-4 * index for index in range(9000)]
     regime_map(load_scene("sphere_in_cylinder"), [3.0, 4.0], frictions, until=20.0, workers=2)
 """
-
-
-def _run(folder: Path, case: Case, room: int = 0) -> subprocess.Popen[str]:
-    return start("-c", _RUN, folder, json.dumps(dataclasses.asdict(case)), str(room))
 
 
 def _judged(
@@ -77,7 +54,7 @@ def drill_storing(site: Site, sound: Path) -> Drilled:
     shutil.copytree(sound, folder)
     case = site.case("well", BEFORE[0])
     half = (folder / f"{case.key}.json").stat().st_size // 2
-    said = end(_run(folder, case, half)).said
+    said = end(run(folder, [case], half, alone=True)).said
     return _judged(site, "dies while it stores", folder, case, said, "was killed by SIGXFSZ", {})
 
 
@@ -97,7 +74,7 @@ def _ended_by(sent: signal.Signals, site: Site, sound: Path, name: str, formulat
     shutil.copytree(sound, folder)
     case = site.case(formulation, BEFORE[0])
     if sent is signal.SIGKILL:
-        process = _run(folder, case)
+        process = run(folder, [case])
     else:
         process = command("run", SCENE, "--engine", f"drill[formulation={formulation}]")
     begun = wait_until((site.folder / f"alive-{formulation}").exists)
@@ -118,7 +95,7 @@ def drill_pool(site: Site, sound: Path) -> Drilled:
     begun = wait_until(lambda: len(descendants(process.pid)) > 2 or process.poll() is not None)
     pool = descendants(process.pid)
     process.kill()
-    said = end(process).said
+    said = end(process).said.partition(":")[0]  # Python may go on about what its processes shared
     ended = wait_until(lambda: not any(map(alive, pool)), _GONE)
     for number in filter(alive, pool):
         os.kill(number, signal.SIGKILL)

@@ -3,29 +3,48 @@
 from __future__ import annotations
 
 import contextlib
+import dataclasses
 import json
 import os
 import signal
 import subprocess
 import sys
 import time
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any
+
+from proofroll.case import Case
 
 # No process of the drill takes this long on any machine [s].
 LIMIT = 120.0
-# A shell's job may have been told to ignore Ctrl-C and the end of its terminal; and whoever may write everywhere still
-# meets the limit on the size of a file.
+# A shell's job may have been told to ignore Ctrl-C and the end of its terminal.
 _COMMAND = """
-import resource, signal, sys
+import signal
 signal.signal(signal.SIGINT, signal.default_int_handler)
 signal.signal(signal.SIGHUP, signal.SIG_DFL)
-if room := int(sys.argv.pop(1)):
-    resource.setrlimit(resource.RLIMIT_FSIZE, (room, resource.RLIM_INFINITY))
 from proofroll.__main__ import main
 main()
+"""
+# Makes cases anew and says how each ended. The size of a file may be limited for this process alone, whose worker was
+# there before and which a larger file ends, or for its workers too, where writing one fails.
+_CASES = """
+import json, resource, signal, sys
+from pathlib import Path
+from proofroll.case import Case
+from proofroll.process import Worker
+from proofroll.runner import Runner
+from proofroll.store import Store
+
+folder, cases, room, alone = json.loads(sys.argv[1])
+runner = Runner(Store(Path(folder)), jobs=1, fresh=True)
+if alone:
+    runner.workers.keep(cases[0]["engine"]["name"], Worker())
+    signal.signal(signal.SIGXFSZ, signal.SIG_DFL)
+if room:
+    resource.setrlimit(resource.RLIMIT_FSIZE, (room, resource.RLIM_INFINITY))
+results = runner.run([Case.from_dict(case) for case in cases])
+print(json.dumps({key: [result.status, result.message] for key, result in results.items()}))
 """
 
 
@@ -38,10 +57,9 @@ class Ended:
     err: str
 
     @property
-    def runs(self) -> list[dict[str, Any]]:
-        """The runs of a comparison."""
-        found: list[dict[str, Any]] = json.loads(self.out)["runs"]
-        return found
+    def results(self) -> dict[str, tuple[str, str]]:
+        """Status and message of the cases that were made, by key."""
+        return {key: tuple(result) for key, result in json.loads(self.out or "{}").items()}
 
     @property
     def said(self) -> str:
@@ -61,9 +79,22 @@ def start(*arguments: str | Path) -> subprocess.Popen[str]:
     )
 
 
-def command(*arguments: str | Path, room: int = 0) -> subprocess.Popen[str]:
-    """The command ``proofroll``, which may write no file of more than ``room`` bytes (0: as it likes)."""
-    return start("-c", _COMMAND, str(room), *arguments)
+def command(*arguments: str | Path) -> subprocess.Popen[str]:
+    """The command ``proofroll``."""
+    return start("-c", _COMMAND, *arguments)
+
+
+def run(store: Path, cases: Sequence[Case], room: int = 0, alone: bool = False) -> subprocess.Popen[str]:
+    """Makes cases anew, one after another.
+
+    Args:
+        store: folder of the results.
+        cases: which.
+        room: largest size of a file [bytes]; 0: as one likes.
+        alone: whether that holds for the process itself, not for its workers, and ends it.
+    """
+    asked = [str(store), [dataclasses.asdict(case) for case in cases], room, alone]
+    return start("-c", _CASES, json.dumps(asked))
 
 
 def end(process: subprocess.Popen[str]) -> Ended:

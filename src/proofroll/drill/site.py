@@ -33,7 +33,7 @@ _UNTIL, _EVERY = 0.1, 0.05
 HANG = 1.5
 _LIMIT = 60.0
 # Enough for any engine of the drill, start-up included, and little enough that no machine suffers [GB].
-MEMORY = 0.6
+MEMORY = 0.5
 # How long a process that was ended may take to be gone [s].
 _GONE = 5.0
 
