@@ -16,14 +16,19 @@ from proofroll.memory import descendants
 
 # How long the processes of a pool may take to end [s].
 _GONE = 10.0
-# Two processes compute for longer than they are left alone.
+# Two processes compute for longer than they are left alone, and the first result of theirs is told.
 _MAP = """
+import sys
+from pathlib import Path
 from proofroll.scene_file import load_scene
 from proofroll.truth.regimes import regime_map
 
+def tell(_):
+    Path(sys.argv[1]).touch()
+
 if __name__ == "__main__":
-    frictions = [0.1 + 1e-4 * index for index in range(9000)]
-    regime_map(load_scene("sphere_in_cylinder"), [3.0, 4.0], frictions, until=20.0, workers=2)
+    speeds = [2.0 + 1e-3 * index for index in range(5000)]
+    regime_map(load_scene("sphere_in_cylinder"), speeds, [0.2, 0.3], until=4.0, workers=2, progress=tell)
 """
 
 
@@ -90,15 +95,15 @@ def drill_pool(site: Site, sound: Path) -> Drilled:
     shutil.copytree(sound, folder)
     script = site.folder / "pool.py"  # a program whose processes are spawned must be a file
     script.write_text(_MAP, encoding="utf-8")
-    process = start(script)
-    # Two that compute, and one in which Python keeps account of what they share.
-    begun = wait_until(lambda: len(descendants(process.pid)) > 2 or process.poll() is not None)
+    begun = site.folder / "pool-has-begun"
+    process = start(script, begun)
+    wait_until(lambda: begun.exists() or process.poll() is not None)
     pool = descendants(process.pid)
     process.kill()
-    said = end(process).said.partition(":")[0]  # Python may go on about what its processes shared
     ended = wait_until(lambda: not any(map(alive, pool)), _GONE)
     for number in filter(alive, pool):
         os.kill(number, signal.SIGKILL)
-    problems = {"the pool did not begin": not (begun and pool), "a process of the pool lives on": not ended}
+    said = end(process).said.partition(":")[0]  # Python may go on about what its processes shared
+    problems = {"the pool did not begin": not (begun.exists() and pool), "a process of the pool lives on": not ended}
     case = site.case("well", BEFORE[0])
     return _judged(site, "is killed with its pool", folder, case, said, "was killed by SIGKILL", problems)
