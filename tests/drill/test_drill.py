@@ -144,11 +144,12 @@ def test_table_for_a_person() -> None:
 
 def test_a_site_leaves_nothing(monkeypatch: pytest.MonkeyPatch) -> None:
     """After a drill its folder is gone, the path is as it was and its engine is unheard of."""
-    monkeypatch.setenv("PYTHONPATH", "somewhere")
-    before = dict(os.environ)
+    monkeypatch.setenv("PYTHONPATH", os.pathsep.join(filter(None, ["somewhere", os.environ.get("PYTHONPATH")])))
+    before, path = dict(os.environ), list(sys.path)
     with site() as here:
         assert here.folder.is_dir()
         assert here.facts["hangs"].settings["formulation"] == "hangs"
         assert dict(os.environ) != before
     assert not here.folder.exists()
     assert dict(os.environ) == before
+    assert sys.path == path

@@ -1,0 +1,25 @@
+"""What is refused of a comparison before anything of it runs."""
+
+from __future__ import annotations
+
+import dataclasses
+
+import pytest
+
+from proofroll.comparison import Row
+from proofroll.comparison_file import load_comparison
+from proofroll.errors import InputError
+from proofroll.studies import planning
+
+
+def test_a_wrong_setting_is_found_before_anything_runs(monkeypatch: pytest.MonkeyPatch) -> None:
+    """A setting that does not exist is told with file and row, before the truth looks for the edge of a stair."""
+
+    def ran(*_: object) -> None:
+        raise AssertionError("the truth was run first")
+
+    monkeypatch.setattr(planning, "settled", ran)
+    comparison = load_comparison("stick_slip")
+    rows = [Row("projection", comparison.rows[0].tolerance), Row("projection[step=1]", comparison.rows[0].tolerance)]
+    with pytest.raises(InputError, match=r"stick_slip\.toml: rows\.1\.engine = 'projection\[step=1\]'.*no such setting"):
+        planning.plan(dataclasses.replace(comparison, rows=rows))
