@@ -155,5 +155,8 @@ def read(path: Path) -> xr.Dataset:
     import xarray as xr
 
     # Times stay numbers of seconds, and no number stands for an absent one.
-    found = xr.load_dataset(io.BytesIO(content(path)), engine="scipy", decode_times=False, mask_and_scale=False)
+    try:
+        found = xr.load_dataset(io.BytesIO(content(path)), engine="scipy", decode_times=False, mask_and_scale=False)
+    except TypeError:
+        raise ValueError(f"{path} is no netCDF-3") from None
     return found.assign({name: item.astype(str) for name, item in found.variables.items() if item.dtype == object})

@@ -1,7 +1,7 @@
 """The process in which engines run: one request a line on standard input, one answer a line on a private pipe.
 
-``python -m proofroll.worker FD PARENT`` serves requests until its input ends. What an engine prints cannot reach the
-answers, and what an engine breaks costs only this process.
+``python -m proofroll.worker FD PARENT LIFE`` serves requests until its input ends. What an engine prints cannot reach
+the answers, and what an engine breaks costs only this process.
 """
 
 from __future__ import annotations
@@ -17,15 +17,16 @@ from typing import Any
 from proofroll.case import Case
 from proofroll.case_run import run
 from proofroll.clean_runs import time_once
-from proofroll.ending import end_with
+from proofroll.ending import end_with, end_with_pipe
 from proofroll.errors import Diverged, InputError, Missing, ProofrollError, Refused
 from proofroll.identity import describe, resolve
 from proofroll.memory import volunteer
 
 
-def main(answers: int, parent: int) -> None:
-    """Serves requests; ``answers`` is the file descriptor for the answers, ``parent`` the process that asks."""
+def main(answers: int, parent: int, life: int) -> None:
+    """Serves requests; ``answers`` is the pipe for the answers, ``life`` one that ``parent``, who asks, holds open."""
     end_with(parent)
+    end_with_pipe(life)
     signal.signal(signal.SIGINT, signal.SIG_DFL)  # an engine that catches it would take it for its own failure
     volunteer()
     requests = os.fdopen(os.dup(0), encoding="utf-8")
@@ -101,4 +102,4 @@ def one_line(error: BaseException) -> str:
 
 
 if __name__ == "__main__":
-    main(int(sys.argv[1]), int(sys.argv[2]))
+    main(*map(int, sys.argv[1:4]))

@@ -30,7 +30,8 @@ TRIED = {
     "tampered trajectory", "interrupt (Ctrl-C)", "full disk", "two runs in one folder", "is sent Ctrl-C",
     "calls a lack of memory divergence", "calls a file that is lacking a refusal", "commands the terminal",
     "another's result", "deeply nested record", "pipe for a record", "pipe for a trajectory", "device for a record",
-    "device for a trajectory", "folder for a record", "folder for a trajectory", "is killed", "is hung up",
+    "device for a trajectory", "folder for a record", "folder for a trajectory", "is killed",
+    "is killed during C code", "is hung up",
     "is killed with its pool", "dies while it stores",
 }  # fmt: skip
 

@@ -37,16 +37,34 @@ subprocess.Popen([sys.executable, "-c", "import time; time.sleep(600)"], start_n
 Path(sys.argv[1]).touch()
 time.sleep(600)
 """
+PIPED = """
+import ctypes, os, subprocess, sys
+from pathlib import Path
+from proofroll.ending import end_with_pipe
+
+end_with_pipe(int(sys.argv[2]))
+subprocess.Popen([sys.executable, "-c", "import time; time.sleep(600)"])
+Path(sys.argv[1]).touch()
+ctypes.PyDLL(None).sleep(600)
+"""
+HOLDER = """
+import os, subprocess, sys
+life, held = os.pipe()
+subprocess.run([sys.executable, *sys.argv[1:], str(life)], pass_fds=[life], start_new_session=True)
+"""
 PARENT = "import subprocess, sys; subprocess.run([sys.executable, *sys.argv[1:]])"
 
 
-@pytest.mark.parametrize("code", [POOL, CHILD], ids=["a pool", "a process with a child of its own"])
-def test_nothing_outlives_a_parent_that_is_killed(tmp_path: Path, code: str) -> None:
+@pytest.mark.parametrize(
+    ("code", "before"),
+    [(POOL, []), (CHILD, ["-c", PARENT]), (PIPED, ["-c", HOLDER])],
+    ids=["a pool", "a process with a child of its own", "a process in which no thread can run, and its child"],
+)
+def test_nothing_outlives_a_parent_that_is_killed(tmp_path: Path, code: str, before: list[str]) -> None:
     """When the parent is killed its processes, and what they started, end, and before that they do not."""
     script, begun = tmp_path / "script.py", tmp_path / "begun"
     script.write_text(code)
-    arguments = [str(script), str(begun)] if code is POOL else ["-c", PARENT, str(script), str(begun)]
-    parent = subprocess.Popen([sys.executable, *arguments], stderr=subprocess.DEVNULL)
+    parent = subprocess.Popen([sys.executable, *before, str(script), str(begun)], stderr=subprocess.DEVNULL)
     try:
         assert wait_until(begun.exists, 60)
         time.sleep(0.6)

@@ -39,6 +39,11 @@ def _hangs() -> None:
     time.sleep(_FOREVER)
 
 
+def _hangs_in_c() -> None:
+    """No thread of Python runs meanwhile, as in many a solver."""
+    ctypes.PyDLL(None).sleep(int(_FOREVER))
+
+
 def _allocates() -> None:
     hoard = []
     while True:
@@ -150,6 +155,7 @@ DEEDS: Mapping[str, tuple[str, Callable[[], None]]] = {
     "no_file": ("build", _no_file),
     "commands": ("advance", _commands),
     "waits_for_its_parent": ("advance", _hangs),
+    "computes_without_its_parent": ("advance", _hangs_in_c),
     "waits_for_its_terminal": ("advance", _hangs),
 }
 

@@ -17,6 +17,7 @@ _OTHERS = (
     command_faults.drill_full_disk,
     command_faults.drill_two_runs,
     process_faults.drill_killed,
+    process_faults.drill_killed_in_c,
     process_faults.drill_hung_up,
     process_faults.drill_pool,
     process_faults.drill_storing,

@@ -68,6 +68,12 @@ def drill_killed(site: Site, sound: Path) -> Drilled:
     return _ended_by(signal.SIGKILL, site, sound, "is killed", "waits_for_its_parent", "was killed by SIGKILL")
 
 
+def drill_killed_in_c(site: Site, sound: Path) -> Drilled:
+    """Likewise, while no thread of Python can run in the process of the engine."""
+    name, formulation = "is killed during C code", "computes_without_its_parent"
+    return _ended_by(signal.SIGKILL, site, sound, name, formulation, "was killed by SIGKILL")
+
+
 def drill_hung_up(site: Site, sound: Path) -> Drilled:
     """The terminal of a command is closed while the engine hangs."""
     expected = "exit code 130: proofroll: interrupted"

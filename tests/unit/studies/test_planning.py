@@ -20,6 +20,7 @@ def test_a_wrong_setting_is_found_before_anything_runs(monkeypatch: pytest.Monke
 
     monkeypatch.setattr(planning, "settled", ran)
     comparison = load_comparison("stick_slip")
-    rows = [Row("projection", comparison.rows[0].tolerance), Row("projection[step=1]", comparison.rows[0].tolerance)]
-    with pytest.raises(InputError, match=r"stick_slip\.toml: rows\.1\.engine = 'projection\[step=1\]'.*no such setting"):
+    rows = [Row(engine, comparison.rows[0].tolerance) for engine in ("projection", "projection[step=1]")]
+    said = r"stick_slip\.toml: rows\.1\.engine = 'projection\[step=1\]'.*no such setting"
+    with pytest.raises(InputError, match=said):
         planning.plan(dataclasses.replace(comparison, rows=rows))
