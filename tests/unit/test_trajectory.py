@@ -13,7 +13,7 @@ from proofroll.engine import Sample
 from proofroll.errors import ProofrollError
 from proofroll.scene import Scene
 from proofroll.scene_file import load_scene
-from proofroll.trajectory import from_samples, read, trajectory, write
+from proofroll.trajectory import from_samples, read, read_some, trajectory, write
 from proofroll.truth import truth
 
 
@@ -177,3 +177,23 @@ def test_every_number_comes_back(tmp_path: Path) -> None:
     assert found["x"].to_numpy().tobytes() == values.tobytes()
     assert found["sticking"].dtype == bool
     xr.testing.assert_identical(found, dataset)
+
+
+def test_some_variables_are_read_as_all_are(tmp_path: Path) -> None:
+    """A part of a file is what the whole has there, texts too; what the file has not is left out."""
+    dataset = truth(load_scene("sphere_in_cylinder", mu_static=0.15), np.linspace(0, 0.5, 11))
+    write(dataset, tmp_path / "x.nc")
+    found = read_some(tmp_path / "x.nc", ["p_WB", "event_kind", "event_time", "absent"])
+    assert found.keys() == {"p_WB", "event_kind", "event_time"}
+    for name, values in found.items():
+        assert values.tolist() == dataset[name].to_numpy().tolist()
+        assert values.dtype.isnative
+    write(dataset.isel(event=slice(0, 0)), tmp_path / "y.nc")
+    assert read_some(tmp_path / "y.nc", ["event_kind"])["event_kind"].tolist() == []
+
+
+def test_another_file_is_no_trajectory(tmp_path: Path) -> None:
+    """What is no netCDF-3 says so in a line."""
+    (tmp_path / "x.nc").write_bytes(b"something else")
+    with pytest.raises(ValueError, match="is no netCDF-3"):
+        read(tmp_path / "x.nc")

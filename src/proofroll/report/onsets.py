@@ -8,8 +8,8 @@ from typing import TYPE_CHECKING, Any
 
 from proofroll.events import Event, events_of
 from proofroll.plain import plain
-from proofroll.report.plots import stored
 from proofroll.studies.onset import onset_verdict as judged_onset
+from proofroll.trajectory import read_some
 from proofroll.truth.onset import Onset
 
 if TYPE_CHECKING:
@@ -90,9 +90,8 @@ def first_slip(events: list[dict[str, Any]]) -> dict[str, Any] | None:
 
 def _events(path: Path) -> list[Event]:
     """The events of a stored trajectory, without the rest of it."""
-    columns = stored(path, [f"event_{name}" for name in ("kind", "time", "low", "high")])
+    columns = read_some(path, [f"event_{name}" for name in ("kind", "time", "low", "high")])
     if not columns:
         return []
     kinds, *times = (values.tolist() for values in columns.values())
-    words = [kind.decode() if isinstance(kind, bytes) else kind for kind in kinds]
-    return [Event(*row) for row in zip(words, *times, strict=True)]
+    return [Event(*row) for row in zip(kinds, *times, strict=True)]

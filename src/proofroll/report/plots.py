@@ -14,11 +14,9 @@ from proofroll.scene_file import load_scene
 from proofroll.studies.compare import Outcome, Run
 from proofroll.studies.planning import point_name
 from proofroll.surfaces import FloatArray
-from proofroll.trajectory import read
+from proofroll.trajectory import read, read_some
 
 if TYPE_CHECKING:
-    from pathlib import Path
-
     import xarray as xr
 
     from proofroll.store import Store
@@ -84,15 +82,6 @@ def kept(curves: list[FloatArray], most: int = MOST_POINTS) -> np.typing.NDArray
     return np.unique(np.concatenate([M4Downsampler().downsample(np.ascontiguousarray(c), n_out=most) for c in curves]))
 
 
-def stored(path: Path, names: list[str]) -> dict[str, np.typing.NDArray[Any]]:
-    """Some variables of a trajectory: a tenth of the time that reading it whole takes."""
-    from scipy.io import netcdf_file
-
-    with netcdf_file(path, mmap=False) as file:
-        found = {name: file.variables[name][...] for name in names if name in file.variables}
-    return {name: values.astype(values.dtype.newbyteorder("=")) for name, values in found.items()}
-
-
 def _engines(outcome: Outcome, store: Store, point: str, drawn: list[str]) -> list[tuple[int, Run, Curves]]:
     """Row number, run and curves of every run at a point that has a trajectory."""
     numbers: dict[int, int] = {}
@@ -101,7 +90,7 @@ def _engines(outcome: Outcome, store: Store, point: str, drawn: list[str]) -> li
         number = numbers.setdefault(id(run.row), len(numbers))
         if point_name(run.parameters) == point and _has_trajectory(run, store):
             assert run.case is not None  # it has a trajectory
-            found.append((number, run, stored(store.trajectory(run.case), drawn)))
+            found.append((number, run, read_some(store.trajectory(run.case), drawn)))
     return found
 
 

@@ -12,7 +12,6 @@ from proofroll.case import Case, Status
 from proofroll.plain import plain
 from proofroll.report.content import by_row, outcome_content
 from proofroll.report.labels import names, symbol, unit
-from proofroll.report.plots import stored
 from proofroll.report.replay_library import packed, thinned, three
 from proofroll.report.replay_poses import NEEDED, Poses, Sampled, frame_times, poses
 from proofroll.report.replay_wall import middle, wall
@@ -23,6 +22,7 @@ from proofroll.store import Store
 from proofroll.studies.compare import Outcome, Run
 from proofroll.studies.planning import point_name
 from proofroll.surfaces import FloatArray
+from proofroll.trajectory import read_some
 
 # What the numbers of the picture are rounded to, powers of two: 8e-6 m, 6e-5 of a quaternion, 1e-3 N. None is seen.
 LENGTH, TURN, FORCE = 2.0**-17, 2.0**-14, 2.0**-10
@@ -101,7 +101,7 @@ def _case(
     scene = load_scene(case.scene, **case.parameters)
     body = scene.rolling
     coordinates = body.surface.coordinates
-    sampled = stored(store.trajectory(case), [*NEEDED, *coordinates])
+    sampled = read_some(store.trajectory(case), [*NEEDED, *coordinates])
     # The comparison that has most to show at this point names the case.
     title = max(shared, key=lambda pair: len(_runs(pair[0], pair[1], store)))[0].comparison.title
     ghosts = _chosen(
@@ -116,7 +116,7 @@ def _case(
     times = frame_times(sampled)
     true = poses(body, sampled, times, integrate=True)
     drawn = [
-        _reachable(poses(body, stored(_file(ghost.run, store), list(NEEDED)), times), true, body) for ghost in ghosts
+        _reachable(poses(body, read_some(_file(ghost.run, store), list(NEEDED)), times), true, body) for ghost in ghosts
     ]
     u = np.stack([np.interp(times, sampled["time"], sampled[name]) for name in coordinates], axis=1)
     built = wall(body, u)
@@ -192,7 +192,7 @@ def _looks(outcome: Outcome) -> list[tuple[str, int]]:
 def _ghosts(runs: list[tuple[int, Run]], looks: list[tuple[str, int]], true: FloatArray, store: Store) -> list[_Ghost]:
     ghosts = []
     for number, run in runs:
-        path = stored(_file(run, store), ["p_WB"])["p_WB"]
+        path = read_some(_file(run, store), ["p_WB"])["p_WB"]
         count = min(len(path), len(true))  # a run that ended early has fewer samples
         distance = float(np.linalg.norm(path[:count] - true[:count], axis=1).max())
         ghosts.append(_Ghost(run, *looks[number], distance))
