@@ -112,6 +112,7 @@ class SpringKind:
 
     name: ClassVar[str] = "spring"
     tables: ClassVar[tuple[str, ...]] = ("masses",)
+    units: ClassVar[Mapping[str, str]] = {"mass": "kg", "stiffness": "N/m", "x0": "m"}
 
     @staticmethod
     def read(tables: Mapping[str, Any], gravity: Gravity, where: str) -> Sequence[Spring]:

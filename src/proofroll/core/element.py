@@ -271,10 +271,12 @@ class ElementKind(Protocol):
     Attributes:
         name: of the entry point.
         tables: names of the tables of a scene file that it reads.
+        units: unit of each number in them, by its key.
     """
 
     name: ClassVar[str]
     tables: ClassVar[tuple[str, ...]]
+    units: ClassVar[Mapping[str, str]]
 
     @staticmethod
     def read(tables: Mapping[str, Any], gravity: Gravity, where: str) -> Sequence[Element]:

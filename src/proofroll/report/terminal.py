@@ -5,11 +5,11 @@ from __future__ import annotations
 from collections.abc import Sequence
 from typing import TYPE_CHECKING, Any
 
-from rich.console import Console
 from rich.table import Table
 from rich.text import Text
 
 from proofroll.report.labels import SYMBOLS, caveat_lines, headlines, names, verdict_text
+from proofroll.report.screen import Screen
 
 if TYPE_CHECKING:
     from proofroll.drill.row import Drilled
@@ -29,9 +29,9 @@ _STYLES = {
 }
 
 
-def console() -> Console:
+def console() -> Screen:
     """The console for data, on standard output; never wider than 100 columns."""
-    out = Console(highlight=False)
+    out = Screen(highlight=False)
     out.width = min(out.width, WIDTH) if out.is_terminal else WIDTH
     return out
 

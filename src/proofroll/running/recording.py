@@ -13,7 +13,7 @@ import numpy as np
 from proofroll.core.arrays import FloatArray
 from proofroll.core.dataset import from_samples
 from proofroll.core.engine import LocatesEvents, Sample, TellsRemarks
-from proofroll.core.errors import Diverged, InputError
+from proofroll.core.errors import Diverged, InputError, lack_behind
 from proofroll.core.events import between_samples, with_events
 from proofroll.core.scene import Scene
 
@@ -122,6 +122,8 @@ def record(engine: Any, scene: Scene, times: FloatArray, probes: Iterable[float]
             inside += time.process_time() - before
             sample = _finite(engine.sample(), t)
         except Diverged as error:
+            if lack_behind(error):
+                raise
             failure = str(error)
             break
         if t in off:

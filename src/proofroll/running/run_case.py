@@ -4,16 +4,15 @@ from __future__ import annotations
 
 import dataclasses
 import gc
-import json
-import platform
 import statistics
 import time
 from pathlib import Path
 from typing import Any
 
-import proofroll
-from proofroll.core.errors import Diverged, Refused
+from proofroll.core.errors import Diverged, ProofrollError, Refused, lack_behind
 from proofroll.running.case import Case, Result, Status
+from proofroll.running.manifest import manifest
+from proofroll.running.manifest import versions as made_with
 from proofroll.running.time_accounts import Spent
 from proofroll.running.time_case import clean_runs
 
@@ -39,8 +38,7 @@ def _run(case: Case, out: Path, spent: Spent) -> Result:
     from proofroll.files.scene_file import load_scene
     from proofroll.running.recording import off_grid, record, time_grid
 
-    versions = {case.engine.name: case.engine.version, "proofroll": proofroll.__version__}
-    versions["python"] = platform.python_version()
+    versions = made_with(case.engine.name, case.engine.version)
     scene = load_scene(case.scene, asks=case.asks, **case.parameters)
     times = time_grid(case.until, case.every)
     if case.engine.name == "truth":
@@ -64,10 +62,8 @@ def _run(case: Case, out: Path, spent: Spent) -> Result:
         recording = record(engine, scene, times, off_grid(times, fixed_step(settings)))
         spent.on("trajectory", advance=recording.advancing, sampling=recording.sampling)
         del engine
-    except Refused as error:
-        return Result(Status.REFUSED, str(error), versions=versions)
-    except Diverged as error:
-        return Result(Status.DIVERGED, str(error), versions=versions)
+    except (Refused, Diverged) as error:
+        return _answer(error, versions)
     timings: list[float] = []
     if recording.failure is None and case.timed and case.until > 0:
         timings, inside = clean_runs(kind, scene, settings, times)
@@ -82,13 +78,23 @@ def _run(case: Case, out: Path, spent: Spent) -> Result:
         versions=versions,
         trajectory=out.name,
     )
-    manifest = {"status": result.status.value, "message": result.message, "wall_seconds": result.wall_seconds}
-    manifest |= {"engine": case.engine.name, "settings": json.dumps(case.engine.settings, sort_keys=True)}
-    manifest |= {"parameters": json.dumps(dict(scene.parameters)), "versions": json.dumps(versions)}
-    manifest |= {"machine": f"{platform.machine()} {platform.system()}"}
-    write(recording.dataset.assign_attrs(manifest), out)
+    said = {"status": result.status.value, "message": result.message, "wall_seconds": result.wall_seconds}
+    said |= manifest(case.engine.name, case.engine.settings, scene, versions)
+    write(recording.dataset.assign_attrs(said), out)
     spent.on("writing")
     return result
+
+
+def _answer(error: Refused | Diverged, versions: dict[str, str]) -> Result:
+    """What an engine answers, unless the machine made it say so: then there is no answer.
+
+    Raises:
+        ProofrollError: memory, a file or time was lacking.
+    """
+    if lack := lack_behind(error):
+        raise ProofrollError(f"{error} ({type(lack).__name__})")
+    status = Status.REFUSED if isinstance(error, Refused) else Status.DIVERGED
+    return Result(status, str(error), versions=versions)
 
 
 def _run_truth(case: Case, scene: Any, times: Any, out: Path, versions: dict[str, str]) -> Result:
@@ -98,11 +104,10 @@ def _run_truth(case: Case, scene: Any, times: Any, out: Path, versions: dict[str
     start = time.perf_counter()
     try:
         dataset = truth(scene, times)
-    except Refused as error:
-        return Result(Status.REFUSED, str(error), versions=versions)
-    except Diverged as error:
-        return Result(Status.DIVERGED, str(error), versions=versions)
+    except (Refused, Diverged) as error:
+        return _answer(error, versions)
     wall = time.perf_counter() - start
     message = f"{dataset.attrs['route']}, checked by {dataset.attrs['second_route']}"
-    write(dataset.assign_attrs(status="done", message=message, engine="truth", wall_seconds=wall), out)
+    said = {"status": "done", "message": message, "wall_seconds": wall}
+    write(dataset.assign_attrs(said | manifest("truth", {}, scene, versions)), out)
     return Result(Status.DONE, message, wall_seconds=wall, versions=versions, trajectory=out.name)

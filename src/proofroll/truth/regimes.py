@@ -17,6 +17,7 @@ from proofroll.core.scene import Scene
 from proofroll.elements.ball_on_surface.element import rolling_ball
 from proofroll.elements.ball_on_surface.model import RollingBall
 from proofroll.elements.ball_on_surface.surfaces import Cylinder
+from proofroll.running.ending import end_with_pool
 from proofroll.truth.stick_slip import first_route
 from proofroll.truth.switching import End, follow
 from proofroll.truth.variants import at_speed, with_contact
@@ -143,7 +144,7 @@ def _mapped(
         yield from map(row, speeds)
         return
     # Not forked: a parent that shows progress has threads, and a fork copies their locks as they are.
-    with ProcessPoolExecutor(workers, mp_context=get_context("spawn")) as pool:
+    with ProcessPoolExecutor(workers, get_context("spawn"), initializer=end_with_pool) as pool:
         signal.pthread_sigmask(signal.SIG_BLOCK, {signal.SIGINT})  # inherited: Ctrl-C is the parent's affair
         try:
             # Not map, which cancels the rest when interrupted: a pool whose processes are then ended complains.

@@ -414,7 +414,7 @@ CHANGES = {
     "gravity": ({"gravity": 1.1}, "gravity"),
     "f doubled": ({"rolling_resistance": 2.0}, "rolling resistance"),
     "f dropped": ({"rolling_resistance": 0.0}, "rolling resistance"),
-    "mu halved": ({"mu_static": 0.5, "mu_kinetic": 0.5}, "static friction"),
+    "mu halved": ({"mu_kinetic": 0.5, "mu_static": 0.5}, "static friction"),  # never above it in between
 }
 CHANGED_SCENES = {
     "cylinder": cylinder(rolling_resistance=RESISTANCE, axial_speed=0.3, radial_spin=5),

@@ -15,7 +15,7 @@ from proofroll.core.scene import Scene
 from proofroll.elements.ball_on_surface.element import BallOnSurface, changed
 from proofroll.elements.ball_on_surface.model import Ball, Contact, InitialMotion
 from proofroll.elements.ball_on_surface.surfaces import AnySurface
-from proofroll.files.validation import strict, validated
+from proofroll.files.validation import strict, units_of, validated
 
 
 @dataclass(frozen=True)
@@ -36,6 +36,7 @@ class BallOnSurfaceKind:
 
     name: ClassVar[str] = "ball_on_surface"
     tables: ClassVar[tuple[str, ...]] = ("balls", "surfaces", "contacts", "initial")
+    units: ClassVar[Mapping[str, str]] = units_of(Ball, Contact, InitialMotion, *AnySurface.__args__)
 
     @staticmethod
     def read(tables: Mapping[str, Any], gravity: Gravity, where: str) -> Sequence[BallOnSurface]:
@@ -113,3 +114,9 @@ def _check_names(found: BallTables, where: str) -> None:
                 named = getattr(item, key, None)
                 if named is not None and named not in known:
                     raise InputError(f"{where}: {kind}.{index}.{key}", named, f"choose one of {', '.join(known)}")
+    for index, contact in enumerate(found.contacts):
+        ball, wall = found.balls[balls.index(contact.body)], found.surfaces[surfaces.index(contact.surface)]
+        try:
+            wall.offset(ball.radius)
+        except InputError as error:
+            raise error.within(f"{where}: contacts.{index}", contact.body) from None
