@@ -19,7 +19,9 @@ from proofroll.truth.crossing import first_rise
 from proofroll.truth.switching import End, Leg
 
 _TOLERANCE = 1e-13  # of a step, relative to the scale of each variable
-_APPROACH = 0.6  # part of the time left until something stands still that one step may take
+_APPROACH = 0.5  # part of the time left until something stands still that one step may take, while it is far,
+_CLOSE = 0.99  # and when it is near, where the time left is well known
+_FURTHER = 1.2  # a polynomial is continued over this part of the length of its own step
 _STILL = 1e-9  # time left, relative to the pace of the motion, that is extrapolated
 
 
@@ -72,7 +74,7 @@ class Implicit:
             if left < _STILL * self._pace:
                 halted = walk.state + left * self._contact.rates(walk.state[None, :], True)[0]
                 return walk.leg(self, True, walk.time + left, self.nudged(halted, np.zeros(3)), End.HALT)
-            step, length = walk.step(min(length, _APPROACH * left))
+            step, length = walk.step(min(length, self._approach(left)))
             rise = first_rise(partial(self._excess_along, step), step.time, step.time + step.length)
             if rise is not None:
                 return walk.leg(self, True, rise, walk.cut(rise), End.CONE)
@@ -92,7 +94,7 @@ class Implicit:
                     break
                 return walk.leg(self, False, walk.time + left, still, End.STILL)
             guess = None if started else self._first_guess(state)
-            step, length = walk.step(min(length, _APPROACH * left), guess)
+            step, length = walk.step(min(length, self._approach(left)), guess)
             gone = first_rise(partial(self._pull_along, step), step.time, step.time + step.length)
             if gone is not None:
                 return walk.leg(self, False, gone, walk.cut(gone), End.LIFTOFF)
@@ -130,6 +132,10 @@ class Implicit:
         size = float(np.linalg.norm(v))
         slowing = -float(v @ v_rate) / size if size > 0 else 0.0
         return size / slowing if slowing > 0 else np.inf
+
+    def _approach(self, left: float) -> float:
+        """Longest step when so much time is left until something stands still [s]."""
+        return left * float(np.clip(1 - 2 * left / self._pace, _APPROACH, _CLOSE))
 
     def _first_guess(self, state: FloatArray) -> Callable[[float], FloatArray]:
         """States at the nodes of a first step: u = (G t + α t²/2) d, the rest along its tangent."""
@@ -179,18 +185,25 @@ class _Walk:
         # A spin or slip that has grown has round-off of its present size, below which no error can be told.
         sizes = [0.0, *np.linalg.norm(self.state[3:].reshape(2, 3), axis=-1)]
         system = replace(self._system, scale=np.maximum(self._system.scale, np.repeat(sizes, 3)))
+        guess = guess or self._continued
         while True:
             if self.time + length == self.time:
                 raise Diverged(f"the truth (implicit collocation) could not be integrated past {self.time:g} s")
-            step = take(system, self.time, self.state, length, (guess or self._continued)(length))
+            step = take(system, self.time, self.state, length, guess(length))
             wanted = next_length(step, _TOLERANCE)
             if step.error <= _TOLERANCE:
                 self.steps.append(step)
                 return step, wanted
-            length = min(wanted, 0.8 * length)
+            length, guess = min(wanted, 0.8 * length), self._tangent if self.steps else guess
 
     def _continued(self, length: float) -> FloatArray:
-        """Tangent at the end of the last step: safer for Newton's method than the continued polynomial."""
+        """The last step's polynomial, or where it would have to reach too far the tangent at its end."""
+        if not self.steps or length > _FURTHER * self.steps[-1].length:
+            return self._tangent(length)
+        return self.steps[-1](self.time + nodes(length))
+
+    def _tangent(self, length: float) -> FloatArray:
+        """Tangent at the end of the last step: a poorer guess for Newton's method than a polynomial, but safer."""
         rates = self._system.rates(self.state[None, :])[0]
         return np.asarray(self.state + nodes(length)[:, None] * rates)
 
