@@ -43,7 +43,7 @@ def _run(case: Case, out: Path, spent: Spent) -> Result:
     times = time_grid(case.until, case.every)
     if case.engine.name == "truth":
         spent.on("loading")
-        return _run_truth(case, scene, times, out, versions)
+        return _run_truth(scene, times, out, versions)
     kind = load_engine(case.engine.name)
     settings = resolve_settings(kind, case.engine.settings)
     spent.on("loading")
@@ -67,8 +67,8 @@ def _run(case: Case, out: Path, spent: Spent) -> Result:
     except Diverged as error:
         return Result(Status.DIVERGED, str(error), versions=versions)
     timings: list[float] = []
-    if recording.failure is None and case.timed and case.until > 0:
-        timings, inside = clean_runs(kind, scene, settings, times)
+    if recording.failure is None and case.timed and recording.dataset.sizes["time"] > 1:
+        timings, inside = clean_runs(kind, scene, settings, times[: recording.dataset.sizes["time"]])
         spent.on("building", clean_runs=inside)
     result = Result(
         status=Status.DONE if recording.failure is None else Status.DIVERGED,
@@ -89,21 +89,19 @@ def _run(case: Case, out: Path, spent: Spent) -> Result:
     return result
 
 
-def _run_truth(case: Case, scene: Any, times: Any, out: Path, versions: dict[str, str]) -> Result:
+def _run_truth(scene: Any, times: Any, out: Path, versions: dict[str, str]) -> Result:
     from proofroll.trajectory import write
     from proofroll.truth import truth
 
     start = time.perf_counter()
     try:
-        if case.asks:
-            raise Refused(f"the truth is that of the motion and gives no {', '.join(case.asks)}; ask an engine for it")
         dataset = truth(scene, times)
     except Refused as error:
         return Result(Status.REFUSED, str(error), versions=versions)
     except Diverged as error:
         return Result(Status.DIVERGED, str(error), versions=versions)
     wall = time.perf_counter() - start
-    message = f"{dataset.attrs['route']}, checked by {dataset.attrs['second_route']}"
+    message = dataset.attrs.get("ill_posed") or f"{dataset.attrs['route']}, checked by {dataset.attrs['second_route']}"
     if "sticking" in dataset:
         from proofroll.truth.onset import onset
 

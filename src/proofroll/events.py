@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Literal, get_args
@@ -11,7 +12,10 @@ import numpy as np
 if TYPE_CHECKING:
     import xarray as xr
 
-EventKind = Literal["slip", "stick", "liftoff"]
+EventKind = Literal["slip", "stick", "lift_off"]
+
+# How long a wall must not press before that is a flight [s]: soft and corrected contacts let a ball hop for less.
+_FLIGHT = 0.01
 
 
 @dataclass(frozen=True)
@@ -19,7 +23,7 @@ class Event:
     """One change of the contact.
 
     Attributes:
-        kind: ``slip`` begins, the ball ``stick``s again, or ``liftoff`` (the normal force reached zero).
+        kind: ``slip`` begins, the ball ``stick``s again, or ``lift_off`` (the normal force reached zero).
         time: best value [s].
         time_low, time_high: the event lies between these [s].
     """
@@ -54,6 +58,33 @@ def between_samples(times: Sequence[float], sticking: Sequence[bool]) -> list[Ev
         for before, after, low, high in zip(sticking, sticking[1:], times, times[1:], strict=False)
         if before != after
     ]
+
+
+def lift_off(times: Sequence[float], N: Sequence[float], faint: float) -> Event | None:
+    """When the ball leaves the wall as samples tell it, between two of them; None: it does not.
+
+    It has left where the wall would have to pull, or where for a hundredth of a second it does not press.
+
+    Args:
+        times: of the samples [s].
+        N: normal force there [N]; that at time 0, which several engines do not know, does not count.
+        faint: normal force that is round-off [N].
+    """
+    pressed = 0
+    for index in range(1, len(times)):
+        if not N[index] <= faint:  # also where nobody knows
+            pressed = index
+        elif N[index] < -faint or times[index] - times[pressed + 1] >= _FLIGHT * (1 - 1e-9):
+            low, high = times[pressed], times[pressed + 1]
+            before, after = N[pressed], N[pressed + 1]
+            part = before / (before - after) if after < 0 < before else 0.5
+            return Event("lift_off", low + part * (high - low), low, high)
+    return None
+
+
+def left_at(dataset: xr.Dataset) -> float:
+    """When the ball first leaves the wall [s]; inf: it does not."""
+    return min((event.time for event in events_of(dataset) if event.kind == "lift_off"), default=math.inf)
 
 
 def events_of(dataset: xr.Dataset) -> list[Event]:

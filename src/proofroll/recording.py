@@ -11,8 +11,9 @@ import numpy as np
 
 from proofroll.engine import LocatesEvents, Sample, TellsRemarks
 from proofroll.errors import Diverged, InputError
-from proofroll.events import between_samples, with_events
-from proofroll.scene import Capability, Scene
+from proofroll.events import Event, between_samples, lift_off, with_events
+from proofroll.mechanics import always_pressed, natural_acceleration, normal_force
+from proofroll.scene import Capability, RollingBall, Scene
 from proofroll.surfaces import FloatArray
 from proofroll.trajectory import from_samples
 
@@ -47,7 +48,8 @@ class Recording:
 
     Attributes:
         dataset: the trajectory up to the last finite sample.
-        failure: one sentence if it ended early, else None.
+        failure: one sentence if it failed early, else None.
+        ended: one sentence if it ended where the ball leaves the wall, for the model holds the ball there, else None.
         wall_seconds: spent inside ``advance`` [s].
         advancing, sampling: spent inside ``advance``, and inside ``sample`` and around it: wall and processor seconds
             [s].
@@ -60,10 +62,11 @@ class Recording:
     advancing: tuple[float, float] = (0.0, 0.0)
     sampling: tuple[float, float] = (0.0, 0.0)
     remarks: tuple[str, ...] = ()
+    ended: str | None = None
 
     def message(self, until: float) -> str:
         """One sentence: why it ended early, or that it reached ``until`` [s] and what is to be said about that."""
-        return self.failure or "; ".join([f"reached {until:g} s", *self.remarks])
+        return self.failure or self.ended or "; ".join([f"reached {until:g} s", *self.remarks])
 
 
 def record(engine: Any, scene: Scene, times: FloatArray) -> Recording:
@@ -73,6 +76,8 @@ def record(engine: Any, scene: Scene, times: FloatArray) -> Recording:
     samples = [_finite(engine.sample(), 0.0)]
     failure: str | None = None
     wall = 0.0
+    body = scene.rolling
+    leaves, faint = not always_pressed(body), _FAINT * body.ball.mass * natural_acceleration(body)
     for t in times[1:]:
         before, start = time.process_time(), time.perf_counter()
         try:
@@ -83,22 +88,44 @@ def record(engine: Any, scene: Scene, times: FloatArray) -> Recording:
         except Diverged as error:
             failure = str(error)
             break
+        if leaves and _normal_force(body, samples[-1]) < -faint:
+            break  # a wall that pulls: from here on the model is another one than the scene
     processor += time.process_time()
     sampling = time.perf_counter() - began - wall, processor - inside
     if Capability.BOUNDED_FRICTION in scene.requires and any(sample.sticking is None for sample in samples):
         failure = failure or "the engine does not say whether the ball sticks or slips"
     if Capability.ORIENTATION in scene.requires and any(sample.q_WB is None for sample in samples):
         failure = failure or "the engine does not give the ball's orientation"
+    events = list(engine.events()) if isinstance(engine, LocatesEvents) else []
+    left: Event | None = next((event for event in events if event.kind == "lift_off"), None)
+    ended = None
+    if leaves:
+        pressed = [_normal_force(body, sample) for sample in samples]
+        if left is None and (left := lift_off(times.tolist()[: len(samples)], pressed, faint)) is not None:
+            events.append(left)
+        if pressed[-1] < -faint and len(samples) > 1:
+            del samples[-1]
+        if left is not None and len(samples) < len(times):
+            ended = f"the ball leaves the wall at t = {left.time:.6g} s, where this run ends: the model does not let go"
+            failure = None
     dataset = from_samples(scene, times, samples)
     if "sticking" in dataset:
-        located = isinstance(engine, LocatesEvents)
         sticking = [bool(sample.sticking) for sample in samples]
-        events = engine.events() if located else between_samples(times.tolist(), sticking)
-        dataset = with_events(dataset, events)
+        found = events if isinstance(engine, LocatesEvents) else [*between_samples(times.tolist(), sticking), *events]
+        dataset = with_events(dataset, found)
+    elif leaves and left is not None:
+        dataset = with_events(dataset, [left])
     remarks = tuple(engine.remarks()) if isinstance(engine, TellsRemarks) else ()
-    return Recording(dataset, failure, wall, (wall, inside), sampling, remarks)
+    return Recording(dataset, failure, wall, (wall, inside), sampling, remarks, ended)
 
 
+def _normal_force(body: RollingBall, sample: Sample) -> float:
+    """N [N]; NaN where the engine gives no force."""
+    return math.nan if sample.force is None else float(normal_force(body, sample.p_WB, sample.force))
+
+
+# Normal force, relative to the natural one, that is round-off or what a solver's tolerance leaves.
+_FAINT = 1e-6
 _SAMPLED = ("p_WB", "v_WB", "w_WB", "q_WB", "force")
 _NOT_FINITE = "is not finite (NaN or overflow)"
 

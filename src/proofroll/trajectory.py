@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import io
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -104,8 +104,14 @@ def trajectory(
     return xr.Dataset(
         variables,
         coords={"time": ("time", times, {"units": "s"}), "xyz": ["x", "y", "z"], "wxyz": ["w", "x", "y", "z"]},
-        attrs={"scene": scene.name, "scene_digest": scene.digest},
+        attrs={"scene": scene.name, "scene_digest": scene.digest} | _smallest(variables),
     )
+
+
+def _smallest(variables: Mapping[str, tuple[tuple[str, ...], FloatArray, dict[str, str]]]) -> dict[str, float]:
+    """``smallest_N``, the least normal force at the samples [N], without time 0 (where several engines know none)."""
+    found = variables["N"][1] if "N" in variables else np.zeros(0)
+    return {"smallest_N": float(np.min(found[1:] if len(found) > 1 else found))} if len(found) else {}
 
 
 def _coordinate_rates(surface: Surface, p_WB: FloatArray, v_WB: FloatArray) -> FloatArray:

@@ -165,7 +165,7 @@ def judge(result: Result, dataset: xr.Dataset | None, yardstick: Yardstick) -> O
         if noticed(result.message) or (failure is None and "finite" in result.message):
             failure, time = Failure.DIVERGED, float(dataset["time"][-1])
         elif failure is None:
-            lifted = any(event.kind == "liftoff" for event in events_of(dataset))
+            lifted = any(event.kind == "lift_off" for event in events_of(dataset))
             failure, time = (Failure.LEFT if lifted else Failure.GAVE_UP), float(dataset["time"][-1])
         return _failed(failure, result, error, time, silent=noticed(result.message))
     if first is not None:

@@ -37,7 +37,8 @@ def _tableau(stages: int) -> tuple[FloatArray, FloatArray, FloatArray]:
     return (x + 1) / 2, integrals @ to_coefficients / 2, to_coefficients
 
 
-_NODES, _MATRIX, _TO_LEGENDRE = _tableau(_STAGES)
+# Nodes, the matrix that integrates from values at the nodes (its last row: over the whole step), and coefficients.
+_NODES, MATRIX, _TO_LEGENDRE = _tableau(_STAGES)
 
 
 @dataclass(frozen=True)
@@ -110,11 +111,11 @@ def take(system: System, time: float, state: FloatArray, length: float, guess: F
         rates = system.rates(values)
         if factors is None:
             jacobians = system.jacobian(values)
-            matrix = np.eye(s * n) - (length * np.einsum("ij,jkl->ikjl", _MATRIX, jacobians)).reshape(s * n, s * n)
+            matrix = np.eye(s * n) - (length * np.einsum("ij,jkl->ikjl", MATRIX, jacobians)).reshape(s * n, s * n)
             if not np.all(np.isfinite(matrix)):
                 break
             factors = lu_factor(matrix, check_finite=False)
-        residual = values - state - length * _MATRIX @ rates
+        residual = values - state - length * MATRIX @ rates
         if not np.all(np.isfinite(residual)):
             break
         correction = lu_solve(factors, -residual.ravel(), check_finite=False).reshape(s, n)

@@ -22,12 +22,12 @@ _YZX, _ZXY, _ONES = np.array([1, 2, 0]), np.array([2, 0, 1]), np.ones(3)
 
 
 def _cross(x: AnyArray, y: AnyArray) -> AnyArray:
-    """x × y along the last axis; numpy's own takes several times as long for few vectors."""
+    """Product x × y along the last axis; numpy's own takes several times as long for few vectors."""
     return np.asarray(x[..., _YZX] * y[..., _ZXY] - x[..., _ZXY] * y[..., _YZX])
 
 
 def _dot(x: AnyArray, y: AnyArray) -> AnyArray:
-    """x · y along the last axis, which stays; not conjugated."""
+    """Product x · y along the last axis, which stays; not conjugated."""
     return np.asarray(((x * y) @ _ONES)[..., None])
 
 

@@ -48,7 +48,8 @@ class Implicit:
 
     def excess(self, state: FloatArray) -> float:
         """See :class:`Route`."""
-        return float(self._excess(state[None, :])[0])
+        needed, available = (float(x[0]) for x in self._needed_and_available(state[None, :]))
+        return (needed - available) / max(needed + available, np.finfo(float).tiny)
 
     def ahead(self, state: FloatArray, span: float) -> FloatArray:
         """See :class:`Route`."""
@@ -75,9 +76,12 @@ class Implicit:
                 halted = walk.state + left * self._contact.rates(walk.state[None, :], True)[0]
                 return walk.leg(self, True, walk.time + left, self.nudged(halted, np.zeros(3)), End.HALT)
             step, length = walk.step(min(length, self._approach(left)))
-            rise = first_rise(partial(self._excess_along, step), step.time, step.time + step.length)
-            if rise is not None:
-                return walk.leg(self, True, rise, walk.cut(rise), End.CONE)
+            ends = [(End.LIFTOFF, partial(self._pull_along, step, True))]
+            ends += [(End.CONE, partial(self._excess_along, step))] if np.isfinite(self._mu) else []
+            found = [(first_rise(g, step.time, step.time + step.length), why) for why, g in ends]
+            if ended := [(when, why) for when, why in found if when is not None]:
+                when, why = min(ended, key=lambda item: item[0])
+                return walk.leg(self, True, when, walk.cut(when), why)
         return walk.leg(self, True, until, walk.state, End.TIME)
 
     def slip(self, time: float, state: FloatArray, until: float) -> Leg[FloatArray]:
@@ -95,7 +99,7 @@ class Implicit:
                 return walk.leg(self, False, walk.time + left, still, End.STILL)
             guess = None if started else self._first_guess(state)
             step, length = walk.step(min(length, self._approach(left)), guess)
-            gone = first_rise(partial(self._pull_along, step), step.time, step.time + step.length)
+            gone = first_rise(partial(self._pull_along, step, False), step.time, step.time + step.length)
             if gone is not None:
                 return walk.leg(self, False, gone, walk.cut(gone), End.LIFTOFF)
         return walk.leg(self, False, until, walk.state, End.TIME)
@@ -109,17 +113,18 @@ class Implicit:
         tiny = np.concatenate([state[:6], 1e-100 * self._contact.slip_direction_at_rest(state)])
         return np.asarray(self._contact.force(tiny[None, :], False)[0])
 
-    def _excess(self, y: FloatArray) -> FloatArray:
+    def _needed_and_available(self, y: FloatArray) -> tuple[FloatArray, FloatArray]:
         friction, N = self._contact.split(y, sticking=True)
-        needed, available = np.linalg.norm(friction, axis=-1), self._mu * N
-        return np.asarray((needed - available) / np.maximum(needed + available, np.finfo(float).tiny))
+        return np.linalg.norm(friction, axis=-1), self._mu * N
 
     def _excess_along(self, step: Step, times: FloatArray) -> FloatArray:
-        return self._excess(step(times))
+        """Friction that is missing [N]: smooth also where a step reaches beyond N = 0."""
+        needed, available = self._needed_and_available(step(times))
+        return needed - available
 
-    def _pull_along(self, step: Step, times: FloatArray) -> FloatArray:
+    def _pull_along(self, step: Step, sticking: bool, times: FloatArray) -> FloatArray:
         """-N [N]: rises through zero where the ball leaves the wall."""
-        return -self._contact.split(step(times), False)[1]
+        return -self._contact.split(step(times), sticking)[1]
 
     def _until_still(self, state: FloatArray, sticking: bool) -> float:
         """Time until the centre (sticking) or the contact point (slipping) stands still at the present rate [s]."""

@@ -240,7 +240,7 @@ def test_leaving_the_wall_is_an_event(formulation: str) -> None:
     dataset, failure = run(scene, 1.0, formulation=formulation, dt=1e-3)
     assert failure is not None
     assert "leaves the wall" in failure
-    assert events_of(dataset)[-1].kind == "liftoff"
+    assert events_of(dataset)[-1].kind == "lift_off"
     assert float(dataset.N.min()) > 0
 
 

@@ -216,7 +216,7 @@ def test_leaving_the_wall(resistance: float) -> None:
     """In a lying cylinder a slow ball leaves the wall where N = 0 and flies; its impact is refused, not invented."""
     scene = cylinder(tilt=1.3, speed=2.0, mu_static=0.5, rolling_resistance=resistance)
     _, found = stick_slip(scene, np.array([0.0, 0.3]))
-    assert [event.kind for event in found][-1] == "liftoff"
+    assert [event.kind for event in found][-1] == "lift_off"
     leaving = found[-1].time
     dataset, _ = stick_slip(scene, np.array([leaving - 1e-6, leaving + 0.01, leaving + 0.02]))
     assert abs(float(dataset.N[0])) < 1e-4

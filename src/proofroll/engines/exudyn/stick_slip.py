@@ -106,7 +106,7 @@ class StickSlip:
             if self.sticking and not self._stopped:
                 self.state = self._state(exu.ConfigurationType.Current)
             if self.state.touch.N <= 0:
-                self.events.append(Event("liftoff", 0.5 * (self._before_t + self.t), self._before_t, self.t))
+                self.events.append(Event("lift_off", 0.5 * (self._before_t + self.t), self._before_t, self.t))
                 raise Diverged(f"the ball leaves the wall at {self.t:g} s")
             if self._stopped:
                 self._divide()

@@ -269,7 +269,7 @@ class AdaptiveStickSlip(Adaptive):
         lift = located(solver, lambda y: -self._normal_force(y), -before, -after, self._span)
         time, width = lift[:2] if lift is not None else (float(solver.t), float(solver.step_size))
         if stop is None or time <= stop[0]:
-            self._record("liftoff", time, width)
+            self._record("lift_off", time, width)
             raise left_the_wall(f"at {time:.6g} s")
 
     def _switch(self, time: float, width: float, y: FloatArray) -> float:

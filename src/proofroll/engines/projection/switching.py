@@ -200,7 +200,7 @@ class Switching:
         elif exit_ is Exit.CHANGE:
             self._enter(self._free, high, self._slaved.freed(y))
         elif exit_ is Exit.LIFTOFF:
-            self._event("liftoff", low, high)
+            self._event("lift_off", low, high)
             self._enter(self.mode, high, y)
             self._lost = f"the ball leaves the wall at t = {high:.6g} s; its flight is not modelled"
             raise Diverged(self._lost)
