@@ -88,11 +88,11 @@ def observables(body: RollingBall, dataset: xr.Dataset) -> dict[str, Observable]
             audited = force_audit(body, dataset)
             if audited.size:
                 put("force_audit", "N", audited)
+    if "event_kind" in dataset:
+        put("event_times", "s", np.array([event.time for event in events_of(dataset)]))
     if "sticking" in dataset:
-        events = events_of(dataset)
-        slips = [event.time for event in events if event.kind == "slip"]
+        slips = [event.time for event in events_of(dataset) if event.kind == "slip"]
         put("first_slip", "s", np.array(slips[:1]))
-        put("event_times", "s", np.array([event.time for event in events]))
         put("creep", "m", np.array([_creep(curves["slip"].values, dataset)]))
     return curves
 

@@ -17,6 +17,7 @@ from proofroll.errors import Missing, ProofrollError
 from proofroll.metrics import Observable
 from proofroll.runner import Runner, WorkerDied
 from proofroll.scene_file import load_scene
+from proofroll.studies.common_span import common_span
 from proofroll.studies.planning import Plan, Planned, plan, point_name
 from proofroll.studies.reference import OF_EVENTS, Reference
 from proofroll.trajectory import read
@@ -151,6 +152,7 @@ def _failed(run: Planned, facts: EngineFacts, result: Result) -> Run:
 def _judgements(
     run: Planned, band: Band, reference: Reference, trajectories: dict[float, xr.Dataset]
 ) -> list[Judgement]:
+    reference, trajectories = common_span(reference, trajectories)
     curves = {factor: reference.observed(dataset) for factor, dataset in trajectories.items()}
     main = curves[1.0]
     judgements = []

@@ -170,6 +170,9 @@ def judge(result: Result, dataset: xr.Dataset | None, yardstick: Yardstick) -> O
         return _failed(failure, result, error, time, silent=noticed(result.message))
     if first is not None:
         return _failed(first[0], result, error, first[1], silent=True)
+    if errors is not None and yardstick.true is not None and len(errors) < len(yardstick.true):
+        # Its model ended the run where the ball would leave the wall.
+        return _failed(Failure.LEFT, result, error, float(dataset["time"][-1]))
     if errors is None or error is None or error <= ACCURATE:
         return Outcome(True, True, None, False, error, None, result.message)
     index = int(np.argmax(errors > ACCURATE))

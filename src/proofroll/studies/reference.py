@@ -47,9 +47,9 @@ class Reference:
 
     @property
     def ill_posed(self) -> bool:
-        """Whether the time of the first slip hangs on less than the parameters are known to."""
+        """Whether the time of the first slip, or what follows it, hangs on less than the parameters are known to."""
         onset = json.loads(self.dataset.attrs.get("onset", "{}"))
-        return bool(onset.get("verdict") == "ill-posed")
+        return bool(onset.get("verdict") == "ill-posed" or "ill_posed" in self.dataset.attrs)
 
     def scale(self, name: str) -> float | None:
         """What a percentage of an observable refers to: its size, for the first slip its time; None: nothing."""
@@ -60,7 +60,7 @@ class Reference:
     def observed(self, dataset: xr.Dataset) -> dict[str, Observable]:
         """The observables of an engine's trajectory of this scene."""
         found = observables(self.scene.rolling, dataset)
-        if "sticking" in dataset:
+        if "event_kind" in dataset or "event_kind" in self.dataset:
             found["event_order"] = event_order(dataset, self.dataset)
         return found
 

@@ -17,6 +17,7 @@ from proofroll.truth import collocation
 
 # Turn of the ball within one step [rad], so small that a step's error is that of the spin itself.
 _TURN = 2.0
+_IDENTITY = np.array([1.0, 0.0, 0.0, 0.0])
 
 # A quadrature: nodes in (0, 1), and quaternions (n, 4) from lengths of steps [s], (n,), and spins there, (n, nodes, 3).
 Quadrature = tuple[FloatArray, Callable[[FloatArray, FloatArray], FloatArray]]
@@ -39,13 +40,13 @@ def orientation(
     parts = np.maximum(np.ceil(np.diff(knots) * fastest / _TURN), 1).astype(int)
     h = np.repeat(np.diff(knots) / parts, parts)
     starts = np.repeat(knots[:-1], parts) + h * (np.arange(len(h)) - np.repeat(np.cumsum(parts) - parts, parts))
-    q = [np.array([1.0, 0.0, 0.0, 0.0])]
+    q = [_IDENTITY]
     if len(h):
         spin = motion((starts[:, None] + h[:, None] * nodes).ravel()).w_WB.reshape(len(h), len(nodes), 3)
         for step in turns(h, spin):
             q.append(_left(step) @ q[-1])
     ends = np.concatenate([[0], np.cumsum(parts)])[np.searchsorted(knots, times)]
-    return np.array(q)[ends]
+    return np.asarray(np.array(q)[ends])
 
 
 def _left(q: FloatArray) -> FloatArray:
@@ -59,8 +60,8 @@ def _quaternions(h: FloatArray, spin: FloatArray) -> FloatArray:
     """The quaternion itself by collocation at Gauss points, which keeps its length: order 16."""
     s = len(_GAUSS)
     rates = _left(np.concatenate([np.zeros((*spin.shape[:2], 1)), spin / 2], axis=-1)) * h[:, None, None, None]
-    stages = _stages(rates, np.broadcast_to(rates[..., :1], (*rates.shape[:-1], 1)), _GAUSS_MATRIX)
-    return np.array([1.0, 0.0, 0.0, 0.0]) + np.asarray(np.einsum("j,njr->nr", _WEIGHTS, stages.reshape(-1, s, 4)))
+    stages = _stages(rates, rates[..., :1], _GAUSS_MATRIX).reshape(-1, s, 4)
+    return np.asarray(_IDENTITY + np.einsum("j,njr->nr", _WEIGHTS, stages))
 
 
 def _matrices(h: FloatArray, spin: FloatArray) -> FloatArray:
@@ -81,12 +82,11 @@ def _stages(rates: FloatArray, right: FloatArray, matrix: FloatArray) -> FloatAr
     return np.asarray(np.linalg.solve(system, right.reshape(n, s * k, -1)))
 
 
-_GAUSS = 0.5 + np.polynomial.legendre.leggauss(8)[0] / 2
-_WEIGHTS = np.polynomial.legendre.leggauss(8)[1] / 2
+_POINTS, _SIZES = np.polynomial.legendre.leggauss(8)
+_GAUSS, _WEIGHTS = np.asarray(0.5 + _POINTS / 2), np.asarray(_SIZES / 2)
 _POWERS = np.arange(1, 9)
-_GAUSS_MATRIX: FloatArray = np.linalg.solve(
-    np.vander(_GAUSS, increasing=True).T, (_GAUSS[:, None] ** _POWERS / _POWERS).T
-).T
+_MOMENTS = _GAUSS[:, None] ** _POWERS / _POWERS
+_GAUSS_MATRIX = np.asarray(np.linalg.solve(np.vander(_GAUSS, increasing=True).T, _MOMENTS.T).T, dtype=np.float64)
 
 QUATERNIONS: Quadrature = (_GAUSS, _quaternions)
 MATRICES: Quadrature = (collocation.nodes(1.0), _matrices)

@@ -52,9 +52,8 @@ def truth(scene: Scene, times: FloatArray) -> xr.Dataset:
     if bounded or turns or not (always_pressed(body) or stays_on(body, float(times[-1]))):
         result, events = stick_slip(scene, times)
         return with_events(result if bounded else result.drop_vars("sticking"), events)
-    second = unreduced_taylor.unreduced if unreduced_taylor.available(body) else rolling.unreduced
     result = _dataset(scene, times, _first, QUATERNIONS)
-    check = _dataset(scene, times, second, MATRICES)
+    check = _dataset(scene, times, _unreduced, MATRICES)
     put_error_bars(result, check, _ROUND_OFF)
     result.attrs["second_route"] = check.attrs["route"]
     return result
@@ -62,6 +61,12 @@ def truth(scene: Scene, times: FloatArray) -> xr.Dataset:
 
 def _first(body: RollingBall, times: FloatArray) -> Motion:
     return closed_form(body, times) or rolling.reduced(body, times)
+
+
+def _unreduced(body: RollingBall, times: FloatArray) -> Motion:
+    if unreduced_taylor.available(body):
+        return unreduced_taylor.unreduced(body, times)
+    return rolling.unreduced(body, times)
 
 
 def _dataset(scene: Scene, times: FloatArray, route: Route, quadrature: Quadrature) -> xr.Dataset:
