@@ -92,10 +92,6 @@ def record(engine: Any, scene: Scene, times: FloatArray) -> Recording:
             break  # a wall that pulls: from here on the model is another one than the scene
     processor += time.process_time()
     sampling = time.perf_counter() - began - wall, processor - inside
-    if Capability.BOUNDED_FRICTION in scene.requires and any(sample.sticking is None for sample in samples):
-        failure = failure or "the engine does not say whether the ball sticks or slips"
-    if Capability.ORIENTATION in scene.requires and any(sample.q_WB is None for sample in samples):
-        failure = failure or "the engine does not give the ball's orientation"
     events = list(engine.events()) if isinstance(engine, LocatesEvents) else []
     left: Event | None = next((event for event in events if event.kind == "lift_off"), None)
     ended = None
@@ -105,14 +101,19 @@ def record(engine: Any, scene: Scene, times: FloatArray) -> Recording:
             events.append(left)
         if pressed[-1] < -faint and len(samples) > 1:
             del samples[-1]
-        if left is not None and len(samples) < len(times):
+        # Not where it fails later, in flight
+        if left is not None and len(samples) < len(times) and left.time_high >= times[len(samples) - 1]:
             ended = f"the ball leaves the wall at t = {left.time:.6g} s, where this run ends: the model does not let go"
             failure = None
+    if Capability.BOUNDED_FRICTION in scene.requires and any(sample.sticking is None for sample in samples):
+        failure = failure or "the engine does not say whether the ball sticks or slips"
+    if Capability.ORIENTATION in scene.requires and any(sample.q_WB is None for sample in samples):
+        failure = failure or "the engine does not give the ball's orientation"
     dataset = from_samples(scene, times, samples)
     if "sticking" in dataset:
         sticking = [bool(sample.sticking) for sample in samples]
         found = events if isinstance(engine, LocatesEvents) else [*between_samples(times.tolist(), sticking), *events]
-        dataset = with_events(dataset, found)
+        dataset = with_events(dataset, sorted(found, key=lambda event: event.time))
     elif leaves and left is not None:
         dataset = with_events(dataset, [left])
     remarks = tuple(engine.remarks()) if isinstance(engine, TellsRemarks) else ()

@@ -1,5 +1,6 @@
 from __future__ import annotations
 
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
@@ -8,6 +9,7 @@ from hostile import GivesUp, HostileSettings, NotANumber, Oracle
 
 from proofroll.engine import Sample
 from proofroll.errors import Diverged, InputError
+from proofroll.events import Event, lift_off
 from proofroll.recording import record, time_grid
 from proofroll.scene import Scene
 from proofroll.scene_file import load_scene
@@ -129,3 +131,29 @@ def test_an_orientation_that_was_asked_for() -> None:
     asking = load_scene("sphere_in_cylinder", asks=("orientation",))
     recording = record(Oracle(asking), asking, time_grid(0.1, 0.05))
     assert recording.failure == "the engine does not give the ball's orientation"
+
+
+def test_what_counts_as_lift_off() -> None:
+    """A wall that pulls, or that does not press for 10 ms, has lost the ball; a hop, time 0 and silence do not count."""
+    times = (0.004 * np.arange(8)).tolist()
+    pulls = lift_off(times, [1, 3, 2, 1, -1, 5, 5, 5], 1e-6)
+    assert pulls == Event("lift_off", pytest.approx(0.014), times[3], times[4])
+    rests = lift_off(times, [1, 3, 2, 0, 0, 0, 0, 5], 1e-6)
+    assert rests == Event("lift_off", pytest.approx(0.01), times[2], times[3])
+    assert lift_off(times, [1, 3, 2, 0, 0, 0, 5, 5], 1e-6) is None
+    assert lift_off(times, [-1, 3, 2, 1, 1, 1, 5, 5], 1e-6) is None
+    assert lift_off(times, [np.nan] * 8, 1e-6) is None
+
+
+def test_where_nothing_can_lift_the_ball_a_pull_is_no_lift_off(sphere: Scene) -> None:
+    """In an upright cylinder a wall that pulls is an engine's error, and its run goes on to show it."""
+
+    class Pulls(Oracle):
+        def sample(self) -> Sample:
+            right = super().sample()
+            return replace(right, force=-np.asarray(right.force) if self.t > 0.2 else right.force)
+
+    recording = record(Pulls.build(sphere, HostileSettings()), sphere, time_grid(0.5, 0.1))
+    assert (recording.failure, recording.ended) == (None, None)
+    assert recording.dataset.sizes["time"] == 6
+    assert recording.dataset.attrs["smallest_N"] < 0
