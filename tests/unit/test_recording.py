@@ -134,7 +134,7 @@ def test_an_orientation_that_was_asked_for() -> None:
 
 
 def test_what_counts_as_lift_off() -> None:
-    """A wall that pulls, or that does not press for 10 ms, has lost the ball; a hop, time 0 and silence do not count."""
+    """A wall that pulls, or does not press for 10 ms, has lost the ball; a hop, time 0 and silence do not count."""
     times = (0.004 * np.arange(8)).tolist()
     pulls = lift_off(times, [1, 3, 2, 1, -1, 5, 5, 5], 1e-6)
     assert pulls == Event("lift_off", pytest.approx(0.014), times[3], times[4])
