@@ -9,6 +9,7 @@ from functools import partial
 import numpy as np
 
 from proofroll.errors import Diverged
+from proofroll.mechanics import always_pressed
 from proofroll.motion import Motion
 from proofroll.scene import RollingBall
 from proofroll.surfaces import FloatArray
@@ -41,6 +42,7 @@ class Implicit:
         self._first = first_step
         self._pace = body.ball.radius / max(float(self._contact.scale[-1]), 1e-300)  # [s]
         self._mu = body.contact.mu_static
+        self._held = always_pressed(body)  # then no step need be searched for a lift-off
 
     def start(self) -> FloatArray:
         """See :class:`Route`."""
@@ -76,7 +78,7 @@ class Implicit:
                 halted = walk.state + left * self._contact.rates(walk.state[None, :], True)[0]
                 return walk.leg(self, True, walk.time + left, self.nudged(halted, np.zeros(3)), End.HALT)
             step, length = walk.step(min(length, self._approach(left)))
-            ends = [(End.LIFTOFF, partial(self._pull_along, step, True))]
+            ends = [] if self._held else [(End.LIFTOFF, partial(self._pull_along, step, True))]
             ends += [(End.CONE, partial(self._excess_along, step))] if np.isfinite(self._mu) else []
             found = [(first_rise(g, step.time, step.time + step.length), why) for why, g in ends]
             if ended := [(when, why) for when, why in found if when is not None]:
@@ -99,7 +101,8 @@ class Implicit:
                 return walk.leg(self, False, walk.time + left, still, End.STILL)
             guess = None if started else self._first_guess(state)
             step, length = walk.step(min(length, self._approach(left)), guess)
-            gone = first_rise(partial(self._pull_along, step, False), step.time, step.time + step.length)
+            pull = partial(self._pull_along, step, False)
+            gone = None if self._held else first_rise(pull, step.time, step.time + step.length)
             if gone is not None:
                 return walk.leg(self, False, gone, walk.cut(gone), End.LIFTOFF)
         return walk.leg(self, False, until, walk.state, End.TIME)
