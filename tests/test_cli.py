@@ -84,7 +84,6 @@ BAD = {
     "capability that is lacking": (with_option("--set", "rolling_resistance=1e-4"), 3, ["needs rolling resistance"]),
     "something else asked": (with_option("--ask", "colour"), 2, ["asks = 'colour'", "choose orientation"]),
     "orientation of an engine without": (with_option("--ask", "orientation"), 3, ["needs the ball's orientation"]),
-    "orientation of the truth": ([*with_option("--engine", "truth"), "--ask", "orientation"], 3, ["ask an engine"]),
     "ladder of nothing": (["ladder", "sphere_in_cylinder", "--quantity", "height"], 2, ["quantity = 'height'"]),
     "ladder of no length": (["ladder", "sphere_in_cylinder", "--until", "0"], 2, ["until = 0", "positive"]),
     "unknown comparison": (["compare", "no_such_claim"], 2, ["comparison = 'no_such_claim'"]),
@@ -142,6 +141,7 @@ def test_run_json(proofroll: Proofroll) -> None:
     assert found["final"]["gamma"] == pytest.approx(2.5)
     assert found["final"]["N"] == pytest.approx(0.517 * 25 / 0.2)
     assert set(found["units"]) == set(found["final"])
+    assert found["smallest_N"] == pytest.approx(0.517 * 25 / 0.2)
 
 
 def test_run_of_the_truth(proofroll: Proofroll) -> None:
@@ -159,6 +159,7 @@ def test_run_for_a_person(proofroll: Proofroll) -> None:
     code, out, err = proofroll(*with_option("--until", "0"))
     assert (code, err) == (0, "")
     assert ["gamma", "0", "rad"] in [line.split() for line in out.splitlines()]
+    assert "smallest normal force: " in out
     assert max(map(len, out.splitlines())) <= 100
 
 

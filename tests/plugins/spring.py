@@ -37,6 +37,7 @@ class Spring:
         Observable("pull", "N", "force of the spring", Role.REACTION, floor=1e-9, headline=True),
         Observable("energy_error", "J", "energy now minus energy at the start", Role.RESIDUAL, floor=1e-9),
     )
+    failing_events: ClassVar[Mapping[str, str]] = {}
     failures: ClassVar[Mapping[str, str]] = {"far out": "the mass is ten times farther than at the start"}
 
     @property

@@ -121,7 +121,7 @@ def test_the_contact_changes_at_the_events_and_not_at_the_samples(rolling: Any) 
     body, data = rolling
     events = {
         "sticking": np.ones(data["time"].shape, dtype=np.int8),
-        "event_kind": np.array([b"slip", b"stick", b"liftoff", b"slip"]),
+        "event_kind": np.array([b"slip", b"stick", b"lift_off", b"slip"]),
         "event_time": np.array([0.205, 0.211, 0.9, np.nan]),
     }
     found = poses(body, {**data, **events}, np.array([0.0, 0.204, 0.206, 0.212, 0.899, 0.901])).state

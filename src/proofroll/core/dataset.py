@@ -12,6 +12,7 @@ import numpy as np
 from proofroll.core.arrays import FloatArray
 from proofroll.core.element import Element
 from proofroll.core.engine import Sample
+from proofroll.core.events import Event, with_events
 from proofroll.core.scene import Scene
 
 if TYPE_CHECKING:
@@ -75,6 +76,15 @@ def joined(scene: Scene, parts: Mapping[str, xr.Dataset]) -> xr.Dataset:
         named.append(part.rename({name: scene.label(element, str(name)) for name in dict.fromkeys(own)}))
     whole = xr.merge(named, combine_attrs="drop_conflicts") if len(named) > 1 else named[0]
     return whole.assign_attrs(scene=scene.name, scene_digest=scene.digest)
+
+
+def add_events(scene: Scene, element: Element, dataset: xr.Dataset, events: Sequence[Event]) -> xr.Dataset:
+    """The dataset with the events of an element."""
+    import xarray as xr
+
+    made = with_events(xr.Dataset(), events)
+    named = made.rename({name: scene.label(element, str(name)) for name in (*made.data_vars, *made.dims)})
+    return dataset.assign(named.variables)
 
 
 def part(scene: Scene, element: Element, dataset: xr.Dataset) -> xr.Dataset:

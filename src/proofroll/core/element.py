@@ -15,6 +15,7 @@ import numpy as np
 import numpy.typing as npt
 
 from proofroll.core.arrays import FloatArray
+from proofroll.core.events import Event
 from proofroll.core.gravity import Gravity
 from proofroll.core.observable import Observable
 
@@ -161,11 +162,59 @@ class Element(Protocol):
     def failures(self) -> Mapping[str, str]:
         """Names of its signs of failure, and of causes of errors, with their meaning: threshold and reason."""
 
+    @property
+    def failing_events(self) -> Mapping[str, str]:
+        """Kinds of events -> the sign of failure that each stands for in a run that ends early."""
+
     def signs(self, dataset: xr.Dataset, truth: xr.Dataset | None) -> list[Sign]:
         """Signs of failure besides a wrong path."""
 
     def optional_terms(self, parameters: Mapping[str, float], truth: xr.Dataset) -> list[OptionalTerm]:
         """Parts of the model that the scene's parameters put in or take out."""
+
+
+@dataclass(frozen=True)
+class SeenInRun:
+    """What a watch saw.
+
+    Attributes:
+        samples: how many of the samples are of the scene.
+        events: in order; None: it has nothing to say of events.
+        ended: why the run ends where it does though nothing failed, or None.
+    """
+
+    samples: int
+    events: Sequence[Event] | None
+    ended: str | None = None
+
+
+class RunWatch(Protocol):
+    """Follows one run."""
+
+    def over(self, sample: Sample) -> bool:
+        """Whether the model is no longer that of the scene, so that the run ends here."""
+
+    def conclude(self, times: FloatArray, samples: Sequence[Sample], located: Sequence[Event] | None) -> SeenInRun:
+        """What was seen.
+
+        Args:
+            times: of the samples [s]; there may be fewer samples.
+            samples: of the element.
+            located: the engine's own events (:class:`proofroll.core.engine.LocatesEvents`), or None.
+        """
+
+
+@runtime_checkable
+class WatchesRuns(Protocol):
+    """What an element has besides, if it has events, or if a run can leave the scene."""
+
+    def watch(self, asks: Sequence[str]) -> RunWatch:
+        """A watch over a run that is about to begin."""
+
+    def common_span(
+        self, truth: xr.Dataset, runs: Mapping[Any, xr.Dataset]
+    ) -> tuple[xr.Dataset, dict[Any, xr.Dataset]]:
+        """The truth and runs of it as far as they are comparable."""
 
 
 @runtime_checkable

@@ -1,30 +1,28 @@
-"""What happens to a ball on a wall: it begins to slip, sticks again, leaves the wall. Each with a bracket in time."""
+"""Events of a run, each with a bracket in time."""
 
 from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Literal, get_args
+from typing import TYPE_CHECKING
 
 import numpy as np
 
 if TYPE_CHECKING:
     import xarray as xr
 
-EventKind = Literal["slip", "stick", "liftoff"]
-
 
 @dataclass(frozen=True)
 class Event:
-    """One change of the contact.
+    """One change of what acts in a run.
 
     Attributes:
-        kind: ``slip`` begins, the ball ``stick``s again, or ``liftoff`` (the normal force reached zero).
+        kind: as its kind of element names it, e.g. ``slip``.
         time: best value [s].
         time_low, time_high: the event lies between these [s].
     """
 
-    kind: EventKind
+    kind: str
     time: float
     time_low: float
     time_high: float
@@ -37,7 +35,7 @@ def with_events(dataset: xr.Dataset, events: Sequence[Event]) -> xr.Dataset:
         "event_low": ("not before", [event.time_low for event in events]),
         "event_high": ("not after", [event.time_high for event in events]),
     }
-    kinds = np.array([event.kind for event in events], dtype=f"<U{max(map(len, get_args(EventKind)))}")
+    kinds = np.array([event.kind for event in events], dtype=str) if events else np.zeros(0, dtype="<U1")
     result = dataset.assign(event_kind=("event", kinds, {"units": "1", "long_name": "what happened"}))
     return result.assign(
         {
@@ -45,15 +43,6 @@ def with_events(dataset: xr.Dataset, events: Sequence[Event]) -> xr.Dataset:
             for name, (meaning, values) in columns.items()
         }
     )
-
-
-def between_samples(times: Sequence[float], sticking: Sequence[bool]) -> list[Event]:
-    """Events as the samples tell them: somewhere between two samples [s] of which one sticks and the other slips."""
-    return [
-        Event("stick" if after else "slip", 0.5 * (low + high), low, high)
-        for before, after, low, high in zip(sticking, sticking[1:], times, times[1:], strict=False)
-        if before != after
-    ]
 
 
 def events_of(dataset: xr.Dataset) -> list[Event]:

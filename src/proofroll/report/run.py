@@ -34,6 +34,8 @@ def run_content(case: Case, result: Result, trajectory: Path) -> dict[str, Any]:
     curves = {name: variable for name, variable in dataset.data_vars.items() if variable.dims == ("time",)}
     content["final"] = {"time": float(dataset["time"][-1])} | {str(k): float(v[-1]) for k, v in curves.items()}
     content["units"] = {"time": "s"} | {str(name): variable.attrs["units"] for name, variable in curves.items()}
+    if "smallest_N" in dataset.attrs:
+        content["smallest_N"] = float(dataset.attrs["smallest_N"])
     content["events"] = [dataclasses.asdict(event) for event in events_of(dataset)]
     bars = {str(k): float(v.attrs["error_bar"]) for k, v in curves.items() if "error_bar" in v.attrs}
     if bars:
@@ -62,5 +64,7 @@ def run_lines(content: dict[str, Any]) -> list[Any]:
         bar = [f"{bars[name]:.1e}" if name in bars else ""] if bars else []
         table.add_row(name, f"{value:.12g}", content["units"][name], *bar)
     lines.append(table)
+    if "smallest_N" in content:
+        lines.append(Text(f"smallest normal force: {content['smallest_N']:.6g} N"))
     lines.append(Text(f"{content['wall_seconds']:.3g} s of wall time"))
     return lines

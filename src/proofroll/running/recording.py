@@ -4,17 +4,18 @@ from __future__ import annotations
 
 import math
 import time
-from collections.abc import Iterable
+from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
 from proofroll.core.arrays import FloatArray
-from proofroll.core.dataset import from_samples
+from proofroll.core.dataset import add_events, from_samples, sample_of
+from proofroll.core.element import Element, WatchesRuns
 from proofroll.core.engine import LocatesEvents, Sample, TellsRemarks
 from proofroll.core.errors import Diverged, InputError, lack_behind
-from proofroll.core.events import between_samples, with_events
+from proofroll.core.events import Event
 from proofroll.core.scene import Scene
 
 if TYPE_CHECKING:
@@ -79,7 +80,8 @@ class Recording:
 
     Attributes:
         dataset: the trajectory up to the last finite sample.
-        failure: one sentence if it ended early, else None.
+        failure: one sentence if it failed early, else None.
+        ended: one sentence if it ended where the ball leaves the wall, for the model holds the ball there, else None.
         wall_seconds: spent inside ``advance`` [s].
         advancing, sampling: spent inside ``advance``, and inside ``sample`` and around it: wall and processor seconds
             [s].
@@ -92,10 +94,11 @@ class Recording:
     advancing: tuple[float, float] = (0.0, 0.0)
     sampling: tuple[float, float] = (0.0, 0.0)
     remarks: tuple[str, ...] = ()
+    ended: str | None = None
 
     def message(self, until: float) -> str:
         """One sentence: why it ended early, or that it reached ``until`` [s] and what is to be said about that."""
-        return self.failure or "; ".join([f"reached {until:g} s", *self.remarks])
+        return self.failure or self.ended or "; ".join([f"reached {until:g} s", *self.remarks])
 
 
 def record(engine: Any, scene: Scene, times: FloatArray, probes: Iterable[float] = ()) -> Recording:
@@ -114,6 +117,7 @@ def record(engine: Any, scene: Scene, times: FloatArray, probes: Iterable[float]
     wall = 0.0
     between: dict[float, Sample] = {}
     off = set(map(float, probes))
+    watches = [(element, element.watch(scene.asks)) for element in scene.elements if isinstance(element, WatchesRuns)]
     for t in sorted({*times[1:].tolist(), *off}):
         before, start = time.process_time(), time.perf_counter()
         try:
@@ -128,20 +132,30 @@ def record(engine: Any, scene: Scene, times: FloatArray, probes: Iterable[float]
             break
         if t in off:
             between[t] = sample
-        else:
-            samples.append(sample)
+            continue
+        samples.append(sample)
+        if any(watch.over(sample_of(scene, element, sample)) for element, watch in watches):
+            break  # from here on the model is another one than the scene
     processor += time.process_time()
     sampling = time.perf_counter() - began - wall, processor - inside
+    located = list(engine.events()) if isinstance(engine, LocatesEvents) else None
+    ended: str | None = None
+    events: list[tuple[Element, Sequence[Event]]] = []
+    for element, watch in watches:
+        seen = watch.conclude(times, [sample_of(scene, element, sample) for sample in samples], located)
+        del samples[seen.samples :]
+        if seen.events is not None:
+            events.append((element, seen.events))
+        if seen.ended:
+            ended, failure = seen.ended, None
     lacking = (element.lacks(samples, scene.asks) for element in scene.elements)
     failure = failure or next(filter(None, lacking), None)
-    dataset = from_samples(scene, times, samples, between)
-    if "sticking" in dataset:
-        located = isinstance(engine, LocatesEvents)
-        sticking = [bool(sample.sticking) for sample in samples]
-        events = engine.events() if located else between_samples(times.tolist(), sticking)
-        dataset = with_events(dataset, events)
+    last = times[len(samples) - 1]
+    dataset = from_samples(scene, times, samples, {at: sample for at, sample in between.items() if at < last})
+    for owner, found in events:
+        dataset = add_events(scene, owner, dataset, found)
     remarks = tuple(engine.remarks()) if isinstance(engine, TellsRemarks) else ()
-    return Recording(dataset, failure, wall, (wall, inside), sampling, remarks)
+    return Recording(dataset, failure, wall, (wall, inside), sampling, remarks, ended)
 
 
 _SAMPLED = ("p_WB", "v_WB", "w_WB", "q_WB", "force")

@@ -43,7 +43,7 @@ def _run(case: Case, out: Path, spent: Spent) -> Result:
     times = time_grid(case.until, case.every)
     if case.engine.name == "truth":
         spent.on("loading")
-        return _run_truth(case, scene, times, out, versions)
+        return _run_truth(scene, times, out, versions)
     kind = load_engine(case.engine.name)
     settings = resolve_settings(kind, case.engine.settings)
     spent.on("loading")
@@ -65,8 +65,8 @@ def _run(case: Case, out: Path, spent: Spent) -> Result:
     except (Refused, Diverged) as error:
         return _answer(error, versions)
     timings: list[float] = []
-    if recording.failure is None and case.timed and case.until > 0:
-        timings, inside = clean_runs(kind, scene, settings, times)
+    if recording.failure is None and case.timed and recording.dataset.sizes["time"] > 1:
+        timings, inside = clean_runs(kind, scene, settings, times[: recording.dataset.sizes["time"]])
         spent.on("building", clean_runs=inside)
     result = Result(
         status=Status.DONE if recording.failure is None else Status.DIVERGED,
@@ -97,7 +97,7 @@ def _answer(error: Refused | Diverged, versions: dict[str, str]) -> Result:
     return Result(status, str(error), versions=versions)
 
 
-def _run_truth(case: Case, scene: Any, times: Any, out: Path, versions: dict[str, str]) -> Result:
+def _run_truth(scene: Any, times: Any, out: Path, versions: dict[str, str]) -> Result:
     from proofroll.core.truth import truth
     from proofroll.files.netcdf import write
 
@@ -107,7 +107,7 @@ def _run_truth(case: Case, scene: Any, times: Any, out: Path, versions: dict[str
     except (Refused, Diverged) as error:
         return _answer(error, versions)
     wall = time.perf_counter() - start
-    message = f"{dataset.attrs['route']}, checked by {dataset.attrs['second_route']}"
+    message = dataset.attrs.get("ill_posed") or f"{dataset.attrs['route']}, checked by {dataset.attrs['second_route']}"
     said = {"status": "done", "message": message, "wall_seconds": wall}
     write(dataset.assign_attrs(said | manifest("truth", {}, scene, versions)), out)
     return Result(Status.DONE, message, wall_seconds=wall, versions=versions, trajectory=out.name)

@@ -85,7 +85,9 @@ def simulate(
             raise InputError("truth", ", ".join(options), "the truth has no settings; leave them out")
         from proofroll.core.truth import truth
 
-        found = truth(scene, times).assign_attrs(status="done", message="two independent routes agree")
+        found = truth(scene, times)
+        message = found.attrs.get("ill_posed", "two independent routes agree")
+        found = found.assign_attrs(status="done", message=message)
         return found.assign_attrs(manifest("truth", {}, scene, versions("truth", truth_version())))
     kind, resolved = _resolved(engine, settings)
     built = _build(scene, kind, resolved)

@@ -17,6 +17,7 @@ from proofroll.files.netcdf import read
 from proofroll.files.scene_file import load_scene
 from proofroll.running.case import LASTING, Case, EngineFacts, Result, Status
 from proofroll.running.runner import Runner, WorkerDied
+from proofroll.studies.common_span import common_span
 from proofroll.studies.planning import Plan, Planned, plan, point_name
 from proofroll.studies.reference import Reference
 
@@ -178,6 +179,7 @@ def _of_another_scene(run: Planned, facts: EngineFacts, result: Result, sentence
 def _judgements(
     run: Planned, band: Band, reference: Reference, trajectories: dict[float, xr.Dataset]
 ) -> list[Judgement]:
+    reference, trajectories = common_span(reference, trajectories)
     curves = {factor: reference.observed(dataset) for factor, dataset in trajectories.items()}
     main = curves[1.0]
     judgements = []

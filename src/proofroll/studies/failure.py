@@ -14,7 +14,6 @@ import numpy as np
 from proofroll.core.arrays import FloatArray
 from proofroll.core.dataset import part
 from proofroll.core.element import ExplainsErrors
-from proofroll.core.events import events_of
 from proofroll.core.scene import Scene
 from proofroll.running.case import Result, Status
 from proofroll.running.recording import noticed
@@ -28,7 +27,7 @@ ACCURATE = 0.01
 WRONG = 1.0
 
 DIVERGED, GAVE_UP, CRASHED = "diverged", "solver gave up", "crashed"
-LOST_PHASE, TOO_SLOW, REFUSED, LEFT = "lost phase", "too slow", "refused", "left the surface"
+LOST_PHASE, TOO_SLOW, REFUSED = "lost phase", "too slow", "refused"
 MEANINGS = {
     DIVERGED: "the state became NaN or overflowed",
     LOST_PHASE: "bounded, with no other sign of failure, but wrong",
@@ -117,15 +116,26 @@ def judge(result: Result, dataset: xr.Dataset | None, yardstick: Yardstick) -> O
         if noticed(result.message) or (failure is None and "finite" in result.message):
             failure, time = DIVERGED, float(dataset["time"][-1])
         elif failure is None:
-            lifted = any(event.kind == "liftoff" for event in events_of(dataset))
-            failure, time = (LEFT if lifted else GAVE_UP), float(dataset["time"][-1])
+            failure, time = _by_event(dataset, yardstick.scene) or GAVE_UP, float(dataset["time"][-1])
         return _failed(failure, result, error, time, silent=noticed(result.message))
     if first is not None:
         return _failed(first[0], result, error, first[1], silent=True)
+    if errors is not None and yardstick.true is not None and len(errors) < len(yardstick.true):
+        # Its model ended the run where it is no longer that of the scene.
+        return _failed(_by_event(dataset, yardstick.scene) or GAVE_UP, result, error, float(dataset["time"][-1]))
     if errors is None or error is None or error <= ACCURATE:
         return Outcome(True, True, None, False, error, None, result.message)
     index = int(np.argmax(errors > ACCURATE))
     return Outcome(True, False, _wrong(dataset, yardstick, errors, index), True, error, None, result.message)
+
+
+def _by_event(dataset: xr.Dataset, scene: Scene) -> str | None:
+    """The failure that an event of the run stands for, if one does."""
+    for element in scene.elements:
+        for event in events_of(part(scene, element, dataset)):
+            if event.kind in element.failing_events:
+                return element.failing_events[event.kind]
+    return None
 
 
 def _failed(

@@ -92,7 +92,7 @@ class Reference:
         found = observe(self.scene, dataset)
         for element in self.scene.elements:
             own, true = part(self.scene, element, dataset), part(self.scene, element, self.dataset)
-            if "event_kind" in own:
+            if "event_kind" in own or "event_kind" in true:
                 found[self.scene.label(element, EVENT_ORDER)] = event_order(own, true)
         return found
 

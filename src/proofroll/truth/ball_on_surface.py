@@ -9,7 +9,6 @@ from typing import TYPE_CHECKING
 
 from proofroll.core.arrays import FloatArray
 from proofroll.core.element import Element
-from proofroll.core.errors import Refused
 from proofroll.core.scene import Scene
 from proofroll.elements.ball_on_surface.element import BallOnSurface
 from proofroll.truth.onset import onset
@@ -30,8 +29,6 @@ class BallOnSurfaceTruth:
     @staticmethod
     def truth(element: Element, times: FloatArray, asks: Sequence[str]) -> xr.Dataset:
         """See :func:`proofroll.truth.truth.truth`; with bounded friction also the conditioning of the first slip."""
-        if asks:
-            raise Refused(f"the truth is that of the motion and gives no {', '.join(asks)}; ask an engine for it")
         scene = Scene(element.name, "", (element,), asks=tuple(asks))
         found = truth(scene, times)
         if "sticking" in found:

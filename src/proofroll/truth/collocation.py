@@ -19,7 +19,9 @@ from scipy.linalg import lu_factor, lu_solve
 from proofroll.core.arrays import FloatArray
 
 _STAGES = 13
-_NEWTON = 14  # iterations after which a step is taken again with half its length
+_NEWTON = 9  # iterations after which a step is taken again with half its length
+_GOOD = 1e-4  # a guess that is as near as this keeps its Jacobians
+_NOISE = 3e-16  # size of the last coefficients, relative to the scale, that is only round-off
 _ROUND_OFF = 1e-15  # Newton corrections, relative to the scale, that are only noise
 
 
@@ -35,7 +37,8 @@ def _tableau(stages: int) -> tuple[FloatArray, FloatArray, FloatArray]:
     return (x + 1) / 2, integrals @ to_coefficients / 2, to_coefficients
 
 
-_NODES, _MATRIX, _TO_LEGENDRE = _tableau(_STAGES)
+# Nodes, the matrix that integrates from values at the nodes (its last row: over the whole step), and coefficients.
+_NODES, MATRIX, _TO_LEGENDRE = _tableau(_STAGES)
 
 
 @dataclass(frozen=True)
@@ -103,16 +106,16 @@ def take(system: System, time: float, state: FloatArray, length: float, guess: F
     """
     s, n = guess.shape
     values = guess
-    before, factors = np.inf, None
+    before, factors, grown = np.inf, None, 0
     for _ in range(_NEWTON):
         rates = system.rates(values)
         if factors is None:
             jacobians = system.jacobian(values)
-            matrix = np.eye(s * n) - (length * np.einsum("ij,jkl->ikjl", _MATRIX, jacobians)).reshape(s * n, s * n)
+            matrix = np.eye(s * n) - (length * np.einsum("ij,jkl->ikjl", MATRIX, jacobians)).reshape(s * n, s * n)
             if not np.all(np.isfinite(matrix)):
                 break
             factors = lu_factor(matrix, check_finite=False)
-        residual = values - state - length * _MATRIX @ rates
+        residual = values - state - length * MATRIX @ rates
         if not np.all(np.isfinite(residual)):
             break
         correction = lu_solve(factors, -residual.ravel(), check_finite=False).reshape(s, n)
@@ -122,8 +125,11 @@ def take(system: System, time: float, state: FloatArray, length: float, guess: F
             coefficients = length * _TO_LEGENDRE @ system.rates(values) / system.scale
             # The last two: one of them may vanish by symmetry
             return Step(time, length, np.vstack([state, values]), float(np.max(np.abs(coefficients[-2:]))))
-        if change > 0.02 * before or before == np.inf:
+        if change > 0.02 * before or (before == np.inf and change > _GOOD):
             factors = None
+        grown = grown + 1 if change > before else 0
+        if grown > 1:
+            break
         before = change
     return Step(time, length, np.vstack([state, guess]), np.inf)
 
@@ -132,5 +138,6 @@ def next_length(step: Step, tolerance: float) -> float:
     """Length of the next try: the error falls with the power s - 1 of the length."""
     if not np.isfinite(step.error):
         return 0.4 * step.length
-    growth = (tolerance / max(step.error, 1e-30)) ** (1 / (_STAGES - 1))
+    error = step.error if step.error > _NOISE else 0.0  # of noise nothing follows for a longer step
+    growth = (tolerance / max(error, 1e-30)) ** (1 / (_STAGES - 1))
     return step.length * float(np.clip(0.8 * growth, 0.2, 3.0))

@@ -1,7 +1,8 @@
 """Stick and slip by Newton-Euler in the world: the surface only through its signed distance, every force unknown.
 
-One linear system for p̈, ω̇ and the wall's force R serves both modes; switching exchanges two of its rows. Integrated
-by implicit collocation, so that neither the stiff start of a slip nor its end is regularised.
+The wall's force R follows from what the contact point must do, as vectors: along the wall's normal it never moves, and
+along the wall it sticks or obeys the law of friction. Integrated by implicit collocation, so that neither the stiff
+start of a slip nor its end is regularised.
 """
 
 from __future__ import annotations
@@ -17,14 +18,17 @@ from proofroll.truth.collocation import System
 
 AnyArray = npt.NDArray[Any]  # real or complex
 _PLUS_MINUS = np.concatenate([np.eye(3), -np.eye(3)])
-# [e1]× from e1: e1 @ _CROSS has the rows of the matrix of e1 × x
-_CROSS = np.array(
-    [[[0, 0, 0], [0, 0, -1], [0, 1, 0]], [[0, 0, 1], [0, 0, 0], [-1, 0, 0]], [[0, -1, 0], [1, 0, 0], [0, 0, 0]]]
-)
+_YZX, _ZXY, _ONES = np.array([1, 2, 0]), np.array([2, 0, 1]), np.ones(3)
 
 
-def _times(matrix: AnyArray, x: AnyArray) -> AnyArray:
-    return np.asarray((matrix @ x[..., None])[..., 0])
+def _cross(x: AnyArray, y: AnyArray) -> AnyArray:
+    """Product x × y along the last axis; numpy's own takes several times as long for few vectors."""
+    return np.asarray(x[..., _YZX] * y[..., _ZXY] - x[..., _ZXY] * y[..., _YZX])
+
+
+def _dot(x: AnyArray, y: AnyArray) -> AnyArray:
+    """Product x · y along the last axis, which stays; not conjugated."""
+    return np.asarray(((x * y) @ _ONES)[..., None])
 
 
 class Contact:
@@ -76,60 +80,49 @@ class Contact:
     def _jacobian(self, y: FloatArray, sticking: bool) -> FloatArray:
         """∂ẏ/∂y: exact by complex steps for ω and u, where it is stiff; by differences for the smooth geometry."""
         n, stiff = len(y), np.arange(3, 6 if sticking else 9)
-        small = 1e-6 * self.scale[0]
-        p = np.concatenate([np.tile(y[:, :3], (len(stiff), 1)), *(y[:, :3] + step for step in small * _PLUS_MINUS)])
-        rest = np.tile(y[:, 3:].astype(np.complex128), (len(stiff) + len(_PLUS_MINUS), 1, 1))
-        rest = rest.reshape(-1, n, 6)
-        for number, column in enumerate(stiff):
-            rest[number, :, column - 3] += 1e-30j * self.scale[column]
-        rest = rest.reshape(-1, 6)
-        rates = self._solve(*self._geometry(p), rest[:, :3], rest[:, 3:], sticking)[0].reshape(-1, n, 9)
         result = np.zeros((n, 9, 9))
-        exact, moved = rates[: len(stiff)], rates[len(stiff) :]
-        result[:, :, stiff] = np.moveaxis(np.imag(exact), 0, -1) / (1e-30 * self.scale[stiff])
-        result[:, :, :3] = np.moveaxis(np.real(moved[:3] - moved[3:]), 0, -1) / (2 * small)
+        tilted = np.tile(y[:, 3:].astype(np.complex128), (len(stiff), 1, 1))
+        tilted[np.arange(len(stiff)), :, stiff - 3] += 1e-30j * self.scale[stiff, None]
+        rates = self._solve(*self._geometry(y[:, :3]), tilted[..., :3], tilted[..., 3:], sticking)[0]
+        result[:, :, stiff] = np.moveaxis(np.imag(rates), 0, -1) / (1e-30 * self.scale[stiff])
+        small = 1e-6 * self.scale[0]
+        moved = (y[:, :3] + small * _PLUS_MINUS[:, None]).reshape(-1, 3)
+        e1, bend = self._geometry(moved)
+        rates = self._solve(e1.reshape(6, n, 3), bend.reshape(6, n, 3, 3), y[:, 3:6], y[:, 6:], sticking)[0]
+        result[:, :, :3] = np.moveaxis(np.real(rates[:3] - rates[3:]), 0, -1) / (2 * small)
         return result
 
     def _solve(
         self, e1: FloatArray, bend: FloatArray, w: AnyArray, u: AnyArray, sticking: bool
     ) -> tuple[AnyArray, AnyArray]:
-        """ẏ and R; w and u may be complex."""
+        """ẏ and R; w and u may be complex.
+
+        Newton p̈ = g + R/m and Euler J ω̇ = a e1 × R + f (v/V) × (R · e1) e1 with R = R1 e1 + T leave for the contact
+        point's acceleration p̈ + a ω̇ × e1 + a ω × ė1, with λ = 1/m + a²/J and the direction d of v,
+
+            along e1:        R1/m + e1 · g = -ė1 · v, for e1 · v = 0 always,
+            along the wall:  λ T + g - (a f/J) R1 d + a ω × ė1 = 0 in stick;  T = μ R1 u/|u| in slip.
+        """
         body = self._body
         a, m, J, f = body.ball.radius, body.ball.mass, body.ball.inertia, body.contact.rolling_resistance
-        cross = np.tensordot(e1, _CROSS, axes=1)  # cross @ x = e1 × x
-        v = u + a * _times(cross, w)
-        e1_rate = _times(bend, v)
-        n, eye = len(v), np.eye(3)
-        matrix = np.zeros((n, 9, 9), dtype=v.dtype)
-        right = np.zeros((n, 9), dtype=v.dtype)
-        matrix[:, :3, :3] = m * eye
-        matrix[:, :3, 6:] = -eye
-        right[:, :3] = m * body.gravity
-        matrix[:, 3:6, 3:6] = J * eye
-        matrix[:, 3:6, 6:] = -a * cross
-        if f:  # moment f (v/V) × (R · e1) e1 of the shifted normal force
-            speed = np.sqrt(np.sum(v * v, axis=-1, keepdims=True))
-            ahead = np.divide(v, speed, out=np.zeros_like(v), where=speed != 0)
-            matrix[:, 3:6, 6:] -= f * _times(-cross, ahead)[:, :, None] * e1[:, None, :]
-        # Contact point's acceleration p̈ + a ω̇ × e1 + a ω × ė1: all of it zero in stick, in slip only that along e1,
-        # where ω̇ has no part; the other two rows are then the law of friction.
-        carried = a * _times(np.tensordot(w, _CROSS, axes=1), e1_rate)
-        matrix[:, 6:, :3] = eye
-        matrix[:, 6:, 3:6] = -a * cross
-        right[:, 6:] = -carried
-        if not sticking:
-            size = np.sqrt(np.sum(u * u, axis=-1, keepdims=True))
-            direction = np.divide(u, size, out=np.zeros_like(u), where=size != 0)
-            normal = e1[:, :, None] * e1[:, None, :]
-            law = eye - normal - body.contact.mu_kinetic * direction[:, :, None] * e1[:, None, :]
-            # e1 (e1 · p̈ + ė1 · v) + R_t - μ (R · e1) u/|u| = 0, the two parts at right angles
-            matrix[:, 6:, :3] = normal
-            matrix[:, 6:, 3:6] = 0.0
-            matrix[:, 6:, 6:] = law / m
-            right[:, 6:] = -e1 * np.sum(e1_rate * v, axis=-1, keepdims=True)
-        solution = np.linalg.solve(matrix, right[..., None])[..., 0]
-        p_second, w_rate, R = solution[:, :3], solution[:, 3:6], solution[:, 6:]
+        v = u + a * _cross(e1, w)
+        e1_rate = (bend @ v[..., None])[..., 0]
+        free = body.gravity + a * _cross(w, e1_rate)
+        R1 = -m * (_dot(e1, body.gravity) + _dot(e1_rate, v))
+        along = free - _dot(e1, free) * e1
+        ahead = np.zeros_like(v)
+        if f:
+            speed = np.sqrt(_dot(v, v))
+            ahead = np.divide(v, speed, out=ahead, where=speed != 0)
+            along = along - (a * f / J) * R1 * ahead
         if sticking:
-            return np.concatenate([v, w_rate, np.zeros_like(v)], axis=-1), R
-        u_rate = p_second + carried - a * _times(cross, w_rate)
-        return np.concatenate([v, w_rate, u_rate], axis=-1), R
+            T = along / -(1 / m + a * a / J)
+        else:
+            size = np.sqrt(_dot(u, u))
+            T = body.contact.mu_kinetic * R1 * np.divide(u, size, out=np.zeros_like(u), where=size != 0)
+        R = R1 * e1 + T
+        turning = a * _cross(e1, T)
+        if f:
+            turning = turning + f * R1 * _cross(ahead, e1)
+        u_rate = np.zeros_like(v) if sticking else along + (1 / m + a * a / J) * T - _dot(e1_rate, u) * e1
+        return np.concatenate([v, turning / J, u_rate], axis=-1), R

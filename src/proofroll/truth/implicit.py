@@ -10,6 +10,7 @@ import numpy as np
 
 from proofroll.core.arrays import FloatArray
 from proofroll.core.errors import Diverged
+from proofroll.elements.ball_on_surface.mechanics import always_pressed
 from proofroll.elements.ball_on_surface.model import RollingBall
 from proofroll.elements.ball_on_surface.motion import Motion
 from proofroll.truth.assemble import classic_step
@@ -19,7 +20,9 @@ from proofroll.truth.crossing import first_rise
 from proofroll.truth.switching import End, Leg
 
 _TOLERANCE = 1e-13  # of a step, relative to the scale of each variable
-_APPROACH = 0.6  # part of the time left until something stands still that one step may take
+_APPROACH = 0.5  # part of the time left until something stands still that one step may take, while it is far,
+_CLOSE = 0.99  # and when it is near, where the time left is well known
+_FURTHER = 1.2  # a polynomial is continued over this part of the length of its own step
 _STILL = 1e-9  # time left, relative to the pace of the motion, that is extrapolated
 
 
@@ -39,6 +42,7 @@ class Implicit:
         self._first = first_step
         self._pace = body.ball.radius / max(float(self._contact.scale[-1]), 1e-300)  # [s]
         self._mu = body.contact.mu_static
+        self._held = always_pressed(body)  # then no step need be searched for a lift-off
 
     def start(self) -> FloatArray:
         """See :class:`Route`."""
@@ -46,7 +50,8 @@ class Implicit:
 
     def excess(self, state: FloatArray) -> float:
         """See :class:`Route`."""
-        return float(self._excess(state[None, :])[0])
+        needed, available = (float(x[0]) for x in self._needed_and_available(state[None, :]))
+        return (needed - available) / max(needed + available, np.finfo(float).tiny)
 
     def ahead(self, state: FloatArray, span: float) -> FloatArray:
         """See :class:`Route`."""
@@ -72,10 +77,13 @@ class Implicit:
             if left < _STILL * self._pace:
                 halted = walk.state + left * self._contact.rates(walk.state[None, :], True)[0]
                 return walk.leg(self, True, walk.time + left, self.nudged(halted, np.zeros(3)), End.HALT)
-            step, length = walk.step(min(length, _APPROACH * left))
-            rise = first_rise(partial(self._excess_along, step), step.time, step.time + step.length)
-            if rise is not None:
-                return walk.leg(self, True, rise, walk.cut(rise), End.CONE)
+            step, length = walk.step(min(length, self._approach(left)))
+            ends = [] if self._held else [(End.LIFTOFF, partial(self._pull_along, step, True))]
+            ends += [(End.CONE, partial(self._excess_along, step))] if np.isfinite(self._mu) else []
+            found = [(first_rise(g, step.time, step.time + step.length), why) for why, g in ends]
+            if ended := [(when, why) for when, why in found if when is not None]:
+                when, why = min(ended, key=lambda item: item[0])
+                return walk.leg(self, True, when, walk.cut(when), why)
         return walk.leg(self, True, until, walk.state, End.TIME)
 
     def slip(self, time: float, state: FloatArray, until: float) -> Leg[FloatArray]:
@@ -92,8 +100,9 @@ class Implicit:
                     break
                 return walk.leg(self, False, walk.time + left, still, End.STILL)
             guess = None if started else self._first_guess(state)
-            step, length = walk.step(min(length, _APPROACH * left), guess)
-            gone = first_rise(partial(self._pull_along, step), step.time, step.time + step.length)
+            step, length = walk.step(min(length, self._approach(left)), guess)
+            pull = partial(self._pull_along, step, False)
+            gone = None if self._held else first_rise(pull, step.time, step.time + step.length)
             if gone is not None:
                 return walk.leg(self, False, gone, walk.cut(gone), End.LIFTOFF)
         return walk.leg(self, False, until, walk.state, End.TIME)
@@ -107,17 +116,18 @@ class Implicit:
         tiny = np.concatenate([state[:6], 1e-100 * self._contact.slip_direction_at_rest(state)])
         return np.asarray(self._contact.force(tiny[None, :], False)[0])
 
-    def _excess(self, y: FloatArray) -> FloatArray:
+    def _needed_and_available(self, y: FloatArray) -> tuple[FloatArray, FloatArray]:
         friction, N = self._contact.split(y, sticking=True)
-        needed, available = np.linalg.norm(friction, axis=-1), self._mu * N
-        return np.asarray((needed - available) / np.maximum(needed + available, np.finfo(float).tiny))
+        return np.linalg.norm(friction, axis=-1), self._mu * N
 
     def _excess_along(self, step: Step, times: FloatArray) -> FloatArray:
-        return self._excess(step(times))
+        """Friction that is missing [N]: smooth also where a step reaches beyond N = 0."""
+        needed, available = self._needed_and_available(step(times))
+        return needed - available
 
-    def _pull_along(self, step: Step, times: FloatArray) -> FloatArray:
+    def _pull_along(self, step: Step, sticking: bool, times: FloatArray) -> FloatArray:
         """-N [N]: rises through zero where the ball leaves the wall."""
-        return -self._contact.split(step(times), False)[1]
+        return -self._contact.split(step(times), sticking)[1]
 
     def _until_still(self, state: FloatArray, sticking: bool) -> float:
         """Time until the centre (sticking) or the contact point (slipping) stands still at the present rate [s]."""
@@ -130,6 +140,10 @@ class Implicit:
         size = float(np.linalg.norm(v))
         slowing = -float(v @ v_rate) / size if size > 0 else 0.0
         return size / slowing if slowing > 0 else np.inf
+
+    def _approach(self, left: float) -> float:
+        """Longest step when so much time is left until something stands still [s]."""
+        return left * float(np.clip(1 - 2 * left / self._pace, _APPROACH, _CLOSE))
 
     def _first_guess(self, state: FloatArray) -> Callable[[float], FloatArray]:
         """States at the nodes of a first step: u = (G t + α t²/2) d, the rest along its tangent."""
@@ -179,18 +193,25 @@ class _Walk:
         # A spin or slip that has grown has round-off of its present size, below which no error can be told.
         sizes = [0.0, *np.linalg.norm(self.state[3:].reshape(2, 3), axis=-1)]
         system = replace(self._system, scale=np.maximum(self._system.scale, np.repeat(sizes, 3)))
+        guess = guess or self._continued
         while True:
             if self.time + length == self.time:
                 raise Diverged(f"the truth (implicit collocation) could not be integrated past {self.time:g} s")
-            step = take(system, self.time, self.state, length, (guess or self._continued)(length))
+            step = take(system, self.time, self.state, length, guess(length))
             wanted = next_length(step, _TOLERANCE)
             if step.error <= _TOLERANCE:
                 self.steps.append(step)
                 return step, wanted
-            length = min(wanted, 0.8 * length)
+            length, guess = min(wanted, 0.8 * length), self._tangent if self.steps else guess
 
     def _continued(self, length: float) -> FloatArray:
-        """Tangent at the end of the last step: safer for Newton's method than the continued polynomial."""
+        """The last step's polynomial, or where it would have to reach too far the tangent at its end."""
+        if not self.steps or length > _FURTHER * self.steps[-1].length:
+            return self._tangent(length)
+        return self.steps[-1](self.time + nodes(length))
+
+    def _tangent(self, length: float) -> FloatArray:
+        """Tangent at the end of the last step: a poorer guess for Newton's method than a polynomial, but safer."""
         rates = self._system.rates(self.state[None, :])[0]
         return np.asarray(self.state + nodes(length)[:, None] * rates)
 

@@ -40,6 +40,7 @@ class Polar:
         self._body = body
         self._handover = handover
         ball = body.ball
+        self._mu_k = body.contact.mu_kinetic if np.isfinite(body.contact.mu_kinetic) else 0.0  # then it never slips
         self._A = (1 + ball.inertia_ratio) / (ball.inertia_ratio * ball.mass)
         pace = np.sqrt(ball.radius * np.linalg.norm(body.gravity)) + np.linalg.norm(body.v0)
         pace = max(float(pace), 1e-300)
@@ -57,9 +58,17 @@ class Polar:
 
     def excess(self, state: FloatArray) -> float:
         """See :class:`Route`."""
-        b, N = self._drive(state)
-        needed, available = float(np.linalg.norm(b)) / self._A, self._body.contact.mu_static * N
+        needed, available = self._needed_and_available(state)
         return (needed - available) / max(needed + available, np.finfo(float).tiny)
+
+    def _needed_and_available(self, state: FloatArray) -> tuple[float, float]:
+        b, N = self._drive(state)
+        return float(np.linalg.norm(b)) / self._A, self._body.contact.mu_static * N
+
+    def _missing(self, state: FloatArray) -> float:
+        """Friction that is missing to stick [N]: smooth also where a step reaches beyond N = 0."""
+        needed, available = self._needed_and_available(state)
+        return needed - available
 
     def ahead(self, state: FloatArray, span: float) -> FloatArray:
         """See :class:`Route`."""
@@ -89,9 +98,8 @@ class Polar:
         cap = (lambda y: _APPROACH * self._until_halt(y)) if resisted else None
         for piece in steps(self._rolling, time, state, until, atol=self._atol[:5], cap=cap):
             pieces.append(piece)
-            rise = self._rise(piece)
-            if rise is not None:
-                return leg(*rise, End.CONE)
+            if ended := self._ended(piece):
+                return leg(*ended)
             left = self._until_halt(piece.last) if resisted else np.inf
             if left < _STILL * self._pace and piece.end < until:
                 halted = piece.last + left * self._rolling(piece.last)
@@ -203,7 +211,7 @@ class Polar:
         spin, speed = a * y[4], float(np.hypot(v[0], v[1]))
         ahead = f * N / (kappa * m * a * speed) * v if f and speed > 0 else np.zeros(2)
         b = np.array([g2 - spin * e1_rate[1], g3 + spin * e1_rate[0]]) + ahead  # e1 × (x, y) = (-y, x)
-        grip = body.contact.mu_kinetic * N
+        grip = self._mu_k * N
         c, s = np.cos(phi), np.sin(phi)
         v_rate = np.array([g2 - grip / m * c, g3 - grip / m * s])
         u_second = inverse @ (v_rate - frame.T[1:] @ (bending @ y[2:4]))
@@ -215,7 +223,7 @@ class Polar:
         """d/dτ of (u, u̇, ω1, ln|u|, φ, t)."""
         size, phi = float(np.exp(y[5])), y[6]
         rates, b, N, turning = self._with_slip(y, size, phi)
-        grip = self._A * self._body.contact.mu_kinetic * N
+        grip = self._A * self._mu_k * N
         c, s = np.cos(phi), np.sin(phi)
         return np.array([*(size * rates), b[0] * c + b[1] * s - grip, b[1] * c - b[0] * s - size * turning, size])
 
@@ -244,8 +252,13 @@ class Polar:
         slowing = -float(v @ v_rate) / speed if speed > 0 else 0.0
         return speed / slowing if slowing > 0 else np.inf
 
-    def _rise(self, piece: Piece) -> tuple[float, FloatArray] | None:
-        return stop(self._rolling, piece, self.excess)
+    def _ended(self, piece: Piece) -> tuple[float, FloatArray, End] | None:
+        """What ends rolling without slip first within a step: time, state and reason."""
+        ends: list[tuple[End, Callable[[FloatArray], float]]] = [(End.LIFTOFF, lambda y: -self._drive(y)[1])]
+        if np.isfinite(self._body.contact.mu_static):
+            ends.append((End.CONE, self._missing))
+        found = [(*when, end) for end, g in ends if (when := stop(self._rolling, piece, g))]
+        return min(found, key=lambda item: item[0], default=None)
 
     def _motion(self, y: FloatArray, size: FloatArray, phi: FloatArray | None) -> Motion:
         frame = self._body.surface.frame(y[:, :2])

@@ -7,15 +7,17 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from proofroll.core.arrays import FloatArray
-from proofroll.core.errors import Diverged
-from proofroll.core.events import Event, EventKind
+from proofroll.core.errors import Refused
+from proofroll.core.events import Event
 from proofroll.core.scene import Scene
 from proofroll.elements.ball_on_surface.dataset import variables
 from proofroll.elements.ball_on_surface.element import rolling_ball
-from proofroll.elements.ball_on_surface.model import RollingBall
+from proofroll.elements.ball_on_surface.events import EventKind
+from proofroll.elements.ball_on_surface.model import BallCapability, RollingBall
 from proofroll.truth import taylor
-from proofroll.truth.error_bars import put_error_bars
+from proofroll.truth.error_bars import SAFETY, put_error_bars
 from proofroll.truth.implicit import Implicit
+from proofroll.truth.orientation import MATRICES, QUATERNIONS, Quadrature, orientation
 from proofroll.truth.polar import Polar
 from proofroll.truth.switching import Path, Route, follow
 
@@ -31,6 +33,11 @@ def first_route(body: RollingBall) -> Route[FloatArray]:
     return taylor.Taylor(body) if taylor.available() and taylor.supports(body) else Polar(body)
 
 
+def stays_on(body: RollingBall, until: float) -> bool:
+    """Whether the ball is on the wall until ``until`` [s], as the first route tells it."""
+    return all(kind != "lift_off" for kind, _ in follow(body, first_route(body), until).events)
+
+
 def stick_slip(scene: Scene, times: FloatArray) -> tuple[xr.Dataset, list[Event]]:
     """The true trajectory and the events, with error bars.
 
@@ -41,10 +48,12 @@ def stick_slip(scene: Scene, times: FloatArray) -> tuple[xr.Dataset, list[Event]
     Returns:
         Dataset as of :func:`trajectory.trajectory`, each variable with the attribute ``error_bar`` in its
         own unit, and ``sticking`` (bool per sample; a sample at an event belongs to what follows); and the events up
-        to the last sample, each with a bracket that holds both routes.
+        to the last sample, each with a bracket that holds both routes. Where the routes disagree about what happens,
+        which they do where it hangs on the last digits of the parameters, the attribute ``ill_posed`` says from when
+        on; the events are those before, and the error bars as large as the difference.
 
     Raises:
-        Diverged: the routes disagree about the order of events, which happens where it hangs on the last digits.
+        Diverged: a route could not be integrated.
         Refused: the ball leaves the wall and lands on it again.
     """
     body = rolling_ball(scene)
@@ -52,30 +61,39 @@ def stick_slip(scene: Scene, times: FloatArray) -> tuple[xr.Dataset, list[Event]
     until = float(times[-1])
     routes: tuple[Route[FloatArray], Route[FloatArray]] = (first_route(body), Implicit(body))
     paths = [follow(body, route, until) for route in routes]
-    events = _events(paths, until)
-    result, check = (_dataset(scene, times, path, route.name) for path, route in zip(paths, routes, strict=True))
+    if paths[0].lands is not None:
+        raise Refused(
+            f"the ball leaves the wall at t = {paths[0].events[-1][1]:.9g} s and lands at t = {paths[0].lands:.9g} s; "
+            "a restitution law would be needed, so end the run before it lands"
+        )
+    events, common = _events(paths, until)
+    result, check = (
+        _dataset(scene, times, path, route.name, quadrature)
+        for path, route, quadrature in zip(paths, routes, (QUATERNIONS, MATRICES), strict=True)
+    )
     put_error_bars(result, check, _FLOOR)
     result.attrs["route"], result.attrs["second_route"] = routes[0].name, routes[1].name
+    if not common:
+        after = events[-1].time if events else 0.0
+        result.attrs["ill_posed"] = (
+            f"ill-posed: what happens after {after:.9g} s hangs on the last digits of the parameters, "
+            "and the two routes to the truth disagree about it"
+        )
     return result, events
 
 
-def _events(paths: list[Path[FloatArray]], until: float) -> list[Event]:
+def _events(paths: list[Path[FloatArray]], until: float) -> tuple[list[Event], bool]:
+    """The events up to the first about which the routes disagree, and whether there is no such."""
     first, second = (path.events for path in paths)
     # An event at the very end may be in one route and just beyond the end in the other: then it is not an event yet.
     first, second = _without_last(first, second, until), _without_last(second, first, until)
-    kinds: list[list[EventKind]] = [[kind for kind, _ in events] for events in (first, second)]
-    if kinds[0] != kinds[1]:
-        common = next((i for i, (a, b) in enumerate(zip(*kinds, strict=False)) if a != b), min(map(len, kinds)))
-        after = first[common - 1][1] if common else 0.0
-        raise Diverged(
-            f"the two routes to the truth disagree about what happens after {after:.9g} s; "
-            "there it hangs on the last digits of the parameters, so change one of them a little"
-        )
     result = []
-    for (kind, time), (_, other) in zip(first, second, strict=True):
-        floor = _FLOOR * time
-        result.append(Event(kind, time, max(min(time, other) - floor, 0.0), max(time, other) + floor))
-    return result
+    for (kind, time), (other_kind, other) in zip(first, second, strict=False):
+        if kind != other_kind:
+            break
+        wide = SAFETY * (abs(time - other) + _FLOOR * time)
+        result.append(Event(kind, time, max(time - wide, 0.0), time + wide))
+    return result, len(result) == len(first) == len(second)
 
 
 def _without_last(
@@ -85,8 +103,12 @@ def _without_last(
     return events[:-1] if at_end else events
 
 
-def _dataset(scene: Scene, times: FloatArray, path: Path[FloatArray], route: str) -> xr.Dataset:
+def _dataset(scene: Scene, times: FloatArray, path: Path[FloatArray], route: str, quadrature: Quadrature) -> xr.Dataset:
     motion, sticking = path.motion(times, route)
-    result = variables(rolling_ball(scene), times, motion.p_WB, motion.v_WB, motion.w_WB, force=motion.force)
+    q_WB = None
+    if BallCapability.ORIENTATION in scene.requires:
+        q_WB = orientation(lambda at: path.motion(at, route)[0], times, [leg.end for leg in path.legs], quadrature)
+    body = rolling_ball(scene)
+    result = variables(body, times, motion.p_WB, motion.v_WB, motion.w_WB, force=motion.force, q_WB=q_WB)
     attributes = {"units": "1", "long_name": "whether the ball sticks (rolls without slip)"}
     return result.assign(sticking=("time", sticking, attributes))

@@ -15,13 +15,19 @@ import numpy as np
 
 from proofroll.core.arrays import FloatArray
 from proofroll.core.errors import Diverged, Refused
-from proofroll.core.events import EventKind
+from proofroll.elements.ball_on_surface.events import EventKind
+from proofroll.elements.ball_on_surface.mechanics import natural_acceleration
 from proofroll.elements.ball_on_surface.model import RollingBall
 from proofroll.elements.ball_on_surface.motion import Motion
 from proofroll.elements.ball_on_surface.resting import setting_off, stands, stays
+from proofroll.truth.crossing import first_rise
 
 # Relative distance from the friction cone below which round-off decides on which side a state is.
 _ON_CONE = 1e-13
+# Normal force at time 0, relative to the natural one, below which the ball is off the wall and not at its round-off.
+_OFF_WALL = 1e-12
+# A ball that leaves the wall is looked for on it from this part of its pace on; its gap has grown from zero till then.
+_LEFT = 1e-3
 # Part of the natural speed at which a ball that goes back and forth ever less is taken to be at rest: it has some 1e-9
 # of the natural time to go, and 1e-18 of the way. Reversals much smaller than that drown in the round-off of the time.
 _AT_REST = 1e-9
@@ -39,7 +45,7 @@ class End(Enum):
     CONE = auto()  # sticking: the needed friction left the static cone
     STILL = auto()  # slipping: the contact point stands still
     HALT = auto()  # sticking with rolling resistance: the centre stands still
-    LIFTOFF = auto()  # slipping: the normal force reached zero
+    LIFTOFF = auto()  # the normal force reached zero
 
 
 @dataclass(frozen=True)
@@ -49,7 +55,7 @@ class Leg(Generic[State]):
     Attributes:
         start, end: [s].
         sticking: the mode.
-        state: at the end; the slip velocity in it is zero unless ``why`` is TIME or LIFTOFF.
+        state: at the end; the slip velocity in it is zero unless the ball slips there.
         why: why it ended.
         motion: times within the leg [s], shape (n,) -> motion at these times.
     """
@@ -98,10 +104,12 @@ class Path(Generic[State]):
     Attributes:
         legs: one after another from time 0.
         events: kind and time [s] of each change.
+        lands: when a ball that has left the wall is back on it [s], where the path ends; None: not until the end.
     """
 
     legs: list[Leg[State]]
     events: list[tuple[EventKind, float]]
+    lands: float | None = None
 
     def motion(self, times: FloatArray, route: str) -> tuple[Motion, np.ndarray[tuple[int], np.dtype[np.bool_]]]:
         """Motion at ``times`` [s] and whether the ball sticks there; a time of an event belongs to the later leg."""
@@ -120,8 +128,7 @@ def follow(body: RollingBall, route: Route[State], until: float) -> Path[State]:
     """Everything from time 0 to ``until`` [s].
 
     Raises:
-        Refused: the ball leaves the wall and comes back to it, for impact is not modelled; or it slips to and fro ever
-            faster.
+        Refused: the ball slips to and fro ever faster.
         Diverged: a route makes no progress.
     """
     legs: list[Leg[State]] = []
@@ -132,6 +139,8 @@ def follow(body: RollingBall, route: Route[State], until: float) -> Path[State]:
         if stays(body, route.world(state)[0]):
             return Path([_rest(body, route, state, time, until)], events)
         state = route.nudged(state, setting_off(body, route.world(state)[0]))
+    if _pressed(body, *route.world(state)[:2]) < -_OFF_WALL * natural_acceleration(body):
+        return _flight(body, route, state, time, until, legs, [("lift_off", time)])
     sticking = not _must_slip(body, route, state)
     if not sticking:
         events.append(("slip", time))
@@ -144,9 +153,8 @@ def follow(body: RollingBall, route: Route[State], until: float) -> Path[State]:
         if leg.why is End.TIME:
             return Path(legs, events)
         if leg.why is End.LIFTOFF:
-            events.append(("liftoff", time))
-            legs.append(_flight(body, route, state, time, until))
-            return Path(legs, events)
+            events.append(("lift_off", time))
+            return _flight(body, route, state, time, until, legs, events)
         if _comes_to_rest(body, route, leg):
             if not sticking:
                 events.append(("stick", time))
@@ -172,6 +180,8 @@ def follow(body: RollingBall, route: Route[State], until: float) -> Path[State]:
 
 def _must_slip(body: RollingBall, route: Route[State], state: State) -> bool:
     """Whether the needed friction is outside the static cone, or on it and about to leave."""
+    if not np.isfinite(body.contact.mu_static):
+        return False
     excess = route.excess(state)
     if abs(excess) > _ON_CONE:
         return excess > 0
@@ -204,20 +214,37 @@ def _rest(body: RollingBall, route: Route[State], state: State, time: float, unt
     return Leg(time, until, True, state, End.TIME, motion)
 
 
-def _flight(body: RollingBall, route: Route[State], state: State, time: float, until: float) -> Leg[State]:
-    """Free fall after the wall was left."""
+def _pressed(body: RollingBall, p_WB: FloatArray, v_WB: FloatArray) -> float:
+    """Normal force over mass that keeps the centre on its surface [m/s²]."""
+    e1, bend = body.surface.normal(p_WB), body.surface.normal_gradient(p_WB)
+    return float(e1 @ body.gravity + v_WB @ bend @ v_WB)
+
+
+def _flight(
+    body: RollingBall,
+    route: Route[State],
+    state: State,
+    time: float,
+    until: float,
+    legs: list[Leg[State]],
+    events: list[tuple[EventKind, float]],
+) -> Path[State]:
+    """The legs so far and free fall from the time at which the wall is left, with constant spin, to the wall again."""
     p, v, w = route.world(state)
 
     def motion(times: FloatArray) -> Motion:
         t = (times - time)[:, None]
         p_WB, v_WB = p + t * v + 0.5 * t**2 * body.gravity, v + t * body.gravity
-        away = body.surface.gap(p_WB)
-        if np.any(away < -1e-9 * body.ball.radius):
-            landed = float(times[np.argmax(away < -1e-9 * body.ball.radius)])
-            raise Refused(
-                f"the ball leaves the wall at {time:.6g} s and is back on it before {landed:.6g} s; "
-                "the truth does not model the impact, so end the run earlier"
-            )
         return Motion(p_WB, v_WB, np.broadcast_to(w, p_WB.shape), np.zeros_like(p_WB), "free flight")
 
-    return Leg(time, until, False, state, End.TIME, motion)
+    def sunk(times: FloatArray) -> FloatArray:
+        return -body.surface.gap(motion(times).p_WB)
+
+    lands = None
+    pace = body.ball.radius / (np.sqrt(body.ball.radius * np.linalg.norm(body.gravity)) + np.linalg.norm(v) or 1.0)
+    start = time + _LEFT * float(pace)
+    while lands is None and start < until:  # the gap is a smooth function of the time since: ever longer looks suffice
+        end = min(time + 2 * (start - time), until)
+        lands, start = first_rise(sunk, start, end), end
+    end = until if lands is None else lands
+    return Path([*legs, Leg(time, end, False, state, End.TIME, motion)], events, lands)

@@ -17,7 +17,8 @@ from proofroll.truth.assemble import classic_step, joined
 from proofroll.truth.switching import End, Leg
 from proofroll.truth.taylor_model import Model, model
 
-# Stop conditions of the slip integrator in the order of its events.
+# Stop conditions of the integrators in the order of their events.
+_STICK_ENDS = (End.LIFTOFF, End.CONE)
 _SLIP_ENDS = (End.STILL, End.TIME, End.LIFTOFF)
 _LARGEST = 1e100  # friction that can still be squared
 _TIME_LIMIT = -(2**32) - 3  # heyoka's taylor_outcome.time_limit
@@ -66,7 +67,8 @@ class Taylor:
         self._scales = np.array(surface.length_scales)
         self._A = (1 + body.ball.inertia_ratio) / body.ball.inertia_ratio
         self._pars = [*parameters(body), *(min(mu, _LARGEST) for mu in (contact.mu_kinetic, contact.mu_static))]
-        self._model: Model = model(resistance=contact.rolling_resistance > 0, uniform=is_uniform(body))
+        bounded = bool(np.isfinite(contact.mu_static))
+        self._model: Model = model(contact.rolling_resistance > 0, is_uniform(body), bounded)
 
     def start(self) -> FloatArray:
         """See :class:`Route`."""
@@ -102,7 +104,7 @@ class Taylor:
         def motion(times: FloatArray) -> Motion:
             return self._motion(run.at(times), np.zeros(len(times)), None)
 
-        return Leg(time, run.end, True, run.last, End.TIME if run.event is None else End.CONE, motion)
+        return Leg(time, run.end, True, run.last, End.TIME if run.event is None else _STICK_ENDS[run.event], motion)
 
     def slip(self, time: float, state: FloatArray, until: float) -> Leg[FloatArray]:
         """See :class:`Route`."""

@@ -23,7 +23,8 @@ class Model:
     """Compiled integrators; each holds a state and must not be shared between threads.
 
     Attributes:
-        stick: (q, h, v2, v3, ω1) against t; stops where the needed friction leaves the static cone.
+        stick: (q, h, v2, v3, ω1) against t; stops where N reaches zero, and where friction is bounded where the needed
+            friction leaves the static cone.
         creep: (q, h, v2, v3, ω1, |u|) against t with the direction of slip slaved to the drive; stops where |u|
             reaches the parameter ``limit`` or comes back to zero.
         slip: (q, h, v2, v3, ω1, ln |u|, φ, t) against τ with dt = |u| dτ; stops where ln |u| falls to ``limit``, where
@@ -44,20 +45,21 @@ class Model:
 _local = threading.local()
 
 
-def model(resistance: bool, uniform: bool) -> Model:
+def model(resistance: bool, uniform: bool, bounded: bool) -> Model:
     """The integrators, compiled once per thread.
 
     Args:
         resistance: with rolling resistance; without it the speed may pass through zero.
         uniform: gravity's local components do not change along the surface.
+        bounded: friction has a bound.
     """
     if not hasattr(_local, "models"):
         _local.models = cache(_compiled)
-    compiled: Model = _local.models(resistance, uniform)
+    compiled: Model = _local.models(resistance, uniform, bounded)
     return compiled
 
 
-def _compiled(resistance: bool, uniform: bool) -> Model:
+def _compiled(resistance: bool, uniform: bool, bounded: bool) -> Model:
     import heyoka as hy
 
     size, y, phi, t = hy.make_vars("size", "y", "phi", "t")
@@ -95,7 +97,10 @@ def _compiled(resistance: bool, uniform: bool) -> Model:
         (t, speed),
     ]
     return Model(
-        stick=integrator(rolling, [hy.t_event(equations.excess(mu_s), direction=up)]),
+        stick=integrator(
+            rolling,
+            [hy.t_event(N, direction=down), *([hy.t_event(equations.excess(mu_s), direction=up)] if bounded else [])],
+        ),
         creep=integrator(
             creeping, [hy.t_event(size - limit, direction=up), hy.t_event(size + 1e-10 * limit, direction=down)]
         ),

@@ -7,7 +7,7 @@ import xarray as xr
 from proofroll.core.events import Event, events_of, with_events
 from proofroll.files.netcdf import read, write
 
-EVENTS = [Event("slip", 1.0, 0.9, 1.1), Event("stick", 2.0, 2.0, 2.0), Event("liftoff", 3.0, 2.5, 3.5)]
+EVENTS = [Event("slip", 1.0, 0.9, 1.1), Event("stick", 2.0, 2.0, 2.0), Event("lift_off", 3.0, 2.5, 3.5)]
 
 
 @pytest.mark.parametrize("events", [EVENTS, []], ids=["three", "none"])

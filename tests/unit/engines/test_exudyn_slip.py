@@ -238,10 +238,12 @@ def test_leaving_the_wall_is_an_event(formulation: str) -> None:
     scene = cylinder(speed=2.5, mu_static=3)
     wall = scene.elements[0].surface
     scene = changed(scene, surface=dataclasses.replace(wall, tilt=1.4))
-    dataset, failure = run(scene, 1.0, formulation=formulation, dt=1e-3)
-    assert failure is not None
-    assert "leaves the wall" in failure
-    assert events_of(dataset)[-1].kind == "liftoff"
+    recording = record(build(scene, "exudyn", formulation=formulation, dt=1e-3), scene, time_grid(1.0, 0.05))
+    dataset = recording.dataset
+    assert recording.failure is None
+    assert recording.ended is not None
+    assert "leaves the wall" in recording.ended
+    assert events_of(dataset)[-1].kind == "lift_off"
     assert float(dataset.N.min()) > 0
 
 

@@ -244,15 +244,15 @@ def test_sampling_and_rebuilding_change_nothing(engine: str) -> None:
 
 
 @pytest.mark.parametrize("engine", [*TUNED, "formulation=chart", "formulation=free", "formulation=free,preset=default"])
-def test_flight_is_one_liftoff(engine: str) -> None:
-    """A ball that falls off a leaning wall has one liftoff, no stick or slip in the air, and events after it lands."""
+def test_flight_is_one_lift_off(engine: str) -> None:
+    """A ball that falls off a leaning wall has one lift-off, no stick or slip in the air, and events after it lands."""
     scene = load_scene(CYLINDER, mu_static=0.8, speed=2.0)
     leaning = changed(scene, surface=Cylinder("wall", scene.elements[0].surface.radius, tilt=1.2))
     true = events_of(simulate(leaning, "truth", until=0.3, every=0.05))
-    assert [event.kind for event in true] == ["slip", "liftoff"]
+    assert [event.kind for event in true] == ["slip", "lift_off"]
     ds = record(build(leaning, f"mujoco[{engine}]"), leaning, time_grid(0.6, 0.01)).dataset
     events = events_of(ds)
-    left = [event for event in events if event.kind == "liftoff"]
+    left = [event for event in events if event.kind == "lift_off"]
     assert len(left) == 1
     # What MuJoCo's cone lifts leaves early, and what its default contact lets sink leaves late.
     assert left[0].time == pytest.approx(true[1].time, abs=2e-3 if engine in TUNED else 2.5e-2)
@@ -261,13 +261,13 @@ def test_flight_is_one_liftoff(engine: str) -> None:
     assert not ds.sticking.where((ds.time > 0.28) & (ds.time < 0.5), drop=True).any()
 
 
-def test_hops_are_not_liftoffs() -> None:
+def test_hops_are_not_lift_offs() -> None:
     """A contact that chatters slips all the while it does, 25 steps at a time without a force: nothing else is told."""
     for engine in ("formulation=chart", "formulation=free"):
         ds = run("blajer", engine)
         # After 3.7 s the free ball is thrown 40 mm off the wall, more than its radius: those are flights.
         before = [event for event in events_of(ds) if event.time < 3.0]
-        assert "liftoff" not in {event.kind for event in before}
+        assert "lift_off" not in {event.kind for event in before}
         assert before[-1].kind == "slip"
         assert before[-1].time < 2.5
         assert float(ds.N.where((ds.time > 2.5) & (ds.time < 3.0)).min()) == 0.0

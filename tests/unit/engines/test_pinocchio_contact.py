@@ -180,7 +180,7 @@ def test_leaving_the_wall() -> None:
     scene = leaning_cylinder(1.2, mu_static=0.35, speed=2)
     result = simulate(scene, "pinocchio[formulation=contact]", until=0.4, every=0.01)
     kinds = [event.kind for event in events_of(result)]
-    assert "liftoff" in kinds
+    assert "lift_off" in kinds
     flying = (result.N == 0) & (result.gap > 1e-4)
     assert int(flying.sum()) > 3
 

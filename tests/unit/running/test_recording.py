@@ -1,5 +1,6 @@
 from __future__ import annotations
 
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
@@ -8,7 +9,9 @@ from hostile import GivesUp, HostileSettings, NotANumber, Oracle
 
 from proofroll.core.engine import Sample
 from proofroll.core.errors import Diverged, InputError
+from proofroll.core.events import Event
 from proofroll.core.scene import Scene
+from proofroll.elements.ball_on_surface.events import lift_off
 from proofroll.files.scene_file import load_scene
 from proofroll.running.recording import off_grid, record, time_grid
 
@@ -144,3 +147,29 @@ def test_times_off_the_grid() -> None:
             assert found / step == pytest.approx(np.round(found / step), abs=1e-6)
     assert off_grid(times, 0.02).size == 0, "no whole step ends between"
     assert off_grid(times[:5], None).size == 0, "too few samples for a curve"
+
+
+def test_what_counts_as_lift_off() -> None:
+    """A wall that pulls, or does not press for 10 ms, has lost the ball; a hop, time 0 and silence do not count."""
+    times = (0.004 * np.arange(8)).tolist()
+    pulls = lift_off(times, [1, 3, 2, 1, -1, 5, 5, 5], 1e-6)
+    assert pulls == Event("lift_off", pytest.approx(0.014), times[3], times[4])
+    rests = lift_off(times, [1, 3, 2, 0, 0, 0, 0, 5], 1e-6)
+    assert rests == Event("lift_off", pytest.approx(0.01), times[2], times[3])
+    assert lift_off(times, [1, 3, 2, 0, 0, 0, 5, 5], 1e-6) is None
+    assert lift_off(times, [-1, 3, 2, 1, 1, 1, 5, 5], 1e-6) is None
+    assert lift_off(times, [np.nan] * 8, 1e-6) is None
+
+
+def test_where_nothing_can_lift_the_ball_a_pull_is_no_lift_off(sphere: Scene) -> None:
+    """In an upright cylinder a wall that pulls is an engine's error, and its run goes on to show it."""
+
+    class Pulls(Oracle):
+        def sample(self) -> Sample:
+            right = super().sample()
+            return replace(right, force=-np.asarray(right.force) if self.t > 0.2 else right.force)
+
+    recording = record(Pulls.build(sphere, HostileSettings()), sphere, time_grid(0.5, 0.1))
+    assert (recording.failure, recording.ended) == (None, None)
+    assert recording.dataset.sizes["time"] == 6
+    assert recording.dataset.attrs["smallest_N"] < 0

@@ -94,9 +94,9 @@ def test_runs_that_ended_early(status: Status, message: str, failure: str, silen
     assert (outcome.failure, outcome.silent, outcome.stable, outcome.accurate) == (failure, silent, False, False)
 
 
-def test_a_liftoff_that_ends_a_run() -> None:
+def test_a_lift_off_that_ends_a_run() -> None:
     """An engine that stops because the ball leaves the wall has said so, and that is what happened."""
-    dataset = with_events(run(upto=6), [Event("liftoff", 0.3, 0.2, 0.3)])
+    dataset = with_events(run(upto=6), [Event("lift_off", 0.3, 0.2, 0.3)])
     outcome = judge(Result(Status.DIVERGED, "the ball leaves the wall"), dataset, YARDSTICK)
     assert (outcome.failure, outcome.silent) == ("left the surface", False)
 

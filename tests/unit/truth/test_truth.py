@@ -207,7 +207,7 @@ def test_error_bar_shows_a_wrong_route(monkeypatch: pytest.MonkeyPatch) -> None:
 
     module = sys.modules[truth.__module__]  # the package has a function of the same name
     monkeypatch.setattr(module, "_unreduced", shifted)
-    assert truth(scene, t)["down"].attrs["error_bar"] == pytest.approx(1e-3 * np.cos(0.35), rel=1e-6)
+    assert truth(scene, t)["down"].attrs["error_bar"] == pytest.approx(3 * 1e-3 * np.cos(0.35), rel=1e-6)
     assert honest < 1e-12
 
 

@@ -114,7 +114,14 @@ def variables(
     return xr.Dataset(
         found,
         coords={"time": ("time", times, {"units": "s"}), "xyz": ["x", "y", "z"], "wxyz": ["w", "x", "y", "z"]},
+        attrs=_smallest(found),
     )
+
+
+def _smallest(variables: Mapping[str, tuple[tuple[str, ...], FloatArray, dict[str, str]]]) -> dict[str, float]:
+    """``smallest_N``, the least normal force at the samples [N], without time 0 (where several engines know none)."""
+    found = variables["N"][1] if "N" in variables else np.zeros(0)
+    return {"smallest_N": float(np.min(found[1:] if len(found) > 1 else found))} if len(found) else {}
 
 
 def _coordinate_rates(surface: Surface, p_WB: FloatArray, v_WB: FloatArray) -> FloatArray:

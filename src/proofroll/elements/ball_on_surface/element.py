@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from proofroll.core.arrays import FloatArray
-from proofroll.core.element import FailedRun, FirstMotion, OptionalTerm, Sign, StepNumber
+from proofroll.core.element import FailedRun, FirstMotion, OptionalTerm, RunWatch, Sign, StepNumber
 from proofroll.core.engine import Sample
 from proofroll.core.errors import Refused
 from proofroll.core.gravity import Gravity
@@ -168,6 +168,20 @@ class BallOnSurface:
 
         return from_samples(self.rolling, times, samples, between)
 
+    def watch(self, asks: Sequence[str]) -> RunWatch:  # noqa: ARG002 -- the protocol's
+        """See :class:`proofroll.core.element.WatchesRuns`."""
+        from proofroll.elements.ball_on_surface.events import Watch
+
+        return Watch(self.rolling)
+
+    def common_span(
+        self, truth: xr.Dataset, runs: Mapping[Any, xr.Dataset]
+    ) -> tuple[xr.Dataset, dict[Any, xr.Dataset]]:
+        """See :class:`proofroll.core.element.WatchesRuns`."""
+        from proofroll.elements.ball_on_surface.events import common_span
+
+        return common_span(truth, runs)
+
     def lacks(self, samples: Sequence[Sample], asks: Sequence[str]) -> str | None:
         """See the protocol."""
         if BallCapability.BOUNDED_FRICTION in self.requires and any(sample.sticking is None for sample in samples):
@@ -200,6 +214,13 @@ class BallOnSurface:
         from proofroll.elements.ball_on_surface.failure import MEANINGS
 
         return MEANINGS
+
+    @property
+    def failing_events(self) -> Mapping[str, str]:
+        """See the protocol."""
+        from proofroll.elements.ball_on_surface.failure import LEFT
+
+        return {"lift_off": LEFT}
 
     def signs(self, dataset: xr.Dataset, truth: xr.Dataset | None) -> list[Sign]:
         """See the protocol."""

@@ -37,6 +37,24 @@ def energy(body: RollingBall, p_WB: FloatArray, v_WB: FloatArray, w_WB: FloatArr
     return np.asarray(kinetic - m * p_WB @ body.gravity)
 
 
+def always_pressed(body: RollingBall) -> bool:
+    """Whether the wall presses the ball wherever its centre is and however fast: then nothing can lift it off.
+
+    N / m = e1 · g + v · (∂e1/∂p) v: so it is where no normal points against gravity and the wall nowhere bends away.
+    Looked at around the surface's periodic coordinates; along the others it is taken to be the same everywhere.
+    """
+    around = [np.zeros(1) if period is None else np.linspace(0, period, 64) for period in body.surface.periods]
+    p_WB = body.surface.position(body.u0 + np.stack(np.meshgrid(*around), axis=-1).reshape(-1, 2))
+    gravity, bends = body.surface.normal(p_WB) @ body.gravity, np.linalg.eigvalsh(body.surface.normal_gradient(p_WB))
+    round_off = 1e-12 * float(np.linalg.norm(body.gravity))
+    return bool(np.min(gravity) >= -round_off and np.min(bends) >= -1e-12 * max(float(np.max(bends)), 1.0))
+
+
+def normal_force(body: RollingBall, p_WB: FloatArray, force: FloatArray) -> FloatArray:
+    """N [N], shape (...), of the wall's force on the ball [N], shape (..., 3)."""
+    return np.asarray(-np.sum(force * body.surface.normal(p_WB), axis=-1))
+
+
 def natural_acceleration(body: RollingBall) -> float:
     """What accelerations, and times the mass forces, are measured by at time 0: max(g, |p̈|) [m/s²], never zero.
 

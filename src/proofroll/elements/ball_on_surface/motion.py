@@ -26,6 +26,10 @@ class Motion:
     force: FloatArray
     route: str
 
+    def at(self, which: slice) -> Motion:
+        """The same at some of the times."""
+        return Motion(self.p_WB[which], self.v_WB[which], self.w_WB[which], self.force[which], self.route)
+
 
 def world_motion(
     body: RollingBall,

@@ -110,10 +110,10 @@ def observe(body: RollingBall, dataset: xr.Dataset) -> dict[str, FloatArray]:
         rates = rate_audit(body, dataset)
         if rates.size:
             curves["rate_audit"] = rates
+    if "event_kind" in dataset:
+        curves["event_times"] = np.array([event.time for event in events_of(dataset)])
     if "sticking" in dataset:
-        events = events_of(dataset)
-        curves["first_slip"] = np.array([event.time for event in events if event.kind == "slip"][:1])
-        curves["event_times"] = np.array([event.time for event in events])
+        curves["first_slip"] = np.array([event.time for event in events_of(dataset) if event.kind == "slip"][:1])
         curves["creep"] = np.array([_creep(curves["slip"], dataset)])
     return curves
 

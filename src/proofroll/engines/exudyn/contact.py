@@ -18,7 +18,8 @@ import numpy as np
 from proofroll.core.arrays import FloatArray
 from proofroll.core.engine import Built, Regularised, Sample
 from proofroll.core.errors import Refused
-from proofroll.core.events import Event, EventKind
+from proofroll.core.events import Event
+from proofroll.elements.ball_on_surface.events import EventKind
 from proofroll.elements.ball_on_surface.mechanics import natural_acceleration, newton_euler
 from proofroll.elements.ball_on_surface.model import BallCapability, RollingBall
 from proofroll.engines.exudyn.ball import add_ball
@@ -33,6 +34,9 @@ ON_A_PLANE = 10.0
 # The ball slips once it has left the friction zone and is this many times as fast as its edge: at a grazing onset the
 # time steps throw the slip velocity to and fro across the edge itself.
 SURELY = 2.0
+# Part of the natural force [-]: a ball that presses less, of which rolling needs more friction than a grip gives, is
+# about to leave the wall, where a ball that sticks by whatever friction would leave it hardly later.
+LETTING_GO = 0.01
 # Looked up once: the functions that Exudyn calls ask for them at every iterate and step.
 POSITION, COORDINATES = Output.Position, Output.Coordinates
 # What double precision leaves of any quantity, relative to its scale.
@@ -48,6 +52,7 @@ class Contact:
         if law.mu_static != law.mu_kinetic:
             raise Refused("its contact has one coefficient of friction; make mu_kinetic equal to mu_static")
         self.bounded = math.isfinite(law.mu_static)
+        self._natural = body.ball.mass * natural_acceleration(body)
         stiffness, self.zone, self._grip = settings.penalty
         mu = law.mu_kinetic if self.bounded else self._grip
         e1 = body.surface.frame(body.u0)[:, 0]
@@ -109,7 +114,7 @@ class Contact:
             return True
         gap, speed, _, _ = system.GetNodeOutput(self.data, COORDINATES).tolist()
         if gap > 0:
-            self._events.append(Event("liftoff", 0.5 * (self._t + t), self._t, t))
+            self._events.append(Event("lift_off", 0.5 * (self._t + t), self._t, t))
             self.integration.complaint = "the ball leaves the wall"
             return False
         slip = speed / self.zone
@@ -127,10 +132,19 @@ class Contact:
 
     def _switch(self, kind: EventKind, low: float, high: float) -> None:
         if not self.bounded:
+            # Friction of any bound slips before the ball leaves the wall: not the grip's fault where nothing presses.
+            if self._pressing() < LETTING_GO * self._natural:
+                self._sticks = False
+                return
             self.integration.complaint = "the ball slips, as rolling needs more friction than grip (use a larger grip),"
             return
         self._events.append(Event(kind, 0.5 * (low + high), low, high))
         self._sticks, self._left = kind == "stick", None
+
+    def _pressing(self) -> float:
+        """N [N] of a ball that slips."""
+        force = np.asarray(self.system.GetObjectOutput(self.contact, Output.Force))
+        return float(np.linalg.norm(force)) / math.hypot(1.0, self._grip)
 
     def events(self) -> list[Event]:
         """Stick and slip so far, each between two steps."""

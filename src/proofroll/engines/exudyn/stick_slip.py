@@ -16,7 +16,8 @@ from scipy.optimize import brentq
 from proofroll.core.arrays import FloatArray
 from proofroll.core.engine import whole_steps
 from proofroll.core.errors import Diverged
-from proofroll.core.events import Event, EventKind
+from proofroll.core.events import Event
+from proofroll.elements.ball_on_surface.events import EventKind
 from proofroll.elements.ball_on_surface.model import RollingBall
 from proofroll.engines.exudyn.friction import Touch, mobility, slip_direction
 from proofroll.engines.exudyn.integration import Integration
@@ -106,7 +107,7 @@ class StickSlip:
             if self.sticking and not self._stopped:
                 self.state = self._state(exu.ConfigurationType.Current)
             if self.state.touch.N <= 0:
-                self.events.append(Event("liftoff", 0.5 * (self._before_t + self.t), self._before_t, self.t))
+                self.events.append(Event("lift_off", 0.5 * (self._before_t + self.t), self._before_t, self.t))
                 raise Diverged(f"the ball leaves the wall at {self.t:g} s")
             if self._stopped:
                 self._divide()

@@ -10,7 +10,8 @@ import mujoco
 import numpy as np
 
 from proofroll.core.errors import Refused
-from proofroll.core.events import Event, EventKind
+from proofroll.core.events import Event
+from proofroll.elements.ball_on_surface.events import EventKind
 from proofroll.elements.ball_on_surface.model import Contact, RollingBall
 from proofroll.engines.mujoco.settings import LARGEST_PYRAMIDAL_FRICTION, PRELOAD, MujocoSettings
 
@@ -58,7 +59,7 @@ class BoundedFriction:
     (``correct``): hops of up to 0.05 s, be it 50 steps of 1e-3 s or 130 of 2.5e-4 s, so that no number of steps tells a
     hop from a flight; the distance does, for a hop is a fraction of the radius high. What was before a hop goes on
     after it, unless the ball comes back otherwise. A loss that takes the ball further than its radius from the wall is
-    a liftoff: one event, at the beginning of the loss.
+    a lift-off: one event, at the beginning of the loss.
 
     Attributes:
         sticking: whether the last step with a normal force began with a force inside the cone.
@@ -81,7 +82,7 @@ class BoundedFriction:
         self._settings = settings
         self._steps = 0
         self._lost: int | None = None  # first of the steps without a normal force that have not ended
-        self._flies = False  # whether these were told as a liftoff
+        self._flies = False  # whether these were told as a lift-off
         self._events: list[Event] = []
         self._wrench = np.zeros(6)
         self._force = self._wrench[:3]
@@ -126,7 +127,7 @@ class BoundedFriction:
             self._lost = self._steps
         if not self._flies and float(self._surface.gap(data.xpos[self._ball])) > self._radius:
             self._flies = True
-            self._change(False, self._event(self._lost, "liftoff"))
+            self._change(False, self._event(self._lost, "lift_off"))
 
     def _presses(self, data: Any) -> bool:
         """Whether there is a contact with a normal force; the force goes to ``self._wrench``."""

@@ -96,7 +96,7 @@ class Pinocchio:
         return self._run.sample()
 
     def events(self) -> Sequence[Event]:
-        """See :class:`proofroll.core.engine.LocatesEvents`; none with unbounded friction."""
+        """See :class:`proofroll.core.engine.LocatesEvents`."""
         return self._run.events()
 
     def built(self) -> Built:

@@ -16,7 +16,8 @@ import pinocchio as pin
 from proofroll.core.arrays import FloatArray
 from proofroll.core.engine import whole_steps
 from proofroll.core.errors import Diverged, Refused
-from proofroll.core.events import Event, EventKind
+from proofroll.core.events import Event
+from proofroll.elements.ball_on_surface.events import EventKind
 from proofroll.elements.ball_on_surface.model import RollingBall
 from proofroll.engines.pinocchio.plane_contact import PlaneContact
 from proofroll.engines.pinocchio.settings import PinocchioSettings
@@ -38,7 +39,7 @@ class Kick(NamedTuple):
         v: joint velocity after it, shape (6,).
         impulse: along the axes of the plane [N s], shape (3,).
         normal_force: mean of it over the span of the kick [N].
-        status: ``stick``, ``slip``, or ``liftoff`` where the wall does not press.
+        status: ``stick``, ``slip``, or ``lift_off`` where the wall does not press.
     """
 
     v: FloatArray
@@ -185,7 +186,7 @@ class ContactSteps:
         F2, F3, N = impulse.tolist()
         if not self._faint < N:
             # a plane does not press before the ball has moved into it
-            return impulse, N, "liftoff" if self._pressed else self._status
+            return impulse, N, "lift_off" if self._pressed else self._status
         if math.hypot(F2, F3) < _ON_CONE * mu * N:
             return impulse, N, "stick"
         if not self.bounded:

@@ -11,6 +11,7 @@ from scipy.integrate import DOP853
 from proofroll.core.arrays import FloatArray
 from proofroll.core.engine import whole_steps
 from proofroll.core.errors import Diverged
+from proofroll.core.events import Event
 from proofroll.engines.pinocchio.mechanism import Mechanism, left_the_wall
 from proofroll.engines.pinocchio.settings import PinocchioSettings
 
@@ -20,10 +21,12 @@ class Integrator(Protocol):
 
     Attributes:
         q, v: joint configuration and velocity now.
+        left: that the ball left the wall, which ended the run, or None.
     """
 
     q: FloatArray
     v: FloatArray
+    left: Event | None
 
     @property
     def turns(self) -> bool:
@@ -65,6 +68,7 @@ class FixedStep:
         self._moving = _moving(mechanism, settings)
         self._dt = float(settings.dt or 0.0)
         self._start: FloatArray | None = None
+        self.left: Event | None = None
         self.q, self.v = mechanism.q0.copy(), mechanism.v0.copy()
 
     @property
@@ -90,6 +94,7 @@ class FixedStep:
         """Acceleration at the end of a step, with which the next one starts; ends the run if the wall would pull."""
         acceleration = self._acceleration(self.q, self.v)
         if self._mechanism.normal_force(self._data) < -self._mechanism.faint:
+            self.left = Event("lift_off", time - 0.5 * self._dt, time - self._dt, time)
             raise left_the_wall(f"before {time:.6g} s")
         return acceleration
 
@@ -166,6 +171,7 @@ class Adaptive:
         self._atol = 1e-2 * self._rtol * np.concatenate([mechanism.q_scale[: self._places], mechanism.v_scale])
         self._turning_time = mechanism.q_scale[0] / mechanism.v_scale[0]
         self._solver: Any = None
+        self.left: Event | None = None
         self._short_steps = 0
         self.q, self.v = mechanism.q0.copy(), mechanism.v0.copy()
         self._q = mechanism.q0.copy()
@@ -222,6 +228,7 @@ class Adaptive:
                     self._put_back(solver)
                 # The rates that were found last are those at the end of the step, with projection or without.
                 if self._mechanism.normal_force(self._data) < -self._mechanism.faint:
+                    self.left = Event("lift_off", 0.5 * (solver.t_old + solver.t), solver.t_old, solver.t)
                     raise left_the_wall(f"before {solver.t:.6g} s")
         except np.linalg.LinAlgError as error:
             raise Diverged(f"the equations became singular between {start:g} s and {end:g} s ({error})") from None

@@ -55,8 +55,10 @@ class RowsRun:
         )
 
     def events(self) -> tuple[Event, ...]:
-        """See :class:`proofroll.core.engine.LocatesEvents`; none with unbounded friction."""
-        return tuple(self.motion.events) if isinstance(self.motion, StickSlip) else ()
+        """See :class:`proofroll.core.engine.LocatesEvents`; with unbounded friction there is but leaving the wall."""
+        if isinstance(self.motion, StickSlip):
+            return tuple(self.motion.events)
+        return () if self.motion.left is None else (self.motion.left,)
 
     def built(self) -> Built:
         """See :class:`proofroll.core.engine.Engine`: from the model, and from its rows and torques at the state now."""

@@ -18,7 +18,8 @@ import numpy as np
 
 from proofroll.core.arrays import FloatArray
 from proofroll.core.errors import Diverged
-from proofroll.core.events import Event, EventKind
+from proofroll.core.events import Event
+from proofroll.elements.ball_on_surface.events import EventKind
 from proofroll.elements.ball_on_surface.model import Contact
 from proofroll.engines.pinocchio.crossing import located
 from proofroll.engines.pinocchio.integrators import Adaptive
@@ -269,7 +270,7 @@ class AdaptiveStickSlip(Adaptive):
         lift = located(solver, lambda y: -self._normal_force(y), -before, -after, self._span)
         time, width = lift[:2] if lift is not None else (float(solver.t), float(solver.step_size))
         if stop is None or time <= stop[0]:
-            self._record("liftoff", time, width)
+            self._record("lift_off", time, width)
             raise left_the_wall(f"at {time:.6g} s")
 
     def _switch(self, time: float, width: float, y: FloatArray) -> float:

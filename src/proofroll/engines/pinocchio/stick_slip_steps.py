@@ -76,7 +76,7 @@ class FixedStickSlip(FixedStep):
         low = max(time - self._dt, 0.0)
         best = low + (time - low) * before / (before - normal_force) if before > 0 else low
         best = max([best, *(event.time for event in self.events[-1:])])  # after the slip that comes with it
-        self.events.append(Event("liftoff", best, low, time))
+        self.events.append(Event("lift_off", best, low, time))
         raise left_the_wall(f"at {best:.6g} s")
 
     def _stick_if_it_can(self, time: float) -> None:

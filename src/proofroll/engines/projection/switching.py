@@ -10,7 +10,8 @@ from scipy.optimize import brentq
 
 from proofroll.core.arrays import FloatArray
 from proofroll.core.errors import Diverged
-from proofroll.core.events import Event, EventKind
+from proofroll.core.events import Event
+from proofroll.elements.ball_on_surface.events import EventKind
 from proofroll.engines.projection.friction import Friction
 from proofroll.engines.projection.modes import Exit, Mode, Pace, Survey
 from proofroll.engines.projection.slipping import FreeSlip, SlavedSlip
@@ -200,7 +201,7 @@ class Switching:
         elif exit_ is Exit.CHANGE:
             self._enter(self._free, high, self._slaved.freed(y))
         elif exit_ is Exit.LIFTOFF:
-            self._event("liftoff", low, high)
+            self._event("lift_off", low, high)
             self._enter(self.mode, high, y)
             self._lost = f"the ball leaves the wall at t = {high:.6g} s; its flight is not modelled"
             raise Diverged(self._lost)

@@ -35,7 +35,7 @@ SMOOTH_TURN, WIDEST_TURN = 1.2, 2.5
 _SUBSTEPS = 4
 
 SLIPS, STICKS, AWAY = 0, 1, 2
-_AFTER = {"slip": SLIPS, "stick": STICKS, "liftoff": AWAY}
+_AFTER = {"slip": SLIPS, "stick": STICKS, "lift_off": AWAY}
 
 
 @dataclass(frozen=True)

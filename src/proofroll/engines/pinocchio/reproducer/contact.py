@@ -49,7 +49,7 @@ def solve(delassus, at_contact):
         if coefficient == mu:
             status = "slip" if friction >= mu * press * (1 - 1e-9) else "stick"
             if not press > FAINT * STEP_SIZE:
-                status = "liftoff"
+                status = "lift_off"
         if status != "slip" or KINETIC == mu:
             break
     if status == "slip" and not BOUNDED:
@@ -90,7 +90,7 @@ def kick(q, v, span, centred):
         N = found
         if centred:
             moving = (v + after)[:3] / 2
-    if status == "liftoff" and not contact["pressed"]:
+    if status == "lift_off" and not contact["pressed"]:
         status = contact["status"]  # a plane does not press before the ball has moved into it
     return after, {"status": status, "N": found, "pressed": contact["pressed"] or bool(impulse.any())}
 

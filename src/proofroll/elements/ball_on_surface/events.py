@@ -1,0 +1,133 @@
+"""What happens to a ball on a wall: it begins to slip, sticks again, leaves the wall."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Hashable, Mapping, Sequence
+from typing import TYPE_CHECKING, Literal, TypeVar
+
+import numpy as np
+
+from proofroll.core.arrays import FloatArray
+from proofroll.core.element import SeenInRun
+from proofroll.core.engine import Sample
+from proofroll.core.events import Event, events_of
+from proofroll.elements.ball_on_surface.mechanics import always_pressed, natural_acceleration, normal_force
+from proofroll.elements.ball_on_surface.model import RollingBall
+
+if TYPE_CHECKING:
+    import xarray as xr
+
+EventKind = Literal["slip", "stick", "lift_off"]  # slip begins; it sticks again; the normal force reached zero
+
+# How long a wall must not press before that is a flight [s]: soft and corrected contacts let a ball hop for less.
+_FLIGHT = 0.01
+# Normal force, relative to the natural one, that is round-off or what a solver's tolerance leaves.
+_FAINT = 1e-6
+# What there is on the wall only.
+_ON_WALL = ("N", "F2", "F3", "needed_friction", "slip2", "slip3", "slip", "gap")
+
+Key = TypeVar("Key", bound=Hashable)
+
+
+class Watch:
+    """Looks for slip and for lift-off, after which a model that holds the ball is another one than the scene.
+
+    See :class:`proofroll.core.element.RunWatch`.
+    """
+
+    def __init__(self, body: RollingBall) -> None:
+        self._body, self._leaves = body, not always_pressed(body)
+        self._faint = _FAINT * body.ball.mass * natural_acceleration(body)
+
+    def over(self, sample: Sample) -> bool:
+        """Whether the wall pulls."""
+        return self._leaves and self._press(sample) < -self._faint
+
+    def conclude(self, times: FloatArray, samples: Sequence[Sample], located: Sequence[Event] | None) -> SeenInRun:
+        """The events, and how many samples are of the scene."""
+        at, kept, ended = times.tolist(), len(samples), None
+        events = list(located or ())
+        left = next((event for event in events if event.kind == "lift_off"), None)
+        if self._leaves:
+            pressed = [self._press(sample) for sample in samples]
+            if left is None and (left := lift_off(at[:kept], pressed, self._faint)) is not None:
+                events.append(left)
+            if pressed[-1] < -self._faint and kept > 1:
+                kept -= 1
+            # Not where it fails later, in flight
+            if left is not None and kept < len(at) and left.time_high >= at[kept - 1]:
+                ended = f"the ball leaves the wall at t = {left.time:.6g} s, where this run ends: "
+                ended += "the model does not let go"
+        sticking = [sample.sticking for sample in samples[:kept]]
+        if any(value is None for value in sticking):
+            return SeenInRun(kept, [left] if left is not None else None, ended)
+        if located is None:
+            events = [*between_samples(at, [bool(value) for value in sticking]), *events]
+        return SeenInRun(kept, sorted(events, key=lambda event: event.time), ended)
+
+    def _press(self, sample: Sample) -> float:
+        """N [N]; NaN where the engine gives no force."""
+        if sample.force is None:
+            return math.nan
+        return float(normal_force(self._body, np.reshape(sample.p_WB, 3), np.reshape(sample.force, 3)))
+
+
+def between_samples(times: Sequence[float], sticking: Sequence[bool]) -> list[Event]:
+    """Events as the samples tell them: somewhere between two samples [s] of which one sticks and the other slips."""
+    return [
+        Event("stick" if after else "slip", 0.5 * (low + high), low, high)
+        for before, after, low, high in zip(sticking, sticking[1:], times, times[1:], strict=False)
+        if before != after
+    ]
+
+
+def lift_off(times: Sequence[float], N: Sequence[float], faint: float) -> Event | None:
+    """When the ball leaves the wall as samples tell it, between two of them; None: it does not.
+
+    It has left where the wall would have to pull, or where for a hundredth of a second it does not press.
+
+    Args:
+        times: of the samples [s].
+        N: normal force there [N]; that at time 0, which several engines do not know, does not count.
+        faint: normal force that is round-off [N].
+    """
+    pressed = 0
+    for index in range(1, len(times)):
+        if not N[index] <= faint:  # also where nobody knows
+            pressed = index
+        elif N[index] < -faint or times[index] - times[pressed + 1] >= _FLIGHT * (1 - 1e-9):
+            low, high = times[pressed], times[pressed + 1]
+            before, after = N[pressed], N[pressed + 1]
+            part = before / (before - after) if after < 0 < before else 0.5
+            return Event("lift_off", low + part * (high - low), low, high)
+    return None
+
+
+def left_at(dataset: xr.Dataset) -> float:
+    """When the ball first leaves the wall [s]; inf: it does not."""
+    return min((event.time for event in events_of(dataset) if event.kind == "lift_off"), default=math.inf)
+
+
+def common_span(truth: xr.Dataset, runs: Mapping[Key, xr.Dataset]) -> tuple[xr.Dataset, dict[Key, xr.Dataset]]:
+    """The truth and the runs up to the end of the shortest, and what is on the wall up to the first lift-off of any.
+
+    A model that holds the ball on the wall ends its run where the ball leaves it. That is no fault where the truth's
+    ball leaves the wall too, no more than one sample later; a run that ends before is left too short, and differs.
+    """
+    leaves, true = left_at(truth), truth["time"].to_numpy()
+    if not np.isfinite(leaves):
+        return truth, dict(runs)
+    fewest = int(np.searchsorted(true, leaves)) - 1  # samples on the wall, less one
+    count = min([len(true), *(run.sizes["time"] for run in runs.values() if run.sizes["time"] >= fewest)])
+    until = min([leaves, *(left_at(run) for run in runs.values())])
+
+    def cut(dataset: xr.Dataset) -> xr.Dataset:
+        short = dataset.isel(time=slice(count))
+        there = [name for name in _ON_WALL if name in short]
+        on_wall = {
+            name: short[name].where(short["time"] < until, 0.0).assign_attrs(short[name].attrs) for name in there
+        }
+        return short.assign(on_wall)
+
+    return cut(truth), {key: cut(run) for key, run in runs.items()}

@@ -1,0 +1,92 @@
+"""The ball's orientation from its spin over time, by two quadratures that share nothing: one for each route.
+
+The orientation R(t) from the ball's axes to the world's obeys Ṙ = [ω]× R, and as a quaternion q̇ = (0, ω) q / 2, with
+the identity at time 0. Both quadratures take steps between the kinks of the spin and multiply what each step turns.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterable
+
+import numpy as np
+from scipy.spatial.transform import Rotation
+
+from proofroll.core.arrays import FloatArray
+from proofroll.elements.ball_on_surface.motion import Motion
+from proofroll.truth import collocation
+
+# Turn of the ball within one step [rad], so small that a step's error is that of the spin itself.
+_TURN = 2.0
+_IDENTITY = np.array([1.0, 0.0, 0.0, 0.0])
+
+# A quadrature: nodes in (0, 1), and quaternions (n, 4) from lengths of steps [s], (n,), and spins there, (n, nodes, 3).
+Quadrature = tuple[FloatArray, Callable[[FloatArray, FloatArray], FloatArray]]
+
+
+def orientation(
+    motion: Callable[[FloatArray], Motion], times: FloatArray, kinks: Iterable[float], quadrature: Quadrature
+) -> FloatArray:
+    """q_WB at rising times [s], scalar first, continuous, shape (n, 4).
+
+    Args:
+        motion: at rising times [s].
+        times: from 0 on.
+        kinks: times at which the spin is not smooth [s].
+        quadrature: :data:`QUATERNIONS` or :data:`MATRICES`.
+    """
+    nodes, turns = quadrature
+    knots = np.union1d(np.append(times, 0.0), [time for time in kinks if 0 < time < times[-1]])
+    fastest = float(np.max(np.linalg.norm(motion(knots).w_WB, axis=-1)))
+    parts = np.maximum(np.ceil(np.diff(knots) * fastest / _TURN), 1).astype(int)
+    h = np.repeat(np.diff(knots) / parts, parts)
+    starts = np.repeat(knots[:-1], parts) + h * (np.arange(len(h)) - np.repeat(np.cumsum(parts) - parts, parts))
+    q = [_IDENTITY]
+    if len(h):
+        spin = motion((starts[:, None] + h[:, None] * nodes).ravel()).w_WB.reshape(len(h), len(nodes), 3)
+        for step in turns(h, spin):
+            q.append(_left(step) @ q[-1])
+    ends = np.concatenate([[0], np.cumsum(parts)])[np.searchsorted(knots, times)]
+    return np.asarray(np.array(q)[ends])
+
+
+def _left(q: FloatArray) -> FloatArray:
+    """Matrices of the multiplication by quaternions (..., 4) from the left, shape (..., 4, 4)."""
+    w, x, y, z = np.moveaxis(q, -1, 0)
+    rows = [[w, -x, -y, -z], [x, w, -z, y], [y, z, w, -x], [z, -y, x, w]]
+    return np.asarray(np.moveaxis(np.array(rows), (0, 1), (-2, -1)))
+
+
+def _quaternions(h: FloatArray, spin: FloatArray) -> FloatArray:
+    """The quaternion itself by collocation at Gauss points, which keeps its length: order 16."""
+    s = len(_GAUSS)
+    rates = _left(np.concatenate([np.zeros((*spin.shape[:2], 1)), spin / 2], axis=-1)) * h[:, None, None, None]
+    stages = _stages(rates, rates[..., :1], _GAUSS_MATRIX).reshape(-1, s, 4)
+    return np.asarray(_IDENTITY + np.einsum("j,njr->nr", _WEIGHTS, stages))
+
+
+def _matrices(h: FloatArray, spin: FloatArray) -> FloatArray:
+    """The rotation matrix by collocation at Radau points (:mod:`proofroll.truth.collocation`): order 25."""
+    x, y, z = np.moveaxis(spin * h[:, None, None], -1, 0)
+    zero = np.zeros_like(x)
+    rates = np.moveaxis(np.array([[zero, -z, y], [z, zero, -x], [-y, x, zero]]), (0, 1), (-2, -1))
+    stages = _stages(rates, rates, collocation.MATRIX).reshape(len(h), -1, 3, 3)
+    turned = np.eye(3) + np.einsum("j,njrc->nrc", collocation.MATRIX[-1], stages)
+    q = np.roll(Rotation.from_matrix(turned).as_quat(), 1, axis=-1)
+    return np.asarray(q * np.where(q[:, :1] < 0, -1.0, 1.0))  # a step turns by less than half a turn
+
+
+def _stages(rates: FloatArray, right: FloatArray, matrix: FloatArray) -> FloatArray:
+    """Rates of change X = h A(t) (1 + Σ a X) at the nodes of each step, h A (n, nodes, k, k); one row for each."""
+    n, s, k = rates.shape[:3]
+    system = np.eye(s * k) - np.einsum("nirc,ij->nirjc", rates, matrix).reshape(n, s * k, s * k)
+    return np.asarray(np.linalg.solve(system, right.reshape(n, s * k, -1)))
+
+
+_POINTS, _SIZES = np.polynomial.legendre.leggauss(8)
+_GAUSS, _WEIGHTS = np.asarray(0.5 + _POINTS / 2), np.asarray(_SIZES / 2)
+_POWERS = np.arange(1, 9)
+_MOMENTS = _GAUSS[:, None] ** _POWERS / _POWERS
+_GAUSS_MATRIX = np.asarray(np.linalg.solve(np.vander(_GAUSS, increasing=True).T, _MOMENTS.T).T, dtype=np.float64)
+
+QUATERNIONS: Quadrature = (_GAUSS, _quaternions)
+MATRICES: Quadrature = (collocation.nodes(1.0), _matrices)

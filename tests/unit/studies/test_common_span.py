@@ -1,0 +1,74 @@
+"""Where the ball leaves the wall, a run is held against the truth as far as both go."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from proofroll import load_scene
+from proofroll.core.dataset import observe, scales
+from proofroll.core.scene import Scene
+from proofroll.core.truth import truth
+from proofroll.elements.ball_on_surface.element import changed
+from proofroll.running.recording import record, time_grid
+from proofroll.running.simulation import build
+from proofroll.studies.common_span import common_span
+from proofroll.studies.reference import Reference
+
+TIMES = time_grid(0.4, 5e-3)
+
+
+def lying() -> Scene:
+    """The paper's cylinder on its side; the ball leaves the wall at 0.27268 s."""
+    scene = load_scene("sphere_in_cylinder", speed=2.7)
+    return changed(scene, surface=replace(scene.elements[0].surface, tilt=math.pi / 2))
+
+
+def reference(scene: Scene) -> Reference:
+    """The truth of the scene."""
+    dataset = truth(scene, TIMES)
+    return Reference(scene, dataset, observe(scene, dataset), scales(scene, dataset))
+
+
+@pytest.mark.parametrize("engine", ["reduced", "projection", "mujoco[formulation=chart]"])
+def test_who_leaves_the_wall_is_judged_up_to_there(engine: str) -> None:
+    """Every curve of a run that ends at lift-off, or that flies on, has a truth of its own length and agrees with it.
+
+    The friction of rolling jumps to nothing at lift-off: one sample late would be an error as large as it.
+    """
+    if "mujoco" in engine:
+        pytest.importorskip("mujoco")
+    scene = lying()
+    whole = reference(scene)
+    run = record(build(scene, engine), scene, TIMES).dataset
+    held, cut = common_span(whole, {1.0: run})
+    curves = held.observed(cut[1.0])
+    for name in ("gamma", "z", "N", "F2", "F3", "gap", "slip", "event_times", "event_order"):
+        true, _ = held.true(name, curves[name])
+        assert curves[name].values.shape == true.shape, name
+        size = max(held.sizes.get(name, 1.0), 1e-9)  # nothing moves along the axis
+        assert np.max(np.abs(curves[name].values - true), initial=0.0) < 5e-3 * size, name
+    assert (len(held.dataset.time) == len(TIMES)) == ("mujoco" in engine)
+    assert held.dataset.gamma.attrs["error_bar"] == whole.dataset.gamma.attrs["error_bar"]
+
+
+def test_who_ends_too_early_is_not_excused() -> None:
+    """A run that ends well before the truth's ball leaves the wall stays too short to agree."""
+    scene = lying()
+    short = record(build(scene, "reduced"), scene, TIMES).dataset.isel(time=slice(30))
+    held, cut = common_span(reference(scene), {1.0: short})
+    curve = held.observed(cut[1.0])["gamma"]
+    assert curve.values.shape != held.true("gamma", curve)[0].shape
+
+
+def test_without_lift_off_nothing_changes() -> None:
+    """Where the truth's ball stays on the wall, nothing is cut."""
+    scene = load_scene("sphere_in_cylinder")
+    whole = reference(scene)
+    run = record(build(scene, "reduced"), scene, TIMES).dataset
+    held, cut = common_span(whole, {1.0: run})
+    assert held is whole
+    assert cut[1.0] is run
