@@ -24,6 +24,19 @@ def skew(a: Any) -> Array:
     return np.array([[0.0, -z, y], [z, 0.0, -x], [-y, x, 0.0]])
 
 
+def crosses(a: Array, b: Array) -> Array:
+    """Cross products of two lists of vectors, (n, 3)."""
+    return np.stack(cross(a.T, b.T), axis=1)
+
+
+def skews(a: Array) -> Array:
+    """:func:`skew` of each vector of a list, (n, 3, 3)."""
+    matrices = np.zeros((len(a), 3, 3))
+    matrices[:, [2, 0, 1], [1, 2, 0]] = a
+    matrices[:, [1, 2, 0], [2, 0, 1]] = -a
+    return matrices
+
+
 def about(axis: int, angle: float) -> Array:
     """Rotation about a coordinate axis (0, 1, 2) by an angle, rad."""
     c, s = math.cos(angle), math.sin(angle)
