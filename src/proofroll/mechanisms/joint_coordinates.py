@@ -71,7 +71,7 @@ class JointCoordinates:
     def solve(self, q: Array, v: Array) -> Solution:
         """Accelerations and multipliers for coordinates (nq) and velocities (nv)."""
         motion = self.tree.at(q, v)
-        J, M, loads = self._inertial(motion)
+        J, M, loads = self.inertial(motion)
         b = self._torque - self._damping * v - np.einsum("nij,ni->j", J, loads)
         for stiffness, rest, at_q, at_v in self._springs:
             b[at_v] -= stiffness * (q[at_q] - rest)
@@ -101,6 +101,29 @@ class JointCoordinates:
             return np.concatenate([self.tree.rate(y[:nq], y[nq:]), self.solve(y[:nq], y[nq:]).acceleration])
 
         states = integrated(rate, start, times, tolerance, self.eliminated)
+        return gathered(times, [self.sample(y[:nq], y[nq:]) for y in states])
+
+    def run_rk4(self, times: Array, step: float = 2e-3) -> Record:
+        """The motion at the given times, s, by Runge-Kutta 4 in equal steps of at most ``step``, s.
+
+        Equal steps pass singular poses, before which an error control shrinks its steps for ever.
+        """
+        nq = self.mechanism.nq
+        y, now, states = np.concatenate(self.mechanism.start()), 0.0, []
+
+        def rate(y: Array) -> Array:
+            return np.concatenate([self.tree.rate(y[:nq], y[nq:]), self.solve(y[:nq], y[nq:]).acceleration])
+
+        for time in times:
+            steps = int(np.ceil((time - now) / step - 1e-9))
+            h = (time - now) / max(steps, 1)
+            for _ in range(steps):
+                k1 = rate(y)
+                k2 = rate(y + h / 2 * k1)
+                k3 = rate(y + h / 2 * k2)
+                y = self.eliminated(y + h / 6 * (k1 + 2 * k2 + 2 * k3 + rate(y + h * k3)))
+            now = time
+            states.append(y)
         return gathered(times, [self.sample(y[:nq], y[nq:]) for y in states])
 
     def eliminated(self, y: Array) -> Array:
@@ -136,7 +159,7 @@ class JointCoordinates:
             "residual": np.array(largest),
         }
 
-    def _inertial(self, motion: Motion) -> tuple[Array, Array, Array]:
+    def inertial(self, motion: Motion) -> tuple[Array, Array, Array]:
         """Jacobians at the centres of mass, mass matrix, inertial and gravity wrenches at v̇ = 0."""
         n = len(self._mass)
         R, w = motion.R_WB[:n], motion.w_WB[:n]
