@@ -59,7 +59,10 @@ class Taylor:
         integrator = self._integrator
         integrator.state[:] = self._start
         integrator.time = self._number(0)
-        outcome, *_, states = integrator.propagate_grid(np.array([self._number(time) for time in times]))
+        grid = np.array([self._number(time) for time in [0.0, *times]])  # heyoka begins its grid where it stands
+        grid, first = (grid[1:], 0) if times[0] == 0 else (grid, 1)
+        outcome, *_, states = integrator.propagate_grid(grid)
+        states = states[first:]
         if len(states) < len(times) or not np.isfinite(np.asarray(states, dtype=float)).all():
             raise Diverged(f"Taylor series stopped at t = {float(integrator.time):.6g} s ({outcome})")
         return np.asarray(states)

@@ -87,7 +87,8 @@ def find_truth(mechanism: Mechanism, times: Array, tolerance: float = 3e-14) -> 
     else:
         records |= {name: precise, "joint coordinates, DOP853": one}
     best = next(iter(records.values()))
-    two, one, precise = (_matched(mechanism, best, other) for other in (two, one, precise))
+    # route 1 alone counts turns; all others are put on its
+    best, two, precise = (_matched(mechanism, one, other) for other in (best, two, precise))
     masked = replace(best, wrench=np.where(found.determinate, best.wrench, np.nan))
     bars, differences = {}, {}
     apart = np.maximum(_largest(precise.p_WB - two.p_WB), _largest(precise.q_WB - two.q_WB))
@@ -169,17 +170,17 @@ def _second(route: MaximalCoordinates, times: Array, tolerance: float) -> tuple[
     return double, long, "maximal coordinates, Taylor series in long doubles"
 
 
-def _matched(mechanism: Mechanism, best: Record, other: Record) -> Record:
-    """The other record with quaternions of the same sign and angles on the same turn as the best one's."""
-    q_WB = _same_sign(best.q_WB, other.q_WB)
+def _matched(mechanism: Mechanism, guide: Record, other: Record) -> Record:
+    """The other record with quaternions of the same sign and angles on the same turn as the guide's."""
+    q_WB = _same_sign(guide.q_WB, other.q_WB)
     q = other.q.copy()
     for joint, at in zip(mechanism.joints, mechanism.q_slices, strict=True):
         if joint.kind in {"spherical", "free"}:
             quaternion = slice(at.stop - 4, at.stop)
-            q[:, quaternion] = _same_sign(best.q[:, quaternion], q[:, quaternion])
+            q[:, quaternion] = _same_sign(guide.q[:, quaternion], q[:, quaternion])
         elif joint.kind in {"revolute", "universal", "planar"}:
             angles = slice(at.stop - 1, at.stop) if joint.kind == "planar" else at
-            q[:, angles] += 2 * np.pi * np.round((best.q[:, angles] - q[:, angles]) / (2 * np.pi))
+            q[:, angles] += 2 * np.pi * np.round((guide.q[:, angles] - q[:, angles]) / (2 * np.pi))
     return replace(other, q_WB=q_WB, q=q)
 
 
