@@ -27,6 +27,7 @@ if TYPE_CHECKING:
 
 FACTOR = 3.0  # of safety: the routes' difference estimates the error, it does not bound it
 CHAOS = 1e-9  # m, 1 (of quaternions): where two precisions differ by more, no number of digits is worth comparing
+BRANCH = 1e-3  # m, 1: chaos brings DOP853 this far only after it has parted the two precisions
 ROUND_OFF = 16 * float(np.finfo(float).eps)  # of a number that passed through some ten operations
 JUDGED = ("p_WB", "v_WB", "q_WB", "w_WB", "q", "v", "wrench", "points", "energy")
 
@@ -67,45 +68,43 @@ def find_truth(mechanism: Mechanism, times: Array, tolerance: float = 3e-14) -> 
         Refused: fewer than two routes cover the mechanism; the text says why.
     """
     times = np.asarray(times, dtype=float)
-    found = analysed(mechanism)
-    form = closed_form(mechanism)
+    found, form = analysed(mechanism), closed_form(mechanism)
     first = JointCoordinates(mechanism, found.rank)
-    records: dict[str, Record] = {}
-    if form is not None and form.motion is not None:
-        records[f"closed form: {form.title}"] = _from_form(first, form, times)
-    elif found.singular_start:
+    exact = _from_form(first, form, times) if form is not None and form.motion is not None else None
+    if exact is None and found.singular_start:
         raise Refused("the start is a singular pose, where the motion may branch, and no closed form is known")
-    second = MaximalCoordinates(mechanism)
     try:
         one = first.run(times, tolerance)
-        two, precise, name = _second(second, times, tolerance)
+        two, precise, name = _second(MaximalCoordinates(mechanism), times, tolerance)
+        # route 1 alone counts turns; all others are put on its
+        two, precise = _matched(mechanism, one, two), _matched(mechanism, one, precise)
+        _check_branch(one, two, precise)
+        routes: tuple[str, ...] = (name, "joint coordinates, DOP853")
+        best = precise if exact is None else _matched(mechanism, one, exact)
     except Diverged as stopped:
-        if not records:
+        if exact is None:
             raise Refused(f"no truth to the end: {stopped}; end before it") from None
-        records["joint coordinates, RK4"] = one = two = precise = first.run_rk4(times)
-        name = "joint coordinates, RK4"
-    else:
-        records |= {name: precise, "joint coordinates, DOP853": one}
-    best = next(iter(records.values()))
-    # route 1 alone counts turns; all others are put on its
-    best, two, precise = (_matched(mechanism, one, other) for other in (best, two, precise))
+        one = two = precise = _matched(mechanism, exact, first.run_rk4(times))
+        best, routes = exact, ("joint coordinates, RK4",)
+    if exact is not None and form is not None:
+        routes = (f"closed form: {form.title}", *routes)
+    _check_limits(mechanism, best)
     masked = replace(best, wrench=np.where(found.determinate, best.wrench, np.nan))
     bars, differences = {}, {}
-    apart = np.maximum(_largest(precise.p_WB - two.p_WB), _largest(precise.q_WB - two.q_WB))
-    late = np.flatnonzero(apart > CHAOS)
+    late = np.flatnonzero(_apart(precise, two) > CHAOS)
     horizon = float(times[late[0]]) if len(late) else np.inf
     for field in JUDGED:
         values = getattr(masked, field)
-        routes = [np.where(np.isnan(values), np.nan, getattr(record, field)) for record in (one, two, precise)]
-        difference = np.maximum(_largest(routes[0] - values), _largest(routes[0] - routes[2]))
+        others = [np.where(np.isnan(values), np.nan, getattr(record, field)) for record in (one, two, precise)]
+        difference = np.maximum(_largest(others[0] - values), _largest(others[0] - others[2]))
         size = np.maximum.accumulate(_largest(values))
-        bar = FACTOR * difference + _largest(routes[1] - routes[2]) + ROUND_OFF * size
+        bar = FACTOR * difference + _largest(others[1] - others[2]) + ROUND_OFF * size
         bars[field] = np.maximum.accumulate(bar)
         differences[field] = float(difference[times < horizon].max(initial=0.0))
     checked = None
     if form is not None and form.motion is None:
         checked = (form.title, float(_largest(form.part(times) - form.same(best)).max()))
-    return Truth(masked, bars, differences, horizon, found.determinate, tuple(records), checked)
+    return Truth(masked, bars, differences, horizon, found.determinate, routes, checked)
 
 
 def to_dataset(mechanism: Mechanism, truth: Truth) -> xr.Dataset:
@@ -153,6 +152,37 @@ def to_dataset(mechanism: Mechanism, truth: Truth) -> xr.Dataset:
     if truth.checked_by is not None:
         attributes["closed_form"] = "{}: {:.1e} apart".format(*truth.checked_by)
     return xr.Dataset(data, coordinates, attributes)
+
+
+def _apart(one: Record, two: Record) -> Array:
+    """How far two motions are apart at each time, m and 1."""
+    return np.maximum(_largest(one.p_WB - two.p_WB), _largest(one.q_WB - two.q_WB))
+
+
+def _check_branch(one: Record, two: Record, precise: Record) -> None:
+    """Two routes that part while the precisions of one of them agree have taken different branches.
+
+    Raises:
+        Diverged: they have.
+    """
+    parted = np.flatnonzero((_apart(one, precise) > BRANCH) & (_apart(two, precise) < CHAOS))
+    if len(parted):
+        raise Diverged(f"the two routes part before t = {one.time[parted[0]]:.6g} s, as at a singular pose")
+
+
+def _check_limits(mechanism: Mechanism, record: Record) -> None:
+    """No joint leaves its limits, for no route follows a stop.
+
+    Raises:
+        Refused: one does.
+    """
+    for joint, at in zip(mechanism.joints, mechanism.q_slices, strict=True):
+        if joint.limits is not None:
+            low, high = joint.limits
+            beyond = np.flatnonzero((record.q[:, at] < low).any(axis=1) | (record.q[:, at] > high).any(axis=1))
+            if len(beyond):
+                time = record.time[beyond[0]]
+                raise Refused(f"joint {joint.name} passes its limit before t = {time:.6g} s; no route follows a stop")
 
 
 def _from_form(equations: JointCoordinates, form: ClosedForm, times: Array) -> Record:

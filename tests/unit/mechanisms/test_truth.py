@@ -1,4 +1,5 @@
 import tomllib
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -6,6 +7,7 @@ import pytest
 
 from proofroll.errors import Refused
 from proofroll.mechanisms import maximal_taylor
+from proofroll.mechanisms.joint_coordinates import JointCoordinates
 from proofroll.mechanisms.truth import CHAOS, find_truth, to_dataset
 
 MODELS = Path(__file__).parents[3] / "models"
@@ -77,6 +79,34 @@ def test_singular_poses_without_a_closed_form_are_refused(scene):
     """The reason and the time are said."""
     with pytest.raises(Refused, match=r"no truth to the end: DOP853 stalls at t = .*; end before it"):
         find_truth(scene("slider_crank", crank=0.3999999999999, speed=3.0), np.array([0.0, 2.0]))
+
+
+def test_a_joint_that_reaches_its_limit_is_refused(scene):
+    """No route follows a stop, so the truth ends there, and says where."""
+    pytest.importorskip("heyoka")
+    free = scene("pendulum", angle=0.5)
+    times = np.array([0.0, 0.8])
+    for limits, refused in (((-0.6, 0.6), False), ((-0.3, 0.6), True)):
+        mechanism = replace(free, joints=(replace(free.joints[0], limits=limits),))
+        if refused:
+            with pytest.raises(Refused, match=r"joint pivot passes its limit before t = 0.8 s"):
+                find_truth(mechanism, times)
+        else:
+            assert find_truth(mechanism, times).horizon == np.inf
+
+
+def test_routes_on_different_branches_are_no_truth(scene, monkeypatch):
+    """Should one route change its branch without a word, the difference is not taken for an error bar."""
+    pytest.importorskip("heyoka")
+    run = JointCoordinates.run
+
+    def flipped(self, times, tolerance):
+        record = run(self, times, tolerance)
+        return replace(record, p_WB=record.p_WB + 1e-2)
+
+    monkeypatch.setattr(JointCoordinates, "run", flipped)
+    with pytest.raises(Refused, match="the two routes part before t = "):
+        find_truth(scene("slider_crank"), np.array([0.0, 0.1]))
 
 
 def test_without_heyoka_the_second_route_is_dop853(scene, monkeypatch):
