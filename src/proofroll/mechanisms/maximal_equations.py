@@ -35,6 +35,8 @@ from proofroll.mechanisms.scalars import (
 )
 
 FUNCTIONS: Mapping[str, Callable[[Any], Any]] = {"sin": math.sin, "cos": math.cos, "sqrt": math.sqrt}
+_NONE = (0.0, 0.0, 0.0)
+_Wrench = tuple[Sequence[Scalar], Sequence[Scalar]]
 _AXES = ((1.0, 0.0, 0.0), (0.0, 1.0, 0.0), (0.0, 0.0, 1.0))
 
 
@@ -146,7 +148,7 @@ class MaximalEquations:
         rate: list[Scalar] = []
         for body, at_x, at_u, view in zip(self.bodies, self.x_slices, self.u_slices, views, strict=False):
             weight = [float(body.mass * g) for g in self.mechanism.gravity]
-            force += plus(body.gyroscopic(u[at_u]), body.projected(view, weight, (0.0, 0.0, 0.0)))
+            force += plus(body.gyroscopic(u[at_u]), body.projected(view, weight, _NONE))
             rate += body.rate(x[at_x], u[at_u])
         rows: list[Row] = []
         laws, angle_rate = [], []
@@ -186,7 +188,7 @@ class MaximalEquations:
         body: int,
         push: Sequence[Scalar],
         arm: Sequence[Scalar],
-        moment: Sequence[Scalar] = (0.0, 0.0, 0.0),
+        moment: Sequence[Scalar] = _NONE,
     ) -> None:
         """Adds a force at an arm from the centre of mass, and a moment, to the forces along the velocities."""
         if body < 0:
@@ -214,17 +216,28 @@ class MaximalEquations:
                 bias = add(dot(n, towards), mul(2.0, dot(n_rate, slide)), dot(cross(a.w, n_rate), d))
                 lever = plus(arm_a, d)
             on_b, on_a = cross(arm_b, n), scaled(-1.0, cross(lever, n))
-            rows.append(self._row(number, c, views, dot(n, d), bias, (n, on_b), (scaled(-1.0, n), on_a), n, None))
+            rows.append(self._row(number, views, dot(n, d), bias, (n, on_b), (scaled(-1.0, n), on_a), (n, _NONE)))
         for k, m in facts.rotations:
             x, y = A[k], B[m]
             t = cross(y, x)
             x_rate, y_rate = cross(a.w, x), cross(b.w, y)
             bias = add(dot(cross(a.w, x_rate), y), mul(2.0, dot(x_rate, y_rate)), dot(x, cross(b.w, y_rate)))
-            none = (0.0, 0.0, 0.0)
-            rows.append(self._row(number, c, views, dot(x, y), bias, (none, t), (none, scaled(-1.0, t)), None, t))
+            back = scaled(-1.0, t)
+            rows.append(self._row(number, views, dot(x, y), bias, (_NONE, t), (_NONE, back), (_NONE, t)))
         return rows
 
-    def _row(self, number, c, views, residual, bias, on_b, on_a, n, t) -> Row:  # type: ignore[no-untyped-def]
+    def _row(
+        self,
+        number: int,
+        views: list[View],
+        residual: Scalar,
+        bias: Scalar,
+        on_b: _Wrench,
+        on_a: _Wrench,
+        given: _Wrench,
+    ) -> Row:
+        """A row from what its unit multiplier applies to each body, and what that is at the joint on b."""
+        c = self.connections[number]
         coefficients: dict[int, Scalar] = {}
         for body, (push, moment) in ((c.b, on_b), (c.a, on_a)):
             if body >= 0:
@@ -232,8 +245,7 @@ class MaximalEquations:
                 for place, entry in enumerate(entries, self.u_slices[body].start):
                     if not is_zero(entry):
                         coefficients[place] = entry
-        none = (0.0, 0.0, 0.0)
-        return Row(residual, coefficients, bias, number, n or none, t or none)
+        return Row(residual, coefficients, bias, number, *at)
 
     def _law(
         self, number: int, c: Connection, views: list[View], angles: list[Scalar], force: list[Scalar]

@@ -7,10 +7,12 @@ import numpy as np
 import pytest
 
 from proofroll.errors import Diverged, Refused
-from proofroll.mechanisms import Body, Joint, Mechanism
+from proofroll.mechanisms import Body, Joint, Loop, Mechanism, Tree
 from proofroll.mechanisms.analysis import analysed
+from proofroll.mechanisms.assembly import check_start
 from proofroll.mechanisms.joint_coordinates import JointCoordinates
 from proofroll.mechanisms.maximal_coordinates import MaximalCoordinates
+from proofroll.mechanisms.rotations import to_rpy
 
 # What independent programs (Pinocchio, heyoka, closed forms) agree on: end time, point, its place, tolerance.
 # The tolerances are what those programs differ by among each other, twice.
@@ -91,6 +93,36 @@ def test_routes_agree_on_every_kind_of_joint():
     assert max(place, attitude) < 1e-12
     assert wrench < 1e-10
     assert np.abs(one.v - two.v).max() < 1e-11
+
+
+@pytest.mark.parametrize("kind", ["revolute", "prismatic", "universal", "spherical", "planar", "fixed"])
+def test_routes_agree_on_every_kind_of_loop(kind):
+    """A loop of each kind between two branches in space, reactions included; the root is free, so nothing hides."""
+    tree = mechanism_examples.every_kind()
+    still = replace(tree, loops=(), joints=tuple(replace(j, v0=(0.0,) * j.nv) for j in tree.joints))
+    motion = Tree(still).at(*still.start())
+    (p_a, R_a), (p_b, R_b) = ((motion.p_WB[i], motion.R_WB[i]) for i in (4, 5))
+    at, axis = np.array([0.3, 0.2, 0.1]), np.array([0.6, 0.0, 0.8])
+    world_axis = R_a @ ([0.0, 1.0, 0.0] if kind == "universal" else axis)
+    loop = Loop(
+        "loop",
+        kind,
+        "b4",
+        "b5",
+        tuple(at),
+        tuple(R_b.T @ (p_a + R_a @ at - p_b)),
+        tuple(axis),
+        tuple(R_b.T @ world_axis),
+        to_rpy(R_a.T @ R_b),
+    )
+    mechanism = replace(still, loops=(loop,))
+    check_start(mechanism)
+    times = np.array([0.0, 0.05])
+    one, two = JointCoordinates(mechanism).run(times), MaximalCoordinates(mechanism).run_dop853(times)
+    place, attitude, wrench = apart(one, two, analysed(mechanism).determinate)
+    assert max(place, attitude) < 1e-12
+    assert wrench < 1e-10 * max(1.0, np.abs(one.wrench).max())
+    assert max(one.residual.max(), two.residual.max()) < 1e-12
 
 
 def test_springs_and_dampers_along_joints_act_alike():
