@@ -94,7 +94,7 @@ class JointCoordinates:
             into @ free + locked_into @ normal, back.T @ normal, motion, rows, (locked_into, back), smallest
         )
 
-    def run(self, times: Array, tolerance: float = 1e-13) -> Record:
+    def run(self, times: Array, tolerance: float = 1e-14) -> Record:
         """The motion at the given times, s, by DOP853.
 
         Raises:

@@ -145,7 +145,7 @@ class MaximalCoordinates:
         """
         return self.recorded(times, np.asarray(self.taylor(long_double).run(times), dtype=float))
 
-    def run_dop853(self, times: Array, tolerance: float = 1e-13) -> Record:
+    def run_dop853(self, times: Array, tolerance: float = 1e-14) -> Record:
         """The motion at the given times, s, by DOP853 with projection.
 
         Raises:

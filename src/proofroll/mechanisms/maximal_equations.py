@@ -245,7 +245,7 @@ class MaximalEquations:
                 for place, entry in enumerate(entries, self.u_slices[body].start):
                     if not is_zero(entry):
                         coefficients[place] = entry
-        return Row(residual, coefficients, bias, number, *at)
+        return Row(residual, coefficients, bias, number, *given)
 
     def _law(
         self, number: int, c: Connection, views: list[View], angles: list[Scalar], force: list[Scalar]

@@ -56,7 +56,7 @@ class Truth:
     checked_by: tuple[str, float] | None
 
 
-def find_truth(mechanism: Mechanism, times: Array, tolerance: float = 3e-14) -> Truth:
+def find_truth(mechanism: Mechanism, times: Array, tolerance: float = 1e-14) -> Truth:
     """The truth at the given times.
 
     Args:
