@@ -15,6 +15,7 @@ from proofroll.core.certificate import Line
 from proofroll.core.element import Element, FirstMotion, OptionalTerm, Sign, StepNumber
 from proofroll.core.engine import Level, Sample, Term, whole_steps
 from proofroll.core.gravity import Gravity
+from proofroll.core.numbers import Numbers
 from proofroll.core.observable import Observable, Role
 from proofroll.core.scene import Scene
 
@@ -116,9 +117,9 @@ class SpringKind:
     units: ClassVar[Mapping[str, str]] = {"mass": "kg", "stiffness": "N/m", "x0": "m"}
 
     @staticmethod
-    def read(tables: Mapping[str, Any], gravity: Gravity, where: str) -> Sequence[Spring]:
+    def read(tables: Mapping[str, Any], gravity: Gravity, numbers: Numbers, where: str) -> Sequence[Spring]:
         """One element for each."""
-        return [Spring(**table) for table in tables["masses"]]
+        return [Spring(**table) for table in numbers.filled(tables["masses"], where, SpringKind.units)]
 
     @staticmethod
     def conformance_scenes() -> Mapping[str, Scene]:

@@ -17,6 +17,7 @@ import numpy.typing as npt
 from proofroll.core.arrays import FloatArray
 from proofroll.core.events import Event
 from proofroll.core.gravity import Gravity
+from proofroll.core.numbers import Numbers
 from proofroll.core.observable import Observable
 
 if TYPE_CHECKING:
@@ -328,12 +329,13 @@ class ElementKind(Protocol):
     units: ClassVar[Mapping[str, str]]
 
     @staticmethod
-    def read(tables: Mapping[str, Any], gravity: Gravity, where: str) -> Sequence[Element]:
-        """The elements that the tables of a scene file hold, their numbers filled in.
+    def read(tables: Mapping[str, Any], gravity: Gravity, numbers: Numbers, where: str) -> Sequence[Element]:
+        """The elements that the tables of a scene file hold.
 
         Args:
             tables: the file's tables of this kind.
             gravity: of the scene.
+            numbers: the parameters, with which the tables are to be filled.
             where: the file, for messages.
 
         Raises:

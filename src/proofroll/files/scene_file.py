@@ -14,6 +14,7 @@ from typing import Any
 from proofroll.core.element import Element
 from proofroll.core.errors import InputError, choices
 from proofroll.core.gravity import Gravity
+from proofroll.core.numbers import Numbers
 from proofroll.core.plugins import load_element_kinds
 from proofroll.core.scene import Scene
 from proofroll.files.data_folders import data_folder
@@ -31,6 +32,7 @@ class Parameter:
         above, at_least, below, at_most: bounds, as numbers or names of other parameters.
         nonzero: why the value must not be zero.
         unbounded: whether inf is allowed.
+        integer: whether it counts something.
     """
 
     value: float | str
@@ -44,6 +46,7 @@ class Parameter:
     at_most: float | str | None = None
     nonzero: str | None = None
     unbounded: bool = False
+    integer: bool = False
 
 
 @dataclass(frozen=True)
@@ -55,6 +58,8 @@ class SceneFile:
     parameters: dict[str, Parameter]
     gravity: dict[str, Any]
     asks: list[str] = field(default_factory=list)
+    reason: str = ""
+    duration: float | None = None
     tables: dict[str, Any] = field(default_factory=dict)  # all others, which kinds of elements read
 
 
@@ -119,19 +124,21 @@ def load_scene(name: str, /, *, asks: Any = (), **parameters: float) -> Scene:
     file = _parse(folder / "scene.toml")
     values = _values(file, parameters)
     where = str(folder / "scene.toml")
-    gravity = validated(Gravity, _substituted(file.gravity, file, values, f"{where}: gravity"), f"{where}: gravity")
-    tables = {key: _substituted(table, file, values, f"{where}: {key}") for key, table in file.tables.items()}
+    numbers = Numbers(values, {name: item.unit for name, item in file.parameters.items()})
+    gravity = validated(Gravity, numbers.filled(file.gravity, f"{where}: gravity", units_of(Gravity)), f"{where}: gravity")
     return Scene(
         name=folder.name,
         title=file.title,
-        elements=_elements(tables, gravity, where),
+        elements=_elements(file.tables, gravity, numbers, where),
         parameters=values,
         folder=folder,
         asks=tuple(dict.fromkeys([*file.asks, *_names(asks)])),
     )
 
 
-def _elements(tables: Mapping[str, Any], gravity: Gravity, where: str) -> tuple[Element, ...]:
+def _elements(
+    tables: Mapping[str, Any], gravity: Gravity, numbers: Numbers, where: str
+) -> tuple[Element, ...]:
     """What the tables of a file hold, each read by the kind of element that it belongs to.
 
     Raises:
@@ -148,7 +155,7 @@ def _elements(tables: Mapping[str, Any], gravity: Gravity, where: str) -> tuple[
     for kind in kinds:
         own = {name: tables[name] for name in kind.tables if name in tables}
         if own:
-            found += kind.read(own, gravity, where)
+            found += kind.read(own, gravity, numbers, where)
     return tuple(found)
 
 
@@ -227,6 +234,8 @@ def _number(name: str, value: object, parameter: Parameter) -> float:
         raise InputError(name, value, f"this is not a number; give one in {parameter.unit}") from None
     if math.isnan(number) or (math.isinf(number) and not (parameter.unbounded and number > 0)):
         raise InputError(name, value, f"the value must be finite; give a number in {parameter.unit}")
+    if parameter.integer and number != round(number):
+        raise InputError(name, value, f"{parameter.meaning} must be a whole number")
     if parameter.nonzero is not None and number == 0:
         raise InputError(name, value, f"{parameter.nonzero}; give a value other than 0 {parameter.unit}")
     return number
@@ -251,24 +260,3 @@ def _check_bounds(name: str, parameter: Parameter, values: Mapping[str, float], 
             shown = f"{bound} = {limit:g}" if isinstance(bound, str) else f"{limit:g}"
             unit = "" if parameter.unit == "1" else f" {parameter.unit}"
             raise InputError(name, value, f"{parameter.meaning} must be {words} {shown}{unit}")
-
-
-def _substituted(content: Any, file: SceneFile, values: Mapping[str, float], where: str, unit: str = "") -> Any:
-    """The content with each ``$name`` replaced by its number, which must have the unit of its place."""
-    if isinstance(content, dict):
-        return {
-            key: _substituted(value, file, values, f"{where}.{key}", _units().get(key, ""))
-            for key, value in content.items()
-        }
-    if isinstance(content, list):
-        return [_substituted(value, file, values, f"{where}.{index}", unit) for index, value in enumerate(content)]
-    if isinstance(content, bool):
-        raise InputError(where, content, "this is not a number; give one" + (f" in {unit}" if unit else ""))
-    if isinstance(content, str) and content.startswith("$"):
-        if content[1:] not in values:
-            raise InputError(where, content, f"there is no such parameter; choose from {choices(values)}")
-        given = file.parameters[content[1:]].unit
-        if unit and given != unit:
-            raise InputError(where, content, f"this number is in {unit}, that parameter in {given}")
-        return values[content[1:]]
-    return content

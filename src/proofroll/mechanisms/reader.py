@@ -26,17 +26,27 @@ _MOST = 10_000  # repetitions: beyond it, a slip of the pen
 
 
 def read_mechanism(content: Mapping[str, Any], /, **given: float) -> Mechanism:
+    """The mechanism of a whole scene file's content, see :func:`made_mechanism`.
+
+    Args:
+        content: the file's tables: parameters, gravity and those of a mechanism; others are left alone.
+        **given: parameters that the user sets.
+    """
+    values = parameter_values(_table(content, "parameters"), given)
+    return made_mechanism(content, _gravity(content, values), values)
+
+
+def made_mechanism(content: Mapping[str, Any], gravity: checks.Vector, values: Mapping[str, float]) -> Mechanism:
     """The mechanism of a scene file, its loops closed, able to move.
 
     Args:
-        content: the file's tables: parameters, gravity, bodies, joints, loops, springs, points, repeat; others are
-            left alone.
-        **given: parameters that the user sets.
+        content: the tables bodies, joints, loops, springs, points and repeat.
+        gravity: acceleration in the world's axes [m/s²].
+        values: the parameters.
 
     Raises:
         InputError: something in it is wrong; one line says where, what and what to do.
     """
-    values = parameter_values(_table(content, "parameters"), given)
     tables: dict[str, list[tuple[str, Any]]] = {kind: [] for kind in KINDS}
     for kind in KINDS:
         for place, table in enumerate(_tables(content, kind)):
@@ -48,7 +58,7 @@ def read_mechanism(content: Mapping[str, Any], /, **given: float) -> Mechanism:
     made = {kind: tuple(_made(KINDS[kind], field, table) for field, table in tables[kind]) for kind in KINDS}
     if not made["bodies"]:
         raise InputError("bodies", "none", "a mechanism needs a body; add a [[bodies]] table")
-    mechanism = Mechanism(gravity=_gravity(content, values), **made)
+    mechanism = Mechanism(gravity=gravity, **made)
     names = {joint.name for joint, follows in zip(made["joints"], dependent, strict=True) if follows}
     mechanism = assembled(mechanism, names)
     check_start(mechanism)

@@ -11,6 +11,7 @@ from pydantic import Field
 
 from proofroll.core.errors import InputError
 from proofroll.core.gravity import Gravity
+from proofroll.core.numbers import Numbers
 from proofroll.core.scene import Scene
 from proofroll.elements.ball_on_surface.element import BallOnSurface, changed
 from proofroll.elements.ball_on_surface.model import Ball, Contact, InitialMotion
@@ -39,9 +40,11 @@ class BallOnSurfaceKind:
     units: ClassVar[Mapping[str, str]] = units_of(Ball, Contact, InitialMotion, *AnySurface.__args__)
 
     @staticmethod
-    def read(tables: Mapping[str, Any], gravity: Gravity, where: str) -> Sequence[BallOnSurface]:
+    def read(tables: Mapping[str, Any], gravity: Gravity, numbers: Numbers, where: str) -> Sequence[BallOnSurface]:
         """One element for each contact, with the ball, the surface and the start that it names."""
-        found = validated(BallTables, dict(tables), where)
+        units = BallOnSurfaceKind.units
+        filled = {key: numbers.filled(table, f"{where}: {key}", units) for key, table in tables.items()}
+        found = validated(BallTables, filled, where)
         balls = {ball.name: ball for ball in found.balls}
         surfaces = {surface.name: surface for surface in found.surfaces}
         _check_names(found, where)
