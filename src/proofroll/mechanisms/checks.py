@@ -1,0 +1,122 @@
+"""Checks of what a user gives: numbers, vectors, axes, inertias; each failure is one clear line."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+
+from proofroll.errors import InputError
+
+Vector = tuple[float, float, float]
+Matrix = tuple[Vector, Vector, Vector]
+WORLD = "world"
+ZERO: Vector = (0.0, 0.0, 0.0)
+Z: Vector = (0.0, 0.0, 1.0)
+
+
+def assign(item: object, **values: Any) -> None:
+    """Set fields of a frozen dataclass while it is made."""
+    for key, value in values.items():
+        object.__setattr__(item, key, value)
+
+
+def name(value: Any, kind: str) -> str:
+    """The value as a name.
+
+    Raises:
+        InputError: it is empty or cannot be printed.
+    """
+    if not isinstance(value, str) or not value.isprintable() or not value.strip():
+        raise InputError(f"{kind}.name", value, "give a name")
+    return value
+
+
+def number(field: str, value: Any, *, at_least: float | None = None) -> float:
+    """The value as a finite float.
+
+    Raises:
+        InputError: it is none, or lies below ``at_least``.
+    """
+    return numbers(field, [value], 1, at_least=at_least)[0]
+
+
+def numbers(field: str, value: Any, count: int, *, at_least: float | None = None) -> tuple[float, ...]:
+    """The value as ``count`` finite floats; a single number stands for a list of one.
+
+    Raises:
+        InputError: it is not that, or a number lies below ``at_least``.
+    """
+    try:
+        found = np.atleast_1d(np.asarray(value))
+        if found.dtype.kind not in "iuf":  # a bool or a text is no number, though numpy would make it one
+            raise ValueError
+    except ValueError:
+        raise InputError(field, value, f"give {_count(count)}") from None
+    if found.shape != (count,):
+        raise InputError(field, value, f"give {_count(count)}")
+    if not np.isfinite(found).all():
+        raise InputError(field, value, "must be finite")
+    if at_least is not None and (found < at_least).any():
+        raise InputError(field, value, f"must be at least {at_least:g}")
+    return tuple(float(x) for x in found)
+
+
+def vector(field: str, value: Any) -> Vector:
+    """The value as three finite floats.
+
+    Raises:
+        InputError: it is not that.
+    """
+    x, y, z = numbers(field, value, 3)
+    return x, y, z
+
+
+def axis(field: str, value: Any) -> Vector:
+    """The value as a unit vector.
+
+    Raises:
+        InputError: it is no vector, or zero.
+    """
+    found = np.array(vector(field, value))
+    length = float(np.linalg.norm(found))
+    if length == 0.0:
+        raise InputError(field, value, "an axis of length zero has no direction; give a nonzero vector")
+    x, y, z = (float(component) for component in found / length)
+    return x, y, z
+
+
+def inertia(field: str, value: Any) -> Matrix:
+    """The value, three principal moments or a symmetric 3×3 matrix, as a matrix that a rigid body can have.
+
+    Raises:
+        InputError: it is not symmetric, has a negative principal moment, or breaks the triangle inequality.
+    """
+    try:
+        found = np.asarray(value, dtype=float)
+    except (TypeError, ValueError):
+        found = np.zeros(0)
+    if found.shape == (3,):
+        found = np.diag(found)
+    if found.shape != (3, 3) or not np.isfinite(found).all():
+        raise InputError(field, value, "give three principal moments or a 3x3 matrix of finite numbers, kg m^2")
+    size = np.abs(found).max()
+    # 1e-9: digits of a file; a flat body fulfils the triangle inequality with equality, so round-off must pass.
+    if np.abs(found - found.T).max() > 1e-9 * size:
+        raise InputError(field, value, "must be symmetric")
+    found = (found + found.T) / 2
+    low, middle, high = np.linalg.eigvalsh(found)
+    if low < -1e-9 * size:
+        raise InputError(field, value, f"has a negative principal moment, {low:g} kg m^2")
+    if high - low - middle > 1e-9 * size:
+        raise InputError(
+            field,
+            value,
+            f"breaks the triangle inequality: {high:g} > {low:g} + {middle:g}; no rigid body has these moments",
+        )
+    rows = [vector(field, row) for row in found]
+    return rows[0], rows[1], rows[2]
+
+
+def _count(count: int) -> str:
+    return "one number" if count == 1 else f"{count} numbers"

@@ -1,0 +1,103 @@
+"""Rotations as 3×3 matrices and scalar-first unit quaternions."""
+
+from __future__ import annotations
+
+import math
+from typing import Any
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+Array = NDArray[np.float64]
+
+
+def cross(a: Any, b: Any) -> Array:
+    """Cross product of two 3-vectors; several times faster than :func:`numpy.cross` on one pair."""
+    a0, a1, a2 = a
+    b0, b1, b2 = b
+    return np.array([a1 * b2 - a2 * b1, a2 * b0 - a0 * b2, a0 * b1 - a1 * b0])
+
+
+def skew(a: Any) -> Array:
+    """The matrix that multiplies a vector by ``a`` from the left as a cross product."""
+    x, y, z = a
+    return np.array([[0.0, -z, y], [z, 0.0, -x], [-y, x, 0.0]])
+
+
+def crosses(a: Array, b: Array) -> Array:
+    """Cross products of two lists of vectors, (n, 3)."""
+    return np.stack(cross(a.T, b.T), axis=1)
+
+
+def skews(a: Array) -> Array:
+    """:func:`skew` of each vector of a list, (n, 3, 3)."""
+    matrices = np.zeros((len(a), 3, 3))
+    matrices[:, [2, 0, 1], [1, 2, 0]] = a
+    matrices[:, [1, 2, 0], [2, 0, 1]] = -a
+    return matrices
+
+
+def about(axis: int, angle: float) -> Array:
+    """Rotation about a coordinate axis (0, 1, 2) by an angle, rad."""
+    c, s = math.cos(angle), math.sin(angle)
+    i, j = (axis + 1) % 3, (axis + 2) % 3
+    R = np.eye(3)
+    R[i, i], R[i, j], R[j, i], R[j, j] = c, -s, s, c
+    return R
+
+
+def from_rpy(rpy: ArrayLike) -> Array:
+    """Rotation of roll, pitch, yaw about fixed axes x, y, z, rad (URDF's convention)."""
+    roll, pitch, yaw = np.asarray(rpy, dtype=float)
+    return about(2, yaw) @ about(1, pitch) @ about(0, roll)
+
+
+def to_rpy(R: Array) -> tuple[float, float, float]:
+    """Roll, pitch, yaw (rad) of a rotation; roll is 0 where pitch is ±π/2, for there only one combination counts."""
+    cosine = math.hypot(R[0, 0], R[1, 0])
+    pitch = math.atan2(-R[2, 0], cosine)
+    if cosine < 1e-9:
+        return 0.0, pitch, math.atan2(-R[0, 1], R[1, 1])
+    return math.atan2(R[2, 1], R[2, 2]), pitch, math.atan2(R[1, 0], R[0, 0])
+
+
+def from_quaternion(q: Any) -> Array:
+    """Rotation matrix of a quaternion ``(w, x, y, z)`` of any length but zero."""
+    w, x, y, z = q
+    s = 2.0 / (w * w + x * x + y * y + z * z)
+    return np.array(
+        [
+            [1 - s * (y * y + z * z), s * (x * y - w * z), s * (x * z + w * y)],
+            [s * (x * y + w * z), 1 - s * (x * x + z * z), s * (y * z - w * x)],
+            [s * (x * z - w * y), s * (y * z + w * x), 1 - s * (x * x + y * y)],
+        ]
+    )
+
+
+def to_quaternion(R: Array) -> Array:
+    """Unit quaternion ``(w, x, y, z)`` with w ≥ 0 of a rotation (Bar-Itzhack 2000: the largest eigenvector of K)."""
+    K = np.zeros((4, 4))
+    K[0, 0] = np.trace(R)
+    K[1:, 1:] = R + R.T - np.trace(R) * np.eye(3)
+    K[1:, 0] = R[2, 1] - R[1, 2], R[0, 2] - R[2, 0], R[1, 0] - R[0, 1]
+    q: Array = np.linalg.eigh(K, UPLO="L")[1][:, -1]
+    return q if q[0] >= 0 else -q
+
+
+def quaternion_rate(q: Any, w: Any) -> Array:
+    """Time derivative of a quaternion for an angular velocity ``w`` in body axes, rad/s."""
+    q0, q1, q2, q3 = q
+    x, y, z = w
+    return 0.5 * np.array(
+        [-q1 * x - q2 * y - q3 * z, q0 * x + q2 * z - q3 * y, q0 * y + q3 * x - q1 * z, q0 * z + q1 * y - q2 * x]
+    )
+
+
+def frame_of_axis(z: ArrayLike, x: ArrayLike | None = None) -> Array:
+    """Right-handed frame (columns x, y, z) whose z is the axis; x as near as it can be to ``x``, or to a default."""
+    e3 = np.asarray(z, dtype=float) / np.linalg.norm(z)
+    if x is None:
+        x = (1.0, 0.0, 0.0) if abs(e3[0]) < 0.9 else (0.0, 1.0, 0.0)
+    e1 = np.asarray(x, dtype=float) - e3 * (e3 @ np.asarray(x, dtype=float))
+    e1 /= np.linalg.norm(e1)
+    return np.array([e1, cross(e3, e1), e3]).T
