@@ -7,7 +7,7 @@ from dataclasses import replace
 
 import numpy as np
 
-from proofroll.errors import InputError
+from proofroll.core.errors import InputError
 from proofroll.mechanisms.analysis import analysed, least
 from proofroll.mechanisms.joint import FACTS
 from proofroll.mechanisms.kinematics import Tree

@@ -6,7 +6,7 @@ from typing import Any
 
 import numpy as np
 
-from proofroll.errors import InputError
+from proofroll.core.errors import InputError
 
 Vector = tuple[float, float, float]
 Matrix = tuple[Vector, Vector, Vector]

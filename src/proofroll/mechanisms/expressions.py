@@ -11,7 +11,7 @@ from typing import Any
 
 from simpleeval import InvalidExpression, SimpleEval
 
-from proofroll.errors import InputError
+from proofroll.core.errors import InputError
 
 _OPERATORS = {
     ast.Add: operator.add,

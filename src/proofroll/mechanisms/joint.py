@@ -8,7 +8,7 @@ from typing import Literal, NamedTuple
 
 import numpy as np
 
-from proofroll.errors import InputError
+from proofroll.core.errors import InputError
 from proofroll.mechanisms import checks, rotations
 from proofroll.mechanisms.checks import WORLD, ZERO, Vector, Z
 from proofroll.mechanisms.rotations import Array

@@ -13,7 +13,7 @@ from typing import Any
 
 import numpy as np
 
-from proofroll.errors import Refused
+from proofroll.core.errors import Refused
 from proofroll.mechanisms.analysis import analysed, reactions
 from proofroll.mechanisms.kinematics import Motion, Rows, Tree
 from proofroll.mechanisms.model import Mechanism

@@ -1,7 +1,7 @@
 """The data of a mechanism: bodies, a tree of joints, loops that close it, springs, tracked points, gravity.
 
 SI units, angles in rad, world frame W with z up. Every body has a frame of its own; the frame of the world is the
-body ``world``. Each object checks itself and raises :class:`~proofroll.errors.InputError` with one line.
+body ``world``. Each object checks itself and raises :class:`~proofroll.core.errors.InputError` with one line.
 """
 
 from __future__ import annotations
@@ -14,7 +14,7 @@ from typing import Any
 
 import numpy as np
 
-from proofroll.errors import InputError
+from proofroll.core.errors import InputError
 from proofroll.mechanisms import checks
 from proofroll.mechanisms.checks import WORLD, Vector
 from proofroll.mechanisms.joint import Joint

@@ -6,7 +6,7 @@ import operator
 from collections.abc import Mapping
 from typing import Any
 
-from proofroll.errors import InputError
+from proofroll.core.errors import InputError
 from proofroll.mechanisms import checks
 from proofroll.mechanisms.expressions import substituted
 

@@ -7,7 +7,7 @@ from functools import cached_property
 
 import numpy as np
 
-from proofroll.errors import InputError
+from proofroll.core.errors import InputError
 from proofroll.mechanisms import checks, rotations
 from proofroll.mechanisms.checks import WORLD, ZERO, Matrix, Vector, Z
 from proofroll.mechanisms.joint import Kind, check_kind

@@ -13,7 +13,7 @@ from typing import Any
 
 import numpy as np
 
-from proofroll.errors import InputError
+from proofroll.core.errors import InputError
 from proofroll.mechanisms import checks
 from proofroll.mechanisms.assembly import assembled, check_start
 from proofroll.mechanisms.expressions import substituted

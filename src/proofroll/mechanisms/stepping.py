@@ -7,7 +7,7 @@ from collections.abc import Callable, Iterator
 import numpy as np
 from scipy.integrate import DOP853
 
-from proofroll.errors import Diverged
+from proofroll.core.errors import Diverged
 from proofroll.mechanisms.rotations import Array
 
 _LEAST_RELATIVE = 2.3e-14  # scipy's own least, 100 times the spacing of doubles

@@ -6,7 +6,7 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from proofroll.errors import InputError
+from proofroll.core.errors import InputError
 from proofroll.mechanisms.checks import WORLD
 from proofroll.mechanisms.joint import Joint
 from proofroll.mechanisms.parts import Body

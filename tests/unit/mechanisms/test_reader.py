@@ -3,7 +3,7 @@ import tomllib
 import numpy as np
 import pytest
 
-from proofroll.errors import InputError
+from proofroll.core.errors import InputError
 from proofroll.mechanisms.analysis import analysed
 from proofroll.mechanisms.reader import read_mechanism
 
