@@ -28,6 +28,8 @@ class Sample:
         q_WB: orientation as a unit quaternion, scalar first, shape (4,); identity at time 0.
         force: of the wall on the ball at the contact point, -N e1 + F2 e2 + F3 e3 [N], shape (3,).
         sticking: whether the contact holds by static friction; only where friction is bounded.
+        joint_force, joint_torque: of a mechanism: on the child of each joint, then on body_b of each loop, at the joint
+            [N, N m], shape (joints + loops, 3); NaN where the engine cannot say one of them.
     """
 
     p_WB: FloatArray
@@ -36,6 +38,8 @@ class Sample:
     q_WB: FloatArray | None = None
     force: FloatArray | None = None
     sticking: bool | None = None
+    joint_force: FloatArray | None = None
+    joint_torque: FloatArray | None = None
 
 
 @dataclass(frozen=True)
