@@ -9,14 +9,16 @@ it freely, without any drift that would tell.
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from typing import Any
 
 import mujoco
 import numpy as np
 
 from proofroll.engines.mujoco.settings import MujocoSettings, impedance, time_constant
-from proofroll.mechanisms import WORLD, Body, Joint, Loop, Mechanism, Tree
-from proofroll.mechanisms.rotations import Array, to_quaternion
+from proofroll.mechanisms import WORLD, Body, Joint, Loop, Mechanism
+from proofroll.mechanisms.loop_points import held_points
+from proofroll.mechanisms.rotations import to_quaternion
 
 _HINGE, _SLIDE = mujoco.mjtJoint.mjJNT_HINGE, mujoco.mjtJoint.mjJNT_SLIDE
 _BALL, _FREE = mujoco.mjtJoint.mjJNT_BALL, mujoco.mjtJoint.mjJNT_FREE
@@ -30,9 +32,6 @@ PARTS: dict[str, tuple[tuple[Any, int], ...]] = {
     "planar": ((_SLIDE, 0), (_SLIDE, 1), (_HINGE, 2)),
     "free": ((_SLIDE, 0), (_SLIDE, 1), (_SLIDE, 2), (_BALL, 2)),
 }
-# Part of the mechanism's size by which the two points on the axis of a revolute loop are apart.
-_APART = 0.3
-_PARALLEL = 1e-9  # round-off of directions
 
 
 def parts_of(joint: Joint) -> tuple[tuple[Any, int], ...]:
@@ -52,9 +51,8 @@ def write(mechanism: Mechanism, settings: MujocoSettings) -> Any:
     data = {body.name: body for body in mechanism.bodies}
     for number, joint in enumerate(mechanism.joints):
         bodies[joint.child] = _add_body(spec, bodies[joint.parent], number, joint, data[joint.child])
-    flat = is_planar(mechanism)
     for number, loop in enumerate(mechanism.loops):
-        _add_loop(spec, bodies, number, loop, 0.0 if flat else _APART * _size(mechanism), settings)
+        _add_loop(spec, bodies, number, loop, held_points(mechanism, loop), settings)
     for number, spring in enumerate(mechanism.springs):
         tendon = spec.add_tendon(name=f"spring{number}")
         for end, body, position in (("a", spring.body_a, spring.position_a), ("b", spring.body_b, spring.position_b)):
@@ -93,51 +91,17 @@ def _add_body(spec: Any, parent: Any, number: int, joint: Joint, body: Body) -> 
 
 
 def _add_loop(
-    spec: Any, bodies: dict[str, Any], number: int, loop: Loop, apart: float, settings: MujocoSettings
+    spec: Any, bodies: dict[str, Any], number: int, loop: Loop, points: Sequence[float], settings: MujocoSettings
 ) -> None:
-    fixed, two = loop.kind == "fixed", loop.kind == "revolute" and apart > 0
-    for point in range(2 if two else 1):
+    kind = mujoco.mjtEq.mjEQ_WELD if loop.kind == "fixed" else mujoco.mjtEq.mjEQ_CONNECT
+    for point, along in enumerate(points):
         names = [f"loop{number}{end}{point}" for end in "ab"]
         ends = ((loop.body_a, loop.position_a, loop.frame_a), (loop.body_b, loop.position_b, loop.frame_b))
         for name, (body, position, frame) in zip(names, ends, strict=True):
-            bodies[body].add_site(name=name, pos=position + point * apart * frame[:, 2], quat=to_quaternion(frame))
-        kind = mujoco.mjtEq.mjEQ_WELD if fixed else mujoco.mjtEq.mjEQ_CONNECT
+            bodies[body].add_site(name=name, pos=position + along * frame[:, 2], quat=to_quaternion(frame))
         added = spec.add_equality(name=f"loop{number}.{point}", type=kind, objtype=mujoco.mjtObj.mjOBJ_SITE)
         added.name1, added.name2 = names
         if settings.time_constant is not None:
             added.solref = (time_constant(settings), 1.0)
         if settings.impedance is not None:
             added.solimp = (*impedance(settings), 1e-3, 0.5, 2.0)
-
-
-def is_planar(mechanism: Mechanism) -> bool:
-    """Whether all joints and revolute loops let the bodies move in parallel planes alone, by their axes at the start.
-
-    Slides must lie in that plane and turns stand on it; anything else is taken to be spatial.
-    """
-    tree = Tree(mechanism)
-    motion = tree.at(*mechanism.start())
-    turning, sliding = [], []
-    for axis, joint in zip(motion.R_parent[:, :, 2], mechanism.joints, strict=True):
-        if joint.kind not in {"fixed", "revolute", "prismatic", "planar"}:
-            return False
-        if joint.kind == "prismatic":
-            sliding.append(axis)
-        elif joint.kind != "fixed":
-            turning.append(axis)
-    for loop in mechanism.loops:
-        turning.append(motion.R_WB[mechanism.body_index[loop.body_a]] @ loop.frame_a[:, 2])
-    if not turning:
-        return False
-    normal = turning[0]
-    return all(np.linalg.norm(np.cross(normal, axis)) < _PARALLEL for axis in turning) and all(
-        abs(normal @ axis) < _PARALLEL for axis in sliding
-    )
-
-
-def _size(mechanism: Mechanism) -> float:
-    """The longest distance of a joint or loop from its body's frame [m]."""
-    places: list[Array] = [np.array(joint.position) for joint in mechanism.joints]
-    for loop in mechanism.loops:
-        places += [np.array(loop.position_a), np.array(loop.position_b)]
-    return max((float(np.linalg.norm(place)) for place in places), default=1.0) or 1.0

@@ -10,7 +10,7 @@ from annotated_types import Gt
 
 from proofroll.core.errors import InputError
 from proofroll.elements.ball_on_surface.compiled import library
-from proofroll.engines.projection.integrators import INTEGRATORS, TIGHTEST
+from proofroll.core.integrators import INTEGRATORS, TIGHTEST
 
 _DT = 1e-3
 
