@@ -13,13 +13,13 @@ from proofroll.core.arrays import FloatArray
 from proofroll.core.engine import Built, Level, Sample, Term
 from proofroll.core.errors import Diverged, Refused
 from proofroll.core.events import Event
+from proofroll.core.integrators import INTEGRATORS, Integrator
 from proofroll.core.scene import Scene
 from proofroll.elements.ball_on_surface.compiled.library import with_heyoka
 from proofroll.elements.ball_on_surface.element import rolling_ball
 from proofroll.elements.ball_on_surface.model import ALL_OF_A_BALL, BallCapability, RollingBall
 from proofroll.engines.projection.friction import Friction
 from proofroll.engines.projection.geometry import geometry_of
-from proofroll.core.integrators import INTEGRATORS, Integrator
 from proofroll.engines.projection.method import ProjectedBall
 from proofroll.engines.projection.modes import Pace
 from proofroll.engines.projection.orientation import EulerAngles, FollowedFrame, Orientation, RotatingFrame

@@ -9,8 +9,8 @@ from typing import Annotated, Literal
 from annotated_types import Gt
 
 from proofroll.core.errors import InputError
-from proofroll.elements.ball_on_surface.compiled import library
 from proofroll.core.integrators import INTEGRATORS, TIGHTEST
+from proofroll.elements.ball_on_surface.compiled import library
 
 _DT = 1e-3
 
