@@ -18,8 +18,10 @@ from proofroll.core.scene import Scene
 from proofroll.elements.ball_on_surface.compiled.library import with_heyoka
 from proofroll.elements.ball_on_surface.element import rolling_ball
 from proofroll.elements.ball_on_surface.model import ALL_OF_A_BALL, BallCapability, RollingBall
+from proofroll.engines.projection import mechanism
 from proofroll.engines.projection.friction import Friction
 from proofroll.engines.projection.geometry import geometry_of
+from proofroll.engines.projection.mechanism import ProjectionMechanism
 from proofroll.engines.projection.method import ProjectedBall
 from proofroll.engines.projection.modes import Pace
 from proofroll.engines.projection.orientation import EulerAngles, FollowedFrame, Orientation, RotatingFrame
@@ -37,14 +39,23 @@ class Projection:
     """Blajer's projection method on any surface that guides a ball."""
 
     name: ClassVar[str] = "projection"
-    provides: ClassVar[Mapping[str, frozenset[str]]] = dict.fromkeys(PRESETS, ALL_OF_A_BALL)
+    provides: ClassVar[Mapping[str, frozenset[str]]] = {
+        "euler": ALL_OF_A_BALL,
+        "rotating_frame": ALL_OF_A_BALL,
+        "dependent": mechanism.PROVIDES,
+    }
+    lacking: ClassVar[Mapping[str, Mapping[str, str]]] = {"dependent": mechanism.LACKING}
     settings: ClassVar[type[ProjectionSettings]] = ProjectionSettings
     presets: ClassVar[Mapping[str, Mapping[str, ProjectionSettings]]] = PRESETS
-    levels: ClassVar[Mapping[str, Level]] = {"euler": Level.PROJECTION, "rotating_frame": Level.PROJECTION}
+    levels: ClassVar[Mapping[str, Level]] = {
+        "euler": Level.PROJECTION,
+        "rotating_frame": Level.PROJECTION,
+        "dependent": Level.PROJECTION,
+    }
     terms: ClassVar[Sequence[Term]] = (
         Term(
             "elimination of violations",
-            ("euler", "rotating_frame"),
+            ("euler", "rotating_frame", "dependent"),
             {"elimination": True},
             {"elimination": False},
             "takes away the slip that a step leaves (Blajer 2002); where rolling is linear with constant coefficients, "
@@ -68,8 +79,10 @@ class Projection:
         return with_heyoka(proofroll.__version__)
 
     @classmethod
-    def build(cls, scene: Scene, settings: ProjectionSettings) -> Self:
-        """See :class:`proofroll.core.engine.Engine`."""
+    def build(cls, scene: Scene, settings: ProjectionSettings) -> Self | ProjectionMechanism:
+        """See :class:`proofroll.core.engine.Engine`; what ``dependent`` builds is a run of a mechanism."""
+        if settings.formulation == "dependent":
+            return ProjectionMechanism.build(scene, settings)
         follow = BallCapability.ORIENTATION in scene.requires
         if follow and settings.integrator == "taylor" and settings.formulation == "rotating_frame":
             raise Refused("the compiled series do not follow the orientation; use integrator=dop853")
