@@ -1,4 +1,4 @@
-"""Formulation ``null_space``: rows of the loops from Pinocchio's frames, and the split that they make of its velocities.
+"""Formulation ``null_space``: rows of the loops from Pinocchio's frames, and the split they make of its velocities.
 
 With M = L Lᵀ, the singular vectors of C L⁻ᵀ split velocities into those that the loops lock and those that they allow.
 Which row depends on which never matters, and the number of independent ones is found once, at the start: where it is
@@ -11,6 +11,7 @@ from typing import Any, NamedTuple
 
 import numpy as np
 import pinocchio as pin
+from numpy.typing import NDArray
 from scipy.linalg.lapack import dpotrf, dtrtri
 
 from proofroll.engines.pinocchio.joint_tree import JointTree
@@ -27,7 +28,7 @@ class Rows(NamedTuple):
     residual: Array
     C: Array
     drift: Array
-    loop: Array
+    loop: NDArray[np.intp]
     force: Array
     torque: Array
 

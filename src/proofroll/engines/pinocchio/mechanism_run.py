@@ -1,4 +1,4 @@
-"""Formulations ``null_space`` and ``constraint_dynamics``: a mechanism's motion, and what is read back from Pinocchio."""
+"""Formulations ``null_space`` and ``constraint_dynamics``: a mechanism's motion, and what is read back of it."""
 
 from __future__ import annotations
 
@@ -11,7 +11,7 @@ from proofroll.core.engine import Sample
 from proofroll.core.errors import Diverged
 from proofroll.core.integrators import INTEGRATORS
 from proofroll.engines.pinocchio.constraint_dynamics import ConstraintDynamics
-from proofroll.engines.pinocchio.joint_tree import AXIS_COLUMN, LACKING, PROVIDES, JointTree
+from proofroll.engines.pinocchio.joint_tree import AXIS_COLUMN, JointTree
 from proofroll.engines.pinocchio.loop_rows import LoopRows
 from proofroll.engines.pinocchio.null_space import NullSpace
 from proofroll.engines.pinocchio.settings import PinocchioSettings

@@ -1,4 +1,4 @@
-"""Formulation ``null_space``: Pinocchio's terms of the joint tree, the loops by projection on their rows' null space."""
+"""Formulation ``null_space``: Pinocchio's terms of the joint tree, loops by projection on their rows' null space."""
 
 from __future__ import annotations
 

@@ -113,6 +113,7 @@ class Projection:
         self._motion: Integrator | Switching | TaylorSeries
         self._friction: Friction | None = None
         if settings.integrator == "taylor":
+            assert settings.formulation != "dependent"  # see the settings
             self._motion = TaylorSeries(body, settings.formulation, x, resolution, self._check, self._accepted)
         elif math.isfinite(body.contact.mu_static) or body.contact.rolling_resistance > 0:
             stepper = STEPPERS[settings.integrator](resolution)

@@ -35,7 +35,7 @@ class Applied:
         self._inertia = np.array([body.inertia for body in mechanism.bodies])
         self._weight = self._mass[:, None] * np.array(mechanism.gravity)
         self._laws = [law for number, joint in enumerate(mechanism.joints) for law in _laws(number, joint)]
-        self._angles = {law: joint_start(law, mechanism.joints[law.connection]) for law in self._laws if law.stiffness}
+        self._angles = {law: _start(law, mechanism.joints[law.connection]) for law in self._laws if law.stiffness}
         self._balls = [(n, joint.damping) for n, joint in enumerate(mechanism.joints) if _damped_ball(joint)]
         com = np.array([*(body.com for body in mechanism.bodies), (0.0, 0.0, 0.0)])
         self._springs = [
@@ -59,16 +59,16 @@ class Applied:
                 rate = bodies.v[b] + np.cross(bodies.w[b], arms[1]) - bodies.v[a] - np.cross(bodies.w[a], arms[0])
                 pull += spring.damping * (between @ rate) / length
             force = pull / length * between
-            for i, arm, on in ((a, arms[0], force), (b, arms[1], -force)):
-                forces[i, :3] += on
-                forces[i, 3:] += np.cross(arm, on) @ bodies.R[i]
+            for i, arm, there in ((a, arms[0], force), (b, arms[1], -force)):
+                forces[i, :3] += there
+                forces[i, 3:] += np.cross(arm, there) @ bodies.R[i]
         found = forces[:-1].ravel()
         if self._laws or self._balls:
             force, torque = self.of_joints(bodies, ends)
-            i = np.flatnonzero(force.any(1) | torque.any(1))
-            m_a = cross(ends.arm_a[i] + ends.d[i], force[i]) + torque[i]
-            m_b = cross(ends.arm_b[i], force[i]) + torque[i]
-            found = found + self._connections.spread(bodies, i, force[i], m_a, m_b).sum(0)
+            on = np.flatnonzero(force.any(1) | torque.any(1))
+            n, t = force[on], torque[on]
+            m_a, m_b = cross(ends.arm_a[on] + ends.d[on], n) + t, cross(ends.arm_b[on], n) + t
+            found = found + self._connections.spread(bodies, on, n, m_a, m_b).sum(0)
         return found
 
     def of_joints(self, bodies: Bodies, ends: Ends) -> tuple[Array, Array]:
@@ -126,7 +126,7 @@ def _laws(number: int, joint: Joint) -> list[_Law]:
     return [_Law(number, axis, joint.stiffness, joint.rest, joint.damping, joint.torque) for axis in axes]
 
 
-def joint_start(law: _Law, joint: Joint) -> float:
+def _start(law: _Law, joint: Joint) -> float:
     """Coordinate of a law at time 0."""
     return joint.q0[1 if law.axis == "x" else 0]
 

@@ -15,6 +15,7 @@ from __future__ import annotations
 from typing import NamedTuple
 
 import numpy as np
+from numpy.typing import NDArray
 
 from proofroll.mechanisms import Mechanism
 from proofroll.mechanisms.joint import FACTS
@@ -31,7 +32,7 @@ class Bodies(NamedTuple):
 
 
 class Ends(NamedTuple):
-    """The connections now, world axes: arms from the centres of mass, d and its rate, axes A and B; (connections, …)."""
+    """Connections now, world axes: arms from the centres of mass, d and its rate, axes A and B, (connections, …)."""
 
     arm_a: Array
     arm_b: Array
@@ -60,7 +61,8 @@ def cross(a: Array, b: Array) -> Array:
 
 def turned(R: Array, a: Array) -> Array:
     """Each vector by its own matrix."""
-    return np.matmul(R, a[:, :, None])[:, :, 0]
+    found: Array = np.matmul(R, a[:, :, None])[:, :, 0]
+    return found
 
 
 class Connections:
@@ -133,7 +135,7 @@ class Connections:
         C = self.spread(bodies, self.owner, force, np.concatenate(m_a), np.concatenate(m_b))
         return Rows(np.concatenate(residual), C, np.concatenate(drift), force, torque)
 
-    def spread(self, bodies: Bodies, connection: Array, n: Array, m_a: Array, m_b: Array) -> Array:
+    def spread(self, bodies: Bodies, connection: NDArray[np.intp], n: Array, m_a: Array, m_b: Array) -> Array:
         """n·(v_b − v_a) + m_b·ω_b − m_a·ω_a on the dependent velocities of all bodies, shape (rows, 6 bodies)."""
         rows, a, b = np.arange(len(n)), self.a[connection], self.b[connection]
         C = np.zeros((len(n), self._count + 1, 6))
