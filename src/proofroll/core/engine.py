@@ -29,6 +29,8 @@ class Sample:
         force: of the wall on the ball at the contact point, -N e1 + F2 e2 + F3 e3 [N], shape (3,). None at time 0
             alone: the engine defines reactions only after a first step.
         sticking: whether the contact holds by static friction; only where friction is bounded.
+        joint_force, joint_torque: of a mechanism: on the child of each joint, then on body_b of each loop, at the joint
+            [N, N m], shape (joints + loops, 3); NaN where the engine cannot say one of them.
     """
 
     p_WB: FloatArray
@@ -37,6 +39,8 @@ class Sample:
     q_WB: FloatArray | None = None
     force: FloatArray | None = None
     sticking: bool | None = None
+    joint_force: FloatArray | None = None
+    joint_torque: FloatArray | None = None
 
 
 @dataclass(frozen=True)

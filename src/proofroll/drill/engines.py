@@ -221,7 +221,7 @@ class Drill:
         wrong: dict[str, Any] = {"nan": {"v_WB": right.v_WB * np.nan}, "shape": {"p_WB": right.p_WB[None]}}
         return dataclasses.replace(right, **wrong.get(self._where, {}))
 
-    def built(self) -> Built:
+    def built(self) -> Any:
         """See :class:`proofroll.core.engine.Engine`."""
         self._do("built")
         return self._inner.built()

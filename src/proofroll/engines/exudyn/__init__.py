@@ -4,6 +4,8 @@ It has no joint for a sphere on a curved wall. Four models of one are built here
 :mod:`generic`, :mod:`carrier`, :mod:`rolling_disc` and :mod:`contact`. The first and the last let the ball slip. In all
 but the first the ball is a rigid body, whose orientation is in the model, asked for or not: the node's Euler parameters
 are its coordinates.
+
+Mechanisms are bodies in redundant coordinates (:mod:`redundant`) or its kinematic tree (:mod:`tree`).
 """
 
 from __future__ import annotations
@@ -13,23 +15,30 @@ from importlib.metadata import version
 from typing import ClassVar, Self
 
 from proofroll.core.engine import Built, Level, Sample, Term
+from proofroll.core.errors import Refused
 from proofroll.core.events import Event
 from proofroll.core.scene import Scene
 from proofroll.elements.ball_on_surface.element import rolling_ball
 from proofroll.elements.ball_on_surface.model import ALL_OF_A_BALL, ROLLS, BallCapability
+from proofroll.engines.exudyn import redundant, tree
 from proofroll.engines.exudyn.carrier import Carrier
 from proofroll.engines.exudyn.contact import Contact
 from proofroll.engines.exudyn.generic import Generic
+from proofroll.engines.exudyn.redundant import Redundant
 from proofroll.engines.exudyn.rolling_disc import RollingDisc
 from proofroll.engines.exudyn.settings import PRESETS, ExudynSettings
+from proofroll.engines.exudyn.tree import KinematicTree
+from proofroll.mechanisms.sampling import MechanismBuilt
 
-Model = Generic | Carrier | RollingDisc | Contact
-MODELS: Mapping[str, type[Model]] = {
+OfBall = Generic | Carrier | RollingDisc | Contact
+OfMechanism = Redundant | KinematicTree
+MODELS: Mapping[str, type[OfBall]] = {
     "generic": Generic,
     "carrier": Carrier,
     "rolling_disc": RollingDisc,
     "contact": Contact,
 }
+OF_MECHANISMS: Mapping[str, type[OfMechanism]] = {"redundant": Redundant, "tree": KinematicTree}
 
 
 class Exudyn:
@@ -41,11 +50,15 @@ class Exudyn:
         "carrier": ROLLS | {BallCapability.ORIENTATION},
         "rolling_disc": ROLLS | {BallCapability.ORIENTATION},
         "contact": ALL_OF_A_BALL,
+        "redundant": redundant.PROVIDES,
+        "tree": tree.PROVIDES,
     }
     lacking: ClassVar[Mapping[str, Mapping[str, str]]] = {
         "generic": {BallCapability.ORIENTATION: "the spin of generic is a quasi-velocity, the rate of no orientation"},
         "carrier": {BallCapability.BOUNDED_FRICTION: "its joint rolls without slip; use generic or contact"},
         "rolling_disc": {BallCapability.BOUNDED_FRICTION: "its joint rolls without slip; use generic or contact"},
+        "redundant": redundant.LACKING,
+        "tree": tree.LACKING,
     }
     settings: ClassVar[type[ExudynSettings]] = ExudynSettings
     presets: ClassVar[Mapping[str, Mapping[str, ExudynSettings]]] = PRESETS
@@ -54,11 +67,13 @@ class Exudyn:
         "carrier": Level.CONSTRAINT,
         "rolling_disc": Level.CONSTRAINT,
         "contact": Level.CONTACT,
+        "redundant": Level.CONSTRAINT,
+        "tree": Level.REDUCED,
     }
     terms: ClassVar[Sequence[Term]] = (
         Term(
             "new Jacobian at every step",
-            ("carrier", "rolling_disc", "contact"),
+            ("carrier", "rolling_disc", "contact", "redundant"),
             {"jacobian": "step"},
             {"jacobian": "reused"},
             "lets Newton's method end after two or three iterations where an old Jacobian needs seven",
@@ -76,7 +91,7 @@ class Exudyn:
         for formulation in ("carrier", "rolling_disc", "contact")
     }
 
-    def __init__(self, model: Model) -> None:
+    def __init__(self, model: OfBall | OfMechanism) -> None:
         self._model = model
 
     @staticmethod
@@ -94,6 +109,8 @@ class Exudyn:
     @classmethod
     def build(cls, scene: Scene, settings: ExudynSettings) -> Self:
         """See :class:`proofroll.core.engine.Engine`."""
+        if settings.formulation in OF_MECHANISMS:
+            return cls(OF_MECHANISMS[settings.formulation](scene, settings))
         return cls(MODELS[settings.formulation](rolling_ball(scene), settings))
 
     @classmethod
@@ -101,6 +118,8 @@ class Exudyn:
         """See :class:`proofroll.core.engine.Reproduces`."""
         from proofroll.engines.exudyn.reproducer import source
 
+        if settings.formulation in OF_MECHANISMS:
+            raise Refused("there is no program for mechanisms yet")
         body = rolling_ball(scene)
         return source(MODELS[settings.formulation](body, settings), body, settings)
 
@@ -116,6 +135,6 @@ class Exudyn:
         """See :class:`proofroll.core.engine.LocatesEvents`."""
         return self._model.events()
 
-    def built(self) -> Built:
+    def built(self) -> Built | MechanismBuilt:
         """See :class:`proofroll.core.engine.Engine`."""
         return self._model.built()

@@ -11,7 +11,7 @@ from proofroll.core.arrays import FloatArray
 from proofroll.core.engine import whole_steps
 from proofroll.core.errors import Diverged, Refused
 from proofroll.engines.exudyn.native import exu
-from proofroll.engines.exudyn.settings import ExudynSettings
+from proofroll.engines.exudyn.settings import EXPLICIT, ExudynSettings
 
 
 def new_system() -> tuple[Any, Any]:
@@ -22,9 +22,15 @@ def new_system() -> tuple[Any, Any]:
     return container, container.AddSystem()
 
 
-def simulation_settings(settings: ExudynSettings) -> Any:
-    """The settings in Exudyn's own structure: no files, one thread, a step that never changes on its own."""
+def simulation_settings(settings: ExudynSettings, *, dependent: bool = False) -> Any:
+    """The settings in Exudyn's own structure: no files, one thread, a step that never changes on its own.
+
+    ``dependent``: constraints may depend on each other, which needs a linear solver that looks for it.
+    """
     result = exu.SimulationSettings()
+    if dependent:
+        result.linearSolver.solverType = exu.LinearSolverType.EigenDense
+        result.linearSolver.ignoreSingularJacobian = True
     result.solution.file.write = False
     result.solution.sensors.active = False
     result.parallel.numberOfThreads = 1
@@ -41,6 +47,8 @@ def simulation_settings(settings: ExudynSettings) -> Any:
     if settings.spectral_radius is not None:
         alpha.spectralRadius = settings.spectral_radius
     alpha.useNewmark = alpha.useIndex2Constraints = settings.integrator == "trapezoidal_index2"
+    if settings.integrator in EXPLICIT:
+        time.explicitIntegration.dynamicSolverType = getattr(exu.DynamicSolverType, settings.integrator.upper())
     time.numberOfSteps = 1
     time.endTime = settings.dt
     return result
@@ -63,6 +71,8 @@ class Integration:
         settings: ExudynSettings,
         start: tuple[FloatArray, FloatArray] | None = None,
         at: float = 0.0,
+        *,
+        dependent: bool = False,
     ) -> None:
         """Initialises the solver in the system's initial configuration.
 
@@ -72,6 +82,7 @@ class Integration:
             start: accelerations of the coordinates and multipliers in that configuration, where the engine cannot find
                 them itself; None: the engine solves for them.
             at: time of that configuration [s].
+            dependent: whether constraints depend on each other.
 
         Raises:
             Refused: the engine does not accept the model.
@@ -80,8 +91,9 @@ class Integration:
         self.complaint: str | None = None
         self.dt = settings.dt
         self.system = system
-        self.options = simulation_settings(settings)
-        self.solver = exu.MainSolverImplicitSecondOrder()
+        self.options = simulation_settings(settings, dependent=dependent)
+        explicit = settings.integrator in EXPLICIT
+        self.solver = exu.MainSolverExplicit() if explicit else exu.MainSolverImplicitSecondOrder()
         if start is not None:
             self.options.timeIntegration.generalizedAlpha.computeInitialAccelerations = False
             system.systemData.SetODE2Coordinates_tt(start[0], exu.ConfigurationType.Initial)
@@ -132,7 +144,9 @@ class Integration:
         return _sentence(self.solver.GetErrorString()) or "it gives no reason"
 
 
-def initial_matrices(system: Any, settings: ExudynSettings) -> tuple[FloatArray, FloatArray, FloatArray]:
+def initial_matrices(
+    system: Any, settings: ExudynSettings, *, dependent: bool = False
+) -> tuple[FloatArray, FloatArray, FloatArray]:
     """Mass matrix, the whole [0 Cᵀ; C D] of the constraints, and generalised forces, in the initial state.
 
     D is not zero where a joint has a free axis, whose multiplier Exudyn keeps and sets to zero.
@@ -140,7 +154,7 @@ def initial_matrices(system: Any, settings: ExudynSettings) -> tuple[FloatArray,
     A second solver is asked, so that the one that integrates is not disturbed. Afterwards the system's present
     accelerations and multipliers are those that Exudyn finds for the initial state.
     """
-    options = simulation_settings(settings)
+    options = simulation_settings(settings, dependent=dependent)
     solver = exu.MainSolverImplicitSecondOrder()
     solver.InitializeSolver(system, options)
     coordinates, size = solver.GetODE2size(), solver.GetODE2size() + solver.GetAEsize()

@@ -18,15 +18,17 @@ class ExudynSettings:
     Attributes:
         formulation: ``generic`` (minimal coordinates and multipliers), ``carrier`` (rigid ball on a massless carrier,
             built-in joints only), ``rolling_disc`` (the engine's rolling-disc joint, re-aimed at every iterate) or
-            ``contact`` (its contact with a hollow sphere that follows the ball; penalty and regularised friction).
+            ``contact`` (its contact with a hollow sphere that follows the ball; penalty and regularised friction); of
+            mechanisms: ``redundant`` (bodies in redundant coordinates, joints as constraints) or ``tree`` (its
+            kinematic tree in joint coordinates).
         preset: which preset the values started from.
         dt: fixed time step [s].
         integrator: ``generalized_alpha`` (constraints at position level, index 3) or ``trapezoidal_index2``
-            (undamped, constraints at velocity level).
+            (undamped, constraints at velocity level); of ``tree`` ``rk44`` or ``rk67``, explicit.
         spectral_radius: of the generalized-alpha method at infinite frequency [-]; 1 damps nothing. None: the engine's
             own, 0.9. The trapezoidal rule has no damping and does not look at it.
         newton_tolerance: relative tolerance of Newton's method [-]; the absolute one is a hundredth of it, which is
-            the engine's own ratio.
+            the engine's own ratio. Explicit integrators have none, and look at neither this nor ``jacobian``.
         jacobian: ``reused`` while Newton's method contracts, or set up again at every ``step``.
         halvings: how often a step is halved where Newton's method fails, before the run ends; ``contact`` only, as the
             following. With 0, and in the other formulations, all steps are dt.
@@ -35,10 +37,10 @@ class ExudynSettings:
         grip: coefficient that stands for unbounded friction [-]; the ball creeps by friction_zone |F| / (grip N).
     """
 
-    formulation: Literal["generic", "carrier", "rolling_disc", "contact"] = "generic"
+    formulation: Literal["generic", "carrier", "rolling_disc", "contact", "redundant", "tree"] = "generic"
     preset: Literal["default", "matched", "tuned"] = "matched"
     dt: Annotated[float, Gt(0)] = 1e-4
-    integrator: Literal["generalized_alpha", "trapezoidal_index2"] = "trapezoidal_index2"
+    integrator: Literal["generalized_alpha", "trapezoidal_index2", "rk44", "rk67"] = "trapezoidal_index2"
     spectral_radius: Annotated[float, Interval(ge=0, le=1)] | None = None
     newton_tolerance: Annotated[float, Interval(gt=0, lt=1)] = 1e-11
     jacobian: Literal["reused", "step"] = "step"
@@ -48,8 +50,11 @@ class ExudynSettings:
     grip: Annotated[float, Gt(0)] | None = None
 
     resolution: ClassVar[str] = "dt"
-    # Both methods are of second order in positions, velocities and multipliers.
-    order: ClassVar[int] = 2
+
+    @property
+    def order(self) -> int:
+        """Both implicit methods are of second order in positions, velocities and multipliers."""
+        return EXPLICIT.get(self.integrator, 2)
 
     def __post_init__(self) -> None:
         """Accepts only settings that have an effect, and all that the formulation needs.
@@ -57,8 +62,11 @@ class ExudynSettings:
         Raises:
             InputError: otherwise.
         """
-        if self.integrator == "trapezoidal_index2":
-            self._has_no("spectral_radius", "the trapezoidal rule has no damping; set integrator=generalized_alpha")
+        if (self.integrator in EXPLICIT) != (self.formulation == "tree"):
+            advice = f"tree has {' and '.join(EXPLICIT)}, the others have implicit integrators"
+            raise InputError("exudyn: integrator", self.integrator, advice)
+        if self.integrator != "generalized_alpha":
+            self._has_no("spectral_radius", f"{self.integrator} has no damping; set integrator=generalized_alpha")
         for name in CONTACT_ONLY:
             if self.formulation != "contact":
                 self._has_no(name, f"{self.formulation} does not use it; set formulation=contact")
@@ -83,6 +91,8 @@ class ExudynSettings:
         return self.stiffness, self.friction_zone, self.grip
 
 
+# Explicit integrators, and their order.
+EXPLICIT = {"rk44": 4, "rk67": 6}
 CONTACT_ONLY = ("halvings", "stiffness", "friction_zone", "grip")
 
 
@@ -92,7 +102,7 @@ CONTACT_ONLY = ("halvings", "stiffness", "friction_zone", "grip")
 # step is taken over by ``contact`` alone: see ``simulation_settings``.
 
 
-def _default(formulation: Literal["generic", "carrier", "rolling_disc"]) -> ExudynSettings:
+def _default(formulation: Literal["generic", "carrier", "rolling_disc", "redundant"]) -> ExudynSettings:
     # The tolerance of 1e-8 is felt: with rolling resistance it moves z by about 1e-6 m at dt = 1e-3, and leaves noise
     # of 0.3 N in the carrier's F2. With rigid bodies, ρ = 0.9 stops being stable where the ball turns by more than
     # about 0.3 rad per step.
@@ -141,5 +151,19 @@ PRESETS: Mapping[str, Mapping[str, ExudynSettings]] = {
         "tuned": ExudynSettings(
             "contact", "tuned", 1e-4, "trapezoidal_index2", None, 1e-8, "step", 10, 1e8, 1e-5, GRIP
         ),
+    },
+    "redundant": {
+        "default": _default("redundant"),
+        # Passes singular poses and dependent constraints, and keeps loops closed to round-off. A tolerance of 1e-10
+        # takes four fifths of the error out of the forces of stiff small mechanisms; a new Jacobian at every step
+        # ends Newton's method where constraints depend on each other.
+        "matched": ExudynSettings("redundant", "matched", 1e-3, "generalized_alpha", 0.9, 1e-10, "reused"),
+        # Constraints at velocity level: loops open by 1e-6 m at 1e-3 s, and forces are a hundred times as accurate.
+        # Dependent constraints leave Newton's method with more round-off than a tighter tolerance asks for.
+        "tuned": ExudynSettings("redundant", "tuned", 1e-3, "trapezoidal_index2", None, 1e-8, "reused"),
+    },
+    "tree": {
+        "default": ExudynSettings("tree", "default", 1e-3, "rk44"),
+        "matched": ExudynSettings("tree", "matched", 1e-3, "rk67"),
     },
 }

@@ -4,24 +4,26 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterator, Mapping, Sequence
-from contextlib import contextmanager
 from typing import Any, ClassVar, Protocol, Self
 
 import mujoco
 import numpy as np
 
 from proofroll.core.engine import Built, Level, Sample, Term, whole_steps
-from proofroll.core.errors import Diverged, Refused
+from proofroll.core.errors import Refused
 from proofroll.core.events import Event
 from proofroll.core.scene import Scene
 from proofroll.elements.ball_on_surface.element import rolling_ball
 from proofroll.elements.ball_on_surface.mechanics import natural_acceleration
 from proofroll.elements.ball_on_surface.model import ALL_OF_A_BALL, BallCapability, RollingBall
+from proofroll.engines.mujoco import mechanism
 from proofroll.engines.mujoco.chart import Chart
 from proofroll.engines.mujoco.contact import Resistance, contact_coefficient, contact_force
 from proofroll.engines.mujoco.free import Facets, Free
 from proofroll.engines.mujoco.friction import BoundedFriction, check_coefficients
+from proofroll.engines.mujoco.mechanism import MujocoMechanism
 from proofroll.engines.mujoco.model import read_spec, write_physics
+from proofroll.engines.mujoco.running import compiled, forget_callbacks, raise_if_fatal, silent
 from proofroll.engines.mujoco.settings import PRESETS, ROLLS, MujocoSettings, check, velocity_lag
 from proofroll.engines.mujoco.softness import softness
 from proofroll.engines.mujoco.start import EVALUATIONS, accelerations, start
@@ -55,13 +57,6 @@ class Formulation(Protocol):
 
 
 _FORMULATIONS: Mapping[str, type[Formulation]] = {"free": Free, "chart": Chart, "facets": Facets}
-_FATAL = (
-    (mujoco.mjtWarning.mjWARN_BADQPOS, "positions are not finite or huge"),
-    (mujoco.mjtWarning.mjWARN_BADQVEL, "velocities are not finite or huge"),
-    (mujoco.mjtWarning.mjWARN_BADQACC, "accelerations are not finite or huge"),
-    (mujoco.mjtWarning.mjWARN_CONTACTFULL, "there are more contacts than MuJoCo holds"),
-    (mujoco.mjtWarning.mjWARN_CNSTRFULL, "there are more constraints than MuJoCo holds"),
-)
 # Joints whose coordinates hold an orientation.
 _TURNING_JOINTS = (int(mujoco.mjtJoint.mjJNT_BALL), int(mujoco.mjtJoint.mjJNT_FREE))
 # Part of the natural force above which a normal force is more than round-off.
@@ -79,12 +74,14 @@ class Mujoco:
         "chart": ALL_OF_A_BALL,
         "free": ALL_OF_A_BALL,
         "facets": ALL_OF_A_BALL - {BallCapability.BOUNDED_FRICTION},
+        "joints": mechanism.PROVIDES,
     }
     lacking: ClassVar[Mapping[str, Mapping[str, str]]] = {
         "facets": {
             BallCapability.BOUNDED_FRICTION: "each edge between two boxes throws the ball off the wall, so facets "
             "cannot tell when it slips"
-        }
+        },
+        "joints": mechanism.LACKING,
     }
     settings: ClassVar[type[Any]] = MujocoSettings
     presets: ClassVar[Mapping[str, Mapping[str, Any]]] = PRESETS
@@ -92,6 +89,7 @@ class Mujoco:
         "chart": Level.CONTACT,
         "free": Level.CONTACT,
         "facets": Level.FACETS,
+        "joints": Level.CONSTRAINT,
     }
     terms: ClassVar[Sequence[Term]] = TERMS
     inherent: ClassVar[Mapping[str, Mapping[str, str]]] = {
@@ -112,7 +110,7 @@ class Mujoco:
         wall = model.geom("wall").id if settings.formulation != "facets" else int(model.body("wall").geomadr[0])
         self._geoms = (wall, self._geom)
         self._steps = 0
-        with _silent():
+        with silent():
             self._start(slips=False)
             if self._friction is not None and not self._friction.start(self._data):
                 self._start(slips=True)
@@ -126,30 +124,38 @@ class Mujoco:
         return str(mujoco.__version__)
 
     @classmethod
-    def build(cls, scene: Scene, settings: MujocoSettings) -> Self:
-        """See :class:`proofroll.core.engine.Engine`."""
+    def build(cls, scene: Scene, settings: MujocoSettings) -> Self | MujocoMechanism:
+        """See :class:`proofroll.core.engine.Engine`; what ``joints`` builds is a run of a mechanism."""
+        if settings.formulation == "joints":
+            return MujocoMechanism.build(scene, settings)
+        return cls._build_ball(scene, settings)
+
+    @classmethod
+    def _build_ball(cls, scene: Scene, settings: MujocoSettings) -> Self:
         body = rolling_ball(scene)
         bounded = math.isfinite(body.contact.mu_static)
         check(settings, bounded=bounded)
         if bounded:
             check_coefficients(body.contact, settings)
-        _forget_callbacks()
+        forget_callbacks()
         spec = read_spec(scene, settings.formulation)
         write_physics(spec, body, settings)
         _FORMULATIONS[settings.formulation].write(spec, body)
-        return cls(_compiled(spec), body, settings)
+        return cls(compiled(spec), body, settings)
 
     @classmethod
     def reproducer(cls, scene: Scene, settings: MujocoSettings) -> str:
         """See :class:`proofroll.core.engine.Reproduces`."""
         from proofroll.engines.mujoco.reproducer import source
 
+        if settings.formulation == "joints":
+            raise Refused("there is no program for mechanisms yet")
         body = rolling_ball(scene)
-        built = cls.build(scene, settings)
+        built = cls._build_ball(scene, settings)
         spec = read_spec(scene, settings.formulation)
         write_physics(spec, body, settings)
         _FORMULATIONS[settings.formulation].write(spec, body)
-        _compiled(spec)
+        compiled(spec)
         return source(spec.to_xml(), built._model, built._data, body, settings)
 
     def advance(self, t: float) -> None:
@@ -159,13 +165,10 @@ class Mujoco:
         steps = whole_steps(self._steps * dt, t, dt)
         if steps == 0:
             return
-        with _silent():
+        with silent():
             self._formulation.run(self._data, steps)
         self._steps += steps
-        warnings = self._data.warning
-        for kind, meaning in _FATAL:
-            if warnings[kind].number:
-                raise Diverged(f"MuJoCo gave up before {t:g} s: {meaning}")
+        raise_if_fatal(self._data, t)
 
     @property
     def native(self) -> tuple[Any, Any]:
@@ -251,36 +254,7 @@ class Mujoco:
     def _evaluated(self) -> Any:
         """A copy of the present state with its own forces: after a step MjData holds those of the last stage."""
         mujoco.mj_copyData(self._scratch, self._model, self._data)
-        with _silent():
+        with silent():
             for _ in range(EVALUATIONS if self._body.contact.rolling_resistance else 1):
                 self._formulation.evaluate(self._scratch)
         return self._scratch
-
-
-def _compiled(spec: Any) -> Any:
-    """The model; MuJoCo takes no mass or inertia below 1e-15, for example, in whatever units.
-
-    Raises:
-        Refused: MuJoCo does not accept the numbers.
-    """
-    try:
-        return spec.compile()
-    except ValueError as error:
-        raise Refused(f"MuJoCo does not accept the model: {' '.join(str(error).split())}") from None
-
-
-def _forget_callbacks() -> None:
-    """Callbacks belong to the process: one that somebody else left would act in our models too."""
-    for name in ("act_bias", "act_dyn", "act_gain", "contactfilter", "control", "passive", "sensor"):
-        getattr(mujoco, f"set_mjcb_{name}")(None)
-
-
-@contextmanager
-def _silent() -> Iterator[None]:
-    """Keeps MuJoCo from printing, and from writing MUJOCO_LOG.TXT; warnings are read from MjData instead."""
-    before = mujoco.get_mju_user_warning()
-    mujoco.set_mju_user_warning(lambda _: None)
-    try:
-        yield
-    finally:
-        mujoco.set_mju_user_warning(before)

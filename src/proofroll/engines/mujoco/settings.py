@@ -24,6 +24,7 @@ SLIDES, TURNS, ROLLS = 3, 4, 6
 SMALLEST_IMPEDANCE = 1e-4
 LARGEST_IMPEDANCE = 0.9999
 SHORTEST_TIME_CONSTANT = 2.0
+FORCES_TIME_CONSTANT = 10.0
 # MuJoCo has no unbounded friction. With the elliptic cone any coefficient above the needed one gives the same motion
 # to all digits (1 to 10000 tried), so this one is out of reach and costs nothing. A pyramidal cone softens the
 # contact by the square of the coefficient: at 100 the ball flies through the wall without a warning.
@@ -45,13 +46,14 @@ class MujocoSettings:
     Attributes:
         formulation: ``free``: a free ball and a plane that is re-posed tangent to the wall before each step;
             ``chart``: the ball on joints that follow the surface's coordinates, with the same plane re-posed at each
-            evaluation of the forces; ``facets``: a free ball in a ring of boxes.
+            evaluation of the forces; ``facets``: a free ball in a ring of boxes; ``joints``: a mechanism of MuJoCo's
+            joints, tendons and equality constraints, which has no contact and none of its options.
         preset: where the other values come from.
         dt: step [s].
         integrator: MuJoCo's name of it.
         cone: friction cone, exact (``elliptic``) or MuJoCo's default approximation (``pyramidal``).
-        time_constant: of the contact's return to zero depth (first number of ``solref``) in steps; None: MuJoCo's
-            default of 0.02 s at every step.
+        time_constant: of the return to zero depth of the contact, and to zero violation of the loops of ``joints``
+            (first number of ``solref``), in steps; None: MuJoCo's default of 0.02 s at every step.
         impedance: constant constraint impedance (``solimp``); 1 would be a rigid contact; None: MuJoCo's default,
             0.9 to 0.95 growing with depth.
         friction: coefficient that stands for unbounded friction [-]; with less than the scene needs, the ball slips.
@@ -70,7 +72,7 @@ class MujocoSettings:
             with MuJoCo's documented coefficients. No scene asks for either; they are there to be compared.
     """
 
-    formulation: Literal["free", "chart", "facets"] = "chart"
+    formulation: Literal["free", "chart", "facets", "joints"] = "chart"
     preset: Literal["default", "matched", "tuned"] = "matched"
     dt: Annotated[float, Gt(0)] = 1e-3
     integrator: Literal["Euler", "RK4", "implicitfast"] = "RK4"
@@ -97,6 +99,8 @@ class MujocoSettings:
         to 2, for its torque uses a normal force that is extrapolated linearly in time. The same holds of the chart's
         other contacts and of J̇v.
         """
+        if self.formulation == "joints":  # of a tree; where a loop is closed by a soft constraint, positions have 2
+            return 4 if self.integrator == "RK4" else 1
         if self.time_constant is None and self.integrator != "RK4":
             return 1
         return 2 if self.curvature or self.formulation == "chart" else 1
@@ -256,4 +260,15 @@ PRESETS: Mapping[str, Mapping[str, MujocoSettings]] = {
     # Better options do not rescue it, since each edge between two boxes is a kick: 0.3 m off instead of 1.2 m in 2 s,
     # whatever the step. It shows what the obvious wall costs.
     "facets": {"default": _obvious("facets")},
+    "joints": {
+        # Loops are springs of 0.02 s, whatever the step.
+        "default": MujocoSettings(
+            "joints", "default", dt=DEFAULT_STEP, integrator="Euler", time_constant=None, impedance=None
+        ),
+        # Ten steps: the loops' forces are as accurate as they get (of the slider-crank 3e-5 of 60 N at 1e-4 s, where
+        # two steps leave 2e-2 N at every step), at the price of ten times the error of positions.
+        "matched": MujocoSettings("joints", "matched", time_constant=FORCES_TIME_CONSTANT),
+        # The shortest that MuJoCo allows: best in positions.
+        "tuned": MujocoSettings("joints", "tuned"),
+    },
 }

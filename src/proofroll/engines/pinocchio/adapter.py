@@ -14,22 +14,36 @@ from proofroll.core.events import Event
 from proofroll.core.scene import Scene
 from proofroll.elements.ball_on_surface.element import rolling_ball
 from proofroll.elements.ball_on_surface.model import ALL_OF_A_BALL, BallCapability
+from proofroll.engines.pinocchio.constraint_dynamics import ConstraintDynamics
 from proofroll.engines.pinocchio.contact_run import ContactRun
+from proofroll.engines.pinocchio.mechanism_run import MechanismRun
+from proofroll.engines.pinocchio.null_space import NullSpace
 from proofroll.engines.pinocchio.rows_run import RowsRun
-from proofroll.engines.pinocchio.settings import PRESETS, PinocchioSettings
+from proofroll.engines.pinocchio.settings import OF_MECHANISMS, PRESETS, PinocchioSettings
+from proofroll.mechanisms.sampling import MechanismBuilt
 
 
 class Pinocchio:
     """Pinocchio's equations of motion with rows of rolling put to them, or its own solver of contact with friction."""
 
     name: ClassVar[str] = "pinocchio"
-    provides: ClassVar[Mapping[str, frozenset[str]]] = dict.fromkeys(PRESETS, ALL_OF_A_BALL)
+    provides: ClassVar[Mapping[str, frozenset[str]]] = {
+        **dict.fromkeys(("composite", "free_flyer", "contact"), ALL_OF_A_BALL),
+        "null_space": NullSpace.provides,
+        "constraint_dynamics": ConstraintDynamics.provides,
+    }
+    lacking: ClassVar[Mapping[str, Mapping[str, str]]] = {
+        "null_space": NullSpace.lacking,
+        "constraint_dynamics": ConstraintDynamics.lacking,
+    }
     settings: ClassVar[type[Any]] = PinocchioSettings
     presets: ClassVar[Mapping[str, Mapping[str, PinocchioSettings]]] = PRESETS
     levels: ClassVar[Mapping[str, Level]] = {
         "composite": Level.CONSTRAINT,
         "free_flyer": Level.CONSTRAINT,
         "contact": Level.CONTACT,
+        "null_space": Level.PROJECTION,
+        "constraint_dynamics": Level.CONSTRAINT,
     }
     terms: ClassVar[Sequence[Term]] = (
         Term(
@@ -41,7 +55,7 @@ class Pinocchio:
         ),
         Term(
             "projection",
-            ("composite", "free_flyer"),
+            ("composite", "free_flyer", "null_space", "constraint_dynamics"),
             {"projection": True},
             {"projection": False},
             "puts the state back on the constraints after each step",
@@ -58,7 +72,7 @@ class Pinocchio:
         "contact": {BallCapability.ORIENTATION: "the spherical joint's configuration is the ball's orientation"}
     }
 
-    def __init__(self, run: ContactRun | RowsRun) -> None:
+    def __init__(self, run: ContactRun | RowsRun | MechanismRun) -> None:
         self._run = run
         self._t = 0.0
 
@@ -76,6 +90,8 @@ class Pinocchio:
     @classmethod
     def build(cls, scene: Scene, settings: PinocchioSettings) -> Self:
         """See :class:`proofroll.core.engine.Engine`."""
+        if settings.formulation in OF_MECHANISMS:
+            return cls(MechanismRun.build(scene, settings))
         settings = _decided(scene, settings)
         return cls((ContactRun if settings.formulation == "contact" else RowsRun)(rolling_ball(scene), settings))
 
@@ -84,6 +100,8 @@ class Pinocchio:
         """See :class:`proofroll.core.engine.Reproduces`."""
         from proofroll.engines.pinocchio.reproducer import source
 
+        if settings.formulation in OF_MECHANISMS:
+            raise Refused("there is no program for mechanisms yet")
         return source(rolling_ball(scene), _decided(scene, settings))
 
     def advance(self, t: float) -> None:
@@ -99,7 +117,7 @@ class Pinocchio:
         """See :class:`proofroll.core.engine.LocatesEvents`."""
         return self._run.events()
 
-    def built(self) -> Built:
+    def built(self) -> Built | MechanismBuilt:
         """See :class:`proofroll.core.engine.Engine`."""
         return self._run.built()
 

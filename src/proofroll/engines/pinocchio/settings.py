@@ -15,6 +15,7 @@ from proofroll.core.errors import InputError
 TIGHTEST_RTOL = 100 * float(np.finfo(float).eps)
 
 _ORDERS = {"semi_implicit_euler": 1, "leapfrog": 2, "rk4": 2, "rk4_dexpinv": 4}
+OF_MECHANISMS = ("null_space", "constraint_dynamics")
 _OF_CONTACT = ("semi_implicit_euler", "leapfrog")
 
 
@@ -25,7 +26,9 @@ class PinocchioSettings:
     Attributes:
         formulation: ``composite`` (joints along the surface's generators, so the ball cannot leave it, and two rows
             of rolling), ``free_flyer`` (six freedoms, one row for the surface and two of rolling) or ``contact`` (a
-            free ball against a plane posed anew in each step, by Pinocchio's solver of contact with friction).
+            free ball against a plane posed anew in each step, by Pinocchio's solver of contact with friction); of
+            mechanisms: ``null_space`` (joint tree, loops by projection on the null space of their rows) or
+            ``constraint_dynamics`` (loops as Pinocchio's own rigid constraints).
         preset: where the other values come from.
         integrator: ``semi_implicit_euler`` and ``rk4`` as they are usually written with ``pin.integrate``;
             ``rk4_dexpinv`` the same with the missing term of rotations; ``dop853`` adaptive, order 8. ``contact`` has
@@ -35,13 +38,16 @@ class PinocchioSettings:
         orientation: integrate the orientation of the ball; None: if the scene asks for it. Its inertia is the same
             about every axis, so the motion does not depend on it, and without it the fast turning needs no small steps.
             ``contact`` always turns the ball: its spherical joint is part of the state.
+            Mechanisms always have it.
         projection: put the state back on the constraints after each step; not in ``contact``, where the solver does.
         solver: of ``contact``: projected Gauss-Seidel or alternating directions (ADMM); None with the others.
         solver_tolerance: of ``contact``: feasibility [m/s] and complementarity [J], both also relative [-]; None with
             the others.
+        proximal: of ``constraint_dynamics``: the term μ that makes dependent rows solvable, taken back by iteration;
+            None with the others.
     """
 
-    formulation: Literal["composite", "free_flyer", "contact"] = "composite"
+    formulation: Literal["composite", "free_flyer", "contact", "null_space", "constraint_dynamics"] = "composite"
     preset: Literal["default", "matched", "tuned"] = "matched"
     integrator: Literal["semi_implicit_euler", "leapfrog", "rk4", "rk4_dexpinv", "dop853"] = "dop853"
     dt: Annotated[float, Gt(0)] | None = None
@@ -50,6 +56,7 @@ class PinocchioSettings:
     projection: bool = True
     solver: Literal["pgs", "admm"] | None = None
     solver_tolerance: Annotated[float, Gt(0)] | None = None
+    proximal: Annotated[float, Gt(0)] | None = None
 
     def __post_init__(self) -> None:
         """Refuses what the formulation or the integrator does not have, and what would change nothing.
@@ -58,6 +65,7 @@ class PinocchioSettings:
             InputError: a setting does not go with another.
         """
         self._check_formulation()
+        self._check_mechanism()
         self._check_resolution()
 
     def _check_formulation(self) -> None:
@@ -81,6 +89,17 @@ class PinocchioSettings:
             )
         if self.formulation == "contact" and self.orientation is False:
             raise InputError("pinocchio: orientation", self.orientation, "contact always turns the ball; leave it out")
+
+    def _check_mechanism(self) -> None:
+        if self.formulation in OF_MECHANISMS:
+            if self.orientation is not None:
+                advice = "a mechanism always has its orientations; leave it out"
+                raise InputError("pinocchio: orientation", self.orientation, advice)
+            if self.integrator not in {"rk4", "dop853"}:
+                raise InputError("pinocchio: integrator", self.integrator, "mechanisms have rk4 and dop853")
+        if (self.formulation == "constraint_dynamics") != (self.proximal is not None):
+            advice = "constraint_dynamics needs a number, and nothing else has one"
+            raise InputError("pinocchio: proximal", self.proximal, advice)
 
     def _check_resolution(self) -> None:
         """A fixed step has dt and no rtol, an adaptive one rtol and no dt."""
@@ -112,9 +131,15 @@ class PinocchioSettings:
         :mod:`proofroll.engines.pinocchio.integrators`. Where the scene decides, this is the order for one that does
         not ask for it.
         """
+        if self.formulation in OF_MECHANISMS:
+            return 4 if self.integrator == "rk4" else None
         if self.integrator == "rk4" and not self.orientation:
             return 4
         return _ORDERS.get(self.integrator)
+
+
+# Of 1e-12 to 1e-5 any gave accelerations to 1e-13; without it, dependent rows give NaN.
+PROXIMAL = 1e-8
 
 
 def _presets(formulation: Literal["composite", "free_flyer"]) -> Mapping[str, PinocchioSettings]:
@@ -148,5 +173,18 @@ PRESETS: Mapping[str, Mapping[str, PinocchioSettings]] = {
         "matched": PinocchioSettings(
             "contact", "matched", "leapfrog", 1e-3, None, projection=False, solver="pgs", solver_tolerance=1e-12
         ),
+    },
+    "null_space": {
+        "default": PinocchioSettings("null_space", "default", "rk4", 1e-3, None, projection=False),
+        "matched": PinocchioSettings("null_space", "matched", "rk4", 1e-3, None),
+        # nothing left of the integrator but round-off
+        "tuned": PinocchioSettings("null_space", "tuned", rtol=TIGHTEST_RTOL),
+    },
+    "constraint_dynamics": {
+        "default": PinocchioSettings(
+            "constraint_dynamics", "default", "rk4", 1e-3, None, projection=False, proximal=PROXIMAL
+        ),
+        "matched": PinocchioSettings("constraint_dynamics", "matched", "rk4", 1e-3, None, proximal=PROXIMAL),
+        "tuned": PinocchioSettings("constraint_dynamics", "tuned", rtol=1e-13, proximal=PROXIMAL),
     },
 }

@@ -13,13 +13,15 @@ from proofroll.core.arrays import FloatArray
 from proofroll.core.engine import Built, Level, Sample, Term
 from proofroll.core.errors import Diverged, Refused
 from proofroll.core.events import Event
+from proofroll.core.integrators import INTEGRATORS, Integrator
 from proofroll.core.scene import Scene
 from proofroll.elements.ball_on_surface.compiled.library import with_heyoka
 from proofroll.elements.ball_on_surface.element import rolling_ball
 from proofroll.elements.ball_on_surface.model import ALL_OF_A_BALL, BallCapability, RollingBall
+from proofroll.engines.projection import mechanism
 from proofroll.engines.projection.friction import Friction
 from proofroll.engines.projection.geometry import geometry_of
-from proofroll.engines.projection.integrators import INTEGRATORS, Integrator
+from proofroll.engines.projection.mechanism import ProjectionMechanism
 from proofroll.engines.projection.method import ProjectedBall
 from proofroll.engines.projection.modes import Pace
 from proofroll.engines.projection.orientation import EulerAngles, FollowedFrame, Orientation, RotatingFrame
@@ -37,14 +39,23 @@ class Projection:
     """Blajer's projection method on any surface that guides a ball."""
 
     name: ClassVar[str] = "projection"
-    provides: ClassVar[Mapping[str, frozenset[str]]] = dict.fromkeys(PRESETS, ALL_OF_A_BALL)
+    provides: ClassVar[Mapping[str, frozenset[str]]] = {
+        "euler": ALL_OF_A_BALL,
+        "rotating_frame": ALL_OF_A_BALL,
+        "dependent": mechanism.PROVIDES,
+    }
+    lacking: ClassVar[Mapping[str, Mapping[str, str]]] = {"dependent": mechanism.LACKING}
     settings: ClassVar[type[ProjectionSettings]] = ProjectionSettings
     presets: ClassVar[Mapping[str, Mapping[str, ProjectionSettings]]] = PRESETS
-    levels: ClassVar[Mapping[str, Level]] = {"euler": Level.PROJECTION, "rotating_frame": Level.PROJECTION}
+    levels: ClassVar[Mapping[str, Level]] = {
+        "euler": Level.PROJECTION,
+        "rotating_frame": Level.PROJECTION,
+        "dependent": Level.PROJECTION,
+    }
     terms: ClassVar[Sequence[Term]] = (
         Term(
             "elimination of violations",
-            ("euler", "rotating_frame"),
+            ("euler", "rotating_frame", "dependent"),
             {"elimination": True},
             {"elimination": False},
             "takes away the slip that a step leaves (Blajer 2002); where rolling is linear with constant coefficients, "
@@ -68,8 +79,10 @@ class Projection:
         return with_heyoka(proofroll.__version__)
 
     @classmethod
-    def build(cls, scene: Scene, settings: ProjectionSettings) -> Self:
-        """See :class:`proofroll.core.engine.Engine`."""
+    def build(cls, scene: Scene, settings: ProjectionSettings) -> Self | ProjectionMechanism:
+        """See :class:`proofroll.core.engine.Engine`; what ``dependent`` builds is a run of a mechanism."""
+        if settings.formulation == "dependent":
+            return ProjectionMechanism.build(scene, settings)
         follow = BallCapability.ORIENTATION in scene.requires
         if follow and settings.integrator == "taylor" and settings.formulation == "rotating_frame":
             raise Refused("the compiled series do not follow the orientation; use integrator=dop853")
@@ -100,6 +113,7 @@ class Projection:
         self._motion: Integrator | Switching | TaylorSeries
         self._friction: Friction | None = None
         if settings.integrator == "taylor":
+            assert settings.formulation != "dependent"  # see the settings
             self._motion = TaylorSeries(body, settings.formulation, x, resolution, self._check, self._accepted)
         elif math.isfinite(body.contact.mu_static) or body.contact.rolling_resistance > 0:
             stepper = STEPPERS[settings.integrator](resolution)

@@ -9,8 +9,8 @@ from typing import Annotated, Literal
 from annotated_types import Gt
 
 from proofroll.core.errors import InputError
+from proofroll.core.integrators import INTEGRATORS, TIGHTEST
 from proofroll.elements.ball_on_surface.compiled import library
-from proofroll.engines.projection.integrators import INTEGRATORS, TIGHTEST
 
 _DT = 1e-3
 
@@ -20,9 +20,10 @@ class ProjectionSettings:
     """Settings of the projection method.
 
     Attributes:
-        formulation: ``euler``, the paper's angles, with a singularity; or ``rotating_frame``, the angular velocity
-            along the local axes, without. The angles are always part of the equations; in the rotating frame the
-            orientation is followed, as a quaternion, only for a scene that asks for it.
+        formulation: of balls, ``euler``, the paper's angles, with a singularity, or ``rotating_frame``, the angular
+            velocity along the local axes, without. The angles are always part of the equations; in the rotating frame
+            the orientation is followed, as a quaternion, only for a scene that asks for it. Of mechanisms,
+            ``dependent``, the coordinates of the bodies, cut apart.
         preset: where the other values come from.
         integrator: ``rk4`` with the fixed step ``dt``, ``dop853`` with the tolerance ``rtol``, or ``taylor`` with it:
             the same equations in compiled Taylor series (heyoka), on a cylinder or plane, without bounded friction.
@@ -37,7 +38,7 @@ class ProjectionSettings:
             from every point of it; or ``projected``, with the projections carried out in numpy at every evaluation.
     """
 
-    formulation: Literal["euler", "rotating_frame"] = "euler"
+    formulation: Literal["euler", "rotating_frame", "dependent"] = "euler"
     preset: Literal["default", "matched", "tuned"] = "matched"
     integrator: Literal["rk4", "dop853", "taylor"] = "dop853"
     dt: Annotated[float, Gt(0)] = _DT
@@ -60,11 +61,17 @@ class ProjectionSettings:
                 "projection: rtol", self.rtol, f"{self.integrator} has a fixed step; set dt, or add integrator=dop853"
             )
 
+        if self.formulation == "dependent" and self.integrator == "taylor":
+            raise InputError("projection: integrator", self.integrator, "dependent has rk4 and dop853")
+        if self.equations == "projected" and self.formulation == "dependent":
+            raise InputError("projection: equations", self.equations, "dependent always projects; leave it out")
         if self.equations == "projected" and self.integrator == "taylor":
             advice = "taylor compiles its own equations; leave it out, or take integrator=dop853"
             raise InputError("projection: equations", self.equations, advice)
         if self.singularity == "stop" and self.formulation != "euler":
-            advice = f"{self.formulation} has no angles, hence no singularity; leave it out, or take formulation=euler"
+            advice = (
+                f"{self.formulation} has no Euler angles, hence no singularity; leave it out, or take formulation=euler"
+            )
             raise InputError("projection: singularity", self.singularity, advice)
 
     @property
@@ -96,5 +103,9 @@ PRESETS: Mapping[str, Mapping[str, ProjectionSettings]] = {
         "default": ProjectionSettings("rotating_frame", "default", "rk4"),
         "matched": ProjectionSettings("rotating_frame", "matched", "dop853"),
         "tuned": ProjectionSettings("rotating_frame", "tuned", "taylor", rtol=library.TIGHTEST),
+    },
+    "dependent": {
+        "default": ProjectionSettings("dependent", "default", "rk4"),
+        "matched": ProjectionSettings("dependent", "matched", "dop853"),
     },
 }

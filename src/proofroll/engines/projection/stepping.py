@@ -16,7 +16,7 @@ from scipy.integrate import DOP853
 from proofroll.core.arrays import FloatArray
 from proofroll.core.engine import whole_steps
 from proofroll.core.errors import Diverged
-from proofroll.engines.projection.integrators import Accept, Rates, classical_step
+from proofroll.core.integrators import Accept, Rates, classical_step
 
 # Part of a fixed step that is not worth a step of its own.
 _SLIVER = 1e-9
@@ -49,7 +49,7 @@ class Stepper(Protocol):
             t: present time [s].
             y: the state.
             rates: ẏ of y.
-            accept: called after each step, see :data:`proofroll.engines.projection.integrators.Accept`.
+            accept: called after each step, see :data:`proofroll.core.integrators.Accept`.
             scales: natural size of each component of y.
         """
 

@@ -1,0 +1,185 @@
+"""Formulation ``tree``: a mechanism without loops as Exudyn's kinematic tree, integrated by explicit methods.
+
+Its links have their frames on their joints, so that everything of a body is turned and moved there first. It knows
+neither reactions nor joints of more than one coordinate.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from typing import Any
+
+import numpy as np
+
+from proofroll.core.engine import Sample
+from proofroll.engines.exudyn.integration import Integration, new_system
+from proofroll.engines.exudyn.native import Output, exu, items
+from proofroll.engines.exudyn.settings import ExudynSettings
+from proofroll.mechanisms import WORLD
+from proofroll.mechanisms.capabilities import ALL_JOINTS, ALL_LOOPS, FORCES, MechanismCapability, require
+from proofroll.mechanisms.rotations import Array, to_quaternion
+from proofroll.mechanisms.sampling import MechanismBuilt, mechanism_of
+
+_KNOWN = {MechanismCapability.REVOLUTE, MechanismCapability.PRISMATIC}
+PROVIDES: frozenset[str] = frozenset(_KNOWN | FORCES)
+LACKING: Mapping[str, str] = {
+    **dict.fromkeys(ALL_JOINTS - _KNOWN, "a joint of Exudyn's kinematic tree has exactly one coordinate"),
+    **dict.fromkeys(ALL_LOOPS, "Exudyn's explicit integrators take no constraints; use redundant"),
+    MechanismCapability.JOINT_FRICTION: "this model has no friction in joints",
+    MechanismCapability.ARMATURE: "Exudyn's kinematic tree has no inertia of drives",
+}
+_TYPES = {"revolute": exu.JointType.RevoluteZ, "prismatic": exu.JointType.PrismaticZ}
+_READ = ("Position", "Velocity", "AngularVelocity", "RotationMatrix", "Acceleration", "AngularAcceleration")
+
+
+class KinematicTree:
+    """See :class:`proofroll.core.engine.Engine` for the methods."""
+
+    def __init__(self, scene: Any, settings: ExudynSettings) -> None:
+        mechanism = mechanism_of(scene)
+        require(mechanism, PROVIDES, LACKING)
+        self._mechanism = mechanism
+        self._container, self._system = new_system()
+        self._link = {joint.child: number for number, joint in enumerate(mechanism.joints)}
+        self._frames = {WORLD: (np.eye(3), np.zeros(3))} | {  # each body's frame in that of its link
+            joint.child: (joint.child_frame.T, -joint.child_frame.T @ joint.child_position)
+            for joint in mechanism.joints
+        }
+        self._tree = self._system.AddObject(self._kinematic_tree())
+        ground = self._system.CreateGround()
+        for spring in mechanism.springs:
+            ends = ((spring.body_a, spring.position_a), (spring.body_b, spring.position_b))
+            markers = [self._marker(ground, body, np.array(position)) for body, position in ends]
+            self._system.AddObject(
+                items.ObjectConnectorSpringDamper(
+                    markerNumbers=markers,
+                    stiffness=spring.stiffness,
+                    damping=spring.damping,
+                    referenceLength=spring.length,
+                )
+            )
+        origins = [(self._link[body.name], self._in_link(body.name, np.zeros(3))) for body in mechanism.bodies]
+        self._sensors = {name: self._add_sensors(name, origins) for name in _READ}
+        on_joints = [(number, [0.0, 0.0, 0.0]) for number in range(len(mechanism.joints))]
+        self._on_joints = {name: self._add_sensors(name, on_joints) for name in ("Position", "RotationMatrix")}
+        self._system.Assemble()
+        self.integration = Integration(self._system, settings)
+
+    def _kinematic_tree(self) -> Any:
+        mechanism, joints = self._mechanism, self._mechanism.joints
+        data = {body.name: body for body in mechanism.bodies}
+        q, v = mechanism.start()
+        node = self._system.AddNode(
+            items.NodeGenericODE2(
+                referenceCoordinates=np.zeros(len(joints)),
+                initialCoordinates=q,
+                initialCoordinates_t=v,
+                numberOfODE2Coordinates=len(joints),
+            )
+        )
+        turns, offsets, coms, inertias = [], [], [], []
+        for joint in joints:
+            R, p = self._frames[joint.parent]
+            turns.append(R @ joint.parent_frame)
+            offsets.append(p + R @ joint.position)
+            R, p = self._frames[joint.child]
+            coms.append(p + R @ data[joint.child].com)
+            inertias.append(R @ np.array(data[joint.child].inertia) @ R.T)
+        return items.ObjectKinematicTree(
+            nodeNumber=node,
+            jointTypes=[_TYPES[joint.kind] for joint in joints],
+            linkParents=[self._link.get(joint.parent, -1) for joint in joints],
+            jointTransformations=exu.Matrix3DList(turns),
+            jointOffsets=exu.Vector3DList(offsets),
+            linkInertiasCOM=exu.Matrix3DList(inertias),
+            linkCOMs=exu.Vector3DList(coms),
+            linkMasses=[data[joint.child].mass for joint in joints],
+            gravity=list(mechanism.gravity),
+            jointForceVector=[joint.torque for joint in joints],
+            # all four at full length, or Exudyn ignores them
+            jointPControlVector=[joint.stiffness for joint in joints],
+            jointDControlVector=[joint.damping for joint in joints],
+            jointPositionOffsetVector=[joint.rest for joint in joints],
+            jointVelocityOffsetVector=[0.0] * len(joints),
+        )
+
+    def _in_link(self, body: str, position: Array) -> list[float]:
+        R, p = self._frames[body]
+        return [float(x) for x in p + R @ position]
+
+    def _marker(self, ground: Any, body: str, position: Array) -> Any:
+        if body == WORLD:
+            return self._system.AddMarker(items.MarkerBodyRigid(bodyNumber=ground, localPosition=position.tolist()))
+        return self._system.AddMarker(
+            items.MarkerKinematicTreeRigid(
+                objectNumber=self._tree, linkNumber=self._link[body], localPosition=self._in_link(body, position)
+            )
+        )
+
+    def _add_sensors(self, name: str, places: Sequence[tuple[int, list[float]]]) -> list[Any]:
+        """Sensors of a quantity at places of links, which are read when it is asked for."""
+        return [
+            self._system.AddSensor(
+                items.SensorKinematicTree(
+                    objectNumber=self._tree,
+                    linkNumber=link,
+                    localPosition=place,
+                    outputVariableType=getattr(Output, name),
+                    writeToFile=False,
+                )
+            )
+            for link, place in places
+        ]
+
+    def _read(self, sensors: Sequence[Any]) -> Array:
+        return np.array([self._system.GetSensorValues(sensor) for sensor in sensors])
+
+    def sample(self) -> Sample:
+        """See :class:`proofroll.core.engine.Engine`; the tree knows no reactions."""
+        links = self._read(self._sensors["RotationMatrix"]).reshape(-1, 3, 3)
+        bodies = [R @ self._frames[body.name][0] for R, body in zip(links, self._mechanism.bodies, strict=True)]
+        return Sample(
+            p_WB=self._read(self._sensors["Position"]),
+            v_WB=self._read(self._sensors["Velocity"]),
+            w_WB=self._read(self._sensors["AngularVelocity"]),
+            q_WB=np.array([to_quaternion(R) for R in bodies]),
+        )
+
+    def events(self) -> Sequence[Any]:
+        """None: nothing here switches."""
+        return ()
+
+    def built(self) -> MechanismBuilt:
+        """See :class:`proofroll.core.engine.Engine`; accelerations from Exudyn's own mass matrix and forces."""
+        tree = self._system.GetObject(self._tree)
+        order = [self._link[body.name] for body in self._mechanism.bodies]
+        frames = [self._frames[body.name] for body in self._mechanism.bodies]
+        # Exudyn's lists do not end as Python's do: they are read by index
+        coms = [np.array(tree["linkCOMs"][i]) for i in order]
+        inertias = [np.array(tree["linkInertiasCOM"][i]) for i in order]
+        linear, angular = self._accelerations()
+        return MechanismBuilt(
+            mass=np.array(tree["linkMasses"])[order],
+            com=np.array([R.T @ (com - p) for (R, p), com in zip(frames, coms, strict=True)]),
+            inertia=np.array([R.T @ inertia @ R for (R, _), inertia in zip(frames, inertias, strict=True)]),
+            joint_position=self._read(self._on_joints["Position"]),
+            joint_axis=self._read(self._on_joints["RotationMatrix"]).reshape(-1, 3, 3)[:, :, 2],
+            gravity=np.array(tree["gravity"]),
+            rows=0,
+            rank=0,
+            mobility=len(self._mechanism.joints),
+            acceleration=linear,
+            angular_acceleration=angular,
+        )
+
+    def _accelerations(self) -> tuple[Array, Array]:
+        """Of the origins of the bodies' frames, and angular; the state stays as it is."""
+        solver, state = self.integration.solver, self._system.systemData
+        solver.ComputeMassMatrix(self._system, 1.0)
+        solver.ComputeODE2RHS(self._system)
+        kept = state.GetODE2Coordinates_tt()
+        found = np.linalg.solve(solver.GetSystemMassMatrix(), solver.GetSystemResidual())
+        state.SetODE2Coordinates_tt(found, exu.ConfigurationType.Current)
+        accelerations = self._read(self._sensors["Acceleration"]), self._read(self._sensors["AngularAcceleration"])
+        state.SetODE2Coordinates_tt(kept, exu.ConfigurationType.Current)
+        return accelerations

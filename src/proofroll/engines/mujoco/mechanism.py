@@ -1,0 +1,236 @@
+"""A mechanism in MuJoCo: start, steps, and what is read back."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from typing import Any
+
+import mujoco
+import numpy as np
+
+from proofroll.core.engine import Regularised, Sample, whole_steps
+from proofroll.core.errors import InputError
+from proofroll.engines.mujoco import mechanism_model
+from proofroll.engines.mujoco.running import compiled, forget_callbacks, raise_if_fatal, silent
+from proofroll.engines.mujoco.settings import MujocoSettings, impedance
+from proofroll.mechanisms import Joint, Mechanism
+from proofroll.mechanisms.capabilities import ALL_JOINTS, FORCES, MechanismCapability, require
+from proofroll.mechanisms.joint_motion import placed
+from proofroll.mechanisms.rotations import Array, to_quaternion
+from proofroll.mechanisms.sampling import DEPENDENT, WITH_AXIS, MechanismBuilt, independent, mechanism_of, unsaid
+
+_CAPABILITY = MechanismCapability
+PROVIDES = (
+    ALL_JOINTS
+    | FORCES
+    | {_CAPABILITY.FIXED_LOOP, _CAPABILITY.REVOLUTE_LOOP, _CAPABILITY.SPHERICAL_LOOP, _CAPABILITY.REDUNDANT}
+    | {_CAPABILITY.JOINT_FRICTION, _CAPABILITY.ARMATURE}
+)
+_NO_ROWS = "MuJoCo's equality constraints hold points or whole frames together, and no single angle or direction"
+LACKING: Mapping[str, str] = {
+    _CAPABILITY.PRISMATIC_LOOP: _NO_ROWS,
+    _CAPABILITY.UNIVERSAL_LOOP: _NO_ROWS,
+    _CAPABILITY.PLANAR_LOOP: _NO_ROWS,
+}
+# The hard answer has round-off of its own, most where rows depend on each other.
+_MARGIN = 1.1
+
+
+class MujocoMechanism:
+    """See :class:`proofroll.core.engine.Engine` for the methods."""
+
+    def __init__(self, mechanism: Mechanism, settings: MujocoSettings) -> None:
+        require(mechanism, PROVIDES, LACKING)
+        forget_callbacks()
+        self._mechanism, self._settings = mechanism, settings
+        self._model = compiled(mechanism_model.write(mechanism, settings))
+        self._data, self._scratch = mujoco.MjData(self._model), mujoco.MjData(self._model)
+        self._bodies = [self._model.body(body.name).id for body in mechanism.bodies]
+        self._sites = [self._model.site(f"{number}").id for number in range(len(mechanism.joints))]
+        self._steps = 0
+        for number, joint in enumerate(mechanism.joints):
+            self._start(number, joint)
+        with silent():
+            mujoco.mj_forward(self._model, self._data)
+
+    @classmethod
+    def build(cls, scene: Any, settings: MujocoSettings) -> MujocoMechanism:
+        """See :class:`proofroll.core.engine.Engine`; ``scene`` may be a mechanism."""
+        check(settings)
+        return cls(mechanism_of(scene), settings)
+
+    def _start(self, number: int, joint: Joint) -> None:
+        """Puts a joint's coordinates, velocities and drive into the state."""
+        parts = [self._model.joint(f"{number}.{part}") for part in range(len(mechanism_model.parts_of(joint)))]
+        if not parts:
+            return
+        q, v = np.array(joint.q0), np.array(joint.v0)
+        if len(parts) == 1 and joint.kind == "free":  # qpos: the body's frame in the world; qvel: its origin's velocity
+            origin, S = placed(joint.kind, q)
+            R = joint.parent_frame @ S
+            arm = R @ joint.child_position
+            place = np.array(joint.position) + joint.parent_frame @ origin - arm
+            q = np.concatenate([place, to_quaternion(R)])
+            v = np.concatenate([R @ v[:3] - np.cross(R @ v[3:], arm), v[3:]])
+        elif joint.kind == "free":
+            v = np.concatenate([placed(joint.kind, q)[1] @ v[:3], v[3:]])
+        self._data.qpos[parts[0].qposadr[0] :][: len(q)] = q
+        first = parts[0].dofadr[0]
+        self._data.qvel[first : first + len(v)] = v
+        if joint.torque:
+            self._data.qfrc_applied[first] = joint.torque
+
+    def advance(self, t: float) -> None:
+        """See :class:`proofroll.core.engine.Engine`."""
+        dt = self._settings.dt
+        steps = whole_steps(self._steps * dt, t, dt)
+        if steps:
+            with silent():
+                mujoco.mj_step(self._model, self._data, steps)
+            self._steps += steps
+            raise_if_fatal(self._data, t)
+
+    @property
+    def native(self) -> tuple[Any, Any]:
+        """MuJoCo's own model and data."""
+        return self._model, self._data
+
+    def sample(self) -> Sample:
+        """See :class:`proofroll.core.engine.Engine`."""
+        data = self._evaluated()
+        twists = np.zeros((len(self._bodies), 6))
+        for row, body in zip(twists, self._bodies, strict=True):
+            mujoco.mj_objectVelocity(self._model, data, mujoco.mjtObj.mjOBJ_XBODY, body, row, 0)
+        force, torque = self._reactions(data)
+        return Sample(
+            p_WB=data.xpos[self._bodies].copy(),
+            v_WB=twists[:, 3:].copy(),
+            w_WB=twists[:, :3].copy(),
+            q_WB=data.xquat[self._bodies].copy(),
+            joint_force=force,
+            joint_torque=torque,
+        )
+
+    def _reactions(self, data: Any) -> tuple[Array, Array]:
+        """Forces and moments of joints and loops on the child, about the joint, world axes.
+
+        The sensors tell what passes through a joint, with its own spring, damper and drive, but without what tendons
+        and loops carry past it.
+        """
+        force, torque = unsaid(self._mechanism)
+        count = len(self._mechanism.joints)
+        for number, site in enumerate(self._sites):
+            R = data.site_xmat[site].reshape(3, 3)
+            force[number] = R @ data.sensor(f"FORCE{number}").data
+            torque[number] = R @ data.sensor(f"TORQUE{number}").data
+        rows = {int(data.efc_id[row]): row for row in reversed(range(data.ne))}  # first row of each constraint
+        for number, loop in enumerate(self._mechanism.loops):
+            if loop.kind == "fixed":
+                continue
+            force[count + number] = torque[count + number] = 0.0
+            origin = data.site(f"loop{number}b0").xpos
+            for point in range(2):
+                equality = mujoco.mj_name2id(self._model, mujoco.mjtObj.mjOBJ_EQUALITY, f"loop{number}.{point}")
+                if equality < 0:
+                    continue
+                on_b = -data.efc_force[rows[equality] : rows[equality] + 3]  # it acts on the first site's body
+                force[count + number] += on_b
+                torque[count + number] += np.cross(data.site(f"loop{number}b{point}").xpos - origin, on_b)
+        return force, torque
+
+    def built(self) -> MechanismBuilt:
+        """See :class:`proofroll.core.engine.Engine`."""
+        model, data = self._model, self._evaluated()
+        axes = np.zeros((len(self._bodies), 3, 3))
+        for R, body in zip(axes, self._bodies, strict=True):
+            flat = np.zeros(9)
+            mujoco.mju_quat2Mat(flat, model.body_iquat[body])
+            R[:] = flat.reshape(3, 3)
+        rows = self._equality_rows(data)
+        rank = independent(rows)
+        linear, angular = self._accelerations(data)
+        return MechanismBuilt(
+            mass=model.body_mass[self._bodies].copy(),
+            com=model.body_ipos[self._bodies].copy(),
+            inertia=np.einsum("nij,nj,nkj->nik", axes, model.body_inertia[self._bodies], axes),
+            joint_position=data.site_xpos[self._sites].copy(),
+            joint_axis=np.array([self._axis(data, number) for number in range(len(self._sites))]),
+            gravity=model.opt.gravity.copy(),
+            rows=len(rows),
+            rank=rank,
+            mobility=int(model.nv) - rank,
+            acceleration=linear,
+            angular_acceleration=angular,
+            regularised=self._softened(data, rows, linear, angular),
+        )
+
+    def _axis(self, data: Any, number: int) -> Array:
+        """Of the turning or sliding along z of a joint's frame, in the world."""
+        kind = self._mechanism.joints[number].kind
+        if kind not in WITH_AXIS:
+            return np.full(3, np.nan)
+        last = 0 if kind == "universal" else len(mechanism_model.PARTS[kind]) - 1
+        return np.array(data.xaxis[self._model.joint(f"{number}.{last}").id])
+
+    def _equality_rows(self, data: Any) -> Array:
+        """Rows of the equality constraints on MuJoCo's velocities, shape (rows, nv)."""
+        rows = np.zeros((data.ne, self._model.nv))
+        if data.ne and mujoco.mj_isSparse(self._model):
+            J = np.zeros((data.nefc, self._model.nv))
+            mujoco.mju_sparse2dense(J, data.efc_J, data.efc_J_rownnz, data.efc_J_rowadr, data.efc_J_colind)
+            rows[:] = J[: data.ne]
+        elif data.ne:
+            rows[:] = np.reshape(data.efc_J, (-1, self._model.nv))[: data.ne]
+        return rows
+
+    def _accelerations(self, data: Any) -> tuple[Array, Array]:
+        """Of the bodies' origins, and angular, shape (bodies, 3) each."""
+        mujoco.mj_rnePostConstraint(self._model, data)
+        found = np.zeros((len(self._bodies), 6))
+        for row, body in zip(found, self._bodies, strict=True):
+            mujoco.mj_objectAcceleration(self._model, data, mujoco.mjtObj.mjOBJ_XBODY, body, row, 0)
+        return found[:, 3:] + self._model.opt.gravity, found[:, :3].copy()  # MuJoCo's are those that a sensor feels
+
+    def _softened(self, data: Any, rows: Array, linear: Array, angular: Array) -> dict[str, Regularised]:
+        """What MuJoCo's soft loops change: its answer against that of its own matrices with hard loops.
+
+        Hard loops have the accelerations that MuJoCo's own terms want (``efc_aref``), exactly. The tolerance is thus
+        what softness explains and no more: rows that are wrong or missing are so in both answers.
+        """
+        if not len(rows):
+            return {}
+        M = np.zeros((self._model.nv, self._model.nv))
+        mujoco.mj_fullM(self._model, data, M)
+        into = np.linalg.solve(M, rows.T)
+        missing = data.efc_aref[: data.ne] - rows @ data.qacc_smooth
+        data.qacc[:] = data.qacc_smooth + into @ np.linalg.pinv(rows @ into, DEPENDENT, hermitian=True) @ missing
+        because = (
+            f"loops are soft, of impedance {impedance(self._settings)[0]:g} at rest; hard ones would change that much"
+        )
+        found = {}
+        for name, soft, hard in zip(
+            ("acceleration", "angular_acceleration"), (linear, angular), self._accelerations(data), strict=True
+        ):
+            difference = float(np.abs(hard - soft).max() / max(np.abs(hard).max(), np.finfo(float).tiny))
+            found[name] = Regularised(_MARGIN * difference + DEPENDENT, because)
+        return found
+
+    def _evaluated(self) -> Any:
+        """A copy of the present state with its own forces: after a step MjData holds those of the last stage."""
+        mujoco.mj_copyData(self._scratch, self._model, self._data)
+        with silent():
+            mujoco.mj_forward(self._model, self._scratch)
+        return self._scratch
+
+
+def check(settings: MujocoSettings) -> None:
+    """Rejects options of a contact that was changed, for this formulation has none.
+
+    Raises:
+        InputError: the first of them.
+    """
+    plain = MujocoSettings(settings.formulation)
+    for name in ("cone", "friction", "friction_damping", "start", "curvature", "cone_correction", "condim"):
+        if getattr(settings, name) != getattr(plain, name):
+            advice = "joints has no contact; leave it out"
+            raise InputError(f"mujoco: {name}", getattr(settings, name), advice)

@@ -1,0 +1,107 @@
+"""Formulation ``joints``: a mechanism as an MjSpec of bodies, joints, equality constraints and tendons.
+
+A body's frame stands at ``qpos = 0`` where it stands at q = 0. Universal and planar joints are two hinges, and two
+slides and a hinge, of one body; a free joint on another body than the world is three slides and a ball. A loop is
+closed by ``connect`` constraints of points (fixed: by a ``weld``). One point holds a spherical loop, and a revolute one
+where the mechanism is planar; in space a revolute loop needs two points of its axis: with one, the bodies turn about
+it freely, without any drift that would tell.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import Any
+
+import mujoco
+import numpy as np
+
+from proofroll.engines.mujoco.settings import MujocoSettings, impedance, time_constant
+from proofroll.mechanisms import WORLD, Body, Joint, Loop, Mechanism
+from proofroll.mechanisms.loop_points import held_points
+from proofroll.mechanisms.rotations import to_quaternion
+
+_HINGE, _SLIDE = mujoco.mjtJoint.mjJNT_HINGE, mujoco.mjtJoint.mjJNT_SLIDE
+_BALL, _FREE = mujoco.mjtJoint.mjJNT_BALL, mujoco.mjtJoint.mjJNT_FREE
+# MuJoCo's joints that make up one of ours, in order, each with the column of the joint's frame that is its axis.
+PARTS: dict[str, tuple[tuple[Any, int], ...]] = {
+    "fixed": (),
+    "revolute": ((_HINGE, 2),),
+    "prismatic": ((_SLIDE, 2),),
+    "universal": ((_HINGE, 2), (_HINGE, 0)),
+    "spherical": ((_BALL, 2),),
+    "planar": ((_SLIDE, 0), (_SLIDE, 1), (_HINGE, 2)),
+    "free": ((_SLIDE, 0), (_SLIDE, 1), (_SLIDE, 2), (_BALL, 2)),
+}
+
+
+def parts_of(joint: Joint) -> tuple[tuple[Any, int], ...]:
+    """MuJoCo's joints that make up a joint."""
+    return ((_FREE, 2),) if joint.kind == "free" and joint.parent == WORLD else PARTS[joint.kind]
+
+
+def write(mechanism: Mechanism, settings: MujocoSettings) -> Any:
+    """The MjSpec; joint k of the mechanism has MuJoCo's joints ``k.0``, ``k.1`` …, a site ``k`` and two sensors."""
+    spec = mujoco.MjSpec()
+    option = spec.option
+    option.timestep, option.gravity = settings.dt, mechanism.gravity
+    option.integrator = getattr(mujoco.mjtIntegrator, f"mjINT_{settings.integrator.upper()}")
+    # Without autoreset, a state that is not finite stays as it is instead of starting anew at time 0.
+    option.disableflags |= int(mujoco.mjtDisableBit.mjDSBL_CONTACT) | int(mujoco.mjtDisableBit.mjDSBL_AUTORESET)
+    bodies = {WORLD: spec.worldbody}
+    data = {body.name: body for body in mechanism.bodies}
+    for number, joint in enumerate(mechanism.joints):
+        bodies[joint.child] = _add_body(spec, bodies[joint.parent], number, joint, data[joint.child])
+    for number, loop in enumerate(mechanism.loops):
+        _add_loop(spec, bodies, number, loop, held_points(mechanism, loop), settings)
+    for number, spring in enumerate(mechanism.springs):
+        tendon = spec.add_tendon(name=f"spring{number}")
+        for end, body, position in (("a", spring.body_a, spring.position_a), ("b", spring.body_b, spring.position_b)):
+            bodies[body].add_site(name=f"spring{number}{end}", pos=position)
+            tendon.wrap_site(f"spring{number}{end}")
+        tendon.stiffness[0], tendon.damping[0] = spring.stiffness, spring.damping
+        tendon.springlength = [spring.length, spring.length]
+    return spec
+
+
+def _add_body(spec: Any, parent: Any, number: int, joint: Joint, body: Body) -> Any:
+    turned = joint.parent_frame @ joint.child_frame.T
+    place = np.array(joint.position) - turned @ joint.child_position
+    added = parent.add_body(name=body.name, pos=place, quat=to_quaternion(turned))
+    added.explicitinertial = True
+    moments, axes = np.linalg.eigh(body.inertia)
+    axes[:, 2] *= np.sign(np.linalg.det(axes))
+    if np.count_nonzero(body.inertia) == np.count_nonzero(np.diag(body.inertia)):
+        moments, axes = np.diag(body.inertia), np.eye(3)
+    added.mass, added.ipos, added.inertia, added.iquat = body.mass, body.com, moments, to_quaternion(axes)
+    for part, (kind, column) in enumerate(parts_of(joint)):
+        made = added.add_joint(
+            name=f"{number}.{part}", type=kind, pos=joint.child_position, axis=joint.child_frame[:, column]
+        )
+        made.stiffness[0], made.damping[0], made.springref = joint.stiffness, joint.damping, joint.rest
+        made.frictionloss, made.armature = joint.friction, joint.armature
+    added.add_site(name=f"{number}", pos=joint.child_position)
+    for kind in ("FORCE", "TORQUE"):
+        spec.add_sensor(
+            name=f"{kind}{number}",
+            type=getattr(mujoco.mjtSensor, f"mjSENS_{kind}"),
+            objtype=mujoco.mjtObj.mjOBJ_SITE,
+            objname=f"{number}",
+        )
+    return added
+
+
+def _add_loop(
+    spec: Any, bodies: dict[str, Any], number: int, loop: Loop, points: Sequence[float], settings: MujocoSettings
+) -> None:
+    kind = mujoco.mjtEq.mjEQ_WELD if loop.kind == "fixed" else mujoco.mjtEq.mjEQ_CONNECT
+    for point, along in enumerate(points):
+        names = [f"loop{number}{end}{point}" for end in "ab"]
+        ends = ((loop.body_a, loop.position_a, loop.frame_a), (loop.body_b, loop.position_b, loop.frame_b))
+        for name, (body, position, frame) in zip(names, ends, strict=True):
+            bodies[body].add_site(name=name, pos=position + along * frame[:, 2], quat=to_quaternion(frame))
+        added = spec.add_equality(name=f"loop{number}.{point}", type=kind, objtype=mujoco.mjtObj.mjOBJ_SITE)
+        added.name1, added.name2 = names
+        if settings.time_constant is not None:
+            added.solref = (time_constant(settings), 1.0)
+        if settings.impedance is not None:
+            added.solimp = (*impedance(settings), 1e-3, 0.5, 2.0)

@@ -1,0 +1,60 @@
+"""What every model in MuJoCo needs around its steps."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from contextlib import contextmanager
+from typing import Any
+
+import mujoco
+
+from proofroll.core.errors import Diverged, Refused
+
+_FATAL = (
+    (mujoco.mjtWarning.mjWARN_BADQPOS, "positions are not finite or huge"),
+    (mujoco.mjtWarning.mjWARN_BADQVEL, "velocities are not finite or huge"),
+    (mujoco.mjtWarning.mjWARN_BADQACC, "accelerations are not finite or huge"),
+    (mujoco.mjtWarning.mjWARN_CONTACTFULL, "there are more contacts than MuJoCo holds"),
+    (mujoco.mjtWarning.mjWARN_CNSTRFULL, "there are more constraints than MuJoCo holds"),
+)
+
+
+def compiled(spec: Any) -> Any:
+    """The model; MuJoCo takes no mass or inertia below 1e-15, for example, in whatever units.
+
+    Raises:
+        Refused: MuJoCo does not accept the numbers.
+    """
+    try:
+        return spec.compile()
+    except ValueError as error:
+        raise Refused(f"MuJoCo does not accept the model: {' '.join(str(error).split())}") from None
+
+
+def forget_callbacks() -> None:
+    """Callbacks belong to the process: one that somebody else left would act in our models too."""
+    for name in ("act_bias", "act_dyn", "act_gain", "contactfilter", "control", "passive", "sensor"):
+        getattr(mujoco, f"set_mjcb_{name}")(None)
+
+
+@contextmanager
+def silent() -> Iterator[None]:
+    """Keeps MuJoCo from printing, and from writing MUJOCO_LOG.TXT; warnings are read from MjData instead."""
+    before = mujoco.get_mju_user_warning()
+    mujoco.set_mju_user_warning(lambda _: None)
+    try:
+        yield
+    finally:
+        mujoco.set_mju_user_warning(before)
+
+
+def raise_if_fatal(data: Any, t: float) -> None:
+    """Looks at MuJoCo's warnings after steps up to ``t`` [s].
+
+    Raises:
+        Diverged: one of them means that the state is worthless.
+    """
+    warnings = data.warning
+    for kind, meaning in _FATAL:
+        if warnings[kind].number:
+            raise Diverged(f"MuJoCo gave up before {t:g} s: {meaning}")

@@ -1,0 +1,111 @@
+"""Formulation ``constraint_dynamics``: the loops as Pinocchio's own rigid constraints, solved by its proximal method.
+
+It holds points or whole frames together, which leaves out the loops between: a revolute one is two points on its axis
+(one where the mechanism is planar). Without the proximal term μ, dependent rows give NaN.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from typing import Any, ClassVar
+
+import numpy as np
+import pinocchio as pin
+
+from proofroll.core.engine import Regularised
+from proofroll.engines.pinocchio.joint_tree import LACKING, PROVIDES, JointTree
+from proofroll.engines.pinocchio.loop_rows import LoopRows
+from proofroll.engines.pinocchio.settings import PinocchioSettings
+from proofroll.mechanisms import WORLD, Loop
+from proofroll.mechanisms.capabilities import ALL_LOOPS, MechanismCapability
+from proofroll.mechanisms.loop_points import held_points
+from proofroll.mechanisms.rotations import Array
+
+_POINTS = {MechanismCapability.SPHERICAL_LOOP, MechanismCapability.REVOLUTE_LOOP}
+_NO_ROWS = "Pinocchio's rigid constraints hold points or whole frames together, and no single angle or direction"
+_ITERATIONS = 50
+_ACCURACY = 1e-14
+
+
+class ConstraintDynamics:
+    """Accelerations and reactions of a tree with Pinocchio's rigid constraints."""
+
+    provides: ClassVar[frozenset[str]] = frozenset(PROVIDES - ALL_LOOPS | _POINTS)
+    lacking: ClassVar[Mapping[str, str]] = {**LACKING, **dict.fromkeys(ALL_LOOPS - _POINTS, _NO_ROWS)}
+
+    def __init__(self, tree: JointTree, rows: LoopRows, settings: PinocchioSettings) -> None:  # noqa: ARG002 -- as others
+        self._tree, self._model = tree, tree.model
+        assert settings.proximal is not None  # see the settings
+        self._proximal = pin.ProximalSettings(_ACCURACY, settings.proximal, _ITERATIONS)
+        self._constraints, self._loops = pin.StdVec_RigidConstraintModel(), []
+        for number, (loop, (a, b)) in enumerate(zip(tree.mechanism.loops, tree.loops, strict=True)):
+            for along in held_points(tree.mechanism, loop):
+                ends: list[Any] = []
+                for frame in (b, a) if self._first_is_b(loop) else (a, b):
+                    on = self._model.frames[frame]
+                    ends += [on.parentJoint, on.placement * pin.SE3(np.eye(3), np.array([0.0, 0.0, along]))]
+                kind = pin.ContactType.CONTACT_3D
+                self._constraints.append(pin.RigidConstraintModel(kind, self._model, *ends, pin.LOCAL))
+                self._loops.append(number)
+        self._results = self._new_results()
+        self._ready: Any = None  # the data that the results belong to
+        self.regularised: Mapping[str, Regularised] = {}
+
+    @staticmethod
+    def _first_is_b(loop: Loop) -> bool:
+        """Whether Pinocchio's first joint carries body_b: its solver crashes where that is the world."""
+        return loop.body_a == WORLD
+
+    def _new_results(self) -> Any:
+        results = pin.StdVec_RigidConstraintData()
+        for constraint in self._constraints:
+            results.append(constraint.createData())
+        return results
+
+    def acceleration(self, data: Any, q: Array, v: Array) -> Array:
+        """Of the joints, shape (nv,)."""
+        tree, model = self._tree, self._model
+        tau = tree.drives(q, v)
+        if tree.has_springs:  # constraintDynamics takes no external forces: they are put to the joints
+            pin.forwardKinematics(model, data, q, v)
+            pin.updateFramePlacements(model, data)
+            rest = np.zeros(model.nv)
+            with_pulls = pin.rnea(model, data, q, rest, rest, tree.pulls(data)).copy()
+            tau = tau + pin.rnea(model, data, q, rest, rest) - with_pulls
+        if self._ready is not data:
+            pin.initConstraintDynamics(model, data, self._constraints, self._results)
+            self._ready = data
+        found = pin.constraintDynamics(model, data, q, v, tau, self._constraints, self._results, self._proximal)
+        return np.array(found)
+
+    def reactions(self, data: Any, q: Array, v: Array) -> tuple[Array, Any]:
+        """Acceleration, and forces of springs and loops on Pinocchio's joints."""
+        tree = self._tree
+        acceleration = self.acceleration(data, q, v)
+        pin.updateFramePlacements(self._model, data)
+        pin.forwardKinematics(self._model, data, q, v)
+        forces = tree.pulls(data)
+        self._on_loops = np.zeros((2, len(tree.loops), 3))
+        for number, result in zip(self._loops, self._results, strict=True):
+            a, b = tree.loops[number]
+            on_first = result.oMc1.rotation @ result.contact_force.linear
+            on_b = on_first if self._first_is_b(tree.mechanism.loops[number]) else -on_first
+            place = result.oMc1.translation
+            tree.put(forces, data, b, place, on_b)
+            tree.put(forces, data, a, place, -on_b)
+            self._on_loops[0, number] += on_b
+            self._on_loops[1, number] += np.cross(place - data.oMf[b].translation, on_b)
+        return acceleration, forces
+
+    def on_loops(self, data: Any) -> tuple[Array, Array]:  # noqa: ARG002 -- the results say it
+        """Force and moment on body_b of each loop, as the last :meth:`reactions` found them."""
+        return self._on_loops[0], self._on_loops[1]
+
+    def constraint_rows(self, data: Any, q: Array, v: Array) -> Array:
+        """Rows of Pinocchio's constraints on the velocities of the joints."""
+        if not self._loops:
+            return np.zeros((0, self._model.nv))
+        self.acceleration(data, q, v)
+        pin.computeJointJacobians(self._model, data, q)
+        J = pin.getConstraintsJacobian(self._model, data, self._constraints, self._results)
+        return np.reshape(J, (-1, self._model.nv))

@@ -1,0 +1,161 @@
+"""A mechanism as a pin.Model: its tree of joints, a frame wherever something is attached, its forces.
+
+Joints are added depth-first, which is the order of a mechanism's joints: in any other, Pinocchio's crba gives a wrong
+mass matrix without a word. A joint's frame is our frame B on the child; bodies that fixed joints hold are appended to
+the joint that carries them.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from typing import Any
+
+import numpy as np
+import pinocchio as pin
+
+from proofroll.mechanisms import WORLD, Joint, Mechanism
+from proofroll.mechanisms.capabilities import ALL_JOINTS, ALL_LOOPS, FORCES, MechanismCapability
+from proofroll.mechanisms.rotations import Array
+
+PROVIDES = ALL_JOINTS | ALL_LOOPS | FORCES | {MechanismCapability.REDUNDANT, MechanismCapability.ARMATURE}
+LACKING: Mapping[str, str] = {
+    MechanismCapability.JOINT_FRICTION: "these equations have no law that switches; Pinocchio's solver of dry friction "
+    "in joints belongs to its contacts"
+}
+_X, _Z = np.array([1.0, 0.0, 0.0]), np.array([0.0, 0.0, 1.0])
+# Column of a joint's own velocities that turns about (or slides along) its axis.
+AXIS_COLUMN = {"revolute": 0, "prismatic": 0, "universal": 0, "planar": 2}
+
+
+class JointTree:
+    """The model and its forces.
+
+    Attributes:
+        model: pin.Model.
+        q0, v0: configuration and velocity at time 0.
+        joint: Pinocchio's joint of each of the mechanism's joints; that of the carrying joint where it is fixed.
+        body, at_joint: Pinocchio's frames of the bodies, and of the joints on their children.
+    """
+
+    def __init__(self, mechanism: Mechanism) -> None:
+        self.mechanism = mechanism
+        self.model: Any = pin.Model()
+        self.model.gravity.linear = np.array(mechanism.gravity)
+        self.joint: list[int] = []
+        self.at_joint: list[int] = []
+        carried = {WORLD: (0, pin.SE3.Identity())}  # body -> joint that carries it, pose of its frame in that joint
+        data = {body.name: body for body in mechanism.bodies}
+        frames: dict[str, int] = {}
+        for joint in mechanism.joints:
+            parent, pose = carried[joint.parent]
+            place = pose * pin.SE3(joint.parent_frame, np.array(joint.position))
+            back = pin.SE3(joint.child_frame, np.array(joint.child_position)).inverse()
+            if joint.kind == "fixed":
+                index, place = parent, place * back
+            else:
+                index, place = self.model.addJoint(parent, _joint_model(joint), place, joint.name), back
+            carried[joint.child] = index, place
+            body = data[joint.child]
+            inertia = pin.Inertia(body.mass, np.array(body.com), np.array(body.inertia))
+            frames[body.name] = self._frame(f"body {body.name}", index, place, inertia)
+            on_child = place * pin.SE3(joint.child_frame, np.array(joint.child_position))
+            self.at_joint.append(self._frame(f"joint {joint.name}", index, on_child))
+            self.joint.append(index)
+        self.body = [frames[body.name] for body in mechanism.bodies]
+        self.loops = [
+            (
+                self._attached(carried, f"{loop.name} a", loop.body_a, loop.position_a, loop.frame_a),
+                self._attached(carried, f"{loop.name} b", loop.body_b, loop.position_b, loop.frame_b),
+            )
+            for loop in mechanism.loops
+        ]
+        self._springs = [
+            (
+                spring,
+                self._attached(carried, f"{spring.name} a", spring.body_a, spring.position_a, np.eye(3)),
+                self._attached(carried, f"{spring.name} b", spring.body_b, spring.position_b, np.eye(3)),
+            )
+            for spring in mechanism.springs
+        ]
+        self.q0, self.v0 = self._start()
+        self._laws()
+
+    def _frame(self, name: str, joint: int, place: Any, inertia: Any = None) -> int:
+        carried = inertia if inertia is not None else pin.Inertia.Zero()
+        frame = pin.Frame(name, joint, 0, place, pin.FrameType.OP_FRAME, carried)
+        return int(self.model.addFrame(frame, inertia is not None))
+
+    def _attached(self, carried: Any, name: str, body: str, position: Any, axes: Array) -> int:
+        joint, pose = carried[body]
+        return self._frame(name, joint, pose * pin.SE3(axes, np.array(position)))
+
+    def _start(self) -> tuple[Array, Array]:
+        q, v = self.mechanism.start()
+        for joint, at in zip(self.mechanism.joints, self.mechanism.q_slices, strict=True):
+            if joint.kind in {"spherical", "free"}:  # Pinocchio writes the scalar last
+                q[at.stop - 4 : at.stop] = np.roll(q[at.stop - 4 : at.stop], -1)
+        return q, v
+
+    def _laws(self) -> None:
+        joints = self.mechanism.joints
+        by_velocity = [joint for joint in joints for _ in range(joint.nv)]
+        self.model.armature = np.array([joint.armature for joint in by_velocity])
+        self._drive = np.array([joint.torque for joint in by_velocity])
+        self._damping = np.array([joint.damping for joint in by_velocity])
+        sprung = zip(joints, self.mechanism.q_slices, self.mechanism.v_slices, strict=True)
+        self._sprung = [(joint.stiffness, joint.rest, at_q, at_v) for joint, at_q, at_v in sprung if joint.stiffness]
+        self.has_springs = bool(self._springs)
+
+    def drives(self, q: Array, v: Array) -> Array:
+        """Generalised forces of joints' own springs, dampers and drives, shape (nv,)."""
+        tau = self._drive - self._damping * v
+        for stiffness, rest, at_q, at_v in self._sprung:
+            tau[at_v] -= stiffness * (q[at_q] - rest)
+        return tau
+
+    def pulls(self, data: Any) -> Any:
+        """Forces of springs on Pinocchio's joints, in their axes; positions and velocities are in ``data``."""
+        forces = self.no_forces()
+        for spring, a, b in self._springs:
+            between = data.oMf[b].translation - data.oMf[a].translation
+            length = float(np.sqrt(between @ between))
+            along = between / length
+            pull = spring.stiffness * (length - spring.length)
+            if spring.damping:
+                rate = self.velocity(data, b).linear - self.velocity(data, a).linear
+                pull += spring.damping * (along @ rate)
+            self.put(forces, data, a, data.oMf[a].translation, pull * along)
+            self.put(forces, data, b, data.oMf[b].translation, -pull * along)
+        return forces
+
+    def velocity(self, data: Any, frame: int) -> Any:
+        """Of a frame's origin, and angular, in the world's axes."""
+        return pin.getFrameVelocity(self.model, data, frame, pin.LOCAL_WORLD_ALIGNED)
+
+    def no_forces(self) -> Any:
+        """External forces that are all zero."""
+        forces = pin.StdVec_Force()
+        for _ in range(self.model.njoints):
+            forces.append(pin.Force.Zero())
+        return forces
+
+    def put(self, forces: Any, data: Any, frame: int, place: Array, force: Array, torque: Array | None = None) -> None:
+        """Adds a force and a moment at a place, in the world's axes, to those on the joint that carries a frame."""
+        joint = self.model.frames[frame].parentJoint
+        at = data.oMi[joint].inverse() * pin.SE3(np.eye(3), place)
+        forces[joint] = forces[joint] + at.act(pin.Force(force, np.zeros(3) if torque is None else torque))
+
+
+def _joint_model(joint: Joint) -> Any:
+    if joint.kind == "planar":  # JointModelPlanar has other coordinates: cosine and sine, and velocities in the child
+        composite = pin.JointModelComposite(pin.JointModelPX())
+        composite.addJoint(pin.JointModelPY())
+        composite.addJoint(pin.JointModelRZ())
+        return composite
+    return {
+        "revolute": pin.JointModelRZ,
+        "prismatic": pin.JointModelPZ,
+        "universal": lambda: pin.JointModelUniversal(_Z, _X),
+        "spherical": pin.JointModelSpherical,
+        "free": pin.JointModelFreeFlyer,
+    }[joint.kind]()

@@ -1,0 +1,156 @@
+"""Formulations ``null_space`` and ``constraint_dynamics``: a mechanism's motion, and what is read back of it."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+import pinocchio as pin
+
+from proofroll.core.engine import Sample
+from proofroll.core.errors import Diverged
+from proofroll.core.integrators import INTEGRATORS
+from proofroll.engines.pinocchio.constraint_dynamics import ConstraintDynamics
+from proofroll.engines.pinocchio.joint_tree import AXIS_COLUMN, JointTree
+from proofroll.engines.pinocchio.loop_rows import LoopRows
+from proofroll.engines.pinocchio.null_space import NullSpace
+from proofroll.engines.pinocchio.settings import PinocchioSettings
+from proofroll.mechanisms import Mechanism
+from proofroll.mechanisms.capabilities import require
+from proofroll.mechanisms.rotations import Array
+from proofroll.mechanisms.sampling import MechanismBuilt, independent, mechanism_of, unsaid
+
+
+class MechanismRun:
+    """See :class:`proofroll.core.engine.Engine` for the methods."""
+
+    def __init__(self, mechanism: Mechanism, settings: PinocchioSettings) -> None:
+        self._mechanism = mechanism
+        kind = NullSpace if settings.formulation == "null_space" else ConstraintDynamics
+        require(mechanism, kind.provides, kind.lacking)
+        self.tree = JointTree(mechanism)
+        self._model, self._data = self.tree.model, self.tree.model.createData()
+        self._nq = self._model.nq
+        rows = LoopRows(self.tree)
+        self.dynamics: NullSpace | ConstraintDynamics = kind(self.tree, rows, settings)
+        self._rows = rows
+        self._turns = self._nq != self._model.nv  # configurations hold quaternions
+        self._eliminates = settings.projection and bool(rows.rank)
+        start = np.concatenate([self.tree.q0, self.tree.v0])
+        resolution = float(getattr(settings, settings.resolution))
+        integrator = INTEGRATORS[settings.integrator]
+        self.motion = integrator(self._rates, self._accepted, start, np.ones(len(start)), resolution)
+
+    @classmethod
+    def build(cls, scene: Any, settings: PinocchioSettings) -> MechanismRun:
+        """See :class:`proofroll.core.engine.Engine`; ``scene`` may be a mechanism."""
+        return cls(mechanism_of(scene), settings)
+
+    def _rates(self, y: Array) -> Array:
+        q, v = y[: self._nq], y[self._nq :]
+        if not self._turns:
+            return np.concatenate([v, self.dynamics.acceleration(self._data, q, v)])
+        q = pin.normalize(self._model, q)  # the rates must not depend on the length to which a quaternion has drifted
+        rate = pin.tangentMap(self._model, q).dot(v)
+        return np.concatenate([rate, self.dynamics.acceleration(self._data, q, v)])
+
+    def _accepted(self, t: float, y: Array) -> Array:
+        if not np.isfinite(y.sum()):
+            raise Diverged(f"the state is not finite at t = {t:.6g} s")
+        if not self._turns and not self._eliminates:
+            return y
+        q, v = y[: self._nq], y[self._nq :]
+        if self._turns:
+            q = pin.normalize(self._model, q)
+        if self._eliminates:
+            q, v = self._rows.eliminated(self._data, q, v)
+        return np.concatenate([q, v])
+
+    def advance(self, start: float, end: float) -> None:
+        """From ``start`` to ``end`` [s]."""
+        try:
+            self.motion.advance(end)
+        except np.linalg.LinAlgError as error:
+            raise Diverged(f"the equations became singular between {start:g} s and {end:g} s ({error})") from None
+
+    def events(self) -> tuple[()]:
+        """None: nothing here switches."""
+        return ()
+
+    def _evaluated(self) -> tuple[Any, Array, Array, Array, Any]:
+        """Data of the present state, q, v, acceleration, and forces of springs and loops on Pinocchio's joints."""
+        data = self._model.createData()
+        q, v = self.motion.x[: self._nq], self.motion.x[self._nq :]
+        acceleration, forces = self.dynamics.reactions(data, q, v)
+        pin.forwardKinematics(self._model, data, q, v, acceleration)
+        pin.updateFramePlacements(self._model, data)
+        return data, q, v, acceleration, forces
+
+    def sample(self) -> Sample:
+        """See :class:`proofroll.core.engine.Engine`."""
+        data, q, v, acceleration, forces = self._evaluated()
+        velocities = [self.tree.velocity(data, frame) for frame in self.tree.body]
+        force, torque = unsaid(self._mechanism)
+        count = len(self._mechanism.joints)
+        force[count:], torque[count:] = self.dynamics.on_loops(data)
+        pin.rnea(self._model, data, q, v, acceleration, forces)
+        for number, (joint, index) in enumerate(zip(self._mechanism.joints, self.tree.joint, strict=True)):
+            if joint.kind != "fixed":  # bodies held by a fixed joint are one body to Pinocchio
+                R = data.oMi[index].rotation
+                force[number], torque[number] = R @ data.f[index].linear, R @ data.f[index].angular
+        return Sample(
+            p_WB=np.array([data.oMf[frame].translation for frame in self.tree.body]),
+            v_WB=np.array([velocity.linear for velocity in velocities]),
+            w_WB=np.array([velocity.angular for velocity in velocities]),
+            q_WB=np.array([np.roll(pin.Quaternion(data.oMf[frame].rotation).coeffs(), 1) for frame in self.tree.body]),
+            joint_force=force,
+            joint_torque=torque,
+        )
+
+    def built(self) -> MechanismBuilt:
+        """See :class:`proofroll.core.engine.Engine`."""
+        model = self._model
+        data, q, v, *_ = self._evaluated()
+        inertias = [model.frames[frame].inertia for frame in self.tree.body]
+        rows = self.dynamics.constraint_rows(model.createData(), q, v)
+        rank = independent(rows)
+        accelerations = [
+            pin.getFrameClassicalAcceleration(model, data, frame, pin.LOCAL_WORLD_ALIGNED) for frame in self.tree.body
+        ]
+        return MechanismBuilt(
+            mass=np.array([inertia.mass for inertia in inertias]),
+            com=np.array([inertia.lever for inertia in inertias]),
+            inertia=np.array([inertia.inertia for inertia in inertias]),
+            joint_position=np.array([data.oMf[frame].translation for frame in self.tree.at_joint]),
+            joint_axis=self._axes(q),
+            gravity=model.gravity.linear.copy(),
+            rows=len(rows),
+            rank=rank,
+            mobility=model.nv - rank,
+            acceleration=np.array([acceleration.linear for acceleration in accelerations]),
+            angular_acceleration=np.array([acceleration.angular for acceleration in accelerations]),
+            mass_matrix_error=self._mass_matrix_error(q),
+            regularised=self.dynamics.regularised,
+        )
+
+    def _axes(self, q: Array) -> Array:
+        """Directions in which the joints' own velocities turn or slide, in the world."""
+        data = self._model.createData()
+        pin.computeJointJacobians(self._model, data, q)
+        found = np.full((len(self._mechanism.joints), 3), np.nan)
+        for number, (joint, index) in enumerate(zip(self._mechanism.joints, self.tree.joint, strict=True)):
+            if joint.kind in AXIS_COLUMN:
+                J = pin.getJointJacobian(self._model, data, index, pin.LOCAL_WORLD_ALIGNED)
+                J = J.reshape(6, self._model.nv)  # of a single column it is a vector
+                column = J[:, self._model.joints[index].idx_v + AXIS_COLUMN[joint.kind]]
+                found[number] = column[:3] if joint.kind == "prismatic" else column[3:]
+        return found
+
+    def _mass_matrix_error(self, q: Array) -> float:
+        """The mass matrix of crba, which the equations use, against unit accelerations of rnea."""
+        model, data, rest = self._model, self._model.createData(), np.zeros(self._model.nv)
+        M = np.reshape(pin.crba(model, data, q), (model.nv, model.nv))
+        M = np.triu(M) + np.triu(M, 1).T
+        weight = pin.rnea(model, data, q, rest, rest).copy()
+        needed = np.array([pin.rnea(model, data, q, rest, unit) - weight for unit in np.eye(model.nv)])
+        return float(np.abs(M - needed).max() / np.abs(M).max())

@@ -1,0 +1,79 @@
+"""Formulation ``null_space``: Pinocchio's terms of the joint tree, loops by projection on their rows' null space."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from typing import Any, ClassVar
+
+import numpy as np
+import pinocchio as pin
+
+from proofroll.core.engine import Regularised
+from proofroll.engines.pinocchio.joint_tree import LACKING, PROVIDES, JointTree
+from proofroll.engines.pinocchio.loop_rows import LoopRows, Rows
+from proofroll.engines.pinocchio.settings import PinocchioSettings
+from proofroll.mechanisms.rotations import Array
+
+
+class NullSpace:
+    """Accelerations and reactions of a tree with loops."""
+
+    provides: ClassVar[frozenset[str]] = frozenset(PROVIDES)
+    lacking: ClassVar[Mapping[str, str]] = LACKING
+    regularised: ClassVar[Mapping[str, Regularised]] = {}
+
+    def __init__(self, tree: JointTree, rows: LoopRows, settings: PinocchioSettings) -> None:  # noqa: ARG002 -- as others
+        self._tree, self._model, self._rows = tree, tree.model, rows
+        self._rest = np.zeros(tree.model.nv)
+
+    def acceleration(self, data: Any, q: Array, v: Array) -> Array:
+        """Of the joints, shape (nv,)."""
+        tree, model = self._tree, self._model
+        tau = tree.drives(q, v)
+        if not tree.loops:
+            if not tree.has_springs:
+                return np.array(pin.aba(model, data, q, v, tau))
+            pin.forwardKinematics(model, data, q, v)
+            pin.updateFramePlacements(model, data)
+            return np.array(pin.aba(model, data, q, v, tau, tree.pulls(data)))
+        return self._solved(data, q, v, tau)[0]
+
+    def _solved(self, data: Any, q: Array, v: Array, tau: Array) -> tuple[Array, Rows, Array]:
+        """Acceleration, rows and multipliers, the smallest in norm where rows depend on each other."""
+        tree, model = self._tree, self._model
+        rows = self._rows.at(data, q, v)
+        pulls = tree.pulls(data) if tree.has_springs else None
+        M = pin.crba(model, data, q).copy()
+        bias = pin.rnea(model, data, q, v, self._rest, pulls) if pulls else pin.rnea(model, data, q, v, self._rest)
+        split = self._rows.split(M, rows.C)
+        free = split.into @ (split.into.T @ (tau - bias))
+        normal = -split.back @ (rows.drift + rows.C @ free)
+        return free + split.locked @ normal, rows, split.back.T @ normal
+
+    def reactions(self, data: Any, q: Array, v: Array) -> tuple[Array, Any]:
+        """Acceleration, and forces of springs and loops on Pinocchio's joints."""
+        tree = self._tree
+        self._on_loops = np.zeros((2, 0, 3))
+        if not tree.loops:
+            acceleration = self.acceleration(data, q, v)
+            pin.forwardKinematics(self._model, data, q, v)
+            pin.updateFramePlacements(self._model, data)
+            return acceleration, tree.pulls(data)
+        acceleration, rows, multipliers = self._solved(data, q, v, tree.drives(q, v))
+        forces = tree.pulls(data)
+        self._on_loops = np.zeros((2, len(tree.loops), 3))
+        np.add.at(self._on_loops[0], rows.loop, multipliers[:, None] * rows.force)
+        np.add.at(self._on_loops[1], rows.loop, multipliers[:, None] * rows.torque)
+        for (a, b), force, torque in zip(tree.loops, *self._on_loops, strict=True):
+            place = data.oMf[b].translation
+            tree.put(forces, data, b, place, force, torque)
+            tree.put(forces, data, a, place, -force, -torque)
+        return acceleration, forces
+
+    def on_loops(self, data: Any) -> tuple[Array, Array]:  # noqa: ARG002 -- the multipliers say it
+        """Force and moment on body_b of each loop, as the last :meth:`reactions` found them."""
+        return self._on_loops[0], self._on_loops[1]
+
+    def constraint_rows(self, data: Any, q: Array, v: Array) -> Array:
+        """Rows of the loops on the velocities of the joints."""
+        return self._rows.at(data, q, v).C if self._tree.loops else np.zeros((0, self._model.nv))

@@ -1,0 +1,113 @@
+"""Formulation ``dependent``: a mechanism by the projection method, and what is read back."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from typing import Any
+
+import numpy as np
+
+from proofroll.core.engine import Sample
+from proofroll.core.errors import Diverged, Refused
+from proofroll.core.integrators import INTEGRATORS
+from proofroll.engines.projection.dependent import DependentCoordinates
+from proofroll.engines.projection.settings import ProjectionSettings
+from proofroll.mechanisms import Mechanism
+from proofroll.mechanisms.capabilities import ALL_JOINTS, ALL_LOOPS, FORCES, MechanismCapability, require
+from proofroll.mechanisms.rotations import Array
+from proofroll.mechanisms.sampling import WITH_AXIS, MechanismBuilt, independent, mechanism_of
+
+PROVIDES = frozenset(ALL_JOINTS | ALL_LOOPS | FORCES | {MechanismCapability.REDUNDANT})
+LACKING: Mapping[str, str] = {
+    MechanismCapability.JOINT_FRICTION: "these equations have no law that switches",
+    MechanismCapability.ARMATURE: "the mass matrix of dependent coordinates is that of the bodies alone",
+}
+
+
+class ProjectionMechanism:
+    """See :class:`proofroll.core.engine.Engine` for the methods."""
+
+    def __init__(self, mechanism: Mechanism, settings: ProjectionSettings) -> None:
+        require(mechanism, PROVIDES, LACKING)
+        for body in mechanism.bodies:
+            if not body.mass or np.linalg.eigvalsh(body.inertia)[0] <= 0:
+                raise Refused(
+                    f"{body.name} has no mass or no moment of inertia about an axis; here each body needs both"
+                )
+        self._mechanism, self._equations = mechanism, DependentCoordinates(mechanism)
+        self._eliminates = settings.eliminates
+        start = self._equations.start
+        resolution = float(getattr(settings, settings.resolution))
+        integrator = INTEGRATORS[settings.integrator]
+        self._motion = integrator(self._equations.rates, self._accepted, start, np.ones(len(start)), resolution)
+
+    @classmethod
+    def build(cls, scene: Any, settings: ProjectionSettings) -> ProjectionMechanism:
+        """See :class:`proofroll.core.engine.Engine`; ``scene`` may be a mechanism."""
+        return cls(mechanism_of(scene), settings)
+
+    def _accepted(self, t: float, x: Array) -> Array:
+        if not np.isfinite(x.sum()):
+            raise Diverged(f"the state is not finite at t = {t:.6g} s")
+        if self._eliminates:
+            x = self._equations.eliminated(x)
+        self._equations.accept(x)
+        return x
+
+    def advance(self, t: float) -> None:
+        """See :class:`proofroll.core.engine.Engine`."""
+        start = self._motion.t
+        try:
+            with np.errstate(over="ignore", invalid="ignore", divide="ignore"):  # found after the step
+                self._motion.advance(t)
+        except np.linalg.LinAlgError as error:
+            raise Diverged(f"{error}, between t = {start:.6g} s and {t:.6g} s") from None
+
+    def sample(self) -> Sample:
+        """See :class:`proofroll.core.engine.Engine`."""
+        equations, x = self._equations, self._motion.x
+        answer = equations.solve(x)
+        bodies, count = answer.bodies, len(equations.mass)
+        R, w = bodies.R[:count], bodies.w[:count]
+        arm = np.einsum("nij,nj->ni", R, equations.com)
+        force, torque = equations.applied.of_joints(bodies, answer.ends)
+        np.add.at(force, equations.connections.owner, answer.multipliers[:, None] * answer.rows.force)
+        np.add.at(torque, equations.connections.owner, answer.multipliers[:, None] * answer.rows.torque)
+        q = equations.parts(x)[1]
+        return Sample(
+            p_WB=bodies.r[:count] - arm,
+            v_WB=bodies.v[:count] - np.cross(w, arm),
+            w_WB=w.copy(),
+            q_WB=q / np.linalg.norm(q, axis=1, keepdims=True),
+            joint_force=force,
+            joint_torque=torque,
+        )
+
+    def built(self) -> MechanismBuilt:
+        """See :class:`proofroll.core.engine.Engine`; gravity from the forces on the bodies at rest."""
+        equations = self._equations
+        answer = equations.solve(self._motion.x)
+        bodies, count = answer.bodies, len(equations.mass)
+        R, w = bodies.R[:count], bodies.w[:count]
+        arm = np.einsum("nij,nj->ni", R, equations.com)
+        of_com = answer.acceleration.reshape(count, 6)
+        turning = np.einsum("nij,nj->ni", R, of_com[:, 3:])
+        joints = len(self._mechanism.joints)
+        ends, rank = answer.ends, independent(answer.rows.C)
+        axes = np.full((joints, 3), np.nan)
+        for number, joint in enumerate(self._mechanism.joints):
+            if joint.kind in WITH_AXIS:
+                axes[number] = ends.A[number, :, 2]
+        return MechanismBuilt(
+            mass=equations.mass.copy(),
+            com=equations.com.copy(),
+            inertia=equations.inertia.copy(),
+            joint_position=(bodies.r[equations.connections.b] + ends.arm_b)[:joints],
+            joint_axis=axes,
+            gravity=equations.applied.gravity,
+            rows=len(answer.rows.C),
+            rank=rank,
+            mobility=6 * count - rank,
+            acceleration=of_com[:, :3] - np.cross(turning, arm) - np.cross(w, np.cross(w, arm)),
+            angular_acceleration=turning,
+        )
