@@ -8,7 +8,13 @@ INERTIA = ((0.5, 0.02, 0.01), (0.02, 0.6, -0.03), (0.01, -0.03, 0.7))
 BODY = Body("body", 1.3, (0.1, -0.2, 0.05), INERTIA)
 LOOPS = ("fixed", "revolute", "prismatic", "universal", "spherical", "planar")
 AXES = {"universal": {"axis_a": (0, 0, 1), "axis_b": (1, 0, 0)}}
-SPEED = {"revolute": (2.0,), "prismatic": (1.5,), "universal": (1.0, 2.0), "spherical": (1, 2, 3), "planar": (1, 0.5, 3)}
+SPEED = {
+    "revolute": (2.0,),
+    "prismatic": (1.5,),
+    "universal": (1.0, 2.0),
+    "spherical": (1, 2, 3),
+    "planar": (1, 0.5, 3),
+}
 
 
 def held(kind, on_arm=False):
@@ -22,7 +28,13 @@ def held(kind, on_arm=False):
     first, parent = ((swing,), "arm") if on_arm else ((), "world")
     place = (0.3, 0.1, -0.2)
     joint = Joint(
-        "held", kind, parent, "body", place, second_axis=(1, 0, 0) if kind == "universal" else None, v0=SPEED.get(kind, ())
+        "held",
+        kind,
+        parent,
+        "body",
+        place,
+        second_axis=(1, 0, 0) if kind == "universal" else None,
+        v0=SPEED.get(kind, ()),
     )
     tree = Mechanism(bodies, (*first, joint))
     from proofroll.mechanisms import Tree

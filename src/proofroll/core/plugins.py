@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import dataclasses
 import re
-from collections.abc import Mapping
+from collections.abc import Collection, Mapping
 from functools import cache
 from importlib.metadata import EntryPoint, entry_points
 from typing import Any
@@ -94,8 +94,13 @@ def parse_engine(text: str) -> EngineSpec:
     return EngineSpec(match[1], options)
 
 
-def resolve_settings(engine: Any, options: Mapping[str, Any]) -> Any:
+def resolve_settings(engine: Any, options: Mapping[str, Any], requires: Collection[str] = ()) -> Any:
     """Complete settings: the preset of the formulation, with the given options put over it.
+
+    Args:
+        engine: its class.
+        options: what is given.
+        requires: by the scene; where no formulation is given, it is the first that provides this.
 
     Raises:
         InputError: unknown or ill-typed option.
@@ -108,7 +113,8 @@ def resolve_settings(engine: Any, options: Mapping[str, Any]) -> Any:
             raise InputError(
                 f"{engine.name}: {key}", value, f"there is no such setting; choose from {', '.join(fields)}"
             )
-    formulation = options.get("formulation", next(iter(engine.presets)))
+    able = (name for name in engine.presets if set(requires) <= engine.provides[name])
+    formulation = options.get("formulation") or next(able, next(iter(engine.presets)))
     if formulation not in engine.presets:
         raise InputError(f"{engine.name}: formulation", formulation, f"choose one of {', '.join(engine.presets)}")
     presets = engine.presets[formulation]

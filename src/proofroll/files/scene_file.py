@@ -125,7 +125,9 @@ def load_scene(name: str, /, *, asks: Any = (), **parameters: float) -> Scene:
     values = _values(file, parameters)
     where = str(folder / "scene.toml")
     numbers = Numbers(values, {name: item.unit for name, item in file.parameters.items()})
-    gravity = validated(Gravity, numbers.filled(file.gravity, f"{where}: gravity", units_of(Gravity)), f"{where}: gravity")
+    gravity = validated(
+        Gravity, numbers.filled(file.gravity, f"{where}: gravity", units_of(Gravity)), f"{where}: gravity"
+    )
     return Scene(
         name=folder.name,
         title=file.title,
@@ -136,9 +138,7 @@ def load_scene(name: str, /, *, asks: Any = (), **parameters: float) -> Scene:
     )
 
 
-def _elements(
-    tables: Mapping[str, Any], gravity: Gravity, numbers: Numbers, where: str
-) -> tuple[Element, ...]:
+def _elements(tables: Mapping[str, Any], gravity: Gravity, numbers: Numbers, where: str) -> tuple[Element, ...]:
     """What the tables of a file hold, each read by the kind of element that it belongs to.
 
     Raises:

@@ -6,6 +6,7 @@ import contextlib
 import dataclasses
 import hashlib
 import inspect
+from collections.abc import Sequence
 from importlib import metadata
 from pathlib import Path
 from typing import Any
@@ -45,7 +46,7 @@ def describe(engine: str) -> dict[str, Any]:
     }
 
 
-def resolve(engine: str, options: dict[str, Any]) -> dict[str, Any]:
+def resolve(engine: str, options: dict[str, Any], requires: Sequence[str] = ()) -> dict[str, Any]:
     """Complete settings of an engine, what else decides its results, and what in them is not its own."""
     if engine == "truth":
         if options:
@@ -56,7 +57,7 @@ def resolve(engine: str, options: dict[str, Any]) -> dict[str, Any]:
     from proofroll.core.plugins import load_engine, resolve_settings
 
     kind = load_engine(engine)
-    settings = resolve_settings(kind, options)
+    settings = resolve_settings(kind, options, requires)
     source = Path(inspect.getfile(kind))
     package = (source.parent / "__init__.py").is_file() and source.parent.name != "engines"
     facts = EngineFacts(

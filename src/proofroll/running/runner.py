@@ -8,7 +8,7 @@ import os
 import queue
 import threading
 from collections import deque
-from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Collection, Iterable, Iterator, Mapping, Sequence
 from concurrent.futures import ThreadPoolExecutor
 from pathlib import Path
 from typing import Any
@@ -35,16 +35,24 @@ def describe(engine: str, workers: Workers | None = None) -> dict[str, Any]:
 
 
 def resolve(
-    engines: Sequence[tuple[str, Mapping[str, Any]]], workers: Workers | None = None
+    engines: Sequence[tuple[str, Mapping[str, Any]]],
+    workers: Workers | None = None,
+    requires: Collection[str] = (),
 ) -> list[EngineFacts | ProofrollError]:
-    """Complete settings for engines with options, each or the reason why not, in the order given."""
+    """Complete settings for engines with options, each or the reason why not, in the order given.
+
+    Args:
+        engines: names and options.
+        workers: processes in which they are asked.
+        requires: by the scene, which decides the formulation where none is given.
+    """
     found: list[EngineFacts | ProofrollError] = [ProofrollError("not asked")] * len(engines)
 
     def ask(name: str, lent: Workers) -> None:
         for index, (other, options) in enumerate(engines):
             if other != name:
                 continue
-            request = {"do": "resolve", "engine": name, "options": dict(options)}
+            request = {"do": "resolve", "engine": name, "options": dict(options), "requires": sorted(requires)}
             worker = lent.take(name)
             try:
                 found[index] = EngineFacts(**worker.request(request, _START_UP_SECONDS))

@@ -31,18 +31,18 @@ def build(scene: Scene, engine: str, **settings: Any) -> Any:
         Missing: the engine is not installed.
         Refused: the engine cannot represent the scene.
     """
-    kind, resolved = _resolved(engine, settings)
+    kind, resolved = _resolved(scene, engine, settings)
     return _build(scene, kind, resolved)
 
 
-def _resolved(engine: str, settings: dict[str, Any]) -> tuple[Any, Any]:
+def _resolved(scene: Scene, engine: str, settings: dict[str, Any]) -> tuple[Any, Any]:
     """The engine's class, and its complete settings."""
     spec = parse_engine(engine)
     for key, value in settings.items():
         if key in spec.options:
             raise InputError(f"{spec.name}: {key}", value, f"{spec.options[key]} is in the brackets; give it once")
     kind = load_engine(spec.name)
-    return kind, resolve_settings(kind, {**spec.options, **settings})
+    return kind, resolve_settings(kind, {**spec.options, **settings}, scene.requires)
 
 
 def _build(scene: Scene, kind: Any, settings: Any) -> Any:
@@ -89,7 +89,7 @@ def simulate(
         message = found.attrs.get("ill_posed", "two independent routes agree")
         found = found.assign_attrs(status="done", message=message)
         return found.assign_attrs(manifest("truth", {}, scene, versions("truth", truth_version())))
-    kind, resolved = _resolved(engine, settings)
+    kind, resolved = _resolved(scene, engine, settings)
     built = _build(scene, kind, resolved)
     difference = first_difference(certify(built, scene))
     if difference is not None:

@@ -120,7 +120,7 @@ class Ladder:
         self._truth_facts = truth
         self.truths: dict[str, Truth] = {}
         self.answers: dict[str, Answer] = {}
-        self.ladder: list[Rung] = rungs(self.engines)
+        self.ladder: list[Rung] = rungs(self.engines, self.scene.requires)
         self.switches: list[Switch] = []
 
     def run(self, progress: Callable[[str], None] = lambda _: None) -> None:

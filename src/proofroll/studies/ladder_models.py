@@ -87,7 +87,7 @@ def described(engines: Sequence[str]) -> dict[str, dict[str, Any] | ProofrollErr
     return found
 
 
-def rungs(engines: Mapping[str, dict[str, Any] | ProofrollError]) -> list[Rung]:
+def rungs(engines: Mapping[str, dict[str, Any] | ProofrollError], requires: frozenset[str]) -> list[Rung]:
     """The ladder from the least model to the most, each formulation with its best preset that tunes nothing."""
     ladder: list[Rung] = []
     for level in Level:
@@ -96,7 +96,7 @@ def rungs(engines: Mapping[str, dict[str, Any] | ProofrollError]) -> list[Rung]:
             if isinstance(told, ProofrollError):
                 continue
             for formulation, presets in told["presets"].items():
-                if told["levels"].get(formulation) != level:
+                if told["levels"].get(formulation) != level or not requires & set(told["provides"][formulation]):
                     continue
                 model = Model(told["name"], {"formulation": formulation, "preset": _preset(presets)})
                 ladder.append(Rung(level, model))

@@ -67,7 +67,9 @@ def plan(comparison: Comparison, engines: Iterable[str] = (), workers: Workers |
         known = ", ".join(dict.fromkeys(parse_engine(row.engine).name for row in comparison.rows))
         raise InputError("engine", ", ".join(chosen), f"{comparison.name} compares {known}")
     specs = [parse_engine(row.engine) for row in rows]
-    resolved = resolve([(spec.name, spec.options) for spec in specs] + [("truth", {})], workers)
+    resolved = resolve(
+        [(spec.name, spec.options) for spec in specs] + [("truth", {})], workers, load_scene(comparison.scene).requires
+    )
     truth_facts = resolved.pop()
     if not isinstance(truth_facts, EngineFacts):
         raise truth_facts

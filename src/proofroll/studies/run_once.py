@@ -33,7 +33,7 @@ def single_case(
         raise InputError("asks", parameters["asks"], "this is no parameter; ask for it with --ask")
     spec = parse_engine(engine)
     loaded = load_scene(scene, asks=asks, **parameters)  # type: ignore[arg-type]  # text is checked and converted there
-    facts = resolve([(spec.name, spec.options)])[0]
+    facts = resolve([(spec.name, spec.options)], requires=loaded.requires)[0]
     if isinstance(facts, ProofrollError):
         raise facts
     return Case(

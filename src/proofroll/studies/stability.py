@@ -11,6 +11,7 @@ from collections.abc import Callable, Generator, Iterable, Sequence
 from dataclasses import dataclass, field
 
 from proofroll.files.netcdf import read
+from proofroll.files.scene_file import load_scene
 from proofroll.running.case import Case, EngineFacts, Result, Status
 from proofroll.running.runner import Runner
 from proofroll.studies.axes import Axis
@@ -120,7 +121,7 @@ def stability(
     """
     effort = effort or Effort()
     tell: Progress = progress or (lambda _text, _count: None)
-    curves, absent = curves_of(engines, runner.workers)
+    curves, absent = curves_of(engines, runner.workers, load_scene(scene).requires)
     for curve in (curve for curve in curves if curve.facts.resolution is None):
         absent[curve.engine] = "has neither step nor tolerance: exact at any time, it has no boundary to look for"
     curves = [curve for curve in curves if curve.facts.resolution is not None]

@@ -138,12 +138,15 @@ class Curve:
         return bool(np.isfinite(loosest) and abs(loosest - other) <= max(bar, _SAME * loosest))
 
 
-def curves_of(engines: Iterable[str], workers: Workers | None = None) -> tuple[list[Curve], dict[str, str]]:
+def curves_of(
+    engines: Iterable[str], workers: Workers | None = None, requires: frozenset[str] = frozenset()
+) -> tuple[list[Curve], dict[str, str]]:
     """A curve without points for every formulation and preset of the engines, and why some engine has none.
 
     Args:
         engines: names, or ``name[key=value,…]`` for one formulation or setting; all that are installed if empty.
         workers: processes in which they are asked.
+        requires: by the scene; formulations that provide nothing of it are for other kinds of scenes, and left out.
     """
     wanted: list[tuple[str, str | None]] = []
     absent: dict[str, str] = {}
@@ -160,13 +163,18 @@ def curves_of(engines: Iterable[str], workers: Workers | None = None) -> tuple[l
         for formulation, presets in described["presets"].items():
             if spec.options.get("formulation", formulation) != formulation:
                 continue
+            if requires and not requires & set(described["provides"][formulation]):
+                absent.setdefault(spec.name, "none of its formulations is for scenes of this kind")
+                continue
             for preset in presets:
                 if spec.options.get("preset", preset) != preset:
                     continue
                 options = {"formulation": formulation, "preset": preset, **spec.options}
                 inner = ",".join(f"{key}={value}" for key, value in options.items())
                 wanted.append((f"{spec.name}[{inner}]", levels.get(formulation)))
-        if not any(parse_engine(name).name == spec.name for name, _ in wanted):
+        if any(parse_engine(name).name == spec.name for name, _ in wanted):
+            absent.pop(spec.name, None)
+        elif spec.name not in absent:
             raise InputError("engine", text, f"{spec.name} has {', '.join(described['presets'])}")
     specs = [parse_engine(name) for name, _ in wanted]
     curves = []

@@ -118,7 +118,7 @@ def tradeoff(
     """
     scene = question.loaded()
     scene.observable(question.quantity)
-    curves, absent = curves_of(engines, runner.workers)
+    curves, absent = curves_of(engines, runner.workers, scene.requires)
 
     def told(case: Case, _: Result) -> None:
         if progress:

@@ -1,0 +1,1 @@
+"""Bodies, joints, loops and springs."""

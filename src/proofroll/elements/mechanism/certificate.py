@@ -1,0 +1,97 @@
+"""What an engine built of a mechanism, line by line."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from proofroll.core.certificate import Line
+from proofroll.core.engine import Regularised, Sample
+from proofroll.mechanisms.sampling import MechanismBuilt
+
+if TYPE_CHECKING:
+    from proofroll.elements.mechanism.element import MechanismElement
+
+# Engines compose poses and inertias of chains of bodies by themselves; each product costs some machine epsilons.
+COMPOSED = 1e-9
+_COMPOSED = "composed along the tree by the engine's own arithmetic"
+_CLOSED = "the start closes loops to 1e-12 m, and an engine may close them once more"
+# What a model may soften: quantity -> largest relative difference that any reason explains, and why.
+CAPS: Mapping[str, Regularised] = {
+    name: Regularised(1.0, "a loop that is held by a stiff spring pulls by what it is open")
+    for name in ("acceleration", "angular acceleration", "forces", "torques")
+}
+
+
+def certify(element: MechanismElement, built: MechanismBuilt, sample: Sample) -> list[Line]:
+    """Compares what was built, and the sample at time 0, with the mechanism; silence has a line that says so."""
+    mechanism, start, found = element.mechanism, element.start, element.first_motion
+    assert found is not None  # a mechanism always knows how it sets off
+    lines: list[Line] = []
+
+    def compare(quantity: str, unit: str, expected: Any, given: Any, scale: float) -> None:
+        want = np.asarray(expected, dtype=np.float64)
+        if given is None or np.all(np.isnan(given)):
+            lines.append(Line(quantity, unit, tuple(np.ravel(want).tolist()), (), None, COMPOSED))
+            return
+        got = np.asarray(given, dtype=np.float64)
+        known = ~np.isnan(want) & ~np.isnan(got) if got.shape == want.shape else np.zeros(0, dtype=bool)
+        difference = float(np.max(np.abs(got - want)[known], initial=0.0)) / scale if known.size else float("inf")
+        tolerance, because = _allowed(quantity, built.regularised)
+        shown = tuple(np.ravel(want).tolist()), tuple(np.ravel(got).tolist())
+        lines.append(Line(quantity, unit, *shown, difference, tolerance, because))
+
+    size, bodies = element.length, mechanism.bodies
+    masses = np.array([body.mass for body in bodies])
+    inertias = np.array([body.inertia for body in bodies])
+    compare("mass", "kg", masses, built.mass, float(np.max(masses)))
+    compare("centre of mass", "m", np.array([body.com for body in bodies]), built.com, size)
+    compare("inertia", "kg m^2", inertias, built.inertia, float(np.max(np.abs(inertias))) or 1.0)
+    gravity = np.array(mechanism.gravity)
+    compare("gravity", "m/s^2", gravity, built.gravity, float(np.linalg.norm(gravity)) or 1.0)
+    places = np.array([start.point(joint.child, joint.child_position)[0] for joint in mechanism.joints])
+    axes = np.array([_axis(element, joint) for joint in mechanism.joints])
+    if len(mechanism.joints):
+        compare("joint positions", "m", places, built.joint_position, size)
+        compare("joint axes", "1", axes, built.joint_axis, 1.0)
+    compare("mobility", "1", element.analysis.mobility, built.mobility, 1.0)
+    compare("error of the mass matrix", "1", 0.0, built.mass_matrix_error, 1.0)
+    compare("position", "m", start.p_WB[0], sample.p_WB, size)
+    speed = element._speed  # noqa: SLF001 -- the element's own module
+    compare("velocity", "m/s", start.v_WB[0], sample.v_WB, speed)
+    compare("spin", "rad/s", start.w_WB[0], sample.w_WB, speed / size)
+    if sample.q_WB is not None:
+        signs = np.sign(np.sum(sample.q_WB * start.q_WB[0], axis=-1, keepdims=True))
+        compare("orientation", "1", start.q_WB[0], sample.q_WB * signs, 1.0)
+    compare("acceleration", "m/s^2", found.acceleration, built.acceleration, found.scale)
+    compare(
+        "angular acceleration", "rad/s^2", found.angular_acceleration, built.angular_acceleration, _turning(element)
+    )
+    return lines
+
+
+def _turning(element: MechanismElement) -> float:
+    """What angular accelerations are measured by [rad/s²]."""
+    found = element.first_motion
+    assert found is not None  # as above
+    return max(float(np.max(np.abs(found.angular_acceleration))), found.scale / element.length)
+
+
+def _axis(element: MechanismElement, joint: Any) -> Any:
+    """The axis of a joint in the world at the start; NaN where it has none."""
+    if joint.kind not in {"revolute", "prismatic", "universal", "planar"}:
+        return np.full(3, np.nan)
+    parent = element.mechanism.body_index[joint.parent]
+    return element.start.R_WB[0, parent] @ joint.parent_frame[:, 2]
+
+
+def _allowed(quantity: str, regularised: Mapping[str, Regularised]) -> tuple[float, str]:
+    """Tolerance of a quantity and its reason."""
+    soft, cap = regularised.get(quantity), CAPS.get(quantity)
+    if soft is None:
+        return COMPOSED, _COMPOSED
+    if cap is None:
+        return COMPOSED, f"cannot be softened, though the engine asks for {soft.tolerance:.2g} ({soft.because})"
+    return min(soft.tolerance, cap.tolerance), soft.because

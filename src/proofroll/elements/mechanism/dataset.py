@@ -1,0 +1,100 @@
+"""All variables of a run of a mechanism, from the motion of its bodies and the wrenches of its joints."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from proofroll.core.arrays import FloatArray
+from proofroll.core.engine import Sample
+from proofroll.elements.mechanism.placed import Placed
+
+if TYPE_CHECKING:
+    import xarray as xr
+
+    from proofroll.elements.mechanism.element import MechanismElement
+
+
+def from_samples(element: MechanismElement, times: FloatArray, samples: Sequence[Sample]) -> xr.Dataset:
+    """The variables of a run, from one sample per time [s]."""
+    count = len(element.bodies)
+
+    def stacked(name: str, width: int, rows: int) -> FloatArray:
+        empty = np.full((rows, width), np.nan)
+        given = [getattr(sample, name) for sample in samples]
+        return np.array([empty if value is None else np.reshape(value, (rows, width)) for value in given])
+
+    rows = len(element.analysis.determinate)
+    force, torque = stacked("joint_force", 3, rows), stacked("joint_torque", 3, rows)
+    p, v, w = (stacked(name, 3, count) for name in ("p_WB", "v_WB", "w_WB"))
+    return variables(element, times, p, v, w, stacked("q_WB", 4, count), force, torque)
+
+
+def variables(
+    element: MechanismElement,
+    times: FloatArray,
+    p_WB: FloatArray,
+    v_WB: FloatArray,
+    w_WB: FloatArray,
+    q_WB: FloatArray,
+    force: FloatArray,
+    torque: FloatArray,
+) -> xr.Dataset:
+    """Everything that follows from the motion of the bodies and the wrenches, as one Dataset.
+
+    Variables: ``p_WB`` [m], ``v_WB`` [m/s], ``w_WB`` [rad/s] over (time, body, xyz), ``q_WB`` over (time, body, wxyz);
+    ``positions`` [m] of the tracked points; ``q.<joint>``, ``v.<joint>`` of joints with one coordinate;
+    ``<point>.x|y|z`` [m]; ``force.<joint>.x|y|z`` [N] and ``torque.<joint>.x|y|z`` [N m] on the child, at the joint, in
+    world axes, NaN where the equations do not determine it or the engine cannot say it; ``forces``, ``torques``: the
+    determinate components of all; ``energy`` [J], ``energy_error`` [J], ``drift`` [m].
+    """
+    import xarray as xr
+
+    mechanism, determinate = element.mechanism, element.analysis.determinate
+    placed = Placed(mechanism, times, p_WB, v_WB, w_WB, _continuous(q_WB, element.start.q_WB[0]))
+    found: dict[str, tuple[tuple[str, ...], FloatArray, dict[str, str]]] = {}
+
+    def put(name: str, values: FloatArray, unit: str, meaning: str, *dims: str) -> None:
+        found[name] = (("time", *dims), values, {"units": unit, "long_name": meaning})
+
+    put("p_WB", p_WB, "m", "origin of each body's frame in the world", "body", "xyz")
+    put("v_WB", v_WB, "m/s", "velocity of that origin in the world", "body", "xyz")
+    put("w_WB", w_WB, "rad/s", "angular velocity in the world", "body", "xyz")
+    put("q_WB", placed.q_WB, "1", "orientation, quaternion scalar first", "body", "wxyz")
+    put("attitudes", placed.q_WB, "1", "quaternions of the bodies", "body", "wxyz")
+    put("positions", placed.points, "m", "tracked points, or origins of the bodies", "point", "xyz")
+    for name, (q, rate) in placed.coordinates().items():
+        unit = "rad" if next(j for j in mechanism.joints if j.name == name).kind == "revolute" else "m"
+        put(f"q.{name}", q, unit, f"coordinate of {name}")
+        put(f"v.{name}", rate, f"{unit}/s", f"rate of {name}")
+    for index, point in enumerate(mechanism.points):
+        for axis, letter in enumerate("xyz"):
+            put(f"{point.name}.{letter}", placed.points[:, index, axis], "m", f"{letter} of the point {point.name}")
+    names = [joint.name for joint in mechanism.joints] + [loop.name for loop in mechanism.loops]
+    for kind, unit, values, known in (
+        ("force", "N", force, determinate[:, :3]),
+        ("torque", "N m", torque, determinate[:, 3:]),
+    ):
+        masked = np.where(known, values, np.nan)
+        for index, name in enumerate(names):
+            for axis, letter in enumerate("xyz"):
+                meaning = f"{kind} on the child of {name}"
+                put(f"{kind}.{name}.{letter}", masked[:, index, axis], unit, meaning)
+        if np.any(known):
+            meaning = f"determinate components of the {kind}s on children"
+            put(f"{kind}s", values[:, known], unit, meaning, f"{kind}_component")
+    energy = placed.energy()
+    put("energy", energy, "J", "kinetic and potential energy")
+    put("energy_error", energy - energy[0], "J", "energy now minus energy at the start")
+    put("drift", placed.drift(), "m", "how far joints and loops are open")
+    coordinates = {"time": ("time", times, {"units": "s"}), "xyz": ["x", "y", "z"], "wxyz": ["w", "x", "y", "z"]}
+    return xr.Dataset(found, coordinates | {"body": list(element.bodies)})
+
+
+def _continuous(q_WB: FloatArray, start: FloatArray) -> FloatArray:
+    """Quaternions of the sign that is nearest to the one before, from the scene's own start on."""
+    before = np.concatenate([start[None], q_WB[:-1]])
+    signs = np.where(np.sum(before * q_WB, axis=-1, keepdims=True) < 0, -1.0, 1.0)
+    return np.asarray(q_WB * np.cumprod(signs, axis=0))

@@ -1,0 +1,252 @@
+"""A mechanism as an element of a scene: what the harness asks of it."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from functools import cached_property
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+from scipy.spatial.transform import Rotation
+
+from proofroll.core.arrays import FloatArray
+from proofroll.core.element import FirstMotion, OptionalTerm, Sign, StepNumber
+from proofroll.core.engine import Sample
+from proofroll.core.observable import Observable, Role
+from proofroll.elements.mechanism.placed import Placed
+from proofroll.mechanisms.analysis import Analysis, analysed
+from proofroll.mechanisms.capabilities import MechanismCapability, required
+from proofroll.mechanisms.joint_coordinates import JointCoordinates, Solution
+from proofroll.mechanisms.model import Mechanism
+
+if TYPE_CHECKING:
+    import xarray as xr
+
+    from proofroll.core.certificate import Line
+
+# Least size of an observable over its natural one, as for balls: less is stillness to the eye.
+_LEAST = 1e-2
+# Part of the largest kinetic energy by which the energy of a mechanism that nothing drives may grow; all of it is the
+# engine's, and runs that hold 1 % of the path stay far below.
+GAIN = 0.1
+# Part of the mechanism's size by which joints and loops may open: beyond, it is another mechanism.
+OPEN = 0.1
+ENERGY_GAIN, OPENED = "energy gain", "joints opened"
+# An engine without a step is looked at first after this part of the natural time.
+_PART = 1e-4
+_AXES = "xyz"
+
+
+@dataclass(frozen=True)
+class MechanismElement:
+    """Bodies that joints, loops and springs connect. See :class:`proofroll.core.element.Element`.
+
+    Attributes:
+        mechanism: its data.
+    """
+
+    mechanism: Mechanism
+
+    @property
+    def name(self) -> str:
+        """There is one in a scene."""
+        return "mechanism"
+
+    @property
+    def bodies(self) -> tuple[str, ...]:
+        """See the protocol."""
+        return tuple(body.name for body in self.mechanism.bodies)
+
+    @cached_property
+    def analysis(self) -> Analysis:
+        """Rank, mobility, and which reactions are determinate."""
+        return analysed(self.mechanism)
+
+    @cached_property
+    def requires(self) -> frozenset[str]:
+        """See the protocol."""
+        redundant = {MechanismCapability.REDUNDANT} if self.analysis.redundant else set()
+        return frozenset(required(self.mechanism) | redundant)
+
+    def asked(self, name: str) -> str | None:  # noqa: ARG002 -- the protocol's
+        """Nothing can be asked for: all is given."""
+        return None
+
+    @cached_property
+    def start(self) -> Placed:
+        """The mechanism at time 0."""
+        motion = self._solution.motion
+        quaternions = Rotation.from_matrix(motion.R_WB[:-1]).as_quat(scalar_first=True)
+        state = (motion.p_WB[:-1], motion.v_WB[:-1], motion.w_WB[:-1], quaternions)
+        return Placed(self.mechanism, np.zeros(1), *(part[None] for part in state))
+
+    @cached_property
+    def _solution(self) -> Solution:
+        return JointCoordinates(self.mechanism).solve(*self.mechanism.start())
+
+    @cached_property
+    def length(self) -> float:
+        """Largest distance between joints, centres of mass and tracked points at the start [m]."""
+        joints = [self.start.point(joint.child, joint.child_position) for joint in self.mechanism.joints]
+        masses = [self.start.point(body.name, body.com) for body in self.mechanism.bodies]
+        places = np.concatenate([*joints, *masses, *self.start.points.swapaxes(0, 1)])
+        return float(np.max(np.linalg.norm(places[:, None] - places[None], axis=-1))) or 1.0
+
+    @property
+    def natural_time(self) -> float:
+        """Of a pendulum of its size, else of its mass on its stiffest spring, else of a turn [s]."""
+        gravity = float(np.linalg.norm(self.mechanism.gravity))
+        if gravity:
+            return float(2 * np.pi * np.sqrt(self.length / gravity))
+        mass = sum(body.mass for body in self.mechanism.bodies)
+        stiffest = max((spring.stiffness for spring in self.mechanism.springs), default=0.0)
+        if stiffest:
+            return float(2 * np.pi * np.sqrt(mass / stiffest))
+        spin = float(np.max(np.linalg.norm(self.start.w_WB, axis=-1)))
+        return 2 * np.pi / spin if spin else 1.0
+
+    @cached_property
+    def _speed(self) -> float:
+        """Largest speed at the start, or that of falling by its size, or of crossing it in its time [m/s]."""
+        moving = max(float(np.max(np.abs(self.start.v_WB))), float(np.max(np.abs(self.start.w_WB))) * self.length)
+        fall = float(np.sqrt(self.length * np.linalg.norm(self.mechanism.gravity)))
+        return max(moving, fall) or self.length / self.natural_time
+
+    @property
+    def _force(self) -> float:
+        """Weight, or what turns its mass at its speed [N]."""
+        mass = sum(body.mass for body in self.mechanism.bodies)
+        return mass * max(float(np.linalg.norm(self.mechanism.gravity)), self._speed**2 / self.length)
+
+    @cached_property
+    def conservative(self) -> bool:
+        """Whether nothing in it drives or damps."""
+        laws = [(j.damping, j.friction, j.torque) for j in self.mechanism.joints]
+        return not any(any(law) for law in laws) and not any(spring.damping for spring in self.mechanism.springs)
+
+    @cached_property
+    def observables(self) -> tuple[Observable, ...]:
+        """See the protocol."""
+        a, force = _LEAST * self.length, _LEAST * self._force
+        what = "tracked points" if self.mechanism.points else "origins of the bodies' frames"
+        found = [Observable("positions", "m", f"the {what}", Role.MOTION, floor=a, headline=True, decides=True)]
+        found += [
+            Observable(f"{point.name}.{axis}", "m", f"{axis} of the point {point.name}", Role.MOTION, floor=a)
+            for point in self.mechanism.points
+            for axis in _AXES
+        ]
+        for joint in self.mechanism.joints:
+            if joint.nq == 1:
+                unit = "rad" if joint.kind == "revolute" else "m"
+                floor = _LEAST if joint.kind == "revolute" else a
+                found.append(
+                    Observable(f"q.{joint.name}", unit, f"coordinate of {joint.name}", Role.MOTION, floor=floor)
+                )
+        found.append(Observable("attitudes", "1", "quaternions of the bodies", Role.MOTION, floor=1.0, asked_for=False))
+        if np.any(self.analysis.determinate[:, :3]):
+            meaning = "determinate components of the forces on children"
+            found.append(Observable("forces", "N", meaning, Role.REACTION, floor=force, headline=True))
+        if np.any(self.analysis.determinate[:, 3:]):
+            meaning = "determinate components of the moments on children at their joints"
+            found.append(Observable("torques", "N m", meaning, Role.REACTION, floor=force * self.length))
+        if self.conservative:
+            meaning = "energy now minus energy at the start"
+            floor = force * self.length
+            found.append(Observable("energy_error", "J", meaning, Role.RESIDUAL, floor=floor, hangs_on_events=False))
+        meaning = "how far joints and loops are open"
+        found.append(Observable("drift", "m", meaning, Role.RESIDUAL, floor=a, asked_for=False, hangs_on_events=False))
+        return tuple(found)
+
+    def step_numbers(self, h: float, truth: xr.Dataset | None) -> Sequence[StepNumber]:
+        """See the protocol."""
+        spin = float(np.max(np.linalg.norm(self.start.w_WB, axis=-1)))
+        fastest = None if truth is None else float(np.max(np.linalg.norm(truth["w_WB"].to_numpy(), axis=-1)))
+        fall = float(np.sqrt(np.linalg.norm(self.mechanism.gravity) / self.length))
+        return (
+            StepNumber("spin", "|ω0|h", "largest angle [rad] by which a body turns in the first step", spin * h),
+            StepNumber(
+                "rotation", "h|ω|", "largest angle [rad] by which a body turns in a step", fastest and fastest * h
+            ),
+            StepNumber("fall", "h√(g/L)", "step in parts of the time of a fall by the mechanism's size", fall * h),
+        )
+
+    @property
+    def first_motion(self) -> FirstMotion | None:
+        """See the protocol."""
+        found = self._solution
+        motion = found.motion
+        acceleration = (motion.J @ found.acceleration + motion.bias)[:-1]
+        scale = max(float(np.max(np.abs(acceleration[:, :3]))), self._speed**2 / self.length)
+        return FirstMotion(acceleration[:, :3], acceleration[:, 3:], scale, _PART * self.natural_time)
+
+    @property
+    def softened(self) -> frozenset[str]:
+        """See the protocol."""
+        return frozenset({"acceleration", "angular acceleration", "forces", "torques"})
+
+    def dataset(self, times: FloatArray, samples: Sequence[Sample], between: Mapping[float, Sample]) -> xr.Dataset:  # noqa: ARG002 -- the grid hides nothing here: positions are held against the truth
+        """See the protocol; the variables are those of :mod:`proofroll.elements.mechanism.dataset`."""
+        from proofroll.elements.mechanism.dataset import from_samples
+
+        return from_samples(self, times, samples)
+
+    def lacks(self, samples: Sequence[Sample], asks: Sequence[str]) -> str | None:  # noqa: ARG002 -- the protocol's
+        """See the protocol."""
+        lacking = any(sample.q_WB is None for sample in samples)
+        return "the engine does not give the orientation of the bodies" if lacking else None
+
+    def observe(self, dataset: xr.Dataset) -> dict[str, FloatArray]:
+        """See the protocol; reactions that an engine gives in part only are left out."""
+        found = {}
+        for item in self.observables:
+            if item.name not in dataset:
+                continue
+            values = dataset[item.name].to_numpy()
+            values = values[1:] if item.role == Role.REACTION else values
+            if not np.any(np.isnan(values)):
+                found[item.name] = values
+        return found
+
+    def scales(self, truth: xr.Dataset) -> dict[str, float]:
+        """See the protocol: ranges, largest reactions, and natural sizes of what should be zero."""
+        natural = {"attitudes": 1.0, "energy_error": self._force * self.length, "drift": self.length}
+        sizes = {}
+        for item in self.observables:
+            values = truth[item.name].to_numpy() if item.name in truth else np.zeros(1)
+            if item.role == Role.REACTION:
+                sizes[item.name] = float(np.nanmax(np.abs(values)))
+            else:
+                sizes[item.name] = natural.get(item.name) or float(np.max(np.ptp(values, axis=0)))
+        return sizes
+
+    def certify(self, built: Any, sample: Sample) -> list[Line]:
+        """See the protocol."""
+        from proofroll.elements.mechanism.certificate import certify
+
+        return certify(self, built, sample)
+
+    @property
+    def failures(self) -> Mapping[str, str]:
+        """See the protocol."""
+        return {
+            OPENED: f"joints or loops opened by more than {OPEN:.0%} of the mechanism's size",
+            ENERGY_GAIN: f"the energy grew by more than {GAIN:.0%} of what its weight or speed can make",
+        }
+
+    @property
+    def failing_events(self) -> Mapping[str, str]:
+        """None."""
+        return {}
+
+    def signs(self, dataset: xr.Dataset, truth: xr.Dataset | None) -> list[Sign]:  # noqa: ARG002 -- the protocol's
+        """See the protocol."""
+        shown = [Sign(OPENED, dataset["drift"].to_numpy() > OPEN * self.length)]
+        if self.conservative:
+            energy = dataset["energy"].to_numpy()
+            shown.append(Sign(ENERGY_GAIN, energy - energy[0] > GAIN * self._force * self.length))
+        return shown
+
+    def optional_terms(self, parameters: Mapping[str, float], truth: xr.Dataset) -> list[OptionalTerm]:  # noqa: ARG002 -- the protocol's
+        """None yet."""
+        return []

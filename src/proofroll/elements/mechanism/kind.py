@@ -1,0 +1,52 @@
+"""How a scene file holds a mechanism, and on which mechanisms engines are checked."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from typing import Any, ClassVar
+
+from proofroll.core.errors import InputError
+from proofroll.core.gravity import Gravity
+from proofroll.core.numbers import Numbers
+from proofroll.core.scene import Scene
+from proofroll.elements.mechanism.element import MechanismElement
+from proofroll.mechanisms.reader import made_mechanism
+
+
+class MechanismKind:
+    """See :class:`proofroll.core.element.ElementKind`."""
+
+    name: ClassVar[str] = "mechanism"
+    tables: ClassVar[tuple[str, ...]] = ("bodies", "joints", "loops", "springs", "points", "repeat", "published")
+    units: ClassVar[Mapping[str, str]] = {
+        "inertia": "kg m^2",
+        "stiffness": "N/m",
+        "torsional stiffness": "N m/rad",
+        "damping": "N s/m",
+        "torsional damping": "N m s/rad",
+        "torque": "N m",
+    }
+
+    @staticmethod
+    def read(tables: Mapping[str, Any], gravity: Gravity, numbers: Numbers, where: str) -> Sequence[MechanismElement]:
+        """All bodies, joints, loops and springs of a file are one mechanism."""
+        x, y, z = gravity.vector.tolist()
+        try:
+            return [MechanismElement(made_mechanism(tables, (x, y, z), numbers.values))]
+        except InputError as error:
+            raise InputError(f"{where}: {error.field}", error.value, error.advice) from None
+
+    @staticmethod
+    def conformance_scenes() -> Mapping[str, Scene]:
+        """A loop with inertia that changes, a chain, and a top: the most demanding first."""
+        from proofroll.files.scene_file import load_scene
+
+        names = ("slider_crank", "double_pendulum", "heavy_top", "pendulum")
+        return {name: load_scene(name) for name in names}
+
+    @staticmethod
+    def truth_scenes() -> Mapping[str, Scene]:
+        """Those with a loop, with oblique axes, and with a spinning body."""
+        from proofroll.files.scene_file import load_scene
+
+        return {name: load_scene(name) for name in ("slider_crank", "heavy_top")}

@@ -1,0 +1,136 @@
+"""Where everything of a mechanism is, from the poses and velocities of its bodies at many times."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from functools import cached_property
+
+import numpy as np
+from scipy.spatial.transform import Rotation
+
+from proofroll.core.arrays import FloatArray
+from proofroll.mechanisms.joint import FACTS
+from proofroll.mechanisms.model import Mechanism
+
+_TURN = 2 * np.pi
+
+
+@dataclass(frozen=True)
+class Placed:
+    """A motion of all bodies, and what follows from it.
+
+    Attributes:
+        mechanism: whose.
+        time: [s], shape (time,).
+        p_WB, v_WB, w_WB: of each body's frame in the world [m, m/s, rad/s], shape (time, bodies, 3).
+        q_WB: unit quaternions, scalar first, shape (time, bodies, 4).
+    """
+
+    mechanism: Mechanism
+    time: FloatArray
+    p_WB: FloatArray
+    v_WB: FloatArray
+    w_WB: FloatArray
+    q_WB: FloatArray
+
+    @cached_property
+    def R_WB(self) -> FloatArray:
+        """Rotations of the bodies, and of the world last, shape (time, bodies + 1, 3, 3)."""
+        count, bodies = self.q_WB.shape[:2]
+        turned = Rotation.from_quat(self.q_WB.reshape(-1, 4), scalar_first=True).as_matrix()
+        return np.concatenate([turned.reshape(count, bodies, 3, 3), np.broadcast_to(np.eye(3), (count, 1, 3, 3))], 1)
+
+    def point(self, body: str, position: Sequence[float]) -> FloatArray:
+        """A point of a body or of the world in the world [m], shape (time, 3)."""
+        index = self.mechanism.body_index[body]
+        origin = np.zeros((len(self.time), 3)) if index < 0 else self.p_WB[:, index]
+        return np.asarray(origin + self.R_WB[:, index] @ np.asarray(position, dtype=np.float64))
+
+    def velocity(self, body: str, position: Sequence[float]) -> FloatArray:
+        """Of such a point [m/s], shape (time, 3)."""
+        index = self.mechanism.body_index[body]
+        if index < 0:
+            return np.zeros((len(self.time), 3))
+        arm = self.R_WB[:, index] @ np.asarray(position, dtype=np.float64)
+        return np.asarray(self.v_WB[:, index] + np.cross(self.w_WB[:, index], arm))
+
+    def spin(self, body: str) -> FloatArray:
+        """Angular velocity of a body or of the world [rad/s], shape (time, 3)."""
+        index = self.mechanism.body_index[body]
+        return np.zeros((len(self.time), 3)) if index < 0 else self.w_WB[:, index]
+
+    @cached_property
+    def points(self) -> FloatArray:
+        """The tracked points, or where there are none the origins of the bodies [m], shape (time, points, 3)."""
+        tracked = [self.point(point.body, point.position) for point in self.mechanism.points]
+        return np.stack(tracked, axis=1) if tracked else self.p_WB
+
+    def coordinates(self) -> dict[str, tuple[FloatArray, FloatArray]]:
+        """Coordinate and rate of each joint with one coordinate [rad or m, and per s], angles counted in turns."""
+        found = {}
+        for joint in self.mechanism.joints:
+            if joint.nq != 1:
+                continue
+            parent, child = (self.mechanism.body_index[name] for name in (joint.parent, joint.child))
+            A, B = self.R_WB[:, parent] @ joint.parent_frame, self.R_WB[:, child] @ joint.child_frame
+            axis = A[..., 2]
+            if joint.kind == "revolute":
+                cosine, sine = np.sum(A[..., 0] * B[..., 0], -1), np.sum(A[..., 1] * B[..., 0], -1)
+                rate = np.sum((self.spin(joint.child) - self.spin(joint.parent)) * axis, -1)
+                found[joint.name] = _counted(self.time, np.arctan2(sine, cosine), rate, joint.q0[0]), rate
+            else:
+                on_child, on_parent = (joint.child, joint.child_position), (joint.parent, joint.position)
+                apart = self.point(*on_child) - self.point(*on_parent)
+                arm = self.point(*on_child) - self.point(joint.parent, (0.0, 0.0, 0.0))
+                carried = self.velocity(joint.parent, (0.0, 0.0, 0.0)) + np.cross(self.spin(joint.parent), arm)
+                rate = np.sum((self.velocity(*on_child) - carried) * axis, -1)
+                found[joint.name] = np.sum(apart * axis, -1), rate
+        return found
+
+    def energy(self) -> FloatArray:
+        """Kinetic energy, and potential energy of gravity and of all springs [J], shape (time,)."""
+        total = np.zeros(len(self.time))
+        for body in self.mechanism.bodies:
+            R, w = self.R_WB[:, self.mechanism.body_index[body.name]], self.spin(body.name)
+            local = np.einsum("tji,tj->ti", R, w)
+            v = self.velocity(body.name, body.com)
+            total += 0.5 * body.mass * np.sum(v**2, -1) + 0.5 * np.sum(local @ np.array(body.inertia) * local, -1)
+            total -= body.mass * self.point(body.name, body.com) @ np.array(self.mechanism.gravity)
+        for spring in self.mechanism.springs:
+            ends = self.point(spring.body_a, spring.position_a) - self.point(spring.body_b, spring.position_b)
+            total += 0.5 * spring.stiffness * (np.linalg.norm(ends, axis=-1) - spring.length) ** 2
+        coordinates = self.coordinates()
+        for joint in self.mechanism.joints:
+            if joint.stiffness and joint.name in coordinates:
+                total += 0.5 * joint.stiffness * (coordinates[joint.name][0] - joint.rest) ** 2
+            if joint.armature and joint.name in coordinates:
+                total += 0.5 * joint.armature * coordinates[joint.name][1] ** 2
+        return total
+
+    def drift(self) -> FloatArray:
+        """Largest separation [m] or cosine [1] that a joint or a loop should not have, shape (time,)."""
+        worst = np.zeros(len(self.time))
+        joints = [
+            (j.kind, j.parent, j.position, j.parent_frame, j.child, j.child_position, j.child_frame)
+            for j in self.mechanism.joints
+        ]
+        loops = [
+            (k.kind, k.body_a, k.position_a, k.frame_a, k.body_b, k.position_b, k.frame_b) for k in self.mechanism.loops
+        ]
+        for kind, a, at_a, frame_a, b, at_b, frame_b in [*joints, *loops]:
+            A = self.R_WB[:, self.mechanism.body_index[a]] @ frame_a
+            B = self.R_WB[:, self.mechanism.body_index[b]] @ frame_b
+            apart = self.point(b, at_b) - self.point(a, at_a)
+            for axis in FACTS[kind].translations:
+                worst = np.maximum(worst, np.abs(np.sum(apart * A[..., axis], -1)))
+            for first, second in FACTS[kind].rotations:
+                worst = np.maximum(worst, np.abs(np.sum(A[..., first] * B[..., second], -1)))
+        return worst
+
+
+def _counted(time: FloatArray, angle: FloatArray, rate: FloatArray, start: float) -> FloatArray:
+    """Angles on the turns that their rates predict, from that of the start on [rad]."""
+    predicted = np.diff(time) * (rate[1:] + rate[:-1]) / 2
+    turns = np.concatenate([[0.0], np.cumsum(np.round((predicted - np.diff(angle)) / _TURN))])
+    return np.asarray(angle + _TURN * (turns + np.round((start - angle[0]) / _TURN)))
