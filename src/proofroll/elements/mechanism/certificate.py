@@ -76,7 +76,7 @@ def _turning(element: MechanismElement) -> float:
     """What angular accelerations are measured by [rad/s²]."""
     found = element.first_motion
     assert found is not None  # as above
-    return max(float(np.max(np.abs(found.angular_acceleration))), found.scale / element.length)
+    return float(np.max(np.abs(found.angular_acceleration))) or found.scale / element.length
 
 
 def _axis(element: MechanismElement, joint: Any) -> Any:
@@ -89,7 +89,7 @@ def _axis(element: MechanismElement, joint: Any) -> Any:
 
 def _allowed(quantity: str, regularised: Mapping[str, Regularised]) -> tuple[float, str]:
     """Tolerance of a quantity and its reason."""
-    soft, cap = regularised.get(quantity), CAPS.get(quantity)
+    soft, cap = regularised.get(quantity.replace(" ", "_")), CAPS.get(quantity)
     if soft is None:
         return COMPOSED, _COMPOSED
     if cap is None:
