@@ -17,7 +17,7 @@ from proofroll.drill import engine_faults
 from proofroll.drill.engine_faults import ENGINE_FAULTS, drill_damage, drill_engine, prepare
 from proofroll.drill.row import Drilled, drilled
 from proofroll.drill.site import Site, site
-from proofroll.report.terminal import drill_table
+from proofroll.drill.table import drill_table
 from proofroll.running.case import Case, Result
 from proofroll.running.store import Store
 

@@ -5,8 +5,8 @@ from __future__ import annotations
 from pathlib import Path
 from typing import Any
 
-from proofroll.figures.reading import load_figures
-from proofroll.report.figures_part import FiguresPart
+from blajer_2006.part import FiguresPart
+from blajer_2006.reading import load_figures
 from proofroll.report.stability_part import StabilityPart
 from proofroll.report.tradeoff_part import TradeoffPart
 from proofroll.running.runner import Runner

@@ -138,6 +138,15 @@ class Element(Protocol):
 
 
 @runtime_checkable
+class HasOptionalCapabilities(Protocol):
+    """What an element has besides, if scenes of its kind may do without some of what a formulation can provide."""
+
+    @property
+    def optional(self) -> frozenset[str]:
+        """Capabilities that are in an engine's model only where :attr:`Element.requires` or a question names them."""
+
+
+@runtime_checkable
 class ExplainsErrors(Protocol):
     """What an element has besides, if it can say why a bounded path is wrong."""
 

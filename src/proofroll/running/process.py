@@ -18,7 +18,7 @@ from typing import Any, Self
 from proofroll.core.errors import InputError, Missing, ProofrollError
 from proofroll.running.case import Status
 from proofroll.running.memory import VARIABLE, descendants, memory_limit, resident_gb
-from proofroll.starving import starved
+from proofroll.running.starving import starved
 
 # One thread per worker, set before anything is imported there: workers run side by side.
 _ONE_THREAD = dict.fromkeys(

@@ -34,9 +34,10 @@ def _run(case: Case, out: Path, spent: Spent) -> Result:
     from proofroll.core.certificate import certify, first_difference
     from proofroll.core.engine import require_provided
     from proofroll.core.plugins import load_engine, resolve_settings
+    from proofroll.core.time_grid import time_grid
     from proofroll.files.netcdf import write
     from proofroll.files.scene_file import load_scene
-    from proofroll.running.recording import record, time_grid
+    from proofroll.running.recording import record
 
     versions = {case.engine.name: case.engine.version, "proofroll": proofroll.__version__}
     versions["python"] = platform.python_version()

@@ -9,7 +9,8 @@ from proofroll.core.engine import require_provided
 from proofroll.core.errors import InputError, Refused
 from proofroll.core.plugins import load_engine, parse_engine, resolve_settings
 from proofroll.core.scene import Scene
-from proofroll.running.recording import record, time_grid
+from proofroll.core.time_grid import time_grid
+from proofroll.running.recording import record
 
 if TYPE_CHECKING:
     import xarray as xr

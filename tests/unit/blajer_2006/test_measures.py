@@ -7,7 +7,7 @@ import math
 import numpy as np
 import pytest
 
-from proofroll.figures.measures import extremes, measured, sinusoid
+from blajer_2006.measures import extremes, measured, sinusoid
 
 T = np.linspace(0.0, 3.0, 3001)
 FREQUENCY = 10.69

@@ -6,9 +6,9 @@ from pathlib import Path
 
 import pytest
 
+from blajer_2006.judging import rounds_to
+from blajer_2006.reading import load_figures
 from proofroll.core.errors import InputError
-from proofroll.figures.judging import rounds_to
-from proofroll.figures.reading import load_figures
 from proofroll.files.comparison_file import comparison_names, load_comparison
 from proofroll.files.data_folders import data_folder
 

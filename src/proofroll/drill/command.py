@@ -28,7 +28,8 @@ def faults(as_json: Json = False) -> None:
         content = [dataclasses.asdict(row) for row in rows]
         write_json({"tried": len(rows), "contained": contained, "faults": content})
     else:
-        from proofroll.report.terminal import console, drill_table
+        from proofroll.drill.table import drill_table
+        from proofroll.report.terminal import console
 
         console().print(drill_table(rows))
         console().print(f"{len(rows)} faults tried, {contained} contained.")

@@ -7,8 +7,8 @@ from typing import Literal
 
 from pydantic import ConfigDict
 
-from proofroll.figures.measures import Measure
-from proofroll.figures.quantities import ANGLES, TIME
+from blajer_2006.measures import Measure
+from blajer_2006.quantities import ANGLES, TIME
 
 CRITERIA = ("stated", "at_most", "below", "above", "order", "events")
 
@@ -72,7 +72,7 @@ class Panel:
 
 @dataclass(frozen=True)
 class Figure:
-    """One figure: panels of runs, or the regime maps of a comparison.
+    """One figure: panels of runs, or regime maps.
 
     Attributes:
         name: of its file, without ending.
@@ -81,7 +81,7 @@ class Figure:
         columns: of panels.
         height: of a row of panels [inch].
         until: what is drawn [s]; everything by default.
-        regimes: name of the comparison whose regime maps it shows, instead of panels.
+        regimes: name of the study of regimes whose maps it shows, instead of panels.
     """
 
     name: str

@@ -11,15 +11,15 @@ from typing import Any
 import numpy as np
 import pytest
 import xarray as xr
-from proofroll.elements.ball_on_surface.element import rolling_ball
 
-from proofroll.figures.definition import Figures
-from proofroll.figures.drawing import drawn, inline, looks, picture
-from proofroll.figures.judging import count, judged, rounds_to
-from proofroll.figures.reading import load_figures
-from proofroll.figures.study import Study, run_figures
+from blajer_2006.definition import Figures
+from blajer_2006.drawing import drawn, inline, looks, picture
+from blajer_2006.judging import count, judged, rounds_to
+from blajer_2006.reading import load_figures
+from blajer_2006.study import Study, run_figures
+from blajer_2006.writing import write_figures
+from proofroll.elements.ball_on_surface.element import rolling_ball
 from proofroll.files.scene_file import load_scene
-from proofroll.report.figures import write_figures
 from proofroll.running.runner import Runner
 from proofroll.running.store import Store
 

@@ -11,11 +11,11 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from blajer_2006.definition import Statement
+from blajer_2006.measures import DEFINITIONS, measured, unit_of
+from blajer_2006.quantities import TIME
+from blajer_2006.study import Made, Study
 from proofroll.core.events import events_of
-from proofroll.figures.definition import Statement
-from proofroll.figures.measures import DEFINITIONS, measured, unit_of
-from proofroll.figures.quantities import TIME
-from proofroll.figures.study import Made, Study
 
 if TYPE_CHECKING:
     import xarray as xr

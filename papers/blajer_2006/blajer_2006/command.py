@@ -48,10 +48,10 @@ def figures(
     as_json: Json = False,
 ) -> None:
     """Draw the paper's figures from runs; exit 1 if a number that it states does not hold."""
-    from proofroll.figures.drawing import looks
-    from proofroll.figures.reading import load_figures
-    from proofroll.figures.study import run_figures
-    from proofroll.report.figures import closing_lines, statement_table, write_figures
+    from blajer_2006.drawing import looks
+    from blajer_2006.reading import load_figures
+    from blajer_2006.study import run_figures
+    from blajer_2006.writing import closing_lines, statement_table, write_figures
 
     loaded = load_figures(study)
     with looks():  # what is missing shows before the runs rather than after them
@@ -78,14 +78,11 @@ def figures(
 
 
 def _maps(name: str, jobs: int | None) -> list[xr.Dataset]:
-    """The regime maps of a comparison, with a progress bar of their own."""
+    """The regime maps of a study, with a progress bar of their own."""
     import os
 
-    from proofroll.elements.ball_on_surface.regimes_study import regime_maps
-    from proofroll.files.comparison_file import load_comparison
+    from proofroll.elements.ball_on_surface.regimes_study import load_regimes, regime_maps
 
-    wanted = load_comparison(name)
-    total = wanted.regimes.count if wanted.regimes else None
-    with progress_bar("runs of the truth", total=total) as advance:
-        workers = jobs or os.cpu_count() or 1
-        return regime_maps(wanted, workers, lambda count: advance("runs of the truth", count))
+    wanted = load_regimes(name)
+    with progress_bar("runs of the truth", total=wanted.runs) as advance:
+        return regime_maps(wanted, jobs or os.cpu_count() or 1, lambda count: advance("runs of the truth", count))

@@ -10,12 +10,12 @@ from typing import TYPE_CHECKING, Any
 from rich.table import Table
 from rich.text import Text
 
+from blajer_2006 import style
+from blajer_2006.drawing import looks, picture
+from blajer_2006.judging import count, judged
+from blajer_2006.study import Study, study_content
 from proofroll.elements.ball_on_surface.report.regime_map import counts
 from proofroll.elements.ball_on_surface.report.regime_map import picture as map_picture
-from proofroll.figures import style
-from proofroll.figures.drawing import looks, picture
-from proofroll.figures.judging import count, judged
-from proofroll.figures.study import Study, study_content
 from proofroll.files.atomic import replacing
 from proofroll.files.json_data import plain
 from proofroll.report.labels import number, unit
@@ -32,7 +32,7 @@ _MAP_HEIGHT = 3.6  # inch
 
 
 def figures_content(study: Study, maps: Maps) -> dict[str, Any]:
-    """All that is said beside the figures, as plain data: runs, captions, statements; ``maps`` by comparison."""
+    """All that is said beside the figures, as plain data: runs, captions, statements; ``maps`` by the name of their study."""
     entries = []
     for figure in study.figures.figures:
         entry: dict[str, Any] = {"name": figure.name, "caption": figure.caption}
@@ -49,7 +49,7 @@ def write_figures(study: Study, maps: Maps, out: Path, forms: Sequence[str]) -> 
 
     Args:
         study: the runs.
-        maps: regime maps by the name of their comparison.
+        maps: regime maps by the name of their study.
         out: folder.
         forms: of ``svg``, ``png`` and ``pdf``.
 

@@ -4,53 +4,31 @@ from __future__ import annotations
 
 import re
 from decimal import Decimal, InvalidOperation
-from pathlib import Path
-from typing import Any
 
 from pydantic import TypeAdapter, ValidationError
 
+from blajer_2006.definition import CRITERIA, Figure, Figures, Statement
+from blajer_2006.quantities import known
 from proofroll.core.errors import InputError
+from proofroll.core.time_grid import time_grid
 from proofroll.elements.ball_on_surface.element import rolling_ball
-from proofroll.figures.definition import CRITERIA, Figure, Figures, Statement
-from proofroll.figures.quantities import known
-from proofroll.files.comparison_file import load_comparison
-from proofroll.files.data_folders import data_folder
+from proofroll.elements.ball_on_surface.regimes_study import load_regimes
 from proofroll.files.scene_file import load_scene
-from proofroll.files.toml import read_toml, study_files
+from proofroll.files.toml import study_file
 from proofroll.files.validation import first_problem
-from proofroll.running.recording import time_grid
 
 STUDY = "figures"
 
 
 def load_figures(name: str) -> Figures:
-    """Reads a file.
-
-    Args:
-        name: path of a file, the name of one under ``comparisons/``, or the name of a scene that has one.
+    """Reads a file by its path, its name, or the scene that it is about.
 
     Raises:
         InputError: there is none, it is broken, or it is about something else.
     """
-    folder = data_folder("comparisons")
-    places = (Path(name), folder / f"{name}.toml", folder / name)
-    path = next((place for place in places if place.is_file()), None)
-    if path is None:
-        ours = {item: found.get("scene") for item, found in study_files(STUDY)}
-        path = next((item for item, scene in ours.items() if scene == name), None)
-        if path is None:
-            advice = f"there are no such figures; choose one of {', '.join(item.stem for item in ours)} or a file"
-            raise InputError("figures", name, advice)
-    content = read_toml(path)
-    if content.get("study") != STUDY:
-        raise InputError(str(path), "study", f'only a file with study = "{STUDY}" defines figures')
-    return _read(path, content)
-
-
-def _read(path: Path, content: dict[str, Any]) -> Figures:
-    given = {key: value for key, value in content.items() if key != "study"}
+    path, content = study_file(name, STUDY)
     try:
-        found = TypeAdapter(Figures).validate_python({**given, "name": path.stem})
+        found = TypeAdapter(Figures).validate_python({**content, "name": path.stem})
     except ValidationError as error:
         raise first_problem(error, path.name) from None
     _check(path.name, found)
@@ -82,13 +60,13 @@ def _check(where: str, found: Figures) -> None:
 
 def _check_figure(where: str, figure: Figure, found: Figures, quantities: set[str]) -> None:
     if bool(figure.panels) == bool(figure.regimes):
-        raise InputError(f"{where}.panels", figure.name, "give either panels or the comparison of its regime maps")
+        raise InputError(f"{where}.panels", figure.name, "give either panels or the study of its regime maps")
     if figure.columns < 1 or not 0 < figure.height < 20:
         raise InputError(f"{where}.columns", figure.columns, "give at least 1 column, and rows of less than 20 inch")
     if figure.until is not None and not 0 < figure.until <= found.until:
         raise InputError(f"{where}.until", figure.until, f"give a time up to that of the runs, {found.until:g} s")
-    if figure.regimes and load_comparison(figure.regimes).regimes is None:
-        raise InputError(f"{where}.regimes", figure.regimes, "this comparison has no [regimes] table")
+    if figure.regimes:
+        load_regimes(figure.regimes)
     for number, panel in enumerate(figure.panels):
         place = f"{where}.panels.{number}"
         if not panel.y or not panel.runs:

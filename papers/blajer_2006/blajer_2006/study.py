@@ -6,13 +6,13 @@ from collections.abc import Callable
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
 
+from blajer_2006.definition import Figures
+from blajer_2006.quantities import TIME, known, quantity
 from proofroll.core.arrays import FloatArray
 from proofroll.core.errors import ProofrollError
 from proofroll.core.plugins import parse_engine
 from proofroll.elements.ball_on_surface.element import ASKED, rolling_ball
 from proofroll.elements.ball_on_surface.model import RollingBall
-from proofroll.figures.definition import Figures
-from proofroll.figures.quantities import TIME, known, quantity
 from proofroll.files.netcdf import read
 from proofroll.files.scene_file import load_scene
 from proofroll.running.case import Case, EngineFacts, Result, Status

@@ -2,15 +2,20 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, ClassVar
 
+from blajer_2006 import statement_tables
+from blajer_2006.judging import count
+from blajer_2006.reading import STUDY, load_figures
+
 if TYPE_CHECKING:
     import xarray as xr
 
-    from proofroll.figures.definition import Figures
-    from proofroll.figures.study import Study
+    from blajer_2006.definition import Figures
+    from blajer_2006.study import Study
     from proofroll.report.study_parts import Tell
     from proofroll.running.runner import Runner
 
@@ -19,13 +24,27 @@ if TYPE_CHECKING:
 class FiguresPart:
     """Figures of an article from our own runs, and what it states."""
 
+    kind: ClassVar[str] = STUDY
     key: ClassVar[str] = "figures"
+    order: ClassVar[float] = 10
     words: ClassVar[str] = "figures"
+    template: ClassVar[str] = "figures.html"
+    names: ClassVar[Mapping[str, Any]] = {"statements": statement_tables}
     on_request: ClassVar[bool] = False
     asked: Figures
     maps: dict[str, list[xr.Dataset]] = field(default_factory=dict)
-    """Regime maps by comparison; those that are missing are made."""
+    """Regime maps by the name of their study."""
     study: Study | None = None
+
+    @classmethod
+    def load(cls, path: Path, engines: Sequence[str]) -> FiguresPart:  # noqa: ARG003 -- a file names its own engine
+        """See the protocol."""
+        return cls(load_figures(str(path)))
+
+    @staticmethod
+    def line(entry: dict[str, Any]) -> str:
+        """How many statements hold."""
+        return count(entry["study"]["statements"])
 
     @property
     def head(self) -> dict[str, str]:
@@ -39,20 +58,17 @@ class FiguresPart:
         return False
 
     def make(self, runner: Runner, out: Path, tell: Tell) -> None:  # noqa: ARG002 -- the protocol's
-        """Makes the runs, and the maps that no comparison has made."""
-        from proofroll.elements.ball_on_surface.regimes_study import regime_maps
-        from proofroll.figures.study import run_figures
-        from proofroll.files.comparison_file import load_comparison
+        """Makes the runs and the maps."""
+        from blajer_2006.study import run_figures
+        from proofroll.elements.ball_on_surface.regimes_study import load_regimes, regime_maps
 
         self.study = run_figures(self.asked, runner, None, lambda case, _: tell(case.engine.name, 1))
         for name in dict.fromkeys(figure.regimes for figure in self.asked.figures if figure.regimes):
-            if name not in self.maps:
-                workers = runner.jobs
-                self.maps[name] = regime_maps(load_comparison(name), workers, lambda _: tell("runs of the truth", 0))
+            self.maps[name] = regime_maps(load_regimes(name), runner.jobs, lambda _: tell("runs of the truth", 0))
 
     def content(self) -> dict[str, Any]:
         """Captions, runs and statements."""
-        from proofroll.report.figures import figures_content
+        from blajer_2006.writing import figures_content
 
         assert self.study is not None  # it was made
         content = figures_content(self.study, self.maps)
@@ -61,9 +77,9 @@ class FiguresPart:
         return {"study": content, "contradictions": said, "lost": content["lost"]}
 
     def pictures(self, prefix: str) -> dict[str, str]:
-        """One for each figure with panels; the maps are the comparison's."""
+        """One for each figure."""
+        from blajer_2006.drawing import inline
         from proofroll.elements.ball_on_surface.report.regime_map import inline as inline_map
-        from proofroll.figures.drawing import inline
 
         assert self.study is not None  # it was made
         return {

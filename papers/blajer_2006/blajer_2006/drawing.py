@@ -10,12 +10,12 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from blajer_2006 import style
+from blajer_2006.definition import Figure, Panel
+from blajer_2006.quantities import TIME
+from blajer_2006.study import Made, Study
 from proofroll.core.errors import InputError, Missing
 from proofroll.core.events import events_of
-from proofroll.figures import style
-from proofroll.figures.definition import Figure, Panel
-from proofroll.figures.quantities import TIME
-from proofroll.figures.study import Made, Study
 from proofroll.report.svg import element
 
 if TYPE_CHECKING:
