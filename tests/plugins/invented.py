@@ -7,6 +7,9 @@ from typing import Any
 
 from blajer_2006.part import FiguresPart
 from blajer_2006.reading import load_figures
+from proofroll.elements.ball_on_surface.regimes_study import load_regimes
+from proofroll.elements.ball_on_surface.report.regimes_part import RegimesPart
+from proofroll.files.scene_file import load_scene
 from proofroll.report.stability_part import StabilityPart
 from proofroll.report.tradeoff_part import TradeoffPart
 from proofroll.running.runner import Runner
@@ -14,6 +17,7 @@ from proofroll.running.store import Store
 from proofroll.studies import study_identity as installed
 from proofroll.studies.claims import claims_for
 from proofroll.studies.stability_claims import file_for
+from proofroll.truth.regimes import regime_map
 
 
 def point(number: int, engine: str, error: float, seconds: float, **more: Any) -> dict[str, Any]:
@@ -120,6 +124,12 @@ of = "omega3"
 measure = "every"
 stated = "-160"
 """
+
+
+def regimes_part() -> RegimesPart:
+    """A map of four short true runs."""
+    scene = load_scene("sphere_in_cylinder")
+    return RegimesPart(load_regimes("regimes"), maps=[regime_map(scene, [3.0, 4.0], [0.1, 0.7], until=0.5)])
 
 
 def figures_part(folder: Path) -> FiguresPart:

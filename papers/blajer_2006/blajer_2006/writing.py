@@ -32,7 +32,7 @@ _MAP_HEIGHT = 3.6  # inch
 
 
 def figures_content(study: Study, maps: Maps) -> dict[str, Any]:
-    """All that is said beside the figures, as plain data: runs, captions, statements; ``maps`` by the name of their study."""
+    """All that is said beside the figures, as plain data: runs, captions, statements; ``maps`` by study."""
     entries = []
     for figure in study.figures.figures:
         entry: dict[str, Any] = {"name": figure.name, "caption": figure.caption}

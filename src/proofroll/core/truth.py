@@ -1,4 +1,4 @@
-"""The truth of a scene: that of each of its elements, by whatever covers it. What covers what is found as engines are."""
+"""The truth of a scene: that of each of its elements, by the plug-in that covers it."""
 
 from __future__ import annotations
 
@@ -55,7 +55,8 @@ class FindsEdges(Protocol):
         Args:
             element: one that it covers, with any value of the parameter.
             parameter: of the scene.
-            low, high: the values, in the parameter's unit.
+            low: one of the values, in the parameter's unit.
+            high: the other.
             until: how long the event is looked for [s].
 
         Raises:

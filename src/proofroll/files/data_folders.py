@@ -26,6 +26,6 @@ def data_folder(kind: str) -> Path:
 
 @cache
 def study_folders() -> tuple[Path, ...]:
-    """The folders of comparisons and other studies: ``comparisons``, and those of the modules that packages announce."""
+    """The folders of comparisons and other studies: ``comparisons``, and those of modules that packages announce."""
     points = sorted(entry_points(group=STUDY_FOLDERS), key=lambda point: point.name)
     return (data_folder("comparisons"), *(Path(point.load().__file__).parent for point in points))

@@ -15,8 +15,8 @@ from typing import TYPE_CHECKING, Any
 from proofroll.files.scene_file import load_scene
 from proofroll.report import labels, study_tables, tables
 from proofroll.report.compression import packed
-from proofroll.report.kinds import kind_of, report_kinds
-from proofroll.report.study_parts import further, part_kinds
+from proofroll.report.kinds import ReportKind, kind_of, report_kinds
+from proofroll.report.study_parts import Part, further, part_kinds
 from proofroll.report.styles import OUTLINES, styles
 from proofroll.report.tradeoff_tables import name_of
 
@@ -84,10 +84,10 @@ def _templates() -> jinja2.Environment:
     """The templates; everything that is put into them is escaped, save what they mark as ours."""
     import jinja2
 
-    kinds = (*part_kinds(), *report_kinds())
+    kinds: list[type[Part] | type[ReportKind]] = [*part_kinds(), *report_kinds()]
     folders = [Path(inspect.getfile(kind)).parent / "templates" for kind in kinds]
     made = jinja2.Environment(
-        loader=jinja2.FileSystemLoader(dict.fromkeys([Path(__file__).parent / "templates", *folders])),
+        loader=jinja2.FileSystemLoader([*dict.fromkeys([Path(__file__).parent / "templates", *folders])]),
         autoescape=True,
         undefined=jinja2.StrictUndefined,
         trim_blocks=True,
@@ -113,7 +113,7 @@ def _templates() -> jinja2.Environment:
         "outlines": OUTLINES,
         "again": _again,
         "further": further,
-        "parts": part_kinds(),
+        "part_kinds": part_kinds(),
         "kind_of": lambda comparison: kind_of(load_scene(comparison["scene"])),
     }
     for kind in kinds:

@@ -10,7 +10,6 @@ from blajer_2006.judging import rounds_to
 from blajer_2006.reading import load_figures
 from proofroll.core.errors import InputError
 from proofroll.files.comparison_file import comparison_names, load_comparison
-from proofroll.files.data_folders import data_folder
 
 TEXT = """
 study = "figures"
@@ -95,7 +94,7 @@ def test_files_are_found_by_scene_and_are_no_comparisons() -> None:
     assert ours.name not in comparison_names()
     assert ours.wants_orientation
     with pytest.raises(InputError, match="proofroll figures sphere_in_cylinder"):
-        load_comparison(str(data_folder("comparisons") / f"{ours.name}.toml"))
+        load_comparison(ours.name)
     with pytest.raises(InputError, match=f"choose one of {ours.name}"):
         load_figures("sphere_in_cone")
 

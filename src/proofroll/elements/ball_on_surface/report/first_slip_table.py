@@ -13,11 +13,11 @@ from proofroll.report.terminal import number
 def onset_table(content: dict[str, Any]) -> Table:
     """One line per engine: its first slip with bracket, the difference from the truth, and the verdict."""
     table = Table(box=None, padding=(0, 1, 0, 0))
-    table.add_column("engine", no_wrap=True)
+    table.add_column("engine", overflow="fold")
     table.add_column(Text("first slip [s]"), justify="right", no_wrap=True)
     table.add_column(Text("between [s]"), no_wrap=True)
     table.add_column(Text("difference [s]"), justify="right", no_wrap=True)
-    table.add_column("verdict", no_wrap=True)
+    table.add_column("verdict", overflow="fold")
     for item in content["engines"]:
         first = item["onset"]
         bracket = f"{first['time_low']:.9g} … {first['time_high']:.9g}" if first else ""
