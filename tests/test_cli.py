@@ -54,6 +54,8 @@ BAD = {
     "NaN": (with_option("--set", "mass=nan"), 2, ["mass = 'nan'", "finite"]),
     "infinity": (with_option("--set", "speed=inf"), 2, ["speed = 'inf'", "finite"]),
     "text for a number": (with_option("--set", "speed=fast"), 2, ["speed = 'fast'", "not a number"]),
+    "asking by a parameter": (with_option("--set", "asks=0"), 2, ["asks = '0'", "ask for it with --ask"]),
+    "commands for the terminal": (with_option("--set", "speed=\x1b[2J\x9b"), 2, ["speed = ", "not a number"]),
     "no speed": (with_option("--set", "speed=0"), 2, ["speed = ", "nothing to roll on"]),
     "dt of zero": (rk4("0"), 2, ["projection: dt = ", "greater than 0"]),
     "negative dt": (rk4("-1"), 2, ["dt = ", "greater than 0"]),
@@ -77,6 +79,7 @@ BAD = {
     "engine that crashes": (with_option("--engine", "exits"), 3, ["exits crashed", "exit code 7", "no licence"]),
     "engine that raises": (with_option("--engine", "raises"), 3, ["raises crashed", "matrix is singular"]),
     "engine that diverges": (with_option("--engine", "not_a_number"), 3, ["not_a_number diverged", "not finite"]),
+    "engine that commands": (with_option("--engine", "commands"), 3, ["commands diverged", "owned2J it stopped"]),
     "engine that refuses": (with_option("--engine", "refuses"), 3, ["refuses refused", "no wheel, no ball"]),
     "capability that is lacking": (with_option("--set", "rolling_resistance=1e-4"), 3, ["needs rolling resistance"]),
     "something else asked": (with_option("--ask", "colour"), 2, ["asks = 'colour'", "choose orientation"]),
@@ -100,6 +103,7 @@ def test_bad_input(proofroll: Proofroll, arguments: list[str], code: int, words:
     assert (found, err.count("\n")) == (code, 1), err
     assert err.startswith("proofroll: ")
     assert "Traceback" not in err
+    assert (out + err).replace("\n", "").isprintable()
     for word in words:
         assert word in err
     if code == 2:
@@ -417,7 +421,7 @@ def fresh(code: str) -> dict[str, Any]:
 def test_help_is_light(arguments: list[str]) -> None:
     """Help and version load no engine, no array library and no plots."""
     found = fresh(f"sys.argv = ['proofroll', *{arguments}]; from proofroll.cli import main; main()")
-    heavy = {"xarray", "plotly", "numpy", "scipy", "mujoco", "pinocchio", "exudyn", "h5netcdf", "heyoka"}
+    heavy = {"xarray", "plotly", "numpy", "scipy", "mujoco", "pinocchio", "exudyn", "heyoka"}
     assert found["code"] == 0
     assert heavy & set(found["modules"]) == set()
     assert not any(name.startswith("proofroll.engines.") for name in found["modules"])

@@ -8,11 +8,13 @@ from __future__ import annotations
 from importlib import import_module
 from typing import TYPE_CHECKING, Any
 
+from proofroll.core.errors import Diverged, InputError, Missing, ProofrollError, Refused
+
 if TYPE_CHECKING:
     from proofroll.files.scene_file import load_scene
     from proofroll.running.simulation import simulate
 
-__all__ = ["load_scene", "simulate"]
+__all__ = ["Diverged", "InputError", "Missing", "ProofrollError", "Refused", "load_scene", "simulate"]
 __version__ = "0.1.0"
 
 _HOMES = {"load_scene": "proofroll.files.scene_file", "simulate": "proofroll.running.simulation"}
@@ -22,3 +24,7 @@ def __getattr__(name: str) -> Any:
     if name not in _HOMES:
         raise AttributeError(f"module 'proofroll' has no attribute {name!r}")
     return getattr(import_module(_HOMES[name]), name)
+
+
+def __dir__() -> list[str]:
+    return sorted({*globals(), *__all__})  # so that help() finds what is loaded only when it is used

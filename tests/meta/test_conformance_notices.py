@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import dataclasses
 import subprocess
 import sys
 from collections.abc import Callable, Mapping
@@ -12,6 +13,7 @@ from nonconforming import FAILS, Forgetful, Heavy
 from tiny import Tiny
 
 from proofroll.conformance import Check, checks, run_check
+from proofroll.core.engine import Sample
 
 
 @pytest.fixture(autouse=True)
@@ -39,6 +41,26 @@ def failures(engine: type[Tiny], family: str) -> list[str]:
 def test_a_conforming_engine_passes(check: Check) -> None:
     """An engine that keeps every promise fails no check."""
     check()
+
+
+class Late(Tiny):
+    """Defines reactions only after a first step."""
+
+    def sample(self) -> Sample:
+        """No force at time 0."""
+        right = super().sample()
+        return right if self.t else dataclasses.replace(right, force=None)
+
+
+def test_an_engine_without_a_force_at_time_0_conforms() -> None:
+    """Reactions that begin with the first step break no promise about what is built, sampled and moved."""
+    for family in (
+        "certificate_holds",
+        "samples_are_well_formed",
+        "reading_back_changes_nothing",
+        "moves_as_the_truth",
+    ):
+        assert failures(Late, family) == []
 
 
 @pytest.mark.parametrize(("engine", "family"), FAILS.items(), ids=lambda value: getattr(value, "__name__", value))

@@ -31,6 +31,8 @@ HIDDEN = {
     "hidden_mass": ({"N", "F3", "energy_balance"}, {"gamma", "z", "gap", "slip"}),
     "hidden_resistance": ({"gamma", "F2", "energy_balance"}, {"gap", "slip"}),
     "hidden_friction": ({"F2", "F3", "force_audit"}, {"gamma", "z", "N", "energy_balance"}),
+    "hidden_rate": ({"rate_audit"}, {"gamma", "z", "N", "F2", "F3", "gap"}),
+    "hidden_period": ({"rate_audit"}, {"gamma", "z", "N", "F2", "F3", "energy_balance", "force_audit", "gap", "slip"}),
     "hidden_clock": ({"gamma", "z"}, {"gap", "slip"}),
 }
 SOUND = "hidden_none"
@@ -52,6 +54,7 @@ F2 = "1e-6 N"
 F3 = "1e-6 N"
 energy_balance = "1e-7 J"
 force_audit = "1e-3 N"
+rate_audit = "1e-6 m/s"
 gap = "1e-9 m"
 slip = "1e-9 m/s"
 """
@@ -77,7 +80,7 @@ def check_the_sound_engine(outcome: Outcome) -> None:
     """Without a defect the same engine agrees in every observable, so that what is caught is the defect."""
     run = run_of(outcome, SOUND)
     assert run.verdict is Verdict.AGREES, [j for j in run.judgements if j.verdict is not Verdict.AGREES]
-    assert len(run.judgements) == 9
+    assert len(run.judgements) == 10
     assert not run.contradictions
 
 

@@ -7,9 +7,12 @@ scene's own numbers, starts as it should, and moves wrongly.
 from __future__ import annotations
 
 import dataclasses
+import math
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from typing import ClassVar, Self
+
+import numpy as np
 
 from proofroll.core.arrays import FloatArray
 from proofroll.core.engine import Built, Sample
@@ -51,6 +54,8 @@ BUILT: Mapping[str, Callable[[Scene], Scene]] = {
     "mass": _ball(mass=1.001),
     "resistance": _resistance,
     "friction": _same,  # the reported friction has the wrong sign
+    "rate": _same,  # the reported velocity is 0.01 % more than the rate of the position
+    "period": _same,  # the position is off by a beat that is over at every hundredth of a second
     "clock": _same,  # time goes 0.1 % too slowly
     "none": _same,
 }
@@ -114,6 +119,11 @@ class Broken:
         if self.hidden and self.t == 0:
             return self.right.sample()
         found = self.wrong.sample()
+        if self.defect == "rate":
+            return dataclasses.replace(found, v_WB=found.v_WB * 1.0001)
+        if self.defect == "period":
+            beat = 1e-5 * math.sin(200 * math.pi * self.t)
+            return dataclasses.replace(found, p_WB=found.p_WB + np.array([0, 0, beat]))
         if self.defect != "friction" or found.force is None:
             return found
         return dataclasses.replace(found, force=self._reversed(found.p_WB, found.force))

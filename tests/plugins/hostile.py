@@ -202,6 +202,57 @@ class Refuses(Oracle):
         raise Refused("no wheel, no ball")
 
 
+class BlamesMemory(Oracle):
+    """Calls a lack of memory its own divergence."""
+
+    name = "blames_memory"
+
+    def advance(self, t: float) -> None:
+        """See :class:`proofroll.core.engine.Engine`."""
+        try:
+            raise MemoryError
+        except MemoryError:
+            raise Diverged(f"the step failed at {t:g} s") from None
+
+
+class BlamesFile(Oracle):
+    """Calls a file that cannot be read a refusal."""
+
+    name = "blames_file"
+
+    @classmethod
+    def build(cls, scene: Scene, settings: Any) -> Self:  # noqa: ARG003 -- the protocol's signature
+        """See :class:`proofroll.core.engine.Engine`."""
+        try:
+            raise OSError(24, "Too many open files")
+        except OSError as error:
+            raise Refused("no model") from error
+
+
+class Interrupted(Oracle):
+    """Somebody sends it Ctrl-C, which it takes for its own failure."""
+
+    name = "interrupted"
+
+    def advance(self, t: float) -> None:
+        """See :class:`proofroll.core.engine.Engine`."""
+        try:
+            os.kill(os.getpid(), signal.SIGINT)
+            time.sleep(600)
+        except KeyboardInterrupt:
+            raise Diverged(f"the solver stopped at {t:g} s") from None
+
+
+class Commands(Oracle):
+    """Its message is a command to the terminal."""
+
+    name = "commands"
+
+    def advance(self, t: float) -> None:  # noqa: ARG002 -- the protocol's signature
+        """See :class:`proofroll.core.engine.Engine`."""
+        raise Diverged("\x1b]0;owned\x07\x9b2J it stopped")
+
+
 # Entry points of all of them; "absent" needs a module that nobody has.
 ENTRY_POINTS = {
     kind.name: f"hostile:{kind.__name__}"
@@ -218,5 +269,9 @@ ENTRY_POINTS = {
         NotANumber,
         GivesUp,
         Refuses,
+        BlamesMemory,
+        BlamesFile,
+        Interrupted,
+        Commands,
     )
 } | {"absent": "no_such_module_anywhere:Engine", "misspelt": "hostile:NoSuchClass"}

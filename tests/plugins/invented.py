@@ -7,7 +7,7 @@ from typing import Any
 
 from blajer_2006.part import FiguresPart
 from blajer_2006.reading import load_figures
-from proofroll.elements.ball_on_surface.regimes_study import load_regimes
+from proofroll.elements.ball_on_surface.regimes_study import load_regimes, regime_map
 from proofroll.elements.ball_on_surface.report.regimes_part import RegimesPart
 from proofroll.files.scene_file import load_scene
 from proofroll.report.stability_part import StabilityPart
@@ -17,7 +17,6 @@ from proofroll.running.store import Store
 from proofroll.studies import study_identity as installed
 from proofroll.studies.claims import claims_for
 from proofroll.studies.stability_claims import file_for
-from proofroll.truth.regimes import regime_map
 
 
 def point(number: int, engine: str, error: float, seconds: float, **more: Any) -> dict[str, Any]:

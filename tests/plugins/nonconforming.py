@@ -10,11 +10,12 @@ from typing import Any, ClassVar, Self
 import numpy as np
 from tiny import Tiny, TinySettings
 
-from proofroll.core.engine import Built, Sample
+from proofroll.core.engine import Built, Regularised, Sample
 from proofroll.core.errors import Refused
 from proofroll.core.scene import Scene
 from proofroll.elements.ball_on_surface.element import changed
 from proofroll.elements.ball_on_surface.model import BallCapability
+from proofroll.elements.ball_on_surface.rolling_equations import reduced_rates
 
 
 class Unannounced(Tiny):
@@ -124,6 +125,95 @@ class Heavy(Tiny):
         super().__init__(changed(scene, ball=heavy), settings)
 
 
+class Doubled(Heavy):
+    """Builds a ball of twice the mass, and calls that a softened mass."""
+
+    def __init__(self, scene: Scene, settings: Any) -> None:
+        ball = scene.elements[0].ball
+        Tiny.__init__(self, changed(scene, ball=dataclasses.replace(ball, mass=2 * ball.mass)), settings)
+
+    def built(self) -> Built:
+        """With an excuse for everything."""
+        return _excused(super().built())
+
+
+class Pulled(Tiny):
+    """Lives in one and a half times the gravity, and calls that softened."""
+
+    def __init__(self, scene: Scene, settings: Any) -> None:
+        gravity = dataclasses.replace(scene.elements[0].gravity, magnitude=1.5 * scene.elements[0].gravity.magnitude)
+        super().__init__(changed(scene, gravity=gravity), settings)
+
+    def built(self) -> Built:
+        """With an excuse for everything."""
+        return _excused(super().built())
+
+
+def _excused(built: Built) -> Built:
+    """The same with every quantity softened without limit."""
+    names = ("mass", "inertia", "gravity", "position", "acceleration", "angular acceleration", "N", "F2", "F3")
+    excuse = Regularised(float("inf"), "our engine is soft")
+    return dataclasses.replace(built, regularised=dict.fromkeys(names, excuse))
+
+
+class Mute(Tiny):
+    """Says nothing of what it built but what it must, and gives no force."""
+
+    def built(self) -> Built:
+        """The scene's own resistance, whatever it does with it."""
+        return Built(rolling_resistance=self.body.contact.rolling_resistance)
+
+    def sample(self) -> Sample:
+        """The state alone."""
+        return dataclasses.replace(super().sample(), force=None)
+
+
+class Damped(Mute):
+    """Its velocity is damped by 4 % per second, and it does not say so."""
+
+    def rates(self, x: Any) -> Any:
+        """With damping."""
+        return super().rates(x) - np.array([0, 0, 0.04, 0.04, 0.04]) * x
+
+
+class Clamped(Mute):
+    """Its spin is clamped at 30 rad/s as soon as it moves, and it does not say so."""
+
+    def sample(self) -> Sample:
+        """Never faster."""
+        right = super().sample()
+        return dataclasses.replace(right, w_WB=np.clip(right.w_WB, -30, 30) if self.t else right.w_WB)
+
+
+class Unresisting(Mute):
+    """Says that there is rolling resistance, and ignores it."""
+
+    def rates(self, x: Any) -> Any:
+        """Without."""
+        contact = dataclasses.replace(self.body.contact, rolling_resistance=0.0)
+        return reduced_rates(dataclasses.replace(self.body, contact=contact), x)[0]
+
+
+class Drifting(Tiny):
+    """Its position moves by a thousandth faster than its velocity says."""
+
+    def sample(self) -> Sample:
+        """Ahead of itself."""
+        right = super().sample()
+        ahead = self.body.surface.position(self.x[:2] + 1e-3 * self.t * self.x[2:4])
+        return dataclasses.replace(right, p_WB=ahead)
+
+
+class Beating(Tiny):
+    """Off by a beat that is over at every hundredth of a second, where everybody samples."""
+
+    def sample(self) -> Sample:
+        """A tenth of a millimetre along the wall."""
+        right = super().sample()
+        along = self.body.surface.frame(self.x[:2])[:, 2]
+        return dataclasses.replace(right, p_WB=right.p_WB + 1e-4 * np.sin(200 * np.pi * self.t) * along)
+
+
 class Wasteful(Tiny):
     """Carries rolling resistance along where nobody asked for it."""
 
@@ -160,6 +250,15 @@ class Row(Tiny):
         """The wrong shape."""
         right = super().sample()
         return Sample(right.p_WB[None], right.v_WB, right.w_WB)
+
+
+class Hushed(Tiny):
+    """Gives a force at time 0, and none later."""
+
+    def sample(self) -> Sample:
+        """Falls silent."""
+        right = super().sample()
+        return right if self.t == 0 else dataclasses.replace(right, force=None)
 
 
 class Views(Tiny):
@@ -285,10 +384,18 @@ FAILS: Mapping[type[Tiny], str] = {
     Boastful: "provides_what_it_says",
     Silent: "builds_or_refuses",
     Heavy: "certificate_holds",
+    Doubled: "certificate_holds",
+    Pulled: "certificate_holds",
+    Damped: "first_steps_fit_the_scene",
+    Clamped: "first_steps_fit_the_scene",
+    Unresisting: "first_steps_fit_the_scene",
+    Drifting: "moves_as_the_truth",
+    Beating: "moves_as_the_truth",
     Wasteful: "builds_only_what_is_required",
     Thrifty: "builds_only_what_is_required",
     Turning: "builds_only_what_is_required",
     Row: "samples_are_well_formed",
+    Hushed: "samples_are_well_formed",
     Views: "reading_back_changes_nothing",
     Moody: "advance_is_repeatable",
     Forgetful: "advance_in_two_parts",

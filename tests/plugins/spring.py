@@ -12,7 +12,7 @@ from tiny import TinySettings
 
 from proofroll.core.arrays import FloatArray
 from proofroll.core.certificate import Line
-from proofroll.core.element import Element, OptionalTerm, Sign, StepNumber
+from proofroll.core.element import Element, FirstMotion, OptionalTerm, Sign, StepNumber
 from proofroll.core.engine import Level, Sample, Term, whole_steps
 from proofroll.core.gravity import Gravity
 from proofroll.core.observable import Observable, Role
@@ -54,6 +54,14 @@ class Spring:
         """One oscillation [s]."""
         return 2 * np.pi / self.rate
 
+    softened = frozenset[str]()
+
+    @property
+    def first_motion(self) -> FirstMotion:
+        """Back to the middle."""
+        start = np.array([[-(self.rate**2) * self.x0, 0.0, 0.0]])
+        return FirstMotion(start, np.zeros((1, 3)), self.rate**2 * abs(self.x0), 1e-3 / self.rate)
+
     def asked(self, name: str) -> str | None:
         """Nothing can be asked for."""
         return None
@@ -62,7 +70,7 @@ class Spring:
         """The phase of a step."""
         return (StepNumber("phase", "ωh", "angle of the oscillation in a step", self.rate * h),)
 
-    def dataset(self, times: FloatArray, samples: Sequence[Sample]) -> xr.Dataset:
+    def dataset(self, times: FloatArray, samples: Sequence[Sample], between: Mapping[float, Sample]) -> xr.Dataset:
         """Elongation, speed, pull and energy."""
         x, v = (np.array([getattr(s, key)[..., 0] for s in samples]).reshape(-1) for key in ("p_WB", "v_WB"))
         energy = 0.5 * self.mass * v**2 + 0.5 * self.stiffness * x**2
@@ -104,6 +112,7 @@ class SpringKind:
 
     name: ClassVar[str] = "spring"
     tables: ClassVar[tuple[str, ...]] = ("masses",)
+    units: ClassVar[Mapping[str, str]] = {"mass": "kg", "stiffness": "N/m", "x0": "m"}
 
     @staticmethod
     def read(tables: Mapping[str, Any], gravity: Gravity, where: str) -> Sequence[Spring]:
@@ -114,6 +123,11 @@ class SpringKind:
     def conformance_scenes() -> Mapping[str, Scene]:
         """One scene."""
         return {"spring": Scene("spring", "", (Spring("m", 2.0, 50.0, 0.3),), {"mass": 2.0})}
+
+    @staticmethod
+    def truth_scenes() -> Mapping[str, Scene]:
+        """The same."""
+        return SpringKind.conformance_scenes()
 
 
 class SpringTruth:
@@ -132,7 +146,7 @@ class SpringTruth:
         w, A = element.rate, np.array([[0, 1], [-element.stiffness / element.mass, 0]])
         first = [(element.x0 * np.cos(w * t), -element.x0 * w * np.sin(w * t)) for t in times]
         second = [tuple(expm(A * t) @ [element.x0, 0.0]) for t in times]
-        one, two = (element.dataset(times, [at(*state) for state in states]) for states in (first, second))
+        one, two = (element.dataset(times, [at(*state) for state in states], {}) for states in (first, second))
         for name in one.data_vars:
             one[name].attrs["error_bar"] = 3 * float(np.max(np.abs(one[name] - two[name]))) + 1e-15
         return one.assign_attrs(route="cosine", second_route="exponential of the matrix")

@@ -104,7 +104,7 @@ def made(tmp_path_factory: pytest.TempPathFactory) -> tuple[Outcome, Store]:
             ]
             line = {
                 "quantity": "mass", "unit": "kg", "expected": (0.5,), "found": (0.5,), "difference": 1e-17,
-                "tolerance": 1e-12, "because": "", "holds": True,
+                "tolerance": 1e-12, "because": "", "holds": True, "standing": "holds",
             }  # fmt: skip
             result = Result(
                 Status.DONE,

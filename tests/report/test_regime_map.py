@@ -8,7 +8,7 @@ from typing import Any
 import pytest
 import xarray as xr
 
-from proofroll.elements.ball_on_surface.regimes_study import load_regimes
+from proofroll.elements.ball_on_surface.regimes_study import load_regimes, regime_map
 from proofroll.elements.ball_on_surface.report.regime_map import boundaries, counts, draw, inline
 from proofroll.elements.ball_on_surface.report.regimes_part import RegimesPart
 from proofroll.files.scene_file import load_scene
@@ -16,7 +16,6 @@ from proofroll.report.growing_report import begun
 from proofroll.report.terminal import part_lines
 from proofroll.running.store import Store
 from proofroll.studies.compare import Outcome
-from proofroll.truth.regimes import regime_map
 
 
 @pytest.fixture(scope="module")

@@ -267,3 +267,58 @@ def test_a_case_that_asks_nothing_keeps_its_key(make_case: MakeCase) -> None:
     assert case.key == hashlib.sha256(json.dumps(content, sort_keys=True).encode()).hexdigest()[:24]
     asking = dataclasses.replace(case, asks=("orientation",))
     assert Case.from_dict(json.loads(json.dumps(dataclasses.asdict(asking)))) == asking
+
+
+def test_a_result_belongs_to_its_case(tmp_path: Path, make_case: MakeCase) -> None:
+    """Two results whose files were swapped are believed for neither case."""
+    store = Store(tmp_path)
+    cases = [make_case("oracle", parameters={"speed": speed}) for speed in (3.0, 4.0)]
+    for case in cases:
+        made(store, case, case.key.encode())
+    for suffix in (".json", ".nc"):
+        one, other = (tmp_path / f"{case.key}{suffix}" for case in cases)
+        one.rename(tmp_path / "aside")
+        other.rename(one)
+        (tmp_path / "aside").rename(other)
+    assert [store.get(case) for case in cases] == [None, None]
+    assert all(store.has(case) for case in cases)
+
+
+def nested(path: Path) -> None:
+    """Deeper than any reader of JSON goes."""
+    path.write_text("[" * 100_000)
+
+
+def link_to_device(path: Path) -> None:
+    """A file without end."""
+    path.symlink_to("/dev/zero")
+
+
+def folder(path: Path) -> None:
+    """A folder that is not empty."""
+    (path / "inside").mkdir(parents=True)
+
+
+@pytest.mark.parametrize("suffix", [".json", ".nc"])
+@pytest.mark.parametrize("put", [nested, os.mkfifo, link_to_device, folder])
+def test_what_is_no_file_is_damage(tmp_path: Path, make_case: MakeCase, suffix: str, put: Callable[..., None]) -> None:
+    """A pipe, a device, a folder or endless nesting is neither waited for nor believed; a new result replaces it."""
+    store, case = Store(tmp_path), make_case("oracle")
+    made(store, case, b"motion")
+    path = tmp_path / f"{case.key}{suffix}"
+    path.unlink()
+    put(path)
+    assert store.get(case) is None
+    assert store.has(case)
+    result = made(store, case, b"motion")
+    assert store.get(case) == result
+    assert path.is_file()
+    assert not path.is_symlink()
+
+
+def test_a_link_that_leads_nowhere_is_damage(tmp_path: Path, make_case: MakeCase) -> None:
+    """A record that is a broken link is there, and is no result."""
+    store, case = Store(tmp_path), make_case("oracle")
+    (tmp_path / f"{case.key}.json").symlink_to(tmp_path / "nowhere")
+    assert store.has(case)
+    assert store.get(case) is None

@@ -73,6 +73,8 @@ def _interrupt(number: int, _: FrameType | None) -> None:
 def main() -> None:
     """Entry point: every problem is one line on standard error and an exit code."""
     signal.signal(signal.SIGTERM, _interrupt)  # a time limit from outside also ends the workers
+    if signal.getsignal(signal.SIGHUP) is signal.SIG_DFL:  # so does the end of the terminal, but for nohup
+        signal.signal(signal.SIGHUP, _interrupt)
     if signal.getsignal(signal.SIGINT) is signal.default_int_handler:  # a shell may have told us to ignore it
         signal.signal(signal.SIGINT, _interrupt)
     try:

@@ -38,11 +38,12 @@ def new_runner(out: Path, fresh: bool, jobs: int | None) -> Runner:
 @contextmanager
 def progress_bar(what: str, total: int | None = None) -> Iterator[Callable[..., None]]:
     """A progress bar on standard error; call what it gives with a description and, if not 1, a count."""
-    from rich.console import Console
     from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn, TimeElapsedColumn
 
+    from proofroll.report.screen import Screen
+
     columns = (TextColumn("{task.description}"), BarColumn(), MofNCompleteColumn(), TimeElapsedColumn())
-    console = Console(stderr=True)  # where it is no terminal, a bar would leave empty lines before an error
+    console = Screen(stderr=True)  # where it is no terminal, a bar would leave empty lines before an error
     with Progress(*columns, console=console, transient=True, disable=not console.is_terminal) as progress:
         task = progress.add_task(what, total=total)
         yield lambda description, count=1: progress.update(task, advance=count, description=description)
@@ -72,18 +73,21 @@ def require_writable(path: Path) -> None:
 
 def spinner(text: str) -> Any:
     """A sign on standard error that something is under way."""
-    from rich.console import Console
+    from proofroll.report.screen import Screen
 
-    return Console(stderr=True).status(text)
+    return Screen(stderr=True).status(text)
 
 
 def write_json(content: object) -> None:
     """One JSON document on standard output."""
     from proofroll.files.json_data import plain
+    from proofroll.report.screen import escaped
 
-    sys.stdout.write(json.dumps(plain(content), indent=1, ensure_ascii=False) + "\n")
+    sys.stdout.write(escaped(json.dumps(plain(content), indent=1, ensure_ascii=False)) + "\n")
 
 
 def complain(text: str) -> None:
     """One line on standard error."""
-    sys.stderr.write(f"proofroll: {' '.join(text.split())}\n")
+    from proofroll.report.screen import printable
+
+    sys.stderr.write(f"proofroll: {printable(' '.join(text.split()))}\n")

@@ -99,8 +99,10 @@ def samples_are_well_formed(subject: Subject) -> None:
     if orientation is not None:
         identity = float(np.max(np.abs(np.abs(orientation) - [1, 0, 0, 0])))
         require(identity < 1e-12, f"q_WB at time 0 is {orientation} instead of 1, 0, 0, 0")
-    moved = subject.at(subject.span(1))
-    _well_formed(moved.sample(), "after a step")
+    moved = subject.at(subject.span(1)).sample()
+    _well_formed(moved, "after a step")
+    told = start.sample().force is not None
+    require(moved.force is not None or not told, "there is a force at time 0, and none later; only time 0 may lack one")
 
 
 def _well_formed(sample: Sample, when: str) -> None:

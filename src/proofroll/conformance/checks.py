@@ -2,13 +2,14 @@
 
 from __future__ import annotations
 
+import itertools
 from collections.abc import Callable, Iterator, Mapping
 from dataclasses import dataclass
 from fnmatch import fnmatchcase
 from typing import Any
 from unittest import SkipTest
 
-from proofroll.conformance import building, declarations, motion
+from proofroll.conformance import building, declarations, motion, response
 from proofroll.conformance.subject import Subject, scenes
 
 # One per engine.
@@ -27,6 +28,11 @@ _OF_SCENES: tuple[Callable[[Subject], None], ...] = (
     building.builds_or_refuses,
     building.certificate_holds,
     building.builds_only_what_is_required,
+)
+# One per formulation, preset and scene that has a truth.
+_OF_TRUTHS: tuple[Callable[[Subject], None], ...] = (
+    response.first_steps_fit_the_scene,
+    response.moves_as_the_truth,
 )
 # One per formulation and preset, on the first scene that is not refused.
 _OF_PRESETS: tuple[Callable[[Subject], None], ...] = (
@@ -126,8 +132,8 @@ def _runs(engine: Any) -> Iterator[tuple[str, Callable[[], None]]]:
         yield check.__name__, _bound(check, engine)
     for formulation, presets in engine.presets.items():
         for preset, settings in presets.items():
-            for name, scene in scenes().items():
-                for check_scene in _OF_SCENES:
+            for found, of_found in ((scenes(), _OF_SCENES), (response.truth_scenes(), _OF_TRUTHS)):
+                for (name, scene), check_scene in itertools.product(found.items(), of_found):
                     subject = Subject(engine, settings, scene)
                     yield f"{check_scene.__name__}[{formulation}-{preset}-{name}]", _bound(check_scene, subject)
             for check_preset in _OF_PRESETS:

@@ -2,7 +2,10 @@
 
 from __future__ import annotations
 
+import dataclasses
+from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, replace
+from enum import StrEnum
 from typing import Any
 
 import numpy as np
@@ -14,6 +17,14 @@ from proofroll.core.scene import Scene
 EXACT = 1e-12
 
 
+class Standing(StrEnum):
+    """How one quantity of an engine stands to the scene."""
+
+    HOLDS = "holds"
+    DIFFERS = "differs"
+    NOT_REPORTED = "not reported"  # the engine is silent, which is allowed and shown
+
+
 @dataclass(frozen=True)
 class Line:
     """One quantity of the certificate.
@@ -21,8 +32,8 @@ class Line:
     Attributes:
         quantity: what is compared.
         unit: its unit.
-        expected, found: from the scene, and read back from the engine.
-        difference: relative to the quantity's scale.
+        expected, found: from the scene, and read back from the engine; nothing is found where the engine is silent.
+        difference: relative to the quantity's scale; None where the engine is silent.
         tolerance: largest difference that is accepted.
         because: why the tolerance is not round-off; empty if it is.
     """
@@ -31,14 +42,25 @@ class Line:
     unit: str
     expected: tuple[float, ...]
     found: tuple[float, ...]
-    difference: float
+    difference: float | None
     tolerance: float
     because: str = ""
 
     @property
+    def standing(self) -> Standing:
+        """Whether the engine built what the scene says, as far as it tells."""
+        if self.difference is None:
+            return Standing.NOT_REPORTED
+        return Standing.HOLDS if self.difference <= self.tolerance else Standing.DIFFERS
+
+    @property
     def holds(self) -> bool:
-        """Whether the engine built what the scene says."""
-        return bool(self.difference <= self.tolerance)
+        """Whether nothing that the engine says speaks against it; it may also say nothing (:attr:`standing`)."""
+        return self.standing is not Standing.DIFFERS
+
+    def as_dict(self) -> dict[str, Any]:
+        """For a result: all fields, ``holds`` and ``standing``."""
+        return {**dataclasses.asdict(self), "holds": self.holds, "standing": self.standing.value}
 
 
 def certify(engine: Any, scene: Scene) -> list[Line]:
@@ -55,15 +77,22 @@ def certify(engine: Any, scene: Scene) -> list[Line]:
 def first_difference(lines: list[Line]) -> str | None:
     """One sentence about the first quantity that differs, or None if the certificate holds."""
     for line in lines:
-        if not line.holds and all(np.isnan(line.found)):
+        if line.standing is not Standing.DIFFERS:
+            continue
+        if all(np.isnan(line.found)):
             return f"the engine's model does not say its {line.quantity}, which the scene requires"
-        if not line.holds:
-            return (
-                f"the engine's model differs from the scene: {line.quantity} is {_shown(line.found)} instead of "
-                f"{_shown(line.expected)} {line.unit} (relative difference {line.difference:.2g}, "
-                f"allowed {line.tolerance:.2g})"
-            )
+        refused = f"; {line.quantity} {line.because}" if line.tolerance == EXACT and line.because else ""
+        return (
+            f"the engine's model differs from the scene: {line.quantity} is {_shown(line.found)} instead of "
+            f"{_shown(line.expected)} {line.unit} (relative difference {line.difference:.2g}, "
+            f"allowed {line.tolerance:.2g}){refused}"
+        )
     return None
+
+
+def not_reported(lines: Iterable[Mapping[str, Any]]) -> list[str]:
+    """Quantities about which the engine is silent, of a stored certificate (:meth:`Line.as_dict`)."""
+    return [str(line["quantity"]) for line in lines if line["standing"] == Standing.NOT_REPORTED]
 
 
 def _shown(values: tuple[float, ...]) -> str:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import dataclasses
 from collections.abc import Mapping, Sequence
+from types import MappingProxyType
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -20,17 +21,27 @@ if TYPE_CHECKING:
 _SHARED = frozenset({"time", "xyz", "wxyz"})
 
 
-def from_samples(scene: Scene, times: FloatArray, samples: Sequence[Sample]) -> xr.Dataset:
+def from_samples(
+    scene: Scene,
+    times: FloatArray,
+    samples: Sequence[Sample],
+    between: Mapping[float, Sample] = MappingProxyType({}),
+) -> xr.Dataset:
     """The trajectory of a run.
 
     Args:
         scene: the scene that was run.
         times: of the samples [s], shape (time,).
         samples: one per time; fewer if the run ended early.
+        between: samples off the grid, by time [s].
     """
     reached = np.asarray(times[: len(samples)], dtype=np.float64)
     parts = {
-        element.name: element.dataset(reached, [sample_of(scene, element, sample) for sample in samples])
+        element.name: element.dataset(
+            reached,
+            [sample_of(scene, element, sample) for sample in samples],
+            {time: sample_of(scene, element, sample) for time, sample in between.items()},
+        )
         for element in scene.elements
     }
     return joined(scene, parts)

@@ -56,6 +56,23 @@ class StepNumber:
 
 
 @dataclass(frozen=True)
+class FirstMotion:
+    """How the bodies of an element set off, to be held against an engine's own first steps.
+
+    Attributes:
+        acceleration: of the bodies at time 0 in the world [m/s²], shape (bodies, 3).
+        angular_acceleration: likewise [rad/s²].
+        scale: what accelerations are measured by, never zero [m/s²].
+        moment: a time in which little happens: when an engine without a step is looked at first [s].
+    """
+
+    acceleration: FloatArray
+    angular_acceleration: FloatArray
+    scale: float
+    moment: float
+
+
+@dataclass(frozen=True)
 class OptionalTerm:
     """A part of the model that the scene can have or not, for the ladder of models.
 
@@ -111,8 +128,22 @@ class Element(Protocol):
     def step_numbers(self, h: float, truth: xr.Dataset | None) -> Sequence[StepNumber]:
         """Dimensionless numbers of a step ``h`` [s]; always the same names."""
 
-    def dataset(self, times: FloatArray, samples: Sequence[Sample]) -> xr.Dataset:
-        """All variables of a run at ``times`` [s], with ``units`` and ``long_name``."""
+    @property
+    def first_motion(self) -> FirstMotion | None:
+        """How it sets off; None where that has no direction yet."""
+
+    @property
+    def softened(self) -> frozenset[str]:
+        """Quantities of the certificate by whose softness an engine's first steps may differ."""
+
+    def dataset(self, times: FloatArray, samples: Sequence[Sample], between: Mapping[float, Sample]) -> xr.Dataset:
+        """All variables of a run, with ``units`` and ``long_name``.
+
+        Args:
+            times: of the samples [s], shape (time,).
+            samples: one per time.
+            between: samples at other times [s], for audits that the grid must not hide.
+        """
 
     def lacks(self, samples: Sequence[Sample], asks: Sequence[str]) -> str | None:
         """One sentence about what samples do not say though the scene requires it, or None."""
@@ -144,6 +175,19 @@ class HasOptionalCapabilities(Protocol):
     @property
     def optional(self) -> frozenset[str]:
         """Capabilities that are in an engine's model only where :attr:`Element.requires` or a question names them."""
+
+
+@runtime_checkable
+class KnowsAnotherScene(Protocol):
+    """What an element has besides, if a model of it can be of another kind though each of its numbers is allowed."""
+
+    def another_scene(self, lines: Sequence[Mapping[str, Any]], truth: xr.Dataset) -> str | None:
+        """Why the model is of another kind, as one clause; None: it is of the same.
+
+        Args:
+            lines: of a stored certificate (:meth:`proofroll.core.certificate.Line.as_dict`).
+            truth: the true run.
+        """
 
 
 @runtime_checkable
@@ -236,10 +280,12 @@ class ElementKind(Protocol):
     Attributes:
         name: of the entry point.
         tables: names of the tables of a scene file that it reads.
+        units: unit of each number in them, by its key.
     """
 
     name: ClassVar[str]
     tables: ClassVar[tuple[str, ...]]
+    units: ClassVar[Mapping[str, str]]
 
     @staticmethod
     def read(tables: Mapping[str, Any], gravity: Gravity, where: str) -> Sequence[Element]:
@@ -257,3 +303,7 @@ class ElementKind(Protocol):
     @staticmethod
     def conformance_scenes() -> Mapping[str, Scene]:
         """Scenes on which every engine is checked, by name; the most demanding first."""
+
+    @staticmethod
+    def truth_scenes() -> Mapping[str, Scene]:
+        """Scenes on which a short run is held against the truth: such as show a frame taken for another."""

@@ -26,7 +26,8 @@ class Sample:
         v_WB: velocity of the centre [m/s], shape (3,).
         w_WB: angular velocity [rad/s], shape (3,).
         q_WB: orientation as a unit quaternion, scalar first, shape (4,); identity at time 0.
-        force: of the wall on the ball at the contact point, -N e1 + F2 e2 + F3 e3 [N], shape (3,).
+        force: of the wall on the ball at the contact point, -N e1 + F2 e2 + F3 e3 [N], shape (3,). None at time 0
+            alone: the engine defines reactions only after a first step.
         sticking: whether the contact holds by static friction; only where friction is bounded.
     """
 
@@ -68,9 +69,10 @@ class Built:
         angular_acceleration: of the ball at time 0 in the world [rad/s²], shape (3,).
         terms: the optional parts that are in the built model: rolling resistance, bounded friction, orientation.
         regularised: names of certificate quantities (``gap``, ``slip``, ``spin``, ``acceleration``, ``N``, ``F2``, …)
-            that the model softens, with tolerance and reason. Tolerances of acceleration, N, F2 and F3 are relative
-            to :func:`mechanics.natural_acceleration`; one of ``1 / static friction``, where the scene has no
-            bound and the engine needs a number, to 1/mu.
+            that the model softens, with tolerance and reason, as far as :data:`certificate.CAPS` lets it:
+            mass, inertia, gravity, radius and position along the wall are never soft. Tolerances of acceleration, N,
+            F2 and F3 are relative to :func:`mechanics.natural_acceleration`; one of ``1 / static friction``,
+            where the scene has no bound and the engine needs a number, to 1/mu.
     """
 
     mass: float | None = None
@@ -259,6 +261,12 @@ class SharesEquations(Protocol):
     """
 
     shares: ClassVar[Mapping[str, Sequence[str]]]
+
+
+def fixed_step(settings: Settings) -> float | None:
+    """The step of settings with a fixed one [s], or None."""
+    step: float | None = getattr(settings, settings.resolution) if settings.resolution == "dt" else None
+    return step
 
 
 def whole_steps(start: float, end: float, dt: float) -> int:

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterable
+
 
 class ProofrollError(Exception):
     """Base of everything proofroll raises on purpose; its text is one line for a person."""
@@ -22,6 +24,10 @@ class InputError(ProofrollError):
         self.advice = advice
         super().__init__(f"{field} = {_shown(value)}: {advice}")
 
+    def within(self, field: str, value: object) -> InputError:
+        """The same problem as that of a larger thing, of which this is a part."""
+        return InputError(field, value, str(self))
+
 
 class Refused(ProofrollError):  # noqa: N818 -- a refusal is an honest answer, not an error
     """The engine cannot represent this scene honestly; the text says why."""
@@ -33,6 +39,20 @@ class Missing(ProofrollError):  # noqa: N818 -- likewise: the engine is not inst
 
 class Diverged(ProofrollError):  # noqa: N818 -- a finding about the engine
     """The engine gave up or produced a state that is not finite; the text says when."""
+
+
+def lack_behind(error: BaseException) -> BaseException | None:
+    """What the machine, not the engine, lacked where that is behind an error: memory, a file, or time (Ctrl-C)."""
+    found: BaseException | None = error
+    while found is not None and not isinstance(found, (MemoryError, OSError, KeyboardInterrupt)):
+        found = found.__cause__ or found.__context__
+    return found
+
+
+def choices(names: Iterable[str], most: int = 20) -> str:
+    """Names to choose from, of many the first."""
+    shown = list(names)
+    return ", ".join(shown[:most] + ["…"] * (len(shown) > most))
 
 
 def _shown(value: object) -> str:

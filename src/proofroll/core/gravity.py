@@ -2,19 +2,32 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+import math
+from dataclasses import dataclass, field
 
 import numpy as np
 
 from proofroll.core.arrays import FloatArray
+from proofroll.core.bounds import bounded
 
 
 @dataclass(frozen=True)
 class Gravity:
     """Uniform gravity: magnitude [m/s²] and direction (any length)."""
 
-    magnitude: float
-    direction: tuple[float, float, float] = (0.0, 0.0, -1.0)
+    magnitude: float = field(metadata={"unit": "m/s^2"})
+    direction: tuple[float, float, float] = field(default=(0.0, 0.0, -1.0), metadata={"unit": "1"})
+
+    def __post_init__(self) -> None:
+        """Refuses what is no gravity.
+
+        Raises:
+            OutOfBounds: a negative magnitude, or a direction without length.
+        """
+        bounded("magnitude", self.magnitude, at_least=0)
+        for value in self.direction:
+            bounded("direction", value)
+        bounded("length of direction", math.hypot(*self.direction), above=0)
 
     @property
     def vector(self) -> FloatArray:

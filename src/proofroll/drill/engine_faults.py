@@ -3,20 +3,19 @@
 from __future__ import annotations
 
 import dataclasses
+import io
 import json
+import os
 import shutil
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from pathlib import Path
 
 from proofroll.drill.row import Drilled, drilled
-from proofroll.drill.site import BEFORE, BESIDE, HANG, Site, contents, scraps
-from proofroll.running.case import LASTING, Case, Status
-from proofroll.running.runner import Runner
+from proofroll.drill.site import BEFORE, BESIDE, HANG, MEMORY, Site, contents, scraps
+from proofroll.report.screen import Screen
+from proofroll.running.case import LASTING, Status
 from proofroll.running.store import Store
-
-# Enough for any engine of the drill, start-up included, and little enough that no machine suffers [GB].
-_MEMORY = 0.8
 
 
 @dataclass(frozen=True)
@@ -44,7 +43,7 @@ ENGINE_FAULTS = (
     EngineFault("returns NaN", "nan", Status.DIVERGED, "v_WB is not finite (NaN or overflow) at 0.05 s"),
     EngineFault("returns wrong shapes", "wrong_shape", Status.DIVERGED, "p_WB with shape (1, 3) instead of (3,)"),
     EngineFault("hangs", "hangs", Status.TIMEOUT, f"no result within {HANG:g} s"),
-    EngineFault("allocates without end", "allocates", Status.CRASHED, f"needed more than {_MEMORY:g} GB of memory"),
+    EngineFault("allocates without end", "allocates", Status.CRASHED, f"needed more than {MEMORY:g} GB of memory"),
     EngineFault("segfaults", "segfaults", Status.CRASHED, "was killed by SIGSEGV"),
     EngineFault("aborts", "aborts", Status.CRASHED, "was killed by SIGABRT"),
     EngineFault("exits by sys.exit", "says_exit", Status.CRASHED, "ended with exit code 1: no licence"),
@@ -54,6 +53,10 @@ ENGINE_FAULTS = (
     EngineFault("floods its output", "floods", Status.DONE, "reached 0.1 s"),
     EngineFault("writes into every file", "writes_everywhere", Status.CRASHED, "wrote into the answers"),
     EngineFault("reads standard input", "asks", Status.CRASHED, "EOFError"),
+    EngineFault("is sent Ctrl-C", "interrupted", Status.CRASHED, "was killed by SIGINT"),
+    EngineFault("calls a lack of memory divergence", "no_memory", Status.CRASHED, "it diverged (MemoryError)"),
+    EngineFault("calls a file that is lacking a refusal", "no_file", Status.CRASHED, "it refuses (FileNotFoundError)"),
+    EngineFault("commands the terminal", "commands", Status.DIVERGED, "all is well"),
     EngineFault("leaves a process behind", "leaves_a_child", Status.CRASHED, "ended with exit code 9"),
 )
 
@@ -72,13 +75,13 @@ def drill_engine(site: Site, sound: Path, fault: EngineFault) -> Drilled:
     faulty = site.case(fault.formulation, BEFORE[0])
     if fault.status is Status.TIMEOUT:
         faulty = dataclasses.replace(faulty, time_limit=HANG)
-    beside, there = [site.case("well", speed) for speed in BESIDE], _sound_cases(site)
-    results = Runner(Store(folder), jobs=1, memory=_MEMORY).run([beside[0], faulty, *beside[1:], *there])
+    beside, there = [site.case("well", speed) for speed in BESIDE], site.sound_cases()
+    results = site.runner(folder).run([beside[0], faulty, *beside[1:], *there])
     found = results[faulty.key]
     after, left, alive = contents(folder), scraps(folder), site.alive(fault.formulation)
     site.cure(fault.formulation)
     cases = [*there, *beside, site.case(fault.formulation, BEFORE[0])]
-    rerun = Runner(Store(folder), jobs=1, memory=_MEMORY).run(cases)
+    rerun = site.runner(folder).run(cases)
     lasting = fault.status in LASTING
     return drilled(
         fault.name,
@@ -93,20 +96,24 @@ def drill_engine(site: Site, sound: Path, fault: EngineFault) -> Drilled:
             f"the case ended as {found.status.value}": found.status is not fault.status,
             f"{', '.join(left)} was left in the folder": bool(left),
             "a process of the engine lives on": alive,
+            "the terminal would obey what was said": _commands(found.message),
             "the next run did not mend it": not lasting and rerun[faulty.key].status is not Status.DONE,
         },
     )
 
 
+def _commands(said: str) -> bool:
+    """Whether a terminal on which this is shown gets more than text."""
+    shown = io.StringIO()
+    Screen(file=shown, color_system=None).print(said, markup=False)
+    return not shown.getvalue().replace("\n", "").isprintable()
+
+
 def prepare(site: Site) -> Path:
     """A folder with results that are there before anything goes wrong."""
     folder = site.folder / "sound"
-    Runner(Store(folder), jobs=1).run(_sound_cases(site))
+    site.runner(folder).run(site.sound_cases())
     return folder
-
-
-def _sound_cases(site: Site) -> list[Case]:
-    return [site.case("well", speed) for speed in BEFORE]
 
 
 def _cut(path: Path) -> None:
@@ -126,11 +133,44 @@ def _change_trajectory(path: Path) -> None:
     path.write_bytes(content)
 
 
+def _take_another(path: Path) -> None:
+    other = next(record for record in path.parent.glob("*.json") if record.stem != path.stem)
+    for suffix in (".json", ".nc"):
+        shutil.copy(other.with_suffix(suffix), path.with_suffix(suffix))
+
+
+def _nest(path: Path) -> None:
+    path.write_text("[" * 100_000, encoding="utf-8")
+
+
+def _put_pipe(path: Path) -> None:
+    path.unlink()
+    os.mkfifo(path)
+
+
+def _put_device(path: Path) -> None:
+    path.unlink()
+    path.symlink_to("/dev/zero")
+
+
+def _put_folder(path: Path) -> None:
+    path.unlink()
+    (path / "something").mkdir(parents=True)
+
+
 DAMAGES: Mapping[str, tuple[str, Callable[[Path], None]]] = {
     "truncated record": (".json", _cut),
     "tampered record": (".json", _change_record),
     "truncated trajectory": (".nc", _cut),
     "tampered trajectory": (".nc", _change_trajectory),
+    "another's result": (".json", _take_another),
+    "deeply nested record": (".json", _nest),
+    "pipe for a record": (".json", _put_pipe),
+    "pipe for a trajectory": (".nc", _put_pipe),
+    "device for a record": (".json", _put_device),
+    "device for a trajectory": (".nc", _put_device),
+    "folder for a record": (".json", _put_folder),
+    "folder for a trajectory": (".nc", _put_folder),
 }
 
 
@@ -138,13 +178,13 @@ def drill_damage(site: Site, sound: Path, name: str) -> Drilled:
     """Damages one stored result of two, and runs both again."""
     folder = site.folder / name.replace(" ", "_")
     shutil.copytree(sound, folder)
-    cases = _sound_cases(site)
+    cases = site.sound_cases()
     damaged = cases[0]
     suffix, damage = DAMAGES[name]
     damage(folder / f"{damaged.key}{suffix}")
     sound_ones = contents(folder)
     spoilt = sound_ones.pop(damaged.key)
-    runner = Runner(Store(folder), jobs=1)
+    runner = site.runner(folder)
     results = runner.run(cases)
     found = results[damaged.key]
     return drilled(
@@ -154,7 +194,7 @@ def drill_damage(site: Site, sound: Path, name: str) -> Drilled:
         others=[results[case.key].status is Status.DONE for case in cases[1:]],
         before=sound_ones,
         after=sound_ones,
-        again={key: content for key, content in contents(folder).items() if content != spoilt},
+        again={key: content for key, content in contents(folder).items() if (key, content) != (damaged.key, spoilt)},
         missing=1,
         problems={
             f"the case ended as {found.status.value}": found.status is not Status.DONE,

@@ -22,6 +22,7 @@ from typing import Any, ClassVar, Self
 import numpy as np
 
 from proofroll.core.engine import Built, Sample
+from proofroll.core.errors import Diverged, Refused
 from proofroll.core.scene import Scene
 from proofroll.engines.projection import Projection
 
@@ -36,6 +37,11 @@ def _raises() -> None:
 def _hangs() -> None:
     signal.signal(signal.SIGTERM, signal.SIG_IGN)
     time.sleep(_FOREVER)
+
+
+def _hangs_in_c() -> None:
+    """No thread of Python runs meanwhile, as in many a solver."""
+    ctypes.PyDLL(None).sleep(int(_FOREVER))
 
 
 def _allocates() -> None:
@@ -85,9 +91,35 @@ def _asks() -> None:
 
 
 def _half() -> None:
-    """The process is ended by the system as soon as it has written the first 4 kB of its result."""
+    """The process is ended by the system as soon as it has written the first kB of its result."""
     signal.signal(signal.SIGXFSZ, signal.SIG_DFL)
-    resource.setrlimit(resource.RLIMIT_FSIZE, (4096, resource.getrlimit(resource.RLIMIT_FSIZE)[1]))
+    resource.setrlimit(resource.RLIMIT_FSIZE, (1024, resource.getrlimit(resource.RLIMIT_FSIZE)[1]))
+
+
+def _interrupted() -> None:
+    try:
+        os.kill(os.getpid(), signal.SIGINT)
+        time.sleep(_FOREVER)
+    except KeyboardInterrupt:
+        raise Diverged("it diverged") from None
+
+
+def _no_memory() -> None:
+    try:
+        np.ones(1 << 50)
+    except MemoryError:
+        raise Diverged("it diverged") from None
+
+
+def _no_file() -> None:
+    try:
+        Path("/no/such/licence").read_bytes()
+    except OSError as error:
+        raise Refused("it refuses") from error
+
+
+def _commands() -> None:
+    raise Diverged("\x1b]0;all is well\x07\x1b[2J\x9b31m\u202e")
 
 
 def _leaves_a_child() -> None:
@@ -118,6 +150,13 @@ DEEDS: Mapping[str, tuple[str, Callable[[], None]]] = {
     "writes_everywhere": ("advance", _writes_everywhere),
     "asks": ("advance", _asks),
     "leaves_a_child": ("advance", _leaves_a_child),
+    "interrupted": ("advance", _interrupted),
+    "no_memory": ("advance", _no_memory),
+    "no_file": ("build", _no_file),
+    "commands": ("advance", _commands),
+    "waits_for_its_parent": ("advance", _hangs),
+    "computes_without_its_parent": ("advance", _hangs_in_c),
+    "waits_for_its_terminal": ("advance", _hangs),
 }
 
 

@@ -6,12 +6,22 @@ from collections.abc import Callable
 from concurrent.futures import ThreadPoolExecutor
 from functools import partial
 
-from proofroll.drill import command_faults, engine_faults
+from proofroll.drill import command_faults, engine_faults, process_faults
 from proofroll.drill.row import Drilled
 from proofroll.drill.site import site
 
 # Faults wait rather than compute, so that two at once are no burden.
 _AT_ONCE = 2
+_OTHERS = (
+    command_faults.drill_interrupt,
+    command_faults.drill_full_disk,
+    command_faults.drill_two_runs,
+    process_faults.drill_killed,
+    process_faults.drill_killed_in_c,
+    process_faults.drill_hung_up,
+    process_faults.drill_pool,
+    process_faults.drill_storing,
+)
 
 
 def fault_drill(progress: Callable[[str], None] | None = None) -> list[Drilled]:
@@ -21,14 +31,10 @@ def fault_drill(progress: Callable[[str], None] | None = None) -> list[Drilled]:
         progress: called with the name of each fault when it is over.
     """
     with site() as here, ThreadPoolExecutor(_AT_ONCE) as pool:
-        first = pool.submit(command_faults.prepare, here)
         sound = engine_faults.prepare(here)
-        compared = first.result()
         # The longest first.
         drills: list[Callable[[], Drilled]] = [
-            partial(command_faults.drill_interrupt, here, compared),
-            partial(command_faults.drill_full_disk, here, compared),
-            partial(command_faults.drill_two_runs, here, compared),
+            *(partial(drill, here, sound) for drill in _OTHERS),
             *(partial(engine_faults.drill_engine, here, sound, fault) for fault in engine_faults.ENGINE_FAULTS),
             *(partial(engine_faults.drill_damage, here, sound, name) for name in engine_faults.DAMAGES),
         ]
@@ -40,4 +46,4 @@ def fault_drill(progress: Callable[[str], None] | None = None) -> list[Drilled]:
             return row
 
         rows = list(pool.map(run, drills))
-    return rows[3:] + rows[:3]
+    return rows[len(_OTHERS) :] + rows[: len(_OTHERS)]

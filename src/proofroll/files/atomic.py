@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 import contextlib
+import os
+import stat
 import uuid
 from collections.abc import Iterator
 from pathlib import Path
@@ -27,3 +29,15 @@ def replacing(path: Path) -> Iterator[Path]:
     finally:
         with contextlib.suppress(OSError):
             temporary.unlink(missing_ok=True)
+
+
+def content(path: Path) -> bytes:
+    """What is in an ordinary file. A pipe, which would be waited for, or a device, which may have no end, is none.
+
+    Raises:
+        OSError: it cannot be read, or is no ordinary file.
+    """
+    with open(os.open(path, os.O_RDONLY | os.O_NONBLOCK), "rb") as file:
+        if not stat.S_ISREG(os.fstat(file.fileno()).st_mode):
+            raise OSError(f"{path} is no ordinary file")
+        return file.read()

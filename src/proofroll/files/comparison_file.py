@@ -12,6 +12,7 @@ from pydantic import ConfigDict, TypeAdapter, ValidationError
 
 from proofroll.core.comparison import Band, Comparison, ExceptAt, Row, Tolerance
 from proofroll.core.errors import InputError
+from proofroll.core.plugins import parse_engine, require_engine
 from proofroll.core.time_grid import time_grid
 from proofroll.core.verdict import Verdict
 from proofroll.files.data_folders import study_folders
@@ -20,6 +21,8 @@ from proofroll.files.toml import named_file, read_toml, study_of
 from proofroll.files.validation import first_problem
 
 _LADDER_RUNGS = 3
+# A run for each combination of parameters takes a second: more than these are a mistake.
+_MOST_POINTS = 10_000
 
 
 def comparison_names() -> list[str]:
@@ -72,6 +75,8 @@ def _comparison(path: Path, content: dict[str, Any]) -> Comparison:
         )
     except ValidationError as error:
         raise first_problem(error, where) from None
+    if math.prod(map(len, comparison.vary.values())) + len(comparison.points) > _MOST_POINTS:
+        raise InputError(f"{where}: vary", list(comparison.vary), f"that is more than {_MOST_POINTS} points; vary less")
     for name, band in comparison.bands.items():
         _check_bounds(f"{where}: tolerances.{name}", comparison, band.bounds)
     for index, row in enumerate(comparison.rows):
@@ -117,6 +122,7 @@ def _prepared(where: str, content: object) -> dict[str, Any]:
 
 def _check(where: str, row: Row, comparison: Comparison) -> None:
     """What types cannot say."""
+    _check_engine(where, row)
     if row.tolerance not in comparison.bands:
         raise InputError(f"{where}.tolerance", row.tolerance, f"choose one of {', '.join(comparison.bands)}")
     if row.ladder != [1.0]:
@@ -132,6 +138,15 @@ def _check(where: str, row: Row, comparison: Comparison) -> None:
             raise InputError(f"{where}.except_at", exception.where, "name values that some point of the comparison has")
     if not comparison.combinations(row.only):
         raise InputError(f"{where}.only", row.only, "no point of the comparison fits, so the row would never be run")
+
+
+def _check_engine(where: str, row: Row) -> None:
+    try:
+        name = parse_engine(row.engine).name
+        if name != "truth":
+            require_engine(name)
+    except InputError as error:
+        raise error.within(f"{where}.engine", row.engine) from None
 
 
 def _check_expectations(where: str, row: Row) -> None:

@@ -3,84 +3,60 @@
 from __future__ import annotations
 
 import io
+from collections.abc import Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from proofroll.files.atomic import replacing
+import numpy as np
+import numpy.typing as npt
+
+from proofroll.files.atomic import content, replacing
 
 if TYPE_CHECKING:
     import xarray as xr
 
 
 def write(dataset: xr.Dataset, path: Path) -> None:
-    """Writes netCDF so that the file is either whole or not there.
+    """Writes netCDF-3 so that the file is either whole or not there.
+
+    The format has no truth values, no text of variable length and no integers beyond 32 bits; xarray keeps the first
+    as 0 and 1, the second as characters, and refuses a number that does not fit. Numbers of 64 bits stay as they are.
 
     Raises:
         ProofrollError: the place cannot be written.
     """
-    import h5py
-
-    # Made in memory first: HDF5 does not survive a disk that fills while it writes, and the error would name no reason.
-    content = io.BytesIO()
-    with h5py.File(content, "w") as file:
-        _fill(file, dataset)
+    plain: dict[Any, dict[str, Any]] = {name: {"_FillValue": None} for name in dataset.variables}
+    # Made in memory first: a disk that fills meanwhile gives one reason, and no half of a file.
+    made = dataset.to_netcdf(None, engine="scipy", encoding=plain)
     with replacing(path) as temporary:
-        temporary.write_bytes(content.getbuffer())
-
-
-def _fill(file: Any, dataset: xr.Dataset) -> None:
-    """Variables, dimensions and attributes as netCDF-4 lays them out in HDF5 (NetCDF User's Guide, appendix C).
-
-    The libraries above HDF5 look through all dimensions for each variable, which takes three times as long as this.
-    """
-    import h5py
-
-    text = h5py.string_dtype()
-    for name, length in dataset.sizes.items():
-        if name not in dataset.coords:  # a dimension without values of its own
-            file.create_dataset(name, shape=(length,), dtype=">f4")
-            file[name].make_scale(f"This is a netCDF dimension but not a netCDF variable.{length:10d}")
-    for name in sorted(dataset.variables, key=lambda name: name not in dataset.dims):  # scales before their users
-        variable = dataset.variables[name]
-        values = variable.to_numpy()
-        kind = text if values.dtype.kind == "U" else None
-        made = file.create_dataset(name, data=values.astype(object) if kind else values, dtype=kind)
-        for key, value in variable.attrs.items():
-            made.attrs[key] = value
-        if name in dataset.dims:
-            made.make_scale(name)
-        else:
-            for axis, dimension in enumerate(variable.dims):
-                made.dims[axis].attach_scale(file[dimension])
-    for key, value in dataset.attrs.items():
-        file.attrs[key] = value
-
-
-# What HDF5 keeps about dimensions in attributes.
-_OF_HDF5 = frozenset({"CLASS", "NAME", "REFERENCE_LIST", "DIMENSION_LIST"})
+        temporary.write_bytes(made)
 
 
 def read(path: Path) -> xr.Dataset:
     """A trajectory from the netCDF file that :func:`write` made, wholly in memory.
 
-    By HDF5 itself: the libraries above it take forty times as long for a file of this size, more than many a run.
+    Raises:
+        OSError, ValueError: it cannot be read, or is no netCDF-3.
     """
-    import h5py
     import xarray as xr
 
-    def attributes(item: Any) -> dict[str, Any]:
-        return {key: value for key, value in item.attrs.items() if key not in _OF_HDF5}
+    # Times stay numbers of seconds, and no number stands for an absent one.
+    try:
+        found = xr.load_dataset(io.BytesIO(content(path)), engine="scipy", decode_times=False, mask_and_scale=False)
+    except TypeError:
+        raise ValueError(f"{path} is no netCDF-3") from None
+    return found.assign({name: item.astype(str) for name, item in found.variables.items() if item.dtype == object})
 
-    with h5py.File(path) as file:
-        columns: dict[str, tuple[tuple[str, ...], Any, dict[str, Any]]] = {}
-        for name, item in file.items():
-            own = item.is_scale
-            if own and item.attrs["NAME"].startswith(b"This is a netCDF dimension but not a netCDF variable."):
-                continue
-            dims = (name,) if own else tuple(file[dim[0].name].name.rpartition("/")[2] for dim in item.dims)
-            text = h5py.check_string_dtype(item.dtype)
-            values = item.asstr()[...].astype(str) if text else item[...]
-            columns[name] = (dims, values, attributes(item))
-        coordinates = {name: column for name, column in columns.items() if column[0] == (name,)}
-        others = {name: column for name, column in columns.items() if name not in coordinates}
-        return xr.Dataset(others, coordinates, attributes(file))
+
+def read_some(path: Path, names: Sequence[str]) -> dict[str, npt.NDArray[Any]]:
+    """Some variables of a trajectory, those that there are: a tenth of the time that :func:`read` takes."""
+    from scipy.io import netcdf_file
+
+    with netcdf_file(io.BytesIO(content(path)), mmap=False) as file:
+        found = {name: file.variables[name][...] for name in names if name in file.variables}
+    return {
+        name: values.astype(values.dtype.newbyteorder("="))
+        if values.dtype.kind != "S"
+        else np.array([b"".join(letters).decode() for letters in values], dtype=str)
+        for name, values in found.items()
+    }

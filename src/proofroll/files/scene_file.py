@@ -7,17 +7,18 @@ import math
 import operator
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field
+from functools import cache
 from pathlib import Path
 from typing import Any
 
 from proofroll.core.element import Element
-from proofroll.core.errors import InputError
+from proofroll.core.errors import InputError, choices
 from proofroll.core.gravity import Gravity
 from proofroll.core.plugins import load_element_kinds
 from proofroll.core.scene import Scene
 from proofroll.files.data_folders import data_folder
 from proofroll.files.toml import read_toml
-from proofroll.files.validation import strict, validated
+from proofroll.files.validation import strict, units_of, validated
 
 
 @dataclass(frozen=True)
@@ -59,6 +60,15 @@ class SceneFile:
 
 strict(Parameter, SceneFile, Gravity)
 _OWN = frozenset(item.name for item in dataclasses.fields(SceneFile)) - {"tables"}
+
+
+@cache
+def _units() -> dict[str, str]:
+    """Unit of each number of the mechanics by its key; nothing is converted."""
+    found = dict(units_of(Gravity))
+    for kind in load_element_kinds():
+        found |= kind.units
+    return found
 
 
 def scene_names() -> list[str]:
@@ -109,8 +119,8 @@ def load_scene(name: str, /, *, asks: Any = (), **parameters: float) -> Scene:
     file = _parse(folder / "scene.toml")
     values = _values(file, parameters)
     where = str(folder / "scene.toml")
-    gravity = validated(Gravity, _substituted(file.gravity, values, f"{where}: gravity"), f"{where}: gravity")
-    tables = {key: _substituted(table, values, f"{where}: {key}") for key, table in file.tables.items()}
+    gravity = validated(Gravity, _substituted(file.gravity, file, values, f"{where}: gravity"), f"{where}: gravity")
+    tables = {key: _substituted(table, file, values, f"{where}: {key}") for key, table in file.tables.items()}
     return Scene(
         name=folder.name,
         title=file.title,
@@ -156,28 +166,51 @@ def _parse(path: Path) -> SceneFile:
     own = {key: value for key, value in content.items() if key in _OWN}
     tables = {key: value for key, value in content.items() if key not in _OWN}
     file = validated(SceneFile, own | {"tables": tables}, str(path))
+    known_units = dict.fromkeys([*_units().values(), "s", "N"])
     for name, parameter in file.parameters.items():
+        where = f"{path}: parameters.{name}"
+        if parameter.unit not in known_units:
+            advice = f"this unit is not known, and nothing is converted; write the value in {choices(known_units)}"
+            raise InputError(f"{where}.unit", parameter.unit, advice)
         for key in ("value", "above", "at_least", "below", "at_most"):
             other = getattr(parameter, key)
-            if isinstance(other, str) and (other == name or other not in file.parameters):
-                known = ", ".join(sorted(file.parameters.keys() - {name}))
+            if not isinstance(other, str):
+                continue
+            if other == name or other not in file.parameters:
+                known = choices(item for item in file.parameters if item != name)
                 advice = f"there is no such parameter to refer to; choose from {known}"
-                raise InputError(f"{path}: parameters.{name}.{key}", other, advice)
+                raise InputError(f"{where}.{key}", other, advice)
+            if file.parameters[other].unit != parameter.unit:
+                advice = f"its unit is {file.parameters[other].unit}, that of {name} is {parameter.unit}"
+                raise InputError(f"{where}.{key}", other, advice)
+        _check_end(file, name, f"{where}.value")
     return file
+
+
+def _check_end(file: SceneFile, name: str, where: str) -> None:
+    """The defaults that follow one another end at a number.
+
+    Raises:
+        InputError: they go round in a circle.
+    """
+    passed = [name]
+    while isinstance(following := file.parameters[passed[-1]].value, str) and following in file.parameters:
+        if following in passed:
+            raise InputError(where, " -> ".join([*passed, following]), "this goes round in a circle; give a number")
+        passed.append(following)
 
 
 def _values(file: SceneFile, given: Mapping[str, object]) -> dict[str, float]:
     """Every parameter's number: given, or default, or that of the parameter it follows."""
-    known = ", ".join(file.parameters)
     for name, value in given.items():
         if name not in file.parameters:
-            raise InputError(name, value, f"there is no such parameter; choose from {known}")
+            raise InputError(name, value, f"there is no such parameter; choose from {choices(file.parameters)}")
     values: dict[str, float] = {}
     for name, parameter in file.parameters.items():
-        chosen = given.get(name, parameter.value)
-        if name not in given and isinstance(chosen, str):
-            chosen = values[chosen] if chosen in values else given.get(chosen, file.parameters[chosen].value)
-        values[name] = _number(name, chosen, parameter)
+        source = name
+        while source not in given and isinstance(following := file.parameters[source].value, str):
+            source = following
+        values[name] = _number(name, given.get(source, file.parameters[source].value), parameter)
     # Numbers first, then other parameters: a parameter is never blamed for the bad value of another.
     for kind in (float, str):
         for name, parameter in file.parameters.items():
@@ -220,13 +253,22 @@ def _check_bounds(name: str, parameter: Parameter, values: Mapping[str, float], 
             raise InputError(name, value, f"{parameter.meaning} must be {words} {shown}{unit}")
 
 
-def _substituted(content: Any, values: Mapping[str, float], where: str) -> Any:
+def _substituted(content: Any, file: SceneFile, values: Mapping[str, float], where: str, unit: str = "") -> Any:
+    """The content with each ``$name`` replaced by its number, which must have the unit of its place."""
     if isinstance(content, dict):
-        return {key: _substituted(value, values, f"{where}.{key}") for key, value in content.items()}
+        return {
+            key: _substituted(value, file, values, f"{where}.{key}", _units().get(key, ""))
+            for key, value in content.items()
+        }
     if isinstance(content, list):
-        return [_substituted(value, values, f"{where}.{index}") for index, value in enumerate(content)]
+        return [_substituted(value, file, values, f"{where}.{index}", unit) for index, value in enumerate(content)]
+    if isinstance(content, bool):
+        raise InputError(where, content, "this is not a number; give one" + (f" in {unit}" if unit else ""))
     if isinstance(content, str) and content.startswith("$"):
         if content[1:] not in values:
-            raise InputError(where, content, f"there is no such parameter; choose from {', '.join(values)}")
+            raise InputError(where, content, f"there is no such parameter; choose from {choices(values)}")
+        given = file.parameters[content[1:]].unit
+        if unit and given != unit:
+            raise InputError(where, content, f"this number is in {unit}, that parameter in {given}")
         return values[content[1:]]
     return content

@@ -2,10 +2,12 @@
 
 from __future__ import annotations
 
+from dataclasses import fields
 from typing import TypeVar
 
 from pydantic import ConfigDict, TypeAdapter, ValidationError
 
+from proofroll.core.bounds import OutOfBounds
 from proofroll.core.errors import InputError
 
 _T = TypeVar("_T")
@@ -37,6 +39,9 @@ def first_problem(error: ValidationError, where: str) -> InputError:
         return InputError(f"{where}: {location}", problem["input"], "there is no such key here; remove it")
     if problem["type"] in {"missing", "missing_argument"}:
         return InputError(f"{where}: {location}", "nothing", "this key is required; add it")
+    error_found = problem.get("ctx", {}).get("error")
+    if isinstance(error_found, OutOfBounds):
+        return InputError(f"{where}: {location}.{error_found.field}", error_found.value, error_found.advice)
     if problem["type"] in {"union_tag_invalid", "union_tag_not_found"}:
         key = problem["ctx"]["discriminator"].strip("'")
         if problem["type"] == "union_tag_not_found":
@@ -45,3 +50,8 @@ def first_problem(error: ValidationError, where: str) -> InputError:
             f"{where}: {location}.{key}", problem["ctx"]["tag"], f"choose one of {problem['ctx']['expected_tags']}"
         )
     return InputError(f"{where}: {location}", problem["input"], problem["msg"][0].lower() + problem["msg"][1:])
+
+
+def units_of(*types: type) -> dict[str, str]:
+    """Unit of each number of dataclasses whose fields carry one."""
+    return {item.name: item.metadata["unit"] for kind in types for item in fields(kind) if "unit" in item.metadata}

@@ -11,15 +11,13 @@ import numpy.typing
 from proofroll.core.arrays import FloatArray
 from proofroll.core.dataset import scales
 from proofroll.core.observable import Observable, Role
-from proofroll.files.netcdf import read
+from proofroll.files.netcdf import read, read_some
 from proofroll.files.scene_file import load_scene
 from proofroll.report.labels import symbol, unit
 from proofroll.studies.compare import Outcome, Run
 from proofroll.studies.planning import point_name
 
 if TYPE_CHECKING:
-    from pathlib import Path
-
     import xarray as xr
 
     from proofroll.running.store import Store
@@ -88,14 +86,6 @@ def kept(curves: list[FloatArray], most: int = MOST_POINTS) -> np.typing.NDArray
     return np.unique(np.concatenate([M4Downsampler().downsample(np.ascontiguousarray(c), n_out=most) for c in curves]))
 
 
-def stored(path: Path, names: list[str]) -> dict[str, np.typing.NDArray[Any]]:
-    """Some variables of a trajectory: a tenth of the time that reading it whole takes."""
-    import h5netcdf
-
-    with h5netcdf.File(path) as file:
-        return {name: np.asarray(file[name][...]) for name in names if name in file.variables}
-
-
 def _engines(outcome: Outcome, store: Store, point: str, drawn: list[str]) -> list[tuple[int, Run, Curves]]:
     """Row number, run and curves of every run at a point that has a trajectory."""
     numbers: dict[int, int] = {}
@@ -104,7 +94,7 @@ def _engines(outcome: Outcome, store: Store, point: str, drawn: list[str]) -> li
         number = numbers.setdefault(id(run.row), len(numbers))
         if point_name(run.parameters) == point and _has_trajectory(run, store):
             assert run.case is not None  # it has a trajectory
-            found.append((number, run, stored(store.trajectory(run.case), drawn)))
+            found.append((number, run, read_some(store.trajectory(run.case), drawn)))
     return found
 
 

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from typing import Any
 
+from proofroll.core.certificate import Standing, not_reported
 from proofroll.report.labels import (
     SYMBOLS,
     detail,
@@ -175,7 +176,8 @@ def belief(content: dict[str, Any]) -> list[dict[str, Any]]:
     lines = []
     for index, name in enumerate(names(content["rows"])):
         runs = [run for run in content["runs"] if run["row"] == index]
-        certificate = [line for run in runs for line in run["certificate"]]
+        lines_of_all = [line for run in runs for line in run["certificate"]]
+        certificate = [line for line in lines_of_all if line["standing"] != Standing.NOT_REPORTED]
         exact = [line["difference"] for line in certificate if not line["because"] and line["difference"] is not None]
         soft = list(dict.fromkeys(line["quantity"] for line in certificate if line["because"]))
         audit = content["rows"][index]["observables"].get("force_audit")
@@ -186,6 +188,7 @@ def belief(content: dict[str, Any]) -> list[dict[str, Any]]:
                 "total": len(certificate),
                 "difference": max(exact, default=None),
                 "soft": soft,
+                "silent": list(dict.fromkeys(not_reported(lines_of_all))),
                 "audit": audit,
             }
         )

@@ -4,11 +4,11 @@ from __future__ import annotations
 
 from typing import Any
 
-from rich.console import Console
 from rich.table import Table
 from rich.text import Text
 
 from proofroll.report.labels import SYMBOLS, caveat_lines, headlines, names, verdict_text
+from proofroll.report.screen import Screen
 from proofroll.report.study_parts import further, part_kinds
 
 WIDTH = 100
@@ -20,14 +20,15 @@ _STYLES = {
     "converges": "yellow",
     "ill-posed": "cyan",
     "not-judged": "cyan",
+    "another-scene": "cyan",
     "differs": "red",
     "failed": "bold red",
 }
 
 
-def console() -> Console:
+def console() -> Screen:
     """The console for data, on standard output; never wider than 100 columns."""
-    out = Console(highlight=False)
+    out = Screen(highlight=False)
     out.width = min(out.width, WIDTH) if out.is_terminal else WIDTH
     return out
 

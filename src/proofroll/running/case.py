@@ -15,6 +15,7 @@ class Status(StrEnum):
     DONE = "done"
     DIVERGED = "diverged"
     REFUSED = "refused"
+    ANOTHER_SCENE = "another scene"  # it ran, but what it ran is not this scene (KnowsAnotherScene)
     MISSING = "missing"
     CRASHED = "crashed"
     TIMEOUT = "timeout"

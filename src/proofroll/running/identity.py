@@ -53,7 +53,7 @@ def resolve(engine: str, options: dict[str, Any]) -> dict[str, Any]:
         if options:
             raise InputError("truth", ", ".join(options), "the truth has no settings; leave them out")
         code = digest([Path(inspect.getfile(truth)).parent for truth in load_truths()])
-        return dataclasses.asdict(EngineFacts("truth", _truth_version(), code, {}))
+        return dataclasses.asdict(EngineFacts("truth", truth_version(), code, {}))
     from proofroll.core.engine import SharesEquations, TellsCaveats
     from proofroll.core.plugins import load_engine, resolve_settings
 
@@ -74,7 +74,7 @@ def resolve(engine: str, options: dict[str, Any]) -> dict[str, Any]:
     return dataclasses.asdict(facts)
 
 
-def _truth_version() -> str:
+def truth_version() -> str:
     """Of proofroll, and of the libraries by which the truth is integrated."""
     found = [f"proofroll {proofroll.__version__}"]
     for name in ("numpy", "scipy", "heyoka"):

@@ -69,16 +69,17 @@ class Worker:
         self._ending = threading.Lock()
         self._answers, writer = os.pipe()
         self._words, log = os.pipe()
+        life, self._life = os.pipe()  # nothing is written: it closes with this process, however that ends
         os.set_blocking(self._words, False)
         self._open = [self._answers, self._words]
-        self._descriptors = list(self._open)
+        self._descriptors = [*self._open, self._life]
         try:
             self._process = subprocess.Popen(
-                [sys.executable, "-m", "proofroll.running.worker", str(writer), str(os.getpid())],
+                [sys.executable, "-m", "proofroll.running.worker", str(writer), str(os.getpid()), str(life)],
                 stdin=subprocess.PIPE,
                 stdout=log,
                 stderr=log,
-                pass_fds=(writer,),
+                pass_fds=(writer, life),
                 env=os.environ | _ONE_THREAD,
                 text=True,
                 start_new_session=True,  # Ctrl-C reaches the parent alone, which then ends its workers
@@ -90,6 +91,7 @@ class Worker:
         finally:
             os.close(writer)
             os.close(log)
+            os.close(life)
         _living.add(self)
         self._pending = b""
         self._said = b""

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 import time
+from collections.abc import Iterable
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
 
@@ -12,12 +13,43 @@ import numpy as np
 from proofroll.core.arrays import FloatArray
 from proofroll.core.dataset import from_samples
 from proofroll.core.engine import LocatesEvents, Sample, TellsRemarks
-from proofroll.core.errors import Diverged
+from proofroll.core.errors import Diverged, lack_behind
 from proofroll.core.events import between_samples, with_events
 from proofroll.core.scene import Scene
 
 if TYPE_CHECKING:
     import xarray as xr
+
+
+# The most even way to spread parts of an interval: none is near a simple fraction.
+_GOLDEN = (5**0.5 - 1) / 2
+_OFF_GRID = 8
+# So many samples make no curve that others could be held against (proofroll.elements.ball_on_surface.observables).
+_FEW = 17
+
+
+def off_grid(times: FloatArray, step: float | None) -> FloatArray:
+    """A few times [s] between those of the grid, none at the same part of its interval, each a whole number of steps.
+
+    An error that repeats with the grid is zero on it, and seen here.
+
+    Args:
+        times: the grid.
+        step: the engine's [s], or None if it has no fixed one.
+    """
+    found: list[float] = []
+    if len(times) <= _FEW:
+        return np.zeros(0)
+    for index in np.unique(np.linspace(0, len(times) - 2, _OFF_GRID + 2)[1:-1].astype(int)).tolist():
+        start, length = times[index], times[index + 1] - times[index]
+        part = (index + 1) * _GOLDEN % 1
+        if step is None:
+            found.append(start + length * part)
+            continue
+        steps = round(length / step)
+        if steps > 1 and abs(steps * step - length) <= 1e-6 * step:
+            found.append(start + step * min(max(round(part * steps), 1), steps - 1))
+    return np.asarray(found, dtype=np.float64)
 
 
 @dataclass(frozen=True)
@@ -45,28 +77,43 @@ class Recording:
         return self.failure or "; ".join([f"reached {until:g} s", *self.remarks])
 
 
-def record(engine: Any, scene: Scene, times: FloatArray) -> Recording:
-    """Advances a freshly built engine over ``times`` and samples it at each."""
+def record(engine: Any, scene: Scene, times: FloatArray, probes: Iterable[float] = ()) -> Recording:
+    """Advances a freshly built engine over ``times`` and samples it at each, and at a few times off that grid.
+
+    Args:
+        engine: at time 0.
+        scene: what it was built from.
+        times: of the samples [s], shape (time,).
+        probes: times off the grid at which it is sampled besides [s], from :func:`off_grid`.
+    """
     began, processor = time.perf_counter(), -time.process_time()
     inside = 0.0
     samples = [_finite(engine.sample(), 0.0)]
     failure: str | None = None
     wall = 0.0
-    for t in times[1:]:
+    between: dict[float, Sample] = {}
+    off = set(map(float, probes))
+    for t in sorted({*times[1:].tolist(), *off}):
         before, start = time.process_time(), time.perf_counter()
         try:
-            engine.advance(float(t))
+            engine.advance(t)
             wall += time.perf_counter() - start
             inside += time.process_time() - before
-            samples.append(_finite(engine.sample(), float(t)))
+            sample = _finite(engine.sample(), t)
         except Diverged as error:
+            if lack_behind(error):
+                raise
             failure = str(error)
             break
+        if t in off:
+            between[t] = sample
+        else:
+            samples.append(sample)
     processor += time.process_time()
     sampling = time.perf_counter() - began - wall, processor - inside
     lacking = (element.lacks(samples, scene.asks) for element in scene.elements)
     failure = failure or next(filter(None, lacking), None)
-    dataset = from_samples(scene, times, samples)
+    dataset = from_samples(scene, times, samples, between)
     if "sticking" in dataset:
         located = isinstance(engine, LocatesEvents)
         sticking = [bool(sample.sticking) for sample in samples]

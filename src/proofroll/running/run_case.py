@@ -4,16 +4,15 @@ from __future__ import annotations
 
 import dataclasses
 import gc
-import json
-import platform
 import statistics
 import time
 from pathlib import Path
 from typing import Any
 
-import proofroll
-from proofroll.core.errors import Diverged, Refused
+from proofroll.core.errors import Diverged, ProofrollError, Refused, lack_behind
 from proofroll.running.case import Case, Result, Status
+from proofroll.running.manifest import manifest
+from proofroll.running.manifest import versions as made_with
 from proofroll.running.time_accounts import Spent
 from proofroll.running.time_case import clean_runs
 
@@ -31,16 +30,16 @@ def run(case: dict[str, Any], out: str) -> dict[str, Any]:
 
 
 def _run(case: Case, out: Path, spent: Spent) -> Result:
-    from proofroll.core.certificate import certify, first_difference
-    from proofroll.core.engine import require_provided
+    from proofroll.core.certificate import Standing, certify, first_difference
+    from proofroll.core.engine import fixed_step, require_provided
+    from proofroll.core.first_steps import DERIVED, derivable
     from proofroll.core.plugins import load_engine, resolve_settings
     from proofroll.core.time_grid import time_grid
     from proofroll.files.netcdf import write
     from proofroll.files.scene_file import load_scene
-    from proofroll.running.recording import record
+    from proofroll.running.recording import off_grid, record
 
-    versions = {case.engine.name: case.engine.version, "proofroll": proofroll.__version__}
-    versions["python"] = platform.python_version()
+    versions = made_with(case.engine.name, case.engine.version)
     scene = load_scene(case.scene, asks=case.asks, **case.parameters)
     times = time_grid(case.until, case.every)
     if case.engine.name == "truth":
@@ -54,18 +53,18 @@ def _run(case: Case, out: Path, spent: Spent) -> Result:
         engine = kind.build(scene, settings)
         spent.on("building")
         certificate = certify(engine, scene)
+        if any(line.standing is Standing.NOT_REPORTED for line in certificate if line.quantity in DERIVED):
+            certificate += derivable(kind, scene, settings)
         difference = first_difference(certificate)
         spent.on("certificate")
-        lines = [{**dataclasses.asdict(line), "holds": line.holds} for line in certificate]
+        lines = [line.as_dict() for line in certificate]
         if difference is not None:
             return Result(Status.REFUSED, difference, certificate=lines, versions=versions)
-        recording = record(engine, scene, times)
+        recording = record(engine, scene, times, off_grid(times, fixed_step(settings)))
         spent.on("trajectory", advance=recording.advancing, sampling=recording.sampling)
         del engine
-    except Refused as error:
-        return Result(Status.REFUSED, str(error), versions=versions)
-    except Diverged as error:
-        return Result(Status.DIVERGED, str(error), versions=versions)
+    except (Refused, Diverged) as error:
+        return _answer(error, versions)
     timings: list[float] = []
     if recording.failure is None and case.timed and case.until > 0:
         timings, inside = clean_runs(kind, scene, settings, times)
@@ -80,13 +79,23 @@ def _run(case: Case, out: Path, spent: Spent) -> Result:
         versions=versions,
         trajectory=out.name,
     )
-    manifest = {"status": result.status.value, "message": result.message, "wall_seconds": result.wall_seconds}
-    manifest |= {"engine": case.engine.name, "settings": json.dumps(case.engine.settings, sort_keys=True)}
-    manifest |= {"parameters": json.dumps(dict(scene.parameters)), "versions": json.dumps(versions)}
-    manifest |= {"machine": f"{platform.machine()} {platform.system()}"}
-    write(recording.dataset.assign_attrs(manifest), out)
+    said = {"status": result.status.value, "message": result.message, "wall_seconds": result.wall_seconds}
+    said |= manifest(case.engine.name, case.engine.settings, scene, versions)
+    write(recording.dataset.assign_attrs(said), out)
     spent.on("writing")
     return result
+
+
+def _answer(error: Refused | Diverged, versions: dict[str, str]) -> Result:
+    """What an engine answers, unless the machine made it say so: then there is no answer.
+
+    Raises:
+        ProofrollError: memory, a file or time was lacking.
+    """
+    if lack := lack_behind(error):
+        raise ProofrollError(f"{error} ({type(lack).__name__})")
+    status = Status.REFUSED if isinstance(error, Refused) else Status.DIVERGED
+    return Result(status, str(error), versions=versions)
 
 
 def _run_truth(case: Case, scene: Any, times: Any, out: Path, versions: dict[str, str]) -> Result:
@@ -96,11 +105,10 @@ def _run_truth(case: Case, scene: Any, times: Any, out: Path, versions: dict[str
     start = time.perf_counter()
     try:
         dataset = truth(scene, times)
-    except Refused as error:
-        return Result(Status.REFUSED, str(error), versions=versions)
-    except Diverged as error:
-        return Result(Status.DIVERGED, str(error), versions=versions)
+    except (Refused, Diverged) as error:
+        return _answer(error, versions)
     wall = time.perf_counter() - start
     message = f"{dataset.attrs['route']}, checked by {dataset.attrs['second_route']}"
-    write(dataset.assign_attrs(status="done", message=message, engine="truth", wall_seconds=wall), out)
+    said = {"status": "done", "message": message, "wall_seconds": wall}
+    write(dataset.assign_attrs(said | manifest("truth", {}, scene, versions)), out)
     return Result(Status.DONE, message, wall_seconds=wall, versions=versions, trajectory=out.name)

@@ -2,15 +2,18 @@
 
 from __future__ import annotations
 
+import dataclasses
 from typing import TYPE_CHECKING, Any
 
 from proofroll.core.certificate import certify, first_difference
-from proofroll.core.engine import require_provided
+from proofroll.core.engine import fixed_step, require_provided
 from proofroll.core.errors import InputError, Refused
 from proofroll.core.plugins import load_engine, parse_engine, resolve_settings
 from proofroll.core.scene import Scene
 from proofroll.core.time_grid import time_grid
-from proofroll.running.recording import record
+from proofroll.running.identity import truth_version
+from proofroll.running.manifest import manifest, versions
+from proofroll.running.recording import off_grid, record
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -22,18 +25,30 @@ def build(scene: Scene, engine: str, **settings: Any) -> Any:
     Args:
         scene: from :func:`proofroll.load_scene`.
         engine: ``name`` or ``name[key=value,…]``.
-        **settings: the engine's settings, put over those in brackets.
+        **settings: the engine's settings, besides those in brackets.
 
     Raises:
-        InputError: unknown engine or setting.
+        InputError: unknown engine or setting, or one that is given twice.
         Missing: the engine is not installed.
         Refused: the engine cannot represent the scene.
     """
+    kind, resolved = _resolved(engine, settings)
+    return _build(scene, kind, resolved)
+
+
+def _resolved(engine: str, settings: dict[str, Any]) -> tuple[Any, Any]:
+    """The engine's class, and its complete settings."""
     spec = parse_engine(engine)
+    for key, value in settings.items():
+        if key in spec.options:
+            raise InputError(f"{spec.name}: {key}", value, f"{spec.options[key]} is in the brackets; give it once")
     kind = load_engine(spec.name)
-    resolved = resolve_settings(kind, {**spec.options, **settings})
-    require_provided(kind, resolved.formulation, scene)
-    return kind.build(scene, resolved)
+    return kind, resolve_settings(kind, {**spec.options, **settings})
+
+
+def _build(scene: Scene, kind: Any, settings: Any) -> Any:
+    require_provided(kind, settings.formulation, scene)
+    return kind.build(scene, settings)
 
 
 def simulate(
@@ -54,7 +69,9 @@ def simulate(
         **settings: e.g. ``formulation="chart", dt=1e-4``.
 
     Returns:
-        Dataset with the attribute ``status`` (``done`` or ``diverged``) and ``message``, one sentence.
+        Dataset with the attributes ``status`` (``done`` or ``diverged``), ``message``, one sentence, and those of
+        :func:`proofroll.running.manifest.manifest`: engine, settings, parameters, versions. The truth's variables have an
+        attribute ``error_bar``, in their unit.
 
     Raises:
         InputError: a value that makes no sense.
@@ -69,14 +86,17 @@ def simulate(
             raise InputError("truth", ", ".join(options), "the truth has no settings; leave them out")
         from proofroll.core.truth import truth
 
-        return truth(scene, times).assign_attrs(status="done", message="two independent routes agree")
-    built = build(scene, engine, **settings)
+        found = truth(scene, times).assign_attrs(status="done", message="two independent routes agree")
+        return found.assign_attrs(manifest("truth", {}, scene, versions("truth", truth_version())))
+    kind, resolved = _resolved(engine, settings)
+    built = _build(scene, kind, resolved)
     difference = first_difference(certify(built, scene))
     if difference is not None:
         raise Refused(difference)
-    recording = record(built, scene, times)
+    recording = record(built, scene, times, off_grid(times, fixed_step(resolved)))
     return recording.dataset.assign_attrs(
         status="done" if recording.failure is None else "diverged",
         message=recording.message(until),
         wall_seconds=recording.wall_seconds,
+        **manifest(spec.name, dataclasses.asdict(resolved), scene, versions(spec.name, kind.version())),
     )

@@ -15,7 +15,7 @@ from collections.abc import Iterator
 from pathlib import Path
 
 from proofroll.core.errors import ProofrollError
-from proofroll.files.atomic import replacing
+from proofroll.files.atomic import content, replacing
 from proofroll.running.case import LASTING, Case, Result
 
 
@@ -79,7 +79,7 @@ class Store:
 
     def has(self, case: Case) -> bool:
         """Whether there is a record of the case, sound or not."""
-        return (self.folder / f"{case.key}.json").exists()
+        return os.path.lexists(self.folder / f"{case.key}.json")
 
     def put(self, case: Case, result: Result, written: Path | None = None) -> Result:
         """Keeps a result, with its trajectory, if any, from the file ``written``; None: it is in place already.
@@ -92,14 +92,18 @@ class Store:
         if result.trajectory is not None:
             path = written or self.trajectory(case)
             try:
-                checksum = hashlib.sha256(path.read_bytes()).hexdigest()
+                checksum = hashlib.sha256(content(path)).hexdigest()
             except OSError as error:
                 raise ProofrollError(f"{path} cannot be read ({error.strerror or error})") from None
             result = dataclasses.replace(result, checksum=checksum)
         if result.status in LASTING:
-            content = {"case": dataclasses.asdict(case), "result": dataclasses.asdict(result)}
-            with self._locked(fcntl.LOCK_EX), replacing(self.folder / f"{case.key}.json") as record:
-                record.write_text(json.dumps(content | {"seal": _seal(content)}, indent=1), encoding="utf-8")
+            said = {"case": dataclasses.asdict(case), "result": dataclasses.asdict(result)}
+            place = self.folder / f"{case.key}.json"
+            with self._locked(fcntl.LOCK_EX), replacing(place) as record:
+                record.write_text(json.dumps(said | {"seal": _seal(said)}, indent=1), encoding="utf-8")
+                for old in (place, self.trajectory(case)):
+                    if old.is_dir() and not old.is_symlink():  # under the name of a result it is damage
+                        shutil.rmtree(old)
                 if written and result.trajectory is not None:
                     written.replace(self.trajectory(case))
         return result
@@ -118,17 +122,16 @@ class Store:
         """The stored result, or None if there is none or it is not what was stored."""
         try:
             with self._locked(fcntl.LOCK_SH):
-                record = json.loads((self.folder / f"{case.key}.json").read_text(encoding="utf-8"))
-                if record.pop("seal") != _seal(record):
+                record = json.loads(content(self.folder / f"{case.key}.json"))
+                if record.pop("seal") != _seal(record) or Case.from_dict(record["case"]).key != case.key:
                     return None
                 result = Result.from_dict(record["result"])
-                if result.trajectory is not None:
-                    content = self.trajectory(case).read_bytes()
-                    if hashlib.sha256(content).hexdigest() != result.checksum:
-                        return None
-        except (OSError, ValueError, KeyError, TypeError, AttributeError):
-            return None  # absent, truncated or tampered with: the case is run again
-        return result
+                if result.trajectory is None:
+                    return result
+                checksum = hashlib.sha256(content(self.trajectory(case))).hexdigest()
+                return result if checksum == result.checksum else None
+        except (OSError, ValueError, KeyError, TypeError, AttributeError, RecursionError, MemoryError):
+            return None  # absent, truncated, tampered with or no file of ours: the case is run again
 
 
 def _seal(record: object) -> str:

@@ -1,6 +1,6 @@
 """The process in which engines run: one request a line on standard input, one answer a line on a private pipe.
 
-``python -m proofroll.running.worker FD PARENT`` serves requests until its input ends. What an engine prints cannot
+``python -m proofroll.running.worker FD PARENT LIFE`` serves requests until its input ends. What an engine prints cannot
 reach the answers, and what an engine breaks costs only this process.
 """
 
@@ -10,23 +10,25 @@ import gc
 import json
 import os
 import pkgutil
+import signal
 import sys
-import threading
-import time
 from collections.abc import Callable
 from typing import Any
 
 from proofroll.core.errors import Diverged, InputError, Missing, ProofrollError, Refused
 from proofroll.running.case import Case
+from proofroll.running.ending import end_with, end_with_pipe
 from proofroll.running.identity import describe, resolve
 from proofroll.running.memory import volunteer
 from proofroll.running.run_case import run
 from proofroll.running.time_case import time_once
 
 
-def main(answers: int, parent: int) -> None:
-    """Serves requests; ``answers`` is the file descriptor for the answers, ``parent`` the process that asks."""
-    threading.Thread(target=_end_with, args=(parent,), daemon=True).start()
+def main(answers: int, parent: int, life: int) -> None:
+    """Serves requests; ``answers`` is the pipe for the answers, ``life`` one that ``parent``, who asks, holds open."""
+    end_with(parent)
+    end_with_pipe(life)
+    signal.signal(signal.SIGINT, signal.SIG_DFL)  # an engine that catches it would take it for its own failure
     volunteer()
     requests = os.fdopen(os.dup(0), encoding="utf-8")
     with open(os.devnull, "rb") as nothing:
@@ -37,13 +39,6 @@ def main(answers: int, parent: int) -> None:
             number = request.pop("number")
             pipe.write(json.dumps({**_answer(request), "number": number}) + "\n")
             pipe.flush()
-
-
-def _end_with(parent: int) -> None:
-    """Ends this process when its parent is gone, even in the middle of a case."""
-    while os.getppid() == parent:
-        time.sleep(0.5)
-    os._exit(1)
 
 
 def _answer(request: dict[str, Any]) -> dict[str, Any]:
@@ -107,4 +102,4 @@ def one_line(error: BaseException) -> str:
 
 
 if __name__ == "__main__":
-    main(int(sys.argv[1]), int(sys.argv[2]))
+    main(*map(int, sys.argv[1:4]))

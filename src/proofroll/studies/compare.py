@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Collection, Iterable, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -62,6 +62,8 @@ class Run:
     @property
     def verdict(self) -> Verdict:
         """The worst verdict of any observable; incomplete if all that is reported agrees but something is missing."""
+        if self.result.status == Status.ANOTHER_SCENE:
+            return Verdict.ANOTHER_SCENE
         if self.result.status != Status.DONE:
             return Verdict.FAILED
         return worst(self.judgements, self.missing)
@@ -90,7 +92,7 @@ class Outcome:
 
 
 # Where nobody can be judged; that contradicts no claim, and is expected of every engine.
-NOBODY = frozenset({Verdict.ILL_POSED, Verdict.NOT_JUDGED})
+NOBODY = frozenset({Verdict.ILL_POSED, Verdict.NOT_JUDGED, Verdict.ANOTHER_SCENE})
 
 
 def evaluate(planned: Plan, results: dict[str, Result], runner: Runner) -> Outcome:
@@ -117,6 +119,10 @@ def evaluate(planned: Plan, results: dict[str, Result], runner: Runner) -> Outco
         if name not in references:
             scene = load_scene(comparison.scene, **run.parameters)
             references[name] = Reference.read(scene, runner.store.trajectory(planned.truths[name]))
+        other = references[name].another_scene(result.certificate)
+        if other is not None:
+            judged.append(_of_another_scene(run, run.facts, result, other))
+            continue
         trajectories = {
             factor: read(runner.store.trajectory(case))
             for factor, case in run.ladder.items()
@@ -159,6 +165,14 @@ def _failed(run: Planned, facts: EngineFacts, result: Result) -> Run:
     expected = Verdict.FAILED in run.row.expected(run.parameters)
     sentence = f"{run.row.engine} at {point_name(run.parameters)} {result.status}: {result.message}"
     return Run(run.row, run.parameters, facts, result, [], [] if expected else [sentence], run.ladder[1.0])
+
+
+def _of_another_scene(run: Planned, facts: EngineFacts, result: Result, sentence: str) -> Run:
+    """A row whose engine ran another scene: shown with its trajectory, and not judged."""
+    result = replace(result, status=Status.ANOTHER_SCENE, message=sentence)
+    expected = {Verdict.ANOTHER_SCENE, Verdict.DIFFERS, Verdict.FAILED} & set(run.row.expected(run.parameters))
+    said = [] if expected else [f"{run.row.engine} at {point_name(run.parameters)}: {sentence}"]
+    return Run(run.row, run.parameters, facts, result, [], said, run.ladder[1.0])
 
 
 def _judgements(

@@ -58,9 +58,11 @@ def plan(comparison: Comparison, engines: Iterable[str] = (), workers: Workers |
     Raises:
         InputError: an engine or setting that does not exist.
     """
-    comparison = settled(comparison)
     chosen = set(engines)
-    rows = [row for row in comparison.rows if not chosen or parse_engine(row.engine).name in chosen]
+    numbered = {
+        i: row for i, row in enumerate(comparison.rows) if not chosen or parse_engine(row.engine).name in chosen
+    }
+    rows = list(numbered.values())
     if not rows:
         known = ", ".join(dict.fromkeys(parse_engine(row.engine).name for row in comparison.rows))
         raise InputError("engine", ", ".join(chosen), f"{comparison.name} compares {known}")
@@ -69,12 +71,14 @@ def plan(comparison: Comparison, engines: Iterable[str] = (), workers: Workers |
     truth_facts = resolved.pop()
     if not isinstance(truth_facts, EngineFacts):
         raise truth_facts
+    for (index, row), facts in zip(numbered.items(), resolved, strict=True):
+        if isinstance(facts, InputError):
+            raise facts.within(f"{comparison.name}.toml: rows.{index}.engine", row.engine)
+    comparison = settled(comparison)
     rungs = _rungs(rows, resolved, workers)
     truths: dict[str, Case] = {}
     runs: list[Planned] = []
     for row, facts, ladder_facts in zip(rows, resolved, rungs, strict=True):
-        if isinstance(facts, InputError):
-            raise facts
         for point in comparison.variations(row):
             scene = load_scene(comparison.scene, **point)
             truths.setdefault(point_name(point), _case(comparison, scene, point, truth_facts))

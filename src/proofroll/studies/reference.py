@@ -4,15 +4,16 @@ from __future__ import annotations
 
 import itertools
 import re
-from collections.abc import Collection
+from collections.abc import Collection, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
-from typing import TYPE_CHECKING, Self
+from typing import TYPE_CHECKING, Any, Self
 
 import numpy as np
 
 from proofroll.core.arrays import FloatArray
 from proofroll.core.dataset import observe, part, scales
+from proofroll.core.element import KnowsAnotherScene
 from proofroll.core.events import Event, events_of
 from proofroll.core.observable import Role
 from proofroll.core.scene import Scene
@@ -48,6 +49,15 @@ class Reference:
     def of(cls, scene: Scene, dataset: xr.Dataset) -> Self:
         """From a trajectory of the truth."""
         return cls(scene, dataset, observe(scene, dataset), scales(scene, dataset))
+
+    def another_scene(self, lines: Sequence[Mapping[str, Any]]) -> str | None:
+        """Why a model with this certificate is of another kind than the scene, as one clause; None: it is of the same."""
+        for element in self.scene.elements:
+            if isinstance(element, KnowsAnotherScene):
+                why = element.another_scene(lines, part(self.scene, element, self.dataset))
+                if why is not None:
+                    return why
+        return None
 
     @property
     def ill_posed(self) -> bool:

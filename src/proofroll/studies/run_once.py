@@ -29,6 +29,8 @@ def single_case(
     """
     if not 0 < time_limit <= threading.TIMEOUT_MAX:
         raise InputError("time_limit", time_limit, "give a positive, finite time in s")
+    if "asks" in parameters:
+        raise InputError("asks", parameters["asks"], "this is no parameter; ask for it with --ask")
     spec = parse_engine(engine)
     loaded = load_scene(scene, asks=asks, **parameters)  # type: ignore[arg-type]  # text is checked and converted there
     facts = resolve([(spec.name, spec.options)])[0]

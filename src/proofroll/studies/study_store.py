@@ -9,6 +9,7 @@ from collections.abc import Callable, Mapping, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
+from proofroll.files.atomic import content
 from proofroll.files.json_data import plain
 from proofroll.running.store import write_text
 from proofroll.studies import study_identity as installed
@@ -29,11 +30,18 @@ def kept(path: Path) -> tuple[dict[str, Any] | None, list[str]]:
         the study, or None and why there is none: what has changed since, or nothing if there is no such file.
     """
     try:
-        study: dict[str, Any] = json.loads(path.read_text(encoding="utf-8"))
+        study: dict[str, Any] = json.loads(content(path))
         if study["seal"] != _seal(study):
             return None, ["what is stored is not what had been put there"]
         reasons = installed.changes(study["measured"])
-    except (OSError, ValueError, KeyError, TypeError, AttributeError):  # absent, half written, or something else
+    except (
+        OSError,
+        ValueError,
+        KeyError,
+        TypeError,
+        AttributeError,
+        RecursionError,
+    ):  # absent, half written, or something else
         return None, []
     return (None, reasons) if reasons else (study, [])
 

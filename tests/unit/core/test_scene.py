@@ -2,6 +2,7 @@ from __future__ import annotations
 
 import dataclasses
 import math
+from collections.abc import Callable
 from pathlib import Path
 
 import numpy as np
@@ -12,7 +13,8 @@ from proofroll.core.gravity import Gravity
 from proofroll.core.scene import Scene
 from proofroll.elements.ball_on_surface.element import changed, rolling_ball
 from proofroll.elements.ball_on_surface.mechanics import slip_velocity
-from proofroll.elements.ball_on_surface.model import Ball, BallCapability
+from proofroll.elements.ball_on_surface.model import Ball, BallCapability, Contact, InitialMotion
+from proofroll.elements.ball_on_surface.surfaces import Cylinder, Plane
 from proofroll.files.scene_file import load_scene
 
 
@@ -126,3 +128,26 @@ def test_what_cannot_be_asked(asks: object, value: object) -> None:
         load_scene("sphere_in_cylinder", asks=asks)
     assert (caught.value.field, caught.value.value) == ("asks", value)
     assert "\n" not in str(caught.value)
+
+
+@pytest.mark.parametrize(
+    ("make", "field"),
+    [
+        (lambda: Ball("b", 0.0, 1.0), "radius"),
+        (lambda: Ball("b", 1.0, math.nan), "mass"),
+        (lambda: Ball("b", 1.0, 1.0, -0.4), "inertia_ratio"),
+        (lambda: Contact("b", "w", mu_static=-1.0, mu_kinetic=-1.0), "mu_static"),
+        (lambda: Contact("b", "w", mu_static=0.3), "mu_kinetic"),
+        (lambda: Contact("b", "w", -1e-9), "rolling_resistance"),
+        (lambda: Gravity(math.inf), "magnitude"),
+        (lambda: Gravity(9.81, (0.0, 0.0, 0.0)), "length of direction"),
+        (lambda: InitialMotion("b", velocity=(math.nan, 0.0)), "velocity"),
+        (lambda: Cylinder("w", -1.0), "radius"),
+        (lambda: Plane("w", math.nan), "tilt"),
+    ],
+)
+def test_parts_refuse_what_they_cannot_be(make: Callable[[], object], field: str) -> None:
+    """Whoever makes a part of a scene from a number that makes no sense is told which one it is."""
+    with pytest.raises(InputError) as caught:
+        make()
+    assert caught.value.field == field

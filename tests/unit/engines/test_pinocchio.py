@@ -9,7 +9,7 @@ import pytest
 import xarray as xr
 from scipy.spatial.transform import Rotation
 
-from proofroll.core.certificate import certify
+from proofroll.core.certificate import Standing, certify
 from proofroll.core.errors import Diverged, InputError, Refused
 from proofroll.core.scene import Scene
 from proofroll.core.time_grid import time_grid
@@ -81,7 +81,8 @@ def test_certificate(scene: Scene, formulation: str, preset: str) -> None:
     """Every formulation builds exactly what the scene says, on every surface, and says all there is to say."""
     lines = certify(build(scene, "pinocchio", formulation=formulation, preset=preset), scene)
     assert [line.quantity for line in lines if not line.holds] == []
-    assert len(lines) == (16 if formulation == "free_flyer" else 15)  # all but a gap of its own, which joints lack
+    silent = [line.quantity for line in lines if line.standing is Standing.NOT_REPORTED]
+    assert silent == ([] if formulation == "free_flyer" else ["gap in the engine"])  # joints have no gap of their own
     assert all(line.because == "" for line in lines)  # nothing is softened
 
 
@@ -414,7 +415,7 @@ CHANGES = {
     "gravity": ({"gravity": 1.1}, "gravity"),
     "f doubled": ({"rolling_resistance": 2.0}, "rolling resistance"),
     "f dropped": ({"rolling_resistance": 0.0}, "rolling resistance"),
-    "mu halved": ({"mu_static": 0.5, "mu_kinetic": 0.5}, "static friction"),
+    "mu halved": ({"mu_kinetic": 0.5, "mu_static": 0.5}, "static friction"),  # never above it in between
 }
 CHANGED_SCENES = {
     "cylinder": cylinder(rolling_resistance=RESISTANCE, axial_speed=0.3, radial_spin=5),

@@ -1,6 +1,7 @@
 from __future__ import annotations
 
 import math
+import os
 from collections.abc import Callable
 from pathlib import Path
 from typing import Any
@@ -11,6 +12,7 @@ from proofroll.core.errors import InputError
 from proofroll.elements.ball_on_surface.element import rolling_ball
 from proofroll.files.data_folders import data_folder
 from proofroll.files.scene_file import load_scene, read_scene_file, scene_names
+from proofroll.files.toml import read_toml
 
 CYLINDER = "sphere_in_cylinder"
 
@@ -149,6 +151,36 @@ def test_a_scene_outside_models(edited: Callable[[str, str], str]) -> None:
         ("velocity = [", "velocity = [1, ", ["initial.0.velocity"]),
         ("value = 0.517", "", ["parameters.mass.value", "required"]),
         ("value = 0.517", 'valu = 0.517\nvalue = "x"', ["parameters.mass.valu", "no such key"]),
+        ('mass = "$mass"', "mass = -1", ["balls.0.mass = -1", "above 0"]),
+        ('mass = "$mass"', "mass = inf", ["balls.0.mass = inf", "finite"]),
+        ('mass = "$mass"', "mass = nan", ["balls.0.mass = nan", "finite"]),
+        ('mass = "$mass"', "mass = true", ["balls.0.mass = True", "give one in kg"]),
+        ('radius = "$radius"', "radius = 0", ["balls.0.radius = 0", "above 0"]),
+        ('radius = "$radius"', "radius = 0.3", ["radius = 0.3", "smaller than wall with 0.225 m"]),
+        ('mass = "$mass"', 'mass = "$mass"\ninertia_ratio = -0.4', ["balls.0.inertia_ratio = -0.4", "above 0"]),
+        ('radius = "$cylinder_radius"', "radius = -0.2", ["surfaces.0.cylinder.radius = -0.2", "above 0"]),
+        ('radius = "$cylinder_radius"', "radius = 1\ntilt = nan", ["surfaces.0.cylinder.tilt = nan", "finite"]),
+        ('magnitude = "$gravity"', "magnitude = -9.81", ["gravity.magnitude = -9.81", "at least 0"]),
+        ("direction = [0, 0, -1]", "direction = [0, 0, 0]", ["gravity.length of direction = 0", "above 0"]),
+        ("direction = [0, 0, -1]", "direction = [0, nan, -1]", ["gravity.direction = nan", "finite"]),
+        ('mu_static = "$mu_static"', "mu_static = -1", ["contacts.0.mu_static = -1", "at least 0"]),
+        ('mu_static = "$mu_static"', "mu_static = nan", ["contacts.0.mu_static = nan", "number"]),
+        ('mu_static = "$mu_static"', "mu_static = 0.3", ["contacts.0.mu_kinetic = inf", "at most mu_static = 0.3"]),
+        ('rolling_resistance = "$rolling_resistance"', "rolling_resistance = -1", ["contacts.0.rolling", "at least 0"]),
+        ("coordinates = [0, 0]", "coordinates = [0, inf]", ["initial.0.coordinates = inf", "finite"]),
+        ('spin = "$radial_spin"', "spin = nan", ["initial.0.spin = nan", "finite"]),
+        (
+            'value = 0.025\nunit = "m"',
+            'value = 25\nunit = "mm"',
+            ["parameters.radius.unit = 'mm'", "write the value in"],
+        ),
+        ('mass = "$mass"', 'mass = "$radius"', ["balls.0.mass = '$radius'", "in kg, that parameter in m"]),
+        ('velocity = ["$speed"', 'velocity = ["$gravity"', ["initial.0.velocity.0", "in m/s, that parameter in m/s^2"]),
+        ('below = "cylinder_radius"', 'below = "mass"', ["parameters.radius.below = 'mass'", "its unit is kg"]),
+        ("value = inf", 'value = "mu_kinetic"', ["mu_static.value", "mu_static -> mu_kinetic -> mu_static", "circle"]),
+        ('title = "', f'a = {"[" * 5000}\ntitle = "', ["nested more than 16 deep"]),
+        ("[gravity]", f"[gravity.{'.'.join('d' * 5000)}]\n[gravity]", ["nested more than 16 deep"]),
+        ("value = 0.517", f"value = {'9' * 5000}", ["broken"]),
     ],
 )
 def test_broken_scene_files(edited: Callable[[str, str], str], old: str, new: str, words: list[str]) -> None:
@@ -175,6 +207,37 @@ def test_names_that_a_scene_file_does_not_define(
 ) -> None:
     """A name that leads nowhere gives one line that shows it."""
     assert name in str(problem(edited(old, new)))
+
+
+def test_too_many_parameters(edited: Callable[[str, str], str]) -> None:
+    """A file with 100,000 parameters is refused by its size, before it is read."""
+    item = '={value=1,unit="m",meaning="x",source="x"}'
+    many = "[parameters]\n" + "\n".join(f"p{i}{item}" for i in range(100_000))
+    assert "larger than 256 kB" in str(problem(edited("[gravity]", many + "\n[gravity]")))
+
+
+def test_of_many_names_some_are_shown(edited: Callable[[str, str], str]) -> None:
+    """Advice names some of many parameters, not all."""
+    item = '={value=1,unit="m",meaning="x",source="x"}'
+    many = "\n".join(f"parameters.p{i}{item}" for i in range(1000))
+    assert len(str(problem(edited('title = "', f'{many}\ntitle = "'), wheels=4))) < 400
+
+
+def test_defaults_that_follow_one_another(edited: Callable[[str, str], str]) -> None:
+    """A default may name a parameter that is defined later and itself follows another."""
+    first = '[parameters.first]\nvalue = "mu_kinetic"\nunit = "1"\nunbounded = true\n'
+    first += 'meaning = "x"\nsource = "x"\n'
+    folder = edited("[parameters.radius]", f"{first}[parameters.radius]")
+    assert load_scene(folder, mu_static=0.3).parameters["first"] == 0.3
+    assert load_scene(folder, mu_static=0.3, mu_kinetic=0.2).parameters["first"] == 0.2
+    assert load_scene(folder).parameters["first"] == math.inf
+
+
+def test_a_pipe_is_not_waited_for(tmp_path: Path) -> None:
+    """A named pipe in the place of a file is refused at once."""
+    os.mkfifo(tmp_path / "pipe.toml")
+    with pytest.raises(InputError, match="no ordinary file"):
+        read_toml(tmp_path / "pipe.toml")
 
 
 def test_not_text(tmp_path: Path) -> None:

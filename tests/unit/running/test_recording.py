@@ -11,7 +11,7 @@ from proofroll.core.errors import Diverged
 from proofroll.core.scene import Scene
 from proofroll.core.time_grid import time_grid
 from proofroll.files.scene_file import load_scene
-from proofroll.running.recording import record
+from proofroll.running.recording import off_grid, record
 
 
 @pytest.fixture
@@ -93,3 +93,18 @@ def test_an_orientation_that_was_asked_for() -> None:
     asking = load_scene("sphere_in_cylinder", asks=("orientation",))
     recording = record(Oracle(asking), asking, time_grid(0.1, 0.05))
     assert recording.failure == "the engine does not give the ball's orientation"
+
+
+def test_times_off_the_grid() -> None:
+    """Some samples lie strictly between those of the grid, at other parts of each interval, and after whole steps."""
+    times = time_grid(1.0, 0.02)
+    for step in (None, 1e-3, 2e-3):
+        found = off_grid(times, step)
+        assert len(found) == 8
+        parts = (found - times[np.searchsorted(times, found) - 1]) / 0.02
+        assert np.all((parts > 1e-3) & (parts < 1 - 1e-3))
+        assert len(np.unique(np.round(parts, 6))) >= 4
+        if step is not None:
+            assert found / step == pytest.approx(np.round(found / step), abs=1e-6)
+    assert off_grid(times, 0.02).size == 0, "no whole step ends between"
+    assert off_grid(times[:5], None).size == 0, "too few samples for a curve"

@@ -32,15 +32,18 @@ def hostile_engines(install_engines: Callable[[Mapping[str, str]], None]) -> Non
 OUTCOMES = {
     "oracle": (Status.DONE, "reached 0.1 s"),
     "garbage": (Status.DONE, "reached 0.1 s"),
-    "exits": (Status.CRASHED, "exit code 7: fatal: no licence at 0.05"),
+    "exits": (Status.CRASHED, "exit code 7: fatal: no licence at 0.0"),
     "segfaults": (Status.CRASHED, "SIGSEGV"),
     "hangs": (Status.TIMEOUT, "no result within 2 s"),
-    "raises": (Status.CRASHED, "RuntimeError: matrix is singular at t = 0.05"),
+    "raises": (Status.CRASHED, "RuntimeError: matrix is singular at t = 0.0"),
     "says_exit": (Status.CRASHED, "goodbye"),
     "not_a_number": (Status.DIVERGED, "v_WB is not finite"),
     "gives_up": (Status.DIVERGED, "step size fell to nothing"),
     "refuses": (Status.REFUSED, "no wheel, no ball"),
     "absent": (Status.MISSING, "absent is not installed here"),
+    "blames_memory": (Status.CRASHED, "the step failed at 0.05 s (MemoryError)"),
+    "blames_file": (Status.CRASHED, "no model (OSError)"),
+    "interrupted": (Status.CRASHED, "was killed by SIGINT"),
     "misspelt": (Status.CRASHED, "NoSuchClass"),
 }
 
@@ -175,7 +178,7 @@ def test_a_disk_that_is_really_full(tmp_path: Path, make_case: MakeCase) -> None
     """On a full disk what fits is stored, each other row says why not, and running all again loses nothing."""
     cases = [dataclasses.asdict(make_case("oracle", parameters={"speed": speed})) for speed in (3.0, 4.0, 5.0)]
     (tmp_path / "disk").mkdir()
-    mount = 'mount -t tmpfs -o size=64k tmpfs "$1" && shift && exec "$@"'
+    mount = 'mount -t tmpfs -o size=20k tmpfs "$1" && shift && exec "$@"'
     command = ["unshare", "--user", "--map-root-user", "--mount", "sh", "-c", mount, "sh", str(tmp_path / "disk")]
     if not shutil.which("unshare") or subprocess.run([*command, "true"], check=False, capture_output=True).returncode:
         pytest.skip("this system lets nobody mount a small disk")
@@ -207,8 +210,23 @@ def test_manifest(tmp_path: Path, make_case: MakeCase) -> None:
     assert json.loads(attributes["parameters"])["speed"] == 5.0
     assert json.loads(attributes["versions"]) == result.versions
     assert {"engine", "status", "message", "machine", "scene", "scene_digest"} <= set(attributes)
+    assert attributes["engine"] == "oracle"
     assert result.versions.keys() == {"oracle", "proofroll", "python"}
     assert all(line["holds"] for line in result.certificate)
+
+
+def test_manifest_of_the_truth(tmp_path: Path, make_case: MakeCase) -> None:
+    """The truth's file says how it was made as an engine's does, and carries its error bars."""
+    facts = resolve([("truth", {})])[0]
+    assert isinstance(facts, EngineFacts)
+    case = dataclasses.replace(make_case("oracle", parameters={"speed": 5.0}), engine=facts)
+    result = run_one(case, tmp_path / "run.nc")
+    dataset = read(tmp_path / "run.nc")
+    assert dataset.attrs["engine"] == "truth"
+    assert json.loads(dataset.attrs["settings"]) == {}
+    assert json.loads(dataset.attrs["parameters"])["speed"] == 5.0
+    assert json.loads(dataset.attrs["versions"]) == result.versions
+    assert dataset["gamma"].attrs["error_bar"] > 0
 
 
 def test_capabilities_are_checked_before_anything_is_built(tmp_path: Path, make_case: MakeCase) -> None:

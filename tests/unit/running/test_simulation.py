@@ -1,5 +1,9 @@
 from __future__ import annotations
 
+import json
+import math
+import pydoc
+import re
 import subprocess
 import sys
 from collections.abc import Callable, Mapping
@@ -35,10 +39,30 @@ def test_the_truth_is_an_engine_too() -> None:
 
 
 def test_settings_in_brackets_and_by_name() -> None:
-    """Settings by name go over those in brackets."""
+    """Settings may stand in brackets or be given by name; one that is given twice is refused."""
     scene = proofroll.load_scene("sphere_in_cylinder")
-    with pytest.raises(InputError, match=r"oracle: dt = 'x'"):
-        proofroll.simulate(scene, "oracle[dt=1e-3]", dt="x")
+    found = proofroll.simulate(scene, "oracle[dt=1e-3]", until=0.1, formulation="only")
+    assert json.loads(found.attrs["settings"]) == {"formulation": "only", "preset": "matched", "dt": 1e-3}
+    with pytest.raises(InputError, match=r"oracle: dt = 0.01: 1e-3 is in the brackets; give it once"):
+        proofroll.simulate(scene, "oracle[dt=1e-3]", dt=1e-2)
+
+
+@pytest.mark.parametrize("engine", ["truth", "oracle"])
+def test_a_trajectory_says_how_it_was_made(engine: str) -> None:
+    """Engine, settings, parameters and versions are attributes, as in a file."""
+    scene = proofroll.load_scene("sphere_in_cylinder", speed=5.0)
+    found = proofroll.simulate(scene, engine, until=0.1, every=0.1)
+    assert found.attrs["engine"] == engine
+    assert json.loads(found.attrs["parameters"]) == dict(scene.parameters) | {"mu_static": math.inf}
+    assert json.loads(found.attrs["versions"]).keys() == {engine, "proofroll", "python"}
+    assert "dt" in json.loads(found.attrs["settings"]) or engine == "truth"
+
+
+def test_help_shows_the_public_names() -> None:
+    """``help(proofroll)`` shows every public name, also those that are loaded only when they are used."""
+    text = pydoc.plaintext.document(proofroll)
+    for name in proofroll.__all__:
+        assert re.search(rf"^    (class )?{name}\(", text, re.MULTILINE), name
 
 
 def test_a_run_that_diverges_is_given_as_far_as_it_went() -> None:
@@ -73,7 +97,7 @@ def test_importing_proofroll_is_light() -> None:
     """Importing proofroll loads no engine, no xarray, no plotly and no scipy."""
     code = (
         "import sys, proofroll;"
-        "heavy = {'xarray', 'scipy', 'plotly', 'pydantic', 'mujoco', 'pinocchio', 'exudyn', 'h5netcdf', 'numpy'};"
+        "heavy = {'xarray', 'scipy', 'plotly', 'pydantic', 'mujoco', 'pinocchio', 'exudyn', 'numpy'};"
         "print(sorted(heavy & set(sys.modules)))"
     )
     done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
@@ -82,7 +106,9 @@ def test_importing_proofroll_is_light() -> None:
 
 def test_public_names() -> None:
     """The public names are those that are announced, and no others are made up."""
-    assert proofroll.__all__ == ["load_scene", "simulate"]
+    errors = {"Diverged", "InputError", "Missing", "ProofrollError", "Refused"}
+    assert set(proofroll.__all__) == errors | {"load_scene", "simulate"}
+    assert all(issubclass(getattr(proofroll, name), proofroll.ProofrollError) for name in errors)
     assert all(callable(getattr(proofroll, name)) for name in proofroll.__all__)
     with pytest.raises(AttributeError, match="no attribute 'simulat'"):
         _ = proofroll.simulat  # type: ignore[attr-defined]  # that is the point

@@ -4,13 +4,14 @@ from __future__ import annotations
 
 import dataclasses
 import json
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Mapping, Sequence
 from pathlib import Path
 
 import pytest
 import xarray as xr
 from hostile import ENTRY_POINTS
 
+from proofroll.core.certificate import Line
 from proofroll.core.comparison import Band, Comparison, ExceptAt, Row, Tolerance
 from proofroll.core.scene import Scene
 from proofroll.core.time_grid import time_grid
@@ -49,6 +50,7 @@ def judged(
     answer: Answer,
     true: Mapping[float, Result] | None = None,
     rungs: Mapping[float, Answer] | None = None,
+    certificate: Sequence[Line] = (),
 ) -> Outcome:
     """The outcome where every row's engine gives what ``answer`` makes of the truth.
 
@@ -60,7 +62,8 @@ def judged(
     def put(case: Case, given: xr.Dataset | Result) -> Case:
         if isinstance(given, xr.Dataset):
             write(given, store.trajectory(case))
-            given = Result(Status.DONE, "reached the end", trajectory=store.trajectory(case).name)
+            lines = [line.as_dict() for line in certificate]
+            given = Result(Status.DONE, "reached the end", certificate=lines, trajectory=store.trajectory(case).name)
         results[case.key] = given
         return case
 
@@ -185,6 +188,21 @@ def test_what_cannot_be_judged_hides_nothing(tmp_path: Path) -> None:
     (run,) = judged(tmp_path, claim([ROW], [4.0], bounds), off).runs
     assert {item.observable: item.verdict for item in run.judgements} == {"gamma": "not-judged", "z": "differs"}
     assert run.contradictions[0].startswith("alpha at speed=4 differs, expected: agrees (z differs")
+
+
+def test_another_scene_is_shown_and_not_judged(tmp_path: Path) -> None:
+    """A friction of 1 where the unbounded scene needs 1.08 is no verdict, and contradicts only who says it agrees."""
+    number = Line("1 / static friction", "1", (0.0,), (1.0,), 1.0, 1.0, "the engine needs a number")
+    agrees = judged(tmp_path / "a", claim([ROW], [1.2, 4.0]), the_truth, certificate=[number])
+    slow, fast = agrees.runs
+    assert slow.result.status is Status.ANOTHER_SCENE
+    assert slow.result.message.startswith("another scene: a friction of 1, where the scene has no bound and needs 1.08")
+    assert slow.result.trajectory is not None
+    assert slow.judgements == []
+    assert fast.verdict is Verdict.AGREES
+    assert agrees.contradictions == [f"alpha at speed=1.2: {slow.result.message}"]
+    row = dataclasses.replace(ROW, except_at=[ExceptAt({"speed": [1.2]}, [Verdict.DIFFERS])])
+    assert judged(tmp_path / "b", claim([row], [1.2, 4.0]), the_truth, certificate=[number]).contradictions == []
 
 
 def test_exceptions_decide(tmp_path: Path) -> None:

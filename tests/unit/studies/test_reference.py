@@ -5,9 +5,9 @@ from __future__ import annotations
 from typing import Any
 
 import numpy as np
-from proofroll.core.truth import truth
 
 from proofroll.core.engine import SharesEquations
+from proofroll.core.truth import truth
 from proofroll.elements.ball_on_surface.observables import Observable
 from proofroll.engines.reduced import Reduced
 from proofroll.files.scene_file import load_scene

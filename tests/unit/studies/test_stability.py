@@ -26,7 +26,7 @@ from proofroll.studies.stability_claims import Claim, file_for
 from proofroll.studies.stability_content import content, dependence
 from proofroll.studies.stability_places import Effort
 from proofroll.studies.stability_reproducers import write_reproducers
-from proofroll.studies.step_numbers import explanation, values
+from proofroll.studies.step_numbers import explanation
 
 SPEED = Axis("V0", "m/s", "initial speed", [2.0, 8.0], {"speed": Term()})
 ENGINE = "projection[formulation=rotating_frame,preset=default]"

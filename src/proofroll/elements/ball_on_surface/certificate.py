@@ -1,15 +1,16 @@
-"""Equivalence first: what the engine really built, held against the scene before anything is stepped."""
+"""What an engine built of a ball on a surface, line by line, and what of it a model may soften."""
 
 from __future__ import annotations
 
 import dataclasses
+from collections.abc import Iterable, Mapping
 from typing import Any
 
 import numpy as np
 
 from proofroll.core.arrays import FloatArray
 from proofroll.core.certificate import EXACT, Line
-from proofroll.core.engine import Built, Sample
+from proofroll.core.engine import Built, Regularised, Sample
 from proofroll.elements.ball_on_surface.mechanics import (
     initial_angular_acceleration,
     initial_response,
@@ -19,12 +20,29 @@ from proofroll.elements.ball_on_surface.mechanics import (
 from proofroll.elements.ball_on_surface.model import RollingBall
 from proofroll.elements.ball_on_surface.resting import stands
 
+_DEEP = "a ball that is sunk in by its radius has its centre in the wall"
+_LEVER = "a soft contact rolls about a point midway in its depth, and the depth is at most the radius"
+_UNLOADED = "a contact that is not loaded yet lacks the whole force, and no more than that"
+_NUMBER = "a number must stand for friction without bound; whether it is enough, the run tells (another_scene)"
+# What a model may soften: quantity -> largest relative difference that any reason explains, and why. What is not here
+# can never be softened: mass, inertia, gravity, radius, position along the wall, a coefficient that the scene gives.
+CAPS: Mapping[str, Regularised] = {
+    "gap": Regularised(1.0, _DEEP),
+    "gap in the engine": Regularised(1.0, _DEEP),
+    "slip": Regularised(0.5, _LEVER),
+    "spin": Regularised(0.5, _LEVER),
+    "velocity": Regularised(1e-5, "a velocity of half a step before is brought to time 0 by a sequence that converges"),
+    "rolling resistance": Regularised(1e-6, "its moment is read back by way of a normal force that a solver finds"),
+    **dict.fromkeys(("acceleration", "angular acceleration", "N", "F2", "F3"), Regularised(1.0, _UNLOADED)),
+    **dict.fromkeys(("1 / static friction", "1 / kinetic friction"), Regularised(float("inf"), _NUMBER)),
+}
+
 
 def certify(body: RollingBall, built: Built, sample: Sample) -> list[Line]:
     """Compares what was built, and the sample at time 0, with the ball on its surface.
 
-    Quantities about which the engine is silent are left out, except those that the scene requires it to have:
-    rolling resistance and bounded friction.
+    Quantities about which the engine is silent have a line that says so, except those that the scene requires it to
+    have, rolling resistance and bounded friction: there silence is a difference.
     """
     acceleration, force, turning = _expected(body, built)
     natural = natural_acceleration(body)
@@ -35,13 +53,13 @@ def certify(body: RollingBall, built: Built, sample: Sample) -> list[Line]:
     lines: list[Line] = []
 
     def compare(quantity: str, unit: str, expected: Any, found: Any, scale: float, required: bool = False) -> None:
-        if found is None:
-            if not required:
-                return
-            found = np.nan
-        want, got = np.atleast_1d(np.asarray(expected, float)), np.atleast_1d(np.asarray(found, float))
+        want = np.atleast_1d(np.asarray(expected, float))
+        if found is None and not required:
+            lines.append(Line(quantity, unit, tuple(want.tolist()), (), None, EXACT))
+            return
+        got = np.atleast_1d(np.asarray(np.nan if found is None else found, float))
         difference = float(np.max(np.abs(got - want))) / scale if got.shape == want.shape else float("inf")
-        soft = built.regularised.get(quantity)
+        tolerance, because = _allowed(quantity, built.regularised)
         lines.append(
             Line(
                 quantity,
@@ -49,8 +67,8 @@ def certify(body: RollingBall, built: Built, sample: Sample) -> list[Line]:
                 tuple(want.tolist()),
                 tuple(got.tolist()),
                 difference if np.isfinite(difference) else float("inf"),
-                soft.tolerance if soft else EXACT,
-                soft.because if soft else "",
+                tolerance,
+                because,
             )
         )
 
@@ -69,7 +87,9 @@ def certify(body: RollingBall, built: Built, sample: Sample) -> list[Line]:
             compare(name, "1", expected, found, expected or 1.0, required=True)
         elif found is not None:  # a number that stands for no bound is the closer to it, the larger it is
             compare(f"1 / {name}", "1", 0.0, 1 / found if found else np.inf, 1.0)
-    compare("position", "m", body.p0, sample.p_WB, body.ball.radius)
+    # How far the ball is from the wall is the gap's business; along the wall it stands where the scene puts it.
+    below = body.surface.position(body.surface.locate(sample.p_WB))
+    compare("position", "m", body.p0, below, body.ball.radius)
     compare("gap", "m", 0.0, body.surface.gap(sample.p_WB), body.ball.radius)
     compare("gap in the engine", "m", 0.0, built.gap, body.ball.radius)
     compare("velocity", "m/s", body.v0, sample.v_WB, speed)
@@ -78,16 +98,22 @@ def certify(body: RollingBall, built: Built, sample: Sample) -> list[Line]:
     compare("slip", "m/s", np.zeros(3), slip, speed)
     compare("acceleration", "m/s^2", acceleration, built.acceleration, natural)
     compare("angular acceleration", "rad/s^2", turning, built.angular_acceleration, natural / body.ball.radius)
-    if sample.force is not None:
-        for index, (name, sign) in enumerate((("N", -1.0), ("F2", 1.0), ("F3", 1.0))):
-            compare(
-                name,
-                "N",
-                sign * force @ frame[:, index],
-                sign * sample.force @ frame[:, index],
-                body.ball.mass * natural,
-            )
+    for index, (name, sign) in enumerate((("N", -1.0), ("F2", 1.0), ("F3", 1.0))):
+        pressed = None if sample.force is None else sign * sample.force @ frame[:, index]
+        compare(name, "N", sign * force @ frame[:, index], pressed, body.ball.mass * natural)
     return lines
+
+
+def _allowed(quantity: str, regularised: Mapping[str, Regularised]) -> tuple[float, str]:
+    """Tolerance of a quantity and its reason: what the engine softens, as far as that can be softened at all."""
+    soft, cap = regularised.get(quantity), CAPS.get(quantity)
+    if soft is None:
+        return EXACT, ""
+    if cap is None:
+        return EXACT, f"cannot be softened, though the engine asks for {soft.tolerance:.2g} ({soft.because})"
+    if soft.tolerance <= cap.tolerance:
+        return soft.tolerance, soft.because
+    return cap.tolerance, f"{soft.because}; of the {soft.tolerance:.2g} asked for this much is allowed: {cap.because}"
 
 
 def _expected(body: RollingBall, built: Built) -> tuple[FloatArray, FloatArray, FloatArray]:
@@ -101,3 +127,20 @@ def _expected(body: RollingBall, built: Built) -> tuple[FloatArray, FloatArray, 
         free = dataclasses.replace(body, contact=dataclasses.replace(body.contact, rolling_resistance=0.0))
         meant = min((body, free), key=lambda one: float(np.linalg.norm(initial_response(one)[0] - said)))
     return *initial_response(meant), initial_angular_acceleration(meant)
+
+
+def another_scene(lines: Iterable[Mapping[str, Any]], needed: float) -> str | None:
+    """Why the engine's model is of another kind than the scene, as one clause; None: it is of the same.
+
+    A scene without bound on friction is built with a number for it. As long as the motion needs less friction than
+    that, the number changes nothing; where it needs more, the ball slips in the engine and cannot in the scene.
+
+    Args:
+        lines: of a stored certificate (:meth:`Line.as_dict`).
+        needed: largest friction |F|/N that the true motion needs [-].
+    """
+    for line in lines:
+        if line["quantity"] == "1 / static friction" and line["found"] and line["found"][0] * needed > 1:
+            bound = 1 / line["found"][0]
+            return f"another scene: a friction of {bound:.4g}, where the scene has no bound and needs {needed:.4g}"
+    return None

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -17,12 +17,17 @@ if TYPE_CHECKING:
     import xarray as xr
 
 
-def from_samples(body: RollingBall, times: FloatArray, samples: Sequence[Sample]) -> xr.Dataset:
-    """The variables of a run, from one sample per time [s]."""
+def from_samples(
+    body: RollingBall, times: FloatArray, samples: Sequence[Sample], between: Mapping[float, Sample]
+) -> xr.Dataset:
+    """The variables of a run, from one sample per time [s] and some between them; a force missing at time 0 is NaN."""
 
     def stacked(values: list[FloatArray | None]) -> FloatArray | None:
         return None if any(value is None for value in values) else np.asarray(values, dtype=np.float64)
 
+    forces = [s.force for s in samples]
+    if len(forces) > 1 and forces[0] is None:
+        forces[0] = np.full(3, np.nan)
     p, v, w = (np.array([np.reshape(getattr(s, key), 3) for s in samples]) for key in ("p_WB", "v_WB", "w_WB"))
     dataset = variables(
         body,
@@ -30,13 +35,26 @@ def from_samples(body: RollingBall, times: FloatArray, samples: Sequence[Sample]
         p,
         v,
         w,
-        force=stacked([s.force for s in samples]),
+        force=stacked(forces),
         q_WB=stacked([s.q_WB for s in samples]),
     )
+    dataset = with_samples_between(dataset, between)
     if any(s.sticking is None for s in samples):
         return dataset
     sticking = np.array([s.sticking for s in samples], dtype=np.int8)  # netCDF has no boolean
     return dataset.assign(sticking=("time", sticking, {"units": "1", "long_name": "1 sticks, 0 slips"}))
+
+
+def with_samples_between(dataset: xr.Dataset, samples: Mapping[float, Sample]) -> xr.Dataset:
+    """The trajectory with samples off its grid, by time [s]: ``p_between`` [m] and ``v_between`` [m/s]."""
+    if not samples:
+        return dataset
+    p, v = (np.array([np.reshape(getattr(s, name), 3) for s in samples.values()]) for name in ("p_WB", "v_WB"))
+    of = "off the grid, in the world"
+    return dataset.assign(
+        p_between=(("between", "xyz"), p, {"units": "m", "long_name": f"centre of the ball {of}"}),
+        v_between=(("between", "xyz"), v, {"units": "m/s", "long_name": f"velocity of the centre {of}"}),
+    ).assign_coords(between=("between", list(samples), {"units": "s"}))
 
 
 def variables(

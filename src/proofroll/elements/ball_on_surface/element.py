@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING, Any, ClassVar
 import numpy as np
 
 from proofroll.core.arrays import FloatArray
-from proofroll.core.element import FailedRun, OptionalTerm, Sign, StepNumber
+from proofroll.core.element import FailedRun, FirstMotion, OptionalTerm, Sign, StepNumber
 from proofroll.core.engine import Sample
 from proofroll.core.errors import Refused
 from proofroll.core.gravity import Gravity
@@ -36,6 +36,8 @@ if TYPE_CHECKING:
 ASKED: Mapping[str, BallCapability] = {"orientation": BallCapability.ORIENTATION}
 # Rolling resistance that a scene without any is given to see what the term costs: f in radii (Blajer 2006, figure 5).
 _RESISTANCE = 0.02
+# An engine without a step is looked at after this part of the time in which its ball rolls by one radius.
+_PART = 1e-2
 # Friction that is bounded far away from what rolling needs: this many times as much.
 _FAR = 10.0
 
@@ -129,11 +131,46 @@ class BallOnSurface:
 
         return step_numbers(self.rolling, h, truth)
 
-    def dataset(self, times: FloatArray, samples: Sequence[Sample]) -> xr.Dataset:
-        """See the protocol; the variables are those of :func:`proofroll.elements.ball_on_surface.dataset.dataset`."""
+    @cached_property
+    def first_motion(self) -> FirstMotion | None:
+        """See the protocol; None for a ball at rest under rolling resistance, which has no direction yet."""
+        from proofroll.elements.ball_on_surface.mechanics import (
+            initial_angular_acceleration,
+            initial_response,
+            natural_acceleration,
+        )
+        from proofroll.elements.ball_on_surface.resting import stands
+
+        body = self.rolling
+        if stands(body, body.v0):
+            return None
+        speed = float(np.linalg.norm(body.v0)) or float(np.sqrt(self.ball.radius * np.linalg.norm(body.gravity)))
+        return FirstMotion(
+            initial_response(body)[0][None, :],
+            initial_angular_acceleration(body)[None, :],
+            natural_acceleration(body),
+            _PART * self.ball.radius / (speed or 1.0),
+        )
+
+    @property
+    def softened(self) -> frozenset[str]:
+        """See the protocol."""
+        from proofroll.elements.ball_on_surface.certificate import CAPS
+
+        return frozenset(name for name in CAPS if not name.startswith("1 / "))
+
+    def another_scene(self, lines: Sequence[Mapping[str, Any]], truth: xr.Dataset) -> str | None:
+        """See :class:`proofroll.core.element.KnowsAnotherScene`."""
+        from proofroll.elements.ball_on_surface.certificate import another_scene
+
+        friction = truth["needed_friction"].to_numpy()
+        return another_scene(lines, float(np.max(friction[np.isfinite(friction)], initial=0.0)))
+
+    def dataset(self, times: FloatArray, samples: Sequence[Sample], between: Mapping[float, Sample]) -> xr.Dataset:
+        """See the protocol; the variables are those of :func:`proofroll.elements.ball_on_surface.dataset.variables`."""
         from proofroll.elements.ball_on_surface.dataset import from_samples
 
-        return from_samples(self.rolling, times, samples)
+        return from_samples(self.rolling, times, samples, between)
 
     def lacks(self, samples: Sequence[Sample], asks: Sequence[str]) -> str | None:
         """See the protocol."""

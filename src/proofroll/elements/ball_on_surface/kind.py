@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import dataclasses
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from typing import Annotated, Any, ClassVar
@@ -11,10 +12,10 @@ from pydantic import Field
 from proofroll.core.errors import InputError
 from proofroll.core.gravity import Gravity
 from proofroll.core.scene import Scene
-from proofroll.elements.ball_on_surface.element import BallOnSurface
+from proofroll.elements.ball_on_surface.element import BallOnSurface, changed
 from proofroll.elements.ball_on_surface.model import Ball, Contact, InitialMotion
 from proofroll.elements.ball_on_surface.surfaces import AnySurface
-from proofroll.files.validation import strict, validated
+from proofroll.files.validation import strict, units_of, validated
 
 
 @dataclass(frozen=True)
@@ -35,6 +36,7 @@ class BallOnSurfaceKind:
 
     name: ClassVar[str] = "ball_on_surface"
     tables: ClassVar[tuple[str, ...]] = ("balls", "surfaces", "contacts", "initial")
+    units: ClassVar[Mapping[str, str]] = units_of(Ball, Contact, InitialMotion, *AnySurface.__args__)
 
     @staticmethod
     def read(tables: Mapping[str, Any], gravity: Gravity, where: str) -> Sequence[BallOnSurface]:
@@ -76,6 +78,24 @@ class BallOnSurfaceKind:
             "cylinder-oriented": load_scene("sphere_in_cylinder", **cylinder, asks=("orientation",)),
         }
 
+    @staticmethod
+    def truth_scenes() -> Mapping[str, Scene]:
+        """Turned about the axis, tilted, spinning about e1; slow and fast."""
+        scenes = BallOnSurfaceKind.conformance_scenes()
+        return {
+            "plane": scenes["plane"],
+            "slow": _turned(scenes["cylinder-resisting"], -1.0, 0.05, velocity=(1.2, 0.2), spin=5.0),
+            "fast": _turned(scenes["cylinder"], 2.0, -0.2, velocity=(4.5, -0.7)),
+        }
+
+
+def _turned(scene: Scene, gamma: float, tilt: float, **motion: Any) -> Scene:
+    """A scene that starts at the angle ``gamma``, with the axis of its cylinder tilted, both in rad."""
+    (element,) = scene.elements
+    assert isinstance(element, BallOnSurface)
+    start = dataclasses.replace(element.start, coordinates=(gamma, 0.1), **motion)
+    return changed(scene, start=start, surface=dataclasses.replace(element.surface, tilt=tilt))
+
 
 def _check_names(found: BallTables, where: str) -> None:
     """Contacts and initial motions name what there is.
@@ -94,3 +114,9 @@ def _check_names(found: BallTables, where: str) -> None:
                 named = getattr(item, key, None)
                 if named is not None and named not in known:
                     raise InputError(f"{where}: {kind}.{index}.{key}", named, f"choose one of {', '.join(known)}")
+    for index, contact in enumerate(found.contacts):
+        ball, wall = found.balls[balls.index(contact.body)], found.surfaces[surfaces.index(contact.surface)]
+        try:
+            wall.offset(ball.radius)
+        except InputError as error:
+            raise error.within(f"{where}: contacts.{index}", contact.body) from None

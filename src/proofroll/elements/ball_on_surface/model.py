@@ -3,13 +3,14 @@
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from enum import StrEnum
 from typing import Literal
 
 import numpy as np
 
 from proofroll.core.arrays import FloatArray
+from proofroll.core.bounds import OutOfBounds, bounded
 from proofroll.elements.ball_on_surface.surfaces import Surface
 
 
@@ -40,10 +41,19 @@ class Ball:
     """
 
     name: str
-    radius: float
-    mass: float
-    inertia_ratio: float = 0.4
+    radius: float = field(metadata={"unit": "m"})
+    mass: float = field(metadata={"unit": "kg"})
+    inertia_ratio: float = field(default=0.4, metadata={"unit": "1"})
     shape: Literal["ball"] = "ball"
+
+    def __post_init__(self) -> None:
+        """Refuses what no ball has.
+
+        Raises:
+            OutOfBounds: a radius, mass or inertia that is not positive and finite.
+        """
+        for name in ("radius", "mass", "inertia_ratio"):
+            bounded(name, getattr(self, name), above=0)
 
     @property
     def inertia(self) -> float:
@@ -63,9 +73,23 @@ class Contact:
 
     body: str
     surface: str
-    rolling_resistance: float = 0.0
-    mu_static: float = math.inf
-    mu_kinetic: float = math.inf
+    rolling_resistance: float = field(default=0.0, metadata={"unit": "m"})
+    mu_static: float = field(default=math.inf, metadata={"unit": "1"})
+    mu_kinetic: float = field(default=math.inf, metadata={"unit": "1"})
+
+    def __post_init__(self) -> None:
+        """Refuses what is no law of contact.
+
+        Raises:
+            OutOfBounds: a negative number, or more friction while slipping than while sticking.
+        """
+        bounded("rolling_resistance", self.rolling_resistance, at_least=0)
+        bounded("mu_static", self.mu_static, at_least=0, unbounded=True)
+        bounded("mu_kinetic", self.mu_kinetic, at_least=0, unbounded=True)
+        if self.mu_kinetic > self.mu_static:
+            raise OutOfBounds(
+                "mu_kinetic", self.mu_kinetic, f"the value must be at most mu_static = {self.mu_static:g}"
+            )
 
 
 @dataclass(frozen=True)
@@ -80,8 +104,19 @@ class InitialMotion:
 
     body: str
     coordinates: tuple[float, float] = (0.0, 0.0)
-    velocity: tuple[float, float] = (0.0, 0.0)
-    spin: float = 0.0
+    velocity: tuple[float, float] = field(default=(0.0, 0.0), metadata={"unit": "m/s"})
+    spin: float = field(default=0.0, metadata={"unit": "rad/s"})
+
+    def __post_init__(self) -> None:
+        """Refuses what is no number.
+
+        Raises:
+            OutOfBounds: a value that is not finite.
+        """
+        for name in ("coordinates", "velocity"):
+            for value in getattr(self, name):
+                bounded(name, value)
+        bounded("spin", self.spin)
 
 
 @dataclass(frozen=True)

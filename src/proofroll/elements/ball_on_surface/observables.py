@@ -7,6 +7,7 @@ from __future__ import annotations
 
 import itertools
 import math
+from collections.abc import Iterable
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -28,6 +29,8 @@ _DEGREE = 7
 _LEAST = 1e-2
 # The ends of an interpolating spline's derivative are worse than its middle; the audit leaves them out.
 _ENDS = 5
+# Steps in which the turning from one sample to the next is integrated.
+_SUBSTEPS = 16
 
 
 def table(body: RollingBall) -> tuple[Observable, ...]:
@@ -67,6 +70,7 @@ def table(body: RollingBall) -> tuple[Observable, ...]:
         Observable("needed_friction", "1", "friction needed, |F|/N", Role.REACTION, "|F|/N", floor=_LEAST),
         residual("energy_balance", "J", "energy that is not accounted for", energy),
         residual("force_audit", "N", "reported minus recomputed contact force", force, asked_for=False),
+        residual("rate_audit", "m/s", "velocities minus the rates of position and attitude", speed, asked_for=False),
         residual("gap", "m", "distance of the ball from the wall", a),
         # Without a bound on friction nothing slips; with one the true ball does, and is followed.
         Observable(
@@ -87,8 +91,8 @@ def observe(body: RollingBall, dataset: xr.Dataset) -> dict[str, FloatArray]:
     """All observables that a run allows, by name; what the engine cannot say is absent.
 
     Coordinates of the surface as they are; ``N``, ``F2``, ``F3`` [N] and ``needed_friction`` [-] without time 0, where
-    the certificate judges reactions; ``energy_balance`` [J], ``gap`` [m], ``slip`` [m/s] and ``force_audit`` [N], which
-    are zero for a perfect run. With bounded friction ``slip`` is not zero; ``creep`` [m] is, the way slipped while
+    the certificate judges reactions; ``energy_balance`` [J], ``gap`` [m], ``slip`` [m/s] and ``force_audit`` [N]
+    and ``rate_audit`` [m/s], which are zero for a perfect run. With bounded friction ``slip`` is not zero; ``creep`` [m] is, the way slipped while
     sticking, and ``first_slip`` [s] is one value, or none if the ball never slips.
     """
     curves = {name: dataset[name].to_numpy() for name in body.surface.coordinates}
@@ -103,6 +107,9 @@ def observe(body: RollingBall, dataset: xr.Dataset) -> dict[str, FloatArray]:
             audited = force_audit(body, dataset)
             if audited.size:
                 curves["force_audit"] = audited
+        rates = rate_audit(body, dataset)
+        if rates.size:
+            curves["rate_audit"] = rates
     if "sticking" in dataset:
         events = events_of(dataset)
         curves["first_slip"] = np.array([event.time for event in events if event.kind == "slip"][:1])
@@ -129,15 +136,18 @@ def scales(body: RollingBall, truth: xr.Dataset) -> dict[str, float]:
     sizes = {name: float(np.ptp(truth[name].to_numpy())) for name in body.surface.coordinates}
     sizes |= dict.fromkeys(("N", "F2", "F3", "force_audit"), normal)
     sizes["needed_friction"] = float(np.max(friction[np.isfinite(friction)], initial=0.0))
-    return sizes | {"energy_balance": kinetic, "slip": speed, "gap": body.ball.radius, "creep": body.ball.radius}
+    sizes |= dict.fromkeys(("slip", "rate_audit"), speed)
+    return sizes | {"energy_balance": kinetic, "gap": body.ball.radius, "creep": body.ball.radius}
 
 
 def energy_balance(body: RollingBall, dataset: xr.Dataset) -> FloatArray:
     """Energy now plus what resistance and friction took, minus the energy at the start [J], shape (time,).
 
     Rolling resistance takes -M · ω from the ball per second (N f V / a while it rolls), friction -F · u; N, F, ω, V
-    and the slip u are the engine's own.
+    and the slip u are the engine's own. Where there is no force at time 0, work counts from the first sample that has
+    one; shape (time - 1,) then.
     """
+    dataset = _with_forces(dataset)
     balance = dataset["energy"].to_numpy() - float(dataset["energy"][0])
     t, f = dataset["time"].to_numpy(), body.contact.rolling_resistance
     bounded = "sticking" in dataset
@@ -164,14 +174,38 @@ def force_audit(body: RollingBall, dataset: xr.Dataset) -> FloatArray:
     Newton's law along e1, e2, e3 with the acceleration from the engine's own motion: the rates of the surface
     coordinates are differentiated (they turn slowly, unlike the world components), the rest is geometry. Forces jump
     where slip begins or ends, so each stretch between events is taken by itself, without its first and last samples;
-    stretches of few samples are left out.
+    stretches of few samples are left out. That the rates are those of the positions, :func:`rate_audit` says.
     """
+    return _joined(_audited(body, stretch) for stretch in _stretches(_with_forces(dataset)))
+
+
+def rate_audit(body: RollingBall, dataset: xr.Dataset) -> FloatArray:
+    """By how much the velocities are not the rates of the positions, in stretches as :func:`force_audit` [m/s].
+
+    At every sample v against the derivative of the positions, and, where there is an orientation, the radius times ω
+    against its rate; at samples off the grid (:func:`recording.off_grid`) their velocity and, over the time
+    from the nearest sample, their position against the curve through the samples on it.
+    """
+    return _joined(_rates_audited(body, stretch) for stretch in _stretches(dataset))
+
+
+def _with_forces(dataset: xr.Dataset) -> xr.Dataset:
+    """Without time 0 if the engine defines reactions only after a first step."""
+    late = "N" in dataset and bool(np.isnan(dataset["N"][0]))
+    return dataset.isel(time=slice(1, None)) if late else dataset
+
+
+def _joined(audited: Iterable[FloatArray]) -> FloatArray:
+    return np.concatenate([np.zeros(0), *audited])
+
+
+def _stretches(dataset: xr.Dataset) -> list[xr.Dataset]:
+    """The samples between events, where they are enough for the splines."""
     t = dataset["time"].to_numpy()
     inner = [event.time for event in events_of(dataset)]
     cuts = [0, *np.searchsorted(t, inner).tolist(), len(t)]
     stretches = [dataset.isel(time=slice(start, end)) for start, end in itertools.pairwise(cuts)]
-    audited = [_audited(body, stretch) for stretch in stretches if stretch.sizes["time"] > _DEGREE + 2 * _ENDS]
-    return np.concatenate(audited) if audited else np.zeros(0)
+    return [stretch for stretch in stretches if stretch.sizes["time"] > _DEGREE + 2 * _ENDS]
 
 
 def _audited(body: RollingBall, dataset: xr.Dataset) -> FloatArray:
@@ -188,3 +222,50 @@ def _audited(body: RollingBall, dataset: xr.Dataset) -> FloatArray:
     local = np.einsum("tij,ti->tj", surface.frame(u), force) * [-1.0, 1.0, 1.0]
     reported = np.stack([dataset[name].to_numpy() for name in ("N", "F2", "F3")], axis=-1)
     return np.asarray(np.max(np.abs(reported - local), axis=-1)[_ENDS:-_ENDS])
+
+
+def _rates_audited(body: RollingBall, dataset: xr.Dataset) -> FloatArray:
+    """The audit of the rates of a stretch without events: on the grid, then off it."""
+    from scipy.interpolate import make_interp_spline
+
+    surface, t = body.surface, dataset["time"].to_numpy()
+    u = np.stack([dataset[name].to_numpy() for name in surface.coordinates], axis=-1)
+    curve = make_interp_spline(t, u, k=_DEGREE)
+    rate = curve.derivative()
+
+    def apart(times: FloatArray, v_WB: FloatArray) -> FloatArray:
+        moving = np.einsum("tij,tj->ti", surface.tangents(curve(times)), rate(times))
+        along = np.einsum("tij,ti->tj", surface.frame(curve(times))[..., 1:], v_WB - moving)
+        return np.asarray(np.linalg.norm(along, axis=-1))
+
+    found = apart(t, dataset["v_WB"].to_numpy())[_ENDS:-_ENDS]
+    if "q_WB" in dataset:
+        turned = body.ball.radius * _turning_apart(t, dataset["q_WB"].to_numpy(), dataset["w_WB"].to_numpy())
+        found = np.maximum(found, turned[_ENDS : len(t) - _ENDS])
+    if "between" not in dataset:
+        return found
+    between = dataset["between"].to_numpy()
+    inside = (between > t[_ENDS]) & (between < t[-1 - _ENDS])
+    times, p, v = between[inside], dataset["p_between"].to_numpy()[inside], dataset["v_between"].to_numpy()[inside]
+    # Along the wall: how far off it the ball is, is the gap's business.
+    away = surface.position(surface.locate(p)) - surface.position(curve(times))
+    since = np.min(np.abs(times[:, None] - t), axis=1, initial=np.inf)
+    return np.concatenate([found, np.maximum(apart(times, v), np.linalg.norm(away, axis=-1) / since)])
+
+
+def _turning_apart(t: FloatArray, q_WB: FloatArray, w_WB: FloatArray) -> FloatArray:
+    """Mean difference of ω and the rate of the orientation between each two samples [rad/s], shape (time - 1,).
+
+    The ball may turn more than once from sample to sample, so ω is integrated, by Magnus steps of fourth order
+    (Blanes, Casas, Oteo & Ros, Phys. Rep. 470, 2009, section 5.4).
+    """
+    from scipy.interpolate import make_interp_spline
+    from scipy.spatial.transform import Rotation
+
+    spin, h = make_interp_spline(t, w_WB, k=_DEGREE), np.diff(t)[:, None] / _SUBSTEPS
+    attitude = Rotation.from_quat(q_WB, scalar_first=True)
+    turned = attitude[:-1]
+    for step in range(_SUBSTEPS):
+        one, two = (spin(t[:-1] + ((step + 0.5 + side / math.sqrt(12)) * h[:, 0])) for side in (-1, 1))
+        turned = Rotation.from_rotvec(h * (one + two) / 2 - math.sqrt(3) / 12 * h**2 * np.cross(one, two)) * turned
+    return np.asarray((attitude[1:] * turned.inv()).magnitude() / np.diff(t))

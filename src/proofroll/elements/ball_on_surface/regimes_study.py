@@ -3,8 +3,9 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
+from functools import partial
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -12,9 +13,15 @@ from pydantic import ConfigDict, TypeAdapter, ValidationError
 
 from proofroll.core.arrays import FloatArray
 from proofroll.core.errors import InputError
+from proofroll.core.scene import Scene
+from proofroll.elements.ball_on_surface.element import rolling_ball
+from proofroll.elements.ball_on_surface.model import RollingBall
 from proofroll.files.scene_file import load_scene
 from proofroll.files.toml import study_file
 from proofroll.files.validation import first_problem
+from proofroll.running.in_processes import in_processes
+from proofroll.truth.regimes import Regime, analytic_boundaries, classify
+from proofroll.truth.variants import at_speed, with_contact
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -102,8 +109,6 @@ def regime_maps(study: RegimesStudy, workers: int, progress: Callable[[int], Non
         workers: processes at once.
         progress: called with the number of runs just finished.
     """
-    from proofroll.truth.regimes import regime_map
-
     scenes = [load_scene(study.scene, rolling_resistance=f) for f in study.rolling_resistance]
     key = study, "".join(scene.digest for scene in scenes)
     if key not in _MADE:
@@ -112,6 +117,66 @@ def regime_maps(study: RegimesStudy, workers: int, progress: Callable[[int], Non
             regime_map(scene, *axes, until=study.until, workers=workers, progress=progress) for scene in scenes
         ]
     return _MADE[key]
+
+
+def regime_map(
+    scene: Scene,
+    speeds: Sequence[float] | FloatArray,
+    frictions: Sequence[float] | FloatArray,
+    *,
+    until: float = 4.0,
+    workers: int = 1,
+    progress: Callable[[int], None] | None = None,
+) -> xr.Dataset:
+    """The map over initial speed × static friction; the ratio μk/μs is the scene's (1 where it has no bound).
+
+    Args:
+        scene: one ball on one surface; its other parameters are kept.
+        speeds: of the centre [m/s], shape (n,).
+        frictions: μs [-], shape (m,).
+        until: length of each run [s].
+        workers: number of processes; 1 runs in this one.
+        progress: called with the number of runs just finished.
+
+    Returns:
+        Dataset with dims ``speed``, ``mu_static``: ``regime`` (:class:`Regime`), ``slips`` (count), ``first_slip``
+        [s, nan: never]; and per speed, where :func:`analytic_boundaries` knows them, ``mu_falls`` and ``mu_slips``.
+    """
+    import xarray as xr
+
+    body = rolling_ball(scene)
+    mus = np.asarray(frictions, dtype=np.float64)
+    rows = []
+    for values in in_processes(partial(_row, body, mus, until), [float(speed) for speed in speeds], workers):
+        rows.append(values)
+        if progress is not None:
+            progress(len(mus))
+    regime, slips, first = np.moveaxis(np.array(rows).reshape(len(rows), len(mus), 3), -1, 0)
+    dims = ("speed", "mu_static")
+    meaning = ", ".join(f"{item.value}: {item.name.lower().replace('_', ' ')}" for item in Regime)
+    result = xr.Dataset(
+        {
+            "regime": (dims, regime.astype(np.int8), {"units": "1", "long_name": meaning}),
+            "slips": (dims, slips.astype(np.int64), {"units": "1", "long_name": "how often a slip began"}),
+            "first_slip": (dims, first, {"units": "s", "long_name": "time of the first slip"}),
+        },
+        coords={
+            "speed": ("speed", np.asarray(speeds, dtype=np.float64), {"units": "m/s"}),
+            "mu_static": ("mu_static", mus, {"units": "1"}),
+        },
+        attrs={"scene": scene.name, "until": until, "rolling_resistance": body.contact.rolling_resistance},
+    )
+    bounds = analytic_boundaries(body, result["speed"].to_numpy())
+    if bounds is not None:
+        falls, slipping = bounds
+        result["mu_falls"] = ("speed", falls, {"units": "1", "long_name": "below: falls, without rolling resistance"})
+        result["mu_slips"] = ("speed", slipping, {"units": "1", "long_name": "above: never slips, without resistance"})
+    return result
+
+
+def _row(body: RollingBall, mus: FloatArray, until: float, speed: float) -> list[tuple[float, float, float]]:
+    here = at_speed(body, speed)
+    return [classify(with_contact(here, mu_static=float(mu)), until) for mu in mus]
 
 
 for _typed in (RegimesStudy, EvenValues):

@@ -14,13 +14,16 @@ Array arguments may carry leading dimensions (``...``), e.g. time.
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from functools import cached_property, lru_cache
 from typing import Literal, Protocol
 
 import numpy as np
 import numpy.typing as npt
 from scipy.spatial.transform import Rotation
+
+from proofroll.core.bounds import bounded
+from proofroll.core.errors import InputError
 
 FloatArray = npt.NDArray[np.float64]
 
@@ -127,13 +130,22 @@ class Cylinder:
     """
 
     name: str
-    radius: float
-    tilt: float = 0.0
+    radius: float = field(metadata={"unit": "m"})
+    tilt: float = field(default=0.0, metadata={"unit": "rad"})
     kind: Literal["cylinder"] = "cylinder"
 
     coordinates = ("gamma", "z")
     units = ("rad", "m")
     periods = (2 * np.pi, None)
+
+    def __post_init__(self) -> None:
+        """Refuses what is no cylinder.
+
+        Raises:
+            OutOfBounds: a radius that is not positive, or a number that is not finite.
+        """
+        bounded("radius", self.radius, above=0)
+        bounded("tilt", self.tilt)
 
     @property
     def length_scales(self) -> tuple[float, float]:
@@ -148,6 +160,8 @@ class Cylinder:
 
     def offset(self, ball_radius: float) -> Cylinder:
         """See :class:`Surface`."""
+        if not ball_radius < self.radius:
+            raise InputError("radius", ball_radius, f"the ball must be smaller than {self.name} with {self.radius:g} m")
         return Cylinder(self.name, self.radius - ball_radius, self.tilt)
 
     def position(self, u: npt.ArrayLike) -> FloatArray:
@@ -295,14 +309,23 @@ class Plane:
     """
 
     name: str
-    tilt: float = 0.0
-    height: float = 0.0
+    tilt: float = field(default=0.0, metadata={"unit": "rad"})
+    height: float = field(default=0.0, metadata={"unit": "m"})
     kind: Literal["plane"] = "plane"
 
     coordinates = ("down", "across")
     units = ("m", "m")
     periods = (None, None)
     length_scales = (1.0, 1.0)
+
+    def __post_init__(self) -> None:
+        """Refuses what is no plane.
+
+        Raises:
+            OutOfBounds: a number that is not finite.
+        """
+        bounded("tilt", self.tilt)
+        bounded("height", self.height)
 
     @property
     def generators(self) -> tuple[Generator, Generator]:

@@ -72,16 +72,14 @@ def force_function(body: RollingBall, local: LocalGeometry, friction: Sliding | 
 
 
 def _summed(constant: list[float], quadratic: list[tuple[int, int, int, float]]) -> Callable[..., list[float]]:
-    """A function of the rates: a constant in each row, and the quadratic terms.
+    """A function of the rates: a constant in each row, and the quadratic terms, of which a cylinder has four."""
 
-    Its numbers are written into its source, as they are found at run time: a loop over the terms takes as long as all
-    that Exudyn does in a step.
-    """
-    rows = [[repr(value)] for value in constant]
-    for row, i, j, factor in quadratic:
-        rows[row].append(f"{factor!r} * q{i} * q{j}")
-    arguments, sums = ", ".join(f"q{i}" for i in range(SIZE)), ", ".join(" + ".join(row) for row in rows)
-    function: Callable[..., list[float]] = eval(f"lambda {arguments}: [{sums}]", {})  # numbers of our own alone
+    def function(*rates: float) -> list[float]:
+        rows = constant[:]
+        for row, i, j, factor in quadratic:
+            rows[row] += factor * rates[i] * rates[j]
+        return rows
+
     return function
 
 

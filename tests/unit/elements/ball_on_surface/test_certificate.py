@@ -6,9 +6,10 @@ from typing import Any
 import numpy as np
 import pytest
 
-from proofroll.core.certificate import EXACT, Line, certify, first_difference
+from proofroll.core.certificate import EXACT, Line, Standing, certify, first_difference, not_reported
 from proofroll.core.engine import Built, Regularised, Sample
 from proofroll.core.scene import Scene
+from proofroll.elements.ball_on_surface.certificate import CAPS, another_scene
 from proofroll.elements.ball_on_surface.element import rolling_ball
 from proofroll.elements.ball_on_surface.mechanics import (
     initial_angular_acceleration,
@@ -46,15 +47,16 @@ class Stub:
 
 
 ALL = [
-    "mass", "inertia", "gravity", "ball radius", "rolling resistance", "position", "gap", "velocity", "spin", "slip",
-    "acceleration", "N", "F2", "F3",
+    "mass", "inertia", "gravity", "ball radius", "rolling resistance", "position", "gap", "gap in the engine",
+    "velocity", "spin", "slip", "acceleration", "angular acceleration", "N", "F2", "F3",
 ]  # fmt: skip
 
 
 def test_the_scene_itself_is_certified(scene: Scene) -> None:
-    """An engine that built what the scene says passes in every quantity."""
+    """An engine that built what the scene says passes in every quantity, and what it does not say is named."""
     lines = certify(Stub(scene), scene)
     assert [line.quantity for line in lines] == ALL
+    assert not_reported([line.as_dict() for line in lines]) == ["gap in the engine", "angular acceleration"]
     assert first_difference(lines) is None
 
 
@@ -96,11 +98,15 @@ def test_each_quantity_is_watched(quantity: str, built: dict[str, Any], sample: 
 
 
 def test_a_silent_engine_is_judged_by_its_state_alone() -> None:
-    """What the engine cannot say is left out, not passed and not failed."""
+    """What the engine does not say is listed as not reported: it neither passes nor fails."""
     scene = load_scene("sphere_in_cylinder")
     silent = dict.fromkeys(("mass", "inertia", "gravity", "ball_radius", "rolling_resistance", "acceleration"))
     lines = certify(Stub(scene, {"force": None}, **silent), scene)
-    assert [line.quantity for line in lines] == ["position", "gap", "velocity", "spin", "slip"]
+    assert [line.quantity for line in lines] == ALL
+    told = [line.quantity for line in lines if line.standing is not Standing.NOT_REPORTED]
+    assert told == ["position", "gap", "velocity", "spin", "slip"]
+    assert {line.standing for line in lines if line.quantity in told} == {Standing.HOLDS}
+    assert first_difference(lines) is None
 
 
 def test_a_softened_quantity_has_its_own_tolerance_and_reason() -> None:
@@ -114,6 +120,59 @@ def test_a_softened_quantity_has_its_own_tolerance_and_reason() -> None:
     assert lines["N"].because == "the contact is a spring"
     assert not lines["F3"].holds
     assert lines["F3"].tolerance == EXACT
+
+
+@pytest.mark.parametrize(
+    ("quantity", "built", "sample"),
+    [
+        ("mass", {"mass": 2 * 0.517}, {}),
+        ("inertia", {"inertia": np.full(3, 2 * BODY.ball.inertia)}, {}),
+        ("gravity", {"gravity": 1.5 * BODY.gravity}, {}),
+        ("ball radius", {"ball_radius": 0.026}, {}),
+        ("position", {}, {"p_WB": BODY.p0 + np.array([0, 0, 1e-6])}),
+    ],
+)
+def test_what_can_never_be_softened(quantity: str, built: dict[str, Any], sample: dict[str, Any]) -> None:
+    """Mass, inertia, gravity, radius and position along the wall differ, whatever softness the engine declares."""
+    scene = load_scene("sphere_in_cylinder")
+    soft = {quantity: Regularised(1e3, "we soften everything")}
+    sentence = first_difference(certify(Stub(scene, sample, regularised=soft, **built), scene))
+    assert sentence is not None
+    assert f"differs from the scene: {quantity} is" in sentence
+    assert "cannot be softened" in sentence
+
+
+def test_depth_in_the_wall_is_the_gap() -> None:
+    """A ball sunk into the wall is where the scene puts it, along the wall; only its gap is soft."""
+    scene = load_scene("sphere_in_cylinder")
+    sunk = Stub(scene, {"p_WB": BODY.p0 + np.array([1e-4, 0, 0])}, regularised={"gap": Regularised(0.01, "a spring")})
+    assert "gap" not in [line.quantity for line in certify(sunk, scene) if not line.holds]
+    assert "position" not in [line.quantity for line in certify(sunk, scene) if not line.holds]
+
+
+@pytest.mark.parametrize("quantity", [name for name in CAPS if not name.startswith("1 / ")])
+def test_softness_is_capped(quantity: str) -> None:
+    """An engine that asks for more softness than any reason explains gets no more than that, with both reasons."""
+    scene = load_scene("sphere_in_cylinder", rolling_resistance=5e-4)
+    soft = {quantity: Regularised(float("inf"), "our model is soft")}
+    turning = initial_angular_acceleration(rolling_ball(scene))
+    stub = Stub(scene, gap=0.0, angular_acceleration=turning, regularised=soft)
+    line = next(line for line in certify(stub, scene) if line.quantity == quantity)
+    assert line.tolerance == CAPS[quantity].tolerance <= 1
+    assert "our model is soft" in line.because
+    assert CAPS[quantity].because in line.because
+
+
+def test_a_number_for_unbounded_friction_is_another_scene_where_more_is_needed() -> None:
+    """A model with a friction of 1 is of another kind where the unbounded scene needs 1.17, and of the same at 0.9."""
+    scene = load_scene("sphere_in_cylinder")
+    soft = {"1 / static friction": Regularised(1.0, "the engine needs a number")}
+    lines = [line.as_dict() for line in certify(Stub(scene, mu_static=1.0, regularised=soft), scene)]
+    assert another_scene(lines, 0.9) is None
+    assert another_scene(lines, 1.17) == ("another scene: a friction of 1, where the scene has no bound and needs 1.17")
+    for mu in (None, np.inf):
+        unbounded = [line.as_dict() for line in certify(Stub(scene, mu_static=mu), scene)]
+        assert another_scene(unbounded, 1.17) is None
 
 
 def test_the_sentence_names_the_first_difference() -> None:

@@ -1,15 +1,21 @@
 from __future__ import annotations
 
+import dataclasses
+
 import numpy as np
 import pytest
 import xarray as xr
+from scipy.spatial.transform import Rotation
 
-from proofroll.core.dataset import observe, scales
+from proofroll.core.dataset import from_samples, observe, scales
+from proofroll.core.engine import Sample
 from proofroll.core.scene import Scene
-from proofroll.elements.ball_on_surface.dataset import variables
+from proofroll.elements.ball_on_surface.dataset import variables, with_samples_between
 from proofroll.elements.ball_on_surface.element import rolling_ball
-from proofroll.elements.ball_on_surface.observables import energy_balance, force_audit
+from proofroll.elements.ball_on_surface.motion import Motion
+from proofroll.elements.ball_on_surface.observables import energy_balance, force_audit, rate_audit
 from proofroll.files.scene_file import load_scene
+from proofroll.running.recording import off_grid
 from proofroll.truth.rolling import reduced
 
 TIMES = np.linspace(0, 0.6, 61)
@@ -76,13 +82,96 @@ def test_force_audit_sees_a_wrong_mass(case: tuple[Scene, xr.Dataset]) -> None:
     assert rolling_ball(scene).ball.mass == 0.517
 
 
+def test_rate_audit_of_the_truth(case: tuple[Scene, xr.Dataset]) -> None:
+    """Velocities of a right motion are the rates of its positions, to what the splines leave."""
+    scene, dataset = case
+    assert largest(rate_audit(rolling_ball(scene), dataset)) < 1e-8
+
+
+def test_rate_audit_sees_a_velocity_of_its_own(case: tuple[Scene, xr.Dataset]) -> None:
+    """A velocity that is not the rate of the position shows by its size, also where it is constant."""
+    scene, dataset = case
+    drifting = dataset.assign(v_WB=dataset["v_WB"] + xr.DataArray([0, 0, 0.01], dims="xyz"))
+    assert rate_audit(rolling_ball(scene), drifting) == pytest.approx(0.01, rel=1e-4)
+
+
+def test_rate_audit_sees_an_error_with_the_period_of_the_grid() -> None:
+    """What is zero at every sample of the grid, and nowhere else, shows at the samples off it."""
+    scene = load_scene("sphere_in_cylinder")
+    times = off_grid(TIMES, None)
+    both = np.union1d(TIMES, times)
+    motion, probed = reduced(rolling_ball(scene), TIMES), reduced(rolling_ball(scene), both)
+    dataset = variables(rolling_ball(scene), TIMES, motion.p_WB, motion.v_WB, motion.w_WB)
+
+    def with_beat(size: float) -> xr.Dataset:
+        samples = {}
+        for t in times.tolist():
+            index = int(np.searchsorted(both, t))
+            beat = np.array([0, 0, size * np.sin(200 * np.pi * t)])
+            samples[t] = Sample(probed.p_WB[index] + beat, probed.v_WB[index], probed.w_WB[index])
+        return with_samples_between(dataset, samples)
+
+    assert largest(rate_audit(rolling_ball(scene), with_beat(0.0))) < 1e-7
+    assert largest(rate_audit(rolling_ball(scene), with_beat(1e-5))) > 1e-5 / 0.005 / 2
+
+
+def test_rate_audit_sees_an_orientation_of_its_own() -> None:
+    """An orientation that turns by 1 % less than ω says shows as 1 % of the radius times ω, several turns a second."""
+    scene = load_scene("sphere_in_cylinder")
+    motion = reduced(rolling_ball(scene), TIMES)
+    fine = np.linspace(0, TIMES[-1], 64 * (len(TIMES) - 1) + 1)
+    spin = reduced(rolling_ball(scene), np.linspace(0, TIMES[-1], 2 * len(fine) - 1)).w_WB[1::2]  # at the middles
+
+    def audited(factor: float) -> float:
+        attitude, found = Rotation.identity(), [Rotation.identity()]
+        for index, (h, w) in enumerate(zip(np.diff(fine), spin, strict=True), 1):
+            attitude = Rotation.from_rotvec(factor * h * w) * attitude
+            if index % 64 == 0:
+                found.append(attitude)
+        q = np.array([one.as_quat(scalar_first=True) for one in found])
+        return largest(
+            rate_audit(
+                rolling_ball(scene),
+                variables(rolling_ball(scene), TIMES, motion.p_WB, motion.v_WB, motion.w_WB, q_WB=q),
+            )
+        )
+
+    turning = 0.025 * largest(np.linalg.norm(motion.w_WB, axis=1))
+    assert audited(1.0) < 1e-5 * turning
+    assert audited(0.99) == pytest.approx(0.01 * turning, rel=0.02)
+
+
+def test_absent_forces_at_time_0_are_left_out(case: tuple[Scene, xr.Dataset]) -> None:
+    """An engine without a force at time 0 alone has the same audits from the first sample on, and its work counts."""
+    scene, whole = case
+    motion = reduced(rolling_ball(scene), TIMES)
+    samples = [Sample(p, v, w, force=f) for p, v, w, f in zip(*vars_of(motion), strict=True)]
+    samples[0] = dataclasses.replace(samples[0], force=None)
+    dataset = from_samples(scene, TIMES, samples)
+    assert np.isnan(dataset["N"][0])
+    assert dataset["N"].to_numpy()[1:] == pytest.approx(whole["N"].to_numpy()[1:], rel=1e-14)
+    lost = float(whole["energy"][0] - whole["energy"][-1])
+    balance = energy_balance(rolling_ball(scene), dataset)
+    assert len(balance) == len(TIMES) - 1
+    assert largest(balance) < 1e-9 * lost
+    assert largest(force_audit(rolling_ball(scene), dataset)) < 1e-6 * float(whole["N"].max())
+    samples[1] = dataclasses.replace(samples[1], force=None)
+    assert "N" not in from_samples(scene, TIMES, samples), "only time 0 may lack a force"
+
+
+def vars_of(motion: Motion) -> tuple[np.ndarray, ...]:
+    """Positions, velocities, spins and forces."""
+    assert motion.force is not None
+    return motion.p_WB, motion.v_WB, motion.w_WB, motion.force
+
+
 def test_observables(case: tuple[Scene, xr.Dataset]) -> None:
     """Every observable has its unit; what is zero by definition is zero for a right run."""
     scene, dataset = case
     curves = observe(scene, dataset)
     assert {name: curve.unit for name, curve in curves.items()} == {
         "gamma": "rad", "z": "m", "N": "N", "F2": "N", "F3": "N", "needed_friction": "1", "gap": "m", "slip": "m/s",
-        "energy_balance": "J", "force_audit": "N",
+        "energy_balance": "J", "force_audit": "N", "rate_audit": "m/s",
     }  # fmt: skip
     assert largest(curves["gap"].values) < 1e-15
     assert largest(curves["slip"].values) < 1e-13
@@ -92,7 +181,7 @@ def test_observables_without_forces(case: tuple[Scene, xr.Dataset]) -> None:
     """An engine that cannot say forces is not judged by them, nor by a balance that would need them."""
     scene, dataset = case
     silent = dataset.drop_vars(["N", "F2", "F3", "needed_friction"])
-    assert set(observe(scene, silent)) == {"gamma", "z", "gap", "slip"}
+    assert set(observe(scene, silent)) == {"gamma", "z", "gap", "slip", "rate_audit"}
     free = rolling_ball(load_scene("sphere_in_cylinder"))
     assert "energy_balance" in observables(free, silent)
 
@@ -102,7 +191,7 @@ def test_observables_of_few_samples(case: tuple[Scene, xr.Dataset]) -> None:
     scene, dataset = case
     curves = observe(scene, dataset.isel(time=slice(0, 10)))
     assert "z" in curves
-    assert not {"energy_balance", "force_audit"} & set(curves)
+    assert not {"energy_balance", "force_audit", "rate_audit"} & set(curves)
 
 
 def test_slip_is_the_length_of_the_slip_velocity(case: tuple[Scene, xr.Dataset]) -> None:

@@ -4,11 +4,17 @@ from __future__ import annotations
 
 from pathlib import Path
 
+import numpy as np
 import pytest
 
 from proofroll.core.errors import InputError
 from proofroll.elements.ball_on_surface import regimes_study
-from proofroll.elements.ball_on_surface.regimes_study import load_regimes, regime_maps
+from proofroll.elements.ball_on_surface.regimes_study import load_regimes, regime_map, regime_maps
+from proofroll.files.scene_file import load_scene
+from proofroll.truth import taylor
+from proofroll.truth.regimes import Regime
+
+slow = pytest.mark.skipif(not taylor.available(), reason="a map takes minutes without heyoka")
 
 TEXT = """
 study = "regimes"
@@ -75,3 +81,25 @@ def test_maps_are_made_once(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> 
     assert sum(runs) == study.runs
     assert regime_maps(load_regimes(written(tmp_path)), 1, runs.append) is first
     assert sum(runs) == study.runs
+
+
+@slow
+def test_map_follows_the_analytic_boundaries() -> None:
+    """Without resistance every point of the map lies where g c/V0² and (12/7) g c/V0² say, and progress adds up."""
+    done: list[int] = []
+    speeds, mus = np.linspace(1.5, 6, 12), np.linspace(0.02, 0.9, 15)
+    result = regime_map(load_scene("sphere_in_cylinder"), speeds, mus, progress=done.append)
+    boundary = 9.81 * 0.2 / speeds[:, None] ** 2
+    expected = np.where(mus < boundary, Regime.FALLS, np.where(mus < 12 / 7 * boundary, Regime.RECOVERS, 0))
+    np.testing.assert_array_equal(result.regime, expected)
+    np.testing.assert_allclose(result.mu_slips, 12 / 7 * result.mu_falls)
+    assert sum(done) == 12 * 15
+    assert np.array_equal(np.isnan(result.first_slip), result.regime == Regime.NEVER_SLIPS)
+
+
+@slow
+def test_processes_change_nothing() -> None:
+    """Two processes give the map that one gives."""
+    scene = load_scene("sphere_in_cylinder", rolling_resistance=5e-4)
+    one, two = (regime_map(scene, [2.0, 4.0], [0.1, 0.35], workers=workers) for workers in (1, 2))
+    assert one.identical(two)

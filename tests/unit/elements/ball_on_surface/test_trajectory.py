@@ -6,6 +6,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 import xarray as xr
+from scipy.io import netcdf_file
 
 from proofroll.core.dataset import from_samples
 from proofroll.core.engine import Sample
@@ -15,7 +16,7 @@ from proofroll.core.truth import truth
 from proofroll.elements.ball_on_surface.closed_form import closed_form
 from proofroll.elements.ball_on_surface.dataset import variables
 from proofroll.elements.ball_on_surface.element import changed, rolling_ball
-from proofroll.files.netcdf import read, write
+from proofroll.files.netcdf import read, read_some, write
 from proofroll.files.scene_file import load_scene
 
 
@@ -159,11 +160,43 @@ def test_a_dimension_without_entries_is_kept(tmp_path: Path) -> None:
 
 
 def test_others_read_the_same_from_the_file(tmp_path: Path) -> None:
-    """What is read back is what xarray's own reader of netCDF finds, to the types of the values."""
-    write(truth(load_scene("sphere_in_cylinder", mu_static=0.15), np.linspace(0, 0.5, 11)), tmp_path / "x.nc")
-    found, theirs = read(tmp_path / "x.nc"), xr.load_dataset(tmp_path / "x.nc", engine="h5netcdf")
-    assert "event_kind" in theirs
-    xr.testing.assert_identical(found, theirs)
-    assert {name: found[name].dtype for name in found.variables} == {
-        name: theirs[name].dtype for name in found.variables
-    }
+    """The numbers in the file, as another reader of netCDF-3 finds them, are those of the dataset to the last bit."""
+    dataset = truth(load_scene("sphere_in_cylinder", mu_static=0.15), np.linspace(0, 0.5, 11))
+    write(dataset, tmp_path / "x.nc")
+    with netcdf_file(tmp_path / "x.nc", mmap=False) as file:
+        assert "event_kind" in file.variables
+        for name, item in dataset.variables.items():
+            if item.dtype.kind == "f":
+                assert file.variables[name][...].astype(float).tobytes() == item.to_numpy().tobytes(), name
+                assert file.variables[name].units == item.attrs["units"].encode()
+
+
+def test_every_number_comes_back(tmp_path: Path) -> None:
+    """The smallest, the largest and what is no number come back as they were, and truth values stay such."""
+    values = np.array([5e-324, -0.0, 1.7976931348623157e308, np.nan, -np.inf, 0.1, 9.969209968386869e36])
+    dataset = xr.Dataset({"x": ("time", values), "sticking": ("time", values > 0)}, attrs={"bar": 5e-324})
+    write(dataset, tmp_path / "x.nc")
+    found = read(tmp_path / "x.nc")
+    assert found["x"].to_numpy().tobytes() == values.tobytes()
+    assert found["sticking"].dtype == bool
+    xr.testing.assert_identical(found, dataset)
+
+
+def test_some_variables_are_read_as_all_are(tmp_path: Path) -> None:
+    """A part of a file is what the whole has there, texts too; what the file has not is left out."""
+    dataset = truth(load_scene("sphere_in_cylinder", mu_static=0.15), np.linspace(0, 0.5, 11))
+    write(dataset, tmp_path / "x.nc")
+    found = read_some(tmp_path / "x.nc", ["p_WB", "event_kind", "event_time", "absent"])
+    assert found.keys() == {"p_WB", "event_kind", "event_time"}
+    for name, values in found.items():
+        assert values.tolist() == dataset[name].to_numpy().tolist()
+        assert values.dtype.isnative
+    write(dataset.isel(event=slice(0, 0)), tmp_path / "y.nc")
+    assert read_some(tmp_path / "y.nc", ["event_kind"])["event_kind"].tolist() == []
+
+
+def test_another_file_is_no_trajectory(tmp_path: Path) -> None:
+    """What is no netCDF-3 says so in a line."""
+    (tmp_path / "x.nc").write_bytes(b"something else")
+    with pytest.raises(ValueError, match="is no netCDF-3"):
+        read(tmp_path / "x.nc")

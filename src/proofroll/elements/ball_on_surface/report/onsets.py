@@ -10,7 +10,7 @@ from proofroll.core.events import Event, events_of
 from proofroll.elements.ball_on_surface.element import rolling_ball
 from proofroll.elements.ball_on_surface.onset_study import onset_verdict as judged_onset
 from proofroll.files.json_data import plain
-from proofroll.report.plots import stored
+from proofroll.files.netcdf import read_some
 from proofroll.truth.onset import Onset
 
 if TYPE_CHECKING:
@@ -91,9 +91,8 @@ def first_slip(events: list[dict[str, Any]]) -> dict[str, Any] | None:
 
 def _events(path: Path) -> list[Event]:
     """The events of a stored trajectory, without the rest of it."""
-    columns = stored(path, [f"event_{name}" for name in ("kind", "time", "low", "high")])
+    columns = read_some(path, [f"event_{name}" for name in ("kind", "time", "low", "high")])
     if not columns:
         return []
     kinds, *times = (values.tolist() for values in columns.values())
-    words = [kind.decode() if isinstance(kind, bytes) else kind for kind in kinds]
-    return [Event(*row) for row in zip(words, *times, strict=True)]
+    return [Event(*row) for row in zip(kinds, *times, strict=True)]

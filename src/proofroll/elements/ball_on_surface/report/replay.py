@@ -14,10 +14,10 @@ from proofroll.elements.ball_on_surface.model import RollingBall
 from proofroll.elements.ball_on_surface.report.poses import NEEDED, Poses, Sampled, frame_times, poses
 from proofroll.elements.ball_on_surface.report.wall import middle, wall
 from proofroll.files.json_data import plain
+from proofroll.files.netcdf import read_some
 from proofroll.files.scene_file import load_scene
 from proofroll.report.comparison_content import by_row, outcome_content
 from proofroll.report.labels import names, symbol, unit
-from proofroll.report.plots import stored
 from proofroll.report.replay_library import packed, thinned, three
 from proofroll.report.styles import styles
 from proofroll.running.case import Case, Status
@@ -97,7 +97,7 @@ def _case(
     scene = load_scene(case.scene, **case.parameters)
     body = rolling_ball(scene)
     coordinates = body.surface.coordinates
-    sampled = stored(store.trajectory(case), [*NEEDED, *coordinates])
+    sampled = read_some(store.trajectory(case), [*NEEDED, *coordinates])
     # The comparison that has most to show at this point names the case.
     title = max(shared, key=lambda pair: len(_runs(pair[0], pair[1], store)))[0].comparison.title
     ghosts = _chosen(
@@ -112,7 +112,7 @@ def _case(
     times = frame_times(sampled)
     true = poses(body, sampled, times, integrate=True)
     drawn = [
-        _reachable(poses(body, stored(_file(ghost.run, store), list(NEEDED)), times), true, body) for ghost in ghosts
+        _reachable(poses(body, read_some(_file(ghost.run, store), list(NEEDED)), times), true, body) for ghost in ghosts
     ]
     u = np.stack([np.interp(times, sampled["time"], sampled[name]) for name in coordinates], axis=1)
     built = wall(body, u)
@@ -188,7 +188,7 @@ def _looks(outcome: Outcome) -> list[tuple[str, int]]:
 def _ghosts(runs: list[tuple[int, Run]], looks: list[tuple[str, int]], true: FloatArray, store: Store) -> list[_Ghost]:
     ghosts = []
     for number, run in runs:
-        path = stored(_file(run, store), ["p_WB"])["p_WB"]
+        path = read_some(_file(run, store), ["p_WB"])["p_WB"]
         count = min(len(path), len(true))  # a run that ended early has fewer samples
         distance = float(np.linalg.norm(path[:count] - true[:count], axis=1).max())
         ghosts.append(_Ghost(run, *looks[number], distance))

@@ -1,0 +1,103 @@
+"""Checks of an engine's motion against the scene and its truth; nothing that the adapter says of itself is believed."""
+
+from __future__ import annotations
+
+import dataclasses
+from functools import cache
+from typing import TYPE_CHECKING
+from unittest import SkipTest
+
+import numpy as np
+
+from proofroll.conformance.subject import Subject, require
+from proofroll.core.arrays import FloatArray
+from proofroll.core.certificate import first_difference
+from proofroll.core.dataset import from_samples, scales
+from proofroll.core.first_steps import MOST, first_steps, softness
+from proofroll.core.observable import Role
+from proofroll.core.plugins import load_element_kinds
+from proofroll.core.scene import Scene
+
+if TYPE_CHECKING:
+    import xarray as xr
+
+# Length of the run [s], and parts of it that are no whole number of any interval at which somebody samples.
+_LENGTH = 0.1
+_PARTS = (2**0.5 - 1, (5**0.5 - 1) / 2, np.pi / 4, 1.0)
+# Largest difference, relative to what gravity does in that time: more, and the ball goes somewhere else.
+_MOST = 0.1
+# An error is at most twice the change from a step to its half; as much again is spared for the terms beyond the first.
+_MARGIN = 4.0
+_ROUND_OFF = 1e-8
+
+
+@cache
+def truth_scenes() -> dict[str, Scene]:
+    """Scenes of every kind of element that show a frame taken for another."""
+    return {name: scene for kind in load_element_kinds() for name, scene in kind.truth_scenes().items()}
+
+
+def first_steps_fit_the_scene(subject: Subject) -> None:
+    """The first acceleration, derived from the first steps, is the scene's, whatever the adapter says or does not."""
+    subject.build()
+    lines = first_steps(subject.engine, subject.scene, subject.settings)
+    if not lines:
+        raise SkipTest("its contact is so soft that its springs move first; the run against the truth judges it")
+    difference = first_difference([dataclasses.replace(line, tolerance=min(line.tolerance, MOST)) for line in lines])
+    require(difference is None, str(difference))
+
+
+def moves_as_the_truth(subject: Subject) -> None:
+    """A short run ends where the truth does, with its velocities and forces; so it does between any two samples."""
+    step = subject.settings.dt if subject.fixed_step else None
+    times = np.array([0.0, *(part * _LENGTH for part in _PARTS)])
+    if step is not None:
+        times = np.unique(np.ceil(times / step - 1e-9)) * step
+    true = _trajectory(subject.scene.digest, tuple(times.tolist()))
+    moved = _moved(subject, times, true)
+    finer = _moved(subject.finer(0.5), times, true) if step is not None else moved
+    soft = softness(subject.build(), subject.scene)
+    sizes = _sizes(subject.scene, times[-1], true)
+    for name, values in moved.items():
+        error, change = (
+            float(np.max(np.abs(values - other))) / sizes[name] for other in (true[name].to_numpy()[1:], finer[name])
+        )
+        # The speed may be many times what gravity adds to it; a tolerance is relative to it.
+        rough = max(_ROUND_OFF, 10 * subject.closeness)
+        allowed = min(_MOST, _MARGIN * change + soft + rough)
+        require(
+            error <= allowed,
+            f"{name} is off by {error:.2g} of what gravity makes of it in {times[-1]:.2g} s, allowed {allowed:.2g}",
+        )
+
+
+def _moved(subject: Subject, times: FloatArray, true: xr.Dataset) -> dict[str, FloatArray]:
+    """State and first reactions of the engine at all times but the first."""
+    engine = subject.build()
+    samples = [engine.sample()]
+    for t in times[1:].tolist():
+        engine.advance(t)
+        samples.append(engine.sample())
+    found = from_samples(subject.scene, times, samples)
+    return {name: found[name].to_numpy()[1:] for name in _sizes(subject.scene, times[-1], true) if name in found}
+
+
+def _sizes(scene: Scene, length: float, true: xr.Dataset) -> dict[str, float]:
+    """What gravity and the like make in that time [s] of each variable that is compared."""
+    found: dict[str, float] = {}
+    for element in scene.elements:
+        start = element.first_motion
+        fall = (start.scale if start else element.length / element.natural_time**2) * length
+        own = {"p_WB": fall * length / 2, "v_WB": fall, "w_WB": fall / element.length}
+        found |= {scene.label(element, name): size for name, size in own.items()}
+    wanted = [name for name, item in scene.observables.items() if item.role == Role.REACTION and item.headline]
+    sizes = scales(scene, true)
+    return {name: size for name, size in (found | {name: sizes[name] for name in wanted}).items() if name in true}
+
+
+@cache
+def _trajectory(digest: str, times: tuple[float, ...]) -> xr.Dataset:
+    """The truth of one of :func:`truth_scenes`, which many engines and presets are held against."""
+    from proofroll.core.truth import truth
+
+    return truth(next(scene for scene in truth_scenes().values() if scene.digest == digest), np.array(times))

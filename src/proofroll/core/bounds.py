@@ -1,0 +1,27 @@
+"""Bounds on the numbers of a model, checked by the model itself, whoever makes it."""
+
+from __future__ import annotations
+
+import math
+
+from proofroll.core.errors import InputError
+
+
+class OutOfBounds(InputError, ValueError):  # noqa: N818 -- says what is wrong, as the other errors do
+    """A number that a model cannot have; a ValueError too, so that pydantic says where in a file it stands."""
+
+
+def bounded(
+    name: str, value: float, *, above: float = -math.inf, at_least: float = -math.inf, unbounded: bool = False
+) -> None:
+    """Refuses a number that is nan, infinite (unless ``unbounded``) or too small.
+
+    Raises:
+        OutOfBounds: with the name of the number.
+    """
+    if math.isnan(value) or (math.isinf(value) and not (unbounded and value > 0)):
+        raise OutOfBounds(name, value, "the value must be a number" + ("" if unbounded else ", and finite"))
+    if not unbounded and value <= above:
+        raise OutOfBounds(name, value, f"the value must be above {above:g}")
+    if value < at_least:
+        raise OutOfBounds(name, value, f"the value must be at least {at_least:g}")

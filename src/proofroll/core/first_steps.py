@@ -1,0 +1,119 @@
+"""The first acceleration of an engine from its own first steps: what an adapter does not say cannot hide it."""
+
+from __future__ import annotations
+
+import contextlib
+import dataclasses
+from typing import Any
+
+import numpy as np
+
+from proofroll.core.arrays import FloatArray
+from proofroll.core.certificate import Line
+from proofroll.core.dataset import sample_of
+from proofroll.core.element import Element, FirstMotion
+from proofroll.core.engine import fixed_step
+from proofroll.core.errors import Diverged, Refused
+from proofroll.core.scene import Scene
+
+# Derivative at the first of equally spaced values, over the spacing: by a parabola, by a cubic.
+_PARABOLA = np.array([-3.0, 4.0, -1.0, 0.0]) / 2
+_CUBIC = np.array([-11.0, 18.0, -9.0, 2.0]) / 6
+# Three times the observed differences, as for every error bar; the rest is what a cubic misses in the part above.
+_MARGIN = 3.0
+_FLOOR = 1e-6
+# Largest relative tolerance: more would excuse a rolling resistance or a damping that was left out or in.
+MOST = 0.03
+# A contact softened by more than this part moves by its springs at first, whatever its force at time 0.
+_SPRINGS = 0.01
+DERIVED = ("acceleration", "angular acceleration")
+
+
+def first_steps(kind: Any, scene: Scene, settings: Any) -> list[Line]:
+    """Certificate lines of the acceleration and angular acceleration at time 0, derived from the first steps.
+
+    Velocities after one, two and three steps give the derivative at time 0 by a parabola and by a cubic; half the step
+    gives it again. Half a step's error of a method of order p is the change over 2^p - 1: that is taken off. What the
+    two polynomials and the two steps differ by is what the derivation does not know; the tolerance is three times that.
+    An engine without a step is looked at after small times. Empty for a ball at rest under rolling resistance, which
+    has no direction yet, and for a contact so soft that its springs move first.
+
+    Raises:
+        Diverged, Refused: by the engine.
+    """
+    built = kind.build(scene, settings)
+    lines = []
+    for index, element in enumerate(scene.elements):
+        start = element.first_motion
+        soft = softness(built, scene)
+        if start is None or soft > _SPRINGS:
+            continue
+        lines += _lines(kind, scene, settings, index, start, soft)
+    return lines
+
+
+def _lines(kind: Any, scene: Scene, settings: Any, index: int, start: FirstMotion, soft: float) -> list[Line]:
+    """Both lines of one element."""
+    element, step = scene.elements[index], fixed_step(settings)
+    h = step or start.moment
+    finer = dataclasses.replace(settings, dt=h / 2) if step else settings
+    (_, coarse), (parabola, fine) = (
+        _derivatives(kind, scene, element, chosen, interval) for chosen, interval in ((settings, h), (finer, h / 2))
+    )
+    found = fine + ((fine - coarse) / (2**settings.order - 1) if step and settings.order else 0.0)
+    unknown = np.abs(fine - coarse) + np.abs(fine - parabola)
+    lines = []
+    for row, (quantity, unit, expected, scale) in enumerate(
+        (
+            (DERIVED[0], "m/s^2", start.acceleration, start.scale),
+            (DERIVED[1], "rad/s^2", start.angular_acceleration, start.scale / element.length),
+        )
+    ):
+        difference, bar = (float(np.max(np.abs(x))) / scale for x in (found[row] - expected, unknown[row]))
+        lines.append(
+            Line(
+                scene.label(element, f"{quantity} of the first steps"),
+                unit,
+                tuple(np.ravel(expected).tolist()),
+                tuple(np.ravel(found[row]).tolist()),
+                difference if np.isfinite(difference) else float("inf"),
+                _MARGIN * bar + _FLOOR + soft,
+                f"derived from velocities after steps of {h:.2g} s and {h / 2:.2g} s",
+            )
+        )
+    return lines
+
+
+def softness(engine: Any, scene: Scene) -> float:
+    """Largest relative difference that a freshly built engine says its model has, as far as there can be one."""
+    built = engine.built()
+    each = [built] if len(scene.elements) == 1 else [built[element.name] for element in scene.elements]
+    found = [0.0]
+    for element, own in zip(scene.elements, each, strict=True):
+        regularised = getattr(own, "regularised", {})
+        found += [soft.tolerance for name, soft in regularised.items() if name in element.softened]
+    return max(found)
+
+
+def derivable(kind: Any, scene: Scene, settings: Any) -> list[Line]:
+    """:func:`first_steps` as far as they tell anything at this step: those with a tolerance of at most :data:`MOST`.
+
+    For an engine that does not report its first acceleration. Empty where it fails: so will its run.
+    """
+    with contextlib.suppress(Diverged, Refused):
+        return [line for line in first_steps(kind, scene, settings) if line.tolerance <= MOST]
+    return []
+
+
+def _derivatives(kind: Any, scene: Scene, element: Element, settings: Any, h: float) -> tuple[FloatArray, FloatArray]:
+    """Accelerations of all bodies' centres and turning at time 0, by a parabola and by a cubic, shape (2, bodies, 3)."""
+    engine = kind.build(scene, settings)
+    samples = [sample_of(scene, element, engine.sample())]
+    for steps in (1, 2, 3):
+        engine.advance(steps * h)
+        samples.append(sample_of(scene, element, engine.sample()))
+    shape = (len(element.bodies), 3)
+    pairs = [[np.reshape(part, shape) for part in (sample.v_WB, sample.w_WB)] for sample in samples]
+    velocities = np.array(pairs)
+    by_parabola, by_cubic = (np.tensordot(weights, velocities, 1) / h for weights in (_PARABOLA, _CUBIC))
+    return by_parabola, by_cubic

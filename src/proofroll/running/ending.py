@@ -1,0 +1,60 @@
+"""A process that ends with the one that started it, however that one ends."""
+
+from __future__ import annotations
+
+import contextlib
+import fcntl
+import multiprocessing
+import os
+import signal
+import threading
+import time
+
+from proofroll.running.memory import descendants
+
+# How often a process looks for its parent [s]; a look costs some microseconds.
+_TICK = 0.25
+
+
+def end_with(parent: int) -> None:
+    """From now on this process ends, with all that it started, soon after ``parent`` has, even in a long computation.
+
+    Args:
+        parent: number of the process that started this one.
+    """
+    threading.Thread(target=_watch, args=(parent,), daemon=True).start()
+
+
+def end_with_pipe(pipe: int) -> None:
+    """From now on the system ends this process and its group as soon as nobody can write into a pipe any more.
+
+    This also holds while an engine that computes in C lets no thread of Python run; only Linux can do it.
+
+    Args:
+        pipe: its end for reading; into the other nobody ever writes.
+    """
+    if hasattr(fcntl, "F_SETSIG"):
+        with contextlib.suppress(OSError):
+            leads = os.getpgrp() == os.getpid()
+            fcntl.fcntl(pipe, fcntl.F_SETOWN, -os.getpid() if leads else os.getpid())
+            fcntl.fcntl(pipe, fcntl.F_SETSIG, signal.SIGKILL)
+            fcntl.fcntl(pipe, fcntl.F_SETFL, fcntl.fcntl(pipe, fcntl.F_GETFL) | os.O_ASYNC)
+
+
+def end_with_pool() -> None:
+    """As :func:`end_with`, for a process of a :class:`concurrent.futures.ProcessPoolExecutor`.
+
+    Such a process waits on a pipe that all of them hold open, and so for ever when their parent is killed.
+    """
+    owner = multiprocessing.parent_process()
+    if owner is not None and owner.pid is not None:
+        end_with(owner.pid)
+
+
+def _watch(parent: int) -> None:
+    while os.getppid() == parent:
+        time.sleep(_TICK)
+    for process in descendants(os.getpid()):
+        with contextlib.suppress(ProcessLookupError, PermissionError):
+            os.kill(process, signal.SIGKILL)
+    os._exit(1)

@@ -1,0 +1,38 @@
+from __future__ import annotations
+
+import io
+import json
+
+import pytest
+from rich.table import Table
+
+from proofroll.report.screen import Screen, escaped, printable
+
+COMMANDS = "\x1b]0;title\x07\x1b[2J\x9b31m\x00\x08\r\x7f\u202e\u2028"
+
+
+def test_text_without_commands() -> None:
+    """Control characters are left out; letters, symbols and line feeds stay."""
+    assert printable(f"γ̇ = 2 rad/s{COMMANDS}\n–") == "γ̇ = 2 rad/s]0;title[2J31m\n–"
+
+
+def test_json_loses_nothing() -> None:
+    """In JSON control characters are numbers, and come back as they were."""
+    text = escaped(json.dumps({"said": COMMANDS}, ensure_ascii=False))
+    assert printable(text) == text
+    assert json.loads(text) == {"said": COMMANDS}
+
+
+@pytest.mark.parametrize("coloured", [True, False])
+def test_a_screen_obeys_its_own_styles_alone(coloured: bool) -> None:
+    """What is shown in a table or a line commands nothing, while the screen's own colours do."""
+    out = io.StringIO()
+    screen = Screen(file=out, force_terminal=coloured, color_system="standard" if coloured else None, width=80)
+    table = Table("engine")
+    table.add_row(COMMANDS, style="red")
+    screen.print(table)
+    screen.print(COMMANDS, markup=False, style="red")
+    shown = out.getvalue()
+    assert ("\x1b[31m" in shown) == coloured
+    for command in ("\x1b]0", "\x1b[2J", "\x9b", "\x07", "\x00", "\r", "\u202e"):
+        assert command not in shown

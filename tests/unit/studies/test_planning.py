@@ -1,0 +1,26 @@
+"""What is refused of a comparison before anything of it runs."""
+
+from __future__ import annotations
+
+import dataclasses
+
+import pytest
+
+from proofroll.core.comparison import Row
+from proofroll.core.errors import InputError
+from proofroll.files.comparison_file import load_comparison
+from proofroll.studies import planning
+
+
+def test_a_wrong_setting_is_found_before_anything_runs(monkeypatch: pytest.MonkeyPatch) -> None:
+    """A setting that does not exist is told with file and row, before the truth looks for the edge of a stair."""
+
+    def ran(*_: object) -> None:
+        raise AssertionError("the truth was run first")
+
+    monkeypatch.setattr(planning, "settled", ran)
+    comparison = load_comparison("stick_slip")
+    rows = [Row(engine, comparison.rows[0].tolerance) for engine in ("projection", "projection[step=1]")]
+    said = r"stick_slip\.toml: rows\.1\.engine = 'projection\[step=1\]'.*no such setting"
+    with pytest.raises(InputError, match=said):
+        planning.plan(dataclasses.replace(comparison, rows=rows))
