@@ -91,9 +91,9 @@ def made(tmp_path_factory: pytest.TempPathFactory) -> tuple[Outcome, Store]:
             judgements = [
                 judge(
                     name,
-                    curve.unit,
-                    curve.values,
-                    expected[name].values,
+                    scene.observables[name].unit,
+                    curve,
+                    expected[name],
                     truth_error_bar=1e-12,
                     tolerance=bounds[name].absolute(sizes[name]),
                     scale=sizes[name],

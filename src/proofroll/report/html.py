@@ -12,6 +12,7 @@ from pathlib import Path
 from types import MappingProxyType
 from typing import TYPE_CHECKING, Any
 
+from proofroll.core.errors import InputError
 from proofroll.files.scene_file import load_scene
 from proofroll.report import labels, study_tables, tables
 from proofroll.report.compression import packed
@@ -63,8 +64,16 @@ def page(
 
 def _marked(comparison: dict[str, Any], curves: list[dict[str, Any]]) -> list[dict[str, Any]]:
     """The curves with what the scene's kind of element marks on them."""
-    kind = kind_of(load_scene(comparison["scene"]))
+    kind = _kind(comparison)
     return curves if kind is None else kind.mark(comparison, curves)
+
+
+def _kind(comparison: dict[str, Any]) -> type[ReportKind] | None:
+    """What shows more of a comparison's scene; None: nothing, or the data are of a scene that is not here."""
+    try:
+        return kind_of(load_scene(comparison["scene"]))
+    except InputError:
+        return None
 
 
 @functools.cache
@@ -114,7 +123,7 @@ def _templates() -> jinja2.Environment:
         "again": _again,
         "further": further,
         "part_kinds": part_kinds(),
-        "kind_of": lambda comparison: kind_of(load_scene(comparison["scene"])),
+        "kind_of": _kind,
     }
     for kind in kinds:
         made.globals |= kind.names
