@@ -14,7 +14,7 @@ CRITERIA = ("stated", "at_most", "below", "above", "order", "events")
 
 
 @dataclass(frozen=True)
-class Planned:
+class PlannedRun:
     """A run that figures and statements refer to.
 
     Attributes:
@@ -27,7 +27,7 @@ class Planned:
 
 
 @dataclass(frozen=True)
-class Level:
+class HorizontalLine:
     """A horizontal line.
 
     Attributes:
@@ -65,7 +65,7 @@ class Panel:
     equal: bool = False
     zero: bool = False
     share: str = ""
-    levels: list[Level] = field(default_factory=list)
+    levels: list[HorizontalLine] = field(default_factory=list)
     events: bool = False
     truth: bool = True
 
@@ -160,7 +160,7 @@ class Figures:
     engine: str
     until: float
     every: float
-    runs: dict[str, Planned]
+    runs: dict[str, PlannedRun]
     figures: list[Figure]
     statements: list[Statement] = field(default_factory=list)
     symbols: dict[str, str] = field(default_factory=dict)
@@ -174,5 +174,5 @@ class Figures:
         return bool((drawn | {item.of for item in self.statements}) & set(ANGLES))
 
 
-for _typed in (Figures, Figure, Panel, Level, Planned, Statement):
+for _typed in (Figures, Figure, Panel, HorizontalLine, PlannedRun, Statement):
     setattr(_typed, "__pydantic_config__", ConfigDict(extra="forbid"))  # noqa: B010 -- the name is pydantic's, not the class's

@@ -13,7 +13,7 @@ import numpy as np
 from blajer_2006 import style
 from blajer_2006.definition import Figure, Panel
 from blajer_2006.quantities import TIME
-from blajer_2006.study import Made, Study
+from blajer_2006.study import FigureRun, FigureRuns
 from proofroll.core.errors import InputError, Missing
 from proofroll.core.events import events_of
 from proofroll.report.svg import element
@@ -44,7 +44,7 @@ def looks() -> Iterator[None]:
         yield
 
 
-def picture(wanted: Figure, study: Study, form: str) -> bytes:
+def picture(wanted: Figure, study: FigureRuns, form: str) -> bytes:
     """A figure with panels as the content of a file.
 
     Args:
@@ -60,7 +60,7 @@ def picture(wanted: Figure, study: Study, form: str) -> bytes:
         return saved(drawn(wanted, study), form, wanted)
 
 
-def inline(wanted: Figure, study: Study, prefix: str) -> str:
+def inline(wanted: Figure, study: FigureRuns, prefix: str) -> str:
     """A figure with panels as an element of a page whose ids begin with ``prefix``."""
     return element(picture(wanted, study, "svg").decode(), prefix)
 
@@ -81,7 +81,7 @@ def saved(figure: Drawn, form: str, wanted: Figure) -> bytes:
     return content.getvalue()
 
 
-def drawn(wanted: Figure, study: Study) -> Drawn:
+def drawn(wanted: Figure, study: FigureRuns) -> Drawn:
     """The figure as a matplotlib figure; call it within :func:`looks`."""
     from matplotlib.figure import Figure as New
 
@@ -117,7 +117,7 @@ def _pad(panel: Panel, named: bool) -> float:
     return 16 if len(panel.runs) > 1 and not panel.events else 4
 
 
-def _panel(axes: Axes, panel: Panel, wanted: Figure, study: Study) -> None:
+def _panel(axes: Axes, panel: Panel, wanted: Figure, study: FigureRuns) -> None:
     number = 0
     until = wanted.until or study.figures.until
     for run in panel.runs:
@@ -173,29 +173,29 @@ def _key(axes: Axes, panel: Panel, curves: int) -> None:
     )  # fmt: skip
 
 
-def _ordinate(panel: Panel, study: Study) -> str:
+def _ordinate(panel: Panel, study: FigureRuns) -> str:
     symbols = ", ".join(dict.fromkeys(_symbol(name, study) for name in panel.y))
     return style.axis_label(panel.label or symbols, study.units[panel.y[0]])
 
 
-def _curve(made: Made, x: str, y: str, until: float) -> tuple[Any, Any] | None:
+def _curve(made: FigureRun, x: str, y: str, until: float) -> tuple[Any, Any] | None:
     across, up = made.curve(x, until), made.curve(y, until)
     return None if across is None or up is None else (across, up)
 
 
-def _label(panel: Panel, run: str, name: str, study: Study) -> str:
+def _label(panel: Panel, run: str, name: str, study: FigureRuns) -> str:
     parts = [_symbol(name, study)] if len(panel.y) > 1 else []
     if len(panel.runs) > 1:
         parts.append(study.figures.runs[run].label)
     return ", ".join(parts)
 
 
-def _symbol(name: str, study: Study) -> str:
+def _symbol(name: str, study: FigureRuns) -> str:
     given = study.figures.symbols.get(name)
     return f"${given}$" if given else name.replace("_", " ")
 
 
-def _events(axes: Axes, made: Made, wanted: Figure, *, named: bool) -> None:
+def _events(axes: Axes, made: FigureRun, wanted: Figure, *, named: bool) -> None:
     """Shades where the ball slips and marks each change; ``named``: with kind and time above the axes."""
     if made.dataset is None:
         return
@@ -213,7 +213,7 @@ def _events(axes: Axes, made: Made, wanted: Figure, *, named: bool) -> None:
             )  # fmt: skip
 
 
-def _legend(figure: Drawn, wanted: Figure, study: Study) -> None:
+def _legend(figure: Drawn, wanted: Figure, study: FigureRuns) -> None:
     """Says once what lines and marks are."""
     from matplotlib.lines import Line2D
 

@@ -14,13 +14,13 @@ import numpy as np
 from blajer_2006.definition import Statement
 from blajer_2006.measures import DEFINITIONS, measured, unit_of
 from blajer_2006.quantities import TIME
-from blajer_2006.study import Made, Study
+from blajer_2006.study import FigureRun, FigureRuns
 from proofroll.core.events import events_of
 
 if TYPE_CHECKING:
     import xarray as xr
 
-Found = float | list[float] | list[str] | None
+Measured = float | list[float] | list[str] | None
 _BOUNDS: dict[str, tuple[str, Callable[[float, float], bool]]] = {
     "at_most": ("≤", operator.le),
     "below": ("<", operator.lt),
@@ -30,7 +30,7 @@ _BOUNDS: dict[str, tuple[str, Callable[[float, float], bool]]] = {
 _HALF = Decimal("0.5") * (1 + Decimal("1e-9"))
 
 
-def judged(study: Study) -> list[dict[str, Any]]:
+def judged(study: FigureRuns) -> list[dict[str, Any]]:
     """One entry for each statement and run, or for each statement about the order of runs.
 
     Each has ``says``, ``source``, ``ours``, ``defined`` (what its measure means), ``because``, ``runs``, ``of``,
@@ -62,7 +62,7 @@ def rounds_to(value: float, stated: str) -> bool:
     return math.isfinite(value) and abs(Decimal(value) - number) <= _HALF.scaleb(exponent)
 
 
-def _entry(study: Study, item: Statement, runs: list[str]) -> dict[str, Any]:
+def _entry(study: FigureRuns, item: Statement, runs: list[str]) -> dict[str, Any]:
     found = _found(item, [study.runs[name] for name in runs])
     why = next(_reasons(study, item, runs), "") if found is None else ""
     return {
@@ -83,7 +83,7 @@ def _entry(study: Study, item: Statement, runs: list[str]) -> dict[str, Any]:
     }
 
 
-def _unit(study: Study, item: Statement) -> str:
+def _unit(study: FigureRuns, item: Statement) -> str:
     if item.event is not None:
         return "s"
     if item.events:
@@ -99,7 +99,7 @@ def _stated(item: Statement) -> str:
     return ", ".join(item.events) or str(getattr(item, criterion))
 
 
-def _found(item: Statement, made: list[Made]) -> Found:
+def _found(item: Statement, made: list[FigureRun]) -> Measured:
     """What the runs give; None where one of them cannot say."""
     values = [_value(item, run) for run in made]
     if item.order:
@@ -108,7 +108,7 @@ def _found(item: Statement, made: list[Made]) -> Found:
     return values[0]
 
 
-def _value(item: Statement, made: Made) -> Found:
+def _value(item: Statement, made: FigureRun) -> Measured:
     if not made.done or made.dataset is None:
         return None
     if item.events or item.event is not None:
@@ -122,7 +122,7 @@ def _value(item: Statement, made: Made) -> Found:
     return measured(item.measure, made.dataset[TIME].to_numpy()[: values.size], values)
 
 
-def _happened(item: Statement, dataset: xr.Dataset) -> Found:
+def _happened(item: Statement, dataset: xr.Dataset) -> Measured:
     """The kinds of the events, or the time [s] of one; nan where it did not happen."""
     if "event_kind" not in dataset:
         return None
@@ -132,7 +132,7 @@ def _happened(item: Statement, dataset: xr.Dataset) -> Found:
     return events[item.event].time if 0 <= item.event < len(events) else math.nan
 
 
-def _holds(item: Statement, found: Found) -> bool:
+def _holds(item: Statement, found: Measured) -> bool:
     (criterion,) = item.criteria
     if isinstance(found, list):
         if criterion == "events":
@@ -145,7 +145,7 @@ def _holds(item: Statement, found: Found) -> bool:
     return _BOUNDS[criterion][1](found, getattr(item, criterion))
 
 
-def _reasons(study: Study, item: Statement, runs: list[str]) -> Iterator[str]:
+def _reasons(study: FigureRuns, item: Statement, runs: list[str]) -> Iterator[str]:
     """Why nothing was found."""
     for name in runs:
         result = study.runs[name].result

@@ -15,7 +15,7 @@ if TYPE_CHECKING:
     import xarray as xr
 
     from blajer_2006.definition import Figures
-    from blajer_2006.study import Study
+    from blajer_2006.study import FigureRuns
     from proofroll.report.study_parts import Tell
     from proofroll.running.runner import Runner
 
@@ -34,7 +34,7 @@ class FiguresPart:
     asked: Figures
     maps: dict[str, list[xr.Dataset]] = field(default_factory=dict)
     """Regime maps by the name of their study."""
-    study: Study | None = None
+    study: FigureRuns | None = None
 
     @classmethod
     def load(cls, path: Path, engines: Sequence[str]) -> FiguresPart:  # noqa: ARG003 -- a file names its own engine

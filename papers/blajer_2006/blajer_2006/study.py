@@ -26,7 +26,7 @@ TRUTH = "truth"
 
 
 @dataclass(frozen=True)
-class Made:
+class FigureRun:
     """One run in one engine.
 
     Attributes:
@@ -57,7 +57,7 @@ class Made:
 
 
 @dataclass(frozen=True)
-class Study:
+class FigureRuns:
     """All runs of a file of figures.
 
     Attributes:
@@ -70,8 +70,8 @@ class Study:
 
     figures: Figures
     facts: EngineFacts
-    runs: dict[str, Made]
-    truths: dict[str, Made]
+    runs: dict[str, FigureRun]
+    truths: dict[str, FigureRun]
     units: dict[str, str]
 
     @property
@@ -98,7 +98,7 @@ def run_figures(
     runner: Runner,
     engine: str | None = None,
     progress: Callable[[Case, Result], None] | None = None,
-) -> Study:
+) -> FigureRuns:
     """Runs every case of a file in one engine and in the truth; what is stored is reused.
 
     Raises:
@@ -119,12 +119,12 @@ def run_figures(
     truths = {name: _case(figures, planned.parameters, truth, ()) for name, planned in figures.runs.items()}
     results = runner.run([*cases.values(), *truths.values()], progress)
 
-    def made(wanted: dict[str, Case]) -> dict[str, Made]:
+    def made(wanted: dict[str, Case]) -> dict[str, FigureRun]:
         return {name: _made(figures, case, results[case.key], runner) for name, case in wanted.items()}
 
     engine_runs = made(cases)
     body = next(iter(engine_runs.values())).body
-    return Study(figures, facts, engine_runs, engine_runs if spec.name == TRUTH else made(truths), known(body))
+    return FigureRuns(figures, facts, engine_runs, engine_runs if spec.name == TRUTH else made(truths), known(body))
 
 
 def _case(figures: Figures, parameters: dict[str, float], facts: EngineFacts, asks: tuple[str, ...]) -> Case:
@@ -140,13 +140,13 @@ def _case(figures: Figures, parameters: dict[str, float], facts: EngineFacts, as
     )
 
 
-def _made(figures: Figures, case: Case, result: Result, runner: Runner) -> Made:
+def _made(figures: Figures, case: Case, result: Result, runner: Runner) -> FigureRun:
     path = runner.store.trajectory(case)
     dataset = read(path) if result.trajectory is not None and path.is_file() else None
-    return Made(rolling_ball(load_scene(figures.scene, **case.parameters)), result, dataset, figures.start_angles)
+    return FigureRun(rolling_ball(load_scene(figures.scene, **case.parameters)), result, dataset, figures.start_angles)
 
 
-def study_content(study: Study) -> dict[str, Any]:
+def study_content(study: FigureRuns) -> dict[str, Any]:
     """Where the figures come from, as plain data."""
     figures = study.figures
     versions: dict[str, str] = {}

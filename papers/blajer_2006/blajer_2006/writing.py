@@ -13,7 +13,7 @@ from rich.text import Text
 from blajer_2006 import style
 from blajer_2006.drawing import looks, picture
 from blajer_2006.judging import count, judged
-from blajer_2006.study import Study, study_content
+from blajer_2006.study import FigureRuns, study_content
 from proofroll.elements.ball_on_surface.report.regime_map import counts
 from proofroll.elements.ball_on_surface.report.regime_map import picture as map_picture
 from proofroll.files.atomic import replacing
@@ -31,7 +31,7 @@ _DIGITS = 7
 _MAP_HEIGHT = 3.6  # inch
 
 
-def figures_content(study: Study, maps: Maps) -> dict[str, Any]:
+def figures_content(study: FigureRuns, maps: Maps) -> dict[str, Any]:
     """All that is said beside the figures, as plain data: runs, captions, statements; ``maps`` by study."""
     entries = []
     for figure in study.figures.figures:
@@ -44,7 +44,7 @@ def figures_content(study: Study, maps: Maps) -> dict[str, Any]:
     return dict(plain(study_content(study) | {"figures": entries, "statements": judged(study)}))
 
 
-def write_figures(study: Study, maps: Maps, out: Path, forms: Sequence[str]) -> dict[str, Any]:
+def write_figures(study: FigureRuns, maps: Maps, out: Path, forms: Sequence[str]) -> dict[str, Any]:
     """Writes every figure in every form, and ``figures.json``.
 
     Args:

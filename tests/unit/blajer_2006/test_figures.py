@@ -16,7 +16,7 @@ from blajer_2006.definition import Figures
 from blajer_2006.drawing import drawn, inline, looks, picture
 from blajer_2006.judging import count, judged, rounds_to
 from blajer_2006.reading import load_figures
-from blajer_2006.study import Study, run_figures
+from blajer_2006.study import FigureRuns, run_figures
 from blajer_2006.writing import write_figures
 from proofroll.elements.ball_on_surface.element import rolling_ball
 from proofroll.files.scene_file import load_scene
@@ -47,12 +47,12 @@ def runner(tmp_path_factory: pytest.TempPathFactory) -> Runner:
 
 
 @pytest.fixture(scope="module")
-def study(runner: Runner) -> Study:
+def study(runner: Runner) -> FigureRuns:
     """The paper's runs at 4 m/s in the paper's method, beside the truth."""
     return run_figures(only(load_figures("paper_figures"), *RUNS, until=SHORT, every=2e-3), runner)
 
 
-def test_what_the_paper_states_holds(study: Study) -> None:
+def test_what_the_paper_states_holds(study: FigureRuns) -> None:
     """Every statement about the two runs at 4 m/s holds, by the projection method and by the truth alike."""
     entries = judged(study)
     assert len(entries) > 15
@@ -62,7 +62,7 @@ def test_what_the_paper_states_holds(study: Study) -> None:
             assert entry["found"] == pytest.approx(entry["truth"], rel=1e-6)
 
 
-def test_a_wrong_number_does_not_hold(study: Study) -> None:
+def test_a_wrong_number_does_not_hold(study: FigureRuns) -> None:
     """Another last digit, the other bound or the other sign is contradicted by the same runs."""
     stated = {"0.2102": "0.2103", "-160": "-161"}
     wrong = []
@@ -78,7 +78,7 @@ def test_a_wrong_number_does_not_hold(study: Study) -> None:
     assert {entry["holds"] for entry in entries} == {False}
 
 
-def _changed(study: Study, change: Callable[[xr.Dataset], xr.Dataset]) -> Study:
+def _changed(study: FigureRuns, change: Callable[[xr.Dataset], xr.Dataset]) -> FigureRuns:
     """The study with a change of every run of the engine."""
     made = {name: run if run.dataset is None else dataclasses.replace(run, dataset=change(run.dataset.copy(deep=True)))
             for name, run in study.runs.items()}  # fmt: skip
@@ -142,7 +142,7 @@ def test_no_statement_is_one_that_no_run_can_contradict(runner: Runner) -> None:
     assert unassailable == []
 
 
-def test_statements_are_counted_by_whose_they_are(study: Study) -> None:
+def test_statements_are_counted_by_whose_they_are(study: FigureRuns) -> None:
     """What this project adds is not counted as the article's, and each measure of an amplitude says what that is."""
     entries = judged(study)
     own = [entry for entry in entries if entry["ours"]]
@@ -159,7 +159,7 @@ def test_the_scene_has_the_moment_of_inertia_of_the_paper() -> None:
     assert rounds_to(rolling_ball(load_scene("sphere_in_cylinder")).ball.inertia, "1.293e-4")
 
 
-def test_every_axis_has_a_unit(study: Study) -> None:
+def test_every_axis_has_a_unit(study: FigureRuns) -> None:
     """Both axes of each panel are named with a unit, in the figure and in the file."""
     for figure in study.figures.figures:
         with looks():
@@ -174,7 +174,7 @@ def test_every_axis_has_a_unit(study: Study) -> None:
             assert len(lines) == len(panel.y) * len(panel.runs)
 
 
-def test_equal_runs_give_equal_files_in_every_form(study: Study, tmp_path: Path) -> None:
+def test_equal_runs_give_equal_files_in_every_form(study: FigureRuns, tmp_path: Path) -> None:
     """SVG, PNG and PDF are what they are called, twice the same, and the JSON names them."""
     first = study.figures.figures[0]
     figures = dataclasses.replace(study.figures, figures=[dataclasses.replace(first, panels=first.panels[:2])])
@@ -188,7 +188,7 @@ def test_equal_runs_give_equal_files_in_every_form(study: Study, tmp_path: Path)
             assert file == picture(figures.figures[0], small, form)
 
 
-def test_figures_of_one_page_share_no_id(study: Study) -> None:
+def test_figures_of_one_page_share_no_id(study: FigureRuns) -> None:
     """Inlined twice, every reference of a figure is to an id of its own."""
     texts = [inline(study.figures.figures[0], study, prefix) for prefix in ("one-", "two-")]
     ids = [set(re.findall(r' id="([^"]*)"', text)) for text in texts]
