@@ -7,7 +7,7 @@ from collections.abc import Sequence
 from rich.table import Table
 from rich.text import Text
 
-from proofroll.drill.row import Drilled
+from proofroll_drill.row import Drilled
 
 
 def drill_table(rows: Sequence[Drilled]) -> Table:

@@ -11,11 +11,11 @@ from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from pathlib import Path
 
-from proofroll.drill.row import Drilled, drilled
-from proofroll.drill.site import BEFORE, BESIDE, HANG, MEMORY, Site, contents, scraps
 from proofroll.report.screen import Screen
 from proofroll.running.case import LASTING, Status
 from proofroll.running.store import Store
+from proofroll_drill.row import Drilled, drilled
+from proofroll_drill.site import BEFORE, BESIDE, HANG, MEMORY, Site, contents, scraps
 
 
 @dataclass(frozen=True)

@@ -8,11 +8,11 @@ import signal
 from collections.abc import Mapping
 from pathlib import Path
 
-from proofroll.drill.processes import alive, command, end, run, start, wait_until
-from proofroll.drill.row import Drilled, drilled
-from proofroll.drill.site import BEFORE, SCENE, Site, contents
 from proofroll.running.case import Case
 from proofroll.running.memory import descendants
+from proofroll_drill.processes import alive, command, end, run, start, wait_until
+from proofroll_drill.row import Drilled, drilled
+from proofroll_drill.site import BEFORE, SCENE, Site, contents
 
 # How long the processes of a pool may take to end [s].
 _GONE = 10.0

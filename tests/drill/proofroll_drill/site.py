@@ -14,7 +14,6 @@ from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
-from proofroll.drill.engines import DEEDS, FOLDER
 from proofroll.files.atomic import content
 from proofroll.files.comparison_file import load_comparison
 from proofroll.files.scene_file import load_scene
@@ -23,6 +22,7 @@ from proofroll.running.runner import Runner, resolve
 from proofroll.running.store import Store
 from proofroll.running.worker_pool import Workers
 from proofroll.studies.compare import compare
+from proofroll_drill.engines import DEEDS, FOLDER
 
 SCENE = "sphere_in_cylinder"
 # Speeds of the results that are there before anything goes wrong, and of the cases beside the fault [m/s].
@@ -124,11 +124,13 @@ def site() -> Iterator[Site]:
     workers = Workers(MEMORY)
     try:
         (folder / "cured").mkdir()
-        info = folder / "path" / "proofroll_drill-1.0.dist-info"
+        info = folder / "path" / "proofroll_drill_engine-1.0.dist-info"
         info.mkdir(parents=True)
-        (info / "METADATA").write_text("Metadata-Version: 2.1\nName: proofroll-drill\nVersion: 1.0\n", encoding="utf-8")
+        (info / "METADATA").write_text(
+            "Metadata-Version: 2.1\nName: proofroll-drill-engine\nVersion: 1.0\n", encoding="utf-8"
+        )
         (info / "entry_points.txt").write_text(
-            "[proofroll.engines]\ndrill = proofroll.drill.engines:Drill\n", encoding="utf-8"
+            "[proofroll.engines]\ndrill = proofroll_drill.engines:Drill\n", encoding="utf-8"
         )
         os.environ[FOLDER] = str(folder)
         sys.path.insert(0, str(info.parent))

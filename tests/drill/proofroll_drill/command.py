@@ -19,7 +19,7 @@ def faults(as_json: Json = False) -> None:
     """Crash, hang, flood, interrupt and damage runs; exit 1 unless each fault costs nothing but its own case."""
     import dataclasses
 
-    from proofroll.drill.faults import fault_drill
+    from proofroll_drill.faults import fault_drill
 
     with progress_bar("faults") as advance:
         rows = fault_drill(advance)
@@ -28,8 +28,8 @@ def faults(as_json: Json = False) -> None:
         content = [dataclasses.asdict(row) for row in rows]
         write_json({"tried": len(rows), "contained": contained, "faults": content})
     else:
-        from proofroll.drill.table import drill_table
         from proofroll.report.terminal import console
+        from proofroll_drill.table import drill_table
 
         console().print(drill_table(rows))
         console().print(f"{len(rows)} faults tried, {contained} contained.")

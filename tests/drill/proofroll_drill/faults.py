@@ -6,9 +6,9 @@ from collections.abc import Callable
 from concurrent.futures import ThreadPoolExecutor
 from functools import partial
 
-from proofroll.drill import command_faults, engine_faults, process_faults
-from proofroll.drill.row import Drilled
-from proofroll.drill.site import site
+from proofroll_drill import command_faults, engine_faults, process_faults
+from proofroll_drill.row import Drilled
+from proofroll_drill.site import site
 
 # Faults wait rather than compute, so that two at once are no burden.
 _AT_ONCE = 2

@@ -8,9 +8,9 @@ import signal
 import time
 from pathlib import Path
 
-from proofroll.drill.processes import LIMIT, command, end, run, wait_until
-from proofroll.drill.row import Drilled, drilled
-from proofroll.drill.site import BEFORE, BESIDE, Site, contents, scraps
+from proofroll_drill.processes import LIMIT, command, end, run, wait_until
+from proofroll_drill.row import Drilled, drilled
+from proofroll_drill.site import BEFORE, BESIDE, Site, contents, scraps
 
 # A file on the full disk may have this many bytes: no result is so small.
 _ROOM = 1024
