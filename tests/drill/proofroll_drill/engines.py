@@ -175,7 +175,7 @@ class Drill:
     """The projection method with a fault."""
 
     name: ClassVar[str] = "drill"
-    provides: ClassVar[Mapping[str, frozenset[str]]] = Projection.provides
+    provides: ClassVar[Mapping[str, frozenset[str]]] = dict.fromkeys(DEEDS, Projection.provides["rotating_frame"])
     settings: ClassVar[type[DrillSettings]] = DrillSettings
     presets: ClassVar[Mapping[str, Mapping[str, DrillSettings]]] = {
         name: {"matched": DrillSettings(name)} for name in DEEDS
