@@ -7,9 +7,9 @@ OUT ?= out
 
 install: .venv/.installed
 
-.venv/.installed: pyproject.toml constraints.txt benchmarks/pyproject.toml
+.venv/.installed: pyproject.toml constraints.txt benchmarks/pyproject.toml papers/blajer_2006/pyproject.toml tests/drill/pyproject.toml
 	$(PYTHON) -m venv .venv
-	PIP_CONSTRAINT=constraints.txt $(BIN)/python -m pip install --quiet --editable ".[dev]" --editable ./benchmarks
+	PIP_CONSTRAINT=constraints.txt $(BIN)/python -m pip install --quiet --editable ".[dev]" --editable ./benchmarks --editable ./papers/blajer_2006 --editable ./tests/drill
 	touch $@
 
 report: install

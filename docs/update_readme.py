@@ -15,7 +15,7 @@ import numpy as np
 from made_from import facts, restamped, stamp
 from screenshot import screenshot
 
-from proofroll.elements.ball_on_surface.regimes_study import regime_maps
+from proofroll.elements.ball_on_surface.regimes_study import load_regimes, regime_maps
 from proofroll.elements.ball_on_surface.report.regime_map import draw as draw_regimes
 from proofroll.files.comparison_file import load_comparison
 from proofroll.files.netcdf import read
@@ -97,7 +97,7 @@ def main() -> None:
         screenshot(Path(folder) / "report.html", ROOT / "docs" / "report.png")
         study = measured(runner)
     draw_work_precision(study, [study["quantity"]], ROOT / "docs" / "work_precision.svg")
-    draw_regimes(regime_maps(load_comparison("stick_slip"), workers=os.cpu_count() or 1), ROOT / "docs" / "regimes.svg")
+    draw_regimes(regime_maps(load_regimes("regimes"), workers=os.cpu_count() or 1), ROOT / "docs" / "regimes.svg")
     readme = ROOT / "README.md"
     text = readme.read_text(encoding="utf-8")
     for name, table in (

@@ -362,7 +362,10 @@ def test_onset_of_friction_that_makes_no_sense(
 
 
 MAP = """
-[regimes]
+study = "regimes"
+title = "A map"
+question = "What becomes of the ball?"
+scene = "sphere_in_cylinder"
 until = 0.5
 rolling_resistance = [0.0]
 speed = { low = 2, high = 6, count = 3 }
@@ -372,8 +375,8 @@ mu_static = { low = 0.05, high = 0.8, count = 3 }
 
 def test_regimes(proofroll: Proofroll, tmp_path: Path) -> None:
     """A map of 3 x 3 runs is printed as one JSON document, the same that is written beside the picture."""
-    (tmp_path / "claim.toml").write_text(COMPARISON.replace("ENGINE", "oracle") + MAP)
-    arguments = ["regimes", str(tmp_path / "claim.toml"), "--out", str(tmp_path / "out"), "--jobs", "1"]
+    (tmp_path / "map.toml").write_text(MAP)
+    arguments = ["regimes", str(tmp_path / "map.toml"), "--out", str(tmp_path / "out"), "--jobs", "1"]
     code, out, err = proofroll(*arguments, "--json")
     assert code == 0, err
     document = json.loads(out)
@@ -394,12 +397,11 @@ def test_regimes(proofroll: Proofroll, tmp_path: Path) -> None:
 
 
 def test_regimes_of_a_file_without_a_map(proofroll: Proofroll, tmp_path: Path) -> None:
-    """A comparison that has no table of regimes gives one line that says to add one."""
+    """A comparison asks for no map, which one line says."""
     (tmp_path / "claim.toml").write_text(COMPARISON.replace("ENGINE", "oracle"))
     code, out, err = proofroll("regimes", str(tmp_path / "claim.toml"), "--out", str(tmp_path / "out"), "--json")
     assert (code, out) == (2, "")
-    assert "claim: regimes" in err
-    assert "[regimes]" in err
+    assert 'study = "regimes"' in err
     assert err.startswith("proofroll: ")
     assert err.count("\n") == 1
 

@@ -13,13 +13,13 @@ from pathlib import Path
 import pytest
 
 from proofroll.core.plugins import engine_names
-from proofroll.drill import engine_faults
-from proofroll.drill.engine_faults import ENGINE_FAULTS, drill_damage, drill_engine, prepare
-from proofroll.drill.row import Drilled, drilled
-from proofroll.drill.site import Site, site
-from proofroll.report.terminal import drill_table
 from proofroll.running.case import Case, Result
 from proofroll.running.store import Store
+from proofroll_drill import engine_faults
+from proofroll_drill.engine_faults import ENGINE_FAULTS, drill_damage, drill_engine, prepare
+from proofroll_drill.row import Drilled, drilled
+from proofroll_drill.site import Site, site
+from proofroll_drill.table import drill_table
 
 # What must have happened in every drill.
 TRIED = {

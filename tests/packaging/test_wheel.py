@@ -64,9 +64,9 @@ def test_contents(wheel: Path) -> None:
     claims = {path.relative_to(REPOSITORY).as_posix() for path in (REPOSITORY / "comparisons").glob("*.toml")}
     assert claims
     assert {f"proofroll/{name}" for name in models | claims} <= set(names)
-    templates = REPOSITORY / "src" / "proofroll" / "report" / "templates"
-    pages = {path.relative_to(REPOSITORY / "src").as_posix() for path in templates.rglob("*") if path.is_file()}
-    assert pages
+    source = REPOSITORY / "src"
+    pages = {path.relative_to(source).as_posix() for path in source.rglob("templates/*") if path.is_file()}
+    assert {Path(page).parts[1] for page in pages} == {"report", "elements"}
     assert pages <= set(names)
     assert any(name.endswith("LICENSE") for name in names)
     assert not any(name.startswith(("tests/", "proofroll/tests/")) for name in names)

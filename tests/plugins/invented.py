@@ -5,8 +5,11 @@ from __future__ import annotations
 from pathlib import Path
 from typing import Any
 
-from proofroll.figures.reading import load_figures
-from proofroll.report.figures_part import FiguresPart
+from blajer_2006.part import FiguresPart
+from blajer_2006.reading import load_figures
+from proofroll.elements.ball_on_surface.regimes_study import load_regimes, regime_map
+from proofroll.elements.ball_on_surface.report.regimes_part import RegimesPart
+from proofroll.files.scene_file import load_scene
 from proofroll.report.stability_part import StabilityPart
 from proofroll.report.tradeoff_part import TradeoffPart
 from proofroll.running.runner import Runner
@@ -84,7 +87,7 @@ def stability_study() -> dict[str, Any]:
         "runs": 14, "boundaries": 2, "silent": 1, "refused": 0,
         "failures": {"sank in": 2}, "never_accurate": 1, "meanings": {},
         "points": [base, other], "explanations": [explained], "findings": ["good depends on mass, as it should not"],
-        "places": [], "absent": {}, "effort": {"values": 3}, "measured": installed.measured(),
+        "step_symbols": {}, "places": [], "absent": {}, "effort": {"values": 3}, "measured": installed.measured(),
     }  # fmt: skip
 
 
@@ -120,6 +123,12 @@ of = "omega3"
 measure = "every"
 stated = "-160"
 """
+
+
+def regimes_part() -> RegimesPart:
+    """A map of four short true runs."""
+    scene = load_scene("sphere_in_cylinder")
+    return RegimesPart(load_regimes("regimes"), maps=[regime_map(scene, [3.0, 4.0], [0.1, 0.7], until=0.5)])
 
 
 def figures_part(folder: Path) -> FiguresPart:

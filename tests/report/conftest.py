@@ -15,7 +15,7 @@ from typing import Any
 import numpy as np
 import pytest
 from browsing import Visit, launched, visiting
-from invented import figures_part, further
+from invented import figures_part, further, regimes_part
 
 from proofroll.core.comparison import Band, Comparison, Row, Tolerance
 from proofroll.core.dataset import observe, scales
@@ -29,7 +29,6 @@ from proofroll.running.case import Case, EngineFacts, Result, Status
 from proofroll.running.store import Store
 from proofroll.studies.compare import Outcome, Run
 from proofroll.studies.planning import point_name
-from proofroll.truth.regimes import regime_map
 
 
 def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
@@ -92,9 +91,9 @@ def made(tmp_path_factory: pytest.TempPathFactory) -> tuple[Outcome, Store]:
             judgements = [
                 judge(
                     name,
-                    curve.unit,
-                    curve.values,
-                    expected[name].values,
+                    scene.observables[name].unit,
+                    curve,
+                    expected[name],
                     truth_error_bar=1e-12,
                     tolerance=bounds[name].absolute(sizes[name]),
                     scale=sizes[name],
@@ -203,9 +202,8 @@ class Parts:
 @pytest.fixture(scope="session")
 def everything(made: tuple[Outcome, Store], tmp_path_factory: pytest.TempPathFactory) -> Parts:
     """The invented comparison with bounded friction at its first point, so that each part of a report is there."""
-    maps = [regime_map(load_scene("sphere_in_cylinder"), [3.0, 4.0], [0.1, 0.7], until=0.5)]
-    whole = begun([made[0]], made[1], "proofroll report invented", [maps])
-    for part in (figures_part(tmp_path_factory.mktemp("figures")), *further()):
+    whole = begun([made[0]], made[1], "proofroll report invented")
+    for part in (figures_part(tmp_path_factory.mktemp("figures")), regimes_part(), *further()):
         whole.parts.append(part)
         whole.make(part, lambda: None)
     content = whole.content

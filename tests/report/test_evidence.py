@@ -65,9 +65,7 @@ def test_largest_error_that_is_drawn_is_the_judged_one(made: tuple[Outcome, Stor
     write(off, store.trajectory(run.case))
     expected = observe(scene, fine)
     judged = {
-        key: judge(
-            key, "", curve.values, expected[key].values, truth_error_bar=0.0, tolerance=1.0, scale=1.0, limit=None
-        )
+        key: judge(key, "", curve, expected[key], truth_error_bar=0.0, tolerance=1.0, scale=1.0, limit=None)
         for key, curve in observe(scene, off).items()
         if key in {"gamma", "z", "N", "F2", "F3"}
     }

@@ -16,6 +16,7 @@ from proofroll.core.comparison import Band, Comparison, Row, Tolerance
 from proofroll.core.events import Event, events_of, with_events
 from proofroll.core.truth import truth
 from proofroll.core.verdict import Judgement, Verdict
+from proofroll.elements.ball_on_surface.report.onset_tables import bracket, clock, conditioning, slip_table
 from proofroll.elements.ball_on_surface.report.onsets import CURVE, mark
 from proofroll.files.netcdf import write
 from proofroll.files.scene_file import load_scene
@@ -23,7 +24,6 @@ from proofroll.report.growing_report import write_report
 from proofroll.report.html import page
 from proofroll.report.labels import MEANINGS, SYMBOLS
 from proofroll.report.markdown import verdict_table as markdown_table
-from proofroll.report.onset_tables import bracket, clock, conditioning, slip_table
 from proofroll.report.plots import point_curves
 from proofroll.report.report_content import report_content
 from proofroll.report.scores import scores

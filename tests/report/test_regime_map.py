@@ -8,12 +8,14 @@ from typing import Any
 import pytest
 import xarray as xr
 
+from proofroll.elements.ball_on_surface.regimes_study import load_regimes, regime_map
 from proofroll.elements.ball_on_surface.report.regime_map import boundaries, counts, draw, inline
+from proofroll.elements.ball_on_surface.report.regimes_part import RegimesPart
 from proofroll.files.scene_file import load_scene
-from proofroll.report.growing_report import write_report
+from proofroll.report.growing_report import begun
+from proofroll.report.terminal import part_lines
 from proofroll.running.store import Store
 from proofroll.studies.compare import Outcome
-from proofroll.truth.regimes import regime_map
 
 
 @pytest.fixture(scope="module")
@@ -57,10 +59,15 @@ def test_file_is_a_picture_of_its_own(maps: list[xr.Dataset], tmp_path: Path) ->
 
 
 def test_report_shows_the_maps(made: tuple[Outcome, Store], maps: Any, tmp_path: Path, parse: Any) -> None:
-    """Twice on one page, no id is used twice; a comparison without maps has none."""
-    outcome, store = made
-    content = write_report([outcome] * 3, store, tmp_path, "proofroll report", [maps, [], maps])
-    assert [len(item["regimes"]) for item in content["comparisons"]] == [2, 0, 2]
+    """Twice on one page, no id is used twice."""
+    whole = begun([made[0]], made[1], "proofroll report")
+    parts = [RegimesPart(load_regimes("regimes"), maps=maps) for _ in range(2)]
+    whole.expect(parts, tmp_path)
+    for part in parts:
+        whole.make(part, lambda: None)
+    whole.write(tmp_path)
+    assert [len(item["study"]["maps"]) for item in whole.content["regimes"]] == [2, 2]
+    assert part_lines(whole.content)[0] == f"regimes: {RegimesPart.line(whole.content['regimes'][0])}."
     html = (tmp_path / "report.html").read_text(encoding="utf-8")
     elements = parse(html)
     ids = [attributes["id"] for _, attributes in elements.tags if "id" in attributes]

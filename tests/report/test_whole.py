@@ -14,7 +14,7 @@ from proofroll.core.errors import ProofrollError
 from proofroll.report.growing_report import Report, begun
 from proofroll.report.html import page
 from proofroll.report.stability_part import StabilityPart
-from proofroll.report.study_parts import KEYS, absent, all_parts, attempt, entry, parts_of
+from proofroll.report.study_parts import absent, all_parts, attempt, entry, part_kinds, parts_of
 from proofroll.report.summary import three_sentences
 from proofroll.running.store import Store
 from proofroll.studies.compare import Outcome
@@ -39,13 +39,15 @@ def report(made: tuple[Outcome, Store]) -> Report:
 def test_every_part_of_the_default_report_is_found_in_its_order(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    """Figures, trade-offs, maps: one for each file under comparisons/, and each by its name alone."""
+    """Figures, regime maps, trade-offs, stability: one for each file of a study, and each by its name alone."""
     assert "stability_plane" not in [part.head["name"] for part in all_parts([], tmp_path)], "it is made on request"
     monkeypatch.setattr(StabilityPart, "keeps", lambda part, out: bool(part and out))
     parts = all_parts([], tmp_path)
+    keys = [kind.key for kind in part_kinds()]
+    assert keys == ["figures", "regimes", "tradeoffs", "stability"]
     assert "stability_plane" in [part.head["name"] for part in parts], "where it is kept it is there"
-    assert [part.key for part in parts] == sorted((part.key for part in parts), key=KEYS.index)
-    assert {key for key in KEYS if any(part.key == key for part in parts)} == set(KEYS)
+    assert [part.key for part in parts] == sorted((part.key for part in parts), key=keys.index)
+    assert {part.key for part in parts} == set(keys)
     for part in parts:
         comparisons, found = parts_of(["paper", part.head["name"]], [])
         assert comparisons == ["paper"]
@@ -154,6 +156,7 @@ class Broken:
     """A part that cannot be made."""
 
     key: ClassVar[str] = "tradeoffs"
+    order: ClassVar[float] = 30
     words: ClassVar[str] = "a part"
 
     def __init__(self, error: BaseException) -> None:

@@ -38,6 +38,21 @@ def _imported(file: Path) -> list[tuple[int, str]]:
     return found
 
 
+# Packages that stand on this one: it imports none of them.
+OUTSIDE = {"blajer_2006", "proofroll_benchmarks", "proofroll_drill"}
+
+
+def test_nothing_here_imports_what_stands_on_it() -> None:
+    """No module imports an article, a benchmark or the drill; these announce themselves."""
+    wrong = []
+    for file in ROOT.rglob("*.py"):
+        for node in ast.walk(ast.parse(file.read_text(encoding="utf-8"))):
+            names = [alias.name for alias in node.names] if isinstance(node, ast.Import) else []
+            names += [node.module] if isinstance(node, ast.ImportFrom) and node.module else []
+            wrong += [f"{file.relative_to(ROOT)} imports {name}" for name in names if name.split(".")[0] in OUTSIDE]
+    assert not wrong, "\n".join(wrong)
+
+
 @pytest.mark.parametrize("folder", sorted(MAY))
 def test_imports_lead_one_way(folder: str) -> None:
     """No module imports from a folder that its own may not know."""

@@ -12,15 +12,13 @@ from typing import Annotated, Any
 import typer
 
 import proofroll
-from proofroll.cli.comparing import compare, regimes
-from proofroll.cli.drill import drill
-from proofroll.cli.figures import figures
+from proofroll.cli.comparing import compare
 from proofroll.cli.ladder import ladder
 from proofroll.cli.lists import engines, scenes
 from proofroll.cli.options import ENGINE, INTERRUPTED, OK, USAGE, complain
 from proofroll.cli.recommend import recommend
 from proofroll.cli.report import report
-from proofroll.cli.run import onset, run
+from proofroll.cli.run import run
 from proofroll.cli.stability import stability
 from proofroll.cli.tradeoff import tradeoff
 from proofroll.core.errors import InputError, Missing, ProofrollError
@@ -31,10 +29,9 @@ app = typer.Typer(
     pretty_exceptions_enable=False,
     rich_markup_mode=None,
 )
-_STUDIES = (compare, report, onset, regimes, tradeoff, recommend, ladder, stability, figures)
+_STUDIES = (compare, report, tradeoff, recommend, ladder, stability)
 for _command in (scenes, engines, run, *_STUDIES):
     app.command()(_command)
-app.add_typer(drill, name="drill")
 for _point in sorted(entry_points(group="proofroll.commands"), key=lambda point: point.name):
     _added = _point.load()
     if isinstance(_added, typer.Typer):

@@ -1,4 +1,4 @@
-"""The report: comparisons, the paper's figures, speed against accuracy, and where engines stop being right."""
+"""The report: comparisons, and whatever further studies there are."""
 
 from __future__ import annotations
 
@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
-from proofroll.cli.comparing import exit_code, outcomes_of, print_outcome, regime_maps_of
+from proofroll.cli.comparing import exit_code, outcomes_of, print_outcome
 from proofroll.cli.options import (
     CONTRADICTED,
     ENGINE,
@@ -47,22 +47,15 @@ def report(
     """
     from proofroll.files.comparison_file import comparison_names, load_comparison
     from proofroll.report.growing_report import begun
-    from proofroll.report.study_parts import KEYS, all_parts, parts_of
+    from proofroll.report.study_parts import all_parts, parts_of
 
     names, parts = parts_of(studies, engine or []) if studies else (comparison_names(), all_parts(engine or [], out))
     loaded = [load_comparison(name) for name in names]
     runner = new_runner(out, fresh, jobs)
-    keys = [key for key in KEYS if any(part.key == key for part in parts)]
+    keys = list(dict.fromkeys(part.key for part in parts))
     stages = _Stages(len(keys) + bool(loaded))
-    outcomes, maps = [], []
-    if loaded:
-        stage = stages.next("comparisons")
-        outcomes = outcomes_of(loaded, engine or [], runner, stage)
-        maps = [regime_maps_of(item, jobs, stage) if item.regimes else [] for item in loaded]
-    made = begun(outcomes, runner.store, _command(studies or [], engine or [], out), maps)
-    for part in parts:
-        if part.key == "figures":
-            part.maps.update({item.name: found for item, found in zip(loaded, maps, strict=True) if found})  # type: ignore[attr-defined]
+    outcomes = outcomes_of(loaded, engine or [], runner, stages.next("comparisons")) if loaded else []
+    made = begun(outcomes, runner.store, _command(studies or [], engine or [], out))
     missing = made.expect(parts, out, fresh=fresh)
     made.write(out)
     for key in keys:
@@ -110,10 +103,12 @@ def _make(made: Report, part: Part, runner: Runner, out: Path, stage: str) -> No
 
 def _exit_code(content: dict[str, Any], compared: int) -> int:
     """As for the comparisons; a further study that failed counts as a lost engine, a false statement as a verdict."""
-    further = [entry for key in ("figures", "tradeoffs", "stability") for entry in content[key]]
-    if compared == ENGINE or any(entry["missing"] or entry["lost"] for entry in further):
+    from proofroll.report.study_parts import further
+
+    entries = further(content)
+    if compared == ENGINE or any(entry["missing"] or entry["lost"] for entry in entries):
         return ENGINE
-    return CONTRADICTED if compared or any(entry["contradictions"] for entry in further) else OK
+    return CONTRADICTED if compared or any(entry["contradictions"] for entry in entries) else OK
 
 
 def _print(content: dict[str, Any], out: Path) -> None:

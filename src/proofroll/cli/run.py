@@ -8,19 +8,12 @@ from typing import Annotated
 import typer
 
 from proofroll.cli.options import (
-    CONTRADICTED,
     ENGINE,
-    OK,
-    Fresh,
-    Jobs,
     Json,
-    Out,
     SceneName,
     Set,
     assignments,
     complain,
-    new_runner,
-    progress_bar,
     require_writable,
     spinner,
     write_json,
@@ -41,8 +34,8 @@ def run(
     """Run one scene in one engine."""
     import tempfile
 
+    from proofroll.core.time_grid import time_grid
     from proofroll.report.run import run_content, run_lines
-    from proofroll.running.recording import time_grid
     from proofroll.running.runner import run_one
     from proofroll.studies.run_once import single_case
 
@@ -77,44 +70,3 @@ def run(
     if content["status"] != "done":
         complain(f"{content['engine']} {content['status']}: {content['message']}")
         raise typer.Exit(ENGINE)
-
-
-def onset(
-    scene: SceneName,
-    settings: Set = None,
-    engine: Annotated[list[str] | None, typer.Option(help="Engine with settings; repeat. All that can slip.")] = None,
-    until: Annotated[float, typer.Option(help="How long to look for a slip [s].")] = 4.0,
-    uncertainty: Annotated[float, typer.Option(help="Relative uncertainty of friction and resistance.")] = 1e-3,
-    out: Out = Path("out"),
-    fresh: Fresh = False,
-    jobs: Jobs = None,
-    as_json: Json = False,
-) -> None:
-    """Say when the ball first slips, in every engine, and how well that is posed."""
-    from proofroll.elements.ball_on_surface.onset_study import onset_study, summary
-    from proofroll.running.recording import time_grid
-
-    time_grid(until, 0.01)
-    with progress_bar("runs") as advance:
-        study = onset_study(
-            scene,
-            dict(assignments(settings or [])),
-            new_runner(out, fresh, jobs),
-            engines=engine or (),
-            until=until,
-            uncertainty=uncertainty,
-            progress=lambda case, _: advance(case.engine.name),
-        )
-    content = study.content()
-    if as_json:
-        write_json(content)
-    else:
-        from proofroll.report.terminal import console, onset_table
-
-        console().print(summary(content), markup=False)
-        console().print(onset_table(content))
-    verdicts = {item["verdict"] for item in content["engines"]}
-    # A refusal is an answer where nobody asked for that engine in particular.
-    if "failed" in verdicts or (engine and "refused" in verdicts):
-        raise typer.Exit(ENGINE)
-    raise typer.Exit(CONTRADICTED if "disagree" in verdicts else OK)

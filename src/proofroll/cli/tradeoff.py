@@ -103,8 +103,8 @@ def question_of(
     scene: str, settings: list[str] | None, quantities: list[str] | None, until: float | None
 ) -> tuple[TradeoffClaims | None, Question]:
     """What is asked: the file's own question, or another about its scene, for which the file then claims nothing."""
+    from proofroll.core.time_grid import time_grid
     from proofroll.files.scene_file import load_scene
-    from proofroll.running.recording import time_grid
     from proofroll.studies.claims import claims_for, load_claims
     from proofroll.studies.sweep import Question
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import dataclasses
 from collections.abc import Iterable
 from typing import Any
 from unittest import SkipTest
@@ -10,10 +11,10 @@ import numpy as np
 
 from proofroll.conformance.subject import Subject, bits, require, scenes
 from proofroll.core.certificate import certify, first_difference
+from proofroll.core.element import HasOptionalCapabilities
 from proofroll.core.engine import Sample, require_provided
 from proofroll.core.errors import Refused
 from proofroll.core.scene import Scene
-from proofroll.elements.ball_on_surface.model import BallCapability
 
 
 def builds_or_refuses(subject: Subject) -> None:
@@ -63,30 +64,30 @@ def certificate_holds(subject: Subject) -> None:
 def builds_only_what_is_required(subject: Subject) -> None:
     """What the scene requires is in the model; what it does not is not, unless a setting or the engine says why.
 
-    The setting is ``orientation=true``; the engine's reasons are :class:`proofroll.core.engine.CannotLeaveOut`.
+    The setting is one named as what can be asked for, ``orientation=true``; the engine's reasons are
+    :class:`proofroll.core.engine.CannotLeaveOut`.
     """
     engine = subject.build()
     terms = engine.built().terms
     if terms is None:
         raise SkipTest("the engine does not say what is in its model")
-    required = subject.scene.requires & _OPTIONAL
+    elements = subject.scene.elements
+    optional = frozenset().union(*(item.optional for item in elements if isinstance(item, HasOptionalCapabilities)))
+    required = subject.scene.requires & optional
     lacking = required - terms
     require(not lacking, f"the scene requires {_listed(lacking)}, of which nothing was built")
-    excused = set(getattr(subject.engine, "inherent", {}).get(subject.settings.formulation, {}))
-    if getattr(subject.settings, "orientation", None) is True:
-        excused.add(BallCapability.ORIENTATION)
-    wasted = terms - required - excused
+    settings = subject.settings
+    excused = set(getattr(subject.engine, "inherent", {}).get(settings.formulation, {}))
+    wished = [field.name for field in dataclasses.fields(settings) if getattr(settings, field.name) is True]
+    excused |= {item.asked(name) for item in elements for name in wished}
+    wasted = terms - subject.scene.requires - excused
     require(not wasted, f"{_listed(wasted)} is in the model, which the scene does not require")
     follows = engine.sample().q_WB is not None
-    told = BallCapability.ORIENTATION in terms
+    told = bool(terms & {item.asked("orientation") for item in elements})
     require(follows == told, f"the orientation is {'' if told else 'not '}in the model, yet a sample tells otherwise")
 
 
-# What a scene may require besides a ball that rolls on a surface.
-_OPTIONAL = frozenset({BallCapability.ROLLING_RESISTANCE, BallCapability.BOUNDED_FRICTION, BallCapability.ORIENTATION})
-
-
-def _listed(capabilities: Iterable[BallCapability]) -> str:
+def _listed(capabilities: Iterable[str]) -> str:
     return ", ".join(sorted(capabilities))
 
 

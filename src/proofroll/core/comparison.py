@@ -107,48 +107,13 @@ class Row:
 
 @dataclass(frozen=True)
 class Edge:
-    """A value of a parameter at which the time of the first slip jumps, to be found between two others.
+    """A value of a parameter at which the time of an event jumps, to be found between two others.
 
     Attributes:
         edge_between: the two values.
     """
 
     edge_between: tuple[float, float]
-
-
-@dataclass(frozen=True)
-class Axis:
-    """Equally spaced values.
-
-    Attributes:
-        low, high: first and last.
-        count: how many.
-    """
-
-    low: float
-    high: float
-    count: int
-
-
-@dataclass(frozen=True)
-class Regimes:
-    """A map of what becomes of the ball.
-
-    Attributes:
-        speed, mu_static: the axes.
-        rolling_resistance: f [m]; one map for each.
-        until: length of each run [s].
-    """
-
-    speed: Axis
-    mu_static: Axis
-    rolling_resistance: list[float]
-    until: float
-
-    @property
-    def count(self) -> int:
-        """Number of runs of all maps."""
-        return self.speed.count * self.mu_static.count * len(self.rolling_resistance)
 
 
 @dataclass(frozen=True)
@@ -166,7 +131,6 @@ class Comparison:
         rows: engines with settings.
         time_limit: wall seconds a case may take [s].
         timed: whether the speed of every run is measured, in clean runs of its own.
-        regimes: a map that goes with the comparison, or None.
         order: place in a report, the smallest first; those without come last, by name.
     """
 
@@ -182,7 +146,6 @@ class Comparison:
     rows: list[Row] = field(default_factory=list)
     time_limit: float = 120.0
     timed: bool = True
-    regimes: Regimes | None = None
     order: float = math.inf
 
     def combinations(self, only: Mapping[str, list[float]] | None = None) -> list[dict[str, float | Edge]]:

@@ -219,6 +219,15 @@ class WatchesRuns(Protocol):
 
 
 @runtime_checkable
+class HasOptionalCapabilities(Protocol):
+    """What an element has besides, if scenes of its kind may do without some of what a formulation can provide."""
+
+    @property
+    def optional(self) -> frozenset[str]:
+        """Capabilities that are in an engine's model only where :attr:`Element.requires` or a question names them."""
+
+
+@runtime_checkable
 class KnowsAnotherScene(Protocol):
     """What an element has besides, if a model of it can be of another kind though each of its numbers is allowed."""
 

@@ -1,16 +1,16 @@
-"""The truth of a scene: that of each of its elements, by whatever covers it. What covers what is found as engines are."""
+"""The truth of a scene: that of each of its elements, by the plug-in that covers it."""
 
 from __future__ import annotations
 
 from collections.abc import Sequence
 from functools import cache
 from importlib.metadata import entry_points
-from typing import TYPE_CHECKING, Protocol
+from typing import TYPE_CHECKING, Protocol, runtime_checkable
 
 from proofroll.core.arrays import FloatArray
 from proofroll.core.dataset import joined
 from proofroll.core.element import Element
-from proofroll.core.errors import Refused
+from proofroll.core.errors import InputError, Refused
 from proofroll.core.scene import Scene
 
 if TYPE_CHECKING:
@@ -44,6 +44,26 @@ class ElementTruth(Protocol):
         """
 
 
+@runtime_checkable
+class FindsEdges(Protocol):
+    """What a truth has besides, if it knows where the time of an event jumps as a parameter of the scene changes."""
+
+    @staticmethod
+    def edge_between(element: Element, parameter: str, low: float, high: float, until: float) -> float | None:
+        """A value of the parameter between ``low`` and ``high`` at which the time jumps; None: there is none.
+
+        Args:
+            element: one that it covers, with any value of the parameter.
+            parameter: of the scene.
+            low: one of the values, in the parameter's unit.
+            high: the other.
+            until: how long the event is looked for [s].
+
+        Raises:
+            InputError: it finds no edges of this parameter.
+        """
+
+
 @cache
 def load_truths() -> tuple[type[ElementTruth], ...]:
     """All that some installed package announces, by name."""
@@ -64,6 +84,19 @@ def truth(scene: Scene, times: FloatArray) -> xr.Dataset:
         if said:
             whole.attrs[name] = "; ".join(said)
     return whole
+
+
+def edge_between(scene: Scene, parameter: str, low: float, high: float, until: float) -> float | None:
+    """An edge of the first element whose truth finds edges, see :class:`FindsEdges`.
+
+    Raises:
+        InputError: no truth does, or not of this parameter.
+    """
+    for element in scene.elements:
+        for known in load_truths():
+            if known.covers(element) and isinstance(known, FindsEdges):
+                return known.edge_between(element, parameter, low, high, until)
+    raise InputError(parameter, "edge_between", f"no truth of {scene.name} finds edges; give a number")
 
 
 def _of_element(element: Element, times: FloatArray, asks: Sequence[str]) -> xr.Dataset:

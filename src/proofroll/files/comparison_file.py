@@ -13,12 +13,12 @@ from pydantic import ConfigDict, TypeAdapter, ValidationError
 from proofroll.core.comparison import Band, Comparison, ExceptAt, Row, Tolerance
 from proofroll.core.errors import InputError
 from proofroll.core.plugins import parse_engine, require_engine
+from proofroll.core.time_grid import time_grid
 from proofroll.core.verdict import Verdict
-from proofroll.files.data_folders import data_folder
+from proofroll.files.data_folders import study_folders
 from proofroll.files.scene_file import load_scene
-from proofroll.files.toml import read_toml, study_of
+from proofroll.files.toml import named_file, read_toml, study_of
 from proofroll.files.validation import first_problem
-from proofroll.running.recording import time_grid
 
 _LADDER_RUNGS = 3
 # A run for each combination of parameters takes a second: more than these are a mistake.
@@ -27,7 +27,7 @@ _MOST_POINTS = 10_000
 
 def comparison_names() -> list[str]:
     """Names of all comparisons in the order of a report; files of other studies say which with ``study = "…"``."""
-    paths = [path for path in data_folder("comparisons").glob("*.toml") if study_of(path) is None]
+    paths = [path for folder in study_folders() for path in folder.glob("*.toml") if study_of(path) is None]
     return [path.stem for path in sorted(paths, key=lambda path: (_order(path), path.stem))]
 
 
@@ -44,16 +44,12 @@ def load_comparison(name: str) -> Comparison:
     """Reads a comparison.
 
     Args:
-        name: path of a file, or name of one under ``comparisons/``, with or without ``.toml``.
+        name: path of a file, or name of one in a folder of studies, with or without ``.toml``.
 
     Raises:
         InputError: no such file, or it is broken.
     """
-    path = next(
-        (p for p in (Path(name), data_folder("comparisons") / f"{name}.toml", data_folder("comparisons") / name)
-         if p.is_file()),
-        None,
-    )  # fmt: skip
+    path = named_file(name)
     if path is None:
         raise InputError(
             "comparison", name, f"there is no such comparison; choose one of {', '.join(comparison_names())} or a file"
@@ -85,20 +81,10 @@ def _comparison(path: Path, content: dict[str, Any]) -> Comparison:
         _check_bounds(f"{where}: tolerances.{name}", comparison, band.bounds)
     for index, row in enumerate(comparison.rows):
         _check(f"{where}: rows.{index}", row, comparison)
-    _check_times(where, comparison)
-    return comparison
-
-
-def _check_times(where: str, comparison: Comparison) -> None:
     time_grid(comparison.until, comparison.every)
-    lengths = {"time_limit": comparison.time_limit}
-    if comparison.regimes is not None:
-        lengths["regimes.until"] = comparison.regimes.until
-        if not comparison.regimes.rolling_resistance:
-            raise InputError(f"{where}: regimes.rolling_resistance", [], "give at least one value in m")
-    for name, value in lengths.items():
-        if not (math.isfinite(value) and value > 0):
-            raise InputError(f"{where}: {name}", value, "give a positive, finite time in s")
+    if not (math.isfinite(comparison.time_limit) and comparison.time_limit > 0):
+        raise InputError(f"{where}: time_limit", comparison.time_limit, "give a positive, finite time in s")
+    return comparison
 
 
 def _table(where: str, value: object) -> dict[str, Any]:

@@ -1,11 +1,14 @@
-"""Where models and comparisons lie: inside an installed wheel, or at the top of the repository."""
+"""Where models and files of studies lie: in an installed wheel, at the top of the repository, or in other packages."""
 
 from __future__ import annotations
 
+from functools import cache
+from importlib.metadata import entry_points
 from pathlib import Path
 
 from proofroll.core.errors import ProofrollError
 
+STUDY_FOLDERS = "proofroll.study_folders"
 _PACKAGE = Path(__file__).resolve().parents[1]
 
 
@@ -19,3 +22,10 @@ def data_folder(kind: str) -> Path:
         if candidate.is_dir():
             return candidate
     raise ProofrollError(f"the folder {kind}/ is neither in the installed package nor beside src/; reinstall proofroll")
+
+
+@cache
+def study_folders() -> tuple[Path, ...]:
+    """The folders of comparisons and other studies: ``comparisons``, and those of modules that packages announce."""
+    points = sorted(entry_points(group=STUDY_FOLDERS), key=lambda point: point.name)
+    return (data_folder("comparisons"), *(Path(point.load().__file__).parent for point in points))

@@ -10,21 +10,18 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from proofroll.core.errors import ProofrollError
-from proofroll.elements.ball_on_surface.report.regime_map import inline
 from proofroll.files.json_data import plain
 from proofroll.files.scene_file import load_scene
 from proofroll.report.html import page
 from proofroll.report.kinds import kind_of
 from proofroll.report.plots import point_curves
 from proofroll.report.report_content import report_content
-from proofroll.report.study_parts import KEYS, Part, absent, attempt, entry
+from proofroll.report.study_parts import Part, absent, attempt, entry
 from proofroll.report.summary import three_sentences
 from proofroll.running.store import Store, write_text
 
 if TYPE_CHECKING:
     from collections.abc import Callable
-
-    import xarray as xr
 
     from proofroll.studies.compare import Outcome
 
@@ -58,7 +55,7 @@ class Report:
         Returns:
             those that have to be made.
         """
-        self.parts = sorted(parts, key=lambda part: KEYS.index(part.key))
+        self.parts = sorted(parts, key=lambda part: part.order)
         missing = []
         for part in self.parts:
             said = attempt(part, partial(_kept, part, out)) if not fresh else None
@@ -101,28 +98,20 @@ class Report:
             self.pictures |= _drawn(prefix, lambda: part.pictures(prefix))
 
 
-def begun(outcomes: list[Outcome], store: Store, command: str, maps: Sequence[Sequence[xr.Dataset]] = ()) -> Report:
+def begun(outcomes: list[Outcome], store: Store, command: str) -> Report:
     """A report of comparisons, to which further studies can be added.
 
     Args:
         outcomes: what was compared.
         store: where the trajectories are: a folder in that of the report.
         command: that makes the report again.
-        maps: the regime maps of each comparison, empty where it has none.
     """
-    pictures: dict[str, str] = {}
-    for index, found in enumerate(maps):
-        if found:
-            prefix = f"map{index}"
-            pictures |= _drawn(prefix, partial(_map, found, prefix))
     replay = _replay(outcomes, store)
-    content = report_content(outcomes, store, command, maps) | {"replay": _described(replay)}
-    return Report(content, [point_curves(outcome, store) for outcome in outcomes], pictures, replay)
+    content = report_content(outcomes, store, command) | {"replay": _described(replay)}
+    return Report(content, [point_curves(outcome, store) for outcome in outcomes], {}, replay)
 
 
-def write_report(
-    outcomes: list[Outcome], store: Store, out: Path, command: str, maps: Sequence[Sequence[xr.Dataset]] = ()
-) -> dict[str, Any]:
+def write_report(outcomes: list[Outcome], store: Store, out: Path, command: str) -> dict[str, Any]:
     """Writes ``report.html`` and ``report.json`` of comparisons alone.
 
     Args:
@@ -130,7 +119,6 @@ def write_report(
         store: where the trajectories are: a folder in that of the report.
         out: folder of the report.
         command: that makes the report again.
-        maps: the regime maps of each comparison, empty where it has none.
 
     Returns:
         the content of both files as plain data, as :func:`report_content` has it.
@@ -138,7 +126,7 @@ def write_report(
     Raises:
         ProofrollError: the folder cannot be written.
     """
-    report = begun(outcomes, store, command, maps)
+    report = begun(outcomes, store, command)
     report.write(out)
     return report.content
 
@@ -159,10 +147,6 @@ def _described(replay: dict[str, Any]) -> list[dict[str, Any]]:
 
 def _kept(part: Part, out: Path) -> dict[str, Any] | None:
     return entry(part) if part.keeps(out) else None
-
-
-def _map(maps: Sequence[xr.Dataset], prefix: str) -> dict[str, str]:
-    return {"": inline(maps, f"{prefix}-")}
 
 
 def _drawn(prefix: str, draw: Callable[[], dict[str, str]]) -> dict[str, str]:

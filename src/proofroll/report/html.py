@@ -3,17 +3,21 @@
 from __future__ import annotations
 
 import functools
+import inspect
 import json
 import re
 import shlex
 from collections.abc import Mapping
+from pathlib import Path
 from types import MappingProxyType
 from typing import TYPE_CHECKING, Any
 
+from proofroll.core.errors import InputError
 from proofroll.files.scene_file import load_scene
-from proofroll.report import heat_map, labels, onset_tables, study_tables, tables
+from proofroll.report import labels, study_tables, tables
 from proofroll.report.compression import packed
-from proofroll.report.kinds import kind_of
+from proofroll.report.kinds import ReportKind, kind_of, report_kinds
+from proofroll.report.study_parts import Part, further, part_kinds
 from proofroll.report.styles import OUTLINES, styles
 from proofroll.report.tradeoff_tables import name_of
 
@@ -35,9 +39,8 @@ def page(
     Args:
         content: from :func:`proofroll.report.report_content.report_content`.
         curves: from :func:`proofroll.report.plots.point_curves`, one list for each comparison.
-        pictures: markup by name: ``map0`` are the regime maps of the first comparison, the others belong to
-            further studies; what is not there is left out.
-        replay: from :func:`proofroll.elements.ball_on_surface.report.replay.replay_content`; None: the page has none.
+        pictures: of the further studies, markup by name; what is not there is left out.
+        replay: as the comparisons' kind of element gives it; None: the page has none.
     """
     drawn = {
         "rows": [_drawn_rows(comparison) for comparison in content["comparisons"]],
@@ -61,8 +64,16 @@ def page(
 
 def _marked(comparison: dict[str, Any], curves: list[dict[str, Any]]) -> list[dict[str, Any]]:
     """The curves with what the scene's kind of element marks on them."""
-    kind = kind_of(load_scene(comparison["scene"]))
+    kind = _kind(comparison)
     return curves if kind is None else kind.mark(comparison, curves)
+
+
+def _kind(comparison: dict[str, Any]) -> type[ReportKind] | None:
+    """What shows more of a comparison's scene; None: nothing, or the data are of a scene that is not here."""
+    try:
+        return kind_of(load_scene(comparison["scene"]))
+    except InputError:
+        return None
 
 
 @functools.cache
@@ -82,8 +93,10 @@ def _templates() -> jinja2.Environment:
     """The templates; everything that is put into them is escaped, save what they mark as ours."""
     import jinja2
 
+    kinds: list[type[Part] | type[ReportKind]] = [*part_kinds(), *report_kinds()]
+    folders = [Path(inspect.getfile(kind)).parent / "templates" for kind in kinds]
     made = jinja2.Environment(
-        loader=jinja2.PackageLoader("proofroll.report"),
+        loader=jinja2.FileSystemLoader([*dict.fromkeys([Path(__file__).parent / "templates", *folders])]),
         autoescape=True,
         undefined=jinja2.StrictUndefined,
         trim_blocks=True,
@@ -96,25 +109,24 @@ def _templates() -> jinja2.Environment:
         "unit": labels.unit,
         "values": labels.values,
         "settings": labels.settings_text,
-        "clock": onset_tables.clock,
-        "bracket": onset_tables.bracket,
-        "between": onset_tables.between,
         "name_of": name_of,
         "unbroken": _unbroken,
     }
     made.globals |= {
         "tables": tables,
         "studies": study_tables,
-        "heat_map": heat_map.table,
-        "told": heat_map.told,
-        "onsets": onset_tables,
         "names": labels.names,
         "caveats": labels.caveat_lines,
         "symbols": labels.SYMBOLS,
         "meanings": labels.MEANINGS,
         "outlines": OUTLINES,
         "again": _again,
+        "further": further,
+        "part_kinds": part_kinds(),
+        "kind_of": _kind,
     }
+    for kind in kinds:
+        made.globals |= kind.names
     return made
 
 

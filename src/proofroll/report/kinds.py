@@ -2,10 +2,10 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from functools import cache
 from importlib.metadata import entry_points
-from typing import TYPE_CHECKING, Any, Protocol
+from typing import TYPE_CHECKING, Any, ClassVar, Protocol
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -18,7 +18,16 @@ GROUP = "proofroll.report_kinds"
 
 
 class ReportKind(Protocol):
-    """What a report shows of scenes of one kind of element besides verdicts and curves."""
+    """What a report shows of scenes of one kind of element besides verdicts and curves.
+
+    Attributes:
+        template: in the folder ``templates`` beside the class's module, with the macro
+            ``truth(comparison, number, index, truth)``: what is told of a truth besides its route; empty: nothing.
+        names: further names that the template uses; no other kind has them.
+    """
+
+    template: ClassVar[str]
+    names: ClassVar[Mapping[str, Any]]
 
     @staticmethod
     def covers(scene: Scene) -> bool:

@@ -5,7 +5,6 @@ from __future__ import annotations
 from datetime import UTC, datetime
 from typing import TYPE_CHECKING, Any
 
-from proofroll.elements.ball_on_surface.report.regime_map import counts
 from proofroll.files.json_data import plain
 from proofroll.files.netcdf import read
 from proofroll.files.scene_file import load_scene
@@ -13,34 +12,27 @@ from proofroll.report.comparison_content import environment, outcome_content
 from proofroll.report.evidence import add_evidence
 from proofroll.report.findings import findings
 from proofroll.report.kinds import kind_of
-from proofroll.report.study_parts import KEYS
+from proofroll.report.study_parts import part_kinds
 from proofroll.report.summary import three_sentences
 
 if TYPE_CHECKING:
-    from collections.abc import Sequence
-
-    import xarray as xr
-
     from proofroll.running.store import Store
     from proofroll.studies.compare import Outcome
 
-    Maps = Sequence[Sequence[xr.Dataset]]
 
-
-def report_content(outcomes: list[Outcome], store: Store, command: str, maps: Maps = ()) -> dict[str, Any]:
+def report_content(outcomes: list[Outcome], store: Store, command: str) -> dict[str, Any]:
     """All that the report says, as plain data.
 
-    ``findings`` on the whole, ``comparisons``, the entries of further studies under ``figures``, ``tradeoffs`` and
-    ``stability``, ``date`` and ``environment``. Paths of files are relative to the folder of the report.
+    ``findings`` on the whole, ``comparisons``, the entries of further studies under the key of their kind,
+    ``date`` and ``environment``. Paths of files are relative to the folder of the report.
     """
     comparisons = []
-    for index, outcome in enumerate(outcomes):
+    for outcome in outcomes:
         content = outcome_content(outcome)
         for run in content["runs"]:
             run["trajectory"] = run["trajectory"] and f"{store.folder.name}/{run['trajectory']}"
         content["truths"] = _truths(outcome, store)
         content["findings"] = findings(content)
-        content["regimes"] = counts(maps[index]) if index < len(maps) else []
         kind = kind_of(load_scene(outcome.comparison.scene))
         if kind is not None:
             kind.add_to_runs(content, outcome.runs, store)
@@ -53,7 +45,7 @@ def report_content(outcomes: list[Outcome], store: Store, command: str, maps: Ma
     content = {
         "date": datetime.now(UTC).isoformat(timespec="seconds"),
         "comparisons": comparisons,
-        **{key: [] for key in KEYS},
+        **{kind.key: [] for kind in part_kinds()},
         "environment": environment(command, versions),
     }
     content["findings"] = {"sentences": three_sentences(content)}

@@ -8,22 +8,40 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, ClassVar
 
+from proofroll.report import heat_map
+from proofroll.report.study_parts import held
+from proofroll.studies.stability_claims import STUDY, Claim, StabilityFile, file_for
+
 if TYPE_CHECKING:
     from proofroll.report.study_parts import Tell
     from proofroll.running.runner import Runner
-    from proofroll.studies.stability_claims import Claim, StabilityFile
 
 
 @dataclass
 class StabilityPart:
     """Where engines stop being right in one scene."""
 
+    kind: ClassVar[str] = STUDY
     key: ClassVar[str] = "stability"
+    order: ClassVar[float] = 40
     words: ClassVar[str] = "where engines stop being right"
+    template: ClassVar[str] = "stability.html"
+    names: ClassVar[Mapping[str, Any]] = {"heat_map": heat_map.table, "told": heat_map.told}
     asked: StabilityFile
     engines: Sequence[str] = ()
     study: Mapping[str, Any] | None = None
     folder: str = ""
+
+    @classmethod
+    def load(cls, path: Path, engines: Sequence[str]) -> StabilityPart:
+        """See the protocol."""
+        return cls(file_for(str(path)), tuple(engines))
+
+    @staticmethod
+    def line(entry: dict[str, Any]) -> str:
+        """How many boundaries are silent, and what holds of what was claimed."""
+        study = entry["study"]
+        return f"{study['silent']} of {study['boundaries']} boundaries are silent{held(entry['claims'])}"
 
     @property
     def on_request(self) -> bool:
@@ -77,9 +95,14 @@ class StabilityPart:
             contradictions += against
             untested = "" if against else claim.untested(study["points"])
             claims.append(
-                {"says": _says(claim, study["step_symbols"]), "because": claim.because, "against": against, "untested": untested,
-                 "holds": None if untested else not against}
-            )  # fmt: skip
+                {
+                    "says": _says(claim, study["step_symbols"]),
+                    "because": claim.because,
+                    "against": against,
+                    "untested": untested,
+                    "holds": None if untested else not against,
+                }
+            )
         points = [
             point | {"reproducer": f"{self.folder}/{Path(point['reproducer']).name}" if point["reproducer"] else None}
             for point in study["points"]

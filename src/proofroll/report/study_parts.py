@@ -1,28 +1,61 @@
-"""The parts of a report besides the comparisons: each is a file of a study, what is known of it, and how to make it."""
+"""The parts of a report besides the comparisons: each is a file of a study, what is known of it, and how to make it.
+
+Kinds of parts are plug-ins, our own too: entry points of the group ``proofroll.report_parts``.
+"""
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
+from functools import cache
+from importlib.metadata import entry_points
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, ClassVar, Protocol
 
 from proofroll.core.errors import InputError, ProofrollError
-from proofroll.files.data_folders import data_folder
-from proofroll.files.toml import read_toml, study_files
+from proofroll.files.toml import named_file, read_toml, study_files
 
 if TYPE_CHECKING:
     from proofroll.running.runner import Runner
 
+GROUP = "proofroll.report_parts"
 Tell = Callable[[str, int], None]
 
 
 class Part(Protocol):
-    """One further study of a report."""
+    """One further study of a report; its class is the plug-in.
 
+    Attributes:
+        kind: of the study, as its files have it: ``study = "…"``.
+        key: under which the content lists it.
+        order: place among the parts of a report, the smallest first.
+        words: what is made, for a person.
+        template: in the folder ``templates`` beside the class's module, with the macros
+            ``section(entry, index, pictures, content)`` and ``link(entry, index, count)``; the latter for the contents.
+        names: further names that the template uses; no other part has them.
+    """
+
+    kind: ClassVar[str]
     key: ClassVar[str]
-    """Under which the content lists it."""
+    order: ClassVar[float]
     words: ClassVar[str]
-    """What is made, for a person."""
+    template: ClassVar[str]
+    names: ClassVar[Mapping[str, Any]]
+
+    @classmethod
+    def load(cls, path: Path, engines: Sequence[str]) -> Part:
+        """The part that a file asks for.
+
+        Args:
+            path: of the file.
+            engines: to which the study is restricted.
+
+        Raises:
+            InputError: the file is broken.
+        """
+
+    @staticmethod
+    def line(entry: dict[str, Any]) -> str:
+        """What came of it, without its name and a full stop, for the terminal."""
 
     @property
     def on_request(self) -> bool:
@@ -45,6 +78,17 @@ class Part(Protocol):
         """Its pictures as markup, by name; every id in them begins with ``prefix``."""
 
 
+@cache
+def part_kinds() -> tuple[type[Part], ...]:
+    """All that some installed package announces, in the order of a report."""
+    return tuple(sorted((point.load() for point in entry_points(group=GROUP)), key=lambda kind: kind.order))
+
+
+def further(content: Mapping[str, Any]) -> list[dict[str, Any]]:
+    """The entries of all parts that a report's content lists, in its order."""
+    return [item for kind in part_kinds() for item in content[kind.key]]
+
+
 def parts_of(names: Sequence[str], engines: Sequence[str]) -> tuple[list[str], list[Part]]:
     """The names of comparisons, and the parts that other names stand for.
 
@@ -55,60 +99,30 @@ def parts_of(names: Sequence[str], engines: Sequence[str]) -> tuple[list[str], l
     Raises:
         InputError: a file is broken, or asks for something that is no part of a report.
     """
+    kinds = {kind.kind: kind for kind in part_kinds()}
     comparisons: list[str] = []
     found: list[Part] = []
     for name in names:
-        places = (Path(name), data_folder("comparisons") / f"{name}.toml", data_folder("comparisons") / name)
-        path = next((place for place in places if place.is_file()), None)
+        path = named_file(name)
         study = None if path is None else read_toml(path).get("study")
         if path is None or study is None:
             comparisons.append(name)
-        elif study in _LOADERS:
-            found.append(_LOADERS[study](path, engines))
+        elif study in kinds:
+            found.append(kinds[study].load(path, engines))
         else:
-            raise InputError(name, f"study = {study!r}", f"a report has {', '.join(_LOADERS)}, and comparisons")
-    return comparisons, sorted(found, key=lambda part: KEYS.index(part.key))
+            raise InputError(name, f"study = {study!r}", f"a report has {', '.join(kinds)}, and comparisons")
+    return comparisons, sorted(found, key=lambda part: part.order)
 
 
 def all_parts(engines: Sequence[str], out: Path) -> list[Part]:
-    """The parts that the files under ``comparisons/`` ask for, in the order of a report.
+    """The parts that the files of all studies ask for, in the order of a report.
 
     Args:
         engines: to which studies are restricted.
         out: folder of all results; what is made on request is a part where it is kept there.
     """
-    found = [load(path, engines) for study, load in _LOADERS.items() for path, _ in study_files(study)]
+    found = [kind.load(path, engines) for kind in part_kinds() for path, _ in study_files(kind.kind)]
     return [part for part in found if not part.on_request or part.keeps(out)]
-
-
-def _figures(path: Path, engines: Sequence[str]) -> Part:  # noqa: ARG001 -- the figures name their own engine
-    from proofroll.figures.reading import load_figures
-    from proofroll.report.figures_part import FiguresPart
-
-    return FiguresPart(load_figures(str(path)))
-
-
-def _tradeoff(path: Path, engines: Sequence[str]) -> Part:
-    from proofroll.report.tradeoff_part import TradeoffPart
-    from proofroll.studies.claims import load_claims
-
-    return TradeoffPart(load_claims(path), tuple(engines))
-
-
-def _stability(path: Path, engines: Sequence[str]) -> Part:
-    from proofroll.report.stability_part import StabilityPart
-    from proofroll.studies.stability_claims import file_for
-
-    return StabilityPart(file_for(str(path)), tuple(engines))
-
-
-_LOADERS: dict[str, Callable[[Path, Sequence[str]], Part]] = {
-    "figures": _figures,
-    "tradeoff": _tradeoff,
-    "stability": _stability,
-}
-# How the content lists the parts, in the order in which they are made and shown.
-KEYS = ("figures", "tradeoffs", "stability")
 
 
 def attempt(part: Part, action: Callable[[], dict[str, Any] | None]) -> dict[str, Any] | None:
@@ -136,3 +150,12 @@ def absent(part: Part, reason: str) -> dict[str, Any]:
     """What the content lists of a part that there is not; one sentence says why, and how to get it."""
     missing = f"{' '.join(reason.split()).rstrip('.')}; {part.head['command']} makes it."
     return {**part.head, "missing": missing, "study": None, "contradictions": [], "lost": []}
+
+
+def held(claims: Sequence[Mapping[str, Any]]) -> str:
+    """How many claims hold, of those that are decided, and how many are not; nothing where nothing is claimed."""
+    if not claims:
+        return ""
+    verdicts = [claim["holds"] for claim in claims]
+    undecided = f", {verdicts.count(None)} undecided" if None in verdicts else ""
+    return f"; {verdicts.count(True)} of {len(verdicts) - verdicts.count(None)} claims hold{undecided}"

@@ -2,11 +2,9 @@
 
 from __future__ import annotations
 
-import re
 from collections.abc import Mapping
 from typing import Any
 
-from proofroll.figures.judging import count
 from proofroll.report.labels import error, number, symbol, unit
 from proofroll.report.tradeoff_tables import cost_of, name_of, step_of
 
@@ -92,43 +90,6 @@ def effort(study: Mapping[str, Any]) -> str:
     if over:
         return f"{said}Every choice holds {where}, and at the corners of {over}; nothing is known beyond."
     return f"{said}Every choice holds {where}; it was not checked over ranges of the parameters."
-
-
-def titled(name: str) -> str:
-    """A figure's name as a heading: ``figure3`` is ``Figure 3``."""
-    return re.sub(r"(?<=[a-z])(?=\d)", " ", name.replace("_", " ")).capitalize()
-
-
-def statements(study: Mapping[str, Any]) -> list[dict[str, Any]]:
-    """What an article states and what the runs give, one line for each run."""
-    lines, before = [], None
-    for item in study["statements"]:
-        of = unit(item["unit"])
-        lines.append(
-            {
-                **item,
-                "first": item["says"] != before,
-                "runs": ", ".join(item["runs"]),
-                "found": _said(item["found"], of),
-                "truth": _said(item["truth"], of),
-            }
-        )
-        before = item["says"]
-    return lines
-
-
-def counted(study: Mapping[str, Any]) -> str:
-    """How many statements hold."""
-    return count(study["statements"])
-
-
-def _said(found: Any, of: str) -> str:
-    if found is None:
-        return "–"
-    if isinstance(found, list):
-        parts = [part if isinstance(part, str) else number(part, 3) for part in found]
-        return f"{', '.join(parts)} {of}".strip() if parts else "nothing"
-    return f"{number(found, 7)} {of}".strip()
 
 
 def _order(item: Mapping[str, Any]) -> str:

@@ -2,17 +2,14 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 from rich.table import Table
 from rich.text import Text
 
 from proofroll.report.labels import SYMBOLS, caveat_lines, headlines, names, verdict_text
 from proofroll.report.screen import Screen
-
-if TYPE_CHECKING:
-    from proofroll.drill.row import Drilled
+from proofroll.report.study_parts import further, part_kinds
 
 WIDTH = 100
 _WORD, _NUMBER = 14, 7  # characters of the longest word and of a number
@@ -71,52 +68,6 @@ def verdict_table(content: dict[str, Any]) -> Table:
     return table
 
 
-def onset_table(content: dict[str, Any]) -> Table:
-    """One line per engine: its first slip with bracket, the difference from the truth, and the verdict."""
-    table = Table(box=None, padding=(0, 1, 0, 0))
-    table.add_column("engine", no_wrap=True)
-    table.add_column(Text("first slip [s]"), justify="right", no_wrap=True)
-    table.add_column(Text("between [s]"), no_wrap=True)
-    table.add_column(Text("difference [s]"), justify="right", no_wrap=True)
-    table.add_column("verdict", no_wrap=True)
-    for item in content["engines"]:
-        first = item["onset"]
-        bracket = f"{first['time_low']:.9g} … {first['time_high']:.9g}" if first else ""
-        verdict = item["verdict"]
-        if verdict in {"failed", "refused"}:
-            verdict += f": {item['message']}"
-        settings = item["settings"]
-        label = (item["name"], settings.get("formulation", ""), settings.get("preset", ""))
-        table.add_row(
-            Text(" ".join(filter(None, label))),
-            f"{first['time']:.9g}" if first else "none",
-            bracket,
-            number(item["difference"]),
-            Text(verdict),
-        )
-    return table
-
-
-def drill_table(rows: Sequence[Drilled]) -> Table:
-    """One line per fault: whether it was contained, what it cost, and what was said about it."""
-    table = Table(box=None, padding=(0, 1, 0, 0))
-    table.add_column("fault", no_wrap=True)
-    table.add_column("contained", no_wrap=True)
-    for name in ("others arrived", "kept", "recomputed"):
-        table.add_column(name, justify="right")
-    table.add_column("said")
-    for row in rows:
-        table.add_row(
-            row.fault,
-            Text("yes", style="green") if row.contained else Text("NO", style="bold red"),
-            f"{row.others_arrived}/{row.others}",
-            f"{row.kept}/{row.stored}",
-            f"{row.recomputed}/{row.missing}",
-            Text(row.said if row.contained else f"{row.said} ({row.problem})", overflow="fold"),
-        )
-    return table
-
-
 def step(row: dict[str, Any]) -> str:
     """The resolution in few characters: ``1e-3 s``, or ``tol 2e-14``."""
     if not row["resolution"]:
@@ -158,36 +109,13 @@ def closing_lines(content: dict[str, Any]) -> list[str]:
 
 def part_lines(content: dict[str, Any]) -> list[str]:
     """One line for each further study of a report."""
-    from proofroll.figures.judging import count
-
-    lines = []
-    for entry in content["figures"]:
-        if entry["study"] is not None:
-            lines.append(f"{entry['name']}: {count(entry['study']['statements'])}.")
-    for entry in content["tradeoffs"]:
-        if entry["study"] is not None:
-            held = [claim["holds"] for claim in entry["claims"]]
-            lines.append(f"{entry['name']}: {len(entry['study']['points'])} points{_held(held)}.")
-    for entry in content["stability"]:
-        if entry["study"] is not None:
-            study, held = entry["study"], [claim["holds"] for claim in entry["claims"]]
-            lines.append(
-                f"{entry['name']}: {study['silent']} of {study['boundaries']} boundaries are silent{_held(held)}."
-            )
-    return lines
-
-
-def _held(held: Sequence[bool | None]) -> str:
-    """How many claims hold, of those that are decided, and how many are not."""
-    if not held:
-        return ""
-    undecided = f", {held.count(None)} undecided" if None in held else ""
-    return f"; {held.count(True)} of {len(held) - held.count(None)} claims hold{undecided}"
+    pairs = [(kind, entry) for kind in part_kinds() for entry in content[kind.key] if entry["study"] is not None]
+    return [f"{entry['name']}: {kind.line(entry)}." for kind, entry in pairs]
 
 
 def first_lines(content: dict[str, Any]) -> list[str]:
     """What to look at first, in at most three lines."""
-    entries = [entry for key in ("figures", "tradeoffs", "stability") for entry in content[key]]
+    entries = further(content)
     unexpected = [line for item in (*content["comparisons"], *entries) for line in item["contradictions"]]
     missing = [entry for entry in entries if entry["missing"]]
     lines = []

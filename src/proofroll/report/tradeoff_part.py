@@ -8,22 +8,38 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, ClassVar
 
+from proofroll.report.study_parts import held
+from proofroll.studies.claims import STUDY, TradeoffClaims, load_claims
+
 if TYPE_CHECKING:
     from proofroll.report.study_parts import Tell
     from proofroll.running.runner import Runner
-    from proofroll.studies.claims import TradeoffClaims
 
 
 @dataclass
 class TradeoffPart:
     """Speed against accuracy in one scene."""
 
+    kind: ClassVar[str] = STUDY
     key: ClassVar[str] = "tradeoffs"
+    order: ClassVar[float] = 30
     words: ClassVar[str] = "speed against accuracy"
+    template: ClassVar[str] = "tradeoff.html"
+    names: ClassVar[Mapping[str, Any]] = {}
     on_request: ClassVar[bool] = False
     asked: TradeoffClaims
     engines: Sequence[str] = ()
     study: Mapping[str, Any] | None = None
+
+    @classmethod
+    def load(cls, path: Path, engines: Sequence[str]) -> TradeoffPart:
+        """See the protocol."""
+        return cls(load_claims(path), tuple(engines))
+
+    @staticmethod
+    def line(entry: dict[str, Any]) -> str:
+        """How much was measured, and what holds of what was claimed."""
+        return f"{len(entry['study']['points'])} points{held(entry['claims'])}"
 
     @property
     def head(self) -> dict[str, str]:

@@ -19,7 +19,9 @@ from proofroll.running.case import EngineFacts
 # Folders on which every result rests; reports and the command line are not among them.
 FOUNDATION = ("core", "elements", "files", "mechanisms", "running")
 # Modules and folders that only show results, wherever they lie.
-ASIDE = frozenset({"reproducer", "reproducer_source", "report", "onset_study", "regimes_study", "failure_program"})
+ASIDE = frozenset(
+    {"reproducer", "reproducer_source", "report", "onset_study", "regimes_study", "commands", "failure_program"}
+)
 
 
 def describe(engine: str) -> dict[str, Any]:

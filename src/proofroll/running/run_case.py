@@ -34,9 +34,10 @@ def _run(case: Case, out: Path, spent: Spent) -> Result:
     from proofroll.core.engine import fixed_step, require_provided
     from proofroll.core.first_steps import DERIVED, derivable
     from proofroll.core.plugins import load_engine, resolve_settings
+    from proofroll.core.time_grid import time_grid
     from proofroll.files.netcdf import write
     from proofroll.files.scene_file import load_scene
-    from proofroll.running.recording import off_grid, record, time_grid
+    from proofroll.running.recording import off_grid, record
 
     versions = made_with(case.engine.name, case.engine.version)
     scene = load_scene(case.scene, asks=case.asks, **case.parameters)

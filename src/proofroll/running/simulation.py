@@ -10,9 +10,10 @@ from proofroll.core.engine import fixed_step, require_provided
 from proofroll.core.errors import InputError, Refused
 from proofroll.core.plugins import load_engine, parse_engine, resolve_settings
 from proofroll.core.scene import Scene
+from proofroll.core.time_grid import time_grid
 from proofroll.running.identity import truth_version
 from proofroll.running.manifest import manifest, versions
-from proofroll.running.recording import off_grid, record, time_grid
+from proofroll.running.recording import off_grid, record
 
 if TYPE_CHECKING:
     import xarray as xr

@@ -20,8 +20,8 @@ _MOST_BUILDING = 5.0
 def time_once(case: dict[str, Any], seconds: float) -> dict[str, Any]:
     """One measurement of a case's speed: clean runs for about this many wall seconds, one after another."""
     from proofroll.core.plugins import load_engine, resolve_settings
+    from proofroll.core.time_grid import time_grid
     from proofroll.files.scene_file import load_scene
-    from proofroll.running.recording import time_grid
 
     wanted = Case.from_dict(case)
     scene = load_scene(wanted.scene, asks=wanted.asks, **wanted.parameters)

@@ -6,13 +6,12 @@ import dataclasses
 
 from proofroll.core.comparison import Comparison, Edge
 from proofroll.core.errors import InputError
+from proofroll.core.truth import edge_between
 from proofroll.files.scene_file import load_scene
-
-_EDGE_OF = "mu_static"
 
 
 def settled(comparison: Comparison) -> Comparison:
-    """The comparison with every stair edge found, to six digits.
+    """The comparison with every edge found.
 
     Raises:
         InputError: an edge of a parameter for which it is not defined, or none between the two values.
@@ -26,15 +25,14 @@ def settled(comparison: Comparison) -> Comparison:
 
 
 def _found(comparison: Comparison, point: dict[str, float | Edge], name: str, edge: Edge) -> float:
-    from proofroll.truth.onset import edge_between
-
     where = f"{comparison.name}: points: {name}"
-    if name != _EDGE_OF:
-        raise InputError(where, "edge_between", f"an edge can be found only for {_EDGE_OF}")
     low, high = edge.edge_between
     others = {key: value for key, value in point.items() if isinstance(value, float)}
-    scene = load_scene(comparison.scene, **others, mu_static=high)
-    found = edge_between(scene, low, high, comparison.until)
+    scene = load_scene(comparison.scene, **{**others, name: high})
+    try:
+        found = edge_between(scene, name, low, high, comparison.until)
+    except InputError as error:
+        raise InputError(where, error.value, error.advice) from None
     if found is None:
-        raise InputError(where, list(edge.edge_between), "the first slip does not jump between these values")
+        raise InputError(where, list(edge.edge_between), f"nothing jumps between these values of {name}")
     return found

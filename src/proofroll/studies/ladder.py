@@ -15,10 +15,10 @@ from proofroll.core.dataset import observe
 from proofroll.core.errors import InputError, ProofrollError, Refused
 from proofroll.core.observable import Role
 from proofroll.core.scene import Scene
+from proofroll.core.time_grid import time_grid
 from proofroll.files.netcdf import read
 from proofroll.files.scene_file import load_scene
 from proofroll.running.case import Case, EngineFacts, Result, Status
-from proofroll.running.recording import time_grid
 from proofroll.running.runner import Runner, WorkerDied, resolve
 from proofroll.running.stopwatch import Stopwatch
 from proofroll.running.timing import ROUNDS, Timing, interleaved

@@ -9,9 +9,10 @@ from typing import TYPE_CHECKING
 
 from proofroll.core.arrays import FloatArray
 from proofroll.core.element import Element
+from proofroll.core.errors import InputError
 from proofroll.core.scene import Scene
 from proofroll.elements.ball_on_surface.element import BallOnSurface
-from proofroll.truth.onset import onset
+from proofroll.truth.onset import edge_between, onset
 from proofroll.truth.truth import truth
 
 if TYPE_CHECKING:
@@ -19,7 +20,7 @@ if TYPE_CHECKING:
 
 
 class BallOnSurfaceTruth:
-    """See :class:`proofroll.core.truth.ElementTruth`."""
+    """See :class:`proofroll.core.truth.ElementTruth`, :class:`proofroll.core.truth.FindsEdges`."""
 
     @staticmethod
     def covers(element: Element) -> bool:
@@ -37,3 +38,10 @@ class BallOnSurfaceTruth:
             if first.verdict == "ill-posed":
                 found.attrs["ill_posed"] = "the time of the first slip hangs on less than the parameters are known to"
         return found
+
+    @staticmethod
+    def edge_between(element: Element, parameter: str, low: float, high: float, until: float) -> float | None:
+        """A value of static friction at which the time of the first slip jumps, see :func:`proofroll.truth.onset`."""
+        if parameter != "mu_static":
+            raise InputError(parameter, "edge_between", "an edge can be found only for mu_static")
+        return edge_between(Scene(element.name, "", (element,)), low, high, until)

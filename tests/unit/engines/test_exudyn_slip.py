@@ -12,9 +12,10 @@ from proofroll.core.certificate import certify
 from proofroll.core.errors import Diverged, InputError, Refused
 from proofroll.core.events import events_of
 from proofroll.core.scene import Scene
+from proofroll.core.time_grid import time_grid
 from proofroll.elements.ball_on_surface.element import changed, rolling_ball
 from proofroll.elements.ball_on_surface.mechanics import resistance_moment
-from proofroll.running.recording import record, time_grid
+from proofroll.running.recording import record
 from proofroll.running.simulation import build
 
 pytest.importorskip("exudyn")

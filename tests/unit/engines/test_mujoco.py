@@ -13,12 +13,13 @@ from proofroll.core.certificate import certify, first_difference
 from proofroll.core.engine import Sample
 from proofroll.core.errors import Diverged, InputError, Refused
 from proofroll.core.scene import Scene
+from proofroll.core.time_grid import time_grid
 from proofroll.elements.ball_on_surface.element import changed, rolling_ball
 from proofroll.elements.ball_on_surface.surfaces import Cylinder
 from proofroll.engines.mujoco import Mujoco
 from proofroll.engines.mujoco.settings import PRESETS
 from proofroll.files.scene_file import load_scene
-from proofroll.running.recording import record, time_grid
+from proofroll.running.recording import record
 from proofroll.running.simulation import build, simulate
 
 CYLINDER, PLANE = "sphere_in_cylinder", "inclined_plane"

@@ -10,10 +10,11 @@ import pytest
 
 from proofroll.core.errors import InputError, Refused
 from proofroll.core.events import events_of
+from proofroll.core.time_grid import time_grid
 from proofroll.elements.ball_on_surface.element import changed, rolling_ball
 from proofroll.elements.ball_on_surface.surfaces import Cylinder
 from proofroll.files.scene_file import load_scene
-from proofroll.running.recording import record, time_grid
+from proofroll.running.recording import record
 from proofroll.running.simulation import build, simulate
 
 CYLINDER, PLANE = "sphere_in_cylinder", "inclined_plane"

@@ -13,10 +13,11 @@ from proofroll.core.certificate import Standing, certify
 from proofroll.core.errors import Diverged, InputError, Refused
 from proofroll.core.events import events_of
 from proofroll.core.scene import Scene
+from proofroll.core.time_grid import time_grid
 from proofroll.elements.ball_on_surface.element import changed, rolling_ball
 from proofroll.elements.ball_on_surface.model import BallCapability
 from proofroll.files.scene_file import load_scene
-from proofroll.running.recording import record, time_grid
+from proofroll.running.recording import record
 from proofroll.running.simulation import build, simulate
 from proofroll.truth import truth as truth_of
 

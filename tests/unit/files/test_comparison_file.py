@@ -52,12 +52,6 @@ def excepted(where: str, expect: str, after: str = SOFT) -> str:
     return f"{after}\nexcept_at = [{{ where = {{ {where} }}, expect = {expect} }}]"
 
 
-def regimes(until: str) -> str:
-    """The table of a map of four runs."""
-    axis = "{ low = 1, high = 2, count = 2 }"
-    return f"[regimes]\nuntil = {until}\nrolling_resistance = [0]\nspeed = {axis}\nmu_static = {axis}"
-
-
 @pytest.fixture
 def load(tmp_path: Path) -> Callable[..., Comparison]:
     """Reads the comparison above with one text replaced."""
@@ -120,13 +114,6 @@ def test_a_row_that_fits_no_point(tmp_path: Path) -> None:
     path.write_text(text.replace("only = { speed = [4] }", "only = { speed = [4], rolling_resistance = [5e-4] }"))
     with pytest.raises(InputError, match=r"rows\.1\.only.*no point of the comparison fits"):
         load_comparison(str(path))
-
-
-def test_a_map(load: Callable[..., Comparison]) -> None:
-    """A table of regimes is read with its axes, and says how many runs it takes."""
-    found = load("[tolerances.tight]", f"{regimes('4')}\n[tolerances.tight]").regimes
-    assert found is not None
-    assert (found.until, found.rolling_resistance, found.count) == (4.0, [0.0], 4)
 
 
 def test_variations(load: Callable[..., Comparison]) -> None:
@@ -212,8 +199,6 @@ def test_tolerances_of_another_form(text: object) -> None:
         ("[vary]", f"[{'.'.join('v' * 3000)}]\n[vary]", ["claim.toml", "nested more than 16 deep"]),
         ("every = 0.01", "every = 0.01\ntime_limit = -1", ["time_limit = -1", "positive, finite time in s"]),
         ("every = 0.01", "every = 0.01\ntime_limit = inf", ["time_limit = inf", "positive, finite time in s"]),
-        ("[tolerances.tight]", f"{regimes('-4')}\n[tolerances.tight]", ["regimes.until = -4", "positive, finite time"]),
-        ("[tolerances.tight]", f"{regimes('nan')}\n[tolerances.tight]", ["regimes.until = nan", "positive, finite"]),
     ],
 )  # fmt: skip
 def test_broken_comparisons(load: Callable[..., Comparison], old: str, new: str, words: list[str]) -> None:
@@ -253,7 +238,7 @@ def test_comparisons_come_in_the_order_that_they_ask_for(tmp_path: Path, monkeyp
     texts = {"b": "", "a": "", "z": "order = 1", "y": "order = 2.5", "broken": "order = [", "other": 'study = "x"'}
     for name, text in texts.items():
         (tmp_path / f"{name}.toml").write_text(text)
-    monkeypatch.setattr("proofroll.files.comparison_file.data_folder", lambda _: tmp_path)
+    monkeypatch.setattr("proofroll.files.comparison_file.study_folders", lambda: (tmp_path,))
     assert comparison_names() == ["z", "y", "a", "b", "broken"]
 
 

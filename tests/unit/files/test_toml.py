@@ -34,7 +34,7 @@ def test_a_broken_neighbour_costs_nobody_else(tmp_path: Path, monkeypatch: pytes
     """Looking for the file of a scene goes past a broken one, whichever study it is for."""
     (tmp_path / "a_broken.toml").write_text("a = = 1")
     (tmp_path / "b.toml").write_text('study = "made"\nscene = "cone"')
-    monkeypatch.setattr(toml_file, "data_folder", lambda _: tmp_path)
+    monkeypatch.setattr(toml_file, "study_folders", lambda: (tmp_path,))
     assert [(path.name, content["scene"]) for path, content in study_files("made")] == [("b.toml", "cone")]
     assert claims_for("sphere_in_cylinder") is None
     with pytest.raises(InputError, match="no file under comparisons/"):

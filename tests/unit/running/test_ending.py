@@ -9,8 +9,8 @@ from pathlib import Path
 
 import pytest
 
-from proofroll.drill.processes import alive, wait_until
 from proofroll.running.memory import descendants
+from proofroll_drill.processes import alive, wait_until
 
 pytestmark = pytest.mark.skipif(not Path("/proc/self/task").exists(), reason="the system has no /proc")
 

@@ -14,13 +14,13 @@ from hostile import ENTRY_POINTS
 from proofroll.core.certificate import Line
 from proofroll.core.comparison import Band, Comparison, ExceptAt, Row, Tolerance
 from proofroll.core.scene import Scene
+from proofroll.core.time_grid import time_grid
 from proofroll.core.truth import truth
 from proofroll.core.verdict import Verdict
 from proofroll.elements.ball_on_surface.model import BallCapability
 from proofroll.files.netcdf import write
 from proofroll.files.scene_file import load_scene
 from proofroll.running.case import Case, EngineFacts, Result, Status
-from proofroll.running.recording import time_grid
 from proofroll.running.runner import Runner
 from proofroll.running.simulation import simulate
 from proofroll.running.store import Store

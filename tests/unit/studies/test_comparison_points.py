@@ -31,7 +31,7 @@ def test_the_stair_edge_of_our_comparison() -> None:
 
 def test_an_edge_that_is_not_there() -> None:
     """Between two values without a jump no edge is invented."""
-    with pytest.raises(InputError, match="the first slip does not jump between these values"):
+    with pytest.raises(InputError, match="nothing jumps between these values of mu_static"):
         settled(at({**SPEED_AND_RESISTANCE, "mu_static": Edge((0.35, 0.36))}))
 
 

@@ -7,7 +7,7 @@ import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from functools import cached_property
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, ClassVar
 
 import numpy as np
 
@@ -77,6 +77,10 @@ class BallOnSurface:
         if self.surface.kind != "plane":
             needs.add(BallCapability.CURVED_SURFACE)
         return frozenset(needs)
+
+    optional: ClassVar[frozenset[str]] = frozenset(
+        {BallCapability.ROLLING_RESISTANCE, BallCapability.BOUNDED_FRICTION, BallCapability.ORIENTATION}
+    )
 
     def asked(self, name: str) -> str | None:
         """See the protocol."""

@@ -2,12 +2,12 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
-from typing import TYPE_CHECKING, Any
+from collections.abc import Mapping, Sequence
+from typing import TYPE_CHECKING, Any, ClassVar
 
 from proofroll.core.scene import Scene
 from proofroll.elements.ball_on_surface.element import BallOnSurface, rolling_ball
-from proofroll.elements.ball_on_surface.report import onsets
+from proofroll.elements.ball_on_surface.report import onset_tables, onsets
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -18,6 +18,9 @@ if TYPE_CHECKING:
 
 class BallReport:
     """See :class:`proofroll.report.kinds.ReportKind`."""
+
+    template: ClassVar[str] = "slips.html"
+    names: ClassVar[Mapping[str, Any]] = {"onsets": onset_tables}
 
     @staticmethod
     def covers(scene: Scene) -> bool:

@@ -1,0 +1,88 @@
+"""Figures of an article from our own runs, with what it states checked."""
+
+from __future__ import annotations
+
+from enum import StrEnum
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated
+
+import typer
+
+from proofroll.cli.options import (
+    CONTRADICTED,
+    ENGINE,
+    OK,
+    Fresh,
+    Jobs,
+    Json,
+    Out,
+    complain,
+    new_runner,
+    progress_bar,
+    write_json,
+)
+
+if TYPE_CHECKING:
+    import xarray as xr
+
+
+class Form(StrEnum):
+    """Forms of a file."""
+
+    SVG = "svg"
+    PNG = "png"
+    PDF = "pdf"
+
+
+def figures(
+    study: Annotated[
+        str, typer.Argument(help="A file that defines figures, its name, or the scene it is about.")
+    ] = "paper_figures",
+    engine: Annotated[
+        str | None, typer.Option(help="truth, or name[key=value,…]; by default the one that the file names.")
+    ] = None,
+    form: Annotated[list[Form] | None, typer.Option("--format", help="Form of the files; repeat. svg.")] = None,
+    out: Out = Path("out"),
+    fresh: Fresh = False,
+    jobs: Jobs = None,
+    as_json: Json = False,
+) -> None:
+    """Draw the paper's figures from runs; exit 1 if a number that it states does not hold."""
+    from blajer_2006.drawing import looks
+    from blajer_2006.reading import load_figures
+    from blajer_2006.study import run_figures
+    from blajer_2006.writing import closing_lines, statement_table, write_figures
+
+    loaded = load_figures(study)
+    with looks():  # what is missing shows before the runs rather than after them
+        pass
+    runner = new_runner(out, fresh, jobs)
+    with progress_bar("runs") as advance:
+        made = run_figures(loaded, runner, engine, lambda case, _: advance(case.engine.name))
+    maps = {name: _maps(name, jobs) for name in dict.fromkeys(item.regimes for item in loaded.figures) if name}
+    content = write_figures(made, maps, out, list(dict.fromkeys(item.value for item in form or [Form.SVG])))
+    if as_json:
+        write_json(content)
+    else:
+        from proofroll.report.terminal import console
+
+        console().print(statement_table(content))
+        for line in closing_lines(content, out):
+            console().print(line, markup=False)
+    for line in content["lost"]:
+        complain(line)
+    if content["lost"]:
+        raise typer.Exit(ENGINE)
+    contradicted = any(item["holds"] is False for item in content["statements"])
+    raise typer.Exit(CONTRADICTED if contradicted else OK)
+
+
+def _maps(name: str, jobs: int | None) -> list[xr.Dataset]:
+    """The regime maps of a study, with a progress bar of their own."""
+    import os
+
+    from proofroll.elements.ball_on_surface.regimes_study import load_regimes, regime_maps
+
+    wanted = load_regimes(name)
+    with progress_bar("runs of the truth", total=wanted.runs) as advance:
+        return regime_maps(wanted, jobs or os.cpu_count() or 1, lambda count: advance("runs of the truth", count))

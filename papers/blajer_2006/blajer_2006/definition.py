@@ -1,0 +1,178 @@
+"""What a file of figures holds: runs, figures of them, and what an article states about them."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+from typing import Literal
+
+from pydantic import ConfigDict
+
+from blajer_2006.measures import Measure
+from blajer_2006.quantities import ANGLES, TIME
+
+CRITERIA = ("stated", "at_most", "below", "above", "order", "events")
+
+
+@dataclass(frozen=True)
+class PlannedRun:
+    """A run that figures and statements refer to.
+
+    Attributes:
+        label: for a legend; mathematics between dollar signs.
+        parameters: of the scene.
+    """
+
+    label: str
+    parameters: dict[str, float] = field(default_factory=dict)
+
+
+@dataclass(frozen=True)
+class HorizontalLine:
+    """A horizontal line.
+
+    Attributes:
+        value: where, in the panel's unit.
+        label: beside it.
+    """
+
+    value: float
+    label: str
+
+
+@dataclass(frozen=True)
+class Panel:
+    """One pair of axes.
+
+    Attributes:
+        y: quantities that are drawn.
+        runs: names of the runs that are drawn.
+        x: quantity against which; time by default.
+        title: for a person.
+        label: of the ordinate instead of all symbols; mathematics between dollar signs.
+        equal: one scale for both axes.
+        zero: the ordinate begins at zero.
+        share: panels with the same text share the range of y.
+        levels: horizontal lines.
+        events: mark what happened in the first run.
+        truth: also draw the truth's samples.
+    """
+
+    y: list[str]
+    runs: list[str]
+    x: str = TIME
+    title: str = ""
+    label: str = ""
+    equal: bool = False
+    zero: bool = False
+    share: str = ""
+    levels: list[HorizontalLine] = field(default_factory=list)
+    events: bool = False
+    truth: bool = True
+
+
+@dataclass(frozen=True)
+class Figure:
+    """One figure: panels of runs, or regime maps.
+
+    Attributes:
+        name: of its file, without ending.
+        caption: for a person.
+        panels: in reading order.
+        columns: of panels.
+        height: of a row of panels [inch].
+        until: what is drawn [s]; everything by default.
+        regimes: name of the study of regimes whose maps it shows, instead of panels.
+    """
+
+    name: str
+    caption: str
+    panels: list[Panel] = field(default_factory=list)
+    columns: int = 2
+    height: float = 1.9
+    until: float | None = None
+    regimes: str = ""
+
+
+@dataclass(frozen=True)
+class Statement:
+    """What an article, or this project, says about runs: one quantity, one measure of it, and one criterion.
+
+    Attributes:
+        says: for a person.
+        source: where it is said.
+        ours: it is this project's, and not the article's.
+        runs: each must fulfil it by itself; with ``order`` they are held against each other.
+        of: quantity; not for ``events``.
+        measure: of the quantity; ``every`` means all its samples.
+        stated: a number with the digits that the source gives; what is found must round to it.
+        at_most, below, above: bounds, in the unit of the measure.
+        because: why this bound, where the source gives no number.
+        order: of the measures from the first run to the last.
+        events: kinds of the events of the run, in order.
+        event: number of the event whose time [s] is ``stated``, from 0, instead of a measure.
+        until: only what is before counts [s].
+    """
+
+    says: str
+    source: str
+    runs: list[str]
+    ours: bool = False
+    of: str = ""
+    measure: Measure | Literal["every", ""] = ""
+    stated: str = ""
+    at_most: float | None = None
+    below: float | None = None
+    above: float | None = None
+    because: str = ""
+    order: Literal["rising", "falling", ""] = ""
+    events: list[str] = field(default_factory=list)
+    event: int | None = None
+    until: float | None = None
+
+    @property
+    def criteria(self) -> list[str]:
+        """Names of the criteria that are given; exactly one, once the file has been checked."""
+        return [name for name in CRITERIA if getattr(self, name) not in (None, "", [])]
+
+
+@dataclass(frozen=True)
+class Figures:
+    """A file.
+
+    Attributes:
+        name: of the file, without ending.
+        title, source: for a person; the article.
+        scene: of every run.
+        engine: that draws the figures unless the user names another, ``name[key=value,…]``.
+        until, every: last time and sampling interval of every run [s].
+        start_angles: Euler angles φ, θ, ψ of the body's axes at time 0 [rad].
+        symbols: quantity -> symbol of the article, as TeX mathematics.
+        runs: by name.
+        figures: in the order of the article.
+        statements: what is checked.
+        time_limit: wall seconds a run may take [s].
+    """
+
+    name: str
+    title: str
+    source: str
+    scene: str
+    engine: str
+    until: float
+    every: float
+    runs: dict[str, PlannedRun]
+    figures: list[Figure]
+    statements: list[Statement] = field(default_factory=list)
+    symbols: dict[str, str] = field(default_factory=dict)
+    start_angles: tuple[float, float, float] = (0.0, 0.0, 0.0)
+    time_limit: float = 120.0
+
+    @property
+    def wants_orientation(self) -> bool:
+        """Whether anything asks for the Euler angles."""
+        drawn = {name for figure in self.figures for panel in figure.panels for name in (panel.x, *panel.y)}
+        return bool((drawn | {item.of for item in self.statements}) & set(ANGLES))
+
+
+for _typed in (Figures, Figure, Panel, HorizontalLine, PlannedRun, Statement):
+    setattr(_typed, "__pydantic_config__", ConfigDict(extra="forbid"))  # noqa: B010 -- the name is pydantic's, not the class's

@@ -1,0 +1,154 @@
+"""Holds what a file states against the runs: found, stated, and whether it holds to the digits stated."""
+
+from __future__ import annotations
+
+import itertools
+import math
+import operator
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from decimal import Decimal
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from blajer_2006.definition import Statement
+from blajer_2006.measures import DEFINITIONS, measured, unit_of
+from blajer_2006.quantities import TIME
+from blajer_2006.study import FigureRun, FigureRuns
+from proofroll.core.events import events_of
+
+if TYPE_CHECKING:
+    import xarray as xr
+
+Measured = float | list[float] | list[str] | None
+_BOUNDS: dict[str, tuple[str, Callable[[float, float], bool]]] = {
+    "at_most": ("≤", operator.le),
+    "below": ("<", operator.lt),
+    "above": (">", operator.gt),
+}
+# A decimal fraction is not a double: half a unit of the last digit is that, and its round-off.
+_HALF = Decimal("0.5") * (1 + Decimal("1e-9"))
+
+
+def judged(study: FigureRuns) -> list[dict[str, Any]]:
+    """One entry for each statement and run, or for each statement about the order of runs.
+
+    Each has ``says``, ``source``, ``ours``, ``defined`` (what its measure means), ``because``, ``runs``, ``of``,
+    ``measure``, ``unit``, ``stated`` (text), ``found`` by the engine, ``truth`` (what the truth gives)
+    and ``holds``; None where the engine cannot say, and ``why``.
+    """
+    return [
+        _entry(study, item, runs)
+        for item in study.figures.statements
+        for runs in ([item.runs] if item.order else [[run] for run in item.runs])
+    ]
+
+
+def count(statements: Sequence[Mapping[str, Any]]) -> str:
+    """How many statements hold, those of the article apart from this project's own."""
+    parts = []
+    for ours, whose in ((False, "statements"), (True, "of this project's own")):
+        verdicts = [item["holds"] for item in statements if item["ours"] is ours]
+        if verdicts:
+            parts.append(f"{verdicts.count(True)} of {len(verdicts)} {whose}")
+    return f"{' and '.join(parts)} hold"
+
+
+def rounds_to(value: float, stated: str) -> bool:
+    """Whether a number is the stated one to the digits that are written: off by half a unit of the last at most."""
+    number = Decimal(stated)
+    exponent = number.as_tuple().exponent
+    assert isinstance(exponent, int)  # finite, as the file was checked for
+    return math.isfinite(value) and abs(Decimal(value) - number) <= _HALF.scaleb(exponent)
+
+
+def _entry(study: FigureRuns, item: Statement, runs: list[str]) -> dict[str, Any]:
+    found = _found(item, [study.runs[name] for name in runs])
+    why = next(_reasons(study, item, runs), "") if found is None else ""
+    return {
+        "says": item.says,
+        "source": item.source,
+        "ours": item.ours,
+        "defined": DEFINITIONS.get(item.measure, "") if item.measure and item.measure != "every" else "",
+        "because": item.because,
+        "runs": runs,
+        "of": item.of,
+        "measure": item.measure,
+        "unit": _unit(study, item),
+        "stated": _stated(item),
+        "found": found,
+        "truth": _found(item, [study.truths[name] for name in runs]),
+        "holds": None if found is None else _holds(item, found),
+        "why": why,
+    }
+
+
+def _unit(study: FigureRuns, item: Statement) -> str:
+    if item.event is not None:
+        return "s"
+    if item.events:
+        return ""
+    unit = study.units[item.of]
+    return unit if item.measure == "every" or not item.measure else unit_of(item.measure, unit)
+
+
+def _stated(item: Statement) -> str:
+    (criterion,) = item.criteria
+    if criterion in _BOUNDS:
+        return f"{_BOUNDS[criterion][0]} {getattr(item, criterion):g}"
+    return ", ".join(item.events) or str(getattr(item, criterion))
+
+
+def _found(item: Statement, made: list[FigureRun]) -> Measured:
+    """What the runs give; None where one of them cannot say."""
+    values = [_value(item, run) for run in made]
+    if item.order:
+        numbers = [value for value in values if isinstance(value, float)]
+        return numbers if len(numbers) == len(values) else None
+    return values[0]
+
+
+def _value(item: Statement, made: FigureRun) -> Measured:
+    if not made.done or made.dataset is None:
+        return None
+    if item.events or item.event is not None:
+        return _happened(item, made.dataset)
+    values = made.curve(item.of, item.until)
+    if values is None:
+        return None
+    if item.measure == "every":
+        return float(values[np.argmax(np.abs(values - float(item.stated)))])
+    assert item.measure  # as the file was checked for
+    return measured(item.measure, made.dataset[TIME].to_numpy()[: values.size], values)
+
+
+def _happened(item: Statement, dataset: xr.Dataset) -> Measured:
+    """The kinds of the events, or the time [s] of one; nan where it did not happen."""
+    if "event_kind" not in dataset:
+        return None
+    events = [event for event in events_of(dataset) if item.until is None or event.time <= item.until]
+    if item.event is None:
+        return [str(event.kind) for event in events]
+    return events[item.event].time if 0 <= item.event < len(events) else math.nan
+
+
+def _holds(item: Statement, found: Measured) -> bool:
+    (criterion,) = item.criteria
+    if isinstance(found, list):
+        if criterion == "events":
+            return found == item.events
+        compare = operator.lt if item.order == "rising" else operator.gt
+        return all(compare(a, b) for a, b in itertools.pairwise(float(value) for value in found))
+    assert found is not None  # nothing found is not judged
+    if criterion == "stated":
+        return rounds_to(found, item.stated)
+    return _BOUNDS[criterion][1](found, getattr(item, criterion))
+
+
+def _reasons(study: FigureRuns, item: Statement, runs: list[str]) -> Iterator[str]:
+    """Why nothing was found."""
+    for name in runs:
+        result = study.runs[name].result
+        if not study.runs[name].done:
+            yield f"{name}: {result.status}, {result.message}"
+    yield f"{study.engine} does not tell {item.of or 'events'}"

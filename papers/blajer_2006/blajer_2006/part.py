@@ -1,0 +1,90 @@
+"""Figures of an article as a part of a report."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import TYPE_CHECKING, Any, ClassVar
+
+from blajer_2006 import statement_tables
+from blajer_2006.judging import count
+from blajer_2006.reading import STUDY, load_figures
+
+if TYPE_CHECKING:
+    import xarray as xr
+
+    from blajer_2006.definition import Figures
+    from blajer_2006.study import FigureRuns
+    from proofroll.report.study_parts import Tell
+    from proofroll.running.runner import Runner
+
+
+@dataclass
+class FiguresPart:
+    """Figures of an article from our own runs, and what it states."""
+
+    kind: ClassVar[str] = STUDY
+    key: ClassVar[str] = "figures"
+    order: ClassVar[float] = 10
+    words: ClassVar[str] = "figures"
+    template: ClassVar[str] = "figures.html"
+    names: ClassVar[Mapping[str, Any]] = {"statements": statement_tables}
+    on_request: ClassVar[bool] = False
+    asked: Figures
+    maps: dict[str, list[xr.Dataset]] = field(default_factory=dict)
+    """Regime maps by the name of their study."""
+    study: FigureRuns | None = None
+
+    @classmethod
+    def load(cls, path: Path, engines: Sequence[str]) -> FiguresPart:  # noqa: ARG003 -- a file names its own engine
+        """See the protocol."""
+        return cls(load_figures(str(path)))
+
+    @staticmethod
+    def line(entry: dict[str, Any]) -> str:
+        """How many statements hold."""
+        return count(entry["study"]["statements"])
+
+    @property
+    def head(self) -> dict[str, str]:
+        """What it is."""
+        asked = self.asked
+        command = f"proofroll figures {asked.name}"
+        return {"name": asked.name, "title": asked.title, "question": "", "scene": asked.scene, "command": command}
+
+    def keeps(self, out: Path) -> bool:  # noqa: ARG002 -- the protocol's
+        """Its runs are cases, which the runner reuses."""
+        return False
+
+    def make(self, runner: Runner, out: Path, tell: Tell) -> None:  # noqa: ARG002 -- the protocol's
+        """Makes the runs and the maps."""
+        from blajer_2006.study import run_figures
+        from proofroll.elements.ball_on_surface.regimes_study import load_regimes, regime_maps
+
+        self.study = run_figures(self.asked, runner, None, lambda case, _: tell(case.engine.name, 1))
+        for name in dict.fromkeys(figure.regimes for figure in self.asked.figures if figure.regimes):
+            self.maps[name] = regime_maps(load_regimes(name), runner.jobs, lambda _: tell("runs of the truth", 0))
+
+    def content(self) -> dict[str, Any]:
+        """Captions, runs and statements."""
+        from blajer_2006.writing import figures_content
+
+        assert self.study is not None  # it was made
+        content = figures_content(self.study, self.maps)
+        wrong = [item for item in content["statements"] if item["holds"] is False]
+        said = [f"{item['says']} ({', '.join(item['runs'])}): {item['found']}, not {item['stated']}" for item in wrong]
+        return {"study": content, "contradictions": said, "lost": content["lost"]}
+
+    def pictures(self, prefix: str) -> dict[str, str]:
+        """One for each figure."""
+        from blajer_2006.drawing import inline
+        from proofroll.elements.ball_on_surface.report.regime_map import inline as inline_map
+
+        assert self.study is not None  # it was made
+        return {
+            figure.name: inline_map(self.maps[figure.regimes], f"{prefix}{figure.name}-")
+            if figure.regimes
+            else inline(figure, self.study, f"{prefix}{figure.name}-")
+            for figure in self.asked.figures
+        }

@@ -1,0 +1,109 @@
+"""Reads the files that define figures: ``study = "figures"``."""
+
+from __future__ import annotations
+
+import re
+from decimal import Decimal, InvalidOperation
+
+from pydantic import TypeAdapter, ValidationError
+
+from blajer_2006.definition import CRITERIA, Figure, Figures, Statement
+from blajer_2006.quantities import known
+from proofroll.core.errors import InputError
+from proofroll.core.time_grid import time_grid
+from proofroll.elements.ball_on_surface.element import rolling_ball
+from proofroll.elements.ball_on_surface.regimes_study import load_regimes
+from proofroll.files.scene_file import load_scene
+from proofroll.files.toml import study_file
+from proofroll.files.validation import first_problem
+
+STUDY = "figures"
+
+
+def load_figures(name: str) -> Figures:
+    """Reads a file by its path, its name, or the scene that it is about.
+
+    Raises:
+        InputError: there is none, it is broken, or it is about something else.
+    """
+    path, content = study_file(name, STUDY)
+    try:
+        found = TypeAdapter(Figures).validate_python({**content, "name": path.stem})
+    except ValidationError as error:
+        raise first_problem(error, path.name) from None
+    _check(path.name, found)
+    return found
+
+
+def _check(where: str, found: Figures) -> None:
+    """What types cannot say."""
+    time_grid(found.until, found.every)
+    for name, planned in found.runs.items():
+        try:
+            scene = load_scene(found.scene, **planned.parameters)
+        except InputError as error:
+            raise InputError(f"{where}: runs.{name}.{error.field}", error.value, error.advice) from None
+    if not found.runs:
+        raise InputError(f"{where}: runs", "nothing", "give at least one run")
+    quantities = set(known(rolling_ball(scene)))
+    for name in found.symbols:
+        _choose(f"{where}: symbols", name, quantities)
+    names = [figure.name for figure in found.figures]
+    for index, figure in enumerate(found.figures):
+        place = f"{where}: figures.{index}"
+        if not re.fullmatch(r"[\w-]+", figure.name) or names.count(figure.name) > 1:
+            raise InputError(f"{place}.name", figure.name, "give each figure a name of its own, letters and digits")
+        _check_figure(place, figure, found, quantities)
+    for index, statement in enumerate(found.statements):
+        _check_statement(f"{where}: statements.{index}", statement, found, quantities)
+
+
+def _check_figure(where: str, figure: Figure, found: Figures, quantities: set[str]) -> None:
+    if bool(figure.panels) == bool(figure.regimes):
+        raise InputError(f"{where}.panels", figure.name, "give either panels or the study of its regime maps")
+    if figure.columns < 1 or not 0 < figure.height < 20:
+        raise InputError(f"{where}.columns", figure.columns, "give at least 1 column, and rows of less than 20 inch")
+    if figure.until is not None and not 0 < figure.until <= found.until:
+        raise InputError(f"{where}.until", figure.until, f"give a time up to that of the runs, {found.until:g} s")
+    if figure.regimes:
+        load_regimes(figure.regimes)
+    for number, panel in enumerate(figure.panels):
+        place = f"{where}.panels.{number}"
+        if not panel.y or not panel.runs:
+            raise InputError(f"{place}.y", panel.y, "draw at least one quantity of one run")
+        for name in (panel.x, *panel.y):
+            _choose(place, name, quantities)
+        for name in panel.runs:
+            _choose(f"{place}.runs", name, set(found.runs))
+
+
+def _check_statement(where: str, item: Statement, found: Figures, quantities: set[str]) -> None:
+    if not item.source:
+        raise InputError(f"{where}.source", "nothing", "every statement needs its source; add it")
+    if len(item.criteria) != 1:
+        raise InputError(where, ", ".join(item.criteria) or "nothing", f"give exactly one of {', '.join(CRITERIA)}")
+    if item.at_most is not None and not item.because:
+        raise InputError(f"{where}.because", "nothing", "a bound that the source does not give needs its reason")
+    if item.stated:
+        try:
+            finite = Decimal(item.stated).is_finite()
+        except InvalidOperation:
+            finite = False
+        if not finite:
+            raise InputError(f"{where}.stated", item.stated, 'give a number as text with its digits, e.g. "0.21"')
+    if not item.runs:
+        raise InputError(f"{where}.runs", item.runs, "name at least one run")
+    for name in item.runs:
+        _choose(f"{where}.runs", name, set(found.runs))
+    if item.events or item.event is not None:
+        if item.of or item.measure or item.order:
+            raise InputError(f"{where}.of", item.of, "a statement about events has no quantity, measure or order")
+        return
+    _choose(f"{where}.of", item.of, quantities)
+    if not item.measure or (item.measure == "every" and not item.stated):
+        raise InputError(f"{where}.measure", item.measure, "name a measure; every is for a stated number")
+
+
+def _choose(where: str, name: str, among: set[str]) -> None:
+    if name not in among:
+        raise InputError(where, name, f"there is no such name; choose from {', '.join(sorted(among))}")

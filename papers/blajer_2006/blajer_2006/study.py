@@ -1,0 +1,174 @@
+"""Makes the runs that figures are drawn from: one engine, and the truth beside it."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, Any
+
+from blajer_2006.definition import Figures
+from blajer_2006.quantities import TIME, known, quantity
+from proofroll.core.arrays import FloatArray
+from proofroll.core.errors import ProofrollError
+from proofroll.core.plugins import parse_engine
+from proofroll.elements.ball_on_surface.element import ASKED, rolling_ball
+from proofroll.elements.ball_on_surface.model import RollingBall
+from proofroll.files.netcdf import read
+from proofroll.files.scene_file import load_scene
+from proofroll.running.case import Case, EngineFacts, Result, Status
+from proofroll.running.runner import Runner, describe, resolve
+
+if TYPE_CHECKING:
+    import xarray as xr
+
+ORIENTATION = "orientation"
+TRUTH = "truth"
+
+
+@dataclass(frozen=True)
+class FigureRun:
+    """One run in one engine.
+
+    Attributes:
+        body: the scene's ball with the run's parameters.
+        result: how it ended.
+        dataset: its trajectory up to where it ended; None if there is none.
+        start: Euler angles φ, θ, ψ of the body's axes at time 0 [rad].
+    """
+
+    body: RollingBall
+    result: Result
+    dataset: xr.Dataset | None
+    start: tuple[float, float, float]
+
+    @property
+    def done(self) -> bool:
+        """Whether it reached its end."""
+        return self.result.status is Status.DONE and self.dataset is not None
+
+    def curve(self, name: str, until: float | None = None) -> FloatArray | None:
+        """A quantity up to a time [s], shape (time,); None: this engine cannot say, or there is no trajectory."""
+        if self.dataset is None:
+            return None
+        values = quantity(name, self.body, self.dataset, self.start)
+        if values is None or until is None:
+            return values
+        return values[self.dataset[TIME].to_numpy() <= until * (1 + 1e-12)]
+
+
+@dataclass(frozen=True)
+class FigureRuns:
+    """All runs of a file of figures.
+
+    Attributes:
+        figures: the file.
+        facts: the engine with complete settings.
+        runs: of the engine, by name.
+        truths: of the truth, by name.
+        units: of every quantity.
+    """
+
+    figures: Figures
+    facts: EngineFacts
+    runs: dict[str, FigureRun]
+    truths: dict[str, FigureRun]
+    units: dict[str, str]
+
+    @property
+    def engine(self) -> str:
+        """The engine and its formulation, for a legend."""
+        return " ".join(filter(None, (self.facts.name, str(self.facts.settings.get("formulation", "")))))
+
+    @property
+    def lost(self) -> list[str]:
+        """What the runs that did not reach their end say, a sentence each."""
+        made = [(self.engine, self.runs), (TRUTH, self.truths)] if self.truths is not self.runs else [
+            (self.engine, self.runs)
+        ]  # fmt: skip
+        return [
+            f"{name}, {run}: {item.result.status}, {item.result.message}"
+            for name, items in made
+            for run, item in items.items()
+            if not item.done
+        ]
+
+
+def run_figures(
+    figures: Figures,
+    runner: Runner,
+    engine: str | None = None,
+    progress: Callable[[Case, Result], None] | None = None,
+) -> FigureRuns:
+    """Runs every case of a file in one engine and in the truth; what is stored is reused.
+
+    Raises:
+        InputError, Missing: the engine does not exist or is not installed.
+    """
+    spec = parse_engine(engine or figures.engine)
+    facts, truth = resolve([(spec.name, spec.options), (TRUTH, {})], runner.workers)
+    for found in (facts, truth):
+        if isinstance(found, ProofrollError):
+            raise found
+    assert isinstance(facts, EngineFacts)  # for the type checker, as the next line
+    assert isinstance(truth, EngineFacts)
+    # Asked for only of an engine that has it: without it all but the angles can still be drawn.
+    formulation = facts.settings.get("formulation")
+    follows = spec.name != TRUTH and ASKED[ORIENTATION] in describe(spec.name, runner.workers)["provides"][formulation]
+    asks = (ORIENTATION,) if follows and figures.wants_orientation else ()
+    cases = {name: _case(figures, planned.parameters, facts, asks) for name, planned in figures.runs.items()}
+    truths = {name: _case(figures, planned.parameters, truth, ()) for name, planned in figures.runs.items()}
+    results = runner.run([*cases.values(), *truths.values()], progress)
+
+    def made(wanted: dict[str, Case]) -> dict[str, FigureRun]:
+        return {name: _made(figures, case, results[case.key], runner) for name, case in wanted.items()}
+
+    engine_runs = made(cases)
+    body = next(iter(engine_runs.values())).body
+    return FigureRuns(figures, facts, engine_runs, engine_runs if spec.name == TRUTH else made(truths), known(body))
+
+
+def _case(figures: Figures, parameters: dict[str, float], facts: EngineFacts, asks: tuple[str, ...]) -> Case:
+    return Case(
+        scene=figures.scene,
+        parameters=parameters,
+        scene_digest=load_scene(figures.scene, asks=asks, **parameters).digest,
+        engine=facts,
+        until=figures.until,
+        every=figures.every,
+        time_limit=figures.time_limit,
+        asks=asks,
+    )
+
+
+def _made(figures: Figures, case: Case, result: Result, runner: Runner) -> FigureRun:
+    path = runner.store.trajectory(case)
+    dataset = read(path) if result.trajectory is not None and path.is_file() else None
+    return FigureRun(rolling_ball(load_scene(figures.scene, **case.parameters)), result, dataset, figures.start_angles)
+
+
+def study_content(study: FigureRuns) -> dict[str, Any]:
+    """Where the figures come from, as plain data."""
+    figures = study.figures
+    versions: dict[str, str] = {}
+    for made in (*study.runs.values(), *study.truths.values()):
+        versions |= made.result.versions
+    return {
+        "title": figures.title,
+        "source": figures.source,
+        "scene": figures.scene,
+        "engine": {"name": study.facts.name, "settings": study.facts.settings},
+        "until": figures.until,
+        "every": figures.every,
+        "versions": versions,
+        "runs": [
+            {
+                "name": name,
+                "parameters": planned.parameters,
+                "status": study.runs[name].result.status.value,
+                "message": study.runs[name].result.message,
+                "truth": study.truths[name].result.message,
+            }
+            for name, planned in figures.runs.items()
+        ],
+        "lost": study.lost,
+    }

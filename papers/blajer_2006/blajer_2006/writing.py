@@ -1,0 +1,119 @@
+"""Writes the files of a study of figures, and says what came of the statements."""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Mapping, Sequence
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+from rich.table import Table
+from rich.text import Text
+
+from blajer_2006 import style
+from blajer_2006.drawing import looks, picture
+from blajer_2006.judging import count, judged
+from blajer_2006.study import FigureRuns, study_content
+from proofroll.elements.ball_on_surface.report.regime_map import counts
+from proofroll.elements.ball_on_surface.report.regime_map import picture as map_picture
+from proofroll.files.atomic import replacing
+from proofroll.files.json_data import plain
+from proofroll.report.labels import number, unit
+from proofroll.running.store import write_text
+
+if TYPE_CHECKING:
+    import xarray as xr
+
+    Maps = Mapping[str, Sequence[xr.Dataset]]
+
+_SIGNS = {True: ("✓", "green"), False: ("✗", "bold red"), None: ("–", "")}
+_DIGITS = 7
+_MAP_HEIGHT = 3.6  # inch
+
+
+def figures_content(study: FigureRuns, maps: Maps) -> dict[str, Any]:
+    """All that is said beside the figures, as plain data: runs, captions, statements; ``maps`` by study."""
+    entries = []
+    for figure in study.figures.figures:
+        entry: dict[str, Any] = {"name": figure.name, "caption": figure.caption}
+        if figure.regimes:
+            entry["regimes"] = counts(maps[figure.regimes])
+        else:
+            entry["runs"] = list(dict.fromkeys(run for panel in figure.panels for run in panel.runs))
+        entries.append(entry)
+    return dict(plain(study_content(study) | {"figures": entries, "statements": judged(study)}))
+
+
+def write_figures(study: FigureRuns, maps: Maps, out: Path, forms: Sequence[str]) -> dict[str, Any]:
+    """Writes every figure in every form, and ``figures.json``.
+
+    Args:
+        study: the runs.
+        maps: regime maps by the name of their study.
+        out: folder.
+        forms: of ``svg``, ``png`` and ``pdf``.
+
+    Returns:
+        the content of the JSON file, with the names of the others.
+
+    Raises:
+        Missing: matplotlib is not installed.
+        ProofrollError: the folder cannot be written.
+    """
+    content = figures_content(study, maps)
+    for figure, entry in zip(study.figures.figures, content["figures"], strict=True):
+        entry["files"] = []
+        for form in forms:
+            if figure.regimes:
+                with looks():
+                    drawn = map_picture(maps[figure.regimes], form, style.SETTINGS, (style.WIDTH, _MAP_HEIGHT))
+            else:
+                drawn = picture(figure, study, form)
+            path = out / f"{figure.name}.{form}"
+            with replacing(path) as temporary:
+                temporary.write_bytes(drawn)
+            entry["files"].append(path.name)
+    write_text(out / "figures.json", json.dumps(content, indent=1, ensure_ascii=False, allow_nan=False) + "\n")
+    return content
+
+
+def statement_table(content: dict[str, Any]) -> Table:
+    """What is stated, what was found, and whether it holds, one line for each."""
+    table = Table(title=Text(content["title"]), title_justify="left", box=None, padding=(0, 1, 0, 0))
+    table.add_column("statement")
+    table.add_column("run", no_wrap=True)
+    table.add_column("stated", justify="right", no_wrap=True)
+    table.add_column("found", justify="right", max_width=24)
+    table.add_column("", no_wrap=True)
+    said = ""
+    for item in content["statements"]:
+        sign, look = _SIGNS[item["holds"]]
+        shown = unit(item["unit"]) if item["found"] is not None else ""
+        # The order of runs is told by the found numbers; their names are in the JSON.
+        runs = item["runs"][0] if len(item["runs"]) == 1 else f"{len(item['runs'])} runs"
+        table.add_row(
+            Text("" if item["says"] == said else item["says"]),
+            Text(runs),
+            Text(item["stated"]),
+            Text(f"{_said(item['found'])} {shown}".strip()),
+            Text(sign, style=look),
+        )
+        said = item["says"]
+    return table
+
+
+def _said(found: Any) -> str:
+    if isinstance(found, list):
+        return ", ".join(part if isinstance(part, str) else number(part, 3) for part in found) or "nothing"
+    return number(found, _DIGITS)
+
+
+def closing_lines(content: dict[str, Any], out: Path) -> list[str]:
+    """How many statements hold, what is lost, and where the files are."""
+    verdicts = [item["holds"] for item in content["statements"]]
+    lines = [f"{count(content['statements'])}."]
+    if verdicts.count(None):
+        why = dict.fromkeys(item["why"] for item in content["statements"] if item["holds"] is None)
+        lines.append(f"{verdicts.count(None)} cannot be judged: {'; '.join(why)}.")
+    files = [name for figure in content["figures"] for name in figure["files"]]
+    return [*lines, f"{len(files)} figures and figures.json are in {out}: {', '.join(files)}."]

@@ -1,0 +1,72 @@
+"""Regime maps as a part of a report."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import TYPE_CHECKING, Any, ClassVar
+
+from proofroll.elements.ball_on_surface.regimes_study import STUDY, RegimesStudy, load_regimes, regime_maps
+
+if TYPE_CHECKING:
+    import xarray as xr
+
+    from proofroll.report.study_parts import Tell
+    from proofroll.running.runner import Runner
+
+
+@dataclass
+class RegimesPart:
+    """See :class:`proofroll.report.study_parts.Part`."""
+
+    kind: ClassVar[str] = STUDY
+    key: ClassVar[str] = "regimes"
+    order: ClassVar[float] = 20
+    words: ClassVar[str] = "regime maps"
+    template: ClassVar[str] = "regimes.html"
+    names: ClassVar[Mapping[str, Any]] = {}
+    on_request: ClassVar[bool] = False
+    asked: RegimesStudy
+    maps: list[xr.Dataset] = field(default_factory=list)
+
+    @classmethod
+    def load(cls, path: Path, engines: Sequence[str]) -> RegimesPart:  # noqa: ARG003 -- the maps are the truth's
+        """See the protocol."""
+        return cls(load_regimes(str(path)))
+
+    @staticmethod
+    def line(entry: dict[str, Any]) -> str:
+        """How many runs became what."""
+        maps = entry["study"]["maps"]
+        total = {word: sum(item["counts"][word] for item in maps) for word in maps[0]["counts"]}
+        return ", ".join(f"{count} {word}" for word, count in total.items())
+
+    @property
+    def head(self) -> dict[str, str]:
+        """What it is."""
+        asked = self.asked
+        return {
+            "name": asked.name, "title": asked.title, "question": asked.question, "scene": asked.scene,
+            "command": f"proofroll regimes {asked.name}",
+        }  # fmt: skip
+
+    def keeps(self, out: Path) -> bool:  # noqa: ARG002 -- the protocol's
+        """Nothing is kept: a map is made anew by each report."""
+        return False
+
+    def make(self, runner: Runner, out: Path, tell: Tell) -> None:  # noqa: ARG002 -- the protocol's
+        """The whole maps."""
+        self.maps = regime_maps(self.asked, runner.jobs, lambda _: tell("runs of the truth", 0))
+
+    def content(self) -> dict[str, Any]:
+        """Counts and analytic boundaries."""
+        from proofroll.elements.ball_on_surface.report.regime_map import counts
+
+        return {"study": {"maps": counts(self.maps)}, "contradictions": [], "lost": []}
+
+    def pictures(self, prefix: str) -> dict[str, str]:
+        """All maps side by side."""
+        from proofroll.elements.ball_on_surface.report.regime_map import inline
+
+        return {"maps": inline(self.maps, f"{prefix}maps-")}

@@ -1,0 +1,42 @@
+"""A function of many arguments, computed in several processes."""
+
+from __future__ import annotations
+
+import signal
+from collections.abc import Callable, Iterator, Sequence
+from concurrent.futures import ProcessPoolExecutor
+from multiprocessing import active_children, get_context
+from typing import TypeVar
+
+from proofroll.running.ending import end_with_pool
+
+Item = TypeVar("Item")
+Found = TypeVar("Found")
+
+
+def in_processes(function: Callable[[Item], Found], items: Sequence[Item], workers: int) -> Iterator[Found]:
+    """What a function gives for each item, in order; Ctrl-C ends the processes that compute.
+
+    Args:
+        function: can be pickled, and its results too.
+        items: its arguments.
+        workers: processes at once; 1 computes in this one.
+    """
+    if workers == 1:
+        yield from map(function, items)
+        return
+    # Not forked: a parent that shows progress has threads, and a fork copies their locks as they are.
+    with ProcessPoolExecutor(workers, get_context("spawn"), initializer=end_with_pool) as pool:
+        signal.pthread_sigmask(signal.SIG_BLOCK, {signal.SIGINT})  # inherited: Ctrl-C is the parent's affair
+        try:
+            # Not map, which cancels the rest when interrupted: a pool whose processes are then ended complains.
+            found = [pool.submit(function, item) for item in items]
+        finally:
+            signal.pthread_sigmask(signal.SIG_UNBLOCK, {signal.SIGINT})
+        try:
+            for one in found:
+                yield one.result()
+        except BaseException:
+            for process in active_children():
+                process.kill()
+            raise

@@ -1,0 +1,30 @@
+"""What came of the faults as a table on the terminal."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+from rich.table import Table
+from rich.text import Text
+
+from proofroll_drill.row import Drilled
+
+
+def drill_table(rows: Sequence[Drilled]) -> Table:
+    """One line per fault: whether it was contained, what it cost, and what was said about it."""
+    table = Table(box=None, padding=(0, 1, 0, 0))
+    table.add_column("fault", no_wrap=True)
+    table.add_column("contained", no_wrap=True)
+    for name in ("others arrived", "kept", "recomputed"):
+        table.add_column(name, justify="right")
+    table.add_column("said")
+    for row in rows:
+        table.add_row(
+            row.fault,
+            Text("yes", style="green") if row.contained else Text("NO", style="bold red"),
+            f"{row.others_arrived}/{row.others}",
+            f"{row.kept}/{row.stored}",
+            f"{row.recomputed}/{row.missing}",
+            Text(row.said if row.contained else f"{row.said} ({row.problem})", overflow="fold"),
+        )
+    return table

@@ -1,0 +1,46 @@
+"""The times at which a run is sampled."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from proofroll.core.errors import InputError
+from proofroll.core.time_grid import time_grid
+
+
+@pytest.mark.parametrize(
+    ("until", "every", "times"),
+    [
+        (0.3, 0.1, [0, 0.1, 0.2, 0.3]),
+        (0.25, 0.1, [0, 0.1, 0.2, 0.25]),
+        (0, 0.1, [0]),
+        (0.05, 0.1, [0, 0.05]),
+        (1, 1 / 3, [0, 1 / 3, 2 / 3, 1]),
+    ],
+)
+def test_time_grid(until: float, every: float, times: list[float]) -> None:
+    """Samples are taken at every multiple of the interval and at the end, each once."""
+    grid = time_grid(until, every)
+    assert grid == pytest.approx(times, abs=1e-15)
+    assert grid[-1] == until
+
+
+def test_time_grid_ends_exactly() -> None:
+    """Two hundred steps of 0.01 s end at 2 s, not at 2.0000000000000004 s."""
+    grid = time_grid(2.0, 0.01)
+    assert (len(grid), grid[-1]) == (201, 2.0)
+
+
+@pytest.mark.parametrize(
+    ("until", "every", "field"),
+    [
+        (-1, 0.1, "until"), (np.nan, 0.1, "until"), (np.inf, 0.1, "until"),
+        (1, 0, "every"), (1, -0.1, "every"), (1, np.nan, "every"), (1, np.inf, "every"), (1e6, 1e-6, "every"),
+    ],
+)  # fmt: skip
+def test_bad_times(until: float, every: float, field: str) -> None:
+    """Times that make no sense, or more samples than any disk holds, are refused by name."""
+    with pytest.raises(InputError) as caught:
+        time_grid(until, every)
+    assert caught.value.field == field
