@@ -91,7 +91,8 @@ def record(engine: Any, scene: Scene, times: FloatArray, probes: Iterable[float]
     """
     began, processor = time.perf_counter(), -time.process_time()
     inside = 0.0
-    samples = [_finite(engine.sample(), 0.0)]
+    bodies = sum(len(element.bodies) for element in scene.elements)
+    samples = [_finite(engine.sample(), 0.0, bodies)]
     failure: str | None = None
     wall = 0.0
     between: dict[float, Sample] = {}
@@ -103,7 +104,7 @@ def record(engine: Any, scene: Scene, times: FloatArray, probes: Iterable[float]
             engine.advance(t)
             wall += time.perf_counter() - start
             inside += time.process_time() - before
-            sample = _finite(engine.sample(), t)
+            sample = _finite(engine.sample(), t, bodies)
         except Diverged as error:
             if lack_behind(error):
                 raise
@@ -146,16 +147,18 @@ def noticed(message: str) -> bool:
     return any(message.startswith(f"{name} {_NOT_FINITE}") for name in _SAMPLED)
 
 
-def _finite(sample: Sample, t: float) -> Sample:
+def _finite(sample: Sample, t: float, bodies: int) -> Sample:
     for name in _SAMPLED:
         values = getattr(sample, name)
         if values is None:
             continue
         values = np.asarray(values)
-        shape = (4,) if name == "q_WB" else (3,)
-        if np.shape(values) != shape:
+        width = 4 if name == "q_WB" else 3
+        shapes = {(bodies, width)} | ({(width,)} if bodies == 1 else set())
+        if np.shape(values) not in shapes:
+            shape = (width,) if bodies == 1 else (bodies, width)
             raise Diverged(f"the engine gave {name} with shape {np.shape(values)} instead of {shape} at {t:g} s")
         # The sum of finite numbers is finite but for overflow; numpy's own question takes ten times as long.
-        if not math.isfinite(sum(values.tolist())) and not np.all(np.isfinite(values)):
+        if not math.isfinite(sum(values.ravel().tolist())) and not np.all(np.isfinite(values)):
             raise Diverged(f"{name} {_NOT_FINITE} at {t:g} s")
     return sample

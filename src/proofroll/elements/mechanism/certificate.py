@@ -16,6 +16,8 @@ if TYPE_CHECKING:
 
 # Engines compose poses and inertias of chains of bodies by themselves; each product costs some machine epsilons.
 COMPOSED = 1e-9
+# Least angular acceleration over the natural one, to which differences are relative: a pose may have none.
+_LEAST = 1e-2
 _COMPOSED = "composed along the tree by the engine's own arithmetic"
 _CLOSED = "the start closes loops to 1e-12 m, and an engine may close them once more"
 # What a model may soften: quantity -> largest relative difference that any reason explains, and why.
@@ -76,7 +78,8 @@ def _turning(element: MechanismElement) -> float:
     """What angular accelerations are measured by [rad/s²]."""
     found = element.first_motion
     assert found is not None  # as above
-    return float(np.max(np.abs(found.angular_acceleration))) or found.scale / element.length
+    least = _LEAST * found.scale / element.length
+    return max(float(np.max(np.abs(found.angular_acceleration))), least)
 
 
 def _axis(element: MechanismElement, joint: Any) -> Any:
