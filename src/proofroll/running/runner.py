@@ -295,10 +295,10 @@ def _lost(case: Case, error: WorkerDied) -> Result:
     return Result(error.status, str(error), versions={case.engine.name: case.engine.version})
 
 
-def run_one(case: Case, out: Path) -> Result:
+def run_one(case: Case, out: Path, workers: Workers | None = None) -> Result:
     """Runs a single case, its trajectory going to ``out``, with nothing stored or reused."""
-    with Worker() as worker:
-        try:
+    try:
+        with _lent(workers) as lent, lent.lend(case.engine.name) as worker:
             return _ask(worker, case, out)
-        except WorkerDied as error:
-            return _lost(case, error)
+    except WorkerDied as error:
+        return _lost(case, error)
