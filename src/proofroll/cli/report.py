@@ -42,8 +42,9 @@ def report(
 ) -> None:
     """Run the comparisons and the further studies, and write report.html and report.json.
 
-    The files are there after the comparisons, and are written again after each further study. A study that is kept and
-    still holds is used as it is; otherwise it is made briefly, and the report names the command that makes it whole.
+    The files are there after the first comparison, and are written again after all of them and after each further
+    study. A study that is kept and still holds is used as it is; otherwise it is made briefly, as is a comparison that
+    says so, and the report names the command that makes it whole.
     """
     from proofroll.files.comparison_file import comparison_names, load_comparison
     from proofroll.report.growing_report import begun
@@ -51,15 +52,24 @@ def report(
 
     names, parts = parts_of(studies, engine or []) if studies else (comparison_names(), all_parts(engine or [], out))
     loaded = [load_comparison(name) for name in names]
+    if not studies:
+        loaded = [item.briefly() for item in loaded]
     runner = new_runner(out, fresh, jobs)
     keys = [key for key in KEYS if any(part.key == key for part in parts)]
     stages = _Stages(len(keys) + bool(loaded))
     outcomes, maps = [], []
+    command = _command(studies or [], engine or [], out)
     if loaded:
         stage = stages.next("comparisons")
+        if len(loaded) > 1:
+            first = begun(outcomes_of(loaded[:1], engine or [], runner, stage), runner.store, command)
+            first.content["awaited"] = [item.title for item in loaded[1:]]
+            first.expect(parts, out, fresh=fresh)
+            first.write(out)
+            complain(f"{stage}the first is in {out / 'report.html'}")
         outcomes = outcomes_of(loaded, engine or [], runner, stage)
         maps = [regime_maps_of(item, jobs, stage) if item.regimes else [] for item in loaded]
-    made = begun(outcomes, runner.store, _command(studies or [], engine or [], out), maps)
+    made = begun(outcomes, runner.store, command, maps)
     for part in parts:
         if part.key == "figures":
             part.maps.update({item.name: found for item, found in zip(loaded, maps, strict=True) if found})  # type: ignore[attr-defined]

@@ -72,7 +72,7 @@ def _comparison(path: Path, content: dict[str, Any]) -> Comparison:
     rows = [_prepared(f"{where}: rows.{index}", row) for index, row in enumerate(given)]
     try:
         comparison = TypeAdapter(Comparison).validate_python(
-            {**content, "name": path.stem, "bands": bands, "rows": rows}
+            {**content, "name": path.stem, "bands": bands, "rows": rows, "left_out": 0}
         )
     except ValidationError as error:
         raise first_problem(error, where) from None
@@ -81,7 +81,17 @@ def _comparison(path: Path, content: dict[str, Any]) -> Comparison:
     for index, row in enumerate(comparison.rows):
         _check(f"{where}: rows.{index}", row, comparison)
     _check_times(where, comparison)
+    _check_brief(where, comparison)
     return comparison
+
+
+def _check_brief(where: str, comparison: Comparison) -> None:
+    known = {name for point in comparison.combinations() for name in point}
+    for name in comparison.brief:
+        if name not in known:
+            raise InputError(f"{where}: brief", name, f"nothing varies it; choose from {', '.join(sorted(known))}")
+    if comparison.brief and not comparison.briefly().combinations():
+        raise InputError(f"{where}: brief", comparison.brief, "no combination has these values; keep at least one")
 
 
 def _check_times(where: str, comparison: Comparison) -> None:

@@ -31,7 +31,8 @@ def report_content(outcomes: list[Outcome], store: Store, command: str, maps: Ma
     """All that the report says, as plain data.
 
     ``findings`` on the whole, ``comparisons``, the entries of further studies under ``figures``, ``tradeoffs`` and
-    ``stability``, ``date`` and ``environment``. Paths of files are relative to the folder of the report.
+    ``stability``, ``awaited`` (titles of comparisons that are still being run), ``date`` and ``environment``. Paths of
+    files are relative to the folder of the report.
     """
     comparisons = []
     for index, outcome in enumerate(outcomes):
@@ -53,6 +54,7 @@ def report_content(outcomes: list[Outcome], store: Store, command: str, maps: Ma
     content = {
         "date": datetime.now(UTC).isoformat(timespec="seconds"),
         "comparisons": comparisons,
+        "awaited": [],
         **{key: [] for key in KEYS},
         "environment": environment(command, versions),
     }
