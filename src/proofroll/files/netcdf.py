@@ -69,7 +69,7 @@ def read(path: Path) -> xr.Dataset:
     import xarray as xr
 
     def attributes(item: Any) -> dict[str, Any]:
-        return {key: value for key, value in item.attrs.items() if key not in _OF_HDF5}
+        return {key: item.attrs[key] for key in item.attrs if key not in _OF_HDF5}
 
     with h5py.File(path) as file:
         columns: dict[str, tuple[tuple[str, ...], Any, dict[str, Any]]] = {}
@@ -77,7 +77,7 @@ def read(path: Path) -> xr.Dataset:
             own = item.is_scale
             if own and item.attrs["NAME"].startswith(b"This is a netCDF dimension but not a netCDF variable."):
                 continue
-            dims = (name,) if own else tuple(file[dim[0].name].name.rpartition("/")[2] for dim in item.dims)
+            dims = (name,) if own else tuple(dim[0].name.rpartition("/")[2] for dim in item.dims)
             text = h5py.check_string_dtype(item.dtype)
             values = item.asstr()[...].astype(str) if text else item[...]
             columns[name] = (dims, values, attributes(item))
