@@ -229,7 +229,7 @@ def _further(
     curve: Curve,
     references: Mapping[float, Reference],
     asked: set[float],
-    finer_steps: Sequence[float],
+    finer_steps: Sequence[float] = FINER,
 ) -> list[float]:
     """One coarser step or looser tolerance if the coarsest is not broken yet, one of ``finer_steps`` if that pays."""
     if curve.facts.resolution is None or not curve.points:
