@@ -12,6 +12,8 @@ from typing import Any
 
 import pytest
 
+from proofroll.running.process import Worker
+
 RUN = ["run", "sphere_in_cylinder", "--engine", "oracle", "--until", "0.1", "--every", "0.05"]
 KEYS = {
     "scene", "engine", "settings", "status", "message", "until", "final", "events", "wall_seconds", "versions",
@@ -324,6 +326,19 @@ def test_onset(proofroll: Proofroll, tmp_path: Path, engine: str, code: int, ver
         assert abs(row["difference"]) < 1e-9
 
 
+@pytest.mark.parametrize(("soon", "reached"), [(None, "reached 0.17 s"), (0.05, "reached 0.2 s")])
+def test_onset_ends_soon_after_the_slip(
+    proofroll: Proofroll, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, soon: float | None, reached: str
+) -> None:
+    """An engine is ended a little after the true slip; one that has not slipped by then runs to the end."""
+    if soon is not None:
+        monkeypatch.setattr("proofroll.elements.ball_on_surface.onset_study._soon", lambda *_: soon)
+    code, out, err = proofroll(*EARLY, "--engine", LOCATING, "--out", str(tmp_path), "--json")
+    assert code == 0, err
+    (row,) = json.loads(out)["engines"]
+    assert (row["message"], row["verdict"]) == (reached, "agree")
+
+
 def test_onset_where_nobody_was_asked_for(
     proofroll: Proofroll, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
@@ -426,6 +441,29 @@ def test_help_is_light(arguments: list[str]) -> None:
     assert found["code"] == 0
     assert heavy & set(found["modules"]) == set()
     assert not any(name.startswith("proofroll.engines.") for name in found["modules"])
+
+
+@pytest.mark.parametrize("engine", ["exudyn", "mujoco", "projection", "reduced"])
+def test_describing_an_engine_is_light(engine: str) -> None:
+    """What an engine is is told without scipy, xarray and pandas, which take longer to load than all the rest."""
+    pytest.importorskip(engine if engine in {"exudyn", "mujoco"} else "numpy")
+    found = fresh(f"from proofroll.running.identity import describe; describe({engine!r})")
+    assert f"proofroll.engines.{engine}" in found["modules"]
+    assert {"xarray", "pandas", "scipy.integrate", "scipy.spatial", "scipy.optimize"} & set(found["modules"]) == set()
+
+
+def test_a_run_takes_one_process(proofroll: Proofroll, monkeypatch: pytest.MonkeyPatch) -> None:
+    """The process that tells the engine's settings also makes the run: starting another costs as much as both."""
+    started = []
+
+    class Counted(Worker):
+        def __init__(self, *arguments: Any) -> None:
+            started.append(self)
+            super().__init__(*arguments)
+
+    monkeypatch.setattr("proofroll.running.worker_pool.Worker", Counted)
+    code, _, err = proofroll("run", "sphere_in_cylinder", "--engine", "reduced", "--until", "0.1", "--json")
+    assert (code, len(started)) == (0, 1), err
 
 
 def test_help_and_version(proofroll: Proofroll) -> None:

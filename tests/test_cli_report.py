@@ -8,6 +8,8 @@ from pathlib import Path
 
 import pytest
 
+from proofroll.report.growing_report import Report
+
 Proofroll = Callable[..., tuple[int, str, str]]
 
 COMPARISON = """
@@ -125,3 +127,31 @@ def test_what_no_report_has_is_one_line(proofroll: Proofroll, tmp_path: Path) ->
         code, said, err = proofroll("report", name, "--out", str(tmp_path / "out"))
         assert (code, said, err.count("\n")) == (2, "", 1)
     assert not (tmp_path / "out").exists()
+
+
+def test_a_page_after_the_first_comparison(
+    proofroll: Proofroll, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """A report of everything shows the first comparison before it runs the others, names those, and is brief."""
+    text = COMPARISON.replace('"oracle"', '"reduced[formulation=closed_form]"')
+    varied = text.replace("{ speed = [4] }", "{ speed = [2, 4] }\nbrief = { speed = [4] }")
+    files(tmp_path, first=f"order = 1\n{varied}", second=text.replace("A claim", "Another claim"))
+    for module in ("comparison_file", "toml"):
+        monkeypatch.setattr(f"proofroll.files.{module}.data_folder", lambda _: tmp_path)
+    pages = []
+    write = Report.write
+
+    def noted(report: Report, out: Path) -> None:
+        write(report, out)
+        pages.append((out / "report.html").read_text(encoding="utf-8"))
+
+    monkeypatch.setattr(Report, "write", noted)
+    code, _, err = proofroll("report", "--out", str(tmp_path / "out"))
+    assert code == 0, err
+    first, *_, last = pages
+    assert "This page is not whole yet.</b> Still being run: Another claim." in first
+    assert "not whole yet" not in last
+    assert "1 further combinations of parameters are left out here; <code>proofroll compare first</code>" in last
+    content = json.loads((tmp_path / "out" / "report.json").read_text(encoding="utf-8"))
+    assert content["awaited"] == []
+    assert [run["parameters"] for run in content["comparisons"][0]["runs"]] == [{"speed": 4.0}]

@@ -28,6 +28,7 @@ if TYPE_CHECKING:
     from proofroll.report.growing_report import Report
     from proofroll.report.study_parts import Part
     from proofroll.running.runner import Runner
+    from proofroll.studies.compare import Outcome
 
 
 def report(
@@ -42,8 +43,9 @@ def report(
 ) -> None:
     """Run the comparisons and the further studies, and write report.html and report.json.
 
-    The files are there after the comparisons, and are written again after each further study. A study that is kept and
-    still holds is used as it is; otherwise it is made briefly, and the report names the command that makes it whole.
+    The files are there after the first comparison, and are written again after all of them and after each further
+    study. A study that is kept and still holds is used as it is; otherwise it is made briefly, as is a comparison that
+    says so, and the report names the command that makes it whole.
     """
     from proofroll.files.comparison_file import comparison_names, load_comparison
     from proofroll.report.growing_report import begun
@@ -51,11 +53,23 @@ def report(
 
     names, parts = parts_of(studies, engine or []) if studies else (comparison_names(), all_parts(engine or [], out))
     loaded = [load_comparison(name) for name in names]
+    if not studies:
+        loaded = [item.briefly() for item in loaded]
     runner = new_runner(out, fresh, jobs)
     keys = list(dict.fromkeys(part.key for part in parts))
     stages = _Stages(len(keys) + bool(loaded))
-    outcomes = outcomes_of(loaded, engine or [], runner, stages.next("comparisons")) if loaded else []
-    made = begun(outcomes, runner.store, _command(studies or [], engine or [], out))
+    command = _command(studies or [], engine or [], out)
+    outcomes: list[Outcome] = []
+    if loaded:
+        stage = stages.next("comparisons")
+        if len(loaded) > 1:
+            first = begun(outcomes_of(loaded[:1], engine or [], runner, stage), runner.store, command)
+            first.content["awaited"] = [item.title for item in loaded[1:]]
+            first.expect(parts, out, fresh=fresh)
+            first.write(out)
+            complain(f"{stage}the first is in {out / 'report.html'}")
+        outcomes = outcomes_of(loaded, engine or [], runner, stage)
+    made = begun(outcomes, runner.store, command)
     missing = made.expect(parts, out, fresh=fresh)
     made.write(out)
     for key in keys:

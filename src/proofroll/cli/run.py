@@ -32,16 +32,22 @@ def run(
     as_json: Json = False,
 ) -> None:
     """Run one scene in one engine."""
+    import importlib
     import tempfile
+    import threading
 
     from proofroll.core.time_grid import time_grid
     from proofroll.report.run import run_content, run_lines
     from proofroll.running.runner import run_one
+    from proofroll.running.worker_pool import Workers
     from proofroll.studies.run_once import single_case
 
     time_grid(until, every)
     if out is not None:
         require_writable(out)
+    # The result is read with xarray, half a second to import: done while the worker's process is busy.
+    threading.Thread(target=importlib.import_module, args=("xarray",), daemon=True).start()
+    workers = Workers()  # the process that tells the settings also makes the run
     case = single_case(
         scene,
         assignments(settings or []),
@@ -50,11 +56,12 @@ def run(
         every=every,
         time_limit=time_limit,
         asks=tuple(dict.fromkeys(ask or [])),
+        workers=workers,
     )
     with tempfile.TemporaryDirectory() as folder:
         target = Path(folder) / "run.nc"
         with spinner(f"{scene} in {case.engine.name}"):
-            result = run_one(case, target)
+            result = run_one(case, target, workers)
         content = run_content(case, result, target)
         if out is not None and result.trajectory is not None:
             from proofroll.running.store import move

@@ -5,7 +5,7 @@ from __future__ import annotations
 import itertools
 import math
 from collections.abc import Mapping
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 
 from proofroll.core.errors import InputError
 from proofroll.core.verdict import Verdict
@@ -132,6 +132,8 @@ class Comparison:
         time_limit: wall seconds a case may take [s].
         timed: whether the speed of every run is measured, in clean runs of its own.
         order: place in a report, the smallest first; those without come last, by name.
+        brief: parameter -> values; a report of everything has only the combinations that have one of them for each.
+        left_out: how many combinations have been left out for that.
     """
 
     name: str
@@ -147,6 +149,15 @@ class Comparison:
     time_limit: float = 120.0
     timed: bool = True
     order: float = math.inf
+    brief: dict[str, list[float]] = field(default_factory=dict)
+    left_out: int = 0
+
+    def briefly(self) -> Comparison:
+        """The comparison at the combinations that a report of everything has."""
+        vary = {name: [value for value in values if value in self.brief.get(name, values)]
+                for name, values in self.vary.items()}  # fmt: skip
+        kept = replace(self, vary=vary, points=[point for point in self.points if _fits(point, self.brief)])
+        return replace(kept, left_out=len(self.combinations()) - len(kept.combinations()))
 
     def combinations(self, only: Mapping[str, list[float]] | None = None) -> list[dict[str, float | Edge]]:
         """Every combination of parameters, or those that fit ``only``; the scene as it is if nothing varies."""

@@ -6,7 +6,6 @@ from collections.abc import Callable, Mapping
 from typing import ClassVar, Literal, Protocol
 
 import numpy as np
-from scipy.integrate import DOP853
 
 from proofroll.core.arrays import FloatArray
 from proofroll.core.engine import whole_steps
@@ -98,6 +97,8 @@ class DormandPrince853:
     order: ClassVar[int | None] = None
 
     def __init__(self, rates: Rates, accept: Accept, x: FloatArray, scales: FloatArray, resolution: float) -> None:
+        from scipy.integrate import DOP853
+
         self.t, self.x = 0.0, x
         self._accept = accept
         self._solver = DOP853(lambda _, y: rates(y), 0.0, x, np.inf, rtol=resolution, atol=resolution * scales)

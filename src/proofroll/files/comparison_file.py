@@ -71,7 +71,7 @@ def _comparison(path: Path, content: dict[str, Any]) -> Comparison:
     rows = [_prepared(f"{where}: rows.{index}", row) for index, row in enumerate(given)]
     try:
         comparison = TypeAdapter(Comparison).validate_python(
-            {**content, "name": path.stem, "bands": bands, "rows": rows}
+            {**content, "name": path.stem, "bands": bands, "rows": rows, "left_out": 0}
         )
     except ValidationError as error:
         raise first_problem(error, where) from None
@@ -81,10 +81,24 @@ def _comparison(path: Path, content: dict[str, Any]) -> Comparison:
         _check_bounds(f"{where}: tolerances.{name}", comparison, band.bounds)
     for index, row in enumerate(comparison.rows):
         _check(f"{where}: rows.{index}", row, comparison)
+    _check_times(where, comparison)
+    _check_brief(where, comparison)
+    return comparison
+
+
+def _check_brief(where: str, comparison: Comparison) -> None:
+    known = {name for point in comparison.combinations() for name in point}
+    for name in comparison.brief:
+        if name not in known:
+            raise InputError(f"{where}: brief", name, f"nothing varies it; choose from {', '.join(sorted(known))}")
+    if comparison.brief and not comparison.briefly().combinations():
+        raise InputError(f"{where}: brief", comparison.brief, "no combination has these values; keep at least one")
+
+
+def _check_times(where: str, comparison: Comparison) -> None:
     time_grid(comparison.until, comparison.every)
     if not (math.isfinite(comparison.time_limit) and comparison.time_limit > 0):
         raise InputError(f"{where}: time_limit", comparison.time_limit, "give a positive, finite time in s")
-    return comparison
 
 
 def _table(where: str, value: object) -> dict[str, Any]:

@@ -38,6 +38,7 @@ def outcome_content(outcome: Outcome) -> dict[str, Any]:
         "every": comparison.every,
         "vary": comparison.vary,
         "points": comparison.points,
+        "left_out": comparison.left_out,
         "as_expected": not outcome.contradictions,
         "contradictions": outcome.contradictions,
         "tolerances": {

@@ -23,8 +23,9 @@ if TYPE_CHECKING:
 def report_content(outcomes: list[Outcome], store: Store, command: str) -> dict[str, Any]:
     """All that the report says, as plain data.
 
-    ``findings`` on the whole, ``comparisons``, the entries of further studies under the key of their kind,
-    ``date`` and ``environment``. Paths of files are relative to the folder of the report.
+    ``findings`` on the whole, ``comparisons``, ``awaited`` (titles of comparisons that are still being run), the entries
+    of further studies under the key of their kind, ``date`` and ``environment``. Paths of files are relative to the
+    folder of the report.
     """
     comparisons = []
     for outcome in outcomes:
@@ -45,6 +46,7 @@ def report_content(outcomes: list[Outcome], store: Store, command: str) -> dict[
     content = {
         "date": datetime.now(UTC).isoformat(timespec="seconds"),
         "comparisons": comparisons,
+        "awaited": [],
         **{kind.key: [] for kind in part_kinds()},
         "environment": environment(command, versions),
     }

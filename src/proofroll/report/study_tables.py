@@ -82,7 +82,8 @@ def effort(study: Mapping[str, Any]) -> str:
     said = ""
     if study.get("brief"):
         said = (
-            "Speeds were measured briefly, three times at most and those of long runs once: they contradict no claim. "
+            "Speeds were measured briefly, three times at most and those of long runs once, and the finest steps were "
+            "left out: they contradict no claim. "
         )
     over = ", ".join(f"{name} {min(values):g} to {max(values):g}" for name, values in study["over"].items())
     at = ", ".join(f"{name} = {value:g}" for name, value in study["parameters"].items()) or "the default parameters"

@@ -147,7 +147,7 @@ class Runner:
     Args:
         store: where results are kept.
         jobs: how many workers run at once.
-        fresh: run every case again, whatever is stored.
+        fresh: run every case again, once, whatever is stored.
         memory: how much each worker may have [GB]; by default :func:`proofroll.running.memory.memory_limit`.
     """
 
@@ -160,6 +160,7 @@ class Runner:
         self.reused = 0
         self.damaged: set[str] = set()
         """Keys of the cases that were run again because what was stored is not what had been put there."""
+        self._run_here: set[str] = set()
         self._busy: set[Worker] = set()
         self._stopping = threading.Event()
 
@@ -192,9 +193,10 @@ class Runner:
             if case.key in asked:
                 return 0
             asked.add(case.key)
-            stored = None if self.fresh else self.store.get(case)
+            wanted = not self.fresh or case.key in self._run_here
+            stored = self.store.get(case) if wanted else None
             if stored is None:
-                if not self.fresh and self.store.has(case):
+                if wanted and self.store.has(case):
                     self.damaged.add(case.key)
                 shared.add(case)
                 return 1
@@ -219,6 +221,7 @@ class Runner:
                         raise item
                     running -= 1
                     case, result = item
+                    self._run_here.add(case.key)
                     if case.key in self.damaged:
                         result = dataclasses.replace(result, message=f"{result.message}; what was stored was damaged")
                 results[case.key] = result
@@ -303,10 +306,10 @@ def _lost(case: Case, error: WorkerDied) -> Result:
     return Result(error.status, str(error), versions={case.engine.name: case.engine.version})
 
 
-def run_one(case: Case, out: Path) -> Result:
+def run_one(case: Case, out: Path, workers: Workers | None = None) -> Result:
     """Runs a single case, its trajectory going to ``out``, with nothing stored or reused."""
-    with Worker() as worker:
-        try:
+    try:
+        with _lent(workers) as lent, lent.lend(case.engine.name) as worker:
             return _ask(worker, case, out)
-        except WorkerDied as error:
-            return _lost(case, error)
+    except WorkerDied as error:
+        return _lost(case, error)

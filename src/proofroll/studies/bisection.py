@@ -47,9 +47,10 @@ class Found(Generic[V]):
 def search(size: int, stride: int) -> Generator[int, V | None, Found[V]]:
     """Asks for rungs and is sent what a run on each gave; returns what it found.
 
-    It goes down by ``stride`` until two runs in a row are accurate, then bisects for either boundary, and last makes
-    sure that the rung below each passes too, for right beside a boundary a pass may be luck. What is known is never
-    asked again. A rung for which None is sent, and all finer ones, are left out as too long.
+    It goes down by ``stride`` until a run is accurate and one half a stride below it too: the finest run costs most.
+    Then it bisects for either boundary, and last makes sure that the rung below each passes too, for right beside a
+    boundary a pass may be luck. What is known is never asked again. A rung for which None is sent, and all finer ones,
+    are left out as too long.
     """
     found: Found[V] = Found(limit=size)
     seen = found.seen
@@ -66,7 +67,7 @@ def search(size: int, stride: int) -> Generator[int, V | None, Found[V]]:
         in_a_row = in_a_row + 1 if verdict.accurate else 0
         if in_a_row == 2:
             break
-        following = rung + stride
+        following = rung + ((stride + 1) // 2 if verdict.accurate else stride)
         if following >= found.limit:
             following = (rung + found.limit) // 2
             if following == rung:

@@ -10,6 +10,7 @@ from proofroll.core.plugins import parse_engine
 from proofroll.files.scene_file import load_scene
 from proofroll.running.case import Case
 from proofroll.running.runner import resolve
+from proofroll.running.worker_pool import Workers
 
 
 def single_case(
@@ -21,8 +22,11 @@ def single_case(
     every: float,
     time_limit: float,
     asks: Sequence[str] = (),
+    workers: Workers | None = None,
 ) -> Case:
     """The case of one run.
+
+    The engine is asked in one of ``workers``, if they are given: the run can then go on in the same process.
 
     Raises:
         InputError, Missing: something that was given does not exist or makes no sense.
@@ -33,7 +37,7 @@ def single_case(
         raise InputError("asks", parameters["asks"], "this is no parameter; ask for it with --ask")
     spec = parse_engine(engine)
     loaded = load_scene(scene, asks=asks, **parameters)  # type: ignore[arg-type]  # text is checked and converted there
-    facts = resolve([(spec.name, spec.options)], requires=loaded.requires)[0]
+    facts = resolve([(spec.name, spec.options)], workers, loaded.requires)[0]
     if isinstance(facts, ProofrollError):
         raise facts
     return Case(

@@ -125,6 +125,7 @@ def stability(
     for curve in (curve for curve in curves if curve.facts.resolution is None):
         absent[curve.engine] = "has neither step nor tolerance: exact at any time, it has no boundary to look for"
     curves = [curve for curve in curves if curve.facts.resolution is not None]
+    curves = _matched(curves) if effort.matched else curves
     places = places_of(scene, axes, effort)
     measure(scene, places, runner, lambda: tell("the truth", 0))
     points = [
@@ -132,6 +133,16 @@ def stability(
     ]
     _search(scene, points, effort, runner, tell)
     return StabilityMap(scene, list(axes), effort, places, points, absent)
+
+
+def _matched(curves: Sequence[Curve]) -> list[Curve]:
+    """One curve for each formulation: with the matched settings, or the first."""
+    kept: dict[tuple[str, object], Curve] = {}
+    for curve in curves:
+        key = curve.facts.name, curve.facts.settings.get("formulation")
+        if key not in kept or curve.facts.settings.get("preset") == "matched":
+            kept[key] = curve
+    return list(kept.values())
 
 
 def _ladder(curve: Curve, place: Place) -> list[float]:

@@ -35,15 +35,26 @@ class Effort:
         steps: a run of more fixed steps is too long. Steps are counted rather than seconds, so that every machine
             looks for a boundary on the same rungs.
         limit: a run that takes longer is ended [s]; a worker's start counts. What it would have shown is left open.
+        longest: lengths of runs in natural times that an axis may have, or None: any.
+        matched: of each formulation only the matched settings are mapped, or its first where there are none.
     """
 
     periods: float = 3.0
     values: int | None = None
     steps: int = 75_000
     limit: float = 15.0
+    longest: float | None = None
+    matched: bool = False
+
+    def values_of(self, axis: Axis) -> list[float]:
+        """The values of an axis that are mapped."""
+        cut = axis.horizon and self.longest is not None
+        values = [value for value in axis.values if value <= self.longest] if cut else axis.values  # type: ignore[operator]
+        return thinned(values, self.values) if self.values else values
 
 
-QUICK = Effort(values=3, steps=30_000, limit=10.0)
+# Most of a map's time is spent on the longest runs and on engines that no affordable step makes accurate.
+QUICK = Effort(values=3, steps=10_000, limit=3.0, longest=10.0, matched=True)
 
 
 @dataclass
@@ -76,8 +87,12 @@ def places_of(name: str, axes: Sequence[Axis], effort: Effort) -> list[Place]:
     default = load_scene(name)
     found = []
     for axis in axes:
-        for value in thinned(axis.values, effort.values) if effort.values else axis.values:
-            place = Place(axis, value, axis.at(default, value))
+        for value in effort.values_of(axis):
+            # A default that is given is left out, so that axes share the runs of the place where they meet.
+            given = {
+                key: number for key, number in axis.at(default, value).items() if number != default.parameters[key]
+            }
+            place = Place(axis, value, given)
             found.append(place)
             try:
                 scene = load_scene(name, **place.parameters)

@@ -28,7 +28,7 @@ SPARSE = 2
 # Steps in sampling intervals: those that every curve starts with, and those by which it may be extended.
 _STEPS = (1.0, 1 / 2, 1 / 5, 1 / 10, 1 / 25, 1 / 50, 1 / 100, 1 / 250)
 _COARSER = (2.0, 4.0, 8.0)
-_FINER = (1 / 500, 1 / 1000, 1 / 2500)
+FINER = (1 / 500, 1 / 1000, 1 / 2500)
 _TOLERANCES = (1e-1, 1e-2, 1e-3, 1e-4, 1e-6, 1e-8, 1e-10, 1e-12)
 _LOOSER = (1.0, 10.0, 100.0)
 # A run is broken where its error is this part of the quantity's scale; a curve starts in the broken range.
@@ -193,12 +193,16 @@ Progress = Callable[[Case, Result], None]
 
 
 def sweep(
-    question: Question, curves: list[Curve], runner: Runner, progress: Progress | None = None
+    question: Question,
+    curves: list[Curve],
+    runner: Runner,
+    progress: Progress | None = None,
+    finer: Sequence[float] = FINER,
 ) -> dict[float, Reference]:
     """Fills the curves with points, and returns the truth by sampling interval.
 
-    Every curve begins with the same steps. It is then extended to coarser ones until it breaks, and to finer ones
-    while they pay.
+    Every curve begins with the same steps. It is then extended to coarser ones until it breaks, and to ``finer`` ones,
+    in sampling intervals, while they pay.
     """
     references: dict[float, Reference] = {}
     asked: list[set[float]] = [set() for _ in curves]
@@ -206,7 +210,9 @@ def sweep(
         wanted = [
             (index, value)
             for index, curve in enumerate(curves)
-            for value in (_first(question, curve) if first else _further(question, curve, references, asked[index]))
+            for value in (
+                _first(question, curve) if first else _further(question, curve, references, asked[index], finer)
+            )
             if value not in asked[index]
         ]
         if not wanted:
@@ -226,8 +232,14 @@ def _first(question: Question, curve: Curve) -> list[float]:
     return [*_TOLERANCES, own]
 
 
-def _further(question: Question, curve: Curve, references: Mapping[float, Reference], asked: set[float]) -> list[float]:
-    """One coarser step or looser tolerance if the coarsest is not broken yet, and one finer step if that pays."""
+def _further(
+    question: Question,
+    curve: Curve,
+    references: Mapping[float, Reference],
+    asked: set[float],
+    finer_steps: Sequence[float] = FINER,
+) -> list[float]:
+    """One coarser step or looser tolerance if the coarsest is not broken yet, one of ``finer_steps`` if that pays."""
     if curve.facts.resolution is None or not curve.points:
         return []
     found = []
@@ -240,7 +252,7 @@ def _further(question: Question, curve: Curve, references: Mapping[float, Refere
         found.append(coarser)
     if not curve.fixed_step:
         return found
-    finer = next((step for step in map(question.step, _FINER) if step not in asked), None)
+    finer = next((step for step in map(question.step, finer_steps) if step not in asked), None)
     if finer is not None and len(curve.points) > 1:
         now, before = (point.errors.get(question.quantity, np.inf) for point in (finest, curve.points[-2]))
         if now < (1 - _GAIN) * before:

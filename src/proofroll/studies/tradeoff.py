@@ -18,16 +18,19 @@ import numpy as np
 
 from proofroll.running.case import Case, Result, Status
 from proofroll.running.runner import Runner
-from proofroll.running.stopwatch import Stopwatch
+from proofroll.running.stopwatch import SECONDS, Stopwatch
 from proofroll.running.timing import ROUNDS, Timing, interleaved
 from proofroll.running.worker_pool import Workers
 from proofroll.studies.pareto import envelope, front
 from proofroll.studies.reference import Reference
-from proofroll.studies.sweep import Curve, Point, Question, case_of, cases_of, curves_of, judged, sweep
+from proofroll.studies.sweep import FINER, Curve, Point, Question, case_of, cases_of, curves_of, judged, sweep
 
 # What makes up most of a study's time is the repetition of measurements. A brief one repeats less: in three rounds an
 # outlier does not decide the median; a run longer than this [s] warms itself up, and is measured once.
-BRIEF_ROUNDS, BRIEF_ONCE = 3, 0.5
+# A shorter measurement scatters more, which the interval of the rounds shows.
+BRIEF_ROUNDS, BRIEF_ONCE, BRIEF_SECONDS = 3, 0.5, 0.02
+# The finest steps take as long as all others together, and tell little of a choice: at most this part of an interval.
+BRIEF_FINER = tuple(part for part in FINER if part >= 1e-3)
 
 
 @dataclass(frozen=True)
@@ -110,7 +113,8 @@ def tradeoff(
         engines: names or ``name[key=value,…]``; all that are installed if empty.
         over: parameter -> values; every combination is a corner of the range.
         rounds: how often every speed is measured.
-        brief: measure every speed :data:`BRIEF_ROUNDS` times at most, and that of a long run once.
+        brief: measure every speed :data:`BRIEF_ROUNDS` times at most, and that of a long run once; leave out the
+            finest steps.
         progress: called with a short text after every run and every measurement.
 
     Raises:
@@ -124,7 +128,7 @@ def tradeoff(
         if progress:
             progress(case.engine.name)
 
-    references = sweep(question, curves, runner, told)
+    references = sweep(question, curves, runner, told, BRIEF_FINER if brief else FINER)
     found = Tradeoff(question, curves, absent, references, brief=brief)
     truth = _truth_case(question, references, runner)
     found.timings = _timed(found, truth, runner.workers, rounds, progress)
@@ -147,9 +151,10 @@ def _truth_case(question: Question, references: Mapping[float, Reference], runne
 def _timed(found: Tradeoff, truth: Case, workers: Workers, rounds: int, progress: Progress | None) -> dict[str, Timing]:
     cases = {point.case.key: point.case for point in found.points if point.result.status == Status.DONE}
     cases[truth.key] = truth
+    seconds = BRIEF_SECONDS if found.brief else SECONDS
     with Stopwatch(workers) as stopwatch:
         return interleaved(
-            {key: lambda case=case: stopwatch(case) for key, case in cases.items()},  # type: ignore[misc]
+            {key: lambda case=case: stopwatch(case, seconds) for key, case in cases.items()},  # type: ignore[misc]
             min(rounds, BRIEF_ROUNDS) if found.brief else rounds,
             once_above=BRIEF_ONCE if found.brief else np.inf,
             progress=(lambda key: progress(f"timing {cases[key].engine.name}")) if progress else None,

@@ -6,7 +6,6 @@ from collections.abc import Callable, Iterator
 from dataclasses import dataclass
 
 import numpy as np
-from scipy.integrate import DOP853
 
 from proofroll.core.arrays import FloatArray
 from proofroll.core.errors import Diverged
@@ -41,6 +40,8 @@ def steps(
     """Steps of DOP853 from ``start`` to ``until``, each no longer than ``cap`` says of the state before it."""
     if not until > start:
         return
+    from scipy.integrate import DOP853
+
     solver = DOP853(lambda _, y: rates(y), start, state, until, rtol=_RTOL, atol=atol)
     while solver.status == "running":
         if cap is not None:

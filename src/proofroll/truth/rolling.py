@@ -13,9 +13,9 @@ from __future__ import annotations
 import math
 from collections.abc import Callable
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
-from scipy.integrate import DOP853
 
 from proofroll.core.arrays import FloatArray
 from proofroll.core.errors import Diverged
@@ -143,7 +143,9 @@ def _integrate(body: RollingBall, equations: _Equations, x: FloatArray, times: F
     return states, len(times)
 
 
-def _solver(equations: _Equations, t: float, x: FloatArray, until: float, atol: FloatArray, first: float) -> DOP853:
+def _solver(equations: _Equations, t: float, x: FloatArray, until: float, atol: FloatArray, first: float) -> Any:
+    from scipy.integrate import DOP853
+
     return DOP853(
         lambda _, y: equations.rates(y),
         t,

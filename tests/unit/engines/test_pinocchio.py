@@ -90,29 +90,6 @@ def test_certificate(scene: Scene, formulation: str, preset: str) -> None:
 
 # Bounds: a few times what was measured over 2 s; what remains is round-off and the truth's own error. With the
 # orientation the tolerance of the ball's turning (3e-14 per step, some hundred steps per second) still shows.
-@pytest.mark.parametrize(
-    ("formulation", "option", "z", "force"),
-    [
-        ("composite", "orientation=true", 1e-12, 5e-11),
-        ("composite", "preset=matched", 5e-14, 2e-12),
-        ("composite", "preset=tuned", 5e-14, 2e-12),
-        ("free_flyer", "preset=tuned", 5e-14, 5e-12),
-    ],
-)
-@pytest.mark.parametrize("resistance", [0.0, RESISTANCE])
-def test_accuracy_on_the_cylinder(formulation: str, option: str, z: float, force: float, resistance: float) -> None:
-    """At tight tolerance path, spin, reactions and energy are the truth's, with and without rolling resistance."""
-    engine = f"pinocchio[formulation={formulation},{option}]"
-    errors = largest_errors(cylinder(rolling_resistance=resistance), engine, until=2.0, every=0.1)
-    assert errors["z"] < z
-    assert errors["gamma"] < 1e-11
-    assert max(errors["N"], errors["F2"], errors["F3"]) < force
-    assert errors["energy"] < 2e-12
-    assert errors["omega1"] < 1e-9
-    assert max(errors["slip2"], errors["slip3"]) < 1e-13
-    assert errors["gap"] < 1e-15
-
-
 def test_accuracy_of_the_free_ball_in_its_own_axes() -> None:
     """The free flyer in the ball's turning axes, put back on its rows, is as accurate (0.2 s: it is slow)."""
     errors = largest_errors(cylinder(), "pinocchio[formulation=free_flyer,orientation=true]", until=0.2, every=0.1)
@@ -314,17 +291,6 @@ def test_wrong_settings_give_one_line(options: str, field: str, advice: str) -> 
     assert field in caught.value.field
     assert advice in str(caught.value)
     assert "\n" not in str(caught.value)
-
-
-def test_presets_are_complete() -> None:
-    """Each formulation has its presets, and each preset is filed under its own name."""
-    from proofroll.engines.pinocchio import Pinocchio
-
-    assert set(Pinocchio.presets) == {*FORMULATIONS, "contact"}
-    for formulation, presets in Pinocchio.presets.items():
-        assert set(presets) == (set(PRESETS) if formulation in FORMULATIONS else {"default", "matched"})
-        assert all((s.formulation, s.preset) == (formulation, name) for name, s in presets.items())
-        assert {s.resolution for s in presets.values()} == ({"dt", "rtol"} if formulation in FORMULATIONS else {"dt"})
 
 
 def test_surface_without_generators() -> None:

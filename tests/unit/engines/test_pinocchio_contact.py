@@ -11,7 +11,6 @@ import xarray as xr
 from proofroll.core.certificate import certify
 from proofroll.core.errors import Diverged, Refused
 from proofroll.core.events import events_of
-from proofroll.core.plugins import load_engine, resolve_settings
 from proofroll.core.scene import Scene
 from proofroll.elements.ball_on_surface.element import changed
 from proofroll.files.scene_file import load_scene
@@ -55,19 +54,6 @@ def test_plane_at_the_start_of_the_step() -> None:
     found = errors("pinocchio[formulation=contact,preset=default]")
     assert found["gap"] == pytest.approx(4.0**2 * 1e-6 / (2 * 0.2), rel=0.05)
     assert 5e-3 < found["z"] < 2e-2
-
-
-@pytest.mark.parametrize(("preset", "order"), [("default", 1), ("matched", 2)])
-@pytest.mark.parametrize("resistance", [0.0, RESISTANCE])
-def test_declared_order(preset: str, order: int, resistance: float) -> None:
-    """The measured order in the step is the declared one."""
-    found = [
-        errors(f"pinocchio[formulation=contact,preset={preset},dt={dt}]", rolling_resistance=resistance)["z"]
-        for dt in (2e-3, 1e-3)
-    ]
-    assert np.log2(found[0] / found[1]) == pytest.approx(order, abs=0.25)
-    settings = resolve_settings(load_engine("pinocchio"), {"formulation": "contact", "preset": preset})
-    assert settings.order == order
 
 
 @pytest.mark.parametrize("preset", ["default", "matched"])

@@ -199,6 +199,8 @@ def test_tolerances_of_another_form(text: object) -> None:
         ("[vary]", f"[{'.'.join('v' * 3000)}]\n[vary]", ["claim.toml", "nested more than 16 deep"]),
         ("every = 0.01", "every = 0.01\ntime_limit = -1", ["time_limit = -1", "positive, finite time in s"]),
         ("every = 0.01", "every = 0.01\ntime_limit = inf", ["time_limit = inf", "positive, finite time in s"]),
+        ("[vary]", "brief = { sped = [4] }\n[vary]", ["brief", "sped", "rolling_resistance, speed"]),
+        ("[vary]", "brief = { speed = [5] }\n[vary]", ["brief", "keep at least one"]),
     ],
 )  # fmt: skip
 def test_broken_comparisons(load: Callable[..., Comparison], old: str, new: str, words: list[str]) -> None:
@@ -210,6 +212,21 @@ def test_broken_comparisons(load: Callable[..., Comparison], old: str, new: str,
     assert "claim.toml" in text or "scene" in text
     for word in words:
         assert word in text
+
+
+def test_a_brief_comparison(load: Callable[..., Comparison]) -> None:
+    """What is brief has only the combinations that fit, says how many it leaves out, and without the key has all."""
+    points = "[[points]]\nspeed = 4\nmu_static = 0.3\n[[points]]\nspeed = 6\n[tolerances.tight]"
+    whole = load("[tolerances.tight]", f"[brief]\nspeed = [4]\n{points}")
+    brief = whole.briefly()
+    assert (len(whole.combinations()), whole.left_out) == (6, 0)
+    assert brief.combinations() == [
+        {"speed": 4.0, "mu_static": 0.3},
+        {"speed": 4.0, "rolling_resistance": 0.0},
+        {"speed": 4.0, "rolling_resistance": 5e-4},
+    ]
+    assert brief.left_out == 3
+    assert load().briefly() == load()
 
 
 def test_rows_that_are_no_list(tmp_path: Path) -> None:

@@ -18,6 +18,7 @@ from proofroll.files.netcdf import read
 from proofroll.running.case import Case, EngineFacts, Result, Status
 from proofroll.running.runner import Runner, WorkerDied, describe, resolve, run_one
 from proofroll.running.store import Store
+from proofroll.studies.run_once import single_case
 
 MakeCase = Callable[..., Case]
 
@@ -87,6 +88,19 @@ def test_stored_results_are_reused(tmp_path: Path, make_case: MakeCase) -> None:
     fresh = Runner(Store(tmp_path), jobs=1, fresh=True)
     fresh.run(cases[:1])
     assert fresh.reused == 0
+
+
+def test_a_fresh_runner_runs_each_case_once(tmp_path: Path) -> None:
+    """Studies that share a fresh runner share its cases: what it ran itself is not run again."""
+    case = single_case(
+        "sphere_in_cylinder", {}, "reduced[formulation=closed_form]", until=0.1, every=0.1, time_limit=60
+    )
+    Runner(Store(tmp_path), jobs=1).run([case])
+    fresh = Runner(Store(tmp_path), jobs=1, fresh=True)
+    fresh.run([case])
+    assert fresh.reused == 0
+    fresh.run([case])
+    assert fresh.reused == 1
 
 
 def test_progress_is_told_of_every_case_once(tmp_path: Path, make_case: MakeCase) -> None:

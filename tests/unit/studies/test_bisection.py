@@ -92,3 +92,9 @@ def test_even_the_coarsest_is_too_slow() -> None:
     result = found(lambda _: True, lambda _: True, affordable=0)
     assert result.seen == {}
     assert result.limit == 0
+
+
+@pytest.mark.parametrize("first", range(0, 24, 3))
+def test_the_finest_run_is_near_the_boundary(first: int) -> None:
+    """The finest run costs most: none is more than a stride and a half below the boundary of accuracy."""
+    assert max(found(lambda rung: rung >= first, lambda rung: rung >= first).seen) < first + 6

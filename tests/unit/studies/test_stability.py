@@ -24,7 +24,7 @@ from proofroll.studies.axes import Axis, Term, chosen, thinned
 from proofroll.studies.stability import stability
 from proofroll.studies.stability_claims import Claim, file_for
 from proofroll.studies.stability_content import content, dependence
-from proofroll.studies.stability_places import Effort
+from proofroll.studies.stability_places import Effort, places_of
 from proofroll.studies.stability_reproducers import write_reproducers
 from proofroll.studies.step_numbers import explanation
 
@@ -193,6 +193,34 @@ def test_a_program_does_not_cry_wolf(programs: dict[str, dict[str, Any]]) -> Non
     )  # fmt: skip
     assert run.returncode == 0, run.stdout + run.stderr
     assert "not shown" in run.stdout
+
+
+def test_a_quick_map_leaves_out_the_longest_runs() -> None:
+    """Lengths of runs end at the longest that is allowed, and no axis has more values than asked for."""
+    horizon = Axis("horizon", "1", "length", [1, 10, 100, 1000], horizon=True)
+    assert Effort(values=3, longest=10.0).values_of(horizon) == [1, 10]
+    assert Effort(values=3, longest=10.0).values_of(dataclasses.replace(horizon, horizon=False)) == [1, 100, 1000]
+    assert Effort().values_of(horizon) == horizon.values
+
+
+def test_of_each_formulation_the_matched_settings(tmp_path: Path) -> None:
+    """Where only matched settings are mapped, others of the same formulation are not, but where it has no matched."""
+    axis = Axis("V0", "m/s", "initial speed", [4.0], {"speed": Term()})
+    effort = dataclasses.replace(SHORT, steps=50, matched=True)
+    runner = Runner(Store(tmp_path), jobs=1)
+    found = stability("sphere_in_cylinder", [axis], runner, engines=["projection"], effort=effort)
+    names = [point.curve.engine for point in found.points]
+    assert names == [f"projection[formulation={name},preset=matched]" for name in ("euler", "rotating_frame")]
+    only = "projection[formulation=euler,preset=default]"
+    assert [
+        p.curve.engine for p in stability("sphere_in_cylinder", [axis], runner, engines=[only], effort=effort).points
+    ] == [only]
+
+
+def test_axes_share_the_runs_where_they_meet() -> None:
+    """A value that is the scene's default is no parameter of its own: the case is that of the other axis."""
+    axes = [Axis(name, "1", name, [1.0], {name: Term(times=name)}) for name in ("mass", "radius")]
+    assert [place.parameters for place in places_of("sphere_in_cylinder", axes, SHORT)] == [{}, {}]
 
 
 def test_axes_as_data() -> None:

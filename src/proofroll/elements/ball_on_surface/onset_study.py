@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import dataclasses
+import math
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
@@ -22,6 +23,7 @@ if TYPE_CHECKING:
     from proofroll.truth.onset import Onset
 
 _EVERY = 0.01  # interval between samples [s]; engines that locate events do better than this
+_LATER = 0.05  # an engine that slips later than the truth by more than this part is run once more, to the end [-]
 
 
 @dataclass(frozen=True)
@@ -129,24 +131,44 @@ def onset_study(
         if isinstance(found, InputError):
             raise found
     given = {name: loaded.parameters[name] for name in parameters}
-    cases = [
-        Case(scene, given, loaded.digest, found, until, _EVERY) if isinstance(found, EngineFacts) else None
-        for found in facts
-    ]
-    results = runner.run([case for case in cases if case is not None], progress)
-    rows = []
-    for name, found, case in zip(names, facts, cases, strict=True):
-        if case is None or not isinstance(found, EngineFacts):
+    asked = [found for found in facts if isinstance(found, EngineFacts)]
+
+    def run(engines: Sequence[EngineFacts], end: float) -> list[tuple[Result, Event | None]]:
+        cases = [Case(scene, given, loaded.digest, found, end, _EVERY) for found in engines]
+        results = runner.run(cases, progress)
+        return [(results[case.key], _first_slip(runner, case, results[case.key])) for case in cases]
+
+    # What follows the first slip decides nothing and costs most; who slips later than that runs to the end.
+    soon = _soon(truth, until)
+    answers = run(asked, soon)
+    late = [index for index, (result, first) in enumerate(answers) if first is None and result.status == Status.DONE]
+    if late and soon < until:
+        for index, answer in zip(late, run([asked[index] for index in late], until), strict=True):
+            answers[index] = answer
+    rows, answered = [], iter(answers)
+    for name, found in zip(names, facts, strict=True):
+        if not isinstance(found, EngineFacts):
             status = found.status if isinstance(found, WorkerDied) else Status.MISSING
             rows.append(EngineOnset(name, None, Result(status, str(found)), None, "failed"))
             continue
-        result = results[case.key]
-        first = None
-        if result.trajectory is not None:
-            events = events_of(read(runner.store.trajectory(case)))
-            first = next((event for event in events if event.kind == "slip"), None)
+        result, first = next(answered)
         rows.append(EngineOnset(name, found, result, first, onset_verdict(truth, result, first)))
     return OnsetStudy(loaded, until, truth, rows)
+
+
+def _soon(truth: Onset, until: float) -> float:
+    """A time a little after the truth's first slip, as a whole number of samples; ``until`` if there is none [s]."""
+    if truth.time is None:
+        return until
+    latest = max(truth.time, truth.latest or 0.0)
+    return min(until, _EVERY * (math.ceil(latest * (1 + _LATER) / _EVERY) + 1))
+
+
+def _first_slip(runner: Runner, case: Case, result: Result) -> Event | None:
+    if result.trajectory is None:
+        return None
+    events = events_of(read(runner.store.trajectory(case)))
+    return next((event for event in events if event.kind == "slip"), None)
 
 
 def onset_verdict(truth: Onset, result: Result, first: Event | None) -> str:

@@ -20,7 +20,6 @@ from typing import Literal, Protocol
 
 import numpy as np
 import numpy.typing as npt
-from scipy.spatial.transform import Rotation
 
 from proofroll.core.bounds import bounded
 from proofroll.core.errors import InputError
@@ -111,7 +110,8 @@ class Surface(Protocol):
 @lru_cache
 def _tilt(angle: float) -> FloatArray:
     """Rotation by ``angle`` [rad] about the world's y axis, read-only, shape (3, 3)."""
-    rotation = np.array(Rotation.from_euler("y", angle).as_matrix(), dtype=np.float64)
+    c, s = math.cos(angle), math.sin(angle)
+    rotation = np.array([[c, 0.0, s], [0.0, 1.0, 0.0], [-s, 0.0, c]])
     rotation.flags.writeable = False  # every caller shares it
     return rotation
 

@@ -11,8 +11,6 @@ import dataclasses
 import math
 from typing import Any, NamedTuple, Protocol
 
-from scipy.optimize import brentq
-
 from proofroll.core.arrays import FloatArray
 from proofroll.core.engine import whole_steps
 from proofroll.core.errors import Diverged
@@ -199,6 +197,8 @@ class StickSlip:
 
     def _crossing(self, beyond: State, left: float) -> float:
         """How long from now until the contact changes [s], by ``left`` [s] at the latest."""
+        from scipy.optimize import brentq
+
         ends = {0.0: self._margin(self.state.touch), left: self._margin(beyond.touch)}
 
         def margin(part: float) -> float:

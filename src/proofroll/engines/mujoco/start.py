@@ -8,7 +8,6 @@ from typing import Any, Protocol
 
 import mujoco
 import numpy as np
-from scipy.optimize import brentq
 
 from proofroll.core.arrays import FloatArray
 from proofroll.core.errors import Refused
@@ -140,4 +139,6 @@ def _settled_depth(model: Any, data: Any, body: RollingBall, evaluate_at: Callab
         if upper > body.ball.radius:
             advice = "take a smaller dt or a larger impedance"
             raise Refused(f"the contact is so soft that the ball would sink into the wall; {advice}")
+    from scipy.optimize import brentq
+
     return float(brentq(excess, upper / 10, upper, xtol=1e-14 * upper, rtol=1e-14))

@@ -6,8 +6,6 @@ from collections.abc import Callable
 from typing import Any
 
 import numpy as np
-from scipy.integrate import DOP853
-from scipy.optimize import brentq, minimize_scalar
 
 from proofroll.core.arrays import FloatArray
 
@@ -20,6 +18,8 @@ def first_rise(g: Callable[[float], float], low: float, high: float, at_low: flo
 
     A crest that rises above zero and is gone before ``high`` is found too. ``g`` may start at zero.
     """
+    from scipy.optimize import brentq, minimize_scalar
+
     times = np.linspace(low, high, _LOOKS + 1)
     values = np.array([at_low, *(g(float(t)) for t in times[1:-1]), at_high])
     top = int(np.argmax(values))
@@ -84,6 +84,8 @@ def _integrated(solver: Any, time: float) -> FloatArray:
     """The state at ``time``, integrated from the start of the last step."""
     if time <= solver.t_old:
         return np.asarray(solver.y_old)
+    from scipy.integrate import DOP853
+
     part = DOP853(
         solver.fun, solver.t_old, solver.y_old, time, rtol=solver.rtol, atol=solver.atol, first_step=time - solver.t_old
     )

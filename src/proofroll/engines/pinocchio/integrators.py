@@ -6,7 +6,6 @@ from typing import Any, Protocol
 
 import numpy as np
 import pinocchio as pin
-from scipy.integrate import DOP853
 
 from proofroll.core.arrays import FloatArray
 from proofroll.core.engine import whole_steps
@@ -210,6 +209,8 @@ class Adaptive:
         return np.concatenate((v[:n], self._mechanism.accelerate(self._data, q, v)))
 
     def _solver_from(self, rates: Any, start: float, y: FloatArray) -> Any:
+        from scipy.integrate import DOP853
+
         return DOP853(rates, start, y, np.inf, rtol=self._rtol, atol=self._atol)
 
     def advance(self, start: float, end: float) -> None:

@@ -17,7 +17,6 @@ import math
 from typing import NamedTuple
 
 import numpy as np
-from scipy.linalg.lapack import dgesv
 
 from proofroll.core.arrays import FloatArray
 from proofroll.elements.ball_on_surface.model import RollingBall
@@ -218,6 +217,8 @@ class ProjectedBall:
         Raises:
             ArithmeticError: there is none.
         """
+        from scipy.linalg.lapack import dgesv
+
         C = self.rows @ kin.D
         matrix = np.zeros((5 + len(C), 5 + len(C)))
         matrix[:5, :5] = self.mass_matrix(kin)

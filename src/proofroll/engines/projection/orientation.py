@@ -7,14 +7,16 @@ The five velocities are s = [u̇1 u̇2 r1 r2 r3]; here r gives the angular veloc
 from __future__ import annotations
 
 import math
-from typing import ClassVar, Protocol
+from typing import TYPE_CHECKING, ClassVar, Protocol
 
 import numpy as np
-from scipy.spatial.transform import Rotation
 
 from proofroll.core.arrays import FloatArray
 from proofroll.core.errors import Diverged
 from proofroll.engines.projection.geometry import Geometry
+
+if TYPE_CHECKING:
+    from scipy.spatial.transform import Rotation
 
 # The condition of M̄ grows like 1/sin²θ as θ nears 0 or π. Here, at 30 degrees, nothing is lost yet; the paper's own
 # run, where sin θ stays above 0.75, does not come so far.
@@ -84,6 +86,8 @@ class EulerAngles:
 
     def __init__(self, *, renews: bool = True) -> None:
         """Without ``renews`` the run ends at the singularity, as the paper's equations do by themselves."""
+        from scipy.spatial.transform import Rotation
+
         self.renewals: list[float] = []
         self._renews = renews
         self._orientation_then = Rotation.identity()  # of the ball, where the present axes were chosen
@@ -174,6 +178,8 @@ class EulerAngles:
 
 def _body_axes(angles: FloatArray) -> Rotation:
     """Orientation of the body's axes in the world."""
+    from scipy.spatial.transform import Rotation
+
     phi, theta, psi = angles
     return Rotation.from_euler("ZXZ", [psi, theta, phi])
 

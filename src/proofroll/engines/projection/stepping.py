@@ -8,10 +8,9 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping
-from typing import ClassVar, Protocol
+from typing import Any, ClassVar, Protocol
 
 import numpy as np
-from scipy.integrate import DOP853
 
 from proofroll.core.arrays import FloatArray
 from proofroll.core.engine import whole_steps
@@ -165,7 +164,9 @@ class ControlledSteps:
         """See :class:`Stepper`. As tight as it was located."""
         return low, high
 
-    def _solver_from(self, t: float, y: FloatArray, bound: float, first: float | None) -> DOP853:
+    def _solver_from(self, t: float, y: FloatArray, bound: float, first: float | None) -> Any:
+        from scipy.integrate import DOP853
+
         rates = self._rates
         return DOP853(lambda _, x: rates(x), t, np.array(y), bound, rtol=self._rtol, atol=self._atol, first_step=first)
 

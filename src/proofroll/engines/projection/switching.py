@@ -6,7 +6,6 @@ from collections.abc import Callable
 from typing import NamedTuple
 
 import numpy as np
-from scipy.optimize import brentq
 
 from proofroll.core.arrays import FloatArray
 from proofroll.core.errors import Diverged
@@ -162,6 +161,8 @@ class Switching:
         return self.mode.survey(self.stepper.inside(t))
 
     def _root(self, function: Callable[[float], float], low: float, high: float) -> float:
+        from scipy.optimize import brentq
+
         return float(brentq(function, low, high, xtol=self._resolution(high), rtol=4 * np.finfo(float).eps))
 
     def _resolution(self, t: float) -> float:

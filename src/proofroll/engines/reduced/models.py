@@ -9,7 +9,6 @@ import math
 from typing import Protocol
 
 import numpy as np
-from scipy.integrate import DOP853
 
 from proofroll.core.arrays import FloatArray
 from proofroll.core.errors import Diverged, Refused
@@ -80,6 +79,8 @@ class Integrated:
     """The reduced equations by Dormand and Prince's method of order 8; a step ends at each sample."""
 
     def __init__(self, body: RollingBall, rtol: float) -> None:
+        from scipy.integrate import DOP853
+
         self._body = body
         speed = _speed(body)
         self._scales = np.array(body.surface.length_scales)
