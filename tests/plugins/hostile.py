@@ -44,7 +44,9 @@ class Oracle:
     """Well behaved: answers with the closed form, and says so to standard output and standard error."""
 
     name: ClassVar[str] = "oracle"
-    provides: ClassVar[frozenset[BallCapability]] = frozenset({BallCapability.ROLLING, BallCapability.CURVED_SURFACE})
+    provides: ClassVar[Mapping[str, frozenset[str]]] = {
+        "only": frozenset({BallCapability.ROLLING, BallCapability.CURVED_SURFACE})
+    }
     settings: ClassVar[type[HostileSettings]] = HostileSettings
     presets: ClassVar[Mapping[str, Mapping[str, HostileSettings]]] = {"only": {"matched": HostileSettings()}}
 
