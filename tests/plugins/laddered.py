@@ -11,7 +11,7 @@ from tiny import Tiny, TinySettings
 from proofroll.core.engine import Level, Term, whole_steps
 from proofroll.core.errors import Refused
 from proofroll.core.scene import Scene
-from proofroll.elements.ball_on_surface.model import BallCapability
+from proofroll.elements.ball_on_surface.model import ROLLS, BallCapability
 
 
 @dataclass(frozen=True)
@@ -28,6 +28,7 @@ class Laddered(Tiny):
     """The midpoint rule, to which things can be added that nobody needs."""
 
     name: ClassVar[str] = "laddered"
+    provides: ClassVar[Mapping[str, frozenset[str]]] = {"midpoint": ROLLS, "heavier": ROLLS}
     settings: ClassVar[type[Any]] = LadderedSettings
     presets: ClassVar[Mapping[str, Mapping[str, Any]]] = {
         "midpoint": {"matched": LadderedSettings()},
