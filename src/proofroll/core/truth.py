@@ -1,4 +1,4 @@
-"""The truth of a scene: that of each of its elements, by whatever covers it. What covers what is found as engines are."""
+"""The truth of a scene: that of each of its elements, by whatever covers it; that is found as engines are."""
 
 from __future__ import annotations
 

@@ -78,6 +78,11 @@ class BallOnSurface:
             needs.add(BallCapability.CURVED_SURFACE)
         return frozenset(needs)
 
+    @property
+    def askable(self) -> tuple[str, ...]:
+        """See the protocol."""
+        return tuple(ASKED)
+
     def asked(self, name: str) -> str | None:
         """See the protocol."""
         return ASKED.get(name)
