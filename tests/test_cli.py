@@ -197,7 +197,7 @@ def test_engines(proofroll: Proofroll, monkeypatch: pytest.MonkeyPatch) -> None:
     assert (code, err) == (0, "")
     found = {engine["name"]: engine for engine in json.loads(out)}
     assert found["oracle"]["status"] == "installed"
-    assert found["oracle"]["provides"] == ["a curved surface", "rolling without slip"]
+    assert found["oracle"]["provides"] == {"only": ["a curved surface", "rolling without slip"]}
     assert found["absent"]["status"] == "missing"
     assert "no_such_module_anywhere" in found["absent"]["message"]
     assert found["misspelt"]["status"] == "broken"

@@ -11,7 +11,10 @@ from tiny import Tiny, TinySettings
 from proofroll.core.engine import Level, Term, whole_steps
 from proofroll.core.errors import Refused
 from proofroll.core.scene import Scene
-from proofroll.elements.ball_on_surface.model import BallCapability
+from proofroll.elements.ball_on_surface.model import ROLLS, BallCapability
+
+# How long no wind blows [s].
+_CALM = 0.01
 
 
 @dataclass(frozen=True)
@@ -28,6 +31,7 @@ class Laddered(Tiny):
     """The midpoint rule, to which things can be added that nobody needs."""
 
     name: ClassVar[str] = "laddered"
+    provides: ClassVar[Mapping[str, frozenset[str]]] = {"midpoint": ROLLS, "heavier": ROLLS}
     settings: ClassVar[type[Any]] = LadderedSettings
     presets: ClassVar[Mapping[str, Mapping[str, Any]]] = {
         "midpoint": {"matched": LadderedSettings()},
@@ -55,11 +59,12 @@ class Laddered(Tiny):
 
     def advance(self, t: float) -> None:
         """See :class:`proofroll.core.engine.Engine`."""
-        for _ in range(whole_steps(self.t, t, self.dt)):
+        for step in range(whole_steps(self.t, t, self.dt)):
             stage = self.x + self.dt / 2 * self.rates(self.x) if self.chosen.second_stage else self.x
             for _ in range(5 if self.chosen.idle else 1):
                 rates = self.rates(stage)
-            if self.chosen.wind == "gale":
-                rates[3] += 1.0  # blows upwards by 1 m/s²
+            # Blows upwards by 1 m/s²; had it blown from the start, the first steps would show it
+            if self.chosen.wind == "gale" and self.t + step * self.dt > _CALM:
+                rates[3] += 1.0
             self.x = self.x + self.dt * rates
         self.t = t

@@ -64,6 +64,11 @@ class Spring:
         start = np.array([[-(self.rate**2) * self.x0, 0.0, 0.0]])
         return FirstMotion(start, np.zeros((1, 3)), self.rate**2 * abs(self.x0), 1e-3 / self.rate)
 
+    @property
+    def askable(self) -> tuple[str, ...]:
+        """Nothing can be asked for."""
+        return ()
+
     def asked(self, name: str) -> str | None:
         """Nothing can be asked for."""
         return None

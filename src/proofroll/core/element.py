@@ -112,6 +112,10 @@ class Element(Protocol):
     def requires(self) -> frozenset[str]:
         """What a formulation must provide to represent it with these numbers; each is a text for a person."""
 
+    @property
+    def askable(self) -> tuple[str, ...]:
+        """Names of what may be asked for besides the motion."""
+
     def asked(self, name: str) -> str | None:
         """What a formulation must provide where ``name`` is asked for besides the motion; None: nothing of the kind."""
 

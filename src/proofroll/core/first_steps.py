@@ -106,7 +106,7 @@ def derivable(kind: Any, scene: Scene, settings: Any) -> list[Line]:
 
 
 def _derivatives(kind: Any, scene: Scene, element: Element, settings: Any, h: float) -> tuple[FloatArray, FloatArray]:
-    """Accelerations of all bodies' centres and turning at time 0, by a parabola and by a cubic, shape (2, bodies, 3)."""
+    """Accelerations of all bodies' centres and turning at time 0, by a parabola and a cubic; (2, bodies, 3)."""
     engine = kind.build(scene, settings)
     samples = [sample_of(scene, element, engine.sample())]
     for steps in (1, 2, 3):

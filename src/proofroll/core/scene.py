@@ -14,7 +14,7 @@ from functools import cached_property
 from pathlib import Path
 
 from proofroll.core.element import Element
-from proofroll.core.errors import InputError
+from proofroll.core.errors import InputError, choices
 from proofroll.core.observable import Observable
 
 
@@ -51,7 +51,9 @@ class Scene:
                 raise InputError("scene", name, "two elements have this name; give each its own")
         for name in self.asks:
             if not any(element.asked(name) for element in self.elements):
-                raise InputError("asks", name, "no element of the scene has anything of that name to ask for")
+                known = choices(dict.fromkeys(known for element in self.elements for known in element.askable))
+                advice = f"no element of the scene has that to ask for; choose {known}" if known else "ask for nothing"
+                raise InputError("asks", name, advice)
 
     @cached_property
     def requires(self) -> frozenset[str]:

@@ -63,6 +63,13 @@ class SceneFile:
     tables: dict[str, Any] = field(default_factory=dict)  # all others, which kinds of elements read
 
 
+@dataclass(frozen=True)
+class _GravityTable:
+    """The table that all kinds of elements share."""
+
+    gravity: Gravity
+
+
 strict(Parameter, SceneFile, Gravity)
 _OWN = frozenset(item.name for item in dataclasses.fields(SceneFile)) - {"tables"}
 
@@ -125,13 +132,11 @@ def load_scene(name: str, /, *, asks: Any = (), **parameters: float) -> Scene:
     values = _values(file, parameters)
     where = str(folder / "scene.toml")
     numbers = Numbers(values, {name: item.unit for name, item in file.parameters.items()})
-    gravity = validated(
-        Gravity, numbers.filled(file.gravity, f"{where}: gravity", units_of(Gravity)), f"{where}: gravity"
-    )
+    gravity = {"gravity": numbers.filled(file.gravity, f"{where}: gravity", units_of(Gravity))}
     return Scene(
         name=folder.name,
         title=file.title,
-        elements=_elements(file.tables, gravity, numbers, where),
+        elements=_elements(file.tables, validated(_GravityTable, gravity, where).gravity, numbers, where),
         parameters=values,
         folder=folder,
         asks=tuple(dict.fromkeys([*file.asks, *_names(asks)])),

@@ -51,7 +51,7 @@ class Reference:
         return cls(scene, dataset, observe(scene, dataset), scales(scene, dataset))
 
     def another_scene(self, lines: Sequence[Mapping[str, Any]]) -> str | None:
-        """Why a model with this certificate is of another kind than the scene, as one clause; None: it is of the same."""
+        """Why a model with this certificate is of another kind than the scene, as one clause; None: it is not."""
         for element in self.scene.elements:
             if isinstance(element, KnowsAnotherScene):
                 why = element.another_scene(lines, part(self.scene, element, self.dataset))

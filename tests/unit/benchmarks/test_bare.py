@@ -7,6 +7,7 @@ from collections.abc import Mapping
 import numpy as np
 import pytest
 
+from proofroll.core.engine import require_provided
 from proofroll.core.errors import Diverged, Refused
 from proofroll.core.plugins import load_engine, resolve_settings
 from proofroll.files.scene_file import load_scene
@@ -41,7 +42,9 @@ def centres(
     """Of the adapter and of the bare loop, ``other`` changing the latter's scene; and how far they may be apart."""
     kind = load_engine(engine)
     settings = resolve_settings(kind, {"formulation": formulation})
-    adapter = kind.build(load_scene("sphere_in_cylinder", **parameters), settings)
+    scene = load_scene("sphere_in_cylinder", **parameters)
+    require_provided(kind, formulation, scene)
+    adapter = kind.build(scene, settings)
     for t in times[1:].tolist():
         adapter.advance(t)
     bare = load_bare_loop(engine)(load_scene("sphere_in_cylinder", **{**parameters, **other}), settings)

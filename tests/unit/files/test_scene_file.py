@@ -119,9 +119,9 @@ def test_text_that_is_a_number_is_a_number() -> None:
 
 def test_kinetic_friction_follows_static_friction() -> None:
     """mu_kinetic is mu_static unless it is given."""
-    assert load_scene(CYLINDER, mu_static=0.35).contacts[0].mu_kinetic == 0.35
-    assert load_scene(CYLINDER, mu_static=0.35, mu_kinetic=0.2).contacts[0].mu_kinetic == 0.2
-    assert load_scene(CYLINDER).contacts[0].mu_kinetic == math.inf
+    assert rolling_ball(load_scene(CYLINDER, mu_static=0.35)).contact.mu_kinetic == 0.35
+    assert rolling_ball(load_scene(CYLINDER, mu_static=0.35, mu_kinetic=0.2)).contact.mu_kinetic == 0.2
+    assert rolling_ball(load_scene(CYLINDER)).contact.mu_kinetic == math.inf
 
 
 @pytest.mark.parametrize("name", ["no_such_scene", "", "/", "..", "a" * 1000])

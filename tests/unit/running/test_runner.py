@@ -255,7 +255,7 @@ def test_describe() -> None:
     """An engine is described by itself, from a process of its own."""
     found = describe("oracle")
     assert found["version"] == "1"
-    assert found["provides"] == ["a curved surface", "rolling without slip"]
+    assert found["provides"] == {"only": ["a curved surface", "rolling without slip"]}
     assert found["presets"] == {"only": {"matched": {"formulation": "only", "preset": "matched", "dt": 1e-2}}}
     assert found["summary"].startswith("Well behaved")
 

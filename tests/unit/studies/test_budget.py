@@ -5,7 +5,6 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from proofroll.elements.ball_on_surface.observables import Observable
 from proofroll.running.case import Case, EngineFacts, Result, Status
 from proofroll.studies.budget import FLOOR, MODEL_FORM, TIME_STEP, TRUTH, Budget, Order, budget, order_of, sentence
 from proofroll.studies.sweep import Curve, Point
@@ -29,8 +28,7 @@ def made(
         values = TRUE + step**order * np.cos(T) + model * T + floor * scatter.uniform(-1, 1, T.size)
         error = float(np.max(np.abs(values - TRUE)))
         case = Case("scene", {}, "0", own, 2.0, 0.05)
-        observed = {"z": Observable("z", "m", values)}
-        curve.points.append(Point(case, Result(Status.DONE, "done"), observed, {"z": error}, {"z": bar}))
+        curve.points.append(Point(case, Result(Status.DONE, "done"), {"z": values}, {"z": error}, {"z": bar}))
     return budget(curve, "z", 0.05, TRUE)
 
 
@@ -71,13 +69,12 @@ def test_the_coarse_end_is_that_of_the_whole_curve(start: int) -> None:
         t = T[::stride][start:]
         values = np.sin(3 * t) + step**2 * np.cos(t) + 3e-3 * t
         own = EngineFacts("made", "1", "0", {"dt": step}, "dt", 2)
-        observed = {"z": Observable("z", "m", values)}
         error = float(np.max(np.abs(values - np.sin(3 * t))))
         case = Case("scene", {}, "0", own, 2.0, every)
-        curve.points.append(Point(case, Result(Status.DONE, "done"), observed, {"z": error}, {"z": 1e-13}))
+        curve.points.append(Point(case, Result(Status.DONE, "done"), {"z": values}, {"z": error}, {"z": 1e-13}))
     found = budget(curve, "z", 0.05, TRUE[start:])
     assert (found.coarse_step, found.coarse, found.fine) == (0.4, TIME_STEP, MODEL_FORM)
-    curve.points[0].curves["z"] = Observable("z", "m", curve.points[0].curves["z"].values[:-1])
+    curve.points[0].curves["z"] = curve.points[0].curves["z"][:-1]
     assert budget(curve, "z", 0.05, TRUE[start:]).coarse_step == STEPS[0]
 
 

@@ -48,9 +48,9 @@ def test_who_leaves_the_wall_is_judged_up_to_there(engine: str) -> None:
     curves = held.observed(cut[1.0])
     for name in ("gamma", "z", "N", "F2", "F3", "gap", "slip", "event_times", "event_order"):
         true, _ = held.true(name, curves[name])
-        assert curves[name].values.shape == true.shape, name
+        assert curves[name].shape == true.shape, name
         size = max(held.sizes.get(name, 1.0), 1e-9)  # nothing moves along the axis
-        assert np.max(np.abs(curves[name].values - true), initial=0.0) < 5e-3 * size, name
+        assert np.max(np.abs(curves[name] - true), initial=0.0) < 5e-3 * size, name
     assert (len(held.dataset.time) == len(TIMES)) == ("mujoco" in engine)
     assert held.dataset.gamma.attrs["error_bar"] == whole.dataset.gamma.attrs["error_bar"]
 
@@ -61,7 +61,7 @@ def test_who_ends_too_early_is_not_excused() -> None:
     short = record(build(scene, "reduced"), scene, TIMES).dataset.isel(time=slice(30))
     held, cut = common_span(reference(scene), {1.0: short})
     curve = held.observed(cut[1.0])["gamma"]
-    assert curve.values.shape != held.true("gamma", curve)[0].shape
+    assert curve.shape != held.true("gamma", curve)[0].shape
 
 
 def test_without_lift_off_nothing_changes() -> None:

@@ -15,7 +15,7 @@ from proofroll.elements.ball_on_surface.element import rolling_ball
 from proofroll.elements.ball_on_surface.natural import natural_time
 from proofroll.files.scene_file import load_scene
 from proofroll.running.case import Result, Status
-from proofroll.studies.failure import Yardstick, judge
+from proofroll.studies.failure import Yardstick, judge, meanings
 
 SCENE = load_scene("sphere_in_cylinder")
 TIMES = np.linspace(0.0, 3 * natural_time(rolling_ball(SCENE)), 25)
@@ -138,7 +138,7 @@ def rolling_down(after_rest: float) -> tuple[Any, Yardstick]:
         w = -np.cross(body.surface.normal(body.p0), v) / body.ball.radius
         return variables(rolling_ball(RESISTED), times, body.p0 + way[:, None] * along, v, w)
 
-    return path(after_rest), Yardstick.of(body, times, path(0.0))
+    return path(after_rest), Yardstick.of(RESISTED, path(0.0))
 
 
 @pytest.mark.parametrize(("after", "failure"), [(0.0, None), (-0.002, None), (-0.2, "reversed")])

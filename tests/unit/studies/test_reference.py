@@ -8,7 +8,6 @@ import numpy as np
 
 from proofroll.core.engine import SharesEquations
 from proofroll.core.truth import truth
-from proofroll.elements.ball_on_surface.observables import Observable
 from proofroll.engines.reduced import Reduced
 from proofroll.files.scene_file import load_scene
 from proofroll.running.identity import resolve
@@ -18,7 +17,7 @@ from proofroll.studies.reference import Reference
 def reference(**curves: list[float]) -> Reference:
     """A truth of which only some observables matter."""
     nothing: Any = None
-    found = {name: Observable(name, "s", np.array(values)) for name, values in curves.items()}
+    found = {name: np.array(values) for name, values in curves.items()}
     return Reference(load_scene("sphere_in_cylinder"), nothing, found, {"z": 0.2})
 
 

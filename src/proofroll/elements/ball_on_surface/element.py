@@ -82,6 +82,11 @@ class BallOnSurface:
         {BallCapability.ROLLING_RESISTANCE, BallCapability.BOUNDED_FRICTION, BallCapability.ORIENTATION}
     )
 
+    @property
+    def askable(self) -> tuple[str, ...]:
+        """See the protocol."""
+        return tuple(ASKED)
+
     def asked(self, name: str) -> str | None:
         """See the protocol."""
         return ASKED.get(name)

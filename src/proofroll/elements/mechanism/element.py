@@ -69,6 +69,11 @@ class MechanismElement:
         redundant = {MechanismCapability.REDUNDANT} if self.analysis.redundant else set()
         return frozenset(required(self.mechanism) | redundant)
 
+    @property
+    def askable(self) -> tuple[str, ...]:
+        """Nothing: all is given."""
+        return ()
+
     def asked(self, name: str) -> str | None:  # noqa: ARG002 -- the protocol's
         """Nothing can be asked for: all is given."""
         return None

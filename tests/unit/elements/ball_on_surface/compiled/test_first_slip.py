@@ -36,7 +36,7 @@ def cylinder(**parameters: float) -> Scene:
 
 def oblique(**parameters: float) -> Scene:
     """The same with gravity across the axis, so that needed friction changes along the circle."""
-    return dataclasses.replace(cylinder(**parameters), gravity=Gravity(9.81, (0.2, -0.1, -0.9)))
+    return changed(cylinder(**parameters), gravity=Gravity(9.81, (0.2, -0.1, -0.9)))
 
 
 def true_time(scene: Scene) -> float:

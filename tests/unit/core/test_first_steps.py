@@ -6,11 +6,11 @@ import dataclasses
 
 import pytest
 from nonconforming import Clamped, Damped, Mute, Unresisting
-from proofroll.first_steps import MOST, derivable, first_steps
 from tiny import Tiny, TinySettings
 
 from proofroll.core.certificate import first_difference
 from proofroll.core.errors import Diverged
+from proofroll.core.first_steps import MOST, derivable, first_steps
 from proofroll.core.scene import Scene
 from proofroll.files.scene_file import load_scene
 
