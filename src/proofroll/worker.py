@@ -21,6 +21,7 @@ from proofroll.clean_runs import time_once
 from proofroll.errors import Diverged, InputError, Missing, ProofrollError, Refused
 from proofroll.identity import describe, resolve
 from proofroll.memory import volunteer
+from proofroll.robots.reading import compile_robot, read_robot
 
 
 def main(answers: int, parent: int) -> None:
@@ -53,6 +54,8 @@ def _answer(request: dict[str, Any]) -> dict[str, Any]:
         "time": time_once,
         "reproduce": reproduce,
         "bench": bench,
+        "read_robot": read_robot,
+        "compile_robot": compile_robot,
     }
     action = actions[request.pop("do")]
     try:

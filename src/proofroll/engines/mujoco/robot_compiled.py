@@ -43,7 +43,7 @@ def robot_of(model: Any) -> Robot:
                 bodies[child] = Body(child, 0.0, np.zeros(3), np.zeros((3, 3)))
             joints.append(_joint(model, joint, parent, child, position, rotation, joint in driven))
             parent, position, rotation = child, np.zeros(3), np.eye(3)
-    return Robot("robot", bodies, tuple(joints), _mimics(model), np.array(model.opt.gravity), {"scale": 1.0})
+    return Robot("robot", bodies, tuple(joints), _mimics(model), np.array(model.opt.gravity))
 
 
 def _joint(model: Any, index: int, parent: str, child: str, position: Array, rotation: Array, driven: bool) -> Joint:

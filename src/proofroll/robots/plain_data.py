@@ -1,0 +1,44 @@
+"""Robots and states as plain data, which JSON holds, and back."""
+
+from __future__ import annotations
+
+import dataclasses
+from collections.abc import Mapping
+from typing import Any
+
+import numpy as np
+
+from proofroll.robots.model import Body, Joint, Mimic, Robot
+from proofroll.robots.states import States
+
+
+def plain(value: Any) -> Any:
+    """Dataclasses, mappings and arrays as dicts, lists and numbers."""
+    if dataclasses.is_dataclass(value) and not isinstance(value, type):
+        return {field.name: plain(getattr(value, field.name)) for field in dataclasses.fields(value)}
+    if isinstance(value, Mapping):
+        return {str(key): plain(item) for key, item in value.items()}
+    if isinstance(value, (list, tuple)):
+        return [plain(item) for item in value]
+    return value.tolist() if isinstance(value, (np.ndarray, np.generic)) else value
+
+
+def robot_from(data: Mapping[str, Any]) -> Robot:
+    """The robot of which :func:`plain` made this; its ``sources`` stay plain."""
+    return Robot(
+        data["name"],
+        {name: Body(**_arrays(body)) for name, body in data["bodies"].items()},
+        tuple(Joint(**_arrays(joint)) for joint in data["joints"]),
+        tuple(Mimic(**mimic) for mimic in data["mimics"]),
+        np.array(data["gravity"]),
+        data["sources"],
+    )
+
+
+def states_from(data: Mapping[str, Any]) -> States:
+    """The states of which :func:`plain` made this."""
+    return States(**{field: _arrays(by_joint) for field, by_joint in data.items()})
+
+
+def _arrays(values: Mapping[str, Any]) -> dict[str, Any]:
+    return {key: np.array(item, dtype=float) if isinstance(item, list) else item for key, item in values.items()}
