@@ -12,7 +12,7 @@ from proofroll.robots.protocol import Reading
 from proofroll.robots.robot_file import RobotFile
 
 # A cause that leaves more than this part of a difference explains nothing, not even together with others.
-_HELPS = 0.9
+_HELPS = 0.999
 
 
 @dataclasses.dataclass(frozen=True)
@@ -84,7 +84,7 @@ class _Trial:
         robot = hypothesis.change(Evidence(self.file, step.truth.robot, self.reading))
         if robot is None or robot is step.truth.robot or not robot.moving:
             return None
-        truth = Truth.of(robot, step.truth.states)
+        truth = Truth.of(robot, step.truth.states, like=step.truth)
         found = differences(truth, self.torques, self.reading)
         if layer not in found:
             return None

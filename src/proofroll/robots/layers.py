@@ -8,7 +8,7 @@ from functools import cached_property
 
 import numpy as np
 
-from proofroll.robots.model import Array, Robot
+from proofroll.robots.model import Array, Body, Robot
 from proofroll.robots.protocol import Reading
 from proofroll.robots.states import States
 from proofroll.robots.two_formulations import Dynamics, passive, poses, world_jacobians
@@ -21,8 +21,8 @@ LAYERS = {
     "mass matrix": "M [relative]",
     "gravity": "torque of gravity [relative]",
     "bias": "torque of gravity and velocities [relative]",
-    "inverse dynamics": "torque for given accelerations, with damping and friction [relative]",
-    "forward dynamics": "what the accelerations for given torques leave of the equation of motion [relative]",
+    "inverse dynamics": "torque for given accelerations, without damping, friction and springs [relative]",
+    "forward dynamics": "what is left of the equation of motion, damping, friction and springs included [relative]",
 }
 # Round-off of two formulations is 1e-15 to 3e-14 on robots with up to 67 velocities; the smallest known defect of an
 # importer is 1e-7.
@@ -41,11 +41,37 @@ class Truth:
     states: States
     dynamics: Dynamics
     passive: Array
+    like: Truth | None = None
 
     @classmethod
-    def of(cls, robot: Robot, states: States) -> Truth:
-        """Evaluated by the first formulation."""
-        return cls(robot, states, world_jacobians(robot, states), passive(robot, states))
+    def of(cls, robot: Robot, states: States, like: Truth | None = None) -> Truth:
+        """Evaluated by the first formulation.
+
+        Args:
+            robot: what is evaluated.
+            states: where.
+            like: whose sizes make differences relative; by default its own.
+        """
+        return cls(robot, states, world_jacobians(robot, states), passive(robot, states), like)
+
+    @cached_property
+    def scales(self) -> dict[str, float]:
+        """What a difference of 1 is at each layer: its own largest value, above the round-off of others."""
+        if self.like is not None:
+            return self.like.scales
+        groups = self.robot.groups.values()
+        mass = sum(group.mass for group in groups)
+        floor = _FLOOR * mass * float(np.linalg.norm(self.robot.gravity) or 1.0)
+        sizes = {
+            "mass": mass,
+            "bodies": max((float(np.abs(group.inertia).max()) for group in groups), default=0.0),
+            "mass matrix": float(np.abs(self.dynamics.M).max()),
+            "gravity": max(float(np.abs(self.dynamics.g).max()), floor),
+            "bias": max(float(np.abs(self.dynamics.h).max()), floor),
+            "inverse dynamics": max(float(np.abs(self.inverse).max()), floor),
+            "forward dynamics": max(float(np.abs(self.inverse + self.passive).max()), floor),
+        }
+        return {layer: size or 1.0 for layer, size in sizes.items()}
 
     @cached_property
     def singular(self) -> bool:
@@ -56,6 +82,11 @@ class Truth:
         scaled = self.dynamics.M / own[:, :, None] / own[:, None, :]
         return float(np.linalg.eigvalsh(scaled).min()) < _SINGULAR
 
+    @cached_property
+    def inverse(self) -> Array:
+        """What gives the accelerations of the states where there are no passive forces, shape (states, n)."""
+        return self.torque(self.states.stacked(self.states.acceleration, self.robot)) - self.passive
+
     def torque(self, acceleration: Array) -> Array:
         """What gives these accelerations, shape (states, n)."""
         d = self.dynamics
@@ -63,7 +94,7 @@ class Truth:
 
     def torques(self) -> dict[str, Array]:
         """What gives the accelerations of the states, by joint."""
-        found = self.torque(self.states.stacked(self.states.acceleration, self.robot))
+        found = self.inverse + self.passive
         return {name: found[:, columns] for name, columns in self.robot.columns.items()}
 
 
@@ -89,28 +120,25 @@ def differences(truth: Truth, torques: dict[str, Array], reading: Reading) -> di
     G, theirs = _selection(robot, common, reduced), _columns(reading, common)
     groups = robot.groups
     both = [name for name in common if name in reading.mass]
-    whole = sum(groups[name].mass for name in both) or 1.0
-    masses = [abs(reading.mass[name] - groups[name].mass) for name in both]
-    found["mass"] = abs(sum(reading.mass[name] - groups[name].mass for name in both)) / whole
+    scales = truth.scales
+    masses = [reading.mass[name] - groups[name].mass for name in both]
+    found["mass"] = abs(sum(masses)) / scales["mass"]
     found["kinematics"] = _kinematics(truth, reading, both)
-    spin = max((float(np.abs(groups[name].inertia).max()) for name in both), default=0.0) or 1.0
     found["bodies"] = _largest(
-        [mass / whole for mass in masses]
-        + [np.abs(reading.com[name] - groups[name].com).max() for name in both if groups[name].mass > 0 < reading.mass[name]]
-        + [np.abs(reading.inertia[name] - groups[name].inertia).max() / spin for name in both]
+        [abs(mass) / scales["mass"] for mass in masses]
+        + [_apart(reading.com[name], reading.mass[name], groups[name]) for name in both]
+        + [np.abs(reading.inertia[name] - groups[name].inertia).max() / scales["bodies"] for name in both]
     )
-    floor = _FLOOR * whole * float(np.linalg.norm(robot.gravity) or 1.0)
     M = G.T @ d.M @ G
-    found["mass matrix"] = _relative(reading.M[:, theirs][:, :, theirs], M, 0.0)
+    found["mass matrix"] = _off(reading.M[:, theirs][:, :, theirs], M, scales["mass matrix"])
     for layer, own, expected_torque in (("gravity", reading.g, d.g), ("bias", reading.h, d.h)):
-        found[layer] = _relative(own[:, theirs], expected_torque @ G, floor)
-    asked = truth.states.stacked(truth.states.acceleration, robot)
+        found[layer] = _off(own[:, theirs], expected_torque @ G, scales[layer])
     if reading.inverse is not None:
-        found["inverse dynamics"] = _relative(reading.inverse[:, theirs], truth.torque(asked) @ G, floor)
+        found["inverse dynamics"] = _off(reading.inverse[:, theirs], truth.inverse @ G, scales["inverse dynamics"])
     if reading.forward is not None and not truth.singular:
         given = np.concatenate([torques[joint.name] for joint in robot.moving], axis=1)
         reached = reading.forward[:, theirs] @ G.T
-        found["forward dynamics"] = _relative(truth.torque(reached) @ G, given @ G, floor)
+        found["forward dynamics"] = _off(truth.torque(reached) @ G, given @ G, scales["forward dynamics"])
     return found
 
 
@@ -151,8 +179,12 @@ def _kinematics(truth: Truth, reading: Reading, joints: list[str]) -> float:
     return _largest(off)
 
 
-def _relative(found: Array, true: Array, floor: float) -> float:
-    scale = max(float(np.abs(true).max(initial=0.0)), floor) or 1.0
+def _apart(com: Array, mass: float, group: Body) -> float:
+    """Distance of two centres of mass; 0 where one has no mass to be the centre of."""
+    return float(np.abs(com - group.com).max()) if group.mass > 0 < mass else 0.0
+
+
+def _off(found: Array, true: Array, scale: float) -> float:
     return _largest([np.abs(found - true).max(initial=0.0) / scale])
 
 

@@ -130,6 +130,13 @@ def _mjcf(file: RobotFile) -> Iterator[Finding]:
     for option in file.root.iter("option"):
         if option.get("gravity"):
             yield Finding("note", "option", f"gravity {option.get('gravity')}: some engines ignore it")
+        for name in ("density", "viscosity"):
+            if option.get(name) not in {None, "0"}:
+                yield Finding("note", "option", f"{name}: forces of the medium are not compared")
+    if next(file.root.iter("tendon"), None) is not None:
+        yield Finding("note", "tendon", "springs and damping of tendons are not compared")
+    if any(body.get("gravcomp") for body in file.root.iter("body")):
+        yield Finding("note", "bodies", "compensation of gravity (gravcomp) is not compared")
     if len(trees := [body for world in file.root.iter("worldbody") for body in world.findall("body")]) > 1:
         yield Finding("warning", "worldbody", f"{len(trees)} trees: some engines keep only the first")
     for body in file.root.iter("body"):

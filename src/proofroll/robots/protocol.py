@@ -61,8 +61,9 @@ class Reading:
         coupled: joints that the engine holds to another one as the file's mimic says.
         M, g, h: mass matrix, torque of gravity, torque of gravity and velocities (see
             :class:`proofroll.robots.two_formulations.Dynamics`).
-        inverse: torque for the accelerations asked, passive forces included, shape (states, n); None: not offered.
-        forward: acceleration for the torques asked, shape (states, n); None: not offered.
+        inverse: torque for the accelerations asked, without damping, friction and springs, shape (states, n); None: not
+            offered.
+        forward: acceleration for the torques asked, with all of them, shape (states, n); None: not offered.
         remarks: what the reader did and what the engine said, as sentences.
     """
 

@@ -184,7 +184,10 @@ class _Tree:
     def mass_matrix(self) -> Array:
         """The mass matrix."""
         self.solver.ComputeMassMatrix(self.mbs)
-        return np.array(self.solver.GetSystemMassMatrix())
+        found = np.array(self.solver.GetSystemMassMatrix())
+        if not np.all(np.isfinite(found)):
+            raise Refused("the mass matrix of its tree is not finite, as where a joint moves no mass")
+        return found
 
     def frames(self) -> dict[str, tuple[Array, Array]]:
         """Position and rotation of the body that each joint carries."""

@@ -40,12 +40,16 @@ class MujocoRobots:
         return robot_of(mujoco.MjModel.from_xml_path(str(path)))
 
     def read(self, request: Request) -> Reading:
-        """The compiled model, evaluated without actuators and constraints (of which friction is one)."""
+        """The compiled model, evaluated without actuators, constraints (of which friction is one), tendons and medium."""
         import mujoco
 
         model = _compile(request)
         off = mujoco.mjtDisableBit
         model.opt.disableflags |= int(off.mjDSBL_CONSTRAINT) | int(off.mjDSBL_ACTUATION)
+        model.opt.density = model.opt.viscosity = 0.0
+        for name in ("body_gravcomp", "tendon_stiffness", "tendon_damping"):
+            if hasattr(model, name):
+                getattr(model, name)[:] = 0.0
         if request.kind == "urdf":
             model.opt.gravity = request.gravity
         data = mujoco.MjData(model)
@@ -132,7 +136,7 @@ def _at(
     def inverse(acceleration: Array) -> Array:
         data.qacc[:] = acceleration
         mujoco.mj_inverse(model, data)
-        return np.array(data.qfrc_inverse)
+        return np.array(data.qfrc_inverse + data.qfrc_passive)
 
     def forward(torque: Array) -> Array:
         data.qfrc_applied[:] = torque

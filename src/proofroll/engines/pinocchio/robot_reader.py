@@ -33,16 +33,17 @@ class PinocchioRobots:
         if request.kind == "urdf":
             model.gravity.linear = request.gravity
         data = model.createData()
-        moving = [index for index in range(1, model.njoints) if model.joints[index].nv]
-        joints = tuple(_name(request, model, index) for index in moving)
-        dofs = tuple(int(model.joints[index].nv) for index in moving)
-        frames: dict[str, list[Any]] = {name: [] for name in joints}
+        columns = _columns(request, model)
+        joints = tuple(name for name, _, _ in columns)
+        dofs = tuple(dof for _, _, dof in columns)
+        last = {index: name for name, index, _ in columns}  # of several joints in one body the last carries it
+        frames: dict[str, list[Any]] = {name: [] for name in last.values()}
 
         def at(k: int) -> AtState:
-            q, v, T, drift = _state(request, model, joints, dofs, moving, k)
+            q, v, T, drift = _state(request, model, columns, k)
             pin.forwardKinematics(model, data, q)
             pin.updateFramePlacements(model, data)
-            for name, index in zip(joints, moving, strict=True):
+            for index, name in last.items():
                 frame = _frame(request, model, name, index)
                 frames[name].append((data.oMi[index] if frame is None else data.oMf[frame]).copy())
             M = np.triu(pin.crba(model, data, q))
@@ -57,7 +58,7 @@ class PinocchioRobots:
 
         arrays = evaluate(request, joints, dofs, at)
         mass, com, inertia = {}, {}, {}
-        for name, index in zip(joints, moving, strict=True):
+        for index, name in last.items():
             frame = _frame(request, model, name, index)
             placed = model.inertias[index]
             if frame is not None:
@@ -83,9 +84,28 @@ def _build(request: Request) -> Any:
     return pin.buildModelFromUrdf(str(request.path), *free, **mimic)
 
 
-def _name(request: Request, model: Any, index: int) -> str:
-    name = str(model.names[index])
-    return request.base_joint if request.kind == "urdf" and name == "root_joint" else name
+def _columns(request: Request, model: Any) -> list[tuple[str, int, int]]:
+    """Joints by the file's names in the order of velocities: name, index in the model, velocities.
+
+    Several joints in one body of an MJCF are one composite joint of the model.
+    """
+    found: list[tuple[str, int, int]] = []
+    for index in range(1, model.njoints):
+        joint, name = model.joints[index], str(model.names[index])
+        if request.kind == "urdf" and name == "root_joint":
+            name = request.base_joint
+        if joint.shortname() == "JointModelComposite":
+            parts = [part.nv for part in joint.extract().joints]
+            found += [(part, index, nv) for part, nv in zip(_composite(request, model, index), parts, strict=True)]
+        elif joint.nv:
+            found.append((name, index, int(joint.nv)))
+    return found
+
+
+def _composite(request: Request, model: Any, index: int) -> list[str]:
+    """The file's names of the joints within a composite one, whose body they move."""
+    bodies = {str(frame.name) for frame in model.frames if frame.parentJoint == index}
+    return [name for name, child in request.children.items() if child.rpartition("/")[0] in bodies or child in bodies]
 
 
 def _frame(request: Request, model: Any, joint: str, index: int) -> int | None:
@@ -100,17 +120,20 @@ def _frame(request: Request, model: Any, joint: str, index: int) -> int | None:
 
 
 def _state(
-    request: Request, model: Any, joints: tuple[str, ...], dofs: tuple[int, ...], moving: list[int], k: int
+    request: Request, model: Any, columns: list[tuple[str, int, int]], k: int
 ) -> tuple[Array, Array, Array, Array]:
     """Configuration, velocity, and the relation to the common velocity: both parts of a free base have body axes."""
     import pinocchio as pin
 
     states = request.states
-    q, v = pin.neutral(model), np.zeros(model.nv)
+    described = [entry.key() for entry in model.referenceConfigurations]  # the pose that an MJCF describes
+    q = np.array(model.referenceConfigurations["qpos0"] if "qpos0" in described else pin.neutral(model))
+    v = np.zeros(model.nv)
     T, drift = np.eye(model.nv), np.zeros(model.nv)
     step = np.zeros(model.nv)
-    for name, dof, index in zip(joints, dofs, moving, strict=True):
-        iv, iq = model.joints[index].idx_v, model.joints[index].idx_q
+    iv = 0
+    for name, index, dof in columns:
+        iq = model.joints[index].idx_q
         rate = states.velocity.get(name)
         v[iv : iv + dof] = 0.0 if rate is None else rate[k]
         if name in states.angle:
@@ -123,4 +146,5 @@ def _state(
                 drift[iv : iv + 3] = -R.T @ np.cross(v[iv + 3 : iv + 6], v[iv : iv + 3])
                 iq += 3
             q[iq : iq + 4] = Rotation.from_matrix(R).as_quat()
+        iv += dof
     return pin.integrate(model, q, step), T @ v, T, drift

@@ -12,7 +12,7 @@ def _change(evidence: Evidence) -> Robot | None:
 
 
 HYPOTHESIS = Hypothesis(
-    "damping is not used in inverse and forward dynamics",
+    "damping is not used in the forward dynamics",
     {"pinocchio": "all versions so far"},
     "subtract damping · velocity from the torques yourself (Pinocchio keeps it in model.damping)",
     _change,

@@ -12,7 +12,7 @@ def _change(evidence: Evidence) -> Robot | None:
 
 
 HYPOTHESIS = Hypothesis(
-    "friction of joints is not used in inverse and forward dynamics",
+    "friction of joints is not used in the forward dynamics",
     {
         "pinocchio": "all versions so far",
         "mujoco": "all versions so far (frictionloss is a soft constraint of its solver)",

@@ -12,7 +12,7 @@ def _change(evidence: Evidence) -> Robot | None:
 
 
 HYPOTHESIS = Hypothesis(
-    "springs of joints are not used in inverse and forward dynamics",
+    "springs of joints are not used in the forward dynamics",
     {"pinocchio": "4.1.0", "drake": "1.51.1", "exudyn": "1.13.6"},
     "add stiffness · (coordinate − springref) to the torques yourself",
     _change,

@@ -51,11 +51,9 @@ class DrakeRobots:
             gravity = plant.CalcGravityGeneralizedForces(context)
 
             def inverse(acceleration: Array) -> Array:
-                from pydrake.multibody.plant import MultibodyForces_
+                from pydrake.multibody.tree import MultibodyForces
 
-                forces = MultibodyForces_[float](plant)
-                plant.CalcForceElementsContribution(context, forces)
-                return np.array(plant.CalcInverseDynamics(context, acceleration, forces))
+                return np.array(plant.CalcInverseDynamics(context, acceleration, MultibodyForces(plant))) - gravity
 
             def forward(torque: Array) -> Array:
                 plant.get_applied_generalized_force_input_port().FixValue(context, torque)

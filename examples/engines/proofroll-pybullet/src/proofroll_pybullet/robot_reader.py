@@ -23,10 +23,11 @@ class PybulletRobots:
         "inertia_from_file": "take inertias from the file, not from collision shapes (default here: true)",
         "merge_fixed": "merge links at fixed joints into their parents",
     }
-    # Poses come out in single precision; accelerations from a difference over one step.
+    # Poses of links come out in single precision, and so do those of fixed joints; its own inertias are diagonalised by
+    # a method that stops at 1e-10; accelerations are differences over one step.
     tolerances: ClassVar[Mapping[str, float]] = {
         "kinematics": 5e-6,
-        "bodies": 1e-9,
+        "bodies": 1e-6,
         "mass matrix": 1e-9,
         "gravity": 1e-9,
         "bias": 1e-9,
@@ -198,8 +199,8 @@ class _Loaded:
             if index not in homes:
                 parent, position, rotation = self.parents[index]
                 home, p, R = homes[parent]
-                _, _, c, A = self.inertial(parent)  # the joint is placed in the parent's principal frame
-                homes[index] = (home, p + R @ (c + A @ position), R @ A @ rotation.T)
+                _, _, c, A = self.inertial(parent)  # the joint is placed between the principal frames of both links
+                homes[index] = (home, p + R @ (c + A @ position), R @ A @ rotation.T @ self.inertial(index)[3].T)
             home, p, R = homes[index]
             mass, moments, c, A = self.inertial(index)
             parts[home].append((Body("", mass, c, A @ np.diag(moments) @ A.T), p, R))
