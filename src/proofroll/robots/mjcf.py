@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import copy
+import itertools
 from collections.abc import Iterator
 from pathlib import Path
 from xml.etree.ElementTree import Element
@@ -109,10 +110,12 @@ def _mesh_name(mesh: Element) -> str:
 
 def _name(root: Element) -> None:
     """Names for bodies and joints without one, so that engines can be compared by name."""
+    root.attrib.setdefault("model", "robot")
     taken = {element.get("name") for element in root.iter()}
     for world in root.iter("worldbody"):
         for tag, word in (("body", "body"), ("joint", "joint"), ("freejoint", "joint")):
             for number, element in enumerate(world.iter(tag)):
                 if not element.get("name"):
-                    element.set("name", next(f"{word}{extra}{number}" for extra in (" ", " no ", " number ") if f"{word}{extra}{number}" not in taken))
+                    free = (f"{word}{filler}{number}" for filler in itertools.accumulate(itertools.repeat(" ")))
+                    element.set("name", next(name for name in free if name not in taken))
                     taken.add(element.get("name"))

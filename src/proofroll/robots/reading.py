@@ -110,6 +110,8 @@ def read_robot(engine: str, asked: str, arrays: str) -> dict[str, Any]:
         reading = reader.read(request)
     except Refused as error:
         return told | {"refused": str(error)}
+    except (AttributeError, TypeError, NameError, LookupError, ImportError) as error:  # an importer raises none of these
+        return {"error": "crashed", "message": f"the reader of {engine} failed: {one_line(error)}"}
     except Exception as error:  # whatever an importer raises is its refusal
         return told | {"refused": one_line(error)}
     parts: dict[str, Any] = {name: np.array(list(getattr(reading, name).values()), dtype=float) for name in _BY_JOINT}

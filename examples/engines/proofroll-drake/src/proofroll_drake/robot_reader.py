@@ -10,7 +10,7 @@ import numpy as np
 from proofroll.robots.model import Array
 from proofroll.robots.protocol import AtState, Reading, Request, evaluate
 
-# Mimic is read only into a plant with discrete time.
+# A joint can follow another only in a plant with discrete time.
 _STEP = 1e-3
 
 
@@ -28,7 +28,7 @@ class DrakeRobots:
 
     def read(self, request: Request) -> Reading:
         """The plant, evaluated."""
-        plant = _plant(request, 0.0)
+        plant = _plant(request, _STEP if request.robot.mimics else 0.0)
         context = plant.CreateDefaultContext()
         carriers = {body: joint for joint, body in request.children.items()}
         joints = sorted(
@@ -61,7 +61,8 @@ class DrakeRobots:
 
             M = np.array(plant.CalcMassMatrix(context))
             h = np.array(plant.CalcBiasTerm(context)) - gravity
-            return AtState(T, np.zeros(len(T)), M, -np.array(gravity), h, inverse, forward)
+            continuous = None if plant.time_step() > 0 else forward
+            return AtState(T, np.zeros(len(T)), M, -np.array(gravity), h, inverse, continuous)
 
         arrays = evaluate(request, tuple(named), dofs, at)
         inertias = {
@@ -77,7 +78,8 @@ class DrakeRobots:
             {name: _central(inertia) for name, inertia in inertias.items()},
             {name: np.array([X.translation() for X in found]) for name, found in frames.items()},
             {name: np.array([X.rotation().matrix() for X in found]) for name, found in frames.items()},
-            coupled=_coupled(request),
+            coupled=_coupled(request, plant),
+            remarks=("in discrete time, as its couplings need: no forward dynamics",) if plant.time_step() > 0 else (),
             **arrays,
         )  # fmt: skip
 
@@ -110,12 +112,12 @@ def _put(request: Request, plant: Any, context: Any, joints: Mapping[str, Any], 
 
     states = request.states
     v, T = np.zeros(plant.num_velocities()), np.eye(plant.num_velocities())
-    q = np.array(plant.GetPositions(context))
+    q = np.array(plant.GetDefaultPositions()) if request.kind == "mjcf" else np.zeros(plant.num_positions())
     for name, joint in joints.items():
         start, count = joint.velocity_start(), joint.num_velocities()
         v[start : start + count] = states.velocity[name][k] if name in states.velocity else 0.0
         if name in states.angle:
-            q[joint.position_start()] = states.angle[name][k]
+            q[joint.position_start()] += states.angle[name][k]  # an MJCF describes the default pose
         elif name in states.rotation and count == 3:
             R = states.rotation[name][k]
             q[joint.position_start() : joint.position_start() + 3] = RollPitchYaw(RotationMatrix(R)).vector()
@@ -138,9 +140,7 @@ def _central(inertia: Any) -> Array:
     return np.asarray(about_origin - inertia.get_mass() * (c @ c * np.eye(3) - np.outer(c, c)))
 
 
-def _coupled(request: Request) -> tuple[str, ...]:
-    """Joints that the discrete plant holds to others."""
+def _coupled(request: Request, plant: Any) -> tuple[str, ...]:
+    """Joints that the plant holds to others."""
     mimics = request.robot.mimics
-    if mimics and _plant(request, _STEP).num_constraints() >= len(mimics):
-        return tuple(mimic.joint for mimic in mimics)
-    return ()
+    return tuple(mimic.joint for mimic in mimics) if plant.num_constraints() >= len(mimics) > 0 else ()
