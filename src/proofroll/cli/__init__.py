@@ -12,6 +12,7 @@ import typer
 
 import proofroll
 from proofroll.cli.bench import bench
+from proofroll.cli.check import check, robots
 from proofroll.cli.common import ENGINE, INTERRUPTED, OK, USAGE, complain
 from proofroll.cli.comparing import compare, regimes
 from proofroll.cli.drill import drill
@@ -31,7 +32,7 @@ app = typer.Typer(
     pretty_exceptions_enable=False,
     rich_markup_mode=None,
 )
-_STUDIES = (compare, report, onset, regimes, tradeoff, recommend, ladder, stability, figures)
+_STUDIES = (compare, report, onset, regimes, tradeoff, recommend, ladder, stability, figures, check, robots)
 for _command in (scenes, engines, run, *_STUDIES):
     app.command()(_command)
 app.add_typer(bench, name="bench")

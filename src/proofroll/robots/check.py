@@ -132,7 +132,7 @@ def _row(
 ) -> dict[str, Any]:
     """One engine."""
     row: dict[str, Any] = {"engine": str(spec), "version": None, "status": "refused", "refused": None, "says": ""}
-    row |= {"remarks": [], "layers": {}, "causes": [], "unexplained": None}
+    row |= {"remarks": [], "layers": {}, "causes": [], "unexplained": None, "offending": []}
     try:
         with Worker() as worker:
             answer = reading.ask(worker, spec.name, request, folder, limit)

@@ -20,6 +20,7 @@ class Cause:
     """A cause with its proof.
 
     Attributes:
+        id: module of the hypothesis.
         name: what the engine does.
         layer: the first at which it shows.
         before, after: difference at that layer without and with the hypothesis.
@@ -27,6 +28,7 @@ class Cause:
         known: engines and versions in which it was seen.
     """
 
+    id: str
     name: str
     layer: str
     before: float
@@ -89,7 +91,8 @@ class _Trial:
         if layer not in found:
             return None
         known = ", ".join(f"{name} {versions}".strip() for name, versions in hypothesis.known.items())
-        cause = Cause(hypothesis.name, layer, step.found[layer], found[layer], hypothesis.remedy, known)
+        before, after = step.found[layer], found[layer]
+        cause = Cause(hypothesis.id, hypothesis.name, layer, before, after, hypothesis.remedy, known)
         return _Step(truth, found, (*step.causes, cause))
 
 
@@ -106,7 +109,7 @@ def _closed(
     while step.found[layer] > limit:
         candidates: list[_Step] = []
         for hypothesis in ranked:
-            if hypothesis.name in {cause.name for cause in step.causes}:
+            if hypothesis.id in {cause.id for cause in step.causes}:
                 continue
             if engine not in hypothesis.known and any(item.found[layer] <= limit for item in candidates):
                 break  # one that is known of this engine closes the layer

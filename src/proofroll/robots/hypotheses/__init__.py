@@ -41,16 +41,20 @@ class Hypothesis:
         known: engine -> versions in which it was seen; those are tried first.
         remedy: what a user does about it.
         change: the robot that the engine would hold; None, or the same robot: the file gives no occasion for it.
+        id: name of the module.
     """
 
     name: str
     known: Mapping[str, str]
     remedy: str
     change: Callable[[Evidence], Robot | None]
+    id: str = ""
 
 
 @functools.cache
 def hypotheses() -> tuple[Hypothesis, ...]:
     """All causes: what the modules of this package call ``HYPOTHESIS``."""
-    modules = sorted(module.name for module in pkgutil.iter_modules(__path__))
-    return tuple(importlib.import_module(f"{__name__}.{name}").HYPOTHESIS for name in modules)
+    names = sorted(module.name for module in pkgutil.iter_modules(__path__))
+    return tuple(
+        dataclasses.replace(importlib.import_module(f"{__name__}.{name}").HYPOTHESIS, id=name) for name in names
+    )
