@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import contextlib
 import dataclasses
 import os
 import tempfile
@@ -9,6 +10,7 @@ from collections.abc import Callable, Sequence
 from concurrent.futures import ThreadPoolExecutor
 from pathlib import Path
 from typing import Any
+from xml.etree.ElementTree import Element, tostring
 
 import numpy as np
 
@@ -19,7 +21,7 @@ from proofroll.robots import reading
 from proofroll.robots.explain import explain
 from proofroll.robots.layers import TOLERANCE, LAYERS, Truth, differences
 from proofroll.robots.lint import lint
-from proofroll.robots.model import Robot
+from proofroll.robots.model import Array, Robot
 from proofroll.robots.protocol import Request
 from proofroll.robots.robot_file import RobotFile, open_robot
 from proofroll.robots.states import States, random_states
@@ -131,38 +133,79 @@ def _row(
     file: RobotFile, truth: Truth, bar: float, request: Request, spec: EngineSpec, folder: Path, limit: float, asked: bool
 ) -> dict[str, Any]:
     """One engine."""
-    row: dict[str, Any] = {"engine": str(spec), "version": None, "status": "refused", "refused": None, "says": ""}
-    row |= {"remarks": [], "layers": {}, "causes": [], "unexplained": None, "offending": []}
     try:
         with Worker() as worker:
             answer = reading.ask(worker, spec.name, request, folder, limit)
     except Missing as error:
         if asked:
             raise
-        return row | {"status": "missing", "refused": str(error)}
+        return _unread(spec, "missing", str(error))
     except WorkerDied as error:
-        return row | {"status": str(error.status), "refused": str(error)}
-    row |= {"version": answer.version, "says": answer.says}
+        return _unread(spec, str(error.status), str(error))
+    return judged(file, truth, bar, spec, answer, dict(request.torques))
+
+
+def _unread(spec: EngineSpec, status: str, why: str) -> dict[str, Any]:
+    """The row of an engine that holds nothing."""
+    row: dict[str, Any] = {"engine": str(spec), "version": None, "status": status, "refused": why, "says": ""}
+    return row | {"remarks": [], "layers": {}, "causes": [], "unexplained": None, "offending": []}
+
+
+def judged(
+    file: RobotFile, truth: Truth, bar: float, spec: EngineSpec, answer: reading.Answer, torques: dict[str, Array]
+) -> dict[str, Any]:
+    """The row of an engine that answered.
+
+    Args:
+        file: what was read.
+        truth: what it means.
+        bar: how far the two formulations of the truth differ.
+        spec: the engine as the user wrote it.
+        answer: what it holds, or why it refused.
+        torques: by joint, that the forward dynamics were asked for.
+    """
+    row = _unread(spec, "refused", answer.refused) | {"version": answer.version, "says": answer.says}
     if answer.reading is None:
-        return row | {"refused": answer.refused}
+        return row
     tolerances = {layer: max(answer.tolerances.get(layer, TOLERANCE), _MARGIN * bar) for layer in LAYERS}
     tolerances["joints"] = 0.0
-    found = differences(truth, request.torques, answer.reading)  # type: ignore[arg-type]
+    found = differences(truth, torques, answer.reading)
     layers = {
         layer: {"difference": value, "tolerance": tolerances[layer], "holds": bool(value <= tolerances[layer])}
         for layer, value in found.items()
     }
-    causes, unexplained = explain(file, truth, request.torques, answer.reading, spec.name, tolerances)  # type: ignore[arg-type]
+    recompiled = _Recompiler(file)
+    causes, unexplained = explain(file, truth, torques, answer.reading, spec.name, tolerances, recompiled)
     holds = all(item["holds"] for item in layers.values())
-    status = "holds" if holds else ("differs" if unexplained else "explained")
     return row | {
-        "status": status,
+        "status": "holds" if holds else ("differs" if unexplained else "explained"),
+        "refused": None,
         "remarks": list(answer.reading.remarks),
         "layers": layers,
         "causes": [dataclasses.asdict(cause) for cause in causes],
         "unexplained": unexplained,
         "offending": _offending(truth, answer.reading),
     }
+
+
+class _Recompiler:
+    """What a changed file would mean; None: nothing, or the format is read by us. Each is compiled once."""
+
+    def __init__(self, file: RobotFile) -> None:
+        self._file = file
+        self._known: dict[bytes, Robot | None] = {}
+
+    def __call__(self, root: Element) -> Robot | None:
+        text = tostring(root)
+        if text not in self._known:
+            self._known[text] = None if self._file.kind == "urdf" else self._compiled(root)
+        return self._known[text]
+
+    def _compiled(self, root: Element) -> Robot | None:
+        changed = dataclasses.replace(self._file, root=root)
+        with tempfile.TemporaryDirectory() as name, contextlib.suppress(InputError):
+            return _meaning(changed, reading.write(changed, Path(name)), TIME_LIMIT)[0]
+        return None
 
 
 def _offending(truth: Truth, held: Any) -> list[str]:

@@ -4,10 +4,11 @@ from __future__ import annotations
 
 import dataclasses
 from collections.abc import Callable, Mapping
+from xml.etree.ElementTree import Element
 
 from proofroll.robots.hypotheses import Evidence, Hypothesis, hypotheses
 from proofroll.robots.layers import LAYERS, Truth, differences, first_failing
-from proofroll.robots.model import Array
+from proofroll.robots.model import Array, Robot
 from proofroll.robots.protocol import Reading
 from proofroll.robots.robot_file import RobotFile
 
@@ -53,6 +54,7 @@ def explain(
     reading: Reading,
     engine: str,
     tolerances: dict[str, float],
+    recompiled: Callable[[Element], Robot | None] = lambda _: None,
 ) -> tuple[tuple[Cause, ...], str | None]:
     """The causes of all differences, and the first layer that they leave unexplained.
 
@@ -63,11 +65,12 @@ def explain(
         reading: what the engine holds.
         engine: its name.
         tolerances: layer -> difference up to which it holds.
+        recompiled: see :class:`proofroll.robots.hypotheses.Evidence`.
     """
     step = _Step(truth, differences(truth, torques, reading))
     ranked = sorted(hypotheses(), key=lambda item: engine not in item.known)
     while (layer := first_failing(step.found, tolerances)) is not None:
-        closed = _closed(step, layer, ranked, engine, tolerances, _Trial(file, torques, reading))
+        closed = _closed(step, layer, ranked, engine, tolerances, _Trial(file, torques, reading, recompiled))
         if closed is None:
             return step.causes, layer
         step = closed
@@ -81,9 +84,10 @@ class _Trial:
     file: RobotFile
     torques: dict[str, Array]
     reading: Reading
+    recompiled: Callable[[Element], Robot | None]
 
     def __call__(self, step: _Step, hypothesis: Hypothesis, layer: str) -> _Step | None:
-        robot = hypothesis.change(Evidence(self.file, step.truth.robot, self.reading))
+        robot = hypothesis.change(Evidence(self.file, step.truth.robot, self.reading, self.recompiled))
         if robot is None or robot is step.truth.robot or not robot.moving:
             return None
         truth = Truth.of(robot, step.truth.states, like=step.truth)

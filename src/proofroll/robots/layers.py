@@ -17,7 +17,7 @@ LAYERS = {
     "joints": "joints that are absent, added, or follow no other although the file says so",
     "mass": "mass carried by all moving joints [relative]",
     "kinematics": "position and rotation of each body [m, 1]",
-    "bodies": "mass, centre of mass and inertia of what each joint carries [relative, m]",
+    "bodies": "mass, first moment and inertia of what each joint carries [relative, m]",
     "mass matrix": "M [relative]",
     "gravity": "torque of gravity [relative]",
     "bias": "torque of gravity and velocities [relative]",
@@ -126,7 +126,7 @@ def differences(truth: Truth, torques: dict[str, Array], reading: Reading) -> di
     found["kinematics"] = _kinematics(truth, reading, both)
     found["bodies"] = _largest(
         [abs(mass) / scales["mass"] for mass in masses]
-        + [_apart(reading.com[name], reading.mass[name], groups[name]) for name in both]
+        + [_apart(reading.com[name], reading.mass[name], groups[name], scales["mass"]) for name in both]
         + [np.abs(reading.inertia[name] - groups[name].inertia).max() / scales["bodies"] for name in both]
     )
     M = G.T @ d.M @ G
@@ -179,9 +179,9 @@ def _kinematics(truth: Truth, reading: Reading, joints: list[str]) -> float:
     return _largest(off)
 
 
-def _apart(com: Array, mass: float, group: Body) -> float:
-    """Distance of two centres of mass; 0 where one has no mass to be the centre of."""
-    return float(np.abs(com - group.com).max()) if group.mass > 0 < mass else 0.0
+def _apart(com: Array, mass: float, group: Body, whole: float) -> float:
+    """Difference of two first moments of mass over the whole mass: without mass there is no centre to compare [m]."""
+    return float(np.abs(mass * com - group.mass * group.com).max()) / whole
 
 
 def _off(found: Array, true: Array, scale: float) -> float:

@@ -43,7 +43,17 @@ def robot_of(model: Any) -> Robot:
                 bodies[child] = Body(child, 0.0, np.zeros(3), np.zeros((3, 3)))
             joints.append(_joint(model, joint, parent, child, position, rotation, joint in driven))
             parent, position, rotation = child, np.zeros(3), np.eye(3)
-    return Robot("robot", bodies, tuple(joints), _mimics(model), np.array(model.opt.gravity))
+    return Robot("robot", bodies, tuple(joints), _mimics(model), np.array(model.opt.gravity), _shapes(model, names))
+
+
+def _shapes(model: Any, names: list[str]) -> dict[str, dict[str, list[bool]]]:
+    """Body -> whether each of its shapes, in the order of the file, collides with anything."""
+    found: dict[str, dict[str, list[bool]]] = {name: {"collides": []} for name in names[1:]}
+    for index in range(model.ngeom):
+        name = names[int(model.geom_bodyid[index])]
+        if name in found:
+            found[name]["collides"].append(bool(model.geom_contype[index] or model.geom_conaffinity[index]))
+    return found
 
 
 def _joint(model: Any, index: int, parent: str, child: str, position: Array, rotation: Array, driven: bool) -> Joint:

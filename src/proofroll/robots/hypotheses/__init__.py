@@ -11,6 +11,7 @@ import functools
 import importlib
 import pkgutil
 from collections.abc import Callable, Mapping
+from xml.etree.ElementTree import Element
 
 from proofroll.robots.model import Robot
 from proofroll.robots.protocol import Reading
@@ -25,11 +26,13 @@ class Evidence:
         file: the file.
         robot: what the file describes, with the causes found so far.
         reading: what the engine holds.
+        recompiled: what a changed file would mean, for a format that an engine defines; None where that has no meaning.
     """
 
     file: RobotFile
     robot: Robot
     reading: Reading
+    recompiled: Callable[[Element], Robot | None] = lambda _: None
 
 
 @dataclasses.dataclass(frozen=True)

@@ -10,7 +10,7 @@ from proofroll.robots.model import Body, Robot
 
 def _change(evidence: Evidence) -> Robot | None:
     robot = evidence.robot
-    bare = [name for name, source in robot.sources.items() if name in robot.bodies and not source["inertial"]]
+    bare = [name for name, source in robot.sources.items() if name in robot.bodies and not source.get("inertial", True)]
     if not bare:
         return None
     return robot.with_bodies(Body(name, 1.0, np.zeros(3), np.eye(3)) for name in bare)

@@ -1,0 +1,227 @@
+"""Files in which one thing is planted that an engine treats otherwise: it is found, and named."""
+
+from __future__ import annotations
+
+import dataclasses
+import re
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+from robot_templates import inertial, mjcf, urdf
+
+from proofroll.process import Worker
+from proofroll.registry import parse_engine
+from proofroll.robots import reading
+from proofroll.robots.check import judged
+from proofroll.robots.layers import Truth
+from proofroll.robots.model import Robot
+from proofroll.robots.protocol import Reading, Request
+from proofroll.robots.robot_file import RobotFile, open_robot
+from proofroll.robots.states import random_states
+from proofroll.robots.two_formulations import body_recursion, passive, poses
+from proofroll.robots.urdf import BASE_JOINT, read_urdf
+
+Workers = Callable[[str], Worker]
+DAMPED, RUBBING = '<dynamics damping="0.7"/>', '<dynamics friction="0.4"/>'
+BOTH = '<dynamics damping="0.7" friction="0.4"/>'
+FOLLOWS = '<mimic joint="j1" multiplier="0.5" offset="0.1"/>'
+FOLLOWING = urdf(kinds=("revolute", "prismatic", "revolute"), third=FOLLOWS + '<limit lower="-2" upper="2" effort="1" velocity="1"/>')
+BOX = '<collision><geometry><box size="0.1 0.2 0.3"/></geometry></collision>'
+FLAT = inertial(ixx="0.01", iyy="0.01", izz="0.9")
+TINY = inertial(mass="1e-9", ixx="1e-12", iyy="1e-12", izz="1e-12", ixy="0").replace("0.002", "0").replace("-0.001", "0")
+TWO = '<joint name="k2" axis="1 0 0" pos="0.02 0 0.1"/><joint name="k3" axis="0 1 0" pos="0 0.05 0"/>'
+OTHER = '<body name="other" pos="1 0 0"><joint name="far" type="slide" axis="0 0 1"/><geom size="0.1"/></body>'
+HIDDEN = 'contype="0" conaffinity="0"'
+
+# What a file holds, the engine that reads it, and the causes that must be named.
+REAL: list[tuple[str, str, str, set[str]]] = [
+    *[(f"plain arm in {name}", urdf(), name, set()) for name in ("mujoco", "pinocchio", "exudyn")],
+    *[(f"plain MJCF in {name}", mjcf(), name, set()) for name in ("mujoco", "pinocchio", "exudyn")],
+    ("tool with inertia", urdf(tool=inertial(mass="0.7")), "mujoco", set()),
+    ("inertial turned", urdf(tip=inertial(rpy="0.3 0.2 1.1")), "mujoco", set()),
+    ("inertial turned", urdf(tip=inertial(rpy="0.3 0.2 1.1")), "pinocchio", set()),
+    ("axis not unit", urdf().replace('xyz="0 0.6 0.8"', 'xyz="0 3 4"'), "mujoco", set()),
+    ("axis not unit", urdf().replace('xyz="0 0.6 0.8"', 'xyz="0 3 4"'), "pinocchio", set()),
+    ("damping", urdf(first=DAMPED), "pinocchio", {"damping_left_out"}),
+    ("damping", urdf(first=DAMPED), "mujoco", set()),
+    ("damping", urdf(first=DAMPED), "exudyn", set()),
+    ("friction", urdf(second=RUBBING), "pinocchio", {"friction_left_out"}),
+    ("friction", urdf(second=RUBBING), "mujoco", {"friction_left_out"}),
+    ("friction", urdf(second=RUBBING), "exudyn", {"friction_left_out"}),
+    ("damping and friction", urdf(third=BOTH), "pinocchio", {"damping_left_out", "friction_left_out"}),
+    ("mimic", FOLLOWING, "pinocchio", {"mimic_ignored"}),
+    ("mimic", FOLLOWING, "mujoco", set()),
+    ("mimic, reduced", FOLLOWING, "pinocchio[mimic=true]", set()),
+    ("shape without inertial", urdf(tool=BOX), "mujoco", {"shapes_weighed"}),
+    ("shape without inertial", urdf(tool=BOX), "pinocchio", set()),
+    ("impossible inertia", urdf(tip=FLAT), "mujoco[balanceinertia=true]", {"inertia_balanced"}),
+    ("impossible inertia", urdf(tip=FLAT), "pinocchio", set()),
+    ("tiny tip", urdf(tip=TINY), "mujoco[boundmass=true]", {"mass_bounded"}),
+    ("armature", mjcf(joint='armature="0.2"'), "exudyn", {"armature_left_out"}),
+    ("armature", mjcf(joint='armature="0.2"'), "pinocchio", set()),
+    ("spring", mjcf(joint='stiffness="3" springref="20"'), "pinocchio", {"springs_left_out"}),
+    ("spring", mjcf(joint='stiffness="3" springref="20"'), "mujoco", set()),
+    ("total mass", mjcf(compiler='settotalmass="7"'), "pinocchio", {"total_mass_ignored"}),
+    ("gravity", mjcf(option='gravity="0 1 -3"'), "pinocchio", {"default_gravity"}),
+    ("two trees", mjcf(extra=OTHER), "pinocchio", {"first_tree_only"}),
+    ("hidden shape", mjcf(shape=HIDDEN), "pinocchio", {"noncolliding_shapes_weightless"}),
+    ("two joints", mjcf(second=TWO), "pinocchio", set()),
+    ("two joints", mjcf(second=TWO), "mujoco", set()),
+    ("free body", mjcf(extra='<body name="loose"><freejoint/><geom size="0.1 0.2 0.3" type="box"/></body>'), "mujoco", set()),
+]  # fmt: skip
+
+
+def _examined(path: Path, base: str) -> tuple[RobotFile, Robot | None]:
+    file = open_robot(path, base)
+    return file, read_urdf(file) if file.kind == "urdf" else None
+
+
+def _request(written: Path, file: RobotFile, truth: Truth, options: dict[str, bool]) -> Request:
+    robot = truth.robot
+    children = {joint.name: joint.child for joint in robot.moving}
+    return Request(
+        written, file.kind, file.base, BASE_JOINT, options, children, truth.states, truth.torques(), robot.gravity, robot
+    )  # fmt: skip
+
+
+@pytest.mark.parametrize("base", ["fixed", "free"])
+@pytest.mark.parametrize(("what", "text", "engine", "expected"), REAL, ids=[f"{row[0]}-{row[2]}" for row in REAL])
+def test_real_engines(
+    what: str, text: str, engine: str, expected: set[str], base: str, robot_workers: Workers, tmp_path: Path
+) -> None:
+    """An installed engine's own importer holds the file, or every difference is named with a proof."""
+    kind = "urdf" if text.startswith("<robot") else "mjcf"
+    if kind == "mjcf" and base == "free":
+        pytest.skip("an MJCF says its base itself")
+    spec = parse_engine(engine)
+    pytest.importorskip({"mujoco": "mujoco", "pinocchio": "pinocchio", "exudyn": "exudyn"}[spec.name])
+    path = tmp_path / f"robot.{'urdf' if kind == 'urdf' else 'xml'}"
+    path.write_text(text)
+    file, robot = _examined(path, base)
+    place = tmp_path / "given"
+    place.mkdir()
+    written = reading.write(file, place)
+    if robot is None:
+        robot, _ = reading.compiled(robot_workers("mujoco"), file, written, 60)
+    truth = Truth.of(robot, random_states(robot, 5, 1))
+    request = _request(written, file, truth, reading.options_of(spec.options, spec.name))
+    answer = reading.ask(robot_workers(spec.name), spec.name, request, place, 60)
+    row = judged(file, truth, 1e-14, spec, answer, truth.torques())
+    assert row["refused"] is None
+    assert row["unexplained"] is None, row["layers"]
+    assert {cause["id"] for cause in row["causes"]} == expected
+    assert row["status"] == ("explained" if expected else "holds")
+    for cause in row["causes"]:
+        assert cause["after"] < cause["before"]
+
+
+def _defect(pattern: str, instead: str) -> Callable[[str], str]:
+    """A change of the text of a file."""
+
+    def change(text: str) -> str:
+        changed = re.sub(pattern, instead, text, flags=re.DOTALL)
+        assert changed != text
+        return changed
+
+    return change
+
+
+_ZERO = _defect(re.escape(FLAT), re.sub(r'(ixx|iyy|izz|ixy|ixz|iyz)="[^"]*"', r'\1="0"', FLAT))
+_RADIUS = (3 * 1.3 / 4000 / np.pi) ** (1 / 3)
+_WATER = 0.4 * 1.3 * _RADIUS**2
+_SPHERE = re.sub(r'(ixy|ixz|iyz)="[^"]*"', r'\1="0"', re.sub(r'(ixx|iyy|izz)="[^"]*"', rf'\1="{_WATER!r}"', FLAT))
+_ONE = inertial(mass="1", com="0 0 0", ixx="1", iyy="1", izz="1", ixy="0").replace("0.002", "0").replace("-0.001", "0")
+_EMPTY = '<link name="tool"></link>'
+
+# What an engine that is not installed here does, as a change of the file: planted in our own second formulation.
+SIMULATED: list[tuple[str, str, Callable[[str], str], set[str]]] = [
+    ("unit mass", urdf(), _defect(_EMPTY, f'<link name="tool">{_ONE}</link>'), {"unit_mass_without_inertial"}),
+    ("rpy ignored", urdf(tip=inertial(rpy="0.3 0.2 1.1")), _defect("0.3 0.2 1.1", "0 0 0"), {"inertial_rotation_ignored"}),
+    ("water sphere", urdf(tip=FLAT), _defect(re.escape(FLAT), _SPHERE), {"water_sphere"}),
+    ("zeroed", urdf(tip=FLAT), _ZERO, {"impossible_inertia_zeroed"}),
+    ("two causes", urdf(tip=FLAT, first=DAMPED), lambda text: _ZERO(text).replace(DAMPED, ""),
+     {"impossible_inertia_zeroed", "damping_left_out"}),
+    ("nothing", urdf(third=BOTH, tip=FLAT), lambda text: text, set()),
+]  # fmt: skip
+# What no hypothesis knows must be found, and not be named.
+UNKNOWN: list[tuple[str, Callable[[str], str], str]] = [
+    ("mass", _defect('mass value="2.1"', 'mass value="2.10001"'), "mass"),
+    ("centre of mass", _defect("0 0.1 0.03", "0 0.1 0.03001"), "bodies"),
+    ("inertia", _defect('izz="0.05"', 'izz="0.0500001"'), "bodies"),
+    ("joint's place", _defect("0 0.2 0.3", "0 0.2 0.3000001"), "kinematics"),
+    ("axis", _defect("0 -0.8 0.6", "0 -0.6 0.8"), "kinematics"),
+    ("damping", _defect('damping="0.7"', 'damping="0.71"'), "forward dynamics"),
+]
+
+
+def _held(robot: Robot, truth: Truth) -> Reading:
+    """What an engine would say that holds this robot and evaluates it by the second formulation."""
+    states = truth.states
+    d, placed = body_recursion(robot, states), poses(robot, states)
+    asked = states.stacked(states.acceleration, robot)
+    torque = np.concatenate([truth.torques()[joint.name] for joint in robot.moving], axis=1)
+    forward = np.linalg.solve(d.M, (torque - d.h - passive(robot, states))[..., None])[..., 0]
+    groups = robot.groups
+    return Reading(
+        tuple(groups),
+        tuple(joint.dofs for joint in robot.moving),
+        {name: body.mass for name, body in groups.items()},
+        {name: body.com for name, body in groups.items()},
+        {name: body.inertia for name, body in groups.items()},
+        {joint.name: placed[joint.child][0] for joint in robot.moving},
+        {joint.name: placed[joint.child][1] for joint in robot.moving},
+        d.M,
+        d.g,
+        d.h,
+        np.einsum("sij,sj->si", d.M, asked) + d.h,
+        forward,
+    )
+
+
+def _row(text: str, change: Callable[[str], str], base: str, folder: Path) -> dict[str, Any]:
+    files = []
+    for name, content in (("true", text), ("held", change(text))):
+        path = folder / f"{name}.urdf"
+        path.write_text(content)
+        files.append(open_robot(path, base))
+    robot, held = (read_urdf(file) for file in files)
+    truth = Truth.of(robot, random_states(robot, 5, 1))
+    answer = reading.Answer("1", "", {}, _held(held, truth), "")
+    return judged(files[0], truth, 1e-14, parse_engine("planted"), answer, truth.torques())
+
+
+@pytest.mark.parametrize("base", ["fixed", "free"])
+@pytest.mark.parametrize(("what", "text", "change", "expected"), SIMULATED, ids=[row[0] for row in SIMULATED])
+def test_planted_causes(
+    what: str, text: str, change: Callable[[str], str], expected: set[str], base: str, tmp_path: Path
+) -> None:
+    """A known cause that is planted is named, whatever the engine is called, and nothing else is."""
+    row = _row(text, change, base, tmp_path)
+    assert {cause["id"] for cause in row["causes"]} == expected
+    assert row["unexplained"] is None
+    assert row["status"] == ("explained" if expected else "holds")
+
+
+@pytest.mark.parametrize(("what", "change", "layer"), UNKNOWN, ids=[row[0] for row in UNKNOWN])
+def test_unknown_causes(what: str, change: Callable[[str], str], layer: str, tmp_path: Path) -> None:
+    """A difference that no hypothesis knows is found at its layer and called unexplained."""
+    row = _row(urdf(tip=FLAT, first=BOTH, third=DAMPED), change, "fixed", tmp_path)
+    assert row["status"] == "differs"
+    assert row["unexplained"] == layer
+    assert row["causes"] == []
+
+
+def test_free_base_that_was_fixed(tmp_path: Path) -> None:
+    """An engine that fixes a free base without mass is found out by its missing joint."""
+    path = tmp_path / "robot.urdf"
+    path.write_text(urdf().replace(inertial(mass="4"), ""))
+    free, fixed = open_robot(path, "free"), open_robot(path, "fixed")
+    robot, held = read_urdf(free), read_urdf(fixed)
+    truth = Truth.of(robot, random_states(robot, 5, 1))
+    answer = reading.Answer("1", "", {}, dataclasses.replace(_held(held, truth)), "")
+    row = judged(free, truth, 1e-14, parse_engine("planted"), answer, truth.torques())
+    assert [cause["id"] for cause in row["causes"]] == ["free_base_is_fixed"]
+    assert row["status"] == "explained"
