@@ -15,14 +15,15 @@ Install = Callable[[Mapping[str, str]], None]
 
 def test_json(proofroll: Proofroll, arm: Path) -> None:
     """The JSON has the file, its kind and findings, and for every engine version, layers and causes."""
-    code, out, _ = proofroll("check", str(arm), "--states", "3", "--json")
+    names = ("mujoco", "pinocchio", "exudyn")
+    asked = [word for name in names for word in ("--engine", name)]
+    code, out, _ = proofroll("check", str(arm), *asked, "--states", "3", "--json")
     content = json.loads(out)
     assert code == 0
     assert content["kind"] == "urdf"
     assert content["truth"]["difference"] < 1e-14
     engines = {row["engine"]: row for row in content["engines"]}
-    assert {"mujoco", "pinocchio", "exudyn"} <= engines.keys()
-    for name in ("mujoco", "pinocchio", "exudyn"):
+    for name in names:
         row = engines[name]
         assert row["version"]
         assert row["refused"] is None
@@ -59,14 +60,13 @@ def test_page_escapes(proofroll: Proofroll, tmp_path: Path) -> None:
     assert "<script" not in page
     assert evil in page
     assert 'class="revolute wrong"' in page
-    assert "http" not in page
+    assert "//" not in page
 
 
 @pytest.mark.parametrize(
     ("reader", "status", "said"),
     [
         ("Crashing", "crashed", "SIGABRT"),
-        ("Hanging", "timeout", "no result within 3 s"),
         ("Raising", "refused", "RuntimeError: cannot <b>read</b> [bold]this[/bold]"),
         ("Broken", "crashed", "the reader of bad failed"),
     ],
@@ -74,15 +74,25 @@ def test_page_escapes(proofroll: Proofroll, tmp_path: Path) -> None:
 def test_bad_readers(
     proofroll: Proofroll, install_readers: Install, arm: Path, reader: str, status: str, said: str
 ) -> None:
-    """An importer that crashes, hangs, raises or is mistaken is a row beside the others."""
+    """An importer that crashes, raises or is mistaken is a row beside the others."""
     install_readers({"bad": reader})
-    arguments = ("check", str(arm), "--engine", "bad", "--engine", "pinocchio", "--states", "2", "--time-limit", "3")
+    arguments = ("check", str(arm), "--engine", "bad", "--engine", "pinocchio", "--states", "2")
     code, out, _ = proofroll(*arguments, "--json")
     bad, good = json.loads(out)["engines"]
     assert code == 1
     assert bad["status"] == status
     assert said in bad["refused"]
     assert good["status"] == "holds"
+
+
+def test_a_reader_that_hangs(proofroll: Proofroll, install_readers: Install, arm: Path) -> None:
+    """An importer that never answers is a row after the time limit."""
+    install_readers({"bad": "Hanging"})
+    code, out, _ = proofroll("check", str(arm), "--engine", "bad", "--time-limit", "1", "--json")
+    (row,) = json.loads(out)["engines"]
+    assert code == 1
+    assert row["status"] == "timeout"
+    assert "no result within 1 s" in row["refused"]
 
 
 @pytest.mark.parametrize(

@@ -108,3 +108,24 @@ def wrapped(text: str) -> list[str]:
 def one_line(text: str) -> str:
     """Text from a file without control characters."""
     return " ".join("".join(c if c.isprintable() else " " for c in text).split())
+
+
+def gallery_lines(content: dict[str, Any]) -> Iterator[str]:
+    """A line or more for each robot: what every engine does, and what was not expected."""
+    for row in content["robots"]:
+        if row["file"] is None:
+            yield from wrapped(f"{row['name']}: its package is not installed: pip install 'proofroll[robots]'")
+            continue
+        does = (f"{item['engine']}: {', '.join(item['does']) or 'holds'}" for item in row["engines"])
+        yield from wrapped(f"{row['name']}: {'; '.join(does)}")
+        for sentence in row["unexpected"]:
+            yield from wrapped(f"!! {row['name']}: {sentence}")
+    unexpected = sum(len(row["unexpected"]) for row in content["robots"])
+    checked = [item for row in content["robots"] for item in row["engines"]]
+    named = sum(bool(item["causes"]) for item in checked)
+    unnamed = sum("open" in item["does"] for item in checked)
+    refused = sum(item["status"] == "refused" for item in checked)
+    yield from wrapped(
+        f"{len(content['robots'])} robots, {len(checked)} readings: {named} differ for named causes, {unnamed} have an "
+        f"open one, {refused} refused; {unexpected} otherwise than expected."
+    )

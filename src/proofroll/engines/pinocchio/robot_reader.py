@@ -26,13 +26,14 @@ class PinocchioRobots:
         return importlib.metadata.version("pin")
 
     def read(self, request: Request) -> Reading:
-        """The model, evaluated by crba, nonLinearEffects, rnea and aba."""
+        """The model, evaluated by crba, rnea and aba."""
         import pinocchio as pin
 
         model = _build(request)
         if request.kind == "urdf":
             model.gravity.linear = request.gravity
         data = model.createData()
+        reduced = request.options.get("mimic", False)
         columns = _columns(request, model)
         joints = tuple(name for name, _, _ in columns)
         dofs = tuple(dof for _, _, dof in columns)
@@ -48,13 +49,16 @@ class PinocchioRobots:
                 frames[name].append((data.oMi[index] if frame is None else data.oMf[frame]).copy())
             M = np.triu(pin.crba(model, data, q))
             M = M + np.triu(M, 1).T
-            return AtState(
-                T, drift, M,
-                np.array(pin.computeGeneralizedGravity(model, data, q)),
-                np.array(pin.nonLinearEffects(model, data, q, v)),
-                lambda a: np.array(pin.rnea(model, data, q, v, a)),
-                lambda tau: np.array(pin.aba(model, data, q, v, tau)),
-            )  # fmt: skip
+            still = np.zeros(model.nv)
+            g, h = (np.array(pin.rnea(model, data, q, rate, still)) for rate in (still, v))
+
+            def inverse(acceleration: Array) -> Array:
+                return np.array(pin.rnea(model, data, q, v, acceleration))
+
+            def forward(torque: Array) -> Array:
+                return np.array(pin.aba(model, data, q, v, torque))
+
+            return AtState(T, drift, M, g, h, inverse, None if reduced else forward)  # aba knows no following joints
 
         arrays = evaluate(request, joints, dofs, at)
         mass, com, inertia = {}, {}, {}
@@ -64,7 +68,6 @@ class PinocchioRobots:
             if frame is not None:
                 placed = model.frames[frame].placement.actInv(placed)
             mass[name], com[name], inertia[name] = float(placed.mass), np.array(placed.lever), np.array(placed.inertia)
-        reduced = request.options.get("mimic", False)
         return Reading(
             joints, dofs, mass, com, inertia,
             {name: np.array([X.translation for X in found]) for name, found in frames.items()},
