@@ -20,7 +20,7 @@ class Raising:
         """A version."""
         return "9.9"
 
-    def read(self, request: Any) -> Any:
+    def read(self, _: Any) -> Any:
         """Raises, with markup and line breaks in its words."""
         raise RuntimeError("cannot <b>read</b>\n[bold]this[/bold]")
 
@@ -28,7 +28,7 @@ class Raising:
 class Crashing(Raising):
     """Ends its process."""
 
-    def read(self, request: Any) -> Any:
+    def read(self, _: Any) -> Any:
         """Aborts."""
         os.abort()
 
@@ -36,7 +36,7 @@ class Crashing(Raising):
 class Hanging(Raising):
     """Never answers."""
 
-    def read(self, request: Any) -> Any:
+    def read(self, _: Any) -> Any:
         """Sleeps."""
         time.sleep(1000)
 
@@ -44,6 +44,6 @@ class Hanging(Raising):
 class Broken(Raising):
     """Has a mistake of its own."""
 
-    def read(self, request: Any) -> Any:
+    def read(self, _: Any) -> Any:
         """Asks for what is not there."""
-        return request.nothing_of_that_name
+        return self.nothing_of_that_name

@@ -15,6 +15,12 @@ def inertial(**changes: str) -> str:
     return _INERTIAL.format(**values)
 
 
+def spherical(mass: str, moment: str, com: str = "0.1 0.02 -0.05") -> str:
+    """An inertial element with three equal moments."""
+    plain = inertial(mass=mass, com=com, ixx=moment, iyy=moment, izz=moment, ixy="0")
+    return plain.replace('ixz="0.002" iyz="-0.001"', 'ixz="0" iyz="0"')
+
+
 def urdf(
     *,
     tip: str | None = None,
@@ -30,7 +36,9 @@ def urdf(
     Args:
         tip: inertial of the tip; None: an ordinary one.
         tool: content of the tool's link.
-        first, second, third: put into the joints.
+        first: put into the first joint.
+        second: put into the second joint.
+        third: put into the third joint.
         kinds: of the joints.
         extra: put into the robot.
     """
@@ -66,7 +74,8 @@ def mjcf(
     """An MJCF: an arm of two bodies with shapes.
 
     Args:
-        compiler, option: attributes of these elements.
+        compiler: attributes of that element.
+        option: attributes of that element.
         joint: attributes of the first joint.
         second: joints of the second body.
         shape: attributes of the second body's shape.

@@ -16,8 +16,8 @@ BOMB = """<!DOCTYPE r [<!ENTITY a "aaaaaaaaaa"><!ENTITY b "&a;&a;&a;&a;&a;&a;&a;
 <!ENTITY c "&b;&b;&b;&b;&b;&b;&b;&b;&b;&b;">]><robot name="&c;"/>"""
 OUTSIDE = '<!DOCTYPE r [<!ENTITY x SYSTEM "file:///etc/hostname">]><robot name="&x;"><link name="a"/></robot>'
 LINKS = "".join(f'<link name="l{n}"/>' for n in range(100_000))
-LOOP = """<robot name="r"><link name="a"/><link name="b"/><joint name="i" type="fixed"><parent link="a"/><child link="b"/>
-</joint><joint name="j" type="fixed"><parent link="b"/><child link="a"/></joint></robot>"""
+LOOP = """<robot name="r"><link name="a"/><link name="b"/><joint name="i" type="fixed"><parent link="a"/>
+<child link="b"/></joint><joint name="j" type="fixed"><parent link="b"/><child link="a"/></joint></robot>"""
 ISLAND = LOOP.replace("</robot>", '<link name="c"/></robot>')
 
 HOSTILE = {
@@ -70,8 +70,7 @@ def test_one_line(name: str, tmp_path: Path) -> None:
     if text is not None:
         path.write_text(text)
     with pytest.raises(InputError, match=said) as caught:
-        file = open_robot(path)
-        read_urdf(file)
+        read_urdf(open_robot(path))
     assert "\n" not in str(caught.value)
 
 

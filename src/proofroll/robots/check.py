@@ -19,7 +19,7 @@ from proofroll.process import Worker, WorkerDied
 from proofroll.registry import EngineSpec, parse_engine
 from proofroll.robots import reading
 from proofroll.robots.explain import explain
-from proofroll.robots.layers import TOLERANCE, LAYERS, Truth, differences
+from proofroll.robots.layers import LAYERS, TOLERANCE, Truth, differences
 from proofroll.robots.lint import lint
 from proofroll.robots.model import Array, Robot
 from proofroll.robots.protocol import Request
@@ -63,7 +63,9 @@ def check(
     specs = [parse_engine(text) for text in engines or reading.reader_names()]
     for spec in specs:
         if spec.name not in reading.reader_names():
-            raise InputError("engine", spec.name, f"it reads no robot files; choose one of {', '.join(reading.reader_names())}")
+            raise InputError(
+                "engine", spec.name, f"it reads no robot files; choose one of {', '.join(reading.reader_names())}"
+            )
         reading.options_of(spec.options, spec.name)
     file = open_robot(path, base)
     with tempfile.TemporaryDirectory() as name:
@@ -83,7 +85,16 @@ def check(
             place = folder / str(item[0])
             place.mkdir()
             options = reading.options_of(item[1].options, item[1].name)
-            row = _row(file, truth, bar, dataclasses.replace(request, options=options), item[1], place, time_limit, bool(engines))
+            row = _row(
+                file,
+                truth,
+                bar,
+                dataclasses.replace(request, options=options),
+                item[1],
+                place,
+                time_limit,
+                bool(engines),
+            )
             if progress is not None:
                 progress(str(item[1]))
             return row
@@ -130,7 +141,14 @@ def _bar(truth: Truth) -> float:
 
 
 def _row(
-    file: RobotFile, truth: Truth, bar: float, request: Request, spec: EngineSpec, folder: Path, limit: float, asked: bool
+    file: RobotFile,
+    truth: Truth,
+    bar: float,
+    request: Request,
+    spec: EngineSpec,
+    folder: Path,
+    limit: float,
+    asked: bool,
 ) -> dict[str, Any]:
     """One engine."""
     try:
@@ -236,5 +254,7 @@ def _skeleton(truth: Truth) -> dict[str, Any]:
             {"name": joint.name, "kind": joint.kind, "parent": joint.parent, "child": joint.child}
             for joint in robot.joints
         ],
-        "bodies": {name: {"position": p[0].tolist(), "mass": robot.bodies[name].mass} for name, (p, _) in placed.items() if name in robot.bodies},
+        "bodies": {
+            name: {"position": placed[name][0][0].tolist(), "mass": body.mass} for name, body in robot.bodies.items()
+        },
     }  # fmt: skip

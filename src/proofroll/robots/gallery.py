@@ -1,4 +1,4 @@
-"""The robots of ``comparisons/robots.toml``, which lie in packages: what engines do with each against what is expected."""
+"""The robots of ``comparisons/robots.toml``, which lie in packages: what engines do with each, and were expected to."""
 
 from __future__ import annotations
 
@@ -102,7 +102,12 @@ def gallery(
 
 def _row(entry: Entry, engines: Sequence[str]) -> dict[str, Any]:
     path = locate(entry)
-    row: dict[str, Any] = {"name": entry.name, "file": None if path is None else str(path), "engines": [], "unexpected": []}
+    row: dict[str, Any] = {
+        "name": entry.name,
+        "file": None if path is None else str(path),
+        "engines": [],
+        "unexpected": [],
+    }
     wanted = [name for name in entry.engines if parse_engine(name).name in reading.reader_names()]
     if engines:
         wanted = [name for name in wanted if name in engines or parse_engine(name).name in engines]
@@ -111,7 +116,9 @@ def _row(entry: Entry, engines: Sequence[str]) -> dict[str, Any]:
     found = check(path, wanted, base=entry.base)
     for item in found["engines"]:
         does = outcome(item)
-        row["engines"].append({key: item[key] for key in ("engine", "version", "status", "causes", "refused")} | {"does": does})
+        row["engines"].append(
+            {key: item[key] for key in ("engine", "version", "status", "causes", "refused")} | {"does": does}
+        )
         if item["status"] != "missing" and set(does) != set(entry.engines[item["engine"]]):
             expected = ", ".join(entry.engines[item["engine"]]) or "to hold the file"
             what = ", ".join(does) or "holds the file"

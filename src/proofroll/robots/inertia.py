@@ -15,7 +15,7 @@ _ROUNDING = 1e-9
 
 def moments(inertia: Array) -> Array:
     """Principal moments, smallest first, shape (3,)."""
-    return np.linalg.eigvalsh(inertia)
+    return np.asarray(np.linalg.eigvalsh(inertia), dtype=np.float64)
 
 
 def not_positive(inertia: Array) -> bool:

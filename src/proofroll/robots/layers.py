@@ -90,7 +90,7 @@ class Truth:
     def torque(self, acceleration: Array) -> Array:
         """What gives these accelerations, shape (states, n)."""
         d = self.dynamics
-        return np.einsum("sij,sj->si", d.M, acceleration) + d.h + self.passive
+        return np.asarray(np.einsum("sij,sj->si", d.M, acceleration)) + d.h + self.passive
 
     def torques(self) -> dict[str, Array]:
         """What gives the accelerations of the states, by joint."""

@@ -79,7 +79,13 @@ def _joints(robot: Robot) -> Iterator[Finding]:
             yield Finding("warning", "joints", f"{name} on {number} of {len(robot.moving)}: {what}")
     if robot.mimics:
         names = ", ".join(mimic.joint for mimic in robot.mimics[:3]) + (", …" if len(robot.mimics) > 3 else "")
-        yield Finding("warning", "joints", f"{len(robot.mimics)} follow another (mimic): {names}; engines differ in that")
+        yield Finding(
+            "warning", "joints", f"{len(robot.mimics)} follow another (mimic): {names}; engines differ in that"
+        )
+
+
+def _some(names: list[str]) -> str:
+    return ", ".join(names[:3]) + (", …" if len(names) > 3 else "")
 
 
 def _urdf(file: RobotFile, robot: Robot) -> Iterator[Finding]:
@@ -87,7 +93,9 @@ def _urdf(file: RobotFile, robot: Robot) -> Iterator[Finding]:
     carrying = [name for name in bare if robot.welded[name][0] in robot.columns]
     if carrying:
         names = ", ".join(carrying[:3]) + (", …" if len(carrying) > 3 else "")
-        yield Finding("warning", "links", f"{len(carrying)} without <inertial>: {names}; engines invent different masses")
+        yield Finding(
+            "warning", "links", f"{len(carrying)} without <inertial>: {names}; engines invent different masses"
+        )
     for name in (name for name in bare if robot.sources[name]["shapes"]):
         yield Finding("warning", f"link {name}", "a collision shape without <inertial>: MuJoCo weighs it at 1000 kg/m³")
     for name, source in robot.sources.items():

@@ -15,7 +15,19 @@ from proofroll.robots.safe_xml import MOST_ELEMENTS, read_xml
 # How deep files may include files.
 _DEEPEST = 8
 # Neither mass nor torque without contacts depends on these.
-_LOOKS = {"visual", "statistic", "size", "texture", "material", "skin", "hfield", "sensor", "keyframe", "contact", "custom"}
+_LOOKS = {
+    "visual",
+    "statistic",
+    "size",
+    "texture",
+    "material",
+    "skin",
+    "hfield",
+    "sensor",
+    "keyframe",
+    "contact",
+    "custom",
+}
 _UNCOVERED = {"extension", "deformable", "flexcomp", "composite", "replicate", "attach", "plugin"}
 
 
@@ -25,7 +37,7 @@ def stripped(root: Element, path: Path) -> tuple[Element, list[Finding]]:
     Raises:
         InputError: it includes a file outside its folder, or holds what the check does not cover.
     """
-    root, findings = copy.deepcopy(root), []
+    root = copy.deepcopy(root)
     root.tag = "mujoco"
     _include(root, path, path.resolve().parent, (path.resolve(),))
     for element in root.iter():
@@ -36,7 +48,7 @@ def stripped(root: Element, path: Path) -> tuple[Element, list[Finding]]:
             if child.tag in _LOOKS or child.get("hfield"):
                 parent.remove(child)
         parent.attrib.pop("material", None)
-    findings += _meshes(root, path.resolve().parent)
+    findings = list(_meshes(root, path.resolve().parent))
     _name(root)
     return root, findings
 
@@ -59,7 +71,9 @@ def _include(element: Element, path: Path, folder: Path, open_files: tuple[Path,
         for offset, part in enumerate(included):
             element.insert(index + offset, part)
         if sum(1 for _ in element.iter()) > MOST_ELEMENTS:
-            raise InputError("<include file>", child.get("file", ""), f"more than {MOST_ELEMENTS} elements are included")
+            raise InputError(
+                "<include file>", child.get("file", ""), f"more than {MOST_ELEMENTS} elements are included"
+            )
 
 
 def _inside(folder: Path, name: str) -> Path | None:
@@ -77,7 +91,11 @@ def _meshes(root: Element, folder: Path) -> Iterator[Finding]:
     inferred = any(compiler.get("inertiafromgeom") == "true" for compiler in compilers)
     places = [compiler.attrib.pop(key, None) for key in ("texturedir", "assetdir", "meshdir") for compiler in compilers]
     place = next((place for place in reversed(places) if place), "")
-    files = {_mesh_name(mesh): _inside(folder, f"{place}/{mesh.get('file')}") for mesh in root.iter("mesh") if mesh.get("file")}
+    files = {
+        _mesh_name(mesh): _inside(folder, f"{place}/{mesh.get('file')}")
+        for mesh in root.iter("mesh")
+        if mesh.get("file")
+    }
     present = {name for name, target in files.items() if target is not None and target.is_file()}
     used = {name for name in (_mesh_name(mesh) for mesh in root.iter("mesh") if mesh.get("vertex")) if name}
     for body in root.iter("body"):

@@ -22,7 +22,9 @@ def page(content: dict[str, Any]) -> str:
     import jinja2
 
     templates = jinja2.Environment(
-        loader=jinja2.ChoiceLoader([jinja2.PackageLoader("proofroll.robots"), jinja2.PackageLoader("proofroll.report")]),
+        loader=jinja2.ChoiceLoader(
+            [jinja2.PackageLoader("proofroll.robots"), jinja2.PackageLoader("proofroll.report")]
+        ),
         autoescape=True,
         undefined=jinja2.StrictUndefined,
         trim_blocks=True,

@@ -164,7 +164,7 @@ def evaluate(
             rows["inverse"].append(T.T @ np.asarray(state.inverse(T @ acceleration + state.drift)))
         if state.forward is not None:
             own = np.asarray(state.forward(np.linalg.solve(T.T, torque)))
-            rows["forward"].append(np.linalg.solve(T, own - state.drift))
+            rows["forward"].append(np.asarray(np.linalg.solve(T, own - state.drift), dtype=np.float64))
     return {name: np.array(found) if found else None for name, found in rows.items()}
 
 
@@ -173,5 +173,7 @@ def _stack(rates: Mapping[str, Array], joints: tuple[str, ...], dofs: tuple[int,
     count = len(next(iter(rates.values())))
     parts = [rates.get(name, np.zeros((count, dof))) for name, dof in zip(joints, dofs, strict=True)]
     if any(part.shape[1] != dof for part, dof in zip(parts, dofs, strict=True)):
-        parts = [part if part.shape[1] == dof else np.zeros((count, dof)) for part, dof in zip(parts, dofs, strict=True)]
+        parts = [
+            part if part.shape[1] == dof else np.zeros((count, dof)) for part, dof in zip(parts, dofs, strict=True)
+        ]
     return np.concatenate(parts, axis=1)

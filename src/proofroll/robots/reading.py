@@ -74,16 +74,17 @@ def ask(worker: Worker, engine: str, request: Request, folder: Path, time_limit:
     """
     asked, arrays = folder / "request.json", folder / "answer.npz"
     asked.write_text(json.dumps(plain(request) | {"path": str(request.path)}), encoding="utf-8")
-    told = worker.request({"do": "read_robot", "engine": engine, "asked": str(asked), "arrays": str(arrays)}, time_limit)
+    told = worker.request(
+        {"do": "read_robot", "engine": engine, "asked": str(asked), "arrays": str(arrays)}, time_limit
+    )
     reading = None
     if not told["refused"]:
         with np.load(arrays, allow_pickle=False) as found:
             values: dict[str, Any] = {name: found[name] if name in found.files else None for name in _ARRAYS}
             for name in _BY_JOINT:
                 values[name] = dict(zip(told[name], found[name], strict=True))
-        reading = Reading(
-            tuple(told["joints"]), tuple(told["dofs"]), coupled=tuple(told["coupled"]), remarks=tuple(told["remarks"]), **values
-        )  # fmt: skip
+        values |= {name: tuple(told[name]) for name in ("joints", "dofs", "coupled", "remarks")}
+        reading = Reading(**values)
     return Answer(told["version"], told["says"], told["tolerances"], reading, told["refused"])
 
 
@@ -95,7 +96,11 @@ def read_robot(engine: str, asked: str, arrays: str) -> dict[str, Any]:
     content = json.loads(Path(asked).read_text(encoding="utf-8"))
     request = Request(
         **content
-        | {"path": Path(content["path"]), "states": states_from(content["states"]), "robot": robot_from(content["robot"])}
+        | {
+            "path": Path(content["path"]),
+            "states": states_from(content["states"]),
+            "robot": robot_from(content["robot"]),
+        }
         | {"torques": {name: np.array(rows) for name, rows in content["torques"].items()}}
         | {"gravity": np.array(content["gravity"])}
     )
@@ -110,7 +115,13 @@ def read_robot(engine: str, asked: str, arrays: str) -> dict[str, Any]:
         reading = reader.read(request)
     except Refused as error:
         return told | {"refused": str(error)}
-    except (AttributeError, TypeError, NameError, LookupError, ImportError) as error:  # an importer raises none of these
+    except (
+        AttributeError,
+        TypeError,
+        NameError,
+        LookupError,
+        ImportError,
+    ) as error:  # an importer raises none of these
         return {"error": "crashed", "message": f"the reader of {engine} failed: {one_line(error)}"}
     except Exception as error:  # whatever an importer raises is its refusal
         return told | {"refused": one_line(error)}
@@ -135,7 +146,11 @@ def compile_robot(path: str) -> dict[str, Any]:
                 return {"robot": plain(reader.compiled(Path(path))), "by": f"{name} {reader.version()}"}
             except Exception as error:
                 return {"robot": None, "by": f"{name} {reader.version()}", "message": one_line(error)}
-    return {"robot": None, "by": "", "message": "no engine that defines MJCF is installed: pip install 'proofroll[mujoco]'"}
+    return {
+        "robot": None,
+        "by": "",
+        "message": "no engine that defines MJCF is installed: pip install 'proofroll[mujoco]'",
+    }
 
 
 def compiled(worker: Worker, file: RobotFile, written: Path, time_limit: float) -> tuple[Robot, str]:

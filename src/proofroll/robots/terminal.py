@@ -66,7 +66,8 @@ def lines(content: dict[str, Any]) -> Iterator[str]:
     """What was read, what is wrong with the file, and every engine's causes, in lines of at most 80 characters."""
     truth = content["truth"]
     base = f", {content['base']} base" if content["kind"] == "urdf" else ""
-    said = f"{content['file']}: {content['kind'].upper()}{base}, {truth['velocities']} velocities, {truth['states']} states"
+    said = f"{content['file']}: {content['kind'].upper()}{base}, {truth['velocities']} velocities, "
+    said += f"{truth['states']} states"
     yield from wrapped(said)
     yield from wrapped(f"true is {truth['by']}; its two formulations differ by {amount(truth['difference'])}")
     for finding in content["lint"]:

@@ -71,7 +71,7 @@ def poses(robot: Robot, states: States) -> dict[str, tuple[Array, Array]]:
 
 
 def _rotate(R: Array, r: Array) -> Array:
-    return np.einsum("sij,sj->si", R, r)
+    return np.asarray(np.einsum("sij,sj->si", R, r))
 
 
 def _skew(r: Array) -> Array:
@@ -84,7 +84,7 @@ def _skew(r: Array) -> Array:
 
 @dataclasses.dataclass
 class _Motion:
-    """Of a body in world axes: Jacobians of origin and rotation, velocities, accelerations at zero joint accelerations."""
+    """Of a body in world axes: Jacobians, angular velocity, accelerations at zero joint accelerations."""
 
     Jv: Array
     Jw: Array

@@ -18,9 +18,8 @@ from proofroll.robots.safe_xml import numbers
 # What carries the root; no name in a file begins so.
 BASE_JOINT = "(base)"
 _KINDS = {"revolute": "revolute", "continuous": "revolute", "prismatic": "prismatic", "fixed": "fixed"}
+_MOMENTS = ("xx", "xy", "xz", "yy", "yz", "zz")
 _PRIMITIVES = {"box", "sphere", "cylinder", "capsule"}
-# A unit axis written with six digits is off by less.
-_UNIT = 1e-6
 
 
 def stripped(root: Element) -> tuple[Element, list[Finding]]:
@@ -42,7 +41,9 @@ def stripped(root: Element) -> tuple[Element, list[Finding]]:
                 link.remove(shape)
                 removed += drawn and shape.tag == "collision"
         if removed and link.find("inertial") is None:
-            words = "its collision mesh was left out, and it has no <inertial>: engines that weigh shapes find less mass"
+            words = (
+                "its collision mesh was left out, and it has no <inertial>: engines that weigh shapes find less mass"
+            )
             findings.append(Finding("warning", f"link {link.get('name')}", words))
     return root, findings
 
@@ -107,7 +108,9 @@ def _body(name: str, link: Element) -> tuple[Body, dict[str, Any]]:
     written = np.zeros((3, 3))
     moments = inertial.find("inertia")
     if moments is not None:
-        xx, xy, xz, yy, yz, zz = (numbers(moments, f"i{key}", "0", 1)[0] for key in ("xx", "xy", "xz", "yy", "yz", "zz"))
+        xx, xy, xz, yy, yz, zz = (
+            numbers(moments, f"i{key}", "0", 1)[0] for key in ("xx", "xy", "xz", "yy", "yz", "zz")
+        )
         written = np.array([[xx, xy, xz], [xy, yy, yz], [xz, yz, zz]])
     source |= {"written": written, "frame": R}
     return Body(name, m, com, R @ written @ R.T), source
@@ -151,7 +154,9 @@ def _ordered(joints: list[Joint], links: dict[str, Element], base: str) -> tuple
             raise InputError("<child link>", name, f"{times} joints carry this link; a URDF is a tree")
     roots = [name for name in links if name not in carried]
     if len(roots) != 1:
-        said = "its links form a loop" if not roots else f"it has {len(roots)} roots, {roots[0]} and {roots[1]} among them"
+        said = (
+            "its links form a loop" if not roots else f"it has {len(roots)} roots, {roots[0]} and {roots[1]} among them"
+        )
         raise InputError("<robot>", roots[0] if roots else "", f"{said}; a URDF is a tree with one root")
     below: dict[str, list[Joint]] = {}
     for joint in joints:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import importlib
 import importlib.metadata
 from collections.abc import Mapping
 from typing import Any, ClassVar
@@ -47,7 +48,7 @@ class ExudynRobots:
 
             def forward(torque: Array) -> Array:
                 tree.put(q, v, torque)
-                return np.linalg.solve(M, tree.force())
+                return np.asarray(np.linalg.solve(M, tree.force()))
 
             return AtState(T, drift, M, g, h, None, forward)
 
@@ -72,8 +73,7 @@ class _Tree:
     """The tree in a system of its own, and where its coordinates are."""
 
     def __init__(self, request: Request) -> None:
-        import exudyn as exu
-
+        exu: Any = importlib.import_module("exudyn")
         self.request, self.robot = request, request.robot
         if any(joint.kind == "spherical" for joint in self.robot.moving):
             raise Refused("the tree of Exudyn has no spherical joint")
@@ -92,11 +92,19 @@ class _Tree:
         self._make(n, [types[kind] for kind in kinds], parents, turns, offsets, masses, coms, inertias, zeros)
 
     def _make(
-        self, n: int, kinds: Any, parents: Any, turns: Any, offsets: Any, masses: Any, coms: Any, inertias: Any, zeros: Any
+        self,
+        n: int,
+        kinds: Any,
+        parents: Any,
+        turns: Any,
+        offsets: Any,
+        masses: Any,
+        coms: Any,
+        inertias: Any,
+        zeros: Any,
     ) -> None:
-        import exudyn as exu
-        import exudyn.itemInterface as ii
-
+        exu: Any = importlib.import_module("exudyn")  # its stubs have other signatures than its classes
+        ii: Any = importlib.import_module("exudyn.itemInterface")
         node = self.mbs.AddNode(ii.NodeGenericODE2(referenceCoordinates=zeros, initialCoordinates=zeros,
                                                    initialCoordinates_t=zeros, numberOfODE2Coordinates=n))  # fmt: skip
         self.tree = self.mbs.AddObject(
@@ -107,7 +115,8 @@ class _Tree:
                 linkInertiasCOM=exu.Matrix3DList([np.array(inertia) for inertia in inertias]),
                 linkCOMs=exu.Vector3DList([np.array(com) for com in coms]), linkMasses=list(masses),
                 gravity=list(self.robot.gravity), jointForceVector=zeros, jointPControlVector=zeros,
-                jointDControlVector=list(self.damping), jointPositionOffsetVector=zeros, jointVelocityOffsetVector=zeros,
+                jointDControlVector=list(self.damping), jointPositionOffsetVector=zeros,
+                jointVelocityOffsetVector=zeros,
             )
         )  # fmt: skip
         self.markers = {
@@ -123,6 +132,7 @@ class _Tree:
         self.solver = exu.MainSolverImplicitSecondOrder()
         settings = exu.SimulationSettings()
         settings.timeIntegration.verboseMode = 0
+        settings.solution.file.write = False
         self.solver.InitializeSolver(self.mbs, settings)
 
     def _rows(self, joint: Joint) -> list[tuple[Any, ...]]:
@@ -165,15 +175,15 @@ class _Tree:
             y = Rotation.from_euler("X", angles[0]).apply([0.0, 1.0, 0.0])
             z = Rotation.from_euler("XY", angles[:2]).apply([0.0, 0.0, 1.0])
             inverse = np.linalg.inv(np.column_stack([x, y, z]))
-            a, b, c = rates = inverse @ velocity[turned]
+            a, b, _ = rates = inverse @ velocity[turned]
             moving = np.column_stack([0 * x, np.cross(a * x, y), np.cross(a * x + b * y, z)]) @ rates
             T[turned, turned], drift[turned] = inverse, -inverse @ moving
         return q, T @ velocity, T, drift
 
     def put(self, q: Array, v: Array, torque: Array) -> None:
         """Puts the system into a state with joint torques."""
-        self.mbs.systemData.SetODE2Coordinates(q)
-        self.mbs.systemData.SetODE2Coordinates_t(v)
+        self.mbs.systemData.SetODE2Coordinates(list(q))
+        self.mbs.systemData.SetODE2Coordinates_t(list(v))
         self.mbs.SetObjectParameter(self.tree, "jointForceVector", list(torque))
 
     def force(self) -> Array:

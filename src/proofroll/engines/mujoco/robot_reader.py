@@ -40,7 +40,7 @@ class MujocoRobots:
         return robot_of(mujoco.MjModel.from_xml_path(str(path)))
 
     def read(self, request: Request) -> Reading:
-        """The compiled model, evaluated without actuators, constraints (of which friction is one), tendons and medium."""
+        """The compiled model without actuators, tendons, medium and constraints, of which friction is one."""
         import mujoco
 
         model = _compile(request)

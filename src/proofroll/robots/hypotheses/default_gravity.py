@@ -7,7 +7,6 @@ import numpy as np
 from proofroll.robots.hypotheses import Evidence, Hypothesis
 from proofroll.robots.model import Robot
 
-
 _DEFAULT = np.array([0.0, 0.0, -9.81])
 
 

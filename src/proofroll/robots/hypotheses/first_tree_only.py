@@ -3,11 +3,12 @@
 from __future__ import annotations
 
 from proofroll.robots.hypotheses import Evidence, Hypothesis
-from proofroll.robots.model import WORLD, Robot
+from proofroll.robots.model import WORLD, Joint, Robot
 
 
 def _change(evidence: Evidence) -> Robot | None:
-    robot, kept, joints = evidence.robot, {WORLD}, []
+    robot, kept = evidence.robot, {WORLD}
+    joints: list[Joint] = []
     for joint in robot.joints:
         if joint.parent in kept and not (joint.parent == WORLD and joints):
             kept.add(joint.child)

@@ -20,6 +20,6 @@ HYPOTHESIS = Hypothesis(
         "pybullet": "3.2.7",
         "exudyn": "1.13.6 (its tree has none)",
     },
-    "add the friction torque yourself; in MuJoCo slow joints slip with less than frictionloss, so look at solreffriction",
+    "add the friction torque yourself; in MuJoCo slow joints slip with less than frictionloss: see solreffriction",
     _change,
 )

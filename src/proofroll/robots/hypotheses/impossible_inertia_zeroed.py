@@ -17,7 +17,7 @@ def _change(evidence: Evidence) -> Robot | None:
 
 HYPOTHESIS = Hypothesis(
     "an impossible inertia is replaced by zero",
-    {"pybullet": "3.2.7"},
+    {"pybullet": "3.2.7", "mujoco": "4.0.0 (of a link without mass)"},
     "correct the inertia in the file",
     _change,
 )

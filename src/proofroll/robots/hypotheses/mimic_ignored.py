@@ -12,7 +12,12 @@ def _change(evidence: Evidence) -> Robot | None:
 
 HYPOTHESIS = Hypothesis(
     "mimic is ignored: the following joint moves freely",
-    {"pinocchio": "default of all versions", "pybullet": "3.2.7", "exudyn": "1.13.6 (as fed)"},
-    "in Pinocchio build the model with mimic=True; elsewhere add the coupling q = multiplier · q_other + offset yourself",
+    {
+        "pinocchio": "default of all versions",
+        "pybullet": "3.2.7",
+        "mujoco": "3.3.3 to 3.10.0",
+        "exudyn": "1.13.6 (as fed)",
+    },
+    "in Pinocchio build the model with mimic=True; elsewhere couple q = multiplier · q_other + offset yourself",
     _change,
 )

@@ -10,7 +10,6 @@ from proofroll.robots.hypotheses import Evidence, Hypothesis
 from proofroll.robots.inertia import replaced
 from proofroll.robots.model import Body, Robot
 
-
 # Density of water [kg/m³].
 _WATER = 1000.0
 

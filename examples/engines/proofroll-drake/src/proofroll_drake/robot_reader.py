@@ -7,6 +7,7 @@ from collections.abc import Mapping
 from typing import Any, ClassVar
 
 import numpy as np
+
 from proofroll.robots.model import Array
 from proofroll.robots.protocol import AtState, Reading, Request, evaluate
 

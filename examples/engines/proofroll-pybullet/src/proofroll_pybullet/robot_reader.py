@@ -7,9 +7,10 @@ from collections.abc import Mapping
 from typing import Any, ClassVar
 
 import numpy as np
+from scipy.spatial.transform import Rotation
+
 from proofroll.robots.model import Array, Body, composed
 from proofroll.robots.protocol import AtState, Reading, Request, evaluate
-from scipy.spatial.transform import Rotation
 
 # One step of semi-implicit Euler shows the acceleration at its start exactly, whatever its length [s].
 _STEP = 1e-2
@@ -90,7 +91,8 @@ class _Loaded:
         for index in range(-1, len(infos)):
             pybullet.changeDynamics(self.body, index, linearDamping=0, angularDamping=0, maxJointVelocity=1e9)
         self.damping = {int(info[0]): float(info[6]) for info in moving}
-        for index in self.indices:
+        for index in self.indices:  # a step must not meet a limit either
+            pybullet.changeDynamics(self.body, index, jointLowerLimit=-1e9, jointUpperLimit=1e9)
             pybullet.setJointMotorControl2(self.body, index, pybullet.VELOCITY_CONTROL, force=0)
         self.free = len(self.mass_matrix(np.zeros(len(names)))) == len(names) + 6
         self.joints = ((request.base_joint, *names)) if self.free else names
