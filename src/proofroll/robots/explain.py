@@ -14,6 +14,8 @@ from proofroll.robots.robot_file import RobotFile
 
 # A cause that leaves more than this part of a difference explains nothing, not even together with others.
 _HELPS = 0.999
+# Where no cause closes a layer alone, so many of the best are followed: the largest step is not always a right one.
+_BRANCHES = 3
 
 
 @dataclasses.dataclass(frozen=True)
@@ -110,20 +112,20 @@ def _closed(
 ) -> _Step | None:
     """The step after the causes that close a layer: one alone if there is one, else several one after another."""
     limit = tolerances[layer]
-    while step.found[layer] > limit:
+    best = [step]
+    while best and best[0].found[layer] > limit:
         candidates: list[_Step] = []
-        for hypothesis in ranked:
-            if hypothesis.id in {cause.id for cause in step.causes}:
-                continue
-            if engine not in hypothesis.known and any(item.found[layer] <= limit for item in candidates):
-                break  # one that is known of this engine closes the layer
-            tried = trial(step, hypothesis, layer)
-            if tried is not None and tried.found[layer] <= _HELPS * step.found[layer]:
-                candidates.append(tried)
-        if not candidates:
-            return None
-        step = min(candidates, key=lambda item: _rank(item, layer, tolerances))
-    return step
+        for begun in best:
+            for hypothesis in ranked:
+                if hypothesis.id in {cause.id for cause in begun.causes}:
+                    continue
+                if engine not in hypothesis.known and any(item.found[layer] <= limit for item in candidates):
+                    break  # one that is known of this engine closes the layer
+                tried = trial(begun, hypothesis, layer)
+                if tried is not None and tried.found[layer] <= _HELPS * begun.found[layer]:
+                    candidates.append(tried)
+        best = sorted(candidates, key=lambda item: _rank(item, layer, tolerances))[:_BRANCHES]
+    return best[0] if best else None
 
 
 def _rank(step: _Step, layer: str, tolerances: Mapping[str, float]) -> tuple[int, float]:

@@ -24,8 +24,15 @@ class MujocoRobots:
         "balanceinertia": "replace an inertia that breaks the triangle inequality by a sphere's",
         "boundmass": "raise every mass to 1e-6 kg and every inertia to 1e-8 kg m²",
     }
-    tolerances: ClassVar[Mapping[str, float]] = {}
     says: ClassVar[str] = ""
+
+    @property
+    def tolerances(self) -> dict[str, float]:
+        """Until 3.13 principal axes are found to about the root of double precision: half angles from 1 − cos."""
+        if tuple(int(part) for part in self.version().split(".")[:2]) >= (3, 14):
+            return {}
+        torques = ("mass matrix", "gravity", "bias", "inverse dynamics", "forward dynamics")
+        return {"bodies": 5e-6, **dict.fromkeys(torques, 1e-7)}
 
     def version(self) -> str:
         """Version of the package."""
