@@ -21,7 +21,6 @@ from proofroll.clean_runs import time_once
 from proofroll.errors import Diverged, InputError, Missing, ProofrollError, Refused
 from proofroll.identity import describe, resolve
 from proofroll.memory import volunteer
-from proofroll.robots.reading import compile_robot, read_robot
 
 
 def main(answers: int, parent: int) -> None:
@@ -54,8 +53,7 @@ def _answer(request: dict[str, Any]) -> dict[str, Any]:
         "time": time_once,
         "reproduce": reproduce,
         "bench": bench,
-        "read_robot": read_robot,
-        "compile_robot": compile_robot,
+        "robot": robot,
     }
     action = actions[request.pop("do")]
     try:
@@ -101,6 +99,13 @@ def bench(**what: Any) -> dict[str, Any]:
         return measure_adapter(**what)
     except (Refused, Diverged) as error:
         return {"message": str(error)}
+
+
+def robot(step: str, **what: Any) -> dict[str, Any]:
+    """A robot file in an engine's own importer; see :mod:`proofroll.robots.reading`."""
+    from proofroll.robots import reading
+
+    return reading.STEPS[step](**what)
 
 
 def one_line(error: BaseException) -> str:

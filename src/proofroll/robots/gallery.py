@@ -66,7 +66,7 @@ def locate(entry: Entry) -> Path | None:
         inside = files(entry.package) or []
     except PackageNotFoundError:
         return None
-    found = next((item for item in inside if str(item).endswith(f"/{entry.file}")), None)
+    found = next((item for item in inside if f"/{item}".endswith(f"/{entry.file}")), None)
     return None if found is None else Path(str(found.locate()))
 
 

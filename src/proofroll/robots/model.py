@@ -11,7 +11,8 @@ import numpy as np
 import numpy.typing as npt
 
 Array = npt.NDArray[np.float64]
-WORLD = "world"
+# The parent of what hangs in the world; no body or joint has this name, but many a root link is called world.
+WORLD = ""
 # Degrees of freedom of each kind of joint.
 DOFS = {"fixed": 0, "revolute": 1, "prismatic": 1, "spherical": 3, "free": 6}
 

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import dataclasses
 import json
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from importlib.metadata import entry_points
 from pathlib import Path
 from typing import Any
@@ -75,7 +75,7 @@ def ask(worker: Worker, engine: str, request: Request, folder: Path, time_limit:
     asked, arrays = folder / "request.json", folder / "answer.npz"
     asked.write_text(json.dumps(plain(request) | {"path": str(request.path)}), encoding="utf-8")
     told = worker.request(
-        {"do": "read_robot", "engine": engine, "asked": str(asked), "arrays": str(arrays)}, time_limit
+        {"do": "robot", "step": "read", "engine": engine, "asked": str(asked), "arrays": str(arrays)}, time_limit
     )
     reading = None
     if not told["refused"]:
@@ -153,6 +153,10 @@ def compile_robot(path: str) -> dict[str, Any]:
     }
 
 
+# What a worker can be asked about robots.
+STEPS: dict[str, Callable[..., dict[str, Any]]] = {"read": read_robot, "compile": compile_robot}
+
+
 def compiled(worker: Worker, file: RobotFile, written: Path, time_limit: float) -> tuple[Robot, str]:
     """The robot that an MJCF means, and by whom it was compiled.
 
@@ -160,7 +164,7 @@ def compiled(worker: Worker, file: RobotFile, written: Path, time_limit: float) 
         InputError: the engine that defines the format cannot compile it, or is not installed.
         WorkerDied: it crashed or took too long.
     """
-    told = worker.request({"do": "compile_robot", "path": str(written)}, time_limit)
+    told = worker.request({"do": "robot", "step": "compile", "path": str(written)}, time_limit)
     if told["robot"] is None:
         raise InputError("file", str(file.path), f"it has no meaning: {told['by']} says: {told['message']}")
     return robot_from(told["robot"]), told["by"]
