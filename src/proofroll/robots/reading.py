@@ -108,10 +108,10 @@ def read_robot(engine: str, asked: str, arrays: str) -> dict[str, Any]:
         if option not in reader.options:
             known = ", ".join(reader.options) or "none"
             raise InputError(f"{engine}: {option}", request.options[option], f"there is no such option; it has {known}")
+    if request.kind not in reader.kinds:
+        raise Missing(f"{engine} reads no {request.kind.upper()}")
     told: dict[str, Any] = {"version": reader.version(), "says": reader.says, "tolerances": dict(reader.tolerances)}
     try:
-        if request.kind not in reader.kinds:
-            raise Refused(f"{engine} reads no {request.kind.upper()}")
         reading = reader.read(request)
     except Refused as error:
         return told | {"refused": str(error)}

@@ -98,7 +98,7 @@ def sentences(row: dict[str, Any]) -> Iterator[str]:
         yield f"{name} differs in {layer} by {amount(row['layers'][layer]['difference'])}; no known cause explains it."
 
 
-_VERBS = {"refused": "refuses the file", "missing": "is not installed", "timeout": "took too long"}
+_VERBS = {"refused": "refuses the file", "missing": "is left out", "timeout": "took too long"}
 
 
 def wrapped(text: str) -> list[str]:

@@ -32,6 +32,7 @@ def stripped(root: Element) -> tuple[Element, list[Finding]]:
                 findings.append(Finding("note", child.tag, "options for one program; left out for every engine"))
             elif child.tag not in {"material", "group_state", "link_state"}:
                 findings.append(Finding("warning", str(child.tag), "the specification has no such element; left out"))
+    meshes = 0
     for link in root.iter("link"):
         removed = 0
         for shape in [*link.findall("visual"), *link.findall("collision")]:
@@ -40,11 +41,17 @@ def stripped(root: Element) -> tuple[Element, list[Finding]]:
             if drawn or shape.tag == "visual":
                 link.remove(shape)
                 removed += drawn and shape.tag == "collision"
+        meshes += removed
         if removed and link.find("inertial") is None:
             words = (
                 "its collision mesh was left out, and it has no <inertial>: engines that weigh shapes find less mass"
             )
             findings.append(Finding("warning", f"link {link.get('name')}", words))
+    if meshes:
+        words = (
+            f"{meshes} collision meshes left out for every engine: masses come from <inertial>, contact is not compared"
+        )
+        findings.append(Finding("note", "links", words))
     return root, findings
 
 
