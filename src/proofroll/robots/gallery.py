@@ -17,7 +17,7 @@ from proofroll.robots.hypotheses import hypotheses
 from proofroll.toml_file import read_toml
 
 # What an engine may be expected to do besides the causes by which it differs.
-REFUSES, OPEN = "refuses", "open"
+REFUSES, CRASHED, OPEN = "refuses", "crashed", "open"
 
 
 @dataclasses.dataclass(frozen=True)
@@ -29,7 +29,7 @@ class Entry:
         package: distribution in which the file lies.
         file: end of its path there.
         base: what carries the root of a URDF.
-        engines: engine -> causes by which it differs; ``refuses``; ``open`` beside causes: something stays unexplained.
+        engines: engine -> causes by which it differs; ``refuses``; ``crashed``; ``open`` beside causes: something stays unexplained.
     """
 
     name: str
@@ -46,7 +46,7 @@ def read_gallery(path: Path | None = None) -> list[Entry]:
         InputError: it is broken, or names a cause that there is not.
     """
     path = path or data_folder("comparisons") / "robots.toml"
-    known = {REFUSES, OPEN, *(hypothesis.id for hypothesis in hypotheses())}
+    known = {REFUSES, CRASHED, OPEN, *(hypothesis.id for hypothesis in hypotheses())}
     entries = []
     for item in read_toml(path).get("robots", []):
         try:
@@ -104,6 +104,7 @@ def _row(entry: Entry, engines: Sequence[str]) -> dict[str, Any]:
     path = locate(entry)
     row: dict[str, Any] = {
         "name": entry.name,
+        "package": entry.package,
         "file": None if path is None else str(path),
         "engines": [],
         "unexpected": [],

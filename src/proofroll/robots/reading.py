@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import copy
 import dataclasses
 import json
 from collections.abc import Callable, Mapping
@@ -173,7 +174,9 @@ def compiled(worker: Worker, file: RobotFile, written: Path, time_limit: float) 
 def write(file: RobotFile, folder: Path) -> Path:
     """The file that engines get."""
     target = folder / f"robot.{'urdf' if file.kind == 'urdf' else 'xml'}"
-    target.write_bytes(ElementTree.tostring(file.root, encoding="utf-8"))
+    root = copy.deepcopy(file.root)
+    ElementTree.indent(root)  # PyBullet 3.2.7 cuts lines at 8 kB
+    target.write_bytes(ElementTree.tostring(root, encoding="utf-8"))
     return target
 
 

@@ -115,7 +115,7 @@ def gallery_lines(content: dict[str, Any]) -> Iterator[str]:
     """A line or more for each robot: what every engine does, and what was not expected."""
     for row in content["robots"]:
         if row["file"] is None:
-            yield from wrapped(f"{row['name']}: its package is not installed: pip install 'proofroll[robots]'")
+            yield from wrapped(f"{row['name']}: not here: pip install {row['package']}")
             continue
         does = (f"{item['engine']}: {', '.join(item['does']) or 'holds'}" for item in row["engines"])
         yield from wrapped(f"{row['name']}: {'; '.join(does)}")

@@ -48,9 +48,7 @@ def stripped(root: Element) -> tuple[Element, list[Finding]]:
             )
             findings.append(Finding("warning", f"link {link.get('name')}", words))
     if meshes:
-        words = (
-            f"{meshes} collision meshes left out for every engine: masses come from <inertial>, contact is not compared"
-        )
+        words = f"{meshes} collision meshes left out for every engine: masses come from <inertial> alone"
         findings.append(Finding("note", "links", words))
     return root, findings
 
