@@ -29,7 +29,8 @@ class Entry:
         package: distribution in which the file lies.
         file: end of its path there.
         base: what carries the root of a URDF.
-        engines: engine -> causes by which it differs; ``refuses``; ``crashed``; ``open`` beside causes: something stays unexplained.
+        engines: engine -> causes by which it differs; ``refuses``; ``crashed``; ``open``, also beside causes: something
+            stays unexplained.
     """
 
     name: str
