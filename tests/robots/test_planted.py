@@ -15,13 +15,14 @@ from robot_templates import inertial, mjcf, spherical, urdf
 from proofroll.process import Worker
 from proofroll.registry import parse_engine
 from proofroll.robots import reading
-from proofroll.robots.check import judged
+from proofroll.robots.body_recursion import body_recursion
+from proofroll.robots.judging import judged
 from proofroll.robots.layers import Truth
 from proofroll.robots.model import Robot
 from proofroll.robots.protocol import Reading, Request
 from proofroll.robots.robot_file import RobotFile, open_robot
 from proofroll.robots.states import random_states
-from proofroll.robots.two_formulations import body_recursion, passive, poses
+from proofroll.robots.two_formulations import passive, poses
 from proofroll.robots.urdf import BASE_JOINT, read_urdf
 
 Workers = Callable[[str], Worker]

@@ -10,12 +10,13 @@ import pytest
 from robot_templates import urdf
 from scipy.spatial.transform import Rotation
 
+from proofroll.robots.body_recursion import body_recursion
 from proofroll.robots.layers import Truth
 from proofroll.robots.model import WORLD, Body, Joint, Robot
 from proofroll.robots.plain_data import mechanism_tables, plain, robot_from, states_from
 from proofroll.robots.robot_file import open_robot
 from proofroll.robots.states import random_states
-from proofroll.robots.two_formulations import body_recursion, poses, world_jacobians
+from proofroll.robots.two_formulations import poses, world_jacobians
 from proofroll.robots.urdf import read_urdf
 
 KINDS = ["revolute", "prismatic", "spherical", "fixed", "revolute", "revolute", "spherical", "prismatic", "fixed"]

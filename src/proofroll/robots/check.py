@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import contextlib
 import dataclasses
 import os
 import tempfile
@@ -10,7 +9,6 @@ from collections.abc import Callable, Sequence
 from concurrent.futures import ThreadPoolExecutor
 from pathlib import Path
 from typing import Any
-from xml.etree.ElementTree import Element, tostring
 
 import numpy as np
 
@@ -18,19 +16,15 @@ from proofroll.errors import InputError, Missing
 from proofroll.process import Worker, WorkerDied
 from proofroll.registry import EngineSpec, parse_engine
 from proofroll.robots import reading
-from proofroll.robots.explain import explain
-from proofroll.robots.layers import LAYERS, TOLERANCE, Truth, differences
+from proofroll.robots.body_recursion import body_recursion
+from proofroll.robots.judging import TIME_LIMIT, judged, meaning, unread
+from proofroll.robots.layers import LAYERS, Truth
 from proofroll.robots.lint import lint
-from proofroll.robots.model import Array, Robot
 from proofroll.robots.protocol import Request
 from proofroll.robots.robot_file import RobotFile, open_robot
 from proofroll.robots.states import States, random_states
-from proofroll.robots.two_formulations import body_recursion, poses
-from proofroll.robots.urdf import BASE_JOINT, read_urdf
-
-TIME_LIMIT = 120.0
-# The two formulations must agree to a tenth of any tolerance; else their difference raises it.
-_MARGIN = 10.0
+from proofroll.robots.two_formulations import poses
+from proofroll.robots.urdf import BASE_JOINT
 
 
 def check(
@@ -71,7 +65,7 @@ def check(
     with tempfile.TemporaryDirectory() as name:
         folder = Path(name)
         written = reading.write(file, folder)
-        robot, by = _meaning(file, written, time_limit)
+        robot, by = meaning(file, written, time_limit)
         if not robot.moving:
             raise InputError("file", str(path), "nothing in it moves" + _fixed_hint(file))
         sampled = random_states(robot, states, seed)
@@ -118,17 +112,6 @@ def differs(row: dict[str, Any]) -> bool:
     return row["status"] not in {"holds", "missing"}
 
 
-def _meaning(file: RobotFile, written: Path, time_limit: float) -> tuple[Robot, str]:
-    if file.kind == "urdf":
-        return read_urdf(file), "our own reading of the file"
-    with Worker() as worker:
-        try:
-            robot, by = reading.compiled(worker, file, written, time_limit)
-        except WorkerDied as error:
-            raise InputError("file", str(file.path), f"it could not be compiled: {error}") from None
-    return robot, f"the model that {by} compiles"
-
-
 def _fixed_hint(file: RobotFile) -> str:
     return "; try --base free" if file.kind == "urdf" and file.base == "fixed" else ""
 
@@ -157,87 +140,10 @@ def _row(
     except Missing as error:
         if asked:
             raise
-        return _unread(spec, "missing", str(error))
+        return unread(spec, "missing", str(error))
     except WorkerDied as error:
-        return _unread(spec, str(error.status), str(error))
+        return unread(spec, str(error.status), str(error))
     return judged(file, truth, bar, spec, answer, dict(request.torques))
-
-
-def _unread(spec: EngineSpec, status: str, why: str) -> dict[str, Any]:
-    """The row of an engine that holds nothing."""
-    row: dict[str, Any] = {"engine": str(spec), "version": None, "status": status, "refused": why, "says": ""}
-    return row | {"remarks": [], "layers": {}, "causes": [], "unexplained": None, "offending": []}
-
-
-def judged(
-    file: RobotFile, truth: Truth, bar: float, spec: EngineSpec, answer: reading.Answer, torques: dict[str, Array]
-) -> dict[str, Any]:
-    """The row of an engine that answered.
-
-    Args:
-        file: what was read.
-        truth: what it means.
-        bar: how far the two formulations of the truth differ.
-        spec: the engine as the user wrote it.
-        answer: what it holds, or why it refused.
-        torques: by joint, that the forward dynamics were asked for.
-    """
-    row = _unread(spec, "refused", answer.refused) | {"version": answer.version, "says": answer.says}
-    if answer.reading is None:
-        return row
-    tolerances = {layer: max(answer.tolerances.get(layer, TOLERANCE), _MARGIN * bar) for layer in LAYERS}
-    tolerances["joints"] = 0.0
-    found = differences(truth, torques, answer.reading)
-    layers = {
-        layer: {"difference": value, "tolerance": tolerances[layer], "holds": bool(value <= tolerances[layer])}
-        for layer, value in found.items()
-    }
-    recompiled = _Recompiler(file)
-    causes, unexplained = explain(file, truth, torques, answer.reading, spec.name, tolerances, recompiled)
-    holds = all(item["holds"] for item in layers.values())
-    return row | {
-        "status": "holds" if holds else ("differs" if unexplained else "explained"),
-        "refused": None,
-        "remarks": list(answer.reading.remarks),
-        "layers": layers,
-        "causes": [dataclasses.asdict(cause) for cause in causes],
-        "unexplained": unexplained,
-        "offending": _offending(truth, answer.reading),
-    }
-
-
-class _Recompiler:
-    """What a changed file would mean; None: nothing, or the format is read by us. Each is compiled once."""
-
-    def __init__(self, file: RobotFile) -> None:
-        self._file = file
-        self._known: dict[bytes, Robot | None] = {}
-
-    def __call__(self, root: Element) -> Robot | None:
-        text = tostring(root)
-        if text not in self._known:
-            self._known[text] = None if self._file.kind == "urdf" else self._compiled(root)
-        return self._known[text]
-
-    def _compiled(self, root: Element) -> Robot | None:
-        changed = dataclasses.replace(self._file, root=root)
-        with tempfile.TemporaryDirectory() as name, contextlib.suppress(InputError):
-            return _meaning(changed, reading.write(changed, Path(name)), TIME_LIMIT)[0]
-        return None
-
-
-def _offending(truth: Truth, held: Any) -> list[str]:
-    """Joints whose carried body an engine holds with another mass, centre of mass or inertia, or lacks."""
-    groups = truth.robot.groups
-    found = [name for name in groups if name not in held.joints]
-    spin = max((float(np.abs(group.inertia).max()) for group in groups.values()), default=1.0) or 1.0
-    for name, group in groups.items():
-        if name in held.mass:
-            off = max(abs(held.mass[name] - group.mass), float(np.abs(held.inertia[name] - group.inertia).max()) / spin)
-            apart = float(np.abs(held.com[name] - group.com).max()) if group.mass > 0 < held.mass[name] else 0.0
-            if max(off, apart) > 1e-6:
-                found.append(name)
-    return found
 
 
 def _skeleton(truth: Truth) -> dict[str, Any]:

@@ -1,8 +1,7 @@
 """What is true of a robot at given states, by two formulations that share only the motion within one joint.
 
-A: Jacobians in world axes, M = Σ Jᵀ I J, and h from the accelerations that remain at zero joint accelerations.
-B: spatial vectors in body axes, recursive Newton-Euler, M column by column (Featherstone, Rigid Body Dynamics
-Algorithms, 2008, chapters 5 and 6).
+A, here: Jacobians in world axes, M = Σ Jᵀ I J, and h from the accelerations that remain at zero joint accelerations.
+B, :mod:`proofroll.robots.body_recursion`: recursive Newton-Euler with spatial vectors in body axes.
 """
 
 from __future__ import annotations
@@ -12,7 +11,7 @@ import dataclasses
 import numpy as np
 from scipy.spatial.transform import Rotation
 
-from proofroll.robots.model import WORLD, Array, Body, Joint, Robot
+from proofroll.robots.model import WORLD, Array, Joint, Robot
 from proofroll.robots.states import States
 
 
@@ -43,7 +42,7 @@ def passive(robot: Robot, states: States) -> Array:
     return found
 
 
-def _within(joint: Joint, states: States) -> tuple[Array, Array]:
+def within(joint: Joint, states: States) -> tuple[Array, Array]:
     """Position and rotation of the child in its parent's frame, shapes (states, 3) and (states, 3, 3)."""
     count = states.count
     slid = np.zeros((count, 3))
@@ -65,7 +64,7 @@ def poses(robot: Robot, states: States) -> dict[str, tuple[Array, Array]]:
     found = {WORLD: (np.zeros((states.count, 3)), np.broadcast_to(np.eye(3), (states.count, 3, 3)))}
     for joint in robot.joints:
         p, R = found[joint.parent]
-        r, Q = _within(joint, states)
+        r, Q = within(joint, states)
         found[joint.child] = (p + _rotate(R, r), R @ Q)
     return found
 
@@ -74,7 +73,7 @@ def _rotate(R: Array, r: Array) -> Array:
     return np.asarray(np.einsum("sij,sj->si", R, r))
 
 
-def _skew(r: Array) -> Array:
+def skew(r: Array) -> Array:
     """The matrix of r × for each row."""
     found = np.zeros((*r.shape[:-1], 3, 3))
     found[..., 0, 1], found[..., 0, 2], found[..., 1, 2] = -r[..., 2], r[..., 1], -r[..., 0]
@@ -107,24 +106,25 @@ def world_jacobians(robot: Robot, states: States) -> Dynamics:
         body = robot.bodies[joint.child]
         R = frames[joint.child][1]
         r = R @ body.com
-        Jc = motion.Jv - _skew(r) @ motion.Jw
+        Jc = motion.Jv - skew(r) @ motion.Jw
         ac = motion.a + np.cross(motion.alpha, r) + np.cross(motion.w, np.cross(motion.w, r))
         inertia = R @ body.inertia @ R.transpose(0, 2, 1)
         torque = _rotate(inertia, motion.alpha) + np.cross(motion.w, _rotate(inertia, motion.w))
         M += body.mass * Jc.transpose(0, 2, 1) @ Jc + motion.Jw.transpose(0, 2, 1) @ inertia @ motion.Jw
         g -= body.mass * np.einsum("sij,i->sj", Jc, robot.gravity)
         c += body.mass * np.einsum("sij,si->sj", Jc, ac) + np.einsum("sij,si->sj", motion.Jw, torque)
-    return Dynamics(M + np.diag(_armature(robot)), g, g + c)
+    return Dynamics(M + np.diag(armature(robot)), g, g + c)
 
 
-def _armature(robot: Robot) -> Array:
+def armature(robot: Robot) -> Array:
+    """Of every velocity, shape (n,)."""
     return np.concatenate([np.zeros(0), *(np.full(joint.dofs, joint.armature) for joint in robot.moving)])
 
 
 def _carried(robot: Robot, joint: Joint, parent: _Motion, frames: dict[str, tuple[Array, Array]], v: Array) -> _Motion:
     (p_parent, R_parent), (p, R) = frames[joint.parent], frames[joint.child]
     r = p - p_parent
-    Jv, Jw = parent.Jv - _skew(r) @ parent.Jw, parent.Jw.copy()
+    Jv, Jw = parent.Jv - skew(r) @ parent.Jw, parent.Jw.copy()
     if joint.kind == "fixed":
         return _Motion(Jv, Jw, parent.w, parent.a + _swung(parent, r), parent.alpha)
     columns = robot.columns[joint.name]
@@ -139,7 +139,7 @@ def _carried(robot: Robot, joint: Joint, parent: _Motion, frames: dict[str, tupl
         a = parent.a + _swung(parent, r) + 2 * np.cross(parent.w, relative)
         return _Motion(Jv, Jw, parent.w, a, parent.alpha)
     anchor = p_parent + _rotate(R_parent, np.broadcast_to(joint.position, p.shape))
-    Jw[:, :, columns], Jv[:, :, columns] = u, -_skew(p - anchor) @ u
+    Jw[:, :, columns], Jv[:, :, columns] = u, -skew(p - anchor) @ u
     w, alpha = parent.w + relative, parent.alpha + np.cross(parent.w, relative)
     a = parent.a + _swung(parent, anchor - p_parent)
     a = a + np.cross(alpha, p - anchor) + np.cross(w, np.cross(w, p - anchor))
@@ -149,83 +149,3 @@ def _carried(robot: Robot, joint: Joint, parent: _Motion, frames: dict[str, tupl
 def _swung(motion: _Motion, r: Array) -> Array:
     """Acceleration of a point of the body at r against that of its origin."""
     return np.cross(motion.alpha, r) + np.cross(motion.w, np.cross(motion.w, r))
-
-
-def body_recursion(robot: Robot, states: States) -> Dynamics:
-    """Formulation B."""
-    count, n = states.count, robot.dofs
-    v = states.stacked(states.velocity, robot)[:, None]
-    still = np.zeros((count, 1, n))
-    units = np.broadcast_to(np.eye(n), (count, n, n))
-    M = newton_euler(robot, states, np.zeros((count, n, n)), units, np.zeros(3))
-    g = newton_euler(robot, states, still, still, robot.gravity)[:, 0]
-    h = newton_euler(robot, states, v, still, robot.gravity)[:, 0]
-    return Dynamics(M + np.diag(_armature(robot)), g, h)
-
-
-def newton_euler(robot: Robot, states: States, v: Array, a: Array, gravity: Array) -> Array:
-    """Torques for velocities and accelerations of shape (states, any, n), without armature; the same shape."""
-    start = np.zeros((*v.shape[:2], 6))
-    falling = start.copy()
-    falling[..., 3:] = -gravity
-    velocity, acceleration, force = {WORLD: start}, {WORLD: falling}, {}
-    X, S = {}, {}
-    for joint in robot.joints:
-        r, R = _within(joint, states)
-        E = R.transpose(0, 2, 1)
-        X[joint.child] = np.block([[E, np.zeros_like(E)], [-E @ _skew(r), E]])
-        velocity[joint.child] = velocity[joint.parent] @ X[joint.child].transpose(0, 2, 1)
-        acceleration[joint.child] = acceleration[joint.parent] @ X[joint.child].transpose(0, 2, 1)
-        if joint.dofs:
-            S[joint.child] = _subspace(joint, R)
-            columns = robot.columns[joint.name]
-            relative = v[..., columns] @ S[joint.child].transpose(0, 2, 1)
-            velocity[joint.child] = V = velocity[joint.child] + relative
-            acceleration[joint.child] += a[..., columns] @ S[joint.child].transpose(0, 2, 1)
-            if joint.kind == "free":  # its velocity has world axes: the derivative of Rᵀ v
-                acceleration[joint.child][..., 3:] -= np.cross(V[..., :3], V[..., 3:])
-            else:
-                acceleration[joint.child] += _cross_motion(V, relative)
-        inertia = _spatial(robot.bodies[joint.child])
-        V = velocity[joint.child]
-        force[joint.child] = acceleration[joint.child] @ inertia + _cross_force(V, V @ inertia)
-    torque = np.zeros((*v.shape[:2], robot.dofs))
-    for joint in reversed(robot.joints):
-        if joint.dofs:
-            torque[..., robot.columns[joint.name]] = force[joint.child] @ S[joint.child]
-        if joint.parent != WORLD:
-            force[joint.parent] = force[joint.parent] + force[joint.child] @ X[joint.child]
-    return torque
-
-
-def _subspace(joint: Joint, R: Array) -> Array:
-    """Which spatial velocities (rotation first) the joint gives its child, shape (states, 6, velocities)."""
-    zero = np.zeros((3, 3))
-    if joint.kind == "free":
-        E = R.transpose(0, 2, 1)
-        return np.block([[np.zeros_like(E), E], [E, np.zeros_like(E)]])
-    if joint.kind == "prismatic":
-        found = np.concatenate([np.zeros(3), joint.axis])[:, None]
-    else:
-        turning = np.vstack([np.eye(3), zero + _skew(joint.child_position)])
-        found = turning if joint.kind == "spherical" else turning @ joint.axis[:, None]
-    return np.broadcast_to(found, (len(R), *found.shape))
-
-
-def _spatial(body: Body) -> Array:
-    """Spatial inertia at the origin of the body's frame, shape (6, 6)."""
-    C = _skew(body.com)
-    moment = body.mass * C
-    return np.block([[body.inertia + moment @ C.T, moment], [moment.T, body.mass * np.eye(3)]])
-
-
-def _cross_motion(v: Array, u: Array) -> Array:
-    return np.concatenate(
-        [np.cross(v[..., :3], u[..., :3]), np.cross(v[..., :3], u[..., 3:]) + np.cross(v[..., 3:], u[..., :3])], axis=-1
-    )
-
-
-def _cross_force(v: Array, f: Array) -> Array:
-    return np.concatenate(
-        [np.cross(v[..., :3], f[..., :3]) + np.cross(v[..., 3:], f[..., 3:]), np.cross(v[..., :3], f[..., 3:])], axis=-1
-    )
