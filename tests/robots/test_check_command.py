@@ -7,7 +7,11 @@ from collections.abc import Callable, Mapping
 from pathlib import Path
 
 import pytest
+from rich.console import Console
 from robot_templates import inertial, urdf
+
+from proofroll.robots.layers import LAYERS
+from proofroll.robots.terminal import WIDTH, table
 
 Proofroll = Callable[..., tuple[int, str, str]]
 Install = Callable[[Mapping[str, str]], None]
@@ -47,6 +51,23 @@ def test_a_difference(proofroll: Proofroll, tmp_path: Path) -> None:
     assert cause["layer"] == "forward dynamics"
     assert cause["before"] > 1e-2
     assert cause["after"] < 1e-10
+
+
+def test_wide_table(tmp_path: Path) -> None:
+    """A row in which every layer fails, and a long name, fit into 80 columns without a number cut off."""
+    layers = {
+        layer: {"difference": 1.234e-12 * 7**n, "tolerance": 0.0, "holds": False} for n, layer in enumerate(LAYERS)
+    }
+    row = {"engine": "pybullet[inertia_from_file=false]", "version": "3.2.7", "status": "differs", "layers": layers}
+    refused = {"engine": "mujoco", "version": "4.0.0", "status": "crashed", "layers": {}}
+    with (tmp_path / "table.txt").open("w+") as text:
+        Console(file=text, width=WIDTH).print(table({"layers": LAYERS, "engines": [row, refused]}))
+        text.seek(0)
+        lines = text.read().splitlines()
+    assert max(map(len, lines)) <= 80
+    assert lines[1].count("e-") == len(LAYERS)
+    assert lines[1].count("…") == 1
+    assert "!" in lines[2]
 
 
 def test_page_escapes(proofroll: Proofroll, tmp_path: Path) -> None:

@@ -11,6 +11,7 @@ from typing import Any
 import numpy as np
 import pytest
 from robot_templates import inertial, mjcf, spherical, urdf
+from scipy.spatial.transform import Rotation
 
 from proofroll.process import Worker
 from proofroll.registry import parse_engine
@@ -147,8 +148,45 @@ _SPHERE = re.sub(r'(ixy|ixz|iyz)="[^"]*"', r'\1="0"', re.sub(r'(ixx|iyy|izz)="[^
 _ONE = spherical(mass="1", moment="1", com="0 0 0")
 _EMPTY = '<link name="tool"></link>'
 
+_UNSKEWED = ('ixz="0.002" iyz="-0.001"', 'ixz="0" iyz="0"')
+# Moments in descending order: the axes of the link are MuJoCo's principal ones, so only the place is wrong.
+SORTED = inertial(ixx="0.05", iyy="0.04", izz="0.03", ixy="0").replace(*_UNSKEWED)
+_WELD = Rotation.from_euler("xyz", [0.5, 0.4, 0.1])
+_COM = np.array([0.1, 0.02, -0.05])
+_MISPLACED = " ".join(f"{part:.17g}" for part in _WELD.inv().apply(_COM))
+
+
+def _boxed(text: str) -> str:
+    """Every inertia is that of a box: of the collision box with margins, or of margins alone."""
+
+    def change(link: re.Match[str]) -> str:
+        mass = float(re.findall('mass value="([^"]*)"', link[0])[0])
+        size = re.findall('box size="([^"]*)"', link[0])
+        x, y, z = np.array([float(part) for part in size[0].split()] if size else [0.0, 0.0, 0.0]) + 2e-3
+        moments = mass / 12 * np.array([y * y + z * z, x * x + z * z, x * x + y * y])
+        new = " ".join(f'i{axis}{axis}="{value!r}"' for axis, value in zip("xyz", moments.tolist(), strict=True))
+        return re.sub("<inertia .*?/>", f'<inertia {new} ixy="0" ixz="0" iyz="0"/>', link[0], flags=re.DOTALL)
+
+    return re.sub(r"<link name=\S*><inertial.*?</link>", change, text, flags=re.DOTALL)
+
+
 # What an engine that is not installed here does, as a change of the file: planted in our own second formulation.
 SIMULATED: list[tuple[str, str, Callable[[str], str], set[str]]] = [
+    (
+        "merged link misplaced",
+        urdf(tool=SORTED),
+        _defect('(<link name="tool">.*?)0.1 0.02 -0.05', rf"\g<1>{_MISPLACED}"),
+        {"merged_inertial_misplaced"},
+    ),
+    ("inertia of boxes", urdf(tip=inertial() + BOX), _boxed, {"inertia_from_collision"}),
+    (
+        "merged at origins",
+        urdf(tip=SORTED, tool=spherical(mass="0.4", moment="0.02")),
+        _defect(
+            '(<link name="tip">.*?)0.1 0.02 -0.05(.*?<link name="tool">.*?)0.1 0.02 -0.05', r"\g<1>0 0 0\g<2>0 0 0"
+        ),
+        {"merged_at_link_origins"},
+    ),
     ("unit mass", urdf(), _defect(_EMPTY, f'<link name="tool">{_ONE}</link>'), {"unit_mass_without_inertial"}),
     ("rpy ignored", urdf(tip=TURNED), _defect("0.3 0.2 1.1", "0 0 0"), {"inertial_rotation_ignored"}),
     ("water sphere", urdf(tip=FLAT), _defect(re.escape(FLAT), _SPHERE), {"water_sphere"}),
@@ -227,6 +265,51 @@ def test_unknown_causes(change: Callable[[str], str], layer: str, tmp_path: Path
     assert row["status"] == "differs"
     assert row["unexplained"] == layer
     assert row["causes"] == []
+
+
+LOADED = '<joint name="k2" axis="1 0 0" pos="0.02 0 0.1" armature="0.3"/>'
+_MIDDLE = '<body name="middle"><inertial pos="0 0 0" mass="1e-13" diaginertia="1e-14 1e-14 1e-14"/>'
+_FIRST, _SECOND = re.findall("<joint .*?/>", TWO)
+_LOWER = '<body name="lower" pos="0.1 0.2 0.4" euler="-20 5 40">'
+IN_MJCF: list[tuple[str, str, str, str, str]] = [
+    (
+        "armature_of_actuated_joints_only",
+        mjcf(joint='armature="0.2"', second=LOADED, actuator='<motor joint="k1"/>'),
+        ' armature="0.3"',
+        "",
+        "",
+    ),
+    (
+        "body_placed_by_last_joint",
+        mjcf(second=TWO),
+        _LOWER + TWO,
+        _MIDDLE + _FIRST + _LOWER + _SECOND,
+        "</body>",
+    ),
+]
+
+
+@pytest.mark.parametrize(("cause", "text", "old", "new", "closing"), IN_MJCF, ids=[row[0] for row in IN_MJCF])
+def test_planted_causes_in_mjcf(
+    cause: str, text: str, old: str, new: str, closing: str, robot_workers: Workers, tmp_path: Path
+) -> None:
+    """A known cause that is planted in an MJCF is named, and nothing else is."""
+    pytest.importorskip("mujoco")
+    assert old in text
+    changed = text.replace(old, new).replace("</body></body>", f"</body>{closing}</body>", 1)
+    files, robots = [], []
+    for name, content in (("true", text), ("held", changed)):
+        path = tmp_path / f"{name}.xml"
+        path.write_text(content)
+        files.append(open_robot(path))
+        (tmp_path / f"{name}-given").mkdir()
+        written = reading.write(files[-1], tmp_path / f"{name}-given")
+        robots.append(reading.compiled(robot_workers("mujoco"), files[-1], written, 60)[0])
+    truth = Truth.of(robots[0], random_states(robots[0], 5, 1))
+    answer = reading.Answer("1", "", {}, _held(robots[1], truth), "")
+    row = judged(files[0], truth, 1e-14, parse_engine("planted"), answer, truth.torques())
+    assert [found["id"] for found in row["causes"]] == [cause]
+    assert row["status"] == "explained"
 
 
 def test_free_base_that_was_fixed(tmp_path: Path) -> None:

@@ -122,4 +122,4 @@ def meaning(file: RobotFile, written: Path, time_limit: float) -> tuple[Robot, s
             robot, by = reading.compiled(worker, file, written, time_limit)
         except WorkerDied as error:
             raise InputError("file", str(file.path), f"it could not be compiled: {error}") from None
-    return robot, f"the model that {by} compiles"
+    return robot.change(name=file.root.get("model", "robot")), f"the model that {by} compiles"

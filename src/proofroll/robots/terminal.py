@@ -22,7 +22,7 @@ SHORT = {
     "inverse dynamics": "inv",
     "forward dynamics": "fwd",
 }
-VERDICTS = {"holds": "✓", "explained": "✗", "differs": "✗", "refused": "–", "missing": " "}
+_MARKS = {"holds": "✓", "explained": "✗", "differs": "✗", "refused": "–", "missing": " "}
 _COLOURS = {"holds": "green", "explained": "yellow", "differs": "red", "refused": "magenta"}
 
 
@@ -36,30 +36,31 @@ def console() -> Console:
 def table(content: dict[str, Any]) -> Table:
     """One line per engine: the difference at each layer that does not hold."""
     made = Table(box=None, padding=(0, 1, 0, 0))
-    made.add_column("engine", no_wrap=True, max_width=22)
+    made.add_column("engine", no_wrap=True, max_width=20)
     made.add_column("", no_wrap=True)
     for layer in content["layers"]:
         made.add_column(SHORT[layer], justify="right", no_wrap=True)
     for row in content["engines"]:
         style = _COLOURS.get(row["status"], "bold red")
         label = Text(one_line(f"{row['engine']} {row['version'] or ''}"), overflow="ellipsis")
-        if not row["layers"]:
-            made.add_row(label, Text(row["status"], style=style))
-            continue
         cells = (_cell(row["layers"].get(layer)) for layer in content["layers"])
-        made.add_row(label, Text(VERDICTS[row["status"]], style=style), *cells)
+        made.add_row(label, Text(_MARKS.get(row["status"], "!"), style=style), *cells)
     return made
 
 
 def _cell(layer: dict[str, Any] | None) -> Text:
     if layer is None:
         return Text("–", style="dim")
-    return Text("✓", style="green") if layer["holds"] else Text(amount(layer["difference"]), style="red")
+    return Text("✓", style="green") if layer["holds"] else Text(amount(layer["difference"], 0), style="red")
 
 
-def amount(value: float | None) -> str:
+def amount(value: float | None, digits: int = 1) -> str:
     """A difference in few characters."""
-    return "inf" if value is None or value == float("inf") else f"{value:.1e}".replace("e-0", "e-").replace("e+0", "e")
+    if value is None or value == float("inf"):
+        return "inf"
+    if value in range(100):
+        return f"{value:.0f}"
+    return f"{value:.{digits}e}".replace("e-0", "e-").replace("e+0", "e")
 
 
 def lines(content: dict[str, Any]) -> Iterator[str]:
