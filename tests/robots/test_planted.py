@@ -42,6 +42,8 @@ TINY = (
 TWO = '<joint name="k2" axis="1 0 0" pos="0.02 0 0.1"/><joint name="k3" axis="0 1 0" pos="0 0.05 0"/>'
 OTHER = '<body name="other" pos="1 0 0"><joint name="far" type="slide" axis="0 0 1"/><geom size="0.1"/></body>'
 LOOSE = '<body name="loose"><freejoint/><geom size="0.1 0.2 0.3" type="box"/></body>'
+FLYING = """<mujoco model="f"><worldbody><body name="b" pos="0.2 0.3 1" euler="90 20 0"><freejoint name="f"/>
+<geom type="box" size="0.1 0.2 0.3" pos="0.1 0.2 0.3"/></body></worldbody></mujoco>"""
 HIDDEN = 'contype="0" conaffinity="0"'
 
 # What a file holds, the engine that reads it, and the causes that must be named.
@@ -79,6 +81,9 @@ REAL: list[tuple[str, str, str, set[str]]] = [
     ("two joints", mjcf(second=TWO), "pinocchio", set()),
     ("two joints", mjcf(second=TWO), "mujoco", set()),
     ("free body", mjcf(extra=LOOSE), "mujoco", set()),
+    ("turned free body", FLYING, "mujoco", set()),
+    ("turned free body", FLYING, "pinocchio", {"free_body_offset"}),
+    ("free body", FLYING.replace("90 20 0", "0 0 0"), "pinocchio", set()),
 ]
 
 

@@ -43,7 +43,7 @@ class Joint:
         kind: a key of :data:`DOFS`.
         parent: a body, or :data:`WORLD`.
         child: a body.
-        position: of the joint in the parent's frame [m], shape (3,).
+        position: of the joint in the parent's frame [m], shape (3,); of a free joint what is added to its coordinates.
         rotation: of the child's frame against the parent's at coordinate 0, shape (3, 3).
         axis: unit vector in the child's frame, shape (3,).
         child_position: of the joint in the child's frame [m], shape (3,).

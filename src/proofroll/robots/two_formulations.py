@@ -54,7 +54,7 @@ def within(joint: Joint, states: States) -> tuple[Array, Array]:
     elif joint.kind == "spherical":
         turned = states.rotation[joint.name]
     elif joint.kind == "free":
-        return states.position[joint.name], states.rotation[joint.name]
+        return joint.position + states.position[joint.name], states.rotation[joint.name]
     R = joint.rotation @ turned
     return joint.position + slid @ joint.rotation.T - R @ joint.child_position, R
 

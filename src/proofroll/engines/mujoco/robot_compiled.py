@@ -43,12 +43,19 @@ def robot_of(model: Any) -> Robot:
                 bodies[child] = Body(child, 0.0, np.zeros(3), np.zeros((3, 3)))
             joints.append(_joint(model, joint, parent, child, position, rotation, joint in driven))
             parent, position, rotation = child, np.zeros(3), np.eye(3)
-    return Robot("robot", bodies, tuple(joints), _mimics(model), np.array(model.opt.gravity), _shapes(model, names))
+    return Robot("robot", bodies, tuple(joints), _mimics(model), np.array(model.opt.gravity), _sources(model, names))
 
 
-def _shapes(model: Any, names: list[str]) -> dict[str, dict[str, list[bool]]]:
-    """Body -> whether each of its shapes, in the order of the file, collides with anything."""
-    found: dict[str, dict[str, list[bool]]] = {name: {"collides": []} for name in names[1:]}
+def _sources(model: Any, names: list[str]) -> dict[str, dict[str, Any]]:
+    """Body -> its pose in the file, and whether each of its shapes, in the file's order, collides with anything."""
+    found: dict[str, dict[str, Any]] = {
+        names[index]: {
+            "collides": [],
+            "position": np.array(model.body_pos[index]),
+            "rotation": _matrix(model.body_quat[index]),
+        }
+        for index in range(1, model.nbody)
+    }
     for index in range(model.ngeom):
         name = names[int(model.geom_bodyid[index])]
         if name in found:
