@@ -276,7 +276,15 @@ LOADED = '<joint name="k2" axis="1 0 0" pos="0.02 0 0.1" armature="0.3"/>'
 _MIDDLE = '<body name="middle"><inertial pos="0 0 0" mass="1e-13" diaginertia="1e-14 1e-14 1e-14"/>'
 _FIRST, _SECOND = re.findall("<joint .*?/>", TWO)
 _LOWER = '<body name="lower" pos="0.1 0.2 0.4" euler="-20 5 40">'
+_CLASSES = '<default><joint damping="2"/><default class="bare"/></default>'
 IN_MJCF: list[tuple[str, str, str, str, str]] = [
+    (
+        "defaults_not_inherited",
+        mjcf(joint='class="bare"').replace("<worldbody>", _CLASSES + "<worldbody>"),
+        'class="bare"/></default>',
+        'class="bare"><joint damping="0"/></default></default>',
+        "",
+    ),
     (
         "armature_of_actuated_joints_only",
         mjcf(joint='armature="0.2"', second=LOADED, actuator='<motor joint="k1"/>'),
