@@ -100,7 +100,8 @@ def _truth_version() -> str:
 def digest(sources: list[Path]) -> str:
     """Hash of the adapter's files and of the modules that every result rests on.
 
-    A module or folder ``reproducer`` of an adapter is left out: it writes bug reports, on which no result hangs.
+    What no result hangs on is left out of an adapter: a module or folder ``reproducer``, which writes bug reports, and
+    modules ``robot_…``, which read robot files.
     """
     root = Path(proofroll.__file__).parent
     files = [root / name for name in FOUNDATION if (root / name).is_file()]
@@ -109,7 +110,8 @@ def digest(sources: list[Path]) -> str:
             files.append(source)
             continue
         for file in sorted(source.rglob("*.py")):
-            if "reproducer" not in file.relative_to(source).with_suffix("").parts:
+            parts = file.relative_to(source).with_suffix("").parts
+            if "reproducer" not in parts and not parts[-1].startswith("robot_"):
                 files.append(file)
     content = hashlib.sha256()
     for file in files:
