@@ -87,13 +87,15 @@ def truth_version() -> str:
 def digest(sources: list[Path]) -> str:
     """Hash of the adapter's files and of the folders that every result rests on.
 
-    What only shows results (:data:`ASIDE`), as the bug reports of an adapter do, is left out: no result hangs on it.
+    What only shows results (:data:`ASIDE`), as the bug reports of an adapter do, is left out, and so are modules
+    ``robot_…``, which read robot files: no result hangs on them.
     """
     root = Path(proofroll.__file__).parent
     content = hashlib.sha256()
     for source in [*(root / name for name in FOUNDATION), *sources]:
         files = sorted(source.rglob("*.py")) if source.is_dir() else [source]
         for file in files:
-            if not ASIDE & set(file.relative_to(source.parent).with_suffix("").parts):
+            aside = file.stem.startswith("robot_") or ASIDE & set(file.relative_to(source.parent).with_suffix("").parts)
+            if not aside:
                 content.update(file.read_bytes())
     return content.hexdigest()[:16]

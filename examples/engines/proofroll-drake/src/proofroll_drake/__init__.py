@@ -1,0 +1,1 @@
+"""Drake for proofroll."""

@@ -1,0 +1,1 @@
+"""PyBullet for proofroll."""

@@ -1,0 +1,227 @@
+"""A robot in Exudyn, which reads no such files: its kinematic tree is fed from our reading."""
+
+from __future__ import annotations
+
+import importlib
+import importlib.metadata
+from collections.abc import Mapping
+from typing import Any, ClassVar
+
+import numpy as np
+from scipy.spatial.transform import Rotation
+
+from proofroll.core.errors import Refused
+from proofroll.robots.model import WORLD, Array, Joint, Robot
+from proofroll.robots.protocol import AtState, Reading, Request, evaluate
+
+_FREE = (("prismatic", 0), ("prismatic", 1), ("prismatic", 2), ("revolute", 0), ("revolute", 1), ("revolute", 2))
+
+
+class ExudynRobots:
+    """``ObjectKinematicTree``: joints about z, a free base as three slides and three hinges (about x, y, z)."""
+
+    kinds: ClassVar[tuple[str, ...]] = ("urdf", "mjcf")
+    options: ClassVar[Mapping[str, str]] = {}
+    # A free base has the rates of Euler angles, whose matrix near its singularity costs three digits.
+    tolerances: ClassVar[Mapping[str, float]] = {}
+    says: ClassVar[str] = "fed from our reading of the file: it has no importer of its own, so this checks its dynamics"
+
+    def version(self) -> str:
+        """Version of the package."""
+        return importlib.metadata.version("exudyn")
+
+    def read(self, request: Request) -> Reading:
+        """The tree, evaluated by the parts of its implicit solver."""
+        tree = _Tree(request)
+        joints = tuple(joint.name for joint in request.robot.moving)
+        dofs = tuple(joint.dofs for joint in request.robot.moving)
+        frames: list[dict[str, tuple[Array, Array]]] = []
+
+        def at(k: int) -> AtState:
+            q, v, T, drift = tree.state(k)
+            tree.put(q, np.zeros_like(q), np.zeros_like(q))
+            g = -tree.force()
+            tree.put(q, v, np.zeros_like(q))
+            passive, M = tree.damping * v, tree.mass_matrix()
+            h = -tree.force() - passive
+            frames.append(tree.frames())
+
+            def forward(torque: Array) -> Array:
+                tree.put(q, v, torque)
+                return np.asarray(np.linalg.solve(M, tree.force()))
+
+            return AtState(T, drift, M, g, h, None, forward)
+
+        arrays = evaluate(request, joints, dofs, at)
+        mass, com, inertia = tree.held()
+        return Reading(
+            joints, dofs, mass, com, inertia,
+            {name: np.array([frame[name][0] for frame in frames]) for name in joints},
+            {name: np.array([frame[name][1] for frame in frames]) for name in joints},
+            **arrays,
+        )  # fmt: skip
+
+
+def _turn(joint: Joint) -> Array:
+    """Axes of the tree's link in the child's frame: z is the joint's axis; of a free joint the child's own."""
+    if joint.kind == "free":
+        return np.eye(3)
+    return np.asarray(Rotation.align_vectors(joint.axis[None], [[0, 0, 1]])[0].as_matrix())
+
+
+class _Tree:
+    """The tree in a system of its own, and where its coordinates are."""
+
+    def __init__(self, request: Request) -> None:
+        exu: Any = importlib.import_module("exudyn")
+        self.request, self.robot = request, request.robot
+        if any(joint.kind == "spherical" for joint in self.robot.moving):
+            raise Refused("the tree of Exudyn has no spherical joint")
+        self.turn = {joint.name: _turn(joint) for joint in self.robot.moving}
+        self.damping = np.concatenate([np.full(joint.dofs, joint.damping) for joint in self.robot.moving])
+        self.link: dict[str, int] = {}
+        rows = [row for joint in self.robot.moving for row in self._rows(joint)]
+        types = {("revolute", 0): exu.JointType.RevoluteX, ("revolute", 1): exu.JointType.RevoluteY}
+        types |= {("revolute", 2): exu.JointType.RevoluteZ, ("prismatic", 0): exu.JointType.PrismaticX}
+        types |= {("prismatic", 1): exu.JointType.PrismaticY, ("prismatic", 2): exu.JointType.PrismaticZ}
+        kinds, parents, turns, offsets, masses, coms, inertias = zip(*rows, strict=True)
+        self.container = exu.SystemContainer()
+        self.mbs = self.container.AddSystem()
+        n = len(rows)
+        zeros = [0.0] * n
+        self._make(n, [types[kind] for kind in kinds], parents, turns, offsets, masses, coms, inertias, zeros)
+
+    def _make(
+        self,
+        n: int,
+        kinds: Any,
+        parents: Any,
+        turns: Any,
+        offsets: Any,
+        masses: Any,
+        coms: Any,
+        inertias: Any,
+        zeros: Any,
+    ) -> None:
+        exu: Any = importlib.import_module("exudyn")  # its stubs have other signatures than its classes
+        ii: Any = importlib.import_module("exudyn.itemInterface")
+        node = self.mbs.AddNode(ii.NodeGenericODE2(referenceCoordinates=zeros, initialCoordinates=zeros,
+                                                   initialCoordinates_t=zeros, numberOfODE2Coordinates=n))  # fmt: skip
+        self.tree = self.mbs.AddObject(
+            ii.ObjectKinematicTree(
+                nodeNumber=node, jointTypes=kinds, linkParents=list(parents),
+                jointTransformations=exu.Matrix3DList([np.array(turn) for turn in turns]),
+                jointOffsets=exu.Vector3DList([np.array(offset) for offset in offsets]),
+                linkInertiasCOM=exu.Matrix3DList([np.array(inertia) for inertia in inertias]),
+                linkCOMs=exu.Vector3DList([np.array(com) for com in coms]), linkMasses=list(masses),
+                gravity=list(self.robot.gravity), jointForceVector=zeros, jointPControlVector=zeros,
+                jointDControlVector=list(self.damping), jointPositionOffsetVector=zeros,
+                jointVelocityOffsetVector=zeros,
+            )
+        )  # fmt: skip
+        self.markers = {
+            joint.name: self.mbs.AddMarker(
+                ii.MarkerKinematicTreeRigid(
+                    objectNumber=self.tree, linkNumber=self.link[joint.name],
+                    localPosition=list(-self.turn[joint.name].T @ joint.child_position),
+                )
+            )
+            for joint in self.robot.moving
+        }  # fmt: skip
+        self.mbs.Assemble()
+        self.solver = exu.MainSolverImplicitSecondOrder()
+        settings = exu.SimulationSettings()
+        settings.timeIntegration.verboseMode = 0
+        settings.solution.file.write = False
+        self.solver.InitializeSolver(self.mbs, settings)
+
+    def _rows(self, joint: Joint) -> list[tuple[Any, ...]]:
+        """Links of the tree for a joint: type, parent, rotation, offset, mass, centre of mass, inertia."""
+        robot, start = self.robot, robot_columns(self.robot)[joint.name]
+        group, A = robot.groups[joint.name], self.turn[joint.name]
+        carried = (group.mass, A.T @ (group.com - joint.child_position), A.T @ group.inertia @ A)
+        home, p, R = robot.welded[joint.parent]
+        position, rotation = p + R @ joint.position, R @ joint.rotation @ A
+        parent = -1
+        if home != WORLD:
+            parent = self.link[home]
+            before = next(other for other in robot.moving if other.name == home)
+            B = self.turn[home]
+            position, rotation = B.T @ (position - before.child_position), B.T @ rotation
+        self.link[joint.name] = start + joint.dofs - 1
+        if joint.kind != "free":
+            # the tree's rotation takes coordinates of the parent to those of the joint
+            return [((joint.kind, 2), parent, rotation, position, *carried)]
+        empty = (0.0, np.zeros(3), np.zeros((3, 3)))
+        return [
+            (kind, start + index - 1 if index else -1, np.eye(3), np.zeros(3), *(carried if index == 5 else empty))
+            for index, kind in enumerate(_FREE)
+        ]
+
+    def state(self, k: int) -> tuple[Array, Array, Array, Array]:
+        """Coordinates, velocities, and their relation to the common velocity."""
+        states, n = self.request.states, self.robot.dofs
+        q, T, drift = np.zeros(n), np.eye(n), np.zeros(n)
+        velocity = np.concatenate([states.velocity[joint.name][k] for joint in self.robot.moving])
+        for joint in self.robot.moving:
+            columns = self.robot.columns[joint.name]
+            if joint.kind != "free":
+                q[columns] = states.angle[joint.name][k]
+                continue
+            angles = Rotation.from_matrix(states.rotation[joint.name][k]).as_euler("XYZ")
+            q[columns] = [*states.position[joint.name][k], *angles]
+            turned = slice(columns.start + 3, columns.stop)
+            x = np.array([1.0, 0.0, 0.0])
+            y = Rotation.from_euler("X", angles[0]).apply([0.0, 1.0, 0.0])
+            z = Rotation.from_euler("XY", angles[:2]).apply([0.0, 0.0, 1.0])
+            inverse = np.linalg.inv(np.column_stack([x, y, z]))
+            a, b, _ = rates = inverse @ velocity[turned]
+            moving = np.column_stack([0 * x, np.cross(a * x, y), np.cross(a * x + b * y, z)]) @ rates
+            T[turned, turned], drift[turned] = inverse, -inverse @ moving
+        return q, T @ velocity, T, drift
+
+    def put(self, q: Array, v: Array, torque: Array) -> None:
+        """Puts the system into a state with joint torques."""
+        self.mbs.systemData.SetODE2Coordinates(list(q))
+        self.mbs.systemData.SetODE2Coordinates_t(list(v))
+        self.mbs.SetObjectParameter(self.tree, "jointForceVector", list(torque))
+
+    def force(self) -> Array:
+        """Right-hand side: what M times the accelerations is equal to, damping included."""
+        self.solver.ComputeODE2RHS(self.mbs)
+        return np.array(self.solver.GetSystemResidual())[: self.robot.dofs]
+
+    def mass_matrix(self) -> Array:
+        """The mass matrix."""
+        self.solver.ComputeMassMatrix(self.mbs)
+        found = np.array(self.solver.GetSystemMassMatrix())
+        if not np.all(np.isfinite(found)):
+            raise Refused("the mass matrix of its tree is not finite, as where a joint moves no mass")
+        return found
+
+    def frames(self) -> dict[str, tuple[Array, Array]]:
+        """Position and rotation of the body that each joint carries."""
+        import exudyn as exu
+
+        kind, found = exu.OutputVariableType, {}
+        for name, marker in self.markers.items():
+            p = self.mbs.GetMarkerOutput(marker, kind.Position)
+            R = np.array(self.mbs.GetMarkerOutput(marker, kind.RotationMatrix)).reshape(3, 3)
+            found[name] = (np.array(p), R @ self.turn[name].T)
+        return found
+
+    def held(self) -> tuple[dict[str, float], dict[str, Array], dict[str, Array]]:
+        """Mass, centre of mass and inertia of each link, read back."""
+        parameters = self.mbs.GetObject(self.tree)
+        mass, com, inertia = {}, {}, {}
+        for joint in self.robot.moving:
+            link, A = self.link[joint.name], self.turn[joint.name]
+            mass[joint.name] = float(parameters["linkMasses"][link])
+            com[joint.name] = A @ np.array(parameters["linkCOMs"][link]) + joint.child_position
+            inertia[joint.name] = A @ np.array(parameters["linkInertiasCOM"][link]) @ A.T
+        return mass, com, inertia
+
+
+def robot_columns(robot: Robot) -> dict[str, int]:
+    """First velocity of each joint."""
+    return {name: columns.start for name, columns in robot.columns.items()}

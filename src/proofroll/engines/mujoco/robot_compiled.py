@@ -1,0 +1,105 @@
+"""MuJoCo's compiled model as plain data: what an MJCF means."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+from scipy.spatial.transform import Rotation
+
+from proofroll.core.errors import Refused
+from proofroll.robots.model import WORLD, Array, Body, Joint, Mimic, Robot
+
+_KINDS = {0: "free", 1: "spherical", 2: "prismatic", 3: "revolute"}
+
+
+def robot_of(model: Any) -> Robot:
+    """The robot; a body with several joints is carried by bodies without mass, one for each further joint.
+
+    Coordinates count from ``qpos0``, the pose that the file describes.
+
+    Raises:
+        Refused: the model has what changes its mass matrix and is not covered (armature of a tendon).
+    """
+    if np.any(getattr(model, "tendon_armature", np.zeros(0))):
+        raise Refused("a tendon has armature, which the check does not cover")
+    names = [WORLD, *(model.body(index).name for index in range(1, model.nbody))]
+    bodies: dict[str, Body] = {}
+    joints: list[Joint] = []
+    driven = {int(model.actuator_trnid[index, 0]) for index in range(model.nu) if model.actuator_trntype[index] == 0}
+    for index in range(1, model.nbody):
+        name, parent = names[index], names[int(model.body_parentid[index])]
+        A = _matrix(model.body_iquat[index])
+        inertia = A @ np.diag(model.body_inertia[index]) @ A.T
+        bodies[name] = Body(name, float(model.body_mass[index]), np.array(model.body_ipos[index]), inertia)
+        position, rotation = np.array(model.body_pos[index]), _matrix(model.body_quat[index])
+        first, count = int(model.body_jntadr[index]), int(model.body_jntnum[index])
+        if not count:
+            joints.append(Joint(f"({name})", "fixed", parent, name, position, rotation, np.array([0.0, 0.0, 1.0])))
+        for joint in range(first, first + count):
+            last = joint == first + count - 1
+            child = name if last else f"{name}/{joint - first}"
+            if not last:
+                bodies[child] = Body(child, 0.0, np.zeros(3), np.zeros((3, 3)))
+            joints.append(_joint(model, joint, parent, child, position, rotation, joint in driven))
+            parent, position, rotation = child, np.zeros(3), np.eye(3)
+    return Robot("robot", bodies, tuple(joints), _mimics(model), np.array(model.opt.gravity), _sources(model, names))
+
+
+def _sources(model: Any, names: list[str]) -> dict[str, dict[str, Any]]:
+    """Body -> its pose in the file, and whether each of its shapes, in the file's order, collides with anything."""
+    found: dict[str, dict[str, Any]] = {
+        names[index]: {
+            "collides": [],
+            "position": np.array(model.body_pos[index]),
+            "rotation": _matrix(model.body_quat[index]),
+        }
+        for index in range(1, model.nbody)
+    }
+    for index in range(model.ngeom):
+        name = names[int(model.geom_bodyid[index])]
+        if name in found:
+            found[name]["collides"].append(bool(model.geom_contype[index] or model.geom_conaffinity[index]))
+    return found
+
+
+def _joint(model: Any, index: int, parent: str, child: str, position: Array, rotation: Array, driven: bool) -> Joint:
+    kind = _KINDS[int(model.jnt_type[index])]
+    dof, start = int(model.jnt_dofadr[index]), int(model.jnt_qposadr[index])
+    anchor = np.array(model.jnt_pos[index]) * (kind != "free")
+    shift = float(model.qpos0[start]) * (kind in {"revolute", "prismatic"})
+    bounded = bool(model.jnt_limited[index]) and kind in {"revolute", "prismatic"}
+    return Joint(
+        model.joint(index).name, kind, parent, child,
+        position + rotation @ anchor if kind != "free" else np.zeros(3),
+        rotation if kind != "free" else np.eye(3),
+        np.array(model.jnt_axis[index]), anchor,
+        damping=_first(model.dof_damping[dof]),
+        friction=float(model.dof_frictionloss[dof]),
+        armature=float(model.dof_armature[dof]),
+        stiffness=_first(model.jnt_stiffness[index]),
+        rest=float(model.qpos_spring[start]) - shift,
+        lower=float(model.jnt_range[index, 0]) - shift if bounded else None,
+        upper=float(model.jnt_range[index, 1]) - shift if bounded else None,
+        actuated=driven,
+    )  # fmt: skip
+
+
+def _mimics(model: Any) -> tuple[Mimic, ...]:
+    """Linear couplings of joints; others are constraints that the comparison leaves out."""
+    found = []
+    for index in range(model.neq):
+        first, other = int(model.eq_obj1id[index]), int(model.eq_obj2id[index])
+        factors = model.eq_data[index][:5]
+        if int(model.eq_type[index]) == 2 and other >= 0 and model.eq_active0[index] and not np.any(factors[2:]):
+            found.append(Mimic(model.joint(first).name, model.joint(other).name, float(factors[1]), float(factors[0])))
+    return tuple(found)
+
+
+def _first(value: Any) -> float:
+    """The linear coefficient, where a version of MuJoCo has a polynomial."""
+    return float(np.ravel(value)[0])
+
+
+def _matrix(quaternion: Array) -> Array:
+    return np.asarray(Rotation.from_quat(quaternion, scalar_first=True).as_matrix())

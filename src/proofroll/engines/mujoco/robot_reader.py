@@ -1,0 +1,182 @@
+"""MuJoCo's own importer of URDF and MJCF, its compiled model read back."""
+
+from __future__ import annotations
+
+import importlib.metadata
+from collections.abc import Callable, Mapping
+from pathlib import Path
+from typing import Any, ClassVar
+
+import numpy as np
+from scipy.spatial.transform import Rotation
+
+from proofroll.robots.model import Array, Body, Robot, composed
+from proofroll.robots.protocol import AtState, Reading, Request, evaluate
+
+
+class MujocoRobots:
+    """What MuJoCo's compiler makes of a robot file."""
+
+    kinds: ClassVar[tuple[str, ...]] = ("urdf", "mjcf")
+    defines: ClassVar[str] = "mjcf"
+    options: ClassVar[Mapping[str, str]] = {
+        "fusestatic": "merge bodies without a joint into their parents (default for URDF)",
+        "balanceinertia": "replace an inertia that breaks the triangle inequality by a sphere's",
+        "boundmass": "raise every mass to 1e-6 kg and every inertia to 1e-8 kg m²",
+    }
+    says: ClassVar[str] = ""
+
+    @property
+    def tolerances(self) -> dict[str, float]:
+        """Until 3.13 principal axes are found to about the root of double precision: half angles from 1 − cos."""
+        if tuple(int(part) for part in self.version().split(".")[:2]) >= (3, 14):
+            return {}
+        torques = ("mass matrix", "gravity", "bias", "inverse dynamics", "forward dynamics")
+        return {"bodies": 5e-6, **dict.fromkeys(torques, 1e-7)}
+
+    def version(self) -> str:
+        """Version of the package."""
+        return importlib.metadata.version("mujoco")
+
+    def compiled(self, path: Path) -> Robot:
+        """The compiled model of an MJCF as plain data."""
+        import mujoco
+
+        from proofroll.engines.mujoco.robot_compiled import robot_of
+
+        return robot_of(mujoco.MjModel.from_xml_path(str(path)))
+
+    def read(self, request: Request) -> Reading:
+        """The compiled model without actuators, tendons, medium and constraints, of which friction is one."""
+        import mujoco
+
+        model = _compile(request)
+        off = mujoco.mjtDisableBit
+        model.opt.disableflags |= int(off.mjDSBL_CONSTRAINT) | int(off.mjDSBL_ACTUATION)
+        model.opt.density = model.opt.viscosity = 0.0
+        for name in ("body_gravcomp", "tendon_stiffness", "tendon_damping"):
+            if hasattr(model, name):
+                getattr(model, name)[:] = 0.0
+        if request.kind == "urdf":
+            model.opt.gravity = request.gravity
+        data = mujoco.MjData(model)
+        joints = tuple(model.joint(index).name for index in range(model.njnt))
+        dofs = tuple({0: 6, 1: 3}.get(int(kind), 1) for kind in model.jnt_type)
+        home = {
+            joints[index]: int(model.jnt_bodyid[index])
+            for index in range(model.njnt)
+            if index == model.njnt - 1 or model.jnt_bodyid[index + 1] != model.jnt_bodyid[index]
+        }
+        frames: list[tuple[Array, Array]] = []
+        arrays = evaluate(request, joints, dofs, lambda k: _at(request, model, data, joints, dofs, k, frames))
+        groups = {name: _group(model, body) for name, body in home.items()}
+        return Reading(
+            joints,
+            dofs,
+            {name: body.mass for name, body in groups.items()},
+            {name: body.com for name, body in groups.items()},
+            {name: body.inertia for name, body in groups.items()},
+            {name: np.array([p[body] for p, _ in frames]) for name, body in home.items()},
+            {name: np.array([R[body].reshape(3, 3) for _, R in frames]) for name, body in home.items()},
+            coupled=_coupled(model, joints),
+            remarks=tuple(f"option {name}={str(on).lower()}" for name, on in request.options.items()),
+            **arrays,
+        )
+
+
+def _compile(request: Request) -> Any:
+    """The model; options go into the file, where every version reads them."""
+    import mujoco
+
+    text = request.path.read_text(encoding="utf-8")
+    written = {key: str(on).lower() for key, on in request.options.items() if key != "boundmass"}
+    if request.options.get("boundmass"):
+        written |= {"boundmass": "1e-6", "boundinertia": "1e-8"}
+    if written:
+        compiler = "<compiler " + " ".join(f'{key}="{value}"' for key, value in written.items()) + "/>"
+        end = "</robot>" if request.kind == "urdf" else "</mujoco>"
+        extra = f"<mujoco>{compiler}</mujoco>" if request.kind == "urdf" else compiler
+        text = text[: text.rindex(end)] + extra + end
+    if request.kind == "urdf" and request.base == "free":
+        spec = mujoco.MjSpec.from_string(text)
+        bodies = spec.worldbody.bodies if hasattr(spec.worldbody, "bodies") else [spec.worldbody.first_body()]
+        bodies[0].add_freejoint().name = request.base_joint
+        return spec.compile()
+    return mujoco.MjModel.from_xml_string(text)
+
+
+def _at(
+    request: Request, model: Any, data: Any, joints: tuple[str, ...], dofs: tuple[int, ...], k: int, frames: list[Any]
+) -> AtState:
+    import mujoco
+
+    states = request.states
+    T = np.eye(model.nv)
+    data.qpos[:], data.qvel[:] = model.qpos0, 0.0
+    for index, name in enumerate(joints):
+        q, v = int(model.jnt_qposadr[index]), int(model.jnt_dofadr[index])
+        if name in states.rotation:
+            R = states.rotation[name][k]
+            if dofs[index] == 6:
+                data.qpos[q : q + 3] = states.position[name][k]
+                T[v + 3 : v + 6, v + 3 : v + 6] = R.T  # its angular velocity has body axes
+                q += 3
+            data.qpos[q : q + 4] = Rotation.from_matrix(R).as_quat(scalar_first=True)
+        elif name in states.angle:
+            data.qpos[q] += states.angle[name][k]
+    mujoco.mj_forward(model, data)
+    g = data.qfrc_bias.copy()
+    for index, name in enumerate(joints):
+        v = int(model.jnt_dofadr[index])
+        if name in states.velocity:
+            data.qvel[v : v + dofs[index]] = states.velocity[name][k]
+    data.qvel[:] = T @ data.qvel
+    data.qfrc_applied[:] = 0.0
+    mujoco.mj_forward(model, data)
+    frames.append((data.xpos.copy(), data.xmat.copy()))
+    M = np.zeros((model.nv, model.nv))
+    try:
+        mujoco.mj_fullM(model, data, M)
+    except TypeError:  # before 3.10
+        mujoco.mj_fullM(model, M, data.qM)
+
+    def inverse(acceleration: Array) -> Array:
+        data.qacc[:] = acceleration
+        mujoco.mj_inverse(model, data)
+        return np.array(data.qfrc_inverse + data.qfrc_passive)
+
+    def forward(torque: Array) -> Array:
+        data.qfrc_applied[:] = torque
+        mujoco.mj_forward(model, data)
+        data.qfrc_applied[:] = 0.0
+        return np.array(data.qacc)
+
+    return AtState(T, np.zeros(model.nv), M, g, data.qfrc_bias.copy(), inverse, forward)
+
+
+def _group(model: Any, body: int) -> Body:
+    """A body with what is welded to it, in its frame."""
+    poses = {body: (np.zeros(3), np.eye(3))}
+    parts = []
+    for index in range(body, model.nbody):
+        if index != body:
+            parent = int(model.body_parentid[index])
+            if int(model.body_weldid[index]) != body or parent not in poses:
+                continue
+            p, R = poses[parent]
+            poses[index] = (p + R @ model.body_pos[index], R @ _matrix(model.body_quat[index]))
+        A = _matrix(model.body_iquat[index])
+        inertia = A @ np.diag(model.body_inertia[index]) @ A.T
+        parts.append((Body("", float(model.body_mass[index]), model.body_ipos[index].copy(), inertia), *poses[index]))
+    return composed("", parts)
+
+
+def _matrix(quaternion: Array) -> Array:
+    return np.asarray(Rotation.from_quat(quaternion, scalar_first=True).as_matrix())
+
+
+def _coupled(model: Any, joints: tuple[str, ...]) -> tuple[str, ...]:
+    import mujoco
+
+    joint: Callable[[int], bool] = lambda index: model.eq_type[index] == mujoco.mjtEq.mjEQ_JOINT  # noqa: E731
+    return tuple(joints[int(model.eq_obj1id[index])] for index in range(model.neq) if joint(index))

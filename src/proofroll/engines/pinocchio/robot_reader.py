@@ -1,0 +1,153 @@
+"""Pinocchio's own importers of URDF and MJCF, the model read back."""
+
+from __future__ import annotations
+
+import importlib.metadata
+from collections.abc import Mapping
+from typing import Any, ClassVar
+
+import numpy as np
+from scipy.spatial.transform import Rotation
+
+from proofroll.robots.model import Array
+from proofroll.robots.protocol import AtState, Reading, Request, evaluate
+
+
+class PinocchioRobots:
+    """What ``buildModelFromUrdf`` and ``buildModelFromMJCF`` make of a robot file."""
+
+    kinds: ClassVar[tuple[str, ...]] = ("urdf", "mjcf")
+    options: ClassVar[Mapping[str, str]] = {"mimic": "reduce following joints (default: they move freely)"}
+    tolerances: ClassVar[Mapping[str, float]] = {}
+    says: ClassVar[str] = ""
+
+    def version(self) -> str:
+        """Version of the package."""
+        return importlib.metadata.version("pin")
+
+    def read(self, request: Request) -> Reading:
+        """The model, evaluated by crba, rnea and aba."""
+        import pinocchio as pin
+
+        model = _build(request)
+        if request.kind == "urdf":
+            model.gravity.linear = request.gravity
+        data = model.createData()
+        reduced = request.options.get("mimic", False)
+        columns = _columns(request, model)
+        joints = tuple(name for name, _, _ in columns)
+        dofs = tuple(dof for _, _, dof in columns)
+        last = {index: name for name, index, _ in columns}  # of several joints in one body the last carries it
+        frames: dict[str, list[Any]] = {name: [] for name in last.values()}
+
+        def at(k: int) -> AtState:
+            q, v, T, drift = _state(request, model, columns, k)
+            pin.forwardKinematics(model, data, q)
+            pin.updateFramePlacements(model, data)
+            for index, name in last.items():
+                frame = _frame(request, model, name, index)
+                frames[name].append((data.oMi[index] if frame is None else data.oMf[frame]).copy())
+            M = np.triu(pin.crba(model, data, q))
+            M = M + np.triu(M, 1).T
+            still = np.zeros(model.nv)
+            g, h = (np.array(pin.rnea(model, data, q, rate, still)) for rate in (still, v))
+
+            def inverse(acceleration: Array) -> Array:
+                return np.array(pin.rnea(model, data, q, v, acceleration))
+
+            def forward(torque: Array) -> Array:
+                return np.array(pin.aba(model, data, q, v, torque))
+
+            return AtState(T, drift, M, g, h, inverse, None if reduced else forward)  # aba knows no following joints
+
+        arrays = evaluate(request, joints, dofs, at)
+        mass, com, inertia = {}, {}, {}
+        for index, name in last.items():
+            frame = _frame(request, model, name, index)
+            placed = model.inertias[index]
+            if frame is not None:
+                placed = model.frames[frame].placement.actInv(placed)
+            mass[name], com[name], inertia[name] = float(placed.mass), np.array(placed.lever), np.array(placed.inertia)
+        return Reading(
+            joints, dofs, mass, com, inertia,
+            {name: np.array([X.translation for X in found]) for name, found in frames.items()},
+            {name: np.array([X.rotation for X in found]) for name, found in frames.items()},
+            remarks=("option mimic=true",) if reduced else (),
+            **arrays,
+        )  # fmt: skip
+
+
+def _build(request: Request) -> Any:
+    import pinocchio as pin
+
+    mimic = {"mimic": True} if request.options.get("mimic") else {}
+    if request.kind == "mjcf":
+        return pin.buildModelFromMJCF(str(request.path))
+    free = (pin.JointModelFreeFlyer(),) if request.base == "free" else ()
+    return pin.buildModelFromUrdf(str(request.path), *free, **mimic)
+
+
+def _columns(request: Request, model: Any) -> list[tuple[str, int, int]]:
+    """Joints by the file's names in the order of velocities: name, index in the model, velocities.
+
+    Several joints in one body of an MJCF are one composite joint of the model.
+    """
+    found: list[tuple[str, int, int]] = []
+    for index in range(1, model.njoints):
+        joint, name = model.joints[index], str(model.names[index])
+        if request.kind == "urdf" and name == "root_joint":
+            name = request.base_joint
+        if joint.shortname() == "JointModelComposite":
+            parts = [part.nv for part in joint.extract().joints]
+            found += [(part, index, nv) for part, nv in zip(_composite(request, model, index), parts, strict=True)]
+        elif joint.nv:
+            found.append((name, index, int(joint.nv)))
+    return found
+
+
+def _composite(request: Request, model: Any, index: int) -> list[str]:
+    """The file's names of the joints within a composite one, whose body they move."""
+    bodies = {str(frame.name) for frame in model.frames if frame.parentJoint == index}
+    return [name for name, child in request.children.items() if child.rpartition("/")[0] in bodies or child in bodies]
+
+
+def _frame(request: Request, model: Any, joint: str, index: int) -> int | None:
+    """The frame of the body that a joint carries, where the model has it; its placement is against the joint."""
+    import pinocchio as pin
+
+    body = request.children.get(joint)
+    if body is None or not model.existFrame(body, pin.FrameType.BODY):
+        return None
+    frame = int(model.getFrameId(body, pin.FrameType.BODY))
+    return frame if model.frames[frame].parentJoint == index else None
+
+
+def _state(
+    request: Request, model: Any, columns: list[tuple[str, int, int]], k: int
+) -> tuple[Array, Array, Array, Array]:
+    """Configuration, velocity, and the relation to the common velocity: both parts of a free base have body axes."""
+    import pinocchio as pin
+
+    states = request.states
+    described = [entry.key() for entry in model.referenceConfigurations]  # the pose that an MJCF describes
+    q = np.array(model.referenceConfigurations["qpos0"] if "qpos0" in described else pin.neutral(model))
+    v = np.zeros(model.nv)
+    T, drift = np.eye(model.nv), np.zeros(model.nv)
+    step = np.zeros(model.nv)
+    iv = 0
+    for name, index, dof in columns:
+        iq = model.joints[index].idx_q
+        rate = states.velocity.get(name)
+        v[iv : iv + dof] = 0.0 if rate is None else rate[k]
+        if name in states.angle:
+            step[iv] = states.angle[name][k]
+        elif name in states.rotation:
+            R = states.rotation[name][k]
+            if dof == 6:
+                q[iq : iq + 3] = states.position[name][k]
+                T[iv : iv + 3, iv : iv + 3] = T[iv + 3 : iv + 6, iv + 3 : iv + 6] = R.T
+                drift[iv : iv + 3] = -R.T @ np.cross(v[iv + 3 : iv + 6], v[iv : iv + 3])
+                iq += 3
+            q[iq : iq + 4] = Rotation.from_matrix(R).as_quat()
+        iv += dof
+    return pin.integrate(model, q, step), T @ v, T, drift

@@ -1,0 +1,1 @@
+"""Robot files: whether engines hold the model that the file describes, and if not, who is wrong about what."""

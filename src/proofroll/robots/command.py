@@ -1,0 +1,76 @@
+"""Robot files: whether engines hold the model that a file describes."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Annotated
+
+import typer
+
+from proofroll.cli.options import CONTRADICTED, ENGINE, OK, Engines, Json, progress_bar, write_json
+
+
+def check(
+    file: Annotated[Path, typer.Argument(help="A robot file, URDF or MJCF.")],
+    engine: Engines = None,
+    base: Annotated[str, typer.Option(help="What carries the root of a URDF: fixed or free.")] = "fixed",
+    states: Annotated[int, typer.Option(min=1, max=1000, help="Random states that are compared.")] = 20,
+    seed: Annotated[int, typer.Option(min=0, help="Of the random states.")] = 0,
+    out: Annotated[Path | None, typer.Option("--out", help="Write check.html and check.json to this folder.")] = None,
+    time_limit: Annotated[float, typer.Option(min=0.1, help="Wall seconds for each engine.")] = 120.0,
+    as_json: Json = False,
+) -> None:
+    """Read a robot file with every engine's own importer; exit 1 if one does not hold the model that it describes."""
+    from proofroll.robots.check import check as checked
+    from proofroll.robots.check import differs
+
+    with progress_bar("engines") as advance:
+        content = checked(
+            file, engine or (), base=base, states=states, seed=seed, time_limit=time_limit, progress=advance
+        )
+    if out is not None:
+        import json
+
+        from proofroll.files.json_data import plain
+        from proofroll.robots.page import page
+        from proofroll.running.store import write_text
+
+        write_text(out / "check.html", page(plain(content)))
+        write_text(out / "check.json", json.dumps(plain(content), indent=1, ensure_ascii=False))
+    if as_json:
+        write_json(content)
+    else:
+        from proofroll.robots.terminal import console, lines, table, verdict_lines
+
+        printed = console()
+        for line in lines(content):
+            printed.print(line, markup=False)
+        printed.print(table(content))
+        for line in verdict_lines(content):
+            printed.print(line, markup=False)
+    if any(differs(row) for row in content["engines"]):
+        raise typer.Exit(CONTRADICTED)
+    raise typer.Exit(OK if any(row["layers"] for row in content["engines"]) else ENGINE)
+
+
+def robots(
+    name: Annotated[list[str] | None, typer.Argument(help="Robots of the gallery; by default all.")] = None,
+    engine: Engines = None,
+    as_json: Json = False,
+) -> None:
+    """Check the robots of comparisons/robots.toml; exit 1 if an engine does otherwise than the file expects."""
+    from proofroll.robots.gallery import gallery
+
+    with progress_bar("robots") as advance:
+        content = gallery(name or (), engine or (), progress=advance)
+    if as_json:
+        write_json(content)
+    else:
+        from proofroll.robots.terminal import console, gallery_lines
+
+        printed = console()
+        for line in gallery_lines(content):
+            printed.print(line, markup=False)
+    if any(row["unexpected"] for row in content["robots"]):
+        raise typer.Exit(CONTRADICTED)
+    raise typer.Exit(OK if any(row["engines"] for row in content["robots"]) else ENGINE)

@@ -1,0 +1,135 @@
+"""Why an engine differs: causes that close the difference, each with what it was before and after."""
+
+from __future__ import annotations
+
+import dataclasses
+from collections.abc import Callable, Mapping
+from xml.etree.ElementTree import Element
+
+from proofroll.robots.hypotheses import Evidence, Hypothesis, hypotheses
+from proofroll.robots.layers import LAYERS, Truth, differences, first_failing
+from proofroll.robots.model import Array, Robot
+from proofroll.robots.protocol import Reading
+from proofroll.robots.robot_file import RobotFile
+
+# A cause that leaves more than this part of a difference explains nothing, not even together with others.
+_HELPS = 0.999
+# Where no cause closes a layer alone, so many of the best are followed: the largest step is not always a right one.
+_BRANCHES = 3
+
+
+@dataclasses.dataclass(frozen=True)
+class Cause:
+    """A cause with its proof.
+
+    Attributes:
+        id: module of the hypothesis.
+        name: what the engine does.
+        layer: the first at which it shows.
+        before, after: difference at that layer without and with the hypothesis.
+        remedy: what a user does about it.
+        known: engines and versions in which it was seen.
+    """
+
+    id: str
+    name: str
+    layer: str
+    before: float
+    after: float
+    remedy: str
+    known: str
+
+
+@dataclasses.dataclass(frozen=True)
+class _Step:
+    """A truth under the causes found so far."""
+
+    truth: Truth
+    found: dict[str, float]
+    causes: tuple[Cause, ...] = ()
+
+
+def explain(
+    file: RobotFile,
+    truth: Truth,
+    torques: dict[str, Array],
+    reading: Reading,
+    engine: str,
+    tolerances: dict[str, float],
+    recompiled: Callable[[Element], Robot | None] = lambda _: None,
+) -> tuple[tuple[Cause, ...], str | None]:
+    """The causes of all differences, and the first layer that they leave unexplained.
+
+    Args:
+        file: what was read.
+        truth: what the file describes.
+        torques: that the forward dynamics were asked for, by joint.
+        reading: what the engine holds.
+        engine: its name.
+        tolerances: layer -> difference up to which it holds.
+        recompiled: see :class:`proofroll.robots.hypotheses.Evidence`.
+    """
+    step = _Step(truth, differences(truth, torques, reading))
+    ranked = sorted(hypotheses(), key=lambda item: engine not in item.known)
+    while (layer := first_failing(step.found, tolerances)) is not None:
+        closed = _closed(step, layer, ranked, engine, tolerances, _Trial(file, torques, reading, recompiled))
+        if closed is None:
+            return step.causes, layer
+        step = closed
+    return step.causes, None
+
+
+@dataclasses.dataclass(frozen=True)
+class _Trial:
+    """Evaluates a hypothesis."""
+
+    file: RobotFile
+    torques: dict[str, Array]
+    reading: Reading
+    recompiled: Callable[[Element], Robot | None]
+
+    def __call__(self, step: _Step, hypothesis: Hypothesis, layer: str) -> _Step | None:
+        robot = hypothesis.change(Evidence(self.file, step.truth.robot, self.reading, self.recompiled))
+        if robot is None or robot is step.truth.robot or not robot.moving:
+            return None
+        truth = Truth.of(robot, step.truth.states, like=step.truth)
+        found = differences(truth, self.torques, self.reading)
+        if layer not in found:
+            return None
+        known = ", ".join(f"{name} {versions}".strip() for name, versions in hypothesis.known.items())
+        before, after = step.found[layer], found[layer]
+        cause = Cause(hypothesis.id, hypothesis.name, layer, before, after, hypothesis.remedy, known)
+        return _Step(truth, found, (*step.causes, cause))
+
+
+def _closed(
+    step: _Step,
+    layer: str,
+    ranked: list[Hypothesis],
+    engine: str,
+    tolerances: Mapping[str, float],
+    trial: Callable[[_Step, Hypothesis, str], _Step | None],
+) -> _Step | None:
+    """The step after the causes that close a layer: one alone if there is one, else several one after another."""
+    limit = tolerances[layer]
+    best = [step]
+    while best and best[0].found[layer] > limit:
+        candidates: list[_Step] = []
+        for begun in best:
+            for hypothesis in ranked:
+                if hypothesis.id in {cause.id for cause in begun.causes}:
+                    continue
+                if engine not in hypothesis.known and any(item.found[layer] <= limit for item in candidates):
+                    break  # one that is known of this engine closes the layer
+                tried = trial(begun, hypothesis, layer)
+                if tried is not None and tried.found[layer] <= _HELPS * begun.found[layer]:
+                    candidates.append(tried)
+        best = sorted(candidates, key=lambda item: _rank(item, layer, tolerances))[:_BRANCHES]
+    return best[0] if best else None
+
+
+def _rank(step: _Step, layer: str, tolerances: Mapping[str, float]) -> tuple[int, float]:
+    """Best first: one after which the most layers hold from the start, then the smallest difference."""
+    failing = first_failing(step.found, dict(tolerances))
+    order = list(LAYERS)
+    return (-(order.index(failing) if failing else len(order)), step.found[layer])

@@ -1,0 +1,135 @@
+"""The robots of ``comparisons/robots.toml``, which lie in packages: what engines do with each, and were expected to."""
+
+from __future__ import annotations
+
+import dataclasses
+from collections.abc import Callable, Sequence
+from importlib.metadata import PackageNotFoundError, files
+from pathlib import Path
+from typing import Any
+
+from proofroll.core.errors import InputError
+from proofroll.core.plugins import parse_engine
+from proofroll.files.data_folders import data_folder
+from proofroll.files.toml import read_toml
+from proofroll.robots import reading
+from proofroll.robots.check import check
+from proofroll.robots.hypotheses import hypotheses
+
+# What an engine may be expected to do besides the causes by which it differs.
+REFUSES, CRASHED, OPEN = "refuses", "crashed", "open"
+
+
+@dataclasses.dataclass(frozen=True)
+class Entry:
+    """A robot of the gallery.
+
+    Attributes:
+        name: unique.
+        package: distribution in which the file lies.
+        file: end of its path there.
+        base: what carries the root of a URDF.
+        engines: engine -> causes by which it differs; ``refuses``; ``crashed``; ``open``, also beside causes: something
+            stays unexplained.
+    """
+
+    name: str
+    package: str
+    file: str
+    base: str
+    engines: dict[str, tuple[str, ...]]
+
+
+def read_gallery(path: Path | None = None) -> list[Entry]:
+    """The entries of the file.
+
+    Raises:
+        InputError: it is broken, or names a cause that there is not.
+    """
+    path = path or data_folder("comparisons") / "robots.toml"
+    known = {REFUSES, CRASHED, OPEN, *(hypothesis.id for hypothesis in hypotheses())}
+    entries = []
+    for item in read_toml(path).get("robots", []):
+        try:
+            engines = {engine: tuple(causes) for engine, causes in item["engines"].items()}
+            entry = Entry(item["name"], item["package"], item["file"], item.get("base", "fixed"), engines)
+        except KeyError as error:
+            raise InputError(str(path), item.get("name", "robots"), f"{error.args[0]} is missing") from None
+        for cause in {cause for causes in engines.values() for cause in causes} - known:
+            raise InputError(f"{entry.name}: engines", cause, f"choose from {', '.join(sorted(known))}")
+        entries.append(entry)
+    return entries
+
+
+def locate(entry: Entry) -> Path | None:
+    """The file of a robot, or None where its package is not installed."""
+    try:
+        inside = files(entry.package) or []
+    except PackageNotFoundError:
+        return None
+    found = next((item for item in inside if f"/{item}".endswith(f"/{entry.file}")), None)
+    return None if found is None else Path(str(found.locate()))
+
+
+def gallery(
+    names: Sequence[str] = (), engines: Sequence[str] = (), progress: Callable[[str], None] | None = None
+) -> dict[str, Any]:
+    """Checks robots, each with every engine that its entry expects something of and that is installed.
+
+    Args:
+        names: of robots; by default all.
+        engines: to which it is restricted.
+        progress: called with the name of each robot.
+
+    Returns:
+        plain data: for every robot its file, what each engine does, and what of that was not expected.
+
+    Raises:
+        InputError: there is no such robot or engine.
+    """
+    entries = read_gallery()
+    for name in set(names) - {entry.name for entry in entries}:
+        raise InputError("robot", name, f"choose from {', '.join(entry.name for entry in entries)}")
+    for name in engines:
+        reading.load_reader(parse_engine(name).name)
+    rows = []
+    for entry in entries:
+        if not names or entry.name in names:
+            rows.append(_row(entry, engines))
+            if progress is not None:
+                progress(entry.name)
+    return {"robots": rows}
+
+
+def _row(entry: Entry, engines: Sequence[str]) -> dict[str, Any]:
+    path = locate(entry)
+    row: dict[str, Any] = {
+        "name": entry.name,
+        "package": entry.package,
+        "file": None if path is None else str(path),
+        "engines": [],
+        "unexpected": [],
+    }
+    wanted = [name for name in entry.engines if parse_engine(name).name in reading.reader_names()]
+    if engines:
+        wanted = [name for name in wanted if name in engines or parse_engine(name).name in engines]
+    if path is None or not wanted:
+        return row
+    found = check(path, wanted, base=entry.base)
+    for item in found["engines"]:
+        does = outcome(item)
+        row["engines"].append(
+            {key: item[key] for key in ("engine", "version", "status", "causes", "refused")} | {"does": does}
+        )
+        if item["status"] != "missing" and set(does) != set(entry.engines[item["engine"]]):
+            expected = ", ".join(entry.engines[item["engine"]]) or "to hold the file"
+            what = ", ".join(does) or "holds the file"
+            row["unexpected"].append(f"{item['engine']} {item['version'] or ''}: expected {expected}; found {what}")
+    return row
+
+
+def outcome(row: dict[str, Any]) -> list[str]:
+    """What an engine does, as a gallery expects it."""
+    if not row["layers"]:
+        return [REFUSES] if row["status"] == "refused" else [row["status"]]
+    return [*dict.fromkeys(cause["id"] for cause in row["causes"]), *([OPEN] if row["unexplained"] else [])]

@@ -1,0 +1,27 @@
+"""An impossible inertia is replaced by a sphere with the mean principal moment."""
+
+from __future__ import annotations
+
+import dataclasses
+
+import numpy as np
+
+from proofroll.robots.hypotheses import Evidence, Hypothesis
+from proofroll.robots.inertia import replaced
+from proofroll.robots.model import Body, Robot
+
+
+def _sphere(body: Body) -> Body:
+    return dataclasses.replace(body, inertia=np.trace(body.inertia) / 3 * np.eye(3))
+
+
+def _change(evidence: Evidence) -> Robot | None:
+    return replaced(evidence, _sphere)
+
+
+HYPOTHESIS = Hypothesis(
+    "an impossible inertia is replaced by a sphere with the mean of its principal moments",
+    {"mujoco": "with balanceinertia"},
+    "correct the inertia in the file, and leave balanceinertia out",
+    _change,
+)

@@ -1,0 +1,32 @@
+"""An impossible inertia is replaced by that of a sphere of water with the same mass."""
+
+from __future__ import annotations
+
+import dataclasses
+
+import numpy as np
+
+from proofroll.robots.hypotheses import Evidence, Hypothesis
+from proofroll.robots.inertia import replaced
+from proofroll.robots.model import Body, Robot
+
+# Density of water [kg/m³].
+_WATER = 1000.0
+
+
+def _sphere(body: Body) -> Body:
+    mass = body.mass or 1.0
+    radius = (3 * mass / (4 * np.pi * _WATER)) ** (1 / 3)
+    return dataclasses.replace(body, mass=mass, inertia=0.4 * mass * radius**2 * np.eye(3))
+
+
+def _change(evidence: Evidence) -> Robot | None:
+    return replaced(evidence, _sphere)
+
+
+HYPOTHESIS = Hypothesis(
+    "an impossible inertia is replaced by that of a sphere of water (of 1 kg where the mass is 0)",
+    {"drake": "1.51.1 (a line of its log says so)"},
+    "correct the inertia in the file",
+    _change,
+)

@@ -1,0 +1,125 @@
+"""What an engine's answer is worth: its differences, their causes, and what is held wrongly."""
+
+from __future__ import annotations
+
+import contextlib
+import dataclasses
+import tempfile
+from pathlib import Path
+from typing import Any
+from xml.etree.ElementTree import Element, tostring
+
+import numpy as np
+
+from proofroll.core.errors import InputError
+from proofroll.core.plugins import EngineSpec
+from proofroll.robots import reading
+from proofroll.robots.explain import explain
+from proofroll.robots.layers import LAYERS, TOLERANCE, Truth, differences
+from proofroll.robots.model import Array, Robot
+from proofroll.robots.robot_file import RobotFile
+from proofroll.robots.urdf import read_urdf
+from proofroll.running.process import Worker, WorkerDied
+
+# For each engine [s].
+TIME_LIMIT = 120.0
+# The two formulations must agree to a tenth of any tolerance; else their difference raises it.
+_MARGIN = 10.0
+
+
+def unread(spec: EngineSpec, status: str, why: str) -> dict[str, Any]:
+    """The row of an engine that holds nothing."""
+    row: dict[str, Any] = {"engine": str(spec), "version": None, "status": status, "refused": why, "says": ""}
+    return row | {"remarks": [], "layers": {}, "causes": [], "unexplained": None, "offending": []}
+
+
+def judged(
+    file: RobotFile, truth: Truth, bar: float, spec: EngineSpec, answer: reading.Answer, torques: dict[str, Array]
+) -> dict[str, Any]:
+    """The row of an engine that answered.
+
+    Args:
+        file: what was read.
+        truth: what it means.
+        bar: how far the two formulations of the truth differ.
+        spec: the engine as the user wrote it.
+        answer: what it holds, or why it refused.
+        torques: by joint, that the forward dynamics were asked for.
+    """
+    row = unread(spec, "refused", answer.refused) | {"version": answer.version, "says": answer.says}
+    if answer.reading is None:
+        return row
+    tolerances = {layer: max(answer.tolerances.get(layer, TOLERANCE), _MARGIN * bar) for layer in LAYERS}
+    tolerances["joints"] = 0.0
+    found = differences(truth, torques, answer.reading)
+    layers = {
+        layer: {"difference": value, "tolerance": tolerances[layer], "holds": bool(value <= tolerances[layer])}
+        for layer, value in found.items()
+    }
+    recompiled = _Recompiler(file)
+    causes, unexplained = explain(file, truth, torques, answer.reading, spec.name, tolerances, recompiled)
+    holds = all(item["holds"] for item in layers.values())
+    return row | {
+        "status": "holds" if holds else ("differs" if unexplained else "explained"),
+        "refused": None,
+        "remarks": list(answer.reading.remarks),
+        "layers": layers,
+        "causes": [dataclasses.asdict(cause) for cause in causes],
+        "unexplained": unexplained,
+        "offending": _offending(truth, answer.reading),
+    }
+
+
+class _Recompiler:
+    """What a changed file would mean; None: nothing, or the format is read by us. Each is compiled once."""
+
+    def __init__(self, file: RobotFile) -> None:
+        self._file = file
+        self._known: dict[bytes, Robot | None] = {}
+
+    def __call__(self, root: Element) -> Robot | None:
+        text = tostring(root)
+        if text not in self._known:
+            self._known[text] = None if self._file.kind == "urdf" else self._compiled(root)
+        return self._known[text]
+
+    def _compiled(self, root: Element) -> Robot | None:
+        changed = dataclasses.replace(self._file, root=root)
+        with tempfile.TemporaryDirectory() as name, contextlib.suppress(InputError):
+            return meaning(changed, reading.write(changed, Path(name)), TIME_LIMIT)[0]
+        return None
+
+
+def _offending(truth: Truth, held: Any) -> list[str]:
+    """Joints whose carried body an engine holds with another mass, centre of mass or inertia, or lacks."""
+    groups = truth.robot.groups
+    found = [name for name in groups if name not in held.joints]
+    spin = max((float(np.abs(group.inertia).max()) for group in groups.values()), default=1.0) or 1.0
+    for name, group in groups.items():
+        if name in held.mass:
+            off = max(abs(held.mass[name] - group.mass), float(np.abs(held.inertia[name] - group.inertia).max()) / spin)
+            apart = float(np.abs(held.com[name] - group.com).max()) if group.mass > 0 < held.mass[name] else 0.0
+            if max(off, apart) > 1e-6:
+                found.append(name)
+    return found
+
+
+def meaning(file: RobotFile, written: Path, time_limit: float) -> tuple[Robot, str]:
+    """The robot that a file means, and who says so.
+
+    Args:
+        file: what was read.
+        written: the file that engines get.
+        time_limit: for an engine that defines the format [s].
+
+    Raises:
+        InputError: it has no meaning.
+    """
+    if file.kind == "urdf":
+        return read_urdf(file), "our own reading of the file"
+    with Worker() as worker:
+        try:
+            robot, by = reading.compiled(worker, file, written, time_limit)
+        except WorkerDied as error:
+            raise InputError("file", str(file.path), f"it could not be compiled: {error}") from None
+    return robot.change(name=file.root.get("model", "robot")), f"the model that {by} compiles"

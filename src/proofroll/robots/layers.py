@@ -1,0 +1,194 @@
+"""The layers of a comparison, in the order in which an error of one spoils the next, and how far an engine is off."""
+
+from __future__ import annotations
+
+import dataclasses
+from collections.abc import Iterable
+from functools import cached_property
+
+import numpy as np
+
+from proofroll.robots.model import Array, Body, Robot
+from proofroll.robots.protocol import Reading
+from proofroll.robots.states import States
+from proofroll.robots.two_formulations import Dynamics, passive, poses, world_jacobians
+
+LAYERS = {
+    "joints": "joints that are absent, added, or follow no other although the file says so",
+    "mass": "mass carried by all moving joints [relative]",
+    "kinematics": "position and rotation of each body [m, 1]",
+    "bodies": "mass, first moment and inertia of what each joint carries [relative, m]",
+    "mass matrix": "M [relative]",
+    "gravity": "torque of gravity [relative]",
+    "bias": "torque of gravity and velocities [relative]",
+    "inverse dynamics": "torque for given accelerations, without damping, friction and springs [relative]",
+    "forward dynamics": "what is left of the equation of motion, damping, friction and springs included [relative]",
+}
+# Round-off of two formulations is 1e-15 to 3e-14 on robots with up to 67 velocities; the smallest known defect of an
+# importer is 1e-7.
+TOLERANCE = 1e-10
+# Smallest eigenvalue of the scaled mass matrix: some 64 velocities times round-off.
+_SINGULAR = 1e-14
+# Of the weight times one metre: a torque of gravity below is round-off of larger ones.
+_FLOOR = 1e-3
+
+
+@dataclasses.dataclass(frozen=True)
+class Truth:
+    """A robot with what it does at some states."""
+
+    robot: Robot
+    states: States
+    dynamics: Dynamics
+    passive: Array
+    like: Truth | None = None
+
+    @classmethod
+    def of(cls, robot: Robot, states: States, like: Truth | None = None) -> Truth:
+        """Evaluated by the first formulation.
+
+        Args:
+            robot: what is evaluated.
+            states: where.
+            like: whose sizes make differences relative; by default its own.
+        """
+        return cls(robot, states, world_jacobians(robot, states), passive(robot, states), like)
+
+    @cached_property
+    def scales(self) -> dict[str, float]:
+        """What a difference of 1 is at each layer: its own largest value, above the round-off of others."""
+        if self.like is not None:
+            return self.like.scales
+        groups = self.robot.groups.values()
+        mass = sum(group.mass for group in groups)
+        floor = _FLOOR * mass * float(np.linalg.norm(self.robot.gravity) or 1.0)
+        sizes = {
+            "mass": mass,
+            "bodies": max((float(np.abs(group.inertia).max()) for group in groups), default=0.0),
+            "mass matrix": float(np.abs(self.dynamics.M).max()),
+            "gravity": max(float(np.abs(self.dynamics.g).max()), floor),
+            "bias": max(float(np.abs(self.dynamics.h).max()), floor),
+            "inverse dynamics": max(float(np.abs(self.inverse).max()), floor),
+            "forward dynamics": max(float(np.abs(self.inverse + self.passive).max()), floor),
+        }
+        return {layer: size or 1.0 for layer, size in sizes.items()}
+
+    @cached_property
+    def singular(self) -> bool:
+        """Whether the mass matrix, every velocity scaled by its own inertia, has no inverse within round-off."""
+        own = np.sqrt(np.abs(np.diagonal(self.dynamics.M, axis1=1, axis2=2)))
+        if not own.size or not own.min():
+            return True
+        scaled = self.dynamics.M / own[:, :, None] / own[:, None, :]
+        return float(np.linalg.eigvalsh(scaled).min()) < _SINGULAR
+
+    @cached_property
+    def inverse(self) -> Array:
+        """What gives the accelerations of the states where there are no passive forces, shape (states, n)."""
+        return self.torque(self.states.stacked(self.states.acceleration, self.robot)) - self.passive
+
+    def torque(self, acceleration: Array) -> Array:
+        """What gives these accelerations, shape (states, n)."""
+        d = self.dynamics
+        return np.asarray(np.einsum("sij,sj->si", d.M, acceleration)) + d.h + self.passive
+
+    def torques(self) -> dict[str, Array]:
+        """What gives the accelerations of the states, by joint."""
+        found = self.inverse + self.passive
+        return {name: found[:, columns] for name, columns in self.robot.columns.items()}
+
+
+def differences(truth: Truth, torques: dict[str, Array], reading: Reading) -> dict[str, float]:
+    """How far an engine is off, by layer; a layer that the engine does not offer is left out.
+
+    Args:
+        truth: what the engine is held against.
+        torques: by joint, that the engine was asked the forward dynamics for.
+        reading: what the engine holds.
+    """
+    robot, d = truth.robot, truth.dynamics
+    dofs = dict(zip(reading.joints, reading.dofs, strict=True))
+    followers = {mimic.joint for mimic in robot.mimics}
+    expected = {joint.name: joint.dofs for joint in robot.moving}
+    reduced = {name for name in followers if name not in dofs}
+    unlike = {name for name in expected.keys() | dofs.keys() if expected.get(name) != dofs.get(name)} - reduced
+    free = followers - reduced - set(reading.coupled)
+    found = {"joints": float(len(unlike | free))}
+    common = [name for name in reading.joints if expected.get(name) == dofs[name]]
+    if not common:
+        return found
+    G, theirs = _selection(robot, common, reduced), _columns(reading, common)
+    groups = robot.groups
+    both = [name for name in common if name in reading.mass]
+    scales = truth.scales
+    masses = [reading.mass[name] - groups[name].mass for name in both]
+    found["mass"] = abs(sum(masses)) / scales["mass"]
+    found["kinematics"] = _kinematics(truth, reading, both)
+    found["bodies"] = _largest(
+        [abs(mass) / scales["mass"] for mass in masses]
+        + [_apart(reading.com[name], reading.mass[name], groups[name], scales["mass"]) for name in both]
+        + [np.abs(reading.inertia[name] - groups[name].inertia).max() / scales["bodies"] for name in both]
+    )
+    M = G.T @ d.M @ G
+    found["mass matrix"] = _off(reading.M[:, theirs][:, :, theirs], M, scales["mass matrix"])
+    for layer, own, expected_torque in (("gravity", reading.g, d.g), ("bias", reading.h, d.h)):
+        found[layer] = _off(own[:, theirs], expected_torque @ G, scales[layer])
+    if reading.inverse is not None:
+        found["inverse dynamics"] = _off(reading.inverse[:, theirs], truth.inverse @ G, scales["inverse dynamics"])
+    if reading.forward is not None and not truth.singular:
+        given = np.concatenate([torques[joint.name] for joint in robot.moving], axis=1)
+        reached = reading.forward[:, theirs] @ G.T
+        found["forward dynamics"] = _off(truth.torque(reached) @ G, given @ G, scales["forward dynamics"])
+    return found
+
+
+def first_failing(found: dict[str, float], tolerances: dict[str, float]) -> str | None:
+    """The first layer that exceeds its tolerance; also where the difference is not a number."""
+    return next((layer for layer, value in found.items() if not value <= tolerances[layer]), None)
+
+
+def _selection(robot: Robot, joints: Iterable[str], reduced: set[str]) -> Array:
+    """How the velocities of all joints follow from those of some: joints that follow them, others at rest."""
+    columns = robot.columns
+    G = np.zeros((robot.dofs, 0))
+    followers = {mimic.joint: mimic for mimic in robot.mimics}
+    for name in joints:
+        block = np.zeros((robot.dofs, columns[name].stop - columns[name].start))
+        block[columns[name]] = np.eye(block.shape[1])
+        for follower in reduced:
+            if followers[follower].other == name:
+                block[columns[follower]] = followers[follower].multiplier
+        G = np.hstack([G, block])
+    return G
+
+
+def _columns(reading: Reading, joints: list[str]) -> list[int]:
+    starts = dict(zip(reading.joints, np.cumsum([0, *reading.dofs[:-1]]), strict=True))
+    dofs = dict(zip(reading.joints, reading.dofs, strict=True))
+    return [int(starts[name]) + index for name in joints for index in range(dofs[name])]
+
+
+def _kinematics(truth: Truth, reading: Reading, joints: list[str]) -> float:
+    children = {joint.name: joint.child for joint in truth.robot.moving}
+    true = poses(truth.robot, truth.states)
+    off = []
+    for name in joints:
+        if name in reading.position:
+            p, R = true[children[name]]
+            off += [np.abs(reading.position[name] - p).max(), np.abs(reading.rotation[name] - R).max()]
+    return _largest(off)
+
+
+def _apart(com: Array, mass: float, group: Body, whole: float) -> float:
+    """Difference of two first moments of mass over the whole mass: without mass there is no centre to compare [m]."""
+    return float(np.abs(mass * com - group.mass * group.com).max()) / whole
+
+
+def _off(found: Array, true: Array, scale: float) -> float:
+    return _largest([np.abs(found - true).max(initial=0.0) / scale])
+
+
+def _largest(values: Iterable[float]) -> float:
+    """The largest value; infinite if one is no number."""
+    values = [float(value) for value in values]
+    return max(values, default=0.0) if np.all(np.isfinite(values)) else float("inf")

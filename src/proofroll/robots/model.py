@@ -1,0 +1,179 @@
+"""A robot as data: bodies and the joints between them, as a file describes them and as every formulation takes them."""
+
+from __future__ import annotations
+
+import dataclasses
+from collections.abc import Iterable, Mapping
+from functools import cached_property
+from typing import Any
+
+import numpy as np
+import numpy.typing as npt
+
+Array = npt.NDArray[np.float64]
+# The parent of what hangs in the world; no body or joint has this name, but many a root link is called world.
+WORLD = ""
+# Degrees of freedom of each kind of joint.
+DOFS = {"fixed": 0, "revolute": 1, "prismatic": 1, "spherical": 3, "free": 6}
+
+
+@dataclasses.dataclass(frozen=True)
+class Body:
+    """A rigid body.
+
+    Attributes:
+        name: unique.
+        mass: [kg].
+        com: centre of mass in the body's frame [m], shape (3,).
+        inertia: about the centre of mass, in the body's axes [kg m²], shape (3, 3).
+    """
+
+    name: str
+    mass: float
+    com: Array
+    inertia: Array
+
+
+@dataclasses.dataclass(frozen=True)
+class Joint:
+    """A joint, which carries its child.
+
+    Attributes:
+        name: unique.
+        kind: a key of :data:`DOFS`.
+        parent: a body, or :data:`WORLD`.
+        child: a body.
+        position: of the joint in the parent's frame [m], shape (3,); of a free joint what is added to its coordinates.
+        rotation: of the child's frame against the parent's at coordinate 0, shape (3, 3).
+        axis: unit vector in the child's frame, shape (3,).
+        child_position: of the joint in the child's frame [m], shape (3,).
+        damping: torque per velocity [N m s/rad or N s/m].
+        friction: Coulomb torque [N m or N].
+        armature: inertia added to the joint's own coordinate [kg m² or kg].
+        stiffness: spring torque per coordinate [N m/rad or N/m].
+        rest: coordinate at which the spring is at rest [rad or m].
+        lower, upper: limits of the coordinate; None: there is none.
+        actuated: whether an actuator acts on the joint.
+    """
+
+    name: str
+    kind: str
+    parent: str
+    child: str
+    position: Array
+    rotation: Array
+    axis: Array
+    child_position: Array = dataclasses.field(default_factory=lambda: np.zeros(3))
+    damping: float = 0.0
+    friction: float = 0.0
+    armature: float = 0.0
+    stiffness: float = 0.0
+    rest: float = 0.0
+    lower: float | None = None
+    upper: float | None = None
+    actuated: bool = False
+
+    @property
+    def dofs(self) -> int:
+        """Number of velocities."""
+        return DOFS[self.kind]
+
+
+@dataclasses.dataclass(frozen=True)
+class Mimic:
+    """A joint that follows another: q = multiplier · q_other + offset."""
+
+    joint: str
+    other: str
+    multiplier: float = 1.0
+    offset: float = 0.0
+
+
+@dataclasses.dataclass(frozen=True)
+class Robot:
+    """A tree of bodies, every joint after the joint of its parent.
+
+    Attributes:
+        name: of the robot.
+        bodies: by name.
+        joints: parents first; one for each body.
+        mimics: joints that follow another.
+        gravity: acceleration [m/s²], shape (3,).
+        sources: facts of the file that only hypotheses need, by name of the body: how its inertia was written, say.
+    """
+
+    name: str
+    bodies: Mapping[str, Body]
+    joints: tuple[Joint, ...]
+    mimics: tuple[Mimic, ...] = ()
+    gravity: Array = dataclasses.field(default_factory=lambda: np.array([0.0, 0.0, -9.81]))
+    sources: Mapping[str, Any] = dataclasses.field(default_factory=dict)
+
+    @cached_property
+    def moving(self) -> tuple[Joint, ...]:
+        """The joints that have velocities."""
+        return tuple(joint for joint in self.joints if joint.dofs)
+
+    @cached_property
+    def columns(self) -> dict[str, slice]:
+        """Which velocities belong to which joint."""
+        found, start = {}, 0
+        for joint in self.moving:
+            found[joint.name] = slice(start, start + joint.dofs)
+            start += joint.dofs
+        return found
+
+    @property
+    def dofs(self) -> int:
+        """Number of velocities, those of following joints included."""
+        return sum(joint.dofs for joint in self.joints)
+
+    @cached_property
+    def welded(self) -> dict[str, tuple[str, Array, Array]]:
+        """Body -> the moving joint that carries it, with its position and rotation in the frame of that joint's child.
+
+        What is fixed to the world is carried by :data:`WORLD`.
+        """
+        found = {WORLD: (WORLD, np.zeros(3), np.eye(3))}
+        for joint in self.joints:
+            if joint.dofs:
+                found[joint.child] = (joint.name, np.zeros(3), np.eye(3))
+            else:
+                home, p, R = found[joint.parent]
+                turned = R @ joint.rotation
+                found[joint.child] = (home, p + R @ joint.position - turned @ joint.child_position, turned)
+        return found
+
+    @cached_property
+    def groups(self) -> dict[str, Body]:
+        """What each moving joint carries rigidly, as one body in the frame of the joint's child; by joint."""
+        parts: dict[str, list[tuple[Body, Array, Array]]] = {joint.name: [] for joint in self.moving}
+        for name, (home, p, R) in self.welded.items():
+            if home != WORLD:
+                parts[home].append((self.bodies[name], p, R))
+        return {name: composed(name, found) for name, found in parts.items()}
+
+    def change(self, **changes: Any) -> Robot:
+        """The robot with some attributes replaced."""
+        return dataclasses.replace(self, **changes)
+
+    def with_bodies(self, bodies: Iterable[Body]) -> Robot:
+        """The robot with some bodies replaced by others of the same name."""
+        return self.change(bodies={**self.bodies, **{body.name: body for body in bodies}})
+
+    def with_joints(self, **values: float) -> Robot:
+        """The robot with attributes of all joints replaced."""
+        return self.change(joints=tuple(dataclasses.replace(joint, **values) for joint in self.joints))  # type: ignore[arg-type]
+
+
+def composed(name: str, parts: Iterable[tuple[Body, Array, Array]]) -> Body:
+    """Several bodies as one, each given with its position and rotation in the frame of the whole."""
+    parts = list(parts)
+    mass = sum(body.mass for body, _, _ in parts)
+    moment = sum((body.mass * (p + R @ body.com) for body, p, R in parts), np.zeros(3))
+    com = moment / mass if mass else np.zeros(3)
+    inertia = np.zeros((3, 3))
+    for body, p, R in parts:
+        r = p + R @ body.com - com
+        inertia += R @ body.inertia @ R.T + body.mass * (r @ r * np.eye(3) - np.outer(r, r))
+    return Body(name, mass, com, inertia)

@@ -1,0 +1,182 @@
+"""What an engine adds so that its own importer of robot files can be checked.
+
+A reader is a class that a package announces in the entry-point group ``proofroll.robot_readers`` under the name of its
+engine. It runs in a process of its own. What it raises while it reads is the engine's refusal, in its own words.
+"""
+
+from __future__ import annotations
+
+import dataclasses
+from collections.abc import Callable, Mapping
+from pathlib import Path
+from typing import Any, ClassVar, Protocol
+
+import numpy as np
+
+from proofroll.robots.model import Array, Robot
+from proofroll.robots.states import States
+
+GROUP = "proofroll.robot_readers"
+
+
+@dataclasses.dataclass(frozen=True)
+class Request:
+    """What a reader is asked.
+
+    Attributes:
+        path: of a file that names no other file.
+        kind: ``urdf`` or ``mjcf``.
+        base: for URDF, ``fixed`` (the root is part of the world) or ``free``.
+        base_joint: name under which the reading has the free joint of a URDF's root.
+        options: what the user gave for this engine, a key of the reader's ``options`` each.
+        children: moving joint -> the body that it carries, as the file names them.
+        states: at which everything is evaluated.
+        torques: moving joint -> torques for the forward dynamics, shape (states, velocities of the joint).
+        gravity: for URDF, which says none [m/s²], shape (3,).
+        robot: our own reading, for an engine without an importer.
+    """
+
+    path: Path
+    kind: str
+    base: str
+    base_joint: str
+    options: Mapping[str, bool]
+    children: Mapping[str, str]
+    states: States
+    torques: Mapping[str, Array]
+    gravity: Array
+    robot: Robot
+
+
+@dataclasses.dataclass
+class Reading:
+    """What an engine made of a file; velocities as in :mod:`proofroll.robots.states`.
+
+    Attributes:
+        joints: moving joints in the order of velocities.
+        dofs: velocities of each.
+        mass, com, inertia: joint -> what it carries rigidly, in the frame of the body that it carries, the inertia
+            about the centre of mass.
+        position, rotation: joint -> frame of that body in the world, shapes (states, 3) and (states, 3, 3).
+        coupled: joints that the engine holds to another one as the file's mimic says.
+        M, g, h: mass matrix, torque of gravity, torque of gravity and velocities (see
+            :class:`proofroll.robots.two_formulations.Dynamics`).
+        inverse: torque for the accelerations asked, without damping, friction and springs, shape (states, n); None: not
+            offered.
+        forward: acceleration for the torques asked, with all of them, shape (states, n); None: not offered.
+        remarks: what the reader did and what the engine said, as sentences.
+    """
+
+    joints: tuple[str, ...]
+    dofs: tuple[int, ...]
+    mass: dict[str, float]
+    com: dict[str, Array]
+    inertia: dict[str, Array]
+    position: dict[str, Array]
+    rotation: dict[str, Array]
+    M: Array
+    g: Array
+    h: Array
+    inverse: Array | None = None
+    forward: Array | None = None
+    coupled: tuple[str, ...] = ()
+    remarks: tuple[str, ...] = ()
+
+
+class RobotReader(Protocol):
+    """An engine's importer.
+
+    Attributes:
+        kinds: formats that it reads.
+        options: documented options of the importer that a user may give, each with what it does.
+        tolerances: layer -> difference up to which the engine agrees, where its own precision is less than double's;
+            each with its reason beside it in the code.
+        says: a sentence that is shown with every reading; empty: nothing special.
+    """
+
+    kinds: ClassVar[tuple[str, ...]]
+    options: ClassVar[Mapping[str, str]]
+    says: ClassVar[str]
+
+    @property
+    def tolerances(self) -> Mapping[str, float]:
+        """See above; a class attribute will do."""
+
+    def version(self) -> str:
+        """Version of the engine."""
+
+    def read(self, request: Request) -> Reading:
+        """The model that the engine holds, evaluated.
+
+        Raises:
+            Refused: it cannot be read or evaluated; any other exception counts as the same.
+        """
+
+
+class DefinesFormat(Protocol):
+    """A reader whose engine defines a format: what it compiles from a file is what the file means."""
+
+    defines: ClassVar[str]
+
+    def compiled(self, path: Path) -> Robot:
+        """The compiled model as plain data."""
+
+
+@dataclasses.dataclass(frozen=True)
+class AtState:
+    """One state in an engine's own velocities ν_e = T ν.
+
+    Attributes:
+        T: shape (n, n).
+        drift: dT/dt ν, shape (n,).
+        M, g, h: the engine's own.
+        inverse: acceleration -> torque; None: not offered.
+        forward: torque -> acceleration; None: not offered.
+    """
+
+    T: Array
+    drift: Array
+    M: Array
+    g: Array
+    h: Array
+    inverse: Callable[[Array], Array] | None
+    forward: Callable[[Array], Array] | None
+
+
+def evaluate(
+    request: Request, joints: tuple[str, ...], dofs: tuple[int, ...], at: Callable[[int], AtState]
+) -> dict[str, Any]:
+    """The arrays of a :class:`Reading` from an engine that is asked state by state.
+
+    Args:
+        request: what was asked.
+        joints: the engine's moving joints in the order of its velocities.
+        dofs: velocities of each.
+        at: puts the engine into one state; ``inverse`` and ``forward`` are called before the next one.
+    """
+    rows: dict[str, list[Array]] = {"M": [], "g": [], "h": [], "inverse": [], "forward": []}
+    asked = [_stack(rates, joints, dofs) for rates in (request.states.acceleration, request.torques)]
+    for index in range(request.states.count):
+        state = at(index)
+        acceleration, torque = (rates[index] for rates in asked)
+        T = state.T
+        rows["M"].append(T.T @ state.M @ T)
+        rows["g"].append(T.T @ state.g)
+        rows["h"].append(T.T @ (state.h + state.M @ state.drift))
+        if state.inverse is not None:
+            rows["inverse"].append(T.T @ np.asarray(state.inverse(T @ acceleration + state.drift)))
+        if state.forward is not None:
+            own = np.asarray(state.forward(np.linalg.solve(T.T, torque)))
+            rows["forward"].append(np.asarray(np.linalg.solve(T, own - state.drift), dtype=np.float64))
+    return {name: np.array(found) if found else None for name, found in rows.items()}
+
+
+def _stack(rates: Mapping[str, Array], joints: tuple[str, ...], dofs: tuple[int, ...]) -> Array:
+    """Rates of an engine's joints in its order; of a joint that the file does not have, zero."""
+    count = len(next(iter(rates.values())))
+    parts = [rates.get(name, np.zeros((count, dof))) for name, dof in zip(joints, dofs, strict=True)]
+    if any(part.shape[1] != dof for part, dof in zip(parts, dofs, strict=True)):
+        parts = [
+            part if part.shape[1] == dof else np.zeros((count, dof)) for part, dof in zip(parts, dofs, strict=True)
+        ]
+    return np.concatenate(parts, axis=1)

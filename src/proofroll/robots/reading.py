@@ -1,0 +1,197 @@
+"""A file read by an engine in a process of its own: both sides of the pipe."""
+
+from __future__ import annotations
+
+import copy
+import dataclasses
+import json
+from collections.abc import Callable, Mapping
+from importlib.metadata import entry_points
+from pathlib import Path
+from typing import Any
+from xml.etree import ElementTree
+
+import numpy as np
+
+from proofroll.core.errors import InputError, Missing, Refused
+from proofroll.robots.model import Robot
+from proofroll.robots.plain_data import plain, robot_from, states_from
+from proofroll.robots.protocol import GROUP, Reading, Request
+from proofroll.robots.robot_file import RobotFile
+from proofroll.running.process import Worker
+
+_BY_JOINT = ("mass", "com", "inertia", "position", "rotation")
+_ARRAYS = ("M", "g", "h", "inverse", "forward")
+
+
+def reader_names() -> list[str]:
+    """Engines for which an installed package announces a reader, sorted."""
+    return sorted({point.name for point in entry_points(group=GROUP)})
+
+
+def load_reader(name: str) -> Any:
+    """A reader.
+
+    Raises:
+        InputError: no installed package announces one for this engine.
+        Missing: what it needs is not installed.
+    """
+    for point in entry_points(group=GROUP):
+        if point.name == name:
+            try:
+                reader = point.load()()
+                reader.version()
+            except ModuleNotFoundError as error:
+                raise Missing(f"{name} is not installed here ({error.name or error} is missing)") from None
+            return reader
+    raise InputError("engine", name, f"it reads no robot files; choose one of {', '.join(reader_names())}")
+
+
+@dataclasses.dataclass(frozen=True)
+class Answer:
+    """What a reader answered.
+
+    Attributes:
+        version: of the engine.
+        says: what the reader says with every reading.
+        tolerances: where the engine's own precision is less than double's, by layer.
+        reading: what it holds; None: it refused.
+        refused: why, in its own words.
+    """
+
+    version: str
+    says: str
+    tolerances: dict[str, float]
+    reading: Reading | None
+    refused: str
+
+
+def ask(worker: Worker, engine: str, request: Request, folder: Path, time_limit: float) -> Answer:
+    """Has a file read and evaluated in the worker.
+
+    Raises:
+        WorkerDied: the process crashed or took longer than ``time_limit`` [s].
+        InputError, Missing: see :func:`load_reader`; or the engine has no such option.
+    """
+    asked, arrays = folder / "request.json", folder / "answer.npz"
+    asked.write_text(json.dumps(plain(request) | {"path": str(request.path)}), encoding="utf-8")
+    told = worker.request(_call("read", engine=engine, asked=str(asked), arrays=str(arrays)), time_limit)
+    reading = None
+    if not told["refused"]:
+        with np.load(arrays, allow_pickle=False) as found:
+            values: dict[str, Any] = {name: found[name] if name in found.files else None for name in _ARRAYS}
+            for name in _BY_JOINT:
+                values[name] = dict(zip(told[name], found[name], strict=True))
+        values |= {name: tuple(told[name]) for name in ("joints", "dofs", "coupled", "remarks")}
+        reading = Reading(**values)
+    return Answer(told["version"], told["says"], told["tolerances"], reading, told["refused"])
+
+
+def read_robot(engine: str, asked: str, arrays: str) -> dict[str, Any]:
+    """The worker's side: reads, evaluates, and writes the arrays to a file."""
+    from proofroll.running.worker import one_line
+
+    reader = load_reader(engine)
+    content = json.loads(Path(asked).read_text(encoding="utf-8"))
+    request = Request(
+        **content
+        | {
+            "path": Path(content["path"]),
+            "states": states_from(content["states"]),
+            "robot": robot_from(content["robot"]),
+        }
+        | {"torques": {name: np.array(rows) for name, rows in content["torques"].items()}}
+        | {"gravity": np.array(content["gravity"])}
+    )
+    for option in request.options:
+        if option not in reader.options:
+            known = ", ".join(reader.options) or "none"
+            raise InputError(f"{engine}: {option}", request.options[option], f"there is no such option; it has {known}")
+    if request.kind not in reader.kinds:
+        raise Missing(f"{engine} reads no {request.kind.upper()}")
+    told: dict[str, Any] = {"version": reader.version(), "says": reader.says, "tolerances": dict(reader.tolerances)}
+    try:
+        reading = reader.read(request)
+    except Refused as error:
+        return told | {"refused": str(error)}
+    except (
+        AttributeError,
+        TypeError,
+        NameError,
+        LookupError,
+        ImportError,
+    ) as error:  # an importer raises none of these
+        return {"error": "crashed", "message": f"the reader of {engine} failed: {one_line(error)}"}
+    except Exception as error:  # whatever an importer raises is its refusal
+        return told | {"refused": one_line(error)}
+    parts: dict[str, Any] = {name: np.array(list(getattr(reading, name).values()), dtype=float) for name in _BY_JOINT}
+    parts |= {name: getattr(reading, name) for name in _ARRAYS if getattr(reading, name) is not None}
+    np.savez(arrays, **parts)
+    names = {name: list(getattr(reading, name)) for name in (*_BY_JOINT, "joints", "dofs", "coupled", "remarks")}
+    return told | {"refused": ""} | names
+
+
+def compile_robot(path: str) -> dict[str, Any]:
+    """The worker's side: what a file means in a format that an engine defines."""
+    for name in reader_names():
+        try:
+            reader = load_reader(name)
+        except Missing:
+            continue
+        if getattr(reader, "defines", None) == "mjcf":
+            from proofroll.running.worker import one_line
+
+            try:
+                return {"robot": plain(reader.compiled(Path(path))), "by": f"{name} {reader.version()}"}
+            except Exception as error:
+                return {"robot": None, "by": f"{name} {reader.version()}", "message": one_line(error)}
+    return {
+        "robot": None,
+        "by": "",
+        "message": "no engine that defines MJCF is installed: pip install 'proofroll[mujoco]'",
+    }
+
+
+# What a worker can be asked about robots.
+STEPS: dict[str, Callable[..., dict[str, Any]]] = {"read": read_robot, "compile": compile_robot}
+
+
+def compiled(worker: Worker, file: RobotFile, written: Path, time_limit: float) -> tuple[Robot, str]:
+    """The robot that an MJCF means, and by whom it was compiled.
+
+    Raises:
+        InputError: the engine that defines the format cannot compile it, or is not installed.
+        WorkerDied: it crashed or took too long.
+    """
+    told = worker.request(_call("compile", path=str(written)), time_limit)
+    if told["robot"] is None:
+        raise InputError("file", str(file.path), f"it has no meaning: {told['by']} says: {told['message']}")
+    return robot_from(told["robot"]), told["by"]
+
+
+def write(file: RobotFile, folder: Path) -> Path:
+    """The file that engines get."""
+    target = folder / f"robot.{'urdf' if file.kind == 'urdf' else 'xml'}"
+    root = copy.deepcopy(file.root)
+    ElementTree.indent(root)  # PyBullet 3.2.7 cuts lines at 8 kB
+    target.write_bytes(ElementTree.tostring(root, encoding="utf-8"))
+    return target
+
+
+def options_of(given: Mapping[str, Any], engine: str) -> dict[str, bool]:
+    """Options as the user writes them.
+
+    Raises:
+        InputError: one is neither true nor false.
+    """
+    found = {}
+    for key, value in given.items():
+        if str(value).lower() not in {"true", "false"}:
+            raise InputError(f"{engine}: {key}", value, "write true or false")
+        found[key] = str(value).lower() == "true"
+    return found
+
+
+def _call(step: str, **arguments: Any) -> dict[str, Any]:
+    """A request to a worker for one of :data:`STEPS`."""
+    return {"do": "call", "function": f"{__name__}:{STEPS[step].__name__}", "arguments": arguments}

@@ -1,0 +1,72 @@
+"""Random states of a robot, in the convention that all results are brought to.
+
+A velocity is that of each moving joint in the order of the tree: of a revolute or prismatic joint its rate, of a
+spherical joint the angular velocity in the child's axes, of a free joint the velocity of the child's origin and its
+angular velocity, both in world axes.
+"""
+
+from __future__ import annotations
+
+import dataclasses
+
+import numpy as np
+from scipy.spatial.transform import Rotation
+
+from proofroll.robots.model import Array, Robot
+
+# Slower joints might stick where an engine smooths Coulomb friction [rad/s or m/s].
+_SLOWEST = 0.2
+
+
+@dataclasses.dataclass(frozen=True)
+class States:
+    """States by joint; the first axis counts states.
+
+    Attributes:
+        angle: coordinate of each revolute or prismatic joint [rad or m], shape (states,).
+        rotation: of the child against the parent for each spherical joint, against the world for each free joint,
+            shape (states, 3, 3).
+        position: of the child's origin in the world for each free joint [m], shape (states, 3).
+        velocity, acceleration: of each moving joint, shape (states, velocities of the joint).
+    """
+
+    angle: dict[str, Array]
+    rotation: dict[str, Array]
+    position: dict[str, Array]
+    velocity: dict[str, Array]
+    acceleration: dict[str, Array]
+
+    @property
+    def count(self) -> int:
+        """How many states there are."""
+        return len(next(iter(self.velocity.values()), ()))
+
+    def stacked(self, rates: dict[str, Array], robot: Robot) -> Array:
+        """Velocities or accelerations in the order of a robot's joints, shape (states, velocities)."""
+        return np.concatenate([rates[joint.name] for joint in robot.moving], axis=1)
+
+
+def random_states(robot: Robot, count: int, seed: int) -> States:
+    """States within the limits of the joints (or ±π, ±1 m), of moderate velocities, which obey the mimics."""
+    random = np.random.default_rng(seed)
+    angle, rotation, position = {}, {}, {}
+    for joint in robot.moving:
+        if joint.kind in {"revolute", "prismatic"}:
+            reach = np.pi if joint.kind == "revolute" else 1.0
+            lower = -reach if joint.lower is None else max(joint.lower, -reach)
+            upper = reach if joint.upper is None else min(joint.upper, reach)
+            angle[joint.name] = random.uniform(*((lower, upper) if lower < upper else (-reach, reach)), count)
+        else:
+            rotation[joint.name] = np.asarray(Rotation.random(count, rng=random).as_matrix())
+            if joint.kind == "free":
+                position[joint.name] = random.uniform(-1, 1, (count, 3))
+    velocity = {
+        joint.name: random.uniform(_SLOWEST, 1, (count, joint.dofs)) * random.choice([-1.0, 1.0], (count, joint.dofs))
+        for joint in robot.moving
+    }
+    acceleration = {joint.name: random.uniform(-1, 1, (count, joint.dofs)) for joint in robot.moving}
+    for mimic in robot.mimics:
+        angle[mimic.joint] = mimic.multiplier * angle[mimic.other] + mimic.offset
+        for rates in (velocity, acceleration):
+            rates[mimic.joint] = mimic.multiplier * rates[mimic.other]
+    return States(angle, rotation, position, velocity, acceleration)

@@ -1,0 +1,133 @@
+"""The result of a check on the terminal, within 80 columns."""
+
+from __future__ import annotations
+
+import textwrap
+from collections.abc import Iterator
+from typing import Any
+
+from rich.console import Console
+from rich.table import Table
+from rich.text import Text
+
+WIDTH = 80
+SHORT = {
+    "joints": "joints",
+    "mass": "mass",
+    "kinematics": "poses",
+    "bodies": "bodies",
+    "mass matrix": "M",
+    "gravity": "g",
+    "bias": "h",
+    "inverse dynamics": "inv",
+    "forward dynamics": "fwd",
+}
+_MARKS = {"holds": "✓", "explained": "✗", "differs": "✗", "refused": "–", "missing": " "}
+_COLOURS = {"holds": "green", "explained": "yellow", "differs": "red", "refused": "magenta"}
+
+
+def console() -> Console:
+    """Standard output, never wider than 80 columns."""
+    out = Console(highlight=False)
+    out.width = min(out.width, WIDTH) if out.is_terminal else WIDTH
+    return out
+
+
+def table(content: dict[str, Any]) -> Table:
+    """One line per engine: the difference at each layer that does not hold."""
+    made = Table(box=None, padding=(0, 1, 0, 0))
+    made.add_column("engine", no_wrap=True, max_width=20)
+    made.add_column("", no_wrap=True)
+    for layer in content["layers"]:
+        made.add_column(SHORT[layer], justify="right", no_wrap=True)
+    for row in content["engines"]:
+        style = _COLOURS.get(row["status"], "bold red")
+        label = Text(one_line(f"{row['engine']} {row['version'] or ''}"), overflow="ellipsis")
+        cells = (_cell(row["layers"].get(layer)) for layer in content["layers"])
+        made.add_row(label, Text(_MARKS.get(row["status"], "!"), style=style), *cells)
+    return made
+
+
+def _cell(layer: dict[str, Any] | None) -> Text:
+    if layer is None:
+        return Text("–", style="dim")
+    return Text("✓", style="green") if layer["holds"] else Text(amount(layer["difference"], 0), style="red")
+
+
+def amount(value: float | None, digits: int = 1) -> str:
+    """A difference in few characters."""
+    if value is None or value == float("inf"):
+        return "inf"
+    if value in range(100):
+        return f"{value:.0f}"
+    return f"{value:.{digits}e}".replace("e-0", "e-").replace("e+0", "e")
+
+
+def lines(content: dict[str, Any]) -> Iterator[str]:
+    """What was read, what is wrong with the file, and every engine's causes, in lines of at most 80 characters."""
+    truth = content["truth"]
+    base = f", {content['base']} base" if content["kind"] == "urdf" else ""
+    said = f"{content['file']}: {content['kind'].upper()}{base}, {truth['velocities']} velocities, "
+    said += f"{truth['states']} states"
+    yield from wrapped(said)
+    yield from wrapped(f"true is {truth['by']}; its two formulations differ by {amount(truth['difference'])}")
+    for finding in content["lint"]:
+        yield from wrapped(f"{finding['level']}: {finding['where']}: {finding['what']}")
+
+
+def verdict_lines(content: dict[str, Any]) -> Iterator[str]:
+    """What each engine does, with proof."""
+    for row in content["engines"]:
+        for sentence in sentences(row):
+            yield from wrapped(sentence)
+
+
+def sentences(row: dict[str, Any]) -> Iterator[str]:
+    """What one engine does, a sentence each."""
+    name = f"{row['engine']} {row['version'] or ''}".strip()
+    if row["says"] and row["layers"]:
+        yield f"{name}: {row['says']}"
+    if row["refused"]:
+        yield f"{name} {_VERBS.get(row['status'], row['status'])}: {row['refused']}"
+    for cause in row["causes"]:
+        yield (
+            f"{name} differs in {cause['layer']} by {amount(cause['before'])}; explained by: {cause['name']}; "
+            f"with that hypothesis {amount(cause['after'])}. Do: {cause['remedy']}."
+        )
+    if row["unexplained"]:
+        layer = row["unexplained"]
+        yield f"{name} differs in {layer} by {amount(row['layers'][layer]['difference'])}; no known cause explains it."
+
+
+_VERBS = {"refused": "refuses the file", "missing": "is left out", "timeout": "took too long"}
+
+
+def wrapped(text: str) -> list[str]:
+    """A sentence in lines; what follows the first is indented."""
+    return textwrap.wrap(one_line(text), WIDTH, subsequent_indent="  ", break_on_hyphens=False)
+
+
+def one_line(text: str) -> str:
+    """Text from a file without control characters."""
+    return " ".join("".join(c if c.isprintable() else " " for c in text).split())
+
+
+def gallery_lines(content: dict[str, Any]) -> Iterator[str]:
+    """A line or more for each robot: what every engine does, and what was not expected."""
+    for row in content["robots"]:
+        if row["file"] is None:
+            yield from wrapped(f"{row['name']}: not here: pip install {row['package']}")
+            continue
+        does = (f"{item['engine']}: {', '.join(item['does']) or 'holds'}" for item in row["engines"])
+        yield from wrapped(f"{row['name']}: {'; '.join(does)}")
+        for sentence in row["unexpected"]:
+            yield from wrapped(f"!! {row['name']}: {sentence}")
+    unexpected = sum(len(row["unexpected"]) for row in content["robots"])
+    checked = [item for row in content["robots"] for item in row["engines"]]
+    named = sum(bool(item["causes"]) for item in checked)
+    unnamed = sum("open" in item["does"] for item in checked)
+    refused = sum(item["status"] == "refused" for item in checked)
+    yield from wrapped(
+        f"{len(content['robots'])} robots, {len(checked)} readings: {named} differ for named causes, {unnamed} have an "
+        f"open one, {refused} refused; {unexpected} otherwise than expected."
+    )

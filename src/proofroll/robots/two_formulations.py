@@ -1,0 +1,151 @@
+"""What is true of a robot at given states, by two formulations that share only the motion within one joint.
+
+A, here: Jacobians in world axes, M = Σ Jᵀ I J, and h from the accelerations that remain at zero joint accelerations.
+B, :mod:`proofroll.robots.body_recursion`: recursive Newton-Euler with spatial vectors in body axes.
+"""
+
+from __future__ import annotations
+
+import dataclasses
+
+import numpy as np
+from scipy.spatial.transform import Rotation
+
+from proofroll.robots.model import WORLD, Array, Joint, Robot
+from proofroll.robots.states import States
+
+
+@dataclasses.dataclass(frozen=True)
+class Dynamics:
+    """What the equation of motion M a + h + passive = τ holds; the first axis counts states.
+
+    Attributes:
+        M: mass matrix with armature, shape (states, n, n).
+        g: torque that holds the robot at rest, shape (states, n).
+        h: torque that gives zero accelerations without passive forces, shape (states, n).
+    """
+
+    M: Array
+    g: Array
+    h: Array
+
+
+def passive(robot: Robot, states: States) -> Array:
+    """Damping, Coulomb friction and springs as a torque against the motion, shape (states, n)."""
+    v = states.stacked(states.velocity, robot)
+    found = np.zeros_like(v)
+    for joint in robot.moving:
+        columns = robot.columns[joint.name]
+        found[:, columns] = joint.damping * v[:, columns] + joint.friction * np.sign(v[:, columns])
+        if joint.stiffness and joint.name in states.angle:
+            found[:, columns] += joint.stiffness * (states.angle[joint.name] - joint.rest)[:, None]
+    return found
+
+
+def within(joint: Joint, states: States) -> tuple[Array, Array]:
+    """Position and rotation of the child in its parent's frame, shapes (states, 3) and (states, 3, 3)."""
+    count = states.count
+    slid = np.zeros((count, 3))
+    turned = np.broadcast_to(np.eye(3), (count, 3, 3))
+    if joint.kind == "revolute":
+        turned = Rotation.from_rotvec(states.angle[joint.name][:, None] * joint.axis).as_matrix()
+    elif joint.kind == "prismatic":
+        slid = states.angle[joint.name][:, None] * joint.axis
+    elif joint.kind == "spherical":
+        turned = states.rotation[joint.name]
+    elif joint.kind == "free":
+        return joint.position + states.position[joint.name], states.rotation[joint.name]
+    R = joint.rotation @ turned
+    return joint.position + slid @ joint.rotation.T - R @ joint.child_position, R
+
+
+def poses(robot: Robot, states: States) -> dict[str, tuple[Array, Array]]:
+    """Position of the origin and rotation of every body in the world, shapes (states, 3) and (states, 3, 3)."""
+    found = {WORLD: (np.zeros((states.count, 3)), np.broadcast_to(np.eye(3), (states.count, 3, 3)))}
+    for joint in robot.joints:
+        p, R = found[joint.parent]
+        r, Q = within(joint, states)
+        found[joint.child] = (p + _rotate(R, r), R @ Q)
+    return found
+
+
+def _rotate(R: Array, r: Array) -> Array:
+    return np.asarray(np.einsum("sij,sj->si", R, r))
+
+
+def skew(r: Array) -> Array:
+    """The matrix of r × for each row."""
+    found = np.zeros((*r.shape[:-1], 3, 3))
+    found[..., 0, 1], found[..., 0, 2], found[..., 1, 2] = -r[..., 2], r[..., 1], -r[..., 0]
+    found[..., 1, 0], found[..., 2, 0], found[..., 2, 1] = r[..., 2], -r[..., 1], r[..., 0]
+    return found
+
+
+@dataclasses.dataclass
+class _Motion:
+    """Of a body in world axes: Jacobians, angular velocity, accelerations at zero joint accelerations."""
+
+    Jv: Array
+    Jw: Array
+    w: Array
+    a: Array
+    alpha: Array
+
+
+def world_jacobians(robot: Robot, states: States) -> Dynamics:
+    """Formulation A."""
+    count, n = states.count, robot.dofs
+    v = states.stacked(states.velocity, robot)
+    frames = poses(robot, states)
+    rest = np.zeros((count, 3))
+    motions = {WORLD: _Motion(np.zeros((count, 3, n)), np.zeros((count, 3, n)), rest, rest, rest)}
+    M = np.zeros((count, n, n))
+    g, c = np.zeros((count, n)), np.zeros((count, n))
+    for joint in robot.joints:
+        motion = motions[joint.child] = _carried(robot, joint, motions[joint.parent], frames, v)
+        body = robot.bodies[joint.child]
+        R = frames[joint.child][1]
+        r = R @ body.com
+        Jc = motion.Jv - skew(r) @ motion.Jw
+        ac = motion.a + np.cross(motion.alpha, r) + np.cross(motion.w, np.cross(motion.w, r))
+        inertia = R @ body.inertia @ R.transpose(0, 2, 1)
+        torque = _rotate(inertia, motion.alpha) + np.cross(motion.w, _rotate(inertia, motion.w))
+        M += body.mass * Jc.transpose(0, 2, 1) @ Jc + motion.Jw.transpose(0, 2, 1) @ inertia @ motion.Jw
+        g -= body.mass * np.einsum("sij,i->sj", Jc, robot.gravity)
+        c += body.mass * np.einsum("sij,si->sj", Jc, ac) + np.einsum("sij,si->sj", motion.Jw, torque)
+    return Dynamics(M + np.diag(armature(robot)), g, g + c)
+
+
+def armature(robot: Robot) -> Array:
+    """Of every velocity, shape (n,)."""
+    return np.concatenate([np.zeros(0), *(np.full(joint.dofs, joint.armature) for joint in robot.moving)])
+
+
+def _carried(robot: Robot, joint: Joint, parent: _Motion, frames: dict[str, tuple[Array, Array]], v: Array) -> _Motion:
+    (p_parent, R_parent), (p, R) = frames[joint.parent], frames[joint.child]
+    r = p - p_parent
+    Jv, Jw = parent.Jv - skew(r) @ parent.Jw, parent.Jw.copy()
+    if joint.kind == "fixed":
+        return _Motion(Jv, Jw, parent.w, parent.a + _swung(parent, r), parent.alpha)
+    columns = robot.columns[joint.name]
+    rate = v[:, columns]
+    if joint.kind == "free":
+        Jv[:, :, columns], Jw[:, :, columns] = np.eye(3, 6), np.eye(3, 6, 3)
+        return _Motion(Jv, Jw, rate[:, 3:], np.zeros_like(p), np.zeros_like(p))
+    u = R @ (np.eye(3) if joint.kind == "spherical" else joint.axis[:, None])  # (states, 3, velocities)
+    relative = np.einsum("sij,sj->si", u, rate)
+    if joint.kind == "prismatic":
+        Jv[:, :, columns] = u
+        a = parent.a + _swung(parent, r) + 2 * np.cross(parent.w, relative)
+        return _Motion(Jv, Jw, parent.w, a, parent.alpha)
+    anchor = p_parent + _rotate(R_parent, np.broadcast_to(joint.position, p.shape))
+    Jw[:, :, columns], Jv[:, :, columns] = u, -skew(p - anchor) @ u
+    w, alpha = parent.w + relative, parent.alpha + np.cross(parent.w, relative)
+    a = parent.a + _swung(parent, anchor - p_parent)
+    a = a + np.cross(alpha, p - anchor) + np.cross(w, np.cross(w, p - anchor))
+    return _Motion(Jv, Jw, w, a, alpha)
+
+
+def _swung(motion: _Motion, r: Array) -> Array:
+    """Acceleration of a point of the body at r against that of its origin."""
+    return np.cross(motion.alpha, r) + np.cross(motion.w, np.cross(motion.w, r))

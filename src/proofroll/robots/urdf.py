@@ -1,0 +1,194 @@
+"""Our own reading of URDF, by its specification (wiki.ros.org/urdf/XML): what the file says, nothing invented."""
+
+from __future__ import annotations
+
+import copy
+from collections import Counter
+from typing import Any
+from xml.etree.ElementTree import Element
+
+import numpy as np
+from scipy.spatial.transform import Rotation
+
+from proofroll.core.errors import InputError
+from proofroll.robots.model import WORLD, Array, Body, Joint, Mimic, Robot
+from proofroll.robots.robot_file import Finding, RobotFile
+from proofroll.robots.safe_xml import numbers
+
+# What carries the root; no name in a file begins so.
+BASE_JOINT = "(base)"
+_KINDS = {"revolute": "revolute", "continuous": "revolute", "prismatic": "prismatic", "fixed": "fixed"}
+_MOMENTS = ("xx", "xy", "xz", "yy", "yz", "zz")
+_PRIMITIVES = {"box", "sphere", "cylinder", "capsule"}
+
+
+def stripped(root: Element) -> tuple[Element, list[Finding]]:
+    """A copy without what needs other files or speaks to one engine alone, and what that was."""
+    root, findings = copy.deepcopy(root), []
+    for child in list(root):
+        if child.tag not in {"link", "joint"}:
+            root.remove(child)
+            if child.tag in {"gazebo", "mujoco", "transmission", "drake:proximity_properties"}:
+                findings.append(Finding("note", child.tag, "options for one program; left out for every engine"))
+            elif child.tag not in {"material", "group_state", "link_state"}:
+                findings.append(Finding("warning", str(child.tag), "the specification has no such element; left out"))
+    meshes = 0
+    for link in root.iter("link"):
+        removed = 0
+        for shape in [*link.findall("visual"), *link.findall("collision")]:
+            geometry = shape.find("geometry")
+            drawn = geometry is None or not any(part.tag in _PRIMITIVES for part in geometry)
+            if drawn or shape.tag == "visual":
+                link.remove(shape)
+                removed += drawn and shape.tag == "collision"
+        meshes += removed
+        if removed and link.find("inertial") is None:
+            words = (
+                "its collision mesh was left out, and it has no <inertial>: engines that weigh shapes find less mass"
+            )
+            findings.append(Finding("warning", f"link {link.get('name')}", words))
+    if meshes:
+        words = f"{meshes} collision meshes left out for every engine: masses come from <inertial> alone"
+        findings.append(Finding("note", "links", words))
+    return root, findings
+
+
+def read_urdf(file: RobotFile) -> Robot:
+    """The robot.
+
+    Raises:
+        InputError: the file breaks the specification so that it has no meaning, or holds a planar or floating joint.
+    """
+    links = _named(file.root, "link")
+    elements = _named(file.root, "joint")
+    if not links:
+        raise InputError("file", str(file.path), "it has no links")
+    bodies, sources = {}, {}
+    for name, link in links.items():
+        bodies[name], sources[name] = _body(name, link)
+    joints = [_joint(name, element, links) for name, element in elements.items()]
+    mimics = [
+        Mimic(name, mimic.get("joint", ""), *(numbers(mimic, key, value, 1)[0] for key, value in _RATIO))
+        for name, element in elements.items()
+        if (mimic := element.find("mimic")) is not None and element.get("type") != "fixed"
+    ]
+    robot = Robot(str(file.root.get("name", "robot")), bodies, _ordered(joints, links, file.base), sources=sources)
+    return robot.change(mimics=_direct(mimics, robot))
+
+
+_RATIO = (("multiplier", "1"), ("offset", "0"))
+
+
+def _named(root: Element, tag: str) -> dict[str, Element]:
+    elements = root.findall(tag)
+    for name, times in Counter(element.get("name") for element in elements).items():
+        if not name:
+            raise InputError(f"<{tag} name>", name, f"every {tag} needs a name")
+        if times > 1:
+            raise InputError(f"<{tag} name>", name, f"{times} {tag}s have this name")
+    return {str(element.get("name")): element for element in elements}
+
+
+def _origin(element: Element) -> tuple[Array, Array]:
+    origin = element.find("origin")
+    if origin is None:
+        return np.zeros(3), np.eye(3)
+    angles = numbers(origin, "rpy", "0 0 0", 3)
+    return np.array(numbers(origin, "xyz", "0 0 0", 3)), np.asarray(Rotation.from_euler("xyz", angles).as_matrix())
+
+
+def _body(name: str, link: Element) -> tuple[Body, dict[str, Any]]:
+    shapes = []
+    for collision in link.findall("collision"):
+        geometry = collision.find("geometry")
+        if geometry is not None and len(geometry):
+            shapes.append((geometry[0].tag, dict(geometry[0].attrib), *_origin(collision)))
+    inertial = link.find("inertial")
+    source: dict[str, Any] = {"inertial": inertial is not None, "shapes": shapes}
+    if inertial is None:
+        return Body(name, 0.0, np.zeros(3), np.zeros((3, 3))), source
+    com, R = _origin(inertial)
+    mass = inertial.find("mass")
+    m = 0.0 if mass is None else numbers(mass, "value", None, 1)[0]
+    written = np.zeros((3, 3))
+    moments = inertial.find("inertia")
+    if moments is not None:
+        xx, xy, xz, yy, yz, zz = (
+            numbers(moments, f"i{key}", "0", 1)[0] for key in ("xx", "xy", "xz", "yy", "yz", "zz")
+        )
+        written = np.array([[xx, xy, xz], [xy, yy, yz], [xz, yz, zz]])
+    source |= {"written": written, "frame": R}
+    return Body(name, m, com, R @ written @ R.T), source
+
+
+def _joint(name: str, element: Element, links: dict[str, Element]) -> Joint:
+    kind = _KINDS.get(element.get("type", ""))
+    if kind is None:
+        known = ", ".join(_KINDS)
+        raise InputError(f"<joint {name} type>", element.get("type"), f"the check covers {known}")
+    ends = {}
+    for end in ("parent", "child"):
+        found = element.find(end)
+        ends[end] = "" if found is None else found.get("link", "")
+        if ends[end] not in links:
+            raise InputError(f"<joint {name} {end}>", ends[end], "there is no such link")
+    position, rotation = _origin(element)
+    axis = np.array([1.0, 0.0, 0.0])
+    if kind != "fixed" and (found := element.find("axis")) is not None:
+        axis = np.array(numbers(found, "xyz", "1 0 0", 3))
+    length = float(np.linalg.norm(axis))
+    if not length:
+        raise InputError(f"<joint {name} axis>", "0 0 0", "an axis needs a direction")
+    dynamics = element.find("dynamics")
+    limit = element.find("limit")
+    bounded = limit is not None and element.get("type") in {"revolute", "prismatic"}
+    return Joint(
+        name, kind, ends["parent"], ends["child"], position, rotation, axis / length,
+        damping=0.0 if dynamics is None or kind == "fixed" else numbers(dynamics, "damping", "0", 1)[0],
+        friction=0.0 if dynamics is None or kind == "fixed" else numbers(dynamics, "friction", "0", 1)[0],
+        lower=numbers(limit, "lower", "0", 1)[0] if bounded and limit is not None else None,
+        upper=numbers(limit, "upper", "0", 1)[0] if bounded and limit is not None else None,
+    )  # fmt: skip
+
+
+def _ordered(joints: list[Joint], links: dict[str, Element], base: str) -> tuple[Joint, ...]:
+    """The joints, parents first, with the one that carries the root."""
+    carried = Counter(joint.child for joint in joints)
+    for name, times in carried.items():
+        if times > 1:
+            raise InputError("<child link>", name, f"{times} joints carry this link; a URDF is a tree")
+    roots = [name for name in links if name not in carried]
+    if len(roots) != 1:
+        said = (
+            "its links form a loop" if not roots else f"it has {len(roots)} roots, {roots[0]} and {roots[1]} among them"
+        )
+        raise InputError("<robot>", roots[0] if roots else "", f"{said}; a URDF is a tree with one root")
+    below: dict[str, list[Joint]] = {}
+    for joint in joints:
+        below.setdefault(joint.parent, []).append(joint)
+    kind = "free" if base == "free" else "fixed"
+    found = [Joint(BASE_JOINT, kind, WORLD, roots[0], np.zeros(3), np.eye(3), np.array([0.0, 0.0, 1.0]))]
+    waiting = list(reversed(below.get(roots[0], [])))
+    while waiting:
+        found.append(waiting.pop())
+        waiting += reversed(below.get(found[-1].child, []))
+    if len(found) != len(links):
+        raise InputError("<robot>", roots[0], "some links form a loop; a URDF is a tree with one root")
+    return tuple(found)
+
+
+def _direct(mimics: list[Mimic], robot: Robot) -> tuple[Mimic, ...]:
+    """Each follower in terms of a joint that follows none."""
+    by_joint = {mimic.joint: mimic for mimic in mimics}
+    kinds = {joint.name: joint.kind for joint in robot.moving}
+    found = []
+    for mimic in mimics:
+        factor, offset, other, seen = mimic.multiplier, mimic.offset, mimic.other, {mimic.joint}
+        while other in by_joint and other not in seen:
+            seen.add(other)
+            following = by_joint[other]
+            factor, offset, other = factor * following.multiplier, offset + factor * following.offset, following.other
+        if other in seen or kinds.get(other) not in {"revolute", "prismatic"}:
+            raise InputError(f"<joint {mimic.joint} mimic>", mimic.other, "name another joint that moves")
+        found.append(Mimic(mimic.joint, other, factor, offset))
+    return tuple(found)

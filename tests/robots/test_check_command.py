@@ -1,0 +1,147 @@
+"""``proofroll check``: what it prints, writes and returns."""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Callable, Mapping
+from pathlib import Path
+
+import pytest
+from rich.console import Console
+from robot_templates import inertial, urdf
+
+from proofroll.robots.layers import LAYERS
+from proofroll.robots.terminal import WIDTH, table
+
+Proofroll = Callable[..., tuple[int, str, str]]
+Install = Callable[[Mapping[str, str]], None]
+
+
+def test_json(proofroll: Proofroll, arm: Path) -> None:
+    """The JSON has the file, its kind and findings, and for every engine version, layers and causes."""
+    names = ("mujoco", "pinocchio", "exudyn")
+    asked = [word for name in names for word in ("--engine", name)]
+    code, out, _ = proofroll("check", str(arm), *asked, "--states", "3", "--json")
+    content = json.loads(out)
+    assert code == 0
+    assert content["kind"] == "urdf"
+    assert content["truth"]["difference"] < 1e-14
+    engines = {row["engine"]: row for row in content["engines"]}
+    for name in names:
+        row = engines[name]
+        assert row["version"]
+        assert row["refused"] is None
+        assert row["causes"] == []
+        assert set(row["layers"]) >= {"mass", "kinematics", "bodies", "mass matrix", "gravity", "bias"}
+        assert all(set(layer) == {"difference", "tolerance", "holds"} for layer in row["layers"].values())
+
+
+def test_a_difference(proofroll: Proofroll, tmp_path: Path) -> None:
+    """A difference makes the command exit 1, names the cause with its numbers, and keeps within 80 columns."""
+    path = tmp_path / "robot.urdf"
+    path.write_text(urdf(first='<dynamics damping="0.7"/>'))
+    code, out, _ = proofroll("check", str(path), "--engine", "pinocchio", "--out", str(tmp_path / "out"))
+    assert code == 1
+    assert max(map(len, out.splitlines())) <= 80
+    said = " ".join(out.split())
+    assert "explained by: damping is not used in the forward dynamics; with that hypothesis" in said
+    assert "Do: subtract damping" in said
+    kept = json.loads((tmp_path / "out" / "check.json").read_text())
+    (cause,) = kept["engines"][0]["causes"]
+    assert cause["layer"] == "forward dynamics"
+    assert cause["before"] > 1e-2
+    assert cause["after"] < 1e-10
+
+
+def test_wide_table(tmp_path: Path) -> None:
+    """A row in which every layer fails, and a long name, fit into 80 columns without a number cut off."""
+    layers = {
+        layer: {"difference": 1.234e-12 * 7**n, "tolerance": 0.0, "holds": False} for n, layer in enumerate(LAYERS)
+    }
+    row = {"engine": "pybullet[inertia_from_file=false]", "version": "3.2.7", "status": "differs", "layers": layers}
+    refused = {"engine": "mujoco", "version": "4.0.0", "status": "crashed", "layers": {}}
+    with (tmp_path / "table.txt").open("w+") as text:
+        Console(file=text, width=WIDTH).print(table({"layers": LAYERS, "engines": [row, refused]}))
+        text.seek(0)
+        lines = text.read().splitlines()
+    assert max(map(len, lines)) <= 80
+    assert lines[1].count("e-") == len(LAYERS)
+    assert lines[1].count("…") == 1
+    assert "!" in lines[2]
+
+
+def test_page_escapes(proofroll: Proofroll, tmp_path: Path) -> None:
+    """The page shows names from the file as text, loads nothing, and marks what is held differently."""
+    path = tmp_path / "robot.urdf"
+    evil = "&lt;script&gt;alert(1)&lt;/script&gt;"
+    box = '<collision><geometry><box size="0.1 0.2 0.3"/></geometry></collision>'
+    path.write_text(urdf(tool=box).replace('"tip"', f'"{evil}"').replace('name="arm"', f'name="{evil}"'))
+    code, _, _ = proofroll("check", str(path), "--engine", "mujoco", "--out", str(tmp_path / "out"))
+    page = (tmp_path / "out" / "check.html").read_text()
+    assert code == 1
+    assert "<script" not in page
+    assert evil in page
+    assert 'class="revolute wrong"' in page
+    assert "//" not in page
+
+
+@pytest.mark.parametrize(
+    ("reader", "status", "said"),
+    [
+        ("Crashing", "crashed", "SIGABRT"),
+        ("Raising", "refused", "RuntimeError: cannot <b>read</b> [bold]this[/bold]"),
+        ("Broken", "crashed", "the reader of bad failed"),
+    ],
+)
+def test_bad_readers(
+    proofroll: Proofroll, install_readers: Install, arm: Path, reader: str, status: str, said: str
+) -> None:
+    """An importer that crashes, raises or is mistaken is a row beside the others."""
+    install_readers({"bad": reader})
+    arguments = ("check", str(arm), "--engine", "bad", "--engine", "pinocchio", "--states", "2")
+    code, out, _ = proofroll(*arguments, "--json")
+    bad, good = json.loads(out)["engines"]
+    assert code == 1
+    assert bad["status"] == status
+    assert said in bad["refused"]
+    assert good["status"] == "holds"
+
+
+def test_a_reader_that_hangs(proofroll: Proofroll, install_readers: Install, arm: Path) -> None:
+    """An importer that never answers is a row after the time limit."""
+    install_readers({"bad": "Hanging"})
+    code, out, _ = proofroll("check", str(arm), "--engine", "bad", "--time-limit", "1", "--json")
+    (row,) = json.loads(out)["engines"]
+    assert code == 1
+    assert row["status"] == "timeout"
+    assert "no result within 1 s" in row["refused"]
+
+
+@pytest.mark.parametrize(
+    ("arguments", "said"),
+    [
+        (["--engine", "nothing"], "reads no robot files"),
+        (["--engine", "mujoco[nothing=true]"], "there is no such option; it has fusestatic"),
+        (["--engine", "mujoco[fusestatic=2]"], "write true or false"),
+        (["--base", "loose"], "choose one of fixed, free"),
+        (["--states", "0"], "0"),
+    ],
+)
+def test_bad_options(proofroll: Proofroll, arm: Path, arguments: list[str], said: str) -> None:
+    """An option that is wrong gives one line and exit code 2."""
+    code, out, err = proofroll("check", str(arm), *arguments)
+    assert code == 2
+    assert said in err
+    assert out == ""
+    assert err.count("\n") == 1
+
+
+def test_nothing_moves(proofroll: Proofroll, tmp_path: Path) -> None:
+    """A robot without moving joints is no question; a free base makes it one."""
+    path = tmp_path / "robot.urdf"
+    path.write_text(f'<robot name="stone"><link name="stone">{inertial()}</link></robot>')
+    code, _, err = proofroll("check", str(path))
+    assert code == 2
+    assert "nothing in it moves; try --base free" in err
+    code, _, _ = proofroll("check", str(path), "--base", "free", "--engine", "mujoco")
+    assert code == 0

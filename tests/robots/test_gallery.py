@@ -1,0 +1,62 @@
+"""The gallery of robots from packages."""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Callable
+from pathlib import Path
+
+import pytest
+
+from proofroll.core.errors import InputError
+from proofroll.robots.gallery import locate, outcome, read_gallery
+
+Proofroll = Callable[..., tuple[int, str, str]]
+
+
+def test_the_file() -> None:
+    """The gallery has at least 25 robots of two formats, fixed and free, each with what is expected of the engines."""
+    entries = read_gallery()
+    assert len({entry.name for entry in entries}) == len(entries) >= 25
+    assert {entry.base for entry in entries} == {"fixed", "free"}
+    assert {Path(entry.file).suffix for entry in entries} == {".urdf", ".xml"}
+    assert all({"mujoco", "pinocchio", "exudyn", "drake"} <= entry.engines.keys() for entry in entries)
+
+
+def test_unknown_cause(tmp_path: Path) -> None:
+    """A cause that there is not, or a missing field, is refused in one line."""
+    path = tmp_path / "robots.toml"
+    path.write_text('[[robots]]\nname="r"\npackage="p"\nfile="f"\n[robots.engines]\nmujoco=["no_such_cause"]\n')
+    with pytest.raises(InputError, match="choose from"):
+        read_gallery(path)
+    path.write_text('[[robots]]\nname="r"\n')
+    with pytest.raises(InputError, match="is missing"):
+        read_gallery(path)
+
+
+def test_outcomes() -> None:
+    """What an engine does is its causes in order, and whether something stays open."""
+    row = {"layers": {"mass": {}}, "causes": [{"id": "b"}, {"id": "a"}, {"id": "b"}], "unexplained": "bias"}
+    assert outcome(row) == ["b", "a", "open"]
+    assert outcome({"layers": {}, "status": "refused"}) == ["refuses"]
+    assert outcome({"layers": {}, "status": "timeout"}) == ["timeout"]
+
+
+def test_unknown_robot(proofroll: Proofroll) -> None:
+    """A robot that is not in the gallery gives one line."""
+    code, _, err = proofroll("robots", "no_such_robot")
+    assert code == 2
+    assert "choose from panda" in err
+
+
+@pytest.mark.parametrize("name", ["z1", "allegro_right_hand", "half_cheetah", "pusher"])
+def test_as_expected(proofroll: Proofroll, name: str) -> None:
+    """A robot does in our engines what the gallery expects."""
+    entry = next(entry for entry in read_gallery() if entry.name == name)
+    if locate(entry) is None:
+        pytest.skip(f"{entry.package} is not installed: pip install 'proofroll[robots]'")
+    code, out, _ = proofroll("robots", name, "--engine", "pinocchio", "--engine", "mujoco", "--json")
+    (row,) = json.loads(out)["robots"]
+    assert row["unexpected"] == []
+    assert code == 0
+    assert {"pinocchio", "mujoco"} <= {item["engine"] for item in row["engines"]}

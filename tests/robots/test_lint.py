@@ -1,0 +1,59 @@
+"""What is noticed in a file before any engine sees it."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import pytest
+from robot_templates import inertial, urdf
+
+from proofroll.robots.lint import lint
+from proofroll.robots.robot_file import Finding, open_robot
+from proofroll.robots.urdf import read_urdf
+
+MESH = '<collision><geometry><mesh filename="package://x/y.stl"/></geometry></collision>'
+BOX = '<collision><geometry><box size="0.1 0.2 0.3"/></geometry></collision>'
+NOT_POSITIVE = inertial(ixx="-0.01")
+FLAT = inertial(ixx="0.01", iyy="0.01", izz="0.9")
+MASSLESS = inertial(mass="0")
+EMPTY = inertial(mass="0", ixx="0", iyy="0", izz="0", ixy="0").replace("0.002", "0").replace("-0.001", "0")
+PLANTED = {
+    "without inertial": (urdf(), "warning", "links", "1 without <inertial>: tool"),
+    "shape without inertial": (urdf(tool=BOX), "warning", "link tool", "1000 kg/m³"),
+    "mesh without inertial": (urdf(tool=MESH), "warning", "link tool", "collision mesh was left out"),
+    "not positive": (urdf(tip=NOT_POSITIVE), "error", "link tip", "not positive definite"),
+    "triangle": (urdf(tip=FLAT), "error", "link tip", "breaks the triangle inequality (0.9 > 0.00699"),
+    "inertia without mass": (urdf(tip=MASSLESS), "error", "link tip", "it has inertia but no mass"),
+    "nothing to move": (urdf(tip=EMPTY), "error", "joint j3", "it moves no mass"),
+    "turned inertial": (urdf(tip=inertial(rpy="0.1 0 0")), "note", "link tip", "rpy together with products"),
+    "axis": (urdf().replace("0 0.6 0.8", "0 0.6 0.9"), "warning", "joint j1", "its axis has length 1.08"),
+    "damping": (urdf(first='<dynamics damping="1"/>'), "warning", "joints", "damping on 1 of 3"),
+    "friction": (urdf(first='<dynamics friction="1"/>'), "warning", "joints", "friction on 1 of 3"),
+    "negative damping": (urdf(first='<dynamics damping="-1"/>'), "error", "joint j1", "negative damping -1"),
+    "mimic": (urdf(third='<mimic joint="j1"/>'), "warning", "joints", "1 follow another (mimic): j3"),
+    "limits": (urdf().replace('lower="-1.5"', 'lower="1.5"'), "error", "joint j1", "above the upper one"),
+    "no limits": (urdf(kinds=("revolute", "prismatic", "revolute")), "warning", "joint j3", "needs <limit>"),
+    "author's options": (urdf(extra="<gazebo/>"), "note", "gazebo", "left out for every engine"),
+    "unknown element": (urdf(extra="<wheel/>"), "warning", "wheel", "the specification has no such element"),
+    "unknown inside": (urdf(first="<spring/>"), "warning", "joint j1", "no <spring> here"),
+}
+
+
+def _findings(text: str, folder: Path) -> list[Finding]:
+    path = folder / "robot.urdf"
+    path.write_text(text)
+    file = open_robot(path)
+    return [*file.findings, *lint(file, read_urdf(file))]
+
+
+@pytest.mark.parametrize("name", PLANTED)
+def test_planted(name: str, tmp_path: Path) -> None:
+    """What is planted is found at its place, in words."""
+    text, level, where, what = PLANTED[name]
+    found = _findings(text, tmp_path)
+    assert any(item.level == level and item.where == where and what in item.what for item in found), found
+
+
+def test_nothing_planted(tmp_path: Path) -> None:
+    """A clean file has no findings."""
+    assert _findings(urdf(tool=inertial()), tmp_path) == []
