@@ -21,7 +21,7 @@ from typing import Any, ClassVar, Self
 
 import numpy as np
 
-from proofroll.core.engine import Built, Sample
+from proofroll.core.engine import Sample
 from proofroll.core.scene import Scene
 from proofroll.engines.projection import Projection
 
