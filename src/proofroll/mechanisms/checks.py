@@ -94,7 +94,7 @@ def inertia(field: str, value: Any) -> Matrix:
     """
     try:
         found = np.asarray(value, dtype=float)
-    except (TypeError, ValueError):
+    except (TypeError, ValueError, OverflowError):
         found = np.zeros(0)
     if found.shape == (3,):
         found = np.diag(found)

@@ -143,13 +143,13 @@ class Joint:
         zero = [0.0] * self.nq
         if self.kind in _WITH_QUATERNION:
             zero[-4] = 1.0
-        q0 = list(checks.numbers(f"{field}.q0", zero if np.size(self.q0) == 0 else self.q0, self.nq))
+        q0 = list(checks.numbers(f"{field}.q0", zero if _none(self.q0) else self.q0, self.nq))
         if self.kind in _WITH_QUATERNION:
             length = float(np.linalg.norm(q0[-4:]))
             if length == 0.0:
                 raise InputError(f"{field}.q0", self.q0, "a quaternion of length zero is no rotation; give a unit one")
             q0[-4:] = [component / length for component in q0[-4:]]
-        v0 = checks.numbers(f"{field}.v0", [0.0] * self.nv if np.size(self.v0) == 0 else self.v0, self.nv)
+        v0 = checks.numbers(f"{field}.v0", [0.0] * self.nv if _none(self.v0) else self.v0, self.nv)
         checks.assign(self, q0=tuple(q0), v0=v0)
 
     @property
@@ -182,3 +182,7 @@ def check_kind(field: str, kind: str) -> None:
     """
     if kind not in FACTS:
         raise InputError(f"{field}.kind", kind, f"choose one of {', '.join(FACTS)}")
+
+
+def _none(values: object) -> bool:
+    return isinstance(values, tuple | list) and not values

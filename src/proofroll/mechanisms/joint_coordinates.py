@@ -8,6 +8,7 @@ spherical and free joints are states in the child's axes, which keeps digits whe
 
 from __future__ import annotations
 
+from collections.abc import Iterator
 from dataclasses import dataclass
 from typing import Any
 
@@ -31,6 +32,7 @@ class Solution:
         multipliers: of the loops' rows, the smallest in norm where they are redundant.
         motion, rows: kinematics.
         split: (L⁻ᵀV, Uᵀ/S) of the locked directions: −product with a residual is the correction that removes it.
+        smallest: of the singular values that count, relative to the largest; zero at a singular pose.
     """
 
     acceleration: Array
@@ -38,6 +40,7 @@ class Solution:
     motion: Motion
     rows: Rows
     split: tuple[Array, Array] | None
+    smallest: float
 
 
 class JointCoordinates:
@@ -71,7 +74,7 @@ class JointCoordinates:
     def solve(self, q: Array, v: Array) -> Solution:
         """Accelerations and multipliers for coordinates (nq) and velocities (nv)."""
         motion = self.tree.at(q, v)
-        J, M, loads = self._inertial(motion)
+        J, M, loads = self.inertial(motion)
         b = self._torque - self._damping * v - np.einsum("nij,ni->j", J, loads)
         for stiffness, rest, at_q, at_v in self._springs:
             b[at_v] -= stiffness * (q[at_q] - rest)
@@ -81,27 +84,52 @@ class JointCoordinates:
         into = np.linalg.inv(np.linalg.cholesky(M)).T  # M⁻¹ = into intoᵀ
         free = into.T @ b
         if not self.rank:
-            return Solution(into @ free, np.zeros(0), motion, rows, None)
+            return Solution(into @ free, np.zeros(0), motion, rows, None, 1.0)
         U, S, Vt = np.linalg.svd(rows.C @ into, full_matrices=False)
         locked, back = Vt[: self.rank], U[:, : self.rank].T / S[: self.rank, None]
         normal = -back @ rows.bias - locked @ free
         locked_into = into @ locked.T
-        return Solution(into @ free + locked_into @ normal, back.T @ normal, motion, rows, (locked_into, back))
+        smallest = float(S[self.rank - 1] / S[0])
+        return Solution(
+            into @ free + locked_into @ normal, back.T @ normal, motion, rows, (locked_into, back), smallest
+        )
 
-    def run(self, times: Array, tolerance: float = 1e-13) -> Record:
+    def run(self, times: Array, tolerance: float = 1e-14) -> Record:
         """The motion at the given times, s, by DOP853.
 
         Raises:
             Diverged: the integration stops, e.g. at a singular pose.
         """
-        nq = self.mechanism.nq
-        start = np.concatenate(self.mechanism.start())
-
-        def rate(_: float, y: Array) -> Array:
-            return np.concatenate([self.tree.rate(y[:nq], y[nq:]), self.solve(y[:nq], y[nq:]).acceleration])
-
-        states = integrated(rate, start, times, tolerance, self.eliminated)
+        nq, start = self.mechanism.nq, np.concatenate(self.mechanism.start())
+        states = integrated(self.rate, start, times, tolerance, self.eliminated)
         return gathered(times, [self.sample(y[:nq], y[nq:]) for y in states])
+
+    def rate(self, _: float, y: Array) -> Array:
+        """Right-hand side for the state (q, v)."""
+        q, v = y[: self.mechanism.nq], y[self.mechanism.nq :]
+        return np.concatenate([self.tree.rate(q, v), self.solve(q, v).acceleration])
+
+    def run_rk4(self, times: Array, step: float = 2e-3) -> Record:
+        """The motion at the given times, s, by Runge-Kutta 4 in equal steps of at most ``step``, s.
+
+        Equal steps pass singular poses, before which an error control shrinks its steps for ever.
+        """
+        nq = self.mechanism.nq
+        return gathered(times, [self.sample(y[:nq], y[nq:]) for y in self.rk4_states(times, step)])
+
+    def rk4_states(self, times: Array, step: float) -> Iterator[Array]:
+        """The states (q, v) of :meth:`run_rk4`."""
+        y, now = np.concatenate(self.mechanism.start()), 0.0
+        for time in times:
+            steps = int(np.ceil((time - now) / step - 1e-9))
+            h = (time - now) / max(steps, 1)
+            for _ in range(steps):
+                k1 = self.rate(0.0, y)
+                k2 = self.rate(0.0, y + h / 2 * k1)
+                k3 = self.rate(0.0, y + h / 2 * k2)
+                y = self.eliminated(y + h / 6 * (k1 + 2 * k2 + 2 * k3 + self.rate(0.0, y + h * k3)))
+            now = time
+            yield y
 
     def eliminated(self, y: Array) -> Array:
         """The state with violations of the loops and of unit quaternions removed."""
@@ -136,7 +164,7 @@ class JointCoordinates:
             "residual": np.array(largest),
         }
 
-    def _inertial(self, motion: Motion) -> tuple[Array, Array, Array]:
+    def inertial(self, motion: Motion) -> tuple[Array, Array, Array]:
         """Jacobians at the centres of mass, mass matrix, inertial and gravity wrenches at v̇ = 0."""
         n = len(self._mass)
         R, w = motion.R_WB[:n], motion.w_WB[:n]

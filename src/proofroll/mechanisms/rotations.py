@@ -26,7 +26,7 @@ def skew(a: Any) -> Array:
 
 def crosses(a: Array, b: Array) -> Array:
     """Cross products of two lists of vectors, (n, 3)."""
-    return np.stack(cross(a.T, b.T), axis=1)
+    return cross(a.T, b.T).T
 
 
 def skews(a: Array) -> Array:

@@ -10,7 +10,7 @@ from scipy.integrate import DOP853
 from proofroll.core.errors import Diverged
 from proofroll.mechanisms.rotations import Array
 
-_LEAST_RELATIVE = 2.3e-14  # scipy's own least, 100 times the spacing of doubles
+_STALLED, _STALLED_STEPS = 1e-5, 20  # so many steps in a row, so small against the largest: no smooth motion needs them
 
 
 def integrated(
@@ -34,9 +34,10 @@ def integrated(
     Raises:
         Diverged: the steps become too small or too many, or the state is not finite.
     """
-    # time scipy.integrate needs an end; it is moved from sample to sample, so that the step size survives
-    solver = DOP853(rate, 0.0, start, float(times[-1]) or 1.0, rtol=max(tolerance, _LEAST_RELATIVE), atol=tolerance)
-    steps = 0
+    # scipy needs an end; it is moved from sample to sample, so that the step size survives
+    solver = DOP853(rate, 0.0, start, float(times[-1]) or 1.0, rtol=1e-3, atol=tolerance)
+    solver.rtol = tolerance  # scipy accepts no less than 2.2e-14, which is its caution, not the method's limit
+    steps, largest, small = 0, 0.0, 0
     for time in times:
         if time > solver.t:
             solver.t_bound, solver.status = float(time), "running"
@@ -46,9 +47,14 @@ def integrated(
             steps += 1
             if solver.status == "failed" or not np.isfinite(solver.y).all():
                 raise Diverged(f"DOP853 stopped at t = {solver.t:.6g} s: {message or 'the state is not finite'}")
+            landing = solver.status == "finished"
+            largest = max(largest, solver.step_size)
+            small = 0 if landing or solver.step_size > _STALLED * largest else small + 1
+            if small > _STALLED_STEPS:
+                raise Diverged(f"DOP853 stalls at t = {solver.t:.6g} s: its steps shrink, as at a singular pose")
             if steps > most_steps:
                 raise Diverged(f"DOP853 needs more than {most_steps} steps; it reached t = {solver.t:.6g} s")
-            if solver.status == "finished":
+            if landing:
                 solver.h_abs = max(solver.h_abs, usual)
             if corrected is not None:
                 solver.y = corrected(solver.y)

@@ -187,6 +187,8 @@ BAD = {
     "huge power": (SLIDER_CRANK.replace("= crank/2", "= 9^9^9^9^9"), "bodies.0.com.0"),
     "complex": (SLIDER_CRANK.replace("= crank/2", "= (0-1)^0.5"), "no finite real number"),
     "text": (SLIDER_CRANK.replace("mass = 0.6", 'mass = "heavy"'), "bodies.slider.mass.*give one number"),
+    "ragged list": (SLIDER_CRANK.replace("q0 = 0.5", "q0 = [1, [2], 3]"), "joints.guide.q0.*give one number"),
+    "number beyond all bounds": (SLIDER_CRANK.replace("[1e-3,", f"[{10**400},"), "bodies.slider.inertia.*finite"),
     "nan": (SLIDER_CRANK.replace("mass = 0.6", "mass = nan"), "bodies.slider.mass.*finite"),
     "bool": (SLIDER_CRANK.replace("mass = 0.6", "mass = true"), "bodies.slider.mass.*give one number"),
     "unknown key": (SLIDER_CRANK.replace("mass = 0.6", "mass = 0.6\ncolour = 3"), "bodies.2.colour.*no such key"),

@@ -1,0 +1,85 @@
+"""Vectors of anything that adds and multiplies: numbers, long doubles, heyoka's expressions.
+
+Zeros and ones that are plain floats fold away, so that what a mechanism's geometry makes zero never becomes a term.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import Any
+
+Scalar = Any
+Vector = Sequence[Scalar]
+_ZERO = 0.0
+
+
+def is_zero(a: Scalar) -> bool:
+    """Whether it is the plain float zero."""
+    return type(a) is float and a == 0.0
+
+
+def mul(a: Scalar, b: Scalar) -> Scalar:
+    """a·b."""
+    if is_zero(a) or is_zero(b):
+        return _ZERO
+    if type(a) is float and a == 1.0:
+        return b
+    if type(b) is float and b == 1.0:
+        return a
+    return a * b
+
+
+def add(*terms: Scalar) -> Scalar:
+    """Sum of the terms."""
+    total: Scalar = _ZERO
+    for term in terms:
+        if not is_zero(term):
+            total = term if is_zero(total) else total + term
+    return total
+
+
+def sub(a: Scalar, b: Scalar) -> Scalar:
+    """A − b."""
+    if is_zero(b):
+        return a
+    return -b if is_zero(a) else a - b
+
+
+def dot(a: Vector, b: Vector) -> Scalar:
+    """a·b."""
+    return add(*(mul(x, y) for x, y in zip(a, b, strict=True)))
+
+
+def cross(a: Vector, b: Vector) -> list[Scalar]:
+    """a×b."""
+    return [sub(mul(a[i], b[j]), mul(a[j], b[i])) for i, j in ((1, 2), (2, 0), (0, 1))]
+
+
+def plus(*vectors: Vector) -> list[Scalar]:
+    """Sum of vectors."""
+    return [add(*entries) for entries in zip(*vectors, strict=True)]
+
+
+def minus(a: Vector, b: Vector) -> list[Scalar]:
+    """A − b."""
+    return [sub(x, y) for x, y in zip(a, b, strict=True)]
+
+
+def scaled(factor: Scalar, a: Vector) -> list[Scalar]:
+    """factor·a."""
+    return [mul(factor, x) for x in a]
+
+
+def turned(R: Sequence[Vector], a: Vector) -> list[Scalar]:
+    """R a, for R as a list of rows."""
+    return [dot(row, a) for row in R]
+
+
+def turned_back(R: Sequence[Vector], a: Vector) -> list[Scalar]:
+    """Rᵀ a."""
+    return [dot(column, a) for column in zip(*R, strict=True)]
+
+
+def product(R: Sequence[Vector], S: Sequence[Vector]) -> list[list[Scalar]]:
+    """R S."""
+    return [[dot(row, column) for column in zip(*S, strict=True)] for row in R]
