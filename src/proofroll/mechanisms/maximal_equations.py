@@ -13,7 +13,7 @@ from typing import Any
 
 import numpy as np
 
-from proofroll.errors import Refused
+from proofroll.core.errors import Refused
 from proofroll.mechanisms.checks import WORLD
 from proofroll.mechanisms.joint import FACTS
 from proofroll.mechanisms.maximal_bodies import GROUND, View, made_bodies, placed_bodies

@@ -11,7 +11,7 @@ from typing import Any
 
 import numpy as np
 
-from proofroll.errors import Diverged, Missing
+from proofroll.core.errors import Diverged, Missing
 from proofroll.mechanisms.maximal_equations import Equations, MaximalEquations, Row
 from proofroll.mechanisms.rotations import Array
 from proofroll.mechanisms.scalars import Scalar, add, is_zero, mul, sub

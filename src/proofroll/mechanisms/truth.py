@@ -13,7 +13,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import NDArray
 
-from proofroll.errors import Diverged, Missing, Refused
+from proofroll.core.errors import Diverged, Missing, Refused
 from proofroll.mechanisms.analysis import analysed
 from proofroll.mechanisms.closed_forms import ClosedForm, closed_form
 from proofroll.mechanisms.joint_coordinates import JointCoordinates
