@@ -101,7 +101,8 @@ class Redundant:
             for loop in mechanism.loops
         ]
         for spring in mechanism.springs:
-            markers = self._markers(spring.body_a, spring.position_a, spring.body_b, spring.position_b)
+            ends = ((spring.body_a, spring.position_a), (spring.body_b, spring.position_b))
+            markers = [self._marker(*end, np.eye(3)) for end in ends]
             self._system.AddObject(
                 items.ObjectConnectorSpringDamper(
                     markerNumbers=markers,
@@ -134,53 +135,51 @@ class Redundant:
             marker = system.AddMarker(items.MarkerBodyMass(bodyNumber=made))
             system.AddLoad(items.LoadMassProportional(markerNumber=marker, loadVector=self._mechanism.gravity))
 
-    def _markers(self, a: str, at_a: Any, b: str, at_b: Any) -> list[Any]:
-        return [
-            self._system.AddMarker(
-                items.MarkerBodyRigid(bodyNumber=self._bodies[body], localPosition=list(np.array(at) - self._com[body]))
-            )
-            for body, at in ((a, at_a), (b, at_b))
-        ]
+    def _marker(self, body: str, position: Any, axes: Array) -> Any:
+        """A marker on a body, at a place in its frame and with the axes of a joint."""
+        place = exu.HT(rotation=axes, translation=np.array(position) - self._com[body])
+        return self._system.AddMarker(items.MarkerBodyRigid(bodyNumber=self._bodies[body], localHT=place))
 
     def _join(
         self, item: Joint | Loop, a: str, b: str, at_a: Any, at_b: Any, A: Array, B: Array, *, flat: bool
     ) -> _Made:
-        markers = self._markers(a, at_a, b, at_b)
         if item.kind == "universal":  # Exudyn's row is x of the first to z of the second, ours z to x
             A, B = A[:, [2, 0, 1]], B[:, [1, 2, 0]]
-        options = {"markerNumbers": markers, "rotationMarker0": A, "rotationMarker1": B}
+        markers = [self._marker(a, at_a, A), self._marker(b, at_b, B)]
         constraint, rows = None, _ROWS.get(item.kind, ())
         if item.kind == "spherical":
             constraint = self._system.AddObject(items.ObjectJointSpherical(markerNumbers=markers))
         elif item.kind == "revolute" and not flat:
-            constraint = self._system.AddObject(items.ObjectJointRevoluteZ(**options))
+            constraint = self._system.AddObject(items.ObjectJointRevoluteZ(markerNumbers=markers))
         elif item.kind == "revolute":
-            constraint = self._system.AddObject(items.ObjectJointGeneric(constrainedAxes=_IN_PLANE, **options))
+            constraint = self._system.AddObject(
+                items.ObjectJointGeneric(constrainedAxes=_IN_PLANE, markerNumbers=markers)
+            )
             rows = ()
         elif item.kind != "free":
             held = _HELD[item.kind]
-            constraint = self._system.AddObject(items.ObjectJointGeneric(constrainedAxes=held, **options))
-        spring = self._spring_of(item, options) if isinstance(item, Joint) else None
+            constraint = self._system.AddObject(items.ObjectJointGeneric(constrainedAxes=held, markerNumbers=markers))
+        spring = self._spring_of(item, markers) if isinstance(item, Joint) else None
         return _Made(item.kind, constraint, spring, markers, (a, b), (A, B), rows)
 
-    def _spring_of(self, joint: Joint, options: Mapping[str, Any]) -> Any:
+    def _spring_of(self, joint: Joint, markers: list[Any]) -> Any:
         """Exudyn's object for the joint's own spring, damper and drive, or None."""
         if not (joint.stiffness or joint.damping or joint.torque):
             return None
         law = {"stiffness": joint.stiffness, "damping": joint.damping, "offset": joint.rest}
         if joint.kind == "spherical":
             D = np.diag([0.0, 0.0, 0.0, *[joint.damping] * 3])
-            made = items.ObjectConnectorRigidBodySpringDamper(damping=D, **options)
+            made = items.ObjectConnectorRigidBodySpringDamper(damping=D, markerNumbers=markers)
         elif joint.kind == "prismatic":  # its force is a pull, as the spring's is
-            axis = list(joint.parent_frame[:, 2])
-            markers = options["markerNumbers"]
             made = items.ObjectConnectorLinearSpringDamper(
-                markerNumbers=markers, force=-joint.torque, axisMarker0=axis, **law
+                markerNumbers=markers, force=-joint.torque, axisMarker0=[0.0, 0.0, 1.0], **law
             )
         else:  # its torque acts against the angle, as the spring's does; the node counts whole turns
             turns = items.NodeGenericData(initialCoordinates=[joint.q0[0]], numberOfDataCoordinates=1)
             node = self._system.AddNode(turns)
-            made = items.ObjectConnectorTorsionalSpringDamper(nodeNumber=node, torque=-joint.torque, **law, **options)
+            made = items.ObjectConnectorTorsionalSpringDamper(
+                nodeNumber=node, torque=-joint.torque, **law, markerNumbers=markers
+            )
         return self._system.AddObject(made)
 
     def _constraint_rows(self, settings: ExudynSettings) -> Array:
