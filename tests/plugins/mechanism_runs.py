@@ -1,5 +1,6 @@
 """Engines on mechanisms, held against route 1 of the truth."""
 
+import dataclasses
 import functools
 import tomllib
 from pathlib import Path
@@ -41,8 +42,6 @@ def settings(formulation, **options):
     """The engine, and the settings of its tight preset with some of them changed."""
     name, preset = FORMULATIONS[formulation]
     engine = load_engine(name)
-    import dataclasses
-
     return engine, dataclasses.replace(engine.presets[formulation][preset], **options)
 
 
@@ -71,7 +70,7 @@ def errors(run, mechanism, until):
 
 
 def start(mechanism):
-    """Motion of the bodies' frames at time 0, their accelerations, (bodies, 6), and the wrenches of joints and loops."""
+    """The bodies' frames at time 0, their accelerations (bodies, 6), and the wrenches of joints and loops."""
     equations = JointCoordinates(mechanism)
     found = equations.solve(*mechanism.start())
     motion = Tree(mechanism).at(*mechanism.start())

@@ -26,7 +26,9 @@ def example(formulation):
         return replace(examples.every_kind(), loops=())
     solid = examples.SOLID
     joints = (
-        Joint("a", "revolute", "world", "b0", (1, 0, 0.2), (0.1, 0.2, 0.3), (1, 2, 3), None, (0.1, 0, 0), (0.4,), (1.1,)),
+        Joint(
+            "a", "revolute", "world", "b0", (1, 0, 0.2), (0.1, 0.2, 0.3), (1, 2, 3), None, (0.1, 0, 0), (0.4,), (1.1,)
+        ),
         Joint(
             "b", "prismatic", "b0", "b1", (0, 1, 0), (0.3, 0, 0.3), (1, 0, 3), None, (0, 0.2, 0), (0.5,), (-0.7,),
             stiffness=20, rest=0.1, damping=0.3, torque=0.5,

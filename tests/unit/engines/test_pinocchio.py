@@ -316,11 +316,12 @@ def test_presets_are_complete() -> None:
     """Each formulation has its presets, and each preset is filed under its own name."""
     from proofroll.engines.pinocchio import Pinocchio
 
-    assert set(Pinocchio.presets) == {*FORMULATIONS, "contact"}
+    adaptive = {*FORMULATIONS, "null_space", "constraint_dynamics"}
+    assert set(Pinocchio.presets) == {*adaptive, "contact"}
     for formulation, presets in Pinocchio.presets.items():
-        assert set(presets) == (set(PRESETS) if formulation in FORMULATIONS else {"default", "matched"})
+        assert set(presets) == (set(PRESETS) if formulation in adaptive else {"default", "matched"})
         assert all((s.formulation, s.preset) == (formulation, name) for name, s in presets.items())
-        assert {s.resolution for s in presets.values()} == ({"dt", "rtol"} if formulation in FORMULATIONS else {"dt"})
+        assert {s.resolution for s in presets.values()} == ({"dt", "rtol"} if formulation in adaptive else {"dt"})
 
 
 def test_surface_without_generators() -> None:

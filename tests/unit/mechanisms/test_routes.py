@@ -6,7 +6,7 @@ import mechanism_examples
 import numpy as np
 import pytest
 
-from proofroll.errors import Diverged, Refused
+from proofroll.core.errors import Diverged, Refused
 from proofroll.mechanisms import Body, Joint, Loop, Mechanism, Tree
 from proofroll.mechanisms.analysis import analysed
 from proofroll.mechanisms.assembly import check_start

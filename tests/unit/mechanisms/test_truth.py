@@ -5,7 +5,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from proofroll.errors import Refused
+from proofroll.core.errors import Refused
 from proofroll.mechanisms import maximal_taylor
 from proofroll.mechanisms.joint_coordinates import JointCoordinates
 from proofroll.mechanisms.truth import CHAOS, find_truth, to_dataset
