@@ -20,10 +20,19 @@ ROUND_OFF = 1e-12
 WITH_REACTIONS = tuple(name for name in ALL if name != "tree")
 
 
+def with_laws(formulation):
+    """A joint of each kind, with springs, dampers and drives where there may be any."""
+    law = {"stiffness": 3.0, "rest": 0.2, "damping": 0.3}
+    laws = {"revolute": law | {"torque": 0.7}, "prismatic": law | {"torque": 0.5}, "spherical": {"damping": 0.4}}
+    if formulation != "redundant":  # Exudyn's bodies have no such spring
+        laws["universal"] = law
+    return tuple(replace(joint, **laws.get(joint.kind, {})) for joint in examples.every_kind().joints)
+
+
 def example(formulation):
     """A tree with every kind of joint, or with those that a kinematic tree has; with spring, dampers and drives."""
     if formulation != "tree":
-        return replace(examples.every_kind(), loops=())
+        return replace(examples.every_kind(), loops=(), joints=with_laws(formulation))
     solid = examples.SOLID
     joints = (
         Joint(
