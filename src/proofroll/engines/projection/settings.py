@@ -70,7 +70,7 @@ class ProjectionSettings:
             raise InputError("projection: equations", self.equations, advice)
         if self.singularity == "stop" and self.formulation != "euler":
             advice = (
-                f"{self.formulation} has no Euler angles, hence no singularity; leave it out, or take formulation=euler"
+                f"{self.formulation} has no angles, hence no singularity; leave it out, or take formulation=euler"
             )
             raise InputError("projection: singularity", self.singularity, advice)
 
