@@ -211,3 +211,15 @@ def test_what_a_formulation_lacks_is_refused_with_the_reason(formulation):
     else:
         with pytest.raises(Refused, match="needs dry friction in joints, and "):
             runs.build(formulation, mechanism)
+
+
+@pytest.mark.parametrize("formulation", ["joints", "null_space", "constraint_dynamics"])
+def test_the_inertia_of_a_drive_slows_its_coordinate(formulation):
+    """A pendulum with an armature swings as the truth says, slower than without."""
+    mechanism = runs.model("pendulum")
+    geared = replace(mechanism, joints=(replace(mechanism.joints[0], armature=0.2),))
+    position, reaction = runs.errors(runs.build(formulation, geared), geared, 0.2)
+    assert position < 1e-10
+    assert reaction < 1e-8
+    plain, slow = (runs.true(each, 0.2)[0].v[-1, 0] for each in (mechanism, geared))
+    assert abs(slow) < 0.8 * abs(plain)
