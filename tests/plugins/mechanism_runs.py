@@ -12,6 +12,7 @@ from proofroll.mechanisms import Tree
 from proofroll.mechanisms.analysis import analysed
 from proofroll.mechanisms.joint_coordinates import JointCoordinates
 from proofroll.mechanisms.reader import read_mechanism
+from proofroll.mechanisms.rotations import from_quaternion
 
 # Every formulation for mechanisms: its engine, and the preset that is held against tight bounds.
 FORMULATIONS = {
@@ -57,13 +58,17 @@ def wrench(sample):
 
 
 def errors(run, mechanism, until):
-    """(largest error of positions, largest error of determinate reactions) after time 0, over a grid of times."""
+    """Largest errors of bodies and points, and of determinate reactions, over a grid of times after 0."""
     truth, determinate = true(mechanism, until)
     position, reaction = 0.0, 0.0
     for k, t in enumerate(truth.time[1:], start=1):
         run.advance(float(t))
         sample = run.sample()
         position = max(position, np.abs(sample.p_WB - truth.p_WB[k]).max())
+        for point, place in zip(mechanism.points, truth.points[k], strict=True):
+            i = mechanism.body_index[point.body]
+            found = sample.p_WB[i] + from_quaternion(sample.q_WB[i]) @ point.position
+            position = max(position, np.abs(found - place).max())
         if sample.joint_force is not None:
             reaction = max(reaction, np.nanmax(np.abs(wrench(sample) - truth.wrench[k])[determinate], initial=0.0))
     return position, reaction

@@ -38,6 +38,9 @@ def test_a_revolute_loop_needs_a_second_point_only_in_space():
     assert not is_planar(spatial)
     assert held_points(planar, planar.loops[0]) == (0.0,)
     assert len(held_points(spatial, spatial.loops[0])) == 2
+    sliding = replace(planar.loops[0], kind="prismatic", axis_a=(0, 1, 0))
+    assert is_planar(replace(planar, loops=(sliding,)))
+    assert not is_planar(replace(planar, loops=(replace(planar.loops[0], kind="universal"),)))
     tilted = replace(planar.joints[2], axis=(1, 0, 0.1))
     assert not is_planar(replace(planar, joints=(*planar.joints[:2], tilted)))
 
