@@ -10,6 +10,7 @@ import pytest
 from proofroll.core.comparison import Comparison, Edge, Row
 from proofroll.core.plugins import engine_names, load_engine, parse_engine, resolve_settings
 from proofroll.core.verdict import Verdict
+from proofroll.elements.ball_on_surface.model import BallCapability
 from proofroll.files.comparison_file import comparison_names, load_comparison
 from proofroll.running.runner import Runner
 from proofroll.running.store import Store
@@ -91,5 +92,10 @@ def test_every_setting_is_shown(name: str) -> None:
     specs = [parse_engine(row.engine) for row in load_comparison("paper").rows]
     settings = [resolve_settings(engine, spec.options) for spec in specs if spec.name == name]
     shown = {(name, item.formulation, item.preset) for item in settings}
-    there_are = {(name, formulation, preset) for formulation, presets in engine.presets.items() for preset in presets}
+    there_are = {
+        (name, formulation, preset)
+        for formulation, presets in engine.presets.items()
+        if BallCapability.ROLLING in engine.provides[formulation]
+        for preset in presets
+    }
     assert there_are - shown == {key for key in OMITTED if key[0] == name}

@@ -23,27 +23,24 @@ def held_points(mechanism: Mechanism, loop: Loop) -> tuple[float, ...]:
 
 
 def is_planar(mechanism: Mechanism) -> bool:
-    """Whether all joints and revolute loops let the bodies move in parallel planes alone, by their axes at the start.
+    """Whether all joints and loops let the bodies move in parallel planes alone, by their axes at the start.
 
-    Slides must lie in that plane and turns stand on it; anything else is taken to be spatial.
+    Slides must lie in that plane and turns stand on it; what has other axes is taken to be spatial, but for a loop that
+    has none.
     """
-    tree = Tree(mechanism)
-    motion = tree.at(*mechanism.start())
-    turning, sliding = [], []
-    for axis, joint in zip(motion.R_parent[:, :, 2], mechanism.joints, strict=True):
-        if joint.kind not in {"fixed", "revolute", "prismatic", "planar"}:
-            return False
-        if joint.kind == "prismatic":
-            sliding.append(axis)
-        elif joint.kind != "fixed":
-            turning.append(axis)
+    motion = Tree(mechanism).at(*mechanism.start())
+    axes = [(joint.kind, A[:, 2]) for joint, A in zip(mechanism.joints, motion.R_parent, strict=True)]
     for loop in mechanism.loops:
-        turning.append(motion.R_WB[mechanism.body_index[loop.body_a]] @ loop.frame_a[:, 2])
-    if not turning:
+        R = motion.R_WB[mechanism.body_index[loop.body_a]]
+        axes.append(("fixed" if loop.kind == "spherical" else loop.kind, R @ loop.frame_a[:, 2]))
+    if any(kind not in {"fixed", "revolute", "prismatic", "planar"} for kind, _ in axes):
         return False
-    normal = turning[0]
-    return all(np.linalg.norm(np.cross(normal, axis)) < _PARALLEL for axis in turning) and all(
-        abs(normal @ axis) < _PARALLEL for axis in sliding
+    turning = [axis for kind, axis in axes if kind in {"revolute", "planar"}]
+    sliding = [axis for kind, axis in axes if kind == "prismatic"]
+    return (
+        bool(turning)
+        and all(np.linalg.norm(np.cross(turning[0], axis)) < _PARALLEL for axis in turning)
+        and all(abs(turning[0] @ axis) < _PARALLEL for axis in sliding)
     )
 
 

@@ -18,11 +18,12 @@ from proofroll.running.simulation import build
 pytest.importorskip("exudyn")
 
 from proofroll.elements.ball_on_surface.element import rolling_ball
+from proofroll.engines.exudyn import MODELS as OF_BALLS
 from proofroll.engines.exudyn import PRESETS
 from proofroll.engines.exudyn import ball as ball_module
 from proofroll.engines.exudyn import generic as generic_module
 
-MODELS = [(formulation, preset) for formulation, presets in PRESETS.items() for preset in presets]
+MODELS = [(formulation, preset) for formulation in OF_BALLS for preset in PRESETS[formulation]]
 BOUNDED = ("generic", "contact")
 DYNAMIC = {"acceleration", "angular acceleration", "N", "F2", "F3"}
 

@@ -48,7 +48,7 @@ def simulation_settings(settings: ExudynSettings, *, dependent: bool = False) ->
         alpha.spectralRadius = settings.spectral_radius
     alpha.useNewmark = alpha.useIndex2Constraints = settings.integrator == "trapezoidal_index2"
     if settings.integrator in EXPLICIT:
-        time.explicitIntegration.dynamicSolverType = getattr(exu.DynamicSolverType, settings.integrator.upper())
+        time.solverType = getattr(exu.DynamicSolverType, settings.integrator.upper())
     time.numberOfSteps = 1
     time.endTime = settings.dt
     return result

@@ -65,8 +65,10 @@ class ExudynSettings:
         if (self.integrator in EXPLICIT) != (self.formulation == "tree"):
             advice = f"tree has {' and '.join(EXPLICIT)}, the others have implicit integrators"
             raise InputError("exudyn: integrator", self.integrator, advice)
-        if self.integrator != "generalized_alpha":
-            self._has_no("spectral_radius", f"{self.integrator} has no damping; set integrator=generalized_alpha")
+        if self.integrator == "trapezoidal_index2":
+            self._has_no("spectral_radius", "the trapezoidal rule has no damping; set integrator=generalized_alpha")
+        if self.integrator in EXPLICIT:
+            self._has_no("spectral_radius", "explicit integrators have no damping; leave it out")
         for name in CONTACT_ONLY:
             if self.formulation != "contact":
                 self._has_no(name, f"{self.formulation} does not use it; set formulation=contact")

@@ -8,16 +8,17 @@ from typing import Any
 import mujoco
 import numpy as np
 
-from proofroll.core.engine import Regularised, Sample, whole_steps
+from proofroll.core.engine import Sample, whole_steps
 from proofroll.core.errors import InputError
 from proofroll.engines.mujoco import mechanism_model
+from proofroll.engines.mujoco.mechanism_built import read_back
 from proofroll.engines.mujoco.running import compiled, forget_callbacks, raise_if_fatal, silent
 from proofroll.engines.mujoco.settings import MujocoSettings, impedance
 from proofroll.mechanisms import Joint, Mechanism
 from proofroll.mechanisms.capabilities import ALL_JOINTS, FORCES, MechanismCapability, require
 from proofroll.mechanisms.joint_motion import placed
 from proofroll.mechanisms.rotations import Array, to_quaternion
-from proofroll.mechanisms.sampling import DEPENDENT, WITH_AXIS, MechanismBuilt, independent, mechanism_of, unsaid
+from proofroll.mechanisms.sampling import MechanismBuilt, mechanism_of, unsaid
 
 _CAPABILITY = MechanismCapability
 PROVIDES = (
@@ -32,8 +33,6 @@ LACKING: Mapping[str, str] = {
     _CAPABILITY.UNIVERSAL_LOOP: _NO_ROWS,
     _CAPABILITY.PLANAR_LOOP: _NO_ROWS,
 }
-# The hard answer has round-off of its own, most where rows depend on each other.
-_MARGIN = 1.1
 
 
 class MujocoMechanism:
@@ -140,80 +139,7 @@ class MujocoMechanism:
 
     def built(self) -> MechanismBuilt:
         """See :class:`proofroll.core.engine.Engine`."""
-        model, data = self._model, self._evaluated()
-        axes = np.zeros((len(self._bodies), 3, 3))
-        for R, body in zip(axes, self._bodies, strict=True):
-            flat = np.zeros(9)
-            mujoco.mju_quat2Mat(flat, model.body_iquat[body])
-            R[:] = flat.reshape(3, 3)
-        rows = self._equality_rows(data)
-        rank = independent(rows)
-        linear, angular = self._accelerations(data)
-        return MechanismBuilt(
-            mass=model.body_mass[self._bodies].copy(),
-            com=model.body_ipos[self._bodies].copy(),
-            inertia=np.einsum("nij,nj,nkj->nik", axes, model.body_inertia[self._bodies], axes),
-            joint_position=data.site_xpos[self._sites].copy(),
-            joint_axis=np.array([self._axis(data, number) for number in range(len(self._sites))]),
-            gravity=model.opt.gravity.copy(),
-            rows=len(rows),
-            rank=rank,
-            mobility=int(model.nv) - rank,
-            acceleration=linear,
-            angular_acceleration=angular,
-            regularised=self._softened(data, rows, linear, angular),
-        )
-
-    def _axis(self, data: Any, number: int) -> Array:
-        """Of the turning or sliding along z of a joint's frame, in the world."""
-        kind = self._mechanism.joints[number].kind
-        if kind not in WITH_AXIS:
-            return np.full(3, np.nan)
-        last = 0 if kind == "universal" else len(mechanism_model.PARTS[kind]) - 1
-        return np.array(data.xaxis[self._model.joint(f"{number}.{last}").id])
-
-    def _equality_rows(self, data: Any) -> Array:
-        """Rows of the equality constraints on MuJoCo's velocities, shape (rows, nv)."""
-        rows = np.zeros((data.ne, self._model.nv))
-        if data.ne and mujoco.mj_isSparse(self._model):
-            J = np.zeros((data.nefc, self._model.nv))
-            mujoco.mju_sparse2dense(J, data.efc_J, data.efc_J_rownnz, data.efc_J_rowadr, data.efc_J_colind)
-            rows[:] = J[: data.ne]
-        elif data.ne:
-            rows[:] = np.reshape(data.efc_J, (-1, self._model.nv))[: data.ne]
-        return rows
-
-    def _accelerations(self, data: Any) -> tuple[Array, Array]:
-        """Of the bodies' origins, and angular, shape (bodies, 3) each."""
-        mujoco.mj_rnePostConstraint(self._model, data)
-        found = np.zeros((len(self._bodies), 6))
-        for row, body in zip(found, self._bodies, strict=True):
-            mujoco.mj_objectAcceleration(self._model, data, mujoco.mjtObj.mjOBJ_XBODY, body, row, 0)
-        return found[:, 3:] + self._model.opt.gravity, found[:, :3].copy()  # MuJoCo's are those that a sensor feels
-
-    def _softened(self, data: Any, rows: Array, linear: Array, angular: Array) -> dict[str, Regularised]:
-        """What MuJoCo's soft loops change: its answer against that of its own matrices with hard loops.
-
-        Hard loops have the accelerations that MuJoCo's own terms want (``efc_aref``), exactly. The tolerance is thus
-        what softness explains and no more: rows that are wrong or missing are so in both answers.
-        """
-        if not len(rows):
-            return {}
-        M = np.zeros((self._model.nv, self._model.nv))
-        mujoco.mj_fullM(self._model, data, M)
-        into = np.linalg.solve(M, rows.T)
-        missing = data.efc_aref[: data.ne] - rows @ data.qacc_smooth
-        data.qacc[:] = data.qacc_smooth + into @ np.linalg.pinv(rows @ into, DEPENDENT, hermitian=True) @ missing
-        because = (
-            f"loops are soft, of impedance {impedance(self._settings)[0]:g} at rest; hard ones would change that much"
-        )
-        found = {}
-        for name, soft, hard in zip(
-            ("acceleration", "angular_acceleration"), (linear, angular), self._accelerations(data), strict=True
-        ):
-            difference = float(np.abs(hard - soft).max() / max(np.abs(hard).max(), np.finfo(float).tiny))
-            found[name] = Regularised(_MARGIN * difference + DEPENDENT, because)
-        return found
+        return read_back(self._model, self._evaluated(), self._mechanism, impedance(self._settings)[0])
 
     def _evaluated(self) -> Any:
         """A copy of the present state with its own forces: after a step MjData holds those of the last stage."""

@@ -42,6 +42,7 @@ def parts_of(joint: Joint) -> tuple[tuple[Any, int], ...]:
 def write(mechanism: Mechanism, settings: MujocoSettings) -> Any:
     """The MjSpec; joint k of the mechanism has MuJoCo's joints ``k.0``, ``k.1`` …, a site ``k`` and two sensors."""
     spec = mujoco.MjSpec()
+    spec.compiler.degree = False  # or springs of hinges would have their rest in degrees
     option = spec.option
     option.timestep, option.gravity = settings.dt, mechanism.gravity
     option.integrator = getattr(mujoco.mjtIntegrator, f"mjINT_{settings.integrator.upper()}")

@@ -63,7 +63,7 @@ class ConstraintDynamics:
         return results
 
     def acceleration(self, data: Any, q: Array, v: Array) -> Array:
-        """Of the joints, shape (nv,)."""
+        """Of the joints, shape (nv,), which the next call may overwrite."""
         tree, model = self._tree, self._model
         tau = tree.drives(q, v)
         if tree.has_springs:  # constraintDynamics takes no external forces: they are put to the joints
@@ -75,13 +75,13 @@ class ConstraintDynamics:
         if self._ready is not data:
             pin.initConstraintDynamics(model, data, self._constraints, self._results)
             self._ready = data
-        found = pin.constraintDynamics(model, data, q, v, tau, self._constraints, self._results, self._proximal)
-        return np.array(found)
+        found: Array = pin.constraintDynamics(model, data, q, v, tau, self._constraints, self._results, self._proximal)
+        return found
 
     def reactions(self, data: Any, q: Array, v: Array) -> tuple[Array, Any]:
         """Acceleration, and forces of springs and loops on Pinocchio's joints."""
         tree = self._tree
-        acceleration = self.acceleration(data, q, v)
+        acceleration = self.acceleration(data, q, v).copy()
         pin.updateFramePlacements(self._model, data)
         pin.forwardKinematics(self._model, data, q, v)
         forces = tree.pulls(data)

@@ -105,9 +105,12 @@ class JointTree:
         sprung = zip(joints, self.mechanism.q_slices, self.mechanism.v_slices, strict=True)
         self._sprung = [(joint.stiffness, joint.rest, at_q, at_v) for joint, at_q, at_v in sprung if joint.stiffness]
         self.has_springs = bool(self._springs)
+        self._constant = not self._sprung and not self._damping.any()
 
     def drives(self, q: Array, v: Array) -> Array:
-        """Generalised forces of joints' own springs, dampers and drives, shape (nv,)."""
+        """Generalised forces of joints' own springs, dampers and drives, shape (nv,); not to be written to."""
+        if self._constant:
+            return self._drive
         tau = self._drive - self._damping * v
         for stiffness, rest, at_q, at_v in self._sprung:
             tau[at_v] -= stiffness * (q[at_q] - rest)

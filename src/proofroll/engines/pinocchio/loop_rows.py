@@ -16,7 +16,7 @@ from scipy.linalg.lapack import dpotrf, dtrtri
 
 from proofroll.engines.pinocchio.joint_tree import JointTree
 from proofroll.mechanisms.joint import FACTS
-from proofroll.mechanisms.rotations import Array, cross
+from proofroll.mechanisms.rotations import Array, crosses
 from proofroll.mechanisms.sampling import independent
 
 _NEARBY = 0.05  # rad or m: far enough from a singular start to see the rank that holds in general
@@ -50,6 +50,16 @@ class LoopRows:
 
     def __init__(self, tree: JointTree) -> None:
         self._tree, self._model = tree, tree.model
+        kinds = [loop.kind for loop in tree.mechanism.loops]
+        points = [(number, k) for number, kind in enumerate(kinds) for k in FACTS[kind].translations]
+        angles = [(number, *pair) for number, kind in enumerate(kinds) for pair in FACTS[kind].rotations]
+        self._point, self._axis = np.array(points, dtype=np.intp).reshape(-1, 2).T
+        self._angle, self._x, self._y = np.array(angles, dtype=np.intp).reshape(-1, 3).T
+        # whether a row's direction turns with body_a; points that coincide do so along the world's axes too
+        self._turning = np.array([len(FACTS[kinds[number]].translations) < 3 for number, _ in points]).reshape(-1, 1)
+        self._fixed = np.eye(3)[self._axis]
+        self._loop = np.concatenate([self._point, self._angle])
+        self._ends = np.array(tree.loops, dtype=np.intp).reshape(-1, 2).T
         self.rank = 0
         if tree.loops:
             data = self._model.createData()
@@ -63,52 +73,41 @@ class LoopRows:
         pin.forwardKinematics(model, data, q, v, np.zeros(model.nv))
         pin.computeJointJacobians(model, data, q)
         pin.updateFramePlacements(model, data)
-        parts = [self._of(data, number) for number in range(len(self._tree.loops))]
-        loop = np.repeat(np.arange(len(parts)), [len(part[0]) for part in parts])
-        residual, C, drift, force, torque = (np.concatenate(column) for column in zip(*parts, strict=True))
-        return Rows(residual, C, drift, loop, force, torque)
+        (p_a, A, J_a, v_a, a_a), (p_b, B, J_b, v_b, a_b) = (self._frames(data, ends) for ends in self._ends)
+        J, a, d, w_a, w_b = J_b - J_a, a_b - a_a, p_b - p_a, v_a[:, 3:], v_b[:, 3:]
+        i, turning = self._point, self._turning
+        n = np.where(turning, A[i, :, self._axis], self._fixed)
+        r, n_rate = turning * crosses(d[i], n), turning * crosses(w_a[i], n)
+        C = _times(n, J[i, :3]) - _times(r, J_a[i, 3:])
+        drift = _dot(n, a[i, :3]) - _dot(r, a_a[i, 3:]) + 2 * _dot(n_rate, (v_b - v_a)[i, :3])
+        drift += _dot(crosses(w_a[i], n_rate), d[i])
+        j = self._angle
+        x, y = A[j, :, self._x], B[j, :, self._y]
+        t, x_rate, y_rate = crosses(y, x), crosses(w_a[j], x), crosses(w_b[j], y)
+        turn = _dot(t, a[j, 3:]) + _dot(crosses(w_a[j], x_rate), y) + _dot(x, crosses(w_b[j], y_rate))
+        return Rows(
+            np.concatenate([_dot(n, d[i]), _dot(x, y)]),
+            np.concatenate([C, _times(t, J[j, 3:])]),
+            np.concatenate([drift, turn + 2 * _dot(x_rate, y_rate)]),
+            self._loop,
+            np.concatenate([n, np.zeros_like(t)]),
+            np.concatenate([np.zeros_like(n), t]),
+        )
 
-    def _of(self, data: Any, number: int) -> tuple[Array, Array, Array, Array, Array]:
-        (p_a, A, J_a, w_a, a_a), (p_b, B, J_b, w_b, a_b) = (self._frame(data, f) for f in self._tree.loops[number])
-        facts = FACTS[self._tree.mechanism.loops[number].kind]
-        J, a, d = J_b - J_a, a_b - a_a, p_b - p_a
-        residual, C, drift, force, torque = [], [], [], [], []
-        for k in facts.translations:
-            n = A[:, k]
-            if len(facts.translations) == 3:  # points that coincide do so along the world's axes too
-                n = np.eye(3)[k]
-                row, rate = J[k], a[k]
-            else:  # d(n·d)/dt with n fixed in body_a, twice
-                n_rate, r = cross(w_a[0], n), cross(d, n)
-                row = n @ J[:3] - r @ J_a[3:]
-                speed = w_b[1] - w_a[1]
-                rate = n @ a[:3] - r @ a_a[3:] + 2 * n_rate @ speed + cross(w_a[0], n_rate) @ d
-            residual.append(n @ d)
-            C.append(row)
-            drift.append(rate)
-            force.append(n)
-            torque.append(np.zeros(3))
-        for k, m in facts.rotations:
-            x, y = A[:, k], B[:, m]
-            t, x_rate, y_rate = cross(y, x), cross(w_a[0], x), cross(w_b[0], y)
-            residual.append(x @ y)
-            C.append(t @ J[3:])
-            rate = t @ a[3:] + cross(w_a[0], x_rate) @ y + 2 * x_rate @ y_rate + x @ cross(w_b[0], y_rate)
-            drift.append(rate)
-            force.append(np.zeros(3))
-            torque.append(t)
-        return np.array(residual), np.array(C), np.array(drift), np.array(force), np.array(torque)
-
-    def _frame(self, data: Any, frame: int) -> tuple[Array, Array, Array, tuple[Array, Array], Array]:
-        """Place, axes, Jacobian, (angular velocity, velocity) and acceleration at v̇ = 0 of a frame, world axes."""
-        model, pose = self._model, data.oMf[frame]
-        if model.frames[frame].parentJoint == 0:
-            still = np.zeros(3)
-            return pose.translation, pose.rotation, np.zeros((6, model.nv)), (still, still), np.zeros(6)
-        J = pin.getFrameJacobian(model, data, frame, pin.LOCAL_WORLD_ALIGNED).reshape(6, model.nv)
-        velocity = pin.getFrameVelocity(model, data, frame, pin.LOCAL_WORLD_ALIGNED)
-        acceleration = pin.getFrameClassicalAcceleration(model, data, frame, pin.LOCAL_WORLD_ALIGNED)
-        return pose.translation, pose.rotation, J, (velocity.angular, velocity.linear), acceleration.vector
+    def _frames(self, data: Any, frames: NDArray[np.intp]) -> tuple[Array, Array, Array, Array, Array]:
+        """Places, axes, Jacobians, velocities and accelerations at v̇ = 0 of frames, world axes; the world's stand."""
+        model, count = self._model, len(frames)
+        p, R, J = np.empty((count, 3)), np.empty((count, 3, 3)), np.zeros((count, 6, model.nv))
+        v, a = np.zeros((count, 6)), np.zeros((count, 6))
+        for number, frame in enumerate(frames.tolist()):
+            pose = data.oMf[frame]
+            p[number], R[number] = pose.translation, pose.rotation
+            if model.frames[frame].parentJoint:
+                jacobian = pin.getFrameJacobian(model, data, frame, pin.LOCAL_WORLD_ALIGNED)
+                J[number] = jacobian.reshape(6, model.nv)  # of a single column it is a vector
+                v[number] = pin.getFrameVelocity(model, data, frame, pin.LOCAL_WORLD_ALIGNED).vector
+                a[number] = pin.getFrameClassicalAcceleration(model, data, frame, pin.LOCAL_WORLD_ALIGNED).vector
+        return p, R, J, v, a
 
     def split(self, M: Array, C: Array) -> Split:
         """How the rows split velocities, in the metric of the mass matrix (upper triangle)."""
@@ -138,3 +137,13 @@ class LoopRows:
             rows = self.at(data, q, np.zeros(n))
             q = pin.integrate(self._model, q, -np.linalg.pinv(rows.C, 1e-8) @ rows.residual)
         return rows
+
+
+def _dot(a: Array, b: Array) -> Array:
+    """Products of two lists of vectors."""
+    return np.asarray((a * b).sum(1))
+
+
+def _times(a: Array, J: Array) -> Array:
+    """Each vector times its matrix of three rows."""
+    return np.asarray(np.matmul(a[:, None, :], J)[:, 0])

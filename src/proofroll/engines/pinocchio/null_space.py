@@ -27,12 +27,13 @@ class NullSpace:
         self._rest = np.zeros(tree.model.nv)
 
     def acceleration(self, data: Any, q: Array, v: Array) -> Array:
-        """Of the joints, shape (nv,)."""
+        """Of the joints, shape (nv,), which the next call may overwrite."""
         tree, model = self._tree, self._model
         tau = tree.drives(q, v)
         if not tree.loops:
             if not tree.has_springs:
-                return np.array(pin.aba(model, data, q, v, tau))
+                found: Array = pin.aba(model, data, q, v, tau)
+                return found
             pin.forwardKinematics(model, data, q, v)
             pin.updateFramePlacements(model, data)
             return np.array(pin.aba(model, data, q, v, tau, tree.pulls(data)))
@@ -55,7 +56,7 @@ class NullSpace:
         tree = self._tree
         self._on_loops = np.zeros((2, 0, 3))
         if not tree.loops:
-            acceleration = self.acceleration(data, q, v)
+            acceleration = self.acceleration(data, q, v).copy()
             pin.forwardKinematics(self._model, data, q, v)
             pin.updateFramePlacements(self._model, data)
             return acceleration, tree.pulls(data)

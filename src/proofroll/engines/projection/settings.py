@@ -69,9 +69,7 @@ class ProjectionSettings:
             advice = "taylor compiles its own equations; leave it out, or take integrator=dop853"
             raise InputError("projection: equations", self.equations, advice)
         if self.singularity == "stop" and self.formulation != "euler":
-            advice = (
-                f"{self.formulation} has no Euler angles, hence no singularity; leave it out, or take formulation=euler"
-            )
+            advice = f"{self.formulation} has no angles, hence no singularity; leave it out, or take formulation=euler"
             raise InputError("projection: singularity", self.singularity, advice)
 
     @property

@@ -1,0 +1,151 @@
+"""Joints and loops between rigid bodies as Exudyn's constraints and connectors, and what they transmit.
+
+Each has two markers with the axes of the joint's own frames, along whose first Exudyn gives its reactions.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from typing import Any, NamedTuple
+
+import numpy as np
+
+from proofroll.engines.exudyn.native import Output, exu, items
+from proofroll.mechanisms import WORLD, Joint, Loop
+from proofroll.mechanisms.checks import Vector
+from proofroll.mechanisms.rotations import Array, cross
+
+# What Exudyn's joints hold between two frames: three translations and three rotations, in the axes of the first.
+_HELD = {
+    "fixed": (1, 1, 1, 1, 1, 1),
+    "prismatic": (1, 1, 0, 1, 1, 1),
+    "universal": (1, 1, 1, 0, 1, 0),
+    "planar": (0, 0, 1, 1, 1, 0),
+}
+# A revolute loop of a planar mechanism: what else it holds is held already.
+_IN_PLANE = (1, 1, 0, 0, 0, 0)
+# Which axes (of the first, of the second frame) each rotational row keeps perpendicular. ``TorqueLocal`` is no moment:
+# its components are these rows' multipliers. Found from the rows' residuals; Exudyn's documents do not say it.
+_THREE, _TWO = ((2, 1), (2, 0), (0, 1)), ((2, 0), (2, 1))
+_ROWS = {"fixed": _THREE, "prismatic": _THREE, "revolute": _TWO, "planar": _TWO, "universal": (None, (0, 2))}
+
+
+_End = tuple[str, Vector, Array]  # body, position of the joint in its frame, axes of the joint
+
+
+class Connected(NamedTuple):
+    """A joint or loop: Exudyn's constraint, its own spring, its markers and bodies, and their frames of the joint.
+
+    ``rows`` are those of :data:`_ROWS`, between the frames as they are, or permuted, in Exudyn.
+    """
+
+    kind: str
+    constraint: Any
+    spring: Any
+    markers: list[Any]
+    bodies: tuple[str, str]
+    frames: tuple[Array, Array]
+    rows: tuple[tuple[int, int] | None, ...]
+
+
+class Connections:
+    """Connects the bodies of a system.
+
+    Args:
+        system: Exudyn's.
+        bodies: Exudyn's bodies by name, the world among them.
+        com: centres of mass in the bodies' frames, where Exudyn's bodies have their reference.
+    """
+
+    def __init__(self, system: Any, bodies: Mapping[str, Any], com: Mapping[str, Array]) -> None:
+        self._system, self._bodies, self._com = system, bodies, com
+
+    def joint(self, joint: Joint) -> Connected:
+        """A joint with its own spring, damper and drive."""
+        made = self._join(
+            joint.kind,
+            (joint.parent, joint.position, joint.parent_frame),
+            (joint.child, joint.child_position, joint.child_frame),
+            flat=False,
+        )
+        return made._replace(spring=self._spring_of(joint, made.markers))
+
+    def loop(self, loop: Loop, *, flat: bool) -> Connected:
+        """A loop; ``flat`` in a planar mechanism."""
+        end_a, end_b = (loop.body_a, loop.position_a, loop.frame_a), (loop.body_b, loop.position_b, loop.frame_b)
+        return self._join(loop.kind, end_a, end_b, flat=flat)
+
+    def marker(self, body: str, position: Any, axes: Array) -> Any:
+        """A marker on a body, at a place in its frame and with the axes of a joint."""
+        place = exu.HT(rotation=axes, translation=np.array(position) - self._com[body])
+        return self._system.AddMarker(items.MarkerBodyRigid(bodyNumber=self._bodies[body], localHT=place))
+
+    def _join(self, kind: str, end_a: _End, end_b: _End, *, flat: bool) -> Connected:
+        (a, at_a, A), (b, at_b, B) = end_a, end_b
+        if kind == "universal":  # Exudyn's row is x of the first to z of the second, ours z to x
+            A, B = A[:, [2, 0, 1]], B[:, [1, 2, 0]]
+        markers = [self.marker(a, at_a, A), self.marker(b, at_b, B)]
+        made, rows = None, _ROWS.get(kind, ())
+        if kind == "spherical":
+            made = items.ObjectJointSpherical(markerNumbers=markers)
+        elif kind == "revolute" and flat:
+            made, rows = items.ObjectJointGeneric(constrainedAxes=_IN_PLANE, markerNumbers=markers), ()
+        elif kind == "revolute":
+            made = items.ObjectJointRevoluteZ(markerNumbers=markers)
+        elif kind != "free":
+            made = items.ObjectJointGeneric(constrainedAxes=_HELD[kind], markerNumbers=markers)
+        constraint = None if made is None else self._system.AddObject(made)
+        return Connected(kind, constraint, None, markers, (a, b), (A, B), rows)
+
+    def _spring_of(self, joint: Joint, markers: list[Any]) -> Any:
+        """Exudyn's object for the joint's own spring, damper and drive, or None."""
+        if not (joint.stiffness or joint.damping or joint.torque):
+            return None
+        law = {"stiffness": joint.stiffness, "damping": joint.damping, "offset": joint.rest}
+        if joint.kind == "spherical":
+            D = np.diag([0.0, 0.0, 0.0, *[joint.damping] * 3])
+            made = items.ObjectConnectorRigidBodySpringDamper(damping=D, markerNumbers=markers)
+        elif joint.kind == "prismatic":  # its force is a pull, as the spring's is
+            made = items.ObjectConnectorLinearSpringDamper(
+                markerNumbers=markers, force=-joint.torque, axisMarker0=[0.0, 0.0, 1.0], **law
+            )
+        else:  # its torque acts against the angle, as the spring's does; the node counts whole turns
+            turns = items.NodeGenericData(initialCoordinates=[joint.q0[0]], numberOfDataCoordinates=1)
+            node = self._system.AddNode(turns)
+            made = items.ObjectConnectorTorsionalSpringDamper(
+                nodeNumber=node, torque=-joint.torque, **law, markerNumbers=markers
+            )
+        return self._system.AddObject(made)
+
+    def axes(self, made: Connected) -> tuple[Array, Array]:
+        """The frames of a joint in the world."""
+        R_a, R_b = (
+            np.eye(3) if body == WORLD else self.body(body, Output.RotationMatrix, np.zeros(3)).reshape(3, 3)
+            for body in made.bodies
+        )
+        return R_a @ made.frames[0], R_b @ made.frames[1]
+
+    def reaction(self, made: Connected) -> tuple[Array, Array]:
+        """Force and moment on the second body at its marker."""
+        system, (A, B) = self._system, self.axes(made)
+        force, torque = np.zeros(3), np.zeros(3)
+        if made.kind == "spherical":
+            force -= system.GetObjectOutput(made.constraint, Output.Force)
+        elif made.constraint is not None:
+            force -= A @ system.GetObjectOutput(made.constraint, Output.ForceLocal)
+            multipliers = system.GetObjectOutput(made.constraint, Output.TorqueLocal)
+            for multiplier, row in zip(multipliers, made.rows, strict=False):  # there are always three
+                if row is not None:
+                    torque -= multiplier * cross(B[:, row[1]], A[:, row[0]])
+        if made.spring is not None and made.kind == "prismatic":
+            force -= np.ravel(system.GetObjectOutput(made.spring, Output.ForceLocal))[0] * A[:, 2]
+        elif made.spring is not None and made.kind == "revolute":
+            torque -= np.ravel(system.GetObjectOutput(made.spring, Output.TorqueLocal))[0] * A[:, 2]
+        elif made.spring is not None:
+            torque -= A @ system.GetObjectOutput(made.spring, Output.TorqueLocal)
+        return force, torque
+
+    def body(self, name: str, output: Any, at: Array) -> Array:
+        """A quantity at a place of a body, from its centre of mass."""
+        found = self._system.GetObjectOutputBody(self._bodies[name], output, at, exu.ConfigurationType.Current)
+        return np.array(found)

@@ -1,0 +1,83 @@
+"""Engines on mechanisms, held against route 1 of the truth."""
+
+import dataclasses
+import functools
+import tomllib
+from pathlib import Path
+
+import numpy as np
+
+from proofroll.core.plugins import load_engine
+from proofroll.mechanisms import Tree
+from proofroll.mechanisms.analysis import analysed
+from proofroll.mechanisms.joint_coordinates import JointCoordinates
+from proofroll.mechanisms.reader import read_mechanism
+from proofroll.mechanisms.rotations import from_quaternion
+
+# Every formulation for mechanisms: its engine, and the preset that is held against tight bounds.
+FORMULATIONS = {
+    "joints": ("mujoco", "tuned"),
+    "redundant": ("exudyn", "tuned"),
+    "tree": ("exudyn", "matched"),
+    "null_space": ("pinocchio", "tuned"),
+    "constraint_dynamics": ("pinocchio", "tuned"),
+    "dependent": ("projection", "matched"),
+}
+MODELS = Path(__file__).parents[2] / "models"
+
+
+@functools.cache
+def model(name, **parameters):
+    """The mechanism of a scene."""
+    return read_mechanism(tomllib.loads((MODELS / name / "scene.toml").read_text()), **parameters)
+
+
+@functools.cache
+def true(mechanism, until):
+    """Route 1 at six times from 0, and which components of reactions are determinate."""
+    found = analysed(mechanism)
+    return JointCoordinates(mechanism, found.rank).run(np.linspace(0, until, 6), 1e-13), found.determinate
+
+
+def settings(formulation, **options):
+    """The engine, and the settings of its tight preset with some of them changed."""
+    name, preset = FORMULATIONS[formulation]
+    engine = load_engine(name)
+    return engine, dataclasses.replace(engine.presets[formulation][preset], **options)
+
+
+def build(formulation, mechanism, **options):
+    """The mechanism in the engine."""
+    engine, chosen = settings(formulation, **options)
+    return engine.build(mechanism, chosen)
+
+
+def wrench(sample):
+    """Force and moment of each joint and loop, (joints + loops, 6)."""
+    return np.concatenate([sample.joint_force, sample.joint_torque], axis=1)
+
+
+def errors(run, mechanism, until):
+    """Largest errors of bodies and points, and of determinate reactions, over a grid of times after 0."""
+    truth, determinate = true(mechanism, until)
+    position, reaction = 0.0, 0.0
+    for k, t in enumerate(truth.time[1:], start=1):
+        run.advance(float(t))
+        sample = run.sample()
+        position = max(position, np.abs(sample.p_WB - truth.p_WB[k]).max())
+        for point, place in zip(mechanism.points, truth.points[k], strict=True):
+            i = mechanism.body_index[point.body]
+            found = sample.p_WB[i] + from_quaternion(sample.q_WB[i]) @ point.position
+            position = max(position, np.abs(found - place).max())
+        if sample.joint_force is not None:
+            reaction = max(reaction, np.nanmax(np.abs(wrench(sample) - truth.wrench[k])[determinate], initial=0.0))
+    return position, reaction
+
+
+def start(mechanism):
+    """The bodies' frames at time 0, their accelerations (bodies, 6), and the wrenches of joints and loops."""
+    equations = JointCoordinates(mechanism)
+    found = equations.solve(*mechanism.start())
+    motion = Tree(mechanism).at(*mechanism.start())
+    accelerations = (found.motion.J @ found.acceleration + found.motion.bias)[:-1]
+    return motion, accelerations, equations.sample(*mechanism.start())["wrench"]

@@ -1,0 +1,157 @@
+"""Mistakes that no run shows are shown by what is read back of the model; settings that do nothing are told."""
+
+import importlib
+from dataclasses import replace
+
+import mechanism_examples as examples
+import mechanism_runs as runs
+import numpy as np
+import pytest
+
+from proofroll.core.errors import Diverged, InputError, Refused
+from proofroll.core.plugins import load_engine, resolve_settings
+from proofroll.engines.pinocchio.joint_tree import JointTree
+from proofroll.engines.pinocchio.loop_rows import LoopRows
+from proofroll.engines.projection.dependent import DependentCoordinates
+from proofroll.mechanisms import Body, Joint, Loop, Mechanism
+from proofroll.mechanisms.analysis import analysed
+from proofroll.mechanisms.loop_points import held_points, is_planar
+
+
+@pytest.mark.parametrize(
+    ("formulation", "module"),
+    [("joints", "mujoco.mechanism_model"), ("constraint_dynamics", "pinocchio.constraint_dynamics")],
+)
+def test_one_point_for_a_revolute_loop_in_space_shows_in_the_mobility(formulation, module, monkeypatch):
+    """Closed by one point, Bricard's ring has a mobility too many; its violation would never tell."""
+    mechanism = runs.model("bricard")
+    assert runs.build(formulation, mechanism).built().mobility == 1
+    monkeypatch.setattr(importlib.import_module(f"proofroll.engines.{module}"), "held_points", lambda *_: (0.0,))
+    run = runs.build(formulation, mechanism)
+    assert run.built().mobility > analysed(mechanism).mobility
+
+
+def test_a_revolute_loop_needs_a_second_point_only_in_space():
+    """A planar mechanism is recognised by the axes of its joints; a turn of one axis makes it spatial."""
+    planar, spatial = runs.model("slider_crank"), runs.model("bricard")
+    assert is_planar(planar)
+    assert not is_planar(spatial)
+    assert held_points(planar, planar.loops[0]) == (0.0,)
+    assert len(held_points(spatial, spatial.loops[0])) == 2
+    sliding = replace(planar.loops[0], kind="prismatic", axis_a=(0, 1, 0))
+    assert is_planar(replace(planar, loops=(sliding,)))
+    assert not is_planar(replace(planar, loops=(replace(planar.loops[0], kind="universal"),)))
+    tilted = replace(planar.joints[2], axis=(1, 0, 0.1))
+    assert not is_planar(replace(planar, joints=(*planar.joints[:2], tilted)))
+
+
+def test_a_tree_in_another_order_shows_in_the_mass_matrix():
+    """Joints added to Pinocchio in another than depth-first order make crba wrong, and what is read back tells it."""
+    mechanism = replace(examples.every_kind(), loops=())
+    assert runs.build("null_space", mechanism).built().mass_matrix_error < 1e-12
+    names = [joint.name for joint in mechanism.joints]
+    # b5 hangs on b1, of which b2, b3 and b4 are another branch: put between them it parts b2 from what it carries
+    order = [names.index(name) for name in ("j0", "j1", "j2", "j5", "j6", "j3", "j4")]
+    object.__setattr__(mechanism, "joints", tuple(mechanism.joints[i] for i in order))
+    for cached in ("q_slices", "v_slices"):
+        mechanism.__dict__.pop(cached, None)
+    assert runs.build("null_space", mechanism).built().mass_matrix_error > 1e-2
+
+
+def flat_parallelogram():
+    """Four-bar linkage whose links all lie on one line at the start, a pose where its rank is smaller."""
+    rod = {"mass": 1.0, "com": (0.5, 0, 0), "inertia": (0.01, 0.1, 0.1)}
+    joints = (
+        Joint("a", "revolute", "world", "crank", v0=(1.0,)),
+        Joint("b", "revolute", "crank", "coupler", (1, 0, 0), v0=(-1.0,)),
+        Joint("c", "revolute", "world", "rocker", (1, 0, 0), v0=(1.0,)),
+    )
+    loop = Loop("d", "revolute", "coupler", "rocker", (1, 0, 0), (1, 0, 0))
+    return Mechanism(tuple(Body(name, **rod) for name in ("crank", "coupler", "rocker")), joints, (loop,))
+
+
+def test_the_rank_of_a_singular_start_is_that_of_poses_nearby():
+    """Both formulations with a fixed rank find it near the start, where all links on one line hide one row."""
+    mechanism = flat_parallelogram()
+    found = analysed(mechanism)
+    assert found.singular_start
+    assert LoopRows(JointTree(mechanism)).rank == found.rank
+    equations = DependentCoordinates(mechanism)
+    assert 6 * len(mechanism.bodies) - equations.rank == found.mobility
+
+
+@pytest.mark.parametrize("formulation", ["constraint_dynamics", "null_space", "joints"])
+def test_the_world_may_be_either_end_of_a_loop(formulation):
+    """Turning a loop round turns the sign of its wrench and nothing else."""
+    mechanism = runs.model("bricard")
+    loop = mechanism.loops[0]
+    turned = Loop("hinge5", "revolute", "rod4", "world", loop.position_b, loop.position_a, loop.axis_b, loop.axis_a)
+    options = {"dt": 1e-3} if formulation == "joints" else {}
+    samples = []
+    for each in (mechanism, replace(mechanism, loops=(turned,))):
+        run = runs.build(formulation, each, **options)
+        run.advance(0.05)
+        samples.append(run.sample())
+    np.testing.assert_allclose(samples[0].p_WB, samples[1].p_WB, atol=1e-11)
+    np.testing.assert_allclose(samples[0].joint_force[-1], -samples[1].joint_force[-1], rtol=1e-6)
+
+
+def test_elimination_keeps_loops_closed():
+    """Without it the violation of a loop grows with time; with it, round-off is left."""
+    mechanism = runs.model("slider_crank")
+    gaps = {}
+    for projection in (True, False):
+        run = runs.build("null_space", mechanism, integrator="rk4", dt=5e-3, rtol=None, projection=projection)
+        run.advance(0.2)
+        run = run._run
+        q, v = run.motion.x[:3], run.motion.x[3:]
+        gaps[projection] = np.abs(LoopRows(run.tree).at(run.tree.model.createData(), q, v).residual).max()
+    assert gaps[True] < 1e-12
+    assert gaps[False] > 1e-8
+
+
+@pytest.mark.parametrize(("engine", "formulation"), [("projection", "dependent"), ("pinocchio", "null_space")])
+def test_a_step_that_is_far_too_long_is_told(engine, formulation):
+    """A spinning body that a fixed step cannot follow ends with Diverged, not with a state that is not finite."""
+    kind = load_engine(engine)
+    run = kind.build(runs.model("heavy_top"), replace(kind.presets[formulation]["default"], dt=0.5))
+    with pytest.raises(Diverged):
+        run.advance(500.0)
+
+
+@pytest.mark.parametrize(
+    ("engine", "options", "field"),
+    [
+        ("mujoco", {"formulation": "joints", "cone": "pyramidal"}, "cone"),
+        ("mujoco", {"formulation": "joints", "condim": 6}, "condim"),
+        ("exudyn", {"formulation": "tree", "integrator": "generalized_alpha"}, "integrator"),
+        ("exudyn", {"formulation": "redundant", "integrator": "rk44"}, "integrator"),
+        ("exudyn", {"formulation": "redundant", "stiffness": 1e6}, "stiffness"),
+        ("pinocchio", {"formulation": "null_space", "proximal": 1e-8}, "proximal"),
+        ("pinocchio", {"formulation": "null_space", "orientation": True}, "orientation"),
+        ("pinocchio", {"formulation": "null_space", "integrator": "semi_implicit_euler"}, "integrator"),
+        ("pinocchio", {"formulation": "constraint_dynamics", "solver": "pgs"}, "solver"),
+        ("projection", {"formulation": "dependent", "integrator": "taylor"}, "integrator"),
+        ("projection", {"formulation": "dependent", "equations": "projected"}, "equations"),
+        ("projection", {"formulation": "dependent", "singularity": "stop"}, "singularity"),
+    ],
+)
+def test_settings_that_would_do_nothing_are_told(engine, options, field):
+    """An option that a formulation does not have is one line, not ignored."""
+    kind = load_engine(engine)
+    with pytest.raises(InputError, match=f"{engine}: {field}"):
+        kind.build(runs.model("pendulum"), resolve_settings(kind, options))
+
+
+def test_what_only_some_models_need_is_refused_in_words():
+    """A body without mass, a fixed one, and a universal joint with a spring meet the models that cannot hold them."""
+    bodies = (Body("base", 1.0, inertia=(0.1, 0.1, 0.1)), Body("tip", 0.0))
+    joints = (Joint("a", "universal", "world", "base", stiffness=3.0), Joint("b", "fixed", "base", "tip", (1, 0, 0)))
+    mechanism = Mechanism(bodies, joints)
+    for formulation in ("redundant", "dependent"):
+        with pytest.raises(Refused, match="tip has no mass"):
+            runs.build(formulation, mechanism)
+    with pytest.raises(Refused, match="two angles of a"):
+        runs.build("redundant", Mechanism(bodies[:1], joints[:1]))
+    for formulation in ("joints", "null_space"):
+        assert runs.build(formulation, mechanism).sample().p_WB[1, 0] == pytest.approx(1.0)
