@@ -77,9 +77,14 @@ class StabilityPart:
             contradictions += against
             untested = "" if against else claim.untested(study["points"])
             claims.append(
-                {"says": _says(claim, study["step_symbols"]), "because": claim.because, "against": against, "untested": untested,
-                 "holds": None if untested else not against}
-            )  # fmt: skip
+                {
+                    "says": _says(claim, study["step_symbols"]),
+                    "because": claim.because,
+                    "against": against,
+                    "untested": untested,
+                    "holds": None if untested else not against,
+                }
+            )
         points = [
             point | {"reproducer": f"{self.folder}/{Path(point['reproducer']).name}" if point["reproducer"] else None}
             for point in study["points"]
