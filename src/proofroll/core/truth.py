@@ -1,4 +1,4 @@
-"""The truth of a scene: that of each of its elements, by whatever covers it; that is found as engines are."""
+"""The truth of a scene: that of each of its elements, by the plug-in that covers it."""
 
 from __future__ import annotations
 
