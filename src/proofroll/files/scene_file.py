@@ -58,6 +58,13 @@ class SceneFile:
     tables: dict[str, Any] = field(default_factory=dict)  # all others, which kinds of elements read
 
 
+@dataclass(frozen=True)
+class _GravityTable:
+    """The table that all kinds of elements share."""
+
+    gravity: Gravity
+
+
 strict(Parameter, SceneFile, Gravity)
 _OWN = frozenset(item.name for item in dataclasses.fields(SceneFile)) - {"tables"}
 
@@ -119,12 +126,12 @@ def load_scene(name: str, /, *, asks: Any = (), **parameters: float) -> Scene:
     file = _parse(folder / "scene.toml")
     values = _values(file, parameters)
     where = str(folder / "scene.toml")
-    gravity = validated(Gravity, _substituted(file.gravity, file, values, f"{where}: gravity"), f"{where}: gravity")
+    gravity = {"gravity": _substituted(file.gravity, file, values, f"{where}: gravity")}
     tables = {key: _substituted(table, file, values, f"{where}: {key}") for key, table in file.tables.items()}
     return Scene(
         name=folder.name,
         title=file.title,
-        elements=_elements(tables, gravity, where),
+        elements=_elements(tables, validated(_GravityTable, gravity, where).gravity, where),
         parameters=values,
         folder=folder,
         asks=tuple(dict.fromkeys([*file.asks, *_names(asks)])),

@@ -35,20 +35,21 @@ def first_problem(error: ValidationError, where: str) -> InputError:
     """One line about the first thing that pydantic found wrong in ``where``."""
     problem = error.errors()[0]
     location = ".".join(str(part) for part in problem["loc"])
-    place = f"{where}: {location}" if location else where  # nothing where the whole is wrong
     if problem["type"] in {"unexpected_keyword_argument", "extra_forbidden"}:
-        return InputError(place, problem["input"], "there is no such key here; remove it")
+        return InputError(f"{where}: {location}", problem["input"], "there is no such key here; remove it")
     if problem["type"] in {"missing", "missing_argument"}:
-        return InputError(place, "nothing", "this key is required; add it")
+        return InputError(f"{where}: {location}", "nothing", "this key is required; add it")
     error_found = problem.get("ctx", {}).get("error")
     if isinstance(error_found, OutOfBounds):
-        return InputError(f"{place}.{error_found.field}", error_found.value, error_found.advice)
+        return InputError(f"{where}: {location}.{error_found.field}", error_found.value, error_found.advice)
     if problem["type"] in {"union_tag_invalid", "union_tag_not_found"}:
         key = problem["ctx"]["discriminator"].strip("'")
         if problem["type"] == "union_tag_not_found":
-            return InputError(f"{place}.{key}", "nothing", "this key is required; add it")
-        return InputError(f"{place}.{key}", problem["ctx"]["tag"], f"choose one of {problem['ctx']['expected_tags']}")
-    return InputError(place, problem["input"], problem["msg"][0].lower() + problem["msg"][1:])
+            return InputError(f"{where}: {location}.{key}", "nothing", "this key is required; add it")
+        return InputError(
+            f"{where}: {location}.{key}", problem["ctx"]["tag"], f"choose one of {problem['ctx']['expected_tags']}"
+        )
+    return InputError(f"{where}: {location}", problem["input"], problem["msg"][0].lower() + problem["msg"][1:])
 
 
 def units_of(*types: type) -> dict[str, str]:

@@ -78,14 +78,14 @@ class BallOnSurface:
             needs.add(BallCapability.CURVED_SURFACE)
         return frozenset(needs)
 
-    def asked(self, name: str) -> str | None:
-        """See the protocol."""
-        return ASKED.get(name)
-
     @property
     def askable(self) -> tuple[str, ...]:
         """See the protocol."""
         return tuple(ASKED)
+
+    def asked(self, name: str) -> str | None:
+        """See the protocol."""
+        return ASKED.get(name)
 
     @cached_property
     def rolling(self) -> RollingBall:
