@@ -1,5 +1,7 @@
 """The smallest kind of element: a point mass on a spring along x, with its truth and an engine."""
 
+# ruff: noqa: ARG002, ARG004 -- the protocols' signatures
+
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence

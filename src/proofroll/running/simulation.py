@@ -70,8 +70,8 @@ def simulate(
 
     Returns:
         Dataset with the attributes ``status`` (``done`` or ``diverged``), ``message``, one sentence, and those of
-        :func:`proofroll.running.manifest.manifest`: engine, settings, parameters, versions. The truth's variables have an
-        attribute ``error_bar``, in their unit.
+        :func:`proofroll.running.manifest.manifest`: engine, settings, parameters, versions. The truth's variables have
+        an attribute ``error_bar``, in their unit.
 
     Raises:
         InputError: a value that makes no sense.

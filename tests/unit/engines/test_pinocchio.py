@@ -394,7 +394,7 @@ CHANGED_SCENES = {
 DYNAMICS = {"acceleration", "angular acceleration", "N", "F2", "F3"}
 
 
-def changed(scene: Scene, parameters: dict[str, float]) -> Scene:
+def multiplied(scene: Scene, parameters: dict[str, float]) -> Scene:
     """The scene with some of its numbers multiplied."""
     ball, contact, gravity = scene.elements[0].ball, scene.elements[0].contact, scene.elements[0].gravity
     for name, factor in parameters.items():
@@ -422,7 +422,7 @@ def test_the_certificate_notices(engine: str, name: str, change: str) -> None:
     """An engine built from another scene fails the certificate: by the number itself, and by the motion it causes."""
     scene, (parameters, quantity) = CHANGED_SCENES[name], CHANGES[change]
     engine = f"pinocchio[{engine}]"
-    lines = certify(build(changed(scene, parameters), engine), scene)
+    lines = certify(build(multiplied(scene, parameters), engine), scene)
     failing = {line.quantity for line in lines if not line.holds}
     assert quantity in failing
     if change == "mu halved":
