@@ -101,7 +101,7 @@ def springs(proofroll: Proofroll, tmp_path: Path, monkeypatch: pytest.MonkeyPatc
 
 
 def test_run(proofroll: Proofroll, springs: Path) -> None:
-    """run gives the truth with its error bars, and the engine's end near it."""
+    """Run gives the truth with its error bars, and the engine's end near it."""
     ends = {}
     for engine in ("truth", "sprung"):
         code, out, err = proofroll("run", str(springs), "--engine", engine, "--until", "1", "--json")
@@ -111,7 +111,7 @@ def test_run(proofroll: Proofroll, springs: Path) -> None:
 
 
 def test_compare(proofroll: Proofroll, springs: Path) -> None:
-    """compare judges every observable of the new kind."""
+    """Compare judges every observable of the new kind."""
     code, out, err = proofroll("compare", "springs.toml", "--json")
     assert code == 0, err
     document = json.loads(out)
@@ -120,7 +120,7 @@ def test_compare(proofroll: Proofroll, springs: Path) -> None:
 
 
 def test_tradeoff_and_recommend(proofroll: Proofroll, springs: Path) -> None:
-    """tradeoff goes by the deciding observable, and recommend answers from it."""
+    """Tradeoff goes by the deciding observable, and recommend answers from it."""
     code, out, err = proofroll("tradeoff", str(springs), "--engine", "sprung", "--until", "0.5", "--json")
     assert code == 0, err
     assert json.loads(out)["quantity"] == "x"
@@ -131,7 +131,7 @@ def test_tradeoff_and_recommend(proofroll: Proofroll, springs: Path) -> None:
 
 
 def test_stability(proofroll: Proofroll, springs: Path) -> None:
-    """stability finds boundaries, measures them by the kind's own number and names its own sign of failure."""
+    """Stability finds boundaries, measures them by the kind's own number and names its own sign of failure."""
     code, out, err = proofroll("stability", "hard.toml", "--engine", "sprung", "--quick", "--json")
     assert code == 0, err
     study = json.loads(out)
@@ -141,14 +141,14 @@ def test_stability(proofroll: Proofroll, springs: Path) -> None:
 
 
 def test_ladder(proofroll: Proofroll, springs: Path) -> None:
-    """ladder puts the engine on its rung."""
+    """Ladder puts the engine on its rung."""
     code, out, err = proofroll("ladder", str(springs), "--engine", "sprung", "--until", "0.5", "--json")
     assert code == 0, err
     assert [rung["engine"] for rung in json.loads(out)["rungs"] if rung["engine"]] == ["sprung"]
 
 
 def test_report(proofroll: Proofroll, springs: Path, tmp_path: Path) -> None:
-    """report writes a page about it."""
+    """Report writes a page about it."""
     code, _, err = proofroll("report", "springs.toml", "--out", str(tmp_path / "out"))
     assert code == 0, err
     assert "A mass on a spring" in (tmp_path / "out" / "report.html").read_text(encoding="utf-8")
