@@ -92,15 +92,15 @@ def made(tmp_path_factory: pytest.TempPathFactory) -> tuple[Outcome, Store]:
             judgements = [
                 judge(
                     name,
-                    curve.unit,
-                    curve.values,
-                    expected[name].values,
+                    scene.observables[name].unit,
+                    values,
+                    expected[name],
                     truth_error_bar=1e-12,
                     tolerance=bounds[name].absolute(sizes[name]),
                     scale=sizes[name],
                     limit=None,
                 )
-                for name, curve in observe(scene, dataset).items()
+                for name, values in observe(scene, dataset).items()
                 if name in bounds
             ]
             line = {

@@ -13,12 +13,12 @@ from proofroll.core.certificate import Standing, certify
 from proofroll.core.errors import Diverged, InputError, Refused
 from proofroll.core.events import events_of
 from proofroll.core.scene import Scene
+from proofroll.core.truth import truth as truth_of
 from proofroll.elements.ball_on_surface.element import changed, rolling_ball
 from proofroll.elements.ball_on_surface.model import BallCapability
 from proofroll.files.scene_file import load_scene
 from proofroll.running.recording import record, time_grid
 from proofroll.running.simulation import build, simulate
-from proofroll.truth import truth as truth_of
 
 pin = pytest.importorskip("pinocchio")
 
@@ -341,7 +341,9 @@ def test_surface_without_generators() -> None:
             return getattr(self._surface, name)
 
     scene = cylinder()
-    scene.__dict__["rolling"] = dataclasses.replace(rolling_ball(scene), surface=Bare(rolling_ball(scene).surface))
+    scene.elements[0].__dict__["rolling"] = dataclasses.replace(
+        rolling_ball(scene), surface=Bare(rolling_ball(scene).surface)
+    )
     with pytest.raises(Refused, match="free_flyer"):
         build(scene, "pinocchio[formulation=composite]")
     engine = build(scene, "pinocchio[formulation=free_flyer,preset=tuned]")
@@ -352,7 +354,8 @@ def test_provides_names_what_is_modelled() -> None:
     """The capabilities are those of rolling and of slip."""
     from proofroll.engines.pinocchio import Pinocchio
 
-    assert Pinocchio.provides == set(BallCapability)
+    assert set(Pinocchio.provides) == set(Pinocchio.presets)
+    assert all(provided == set(BallCapability) for provided in Pinocchio.provides.values())
     assert Pinocchio.version() == pin.__version__
 
 
@@ -427,7 +430,7 @@ CHANGED_SCENES = {
 DYNAMICS = {"acceleration", "angular acceleration", "N", "F2", "F3"}
 
 
-def changed(scene: Scene, parameters: dict[str, float]) -> Scene:
+def multiplied(scene: Scene, parameters: dict[str, float]) -> Scene:
     """The scene with some of its numbers multiplied."""
     ball, contact, gravity = scene.elements[0].ball, scene.elements[0].contact, scene.elements[0].gravity
     for name, factor in parameters.items():
@@ -455,7 +458,7 @@ def test_the_certificate_notices(engine: str, name: str, change: str) -> None:
     """An engine built from another scene fails the certificate: by the number itself, and by the motion it causes."""
     scene, (parameters, quantity) = CHANGED_SCENES[name], CHANGES[change]
     engine = f"pinocchio[{engine}]"
-    lines = certify(build(changed(scene, parameters), engine), scene)
+    lines = certify(build(multiplied(scene, parameters), engine), scene)
     failing = {line.quantity for line in lines if not line.holds}
     assert quantity in failing
     if change == "mu halved":
