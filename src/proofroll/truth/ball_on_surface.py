@@ -18,6 +18,8 @@ from proofroll.truth.truth import truth
 if TYPE_CHECKING:
     import xarray as xr
 
+_ILL_POSED = "the time of the first slip hangs on less than the parameters are known to"
+
 
 class BallOnSurfaceTruth:
     """See :class:`proofroll.core.truth.ElementTruth`, :class:`proofroll.core.truth.FindsEdges`."""
@@ -36,7 +38,8 @@ class BallOnSurfaceTruth:
             first = onset(scene, float(times[-1]))
             found.attrs["onset"] = json.dumps(dataclasses.asdict(first))
             if first.verdict == "ill-posed":
-                found.attrs["ill_posed"] = "the time of the first slip hangs on less than the parameters are known to"
+                # Where the routes disagree too, they have said it, and from when on.
+                found.attrs.setdefault("ill_posed", _ILL_POSED)
         return found
 
     @staticmethod

@@ -323,7 +323,7 @@ def test_rolling_needs_more_than_the_grip() -> None:
 
 @pytest.mark.parametrize(
     ("formulation", "words"),
-    [("carrier", "only rolls"), ("rolling_disc", "only rolls"), ("contact", "one coefficient")],
+    [("carrier", "rolls without slip"), ("rolling_disc", "rolls without slip"), ("contact", "one coefficient")],
 )
 def test_what_cannot_slip_refuses(formulation: str, words: str) -> None:
     """A formulation that does not represent the law of friction says so before anything runs."""

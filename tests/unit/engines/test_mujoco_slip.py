@@ -310,16 +310,16 @@ def test_what_mujoco_cannot_represent_is_refused(engine: str, parameters: dict[s
 
 
 @pytest.mark.parametrize(
-    ("engine", "field"),
+    ("engine", "parameters", "field"),
     [
-        ("formulation=facets,cone_correction=true", "cone_correction"),
-        ("formulation=free,cone_correction=true,integrator=RK4", "integrator"),
-        ("formulation=free,preset=tuned,cone=pyramidal", "cone"),
+        ("formulation=facets,cone_correction=true", {}, "cone_correction"),
+        ("formulation=free,cone_correction=true,integrator=RK4", {"mu_static": 0.35}, "integrator"),
+        ("formulation=free,preset=tuned,cone=pyramidal", {"mu_static": 0.35}, "cone"),
     ],
 )
-def test_wrong_settings_give_one_clear_line(engine: str, field: str) -> None:
+def test_wrong_settings_give_one_clear_line(engine: str, parameters: dict[str, float], field: str) -> None:
     """Settings that MuJoCo would ignore or misread are refused by name before anything is built."""
     with pytest.raises(InputError) as caught:
-        build(load_scene(CYLINDER, mu_static=0.35), f"mujoco[{engine}]")
+        build(load_scene(CYLINDER, **parameters), f"mujoco[{engine}]")
     assert field in caught.value.field
     assert "\n" not in str(caught.value)

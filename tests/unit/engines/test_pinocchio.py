@@ -14,12 +14,12 @@ from proofroll.core.errors import Diverged, InputError, Refused
 from proofroll.core.events import events_of
 from proofroll.core.scene import Scene
 from proofroll.core.time_grid import time_grid
+from proofroll.core.truth import truth as truth_of
 from proofroll.elements.ball_on_surface.element import changed, rolling_ball
 from proofroll.elements.ball_on_surface.model import BallCapability
 from proofroll.files.scene_file import load_scene
 from proofroll.running.recording import record
 from proofroll.running.simulation import build, simulate
-from proofroll.truth import truth as truth_of
 
 pin = pytest.importorskip("pinocchio")
 
@@ -308,7 +308,9 @@ def test_surface_without_generators() -> None:
             return getattr(self._surface, name)
 
     scene = cylinder()
-    scene.__dict__["rolling"] = dataclasses.replace(rolling_ball(scene), surface=Bare(rolling_ball(scene).surface))
+    scene.elements[0].__dict__["rolling"] = dataclasses.replace(
+        rolling_ball(scene), surface=Bare(rolling_ball(scene).surface)
+    )
     with pytest.raises(Refused, match="free_flyer"):
         build(scene, "pinocchio[formulation=composite]")
     engine = build(scene, "pinocchio[formulation=free_flyer,preset=tuned]")
@@ -319,7 +321,8 @@ def test_provides_names_what_is_modelled() -> None:
     """The capabilities are those of rolling and of slip."""
     from proofroll.engines.pinocchio import Pinocchio
 
-    assert Pinocchio.provides == set(BallCapability)
+    assert set(Pinocchio.provides) == set(Pinocchio.presets)
+    assert all(provided == set(BallCapability) for provided in Pinocchio.provides.values())
     assert Pinocchio.version() == pin.__version__
 
 

@@ -8,6 +8,7 @@ import numpy as np
 import pytest
 
 import proofroll
+from proofroll.elements.ball_on_surface.element import rolling_ball
 from proofroll.elements.ball_on_surface.rolling_equations import reduced_rates
 from proofroll.elements.ball_on_surface.surfaces import Cylinder, Plane
 from proofroll.engines.projection import uniform
@@ -15,7 +16,7 @@ from proofroll.engines.projection.geometry import General, Uniform, geometry_of,
 from proofroll.engines.projection.method import ProjectedBall
 from proofroll.engines.projection.orientation import EulerAngles, RotatingFrame
 
-BODY = proofroll.load_scene("sphere_in_cylinder", rolling_resistance=5e-4).rolling
+BODY = rolling_ball(proofroll.load_scene("sphere_in_cylinder", rolling_resistance=5e-4))
 A, C, M, J = BODY.ball.radius, BODY.surface.radius, BODY.ball.mass, BODY.ball.inertia
 SEEDS = pytest.mark.parametrize("seed", range(5))
 
@@ -119,7 +120,7 @@ def test_elimination_is_the_mass_orthogonal_projection(seed):
 @SEEDS
 def test_rows_can_be_switched_off(seed):
     """Without rows the ball slides without friction; with one row there is friction along that direction only."""
-    x, ball = random_state(seed), euler_ball(proofroll.load_scene("sphere_in_cylinder").rolling)
+    x, ball = random_state(seed), euler_ball(rolling_ball(proofroll.load_scene("sphere_in_cylinder")))
     kin = ball.kinematics(x)
     ball.rows = ball.rows[:0]
     close((kin.D @ ball.response(kin).acceleration + kin.drift)[2:], [-9.81, 0, 0, 0])
@@ -137,7 +138,7 @@ def test_without_resistance_no_moment_is_modelled(monkeypatch):
     monkeypatch.delattr(ProjectedBall, "resistance")
     monkeypatch.delattr(uniform.Closed, "moment")
     x = random_state(0)
-    free = euler_ball(proofroll.load_scene("sphere_in_cylinder").rolling)
+    free = euler_ball(rolling_ball(proofroll.load_scene("sphere_in_cylinder")))
     assert np.all(np.isfinite(free.rates(x)))
     assert np.all(np.isfinite(free.response(free.kinematics(x)).acceleration))
     with pytest.raises(AttributeError):

@@ -91,7 +91,7 @@ def test_with_a_bound_the_ball_slips_first(route: Any, mu: float) -> None:
 def test_a_ball_under_a_ceiling_falls_at_once() -> None:
     """Where nothing presses at time 0 the ball leaves then, and does not hang."""
     plane = load_scene("inclined_plane")
-    plane = replace(plane, gravity=replace(plane.gravity, direction=(0.0, 0.0, 1.0)))
+    plane = changed(plane, gravity=replace(plane.elements[0].gravity, direction=(0.0, 0.0, 1.0)))
     dataset = truth(plane, np.linspace(0, 0.5, 6))
     assert [(event.kind, event.time) for event in events_of(dataset)] == [("lift_off", 0.0)]
     assert not np.any(dataset.N)

@@ -1,7 +1,6 @@
 from __future__ import annotations
 
 import dataclasses
-import sys
 from typing import Any
 
 import numpy as np
@@ -155,9 +154,7 @@ def test_both_routes_agree_with_resistance(speed: float) -> None:
 def test_other_balls_and_surfaces() -> None:
     """A thin shell on a tilted cylinder has no closed form; its two routes agree."""
     scene = load_scene("sphere_in_cylinder", axial_speed=0.3, rolling_resistance=2e-4)
-    shell = dataclasses.replace(
-        scene, balls=(Ball("ball", A, M, inertia_ratio=2 / 3),), surfaces=(Cylinder("wall", 0.225, tilt=0.5),)
-    )
+    shell = changed(scene, ball=Ball("ball", A, M, inertia_ratio=2 / 3), surface=Cylinder("wall", 0.225, tilt=0.5))
     body, t = rolling_ball(shell), np.linspace(0, 0.5, 3)
     assert closed_form(body, t) is None
     assert max(difference(reduced(body, t), unreduced(body, t)).values()) <= 1e-11
@@ -178,7 +175,7 @@ def test_closed_form_only_where_it_holds() -> None:
     t = np.zeros(1)
     assert closed_form(rolling_ball(load_scene("sphere_in_cylinder", rolling_resistance=1e-6)), t) is None
     assert closed_form(rolling_ball(load_scene("inclined_plane", rolling_resistance=1e-6)), t) is None
-    tilted = dataclasses.replace(load_scene("sphere_in_cylinder"), surfaces=(Cylinder("wall", 0.225, tilt=0.1),))
+    tilted = changed(load_scene("sphere_in_cylinder"), surface=Cylinder("wall", 0.225, tilt=0.1))
     assert closed_form(rolling_ball(tilted), t) is None
 
 
@@ -205,8 +202,7 @@ def test_error_bar_shows_a_wrong_route(monkeypatch: pytest.MonkeyPatch) -> None:
         motion = unreduced(*arguments)
         return dataclasses.replace(motion, p_WB=motion.p_WB + np.array([1e-3, 0, 0]))
 
-    module = sys.modules[truth.__module__]  # the package has a function of the same name
-    monkeypatch.setattr(module, "_unreduced", shifted)
+    monkeypatch.setattr("proofroll.truth.truth._unreduced", shifted)
     assert truth(scene, t)["down"].attrs["error_bar"] == pytest.approx(3 * 1e-3 * np.cos(0.35), rel=1e-6)
     assert honest < 1e-12
 
@@ -256,7 +252,7 @@ needs_heyoka = pytest.mark.skipif(not unreduced_taylor.library.available(), reas
     [
         load_scene("sphere_in_cylinder", axial_speed=1.0, radial_spin=20.0),
         load_scene("inclined_plane", normal_spin=9.0),
-        dataclasses.replace(load_scene("sphere_in_cylinder"), surfaces=(Cylinder("wall", 0.225, tilt=0.5),)),
+        changed(load_scene("sphere_in_cylinder"), surface=Cylinder("wall", 0.225, tilt=0.5)),
     ],
     ids=["cylinder", "plane", "tilted cylinder"],
 )
