@@ -2,7 +2,7 @@
 
 from dataclasses import replace
 
-from proofroll.mechanisms import Body, Joint, Loop, Mechanism, Tree
+from proofroll.elements.mechanism import Body, Joint, Loop, Mechanism, Tree
 
 ARM = Body("arm", 2.0, (0.2, 0, 0.1), ((0.1, 0, 0), (0, 0.2, 0), (0, 0, 0.25)))
 BODY = Body("body", 1.3, (0.1, -0.2, 0.05), ((0.5, 0.02, 0.01), (0.02, 0.6, -0.03), (0.01, -0.03, 0.7)))

@@ -8,11 +8,11 @@ from pathlib import Path
 import numpy as np
 
 from proofroll.core.plugins import load_engine
-from proofroll.mechanisms import Tree
-from proofroll.mechanisms.analysis import analysed
-from proofroll.mechanisms.joint_coordinates import JointCoordinates
-from proofroll.mechanisms.reader import read_mechanism
-from proofroll.mechanisms.rotations import from_quaternion
+from proofroll.elements.mechanism import Tree
+from proofroll.elements.mechanism.analysis import analysed
+from proofroll.elements.mechanism.joint_coordinates import JointCoordinates
+from proofroll.elements.mechanism.reader import read_mechanism
+from proofroll.elements.mechanism.rotations import from_quaternion
 
 # Every formulation for mechanisms: its engine, and the preset that is held against tight bounds.
 FORMULATIONS = {

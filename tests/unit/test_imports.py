@@ -22,7 +22,8 @@ MAY: dict[str, set[str]] = {
     "cli": {"core", "files", "running", "studies", "report", "cli"},
     "elements": {"core", "files", "elements"},
     "truth": {"core", "elements", "truth"},
-    "engines": {"core", "elements", "engines"},
+    "engines": {"core", "elements", "engines", "robots"},  # the protocol of robot readers
+    "robots": {"core", "files", "running", "report", "cli", "robots"},
 }
 # A kind's own studies, commands and parts of the report stand on the harness, as a plug-in of somebody else would.
 PLUGIN_PARTS = {"report", "onset_study", "regimes_study", "commands"}

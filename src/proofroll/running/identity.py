@@ -17,7 +17,7 @@ from proofroll.core.truth import load_truths
 from proofroll.running.case import EngineFacts
 
 # Folders on which every result rests; reports and the command line are not among them.
-FOUNDATION = ("core", "elements", "files", "mechanisms", "running")
+FOUNDATION = ("core", "elements", "files", "running")
 # Modules and folders that only show results, wherever they lie.
 ASIDE = frozenset(
     {"reproducer", "reproducer_source", "report", "onset_study", "regimes_study", "commands", "failure_program"}

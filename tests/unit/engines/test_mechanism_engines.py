@@ -9,10 +9,10 @@ import numpy as np
 import pytest
 
 from proofroll.core.errors import Refused
-from proofroll.mechanisms import Body, Joint, Mechanism, Spring
-from proofroll.mechanisms.analysis import analysed
-from proofroll.mechanisms.capabilities import required
-from proofroll.mechanisms.rotations import from_quaternion
+from proofroll.elements.mechanism import Body, Joint, Mechanism, Spring
+from proofroll.elements.mechanism.analysis import analysed
+from proofroll.elements.mechanism.capabilities import required
+from proofroll.elements.mechanism.rotations import from_quaternion
 
 ALL = tuple(runs.FORMULATIONS)
 ROUND_OFF = 1e-12

@@ -10,12 +10,12 @@ import pytest
 
 from proofroll.core.errors import Diverged, InputError, Refused
 from proofroll.core.plugins import load_engine, resolve_settings
+from proofroll.elements.mechanism import Body, Joint, Loop, Mechanism
+from proofroll.elements.mechanism.analysis import analysed
+from proofroll.elements.mechanism.loop_points import held_points, is_planar
 from proofroll.engines.pinocchio.joint_tree import JointTree
 from proofroll.engines.pinocchio.loop_rows import LoopRows
 from proofroll.engines.projection.dependent import DependentCoordinates
-from proofroll.mechanisms import Body, Joint, Loop, Mechanism
-from proofroll.mechanisms.analysis import analysed
-from proofroll.mechanisms.loop_points import held_points, is_planar
 
 
 @pytest.mark.parametrize(

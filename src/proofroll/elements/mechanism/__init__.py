@@ -1,1 +1,6 @@
-"""Bodies, joints, loops and springs."""
+"""Mechanisms: bodies, joints, loops, springs and tracked points; their kinematics, analysis and truths."""
+
+from proofroll.elements.mechanism.kinematics import Motion, Tree
+from proofroll.elements.mechanism.model import WORLD, Body, Joint, Loop, Mechanism, Point, Spring
+
+__all__ = ["WORLD", "Body", "Joint", "Loop", "Mechanism", "Motion", "Point", "Spring", "Tree"]

@@ -9,7 +9,7 @@ import numpy as np
 
 from proofroll.core.certificate import Line
 from proofroll.core.engine import Regularised, Sample
-from proofroll.mechanisms.sampling import MechanismBuilt
+from proofroll.elements.mechanism.sampling import MechanismBuilt
 
 if TYPE_CHECKING:
     from proofroll.elements.mechanism.element import MechanismElement

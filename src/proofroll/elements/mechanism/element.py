@@ -14,11 +14,11 @@ from proofroll.core.arrays import FloatArray
 from proofroll.core.element import FirstMotion, OptionalTerm, Sign, StepNumber
 from proofroll.core.engine import Sample
 from proofroll.core.observable import Observable, Role
+from proofroll.elements.mechanism.analysis import Analysis, analysed
+from proofroll.elements.mechanism.capabilities import MechanismCapability, required
+from proofroll.elements.mechanism.joint_coordinates import JointCoordinates, Solution
+from proofroll.elements.mechanism.model import Mechanism
 from proofroll.elements.mechanism.placed import Placed
-from proofroll.mechanisms.analysis import Analysis, analysed
-from proofroll.mechanisms.capabilities import MechanismCapability, required
-from proofroll.mechanisms.joint_coordinates import JointCoordinates, Solution
-from proofroll.mechanisms.model import Mechanism
 
 if TYPE_CHECKING:
     import xarray as xr

@@ -10,7 +10,7 @@ from proofroll.core.gravity import Gravity
 from proofroll.core.numbers import Numbers
 from proofroll.core.scene import Scene
 from proofroll.elements.mechanism.element import MechanismElement
-from proofroll.mechanisms.reader import made_mechanism
+from proofroll.elements.mechanism.reader import made_mechanism
 
 
 class MechanismKind:

@@ -10,8 +10,8 @@ import numpy as np
 from scipy.spatial.transform import Rotation
 
 from proofroll.core.arrays import FloatArray
-from proofroll.mechanisms.joint import FACTS
-from proofroll.mechanisms.model import Mechanism
+from proofroll.elements.mechanism.joint import FACTS
+from proofroll.elements.mechanism.model import Mechanism
 
 _TURN = 2 * np.pi
 

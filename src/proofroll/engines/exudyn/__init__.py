@@ -20,6 +20,7 @@ from proofroll.core.events import Event
 from proofroll.core.scene import Scene
 from proofroll.elements.ball_on_surface.element import rolling_ball
 from proofroll.elements.ball_on_surface.model import ALL_OF_A_BALL, ROLLS, BallCapability
+from proofroll.elements.mechanism.sampling import MechanismBuilt
 from proofroll.engines.exudyn import redundant, tree
 from proofroll.engines.exudyn.carrier import Carrier
 from proofroll.engines.exudyn.contact import Contact
@@ -28,7 +29,6 @@ from proofroll.engines.exudyn.redundant import Redundant
 from proofroll.engines.exudyn.rolling_disc import RollingDisc
 from proofroll.engines.exudyn.settings import PRESETS, ExudynSettings
 from proofroll.engines.exudyn.tree import KinematicTree
-from proofroll.mechanisms.sampling import MechanismBuilt
 
 OfBall = Generic | Carrier | RollingDisc | Contact
 OfMechanism = Redundant | KinematicTree

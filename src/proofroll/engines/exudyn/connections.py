@@ -10,10 +10,10 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
+from proofroll.elements.mechanism import WORLD, Joint, Loop
+from proofroll.elements.mechanism.checks import Vector
+from proofroll.elements.mechanism.rotations import Array, cross
 from proofroll.engines.exudyn.native import Output, exu, items
-from proofroll.mechanisms import WORLD, Joint, Loop
-from proofroll.mechanisms.checks import Vector
-from proofroll.mechanisms.rotations import Array, cross
 
 # What Exudyn's joints hold between two frames: three translations and three rotations, in the axes of the first.
 _HELD = {

@@ -12,15 +12,15 @@ import numpy as np
 
 from proofroll.core.engine import Regularised, Sample
 from proofroll.core.errors import Refused
+from proofroll.elements.mechanism import WORLD, Mechanism, Tree
+from proofroll.elements.mechanism.capabilities import ALL_JOINTS, ALL_LOOPS, FORCES, MechanismCapability, require
+from proofroll.elements.mechanism.loop_points import is_planar
+from proofroll.elements.mechanism.rotations import Array, quaternion_rate, to_quaternion
+from proofroll.elements.mechanism.sampling import WITH_AXIS, MechanismBuilt, independent, mechanism_of, unsaid
 from proofroll.engines.exudyn.connections import Connections
 from proofroll.engines.exudyn.integration import Integration, initial_matrices, new_system
 from proofroll.engines.exudyn.native import Output, exu, items
 from proofroll.engines.exudyn.settings import ExudynSettings
-from proofroll.mechanisms import WORLD, Mechanism, Tree
-from proofroll.mechanisms.capabilities import ALL_JOINTS, ALL_LOOPS, FORCES, MechanismCapability, require
-from proofroll.mechanisms.loop_points import is_planar
-from proofroll.mechanisms.rotations import Array, quaternion_rate, to_quaternion
-from proofroll.mechanisms.sampling import WITH_AXIS, MechanismBuilt, independent, mechanism_of, unsaid
 
 PROVIDES = frozenset(ALL_JOINTS | ALL_LOOPS | FORCES | {MechanismCapability.REDUNDANT})
 LACKING: Mapping[str, str] = {

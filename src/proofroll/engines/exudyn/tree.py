@@ -12,13 +12,13 @@ from typing import Any
 import numpy as np
 
 from proofroll.core.engine import Sample
+from proofroll.elements.mechanism import WORLD
+from proofroll.elements.mechanism.capabilities import ALL_JOINTS, ALL_LOOPS, FORCES, MechanismCapability, require
+from proofroll.elements.mechanism.rotations import Array, to_quaternion
+from proofroll.elements.mechanism.sampling import MechanismBuilt, mechanism_of
 from proofroll.engines.exudyn.integration import Integration, new_system
 from proofroll.engines.exudyn.native import Output, exu, items
 from proofroll.engines.exudyn.settings import ExudynSettings
-from proofroll.mechanisms import WORLD
-from proofroll.mechanisms.capabilities import ALL_JOINTS, ALL_LOOPS, FORCES, MechanismCapability, require
-from proofroll.mechanisms.rotations import Array, to_quaternion
-from proofroll.mechanisms.sampling import MechanismBuilt, mechanism_of
 
 _KNOWN = {MechanismCapability.REVOLUTE, MechanismCapability.PRISMATIC}
 PROVIDES: frozenset[str] = frozenset(_KNOWN | FORCES)

@@ -10,15 +10,15 @@ import numpy as np
 
 from proofroll.core.engine import Sample, whole_steps
 from proofroll.core.errors import InputError
+from proofroll.elements.mechanism import Joint, Mechanism
+from proofroll.elements.mechanism.capabilities import ALL_JOINTS, FORCES, MechanismCapability, require
+from proofroll.elements.mechanism.joint_motion import placed
+from proofroll.elements.mechanism.rotations import Array, to_quaternion
+from proofroll.elements.mechanism.sampling import MechanismBuilt, mechanism_of, unsaid
 from proofroll.engines.mujoco import mechanism_model
 from proofroll.engines.mujoco.mechanism_built import read_back
 from proofroll.engines.mujoco.running import compiled, forget_callbacks, raise_if_fatal, silent
 from proofroll.engines.mujoco.settings import MujocoSettings, impedance
-from proofroll.mechanisms import Joint, Mechanism
-from proofroll.mechanisms.capabilities import ALL_JOINTS, FORCES, MechanismCapability, require
-from proofroll.mechanisms.joint_motion import placed
-from proofroll.mechanisms.rotations import Array, to_quaternion
-from proofroll.mechanisms.sampling import MechanismBuilt, mechanism_of, unsaid
 
 _CAPABILITY = MechanismCapability
 PROVIDES = (

@@ -8,10 +8,10 @@ import mujoco
 import numpy as np
 
 from proofroll.core.engine import Regularised
+from proofroll.elements.mechanism import Mechanism
+from proofroll.elements.mechanism.rotations import Array
+from proofroll.elements.mechanism.sampling import DEPENDENT, WITH_AXIS, MechanismBuilt, independent
 from proofroll.engines.mujoco.mechanism_model import PARTS
-from proofroll.mechanisms import Mechanism
-from proofroll.mechanisms.rotations import Array
-from proofroll.mechanisms.sampling import DEPENDENT, WITH_AXIS, MechanismBuilt, independent
 
 # The hard answer has round-off of its own, most where rows depend on each other.
 _MARGIN = 1.1

@@ -15,10 +15,10 @@ from typing import Any
 import mujoco
 import numpy as np
 
+from proofroll.elements.mechanism import WORLD, Body, Joint, Loop, Mechanism
+from proofroll.elements.mechanism.loop_points import held_points
+from proofroll.elements.mechanism.rotations import to_quaternion
 from proofroll.engines.mujoco.settings import MujocoSettings, impedance, time_constant
-from proofroll.mechanisms import WORLD, Body, Joint, Loop, Mechanism
-from proofroll.mechanisms.loop_points import held_points
-from proofroll.mechanisms.rotations import to_quaternion
 
 _HINGE, _SLIDE = mujoco.mjtJoint.mjJNT_HINGE, mujoco.mjtJoint.mjJNT_SLIDE
 _BALL, _FREE = mujoco.mjtJoint.mjJNT_BALL, mujoco.mjtJoint.mjJNT_FREE

@@ -14,13 +14,13 @@ from proofroll.core.events import Event
 from proofroll.core.scene import Scene
 from proofroll.elements.ball_on_surface.element import rolling_ball
 from proofroll.elements.ball_on_surface.model import ALL_OF_A_BALL, BallCapability
+from proofroll.elements.mechanism.sampling import MechanismBuilt
 from proofroll.engines.pinocchio.constraint_dynamics import ConstraintDynamics
 from proofroll.engines.pinocchio.contact_run import ContactRun
 from proofroll.engines.pinocchio.mechanism_run import MechanismRun
 from proofroll.engines.pinocchio.null_space import NullSpace
 from proofroll.engines.pinocchio.rows_run import RowsRun
 from proofroll.engines.pinocchio.settings import OF_MECHANISMS, PRESETS, PinocchioSettings
-from proofroll.mechanisms.sampling import MechanismBuilt
 
 
 class Pinocchio:

@@ -13,13 +13,13 @@ import numpy as np
 import pinocchio as pin
 
 from proofroll.core.engine import Regularised
+from proofroll.elements.mechanism import WORLD, Loop
+from proofroll.elements.mechanism.capabilities import ALL_LOOPS, MechanismCapability
+from proofroll.elements.mechanism.loop_points import held_points
+from proofroll.elements.mechanism.rotations import Array
 from proofroll.engines.pinocchio.joint_tree import LACKING, PROVIDES, JointTree
 from proofroll.engines.pinocchio.loop_rows import LoopRows
 from proofroll.engines.pinocchio.settings import PinocchioSettings
-from proofroll.mechanisms import WORLD, Loop
-from proofroll.mechanisms.capabilities import ALL_LOOPS, MechanismCapability
-from proofroll.mechanisms.loop_points import held_points
-from proofroll.mechanisms.rotations import Array
 
 _POINTS = {MechanismCapability.SPHERICAL_LOOP, MechanismCapability.REVOLUTE_LOOP}
 _NO_ROWS = "Pinocchio's rigid constraints hold points or whole frames together, and no single angle or direction"

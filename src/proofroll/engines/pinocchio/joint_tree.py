@@ -13,9 +13,9 @@ from typing import Any
 import numpy as np
 import pinocchio as pin
 
-from proofroll.mechanisms import WORLD, Joint, Mechanism
-from proofroll.mechanisms.capabilities import ALL_JOINTS, ALL_LOOPS, FORCES, MechanismCapability
-from proofroll.mechanisms.rotations import Array
+from proofroll.elements.mechanism import WORLD, Joint, Mechanism
+from proofroll.elements.mechanism.capabilities import ALL_JOINTS, ALL_LOOPS, FORCES, MechanismCapability
+from proofroll.elements.mechanism.rotations import Array
 
 PROVIDES = ALL_JOINTS | ALL_LOOPS | FORCES | {MechanismCapability.REDUNDANT, MechanismCapability.ARMATURE}
 LACKING: Mapping[str, str] = {

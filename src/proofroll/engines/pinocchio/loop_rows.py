@@ -14,10 +14,10 @@ import pinocchio as pin
 from numpy.typing import NDArray
 from scipy.linalg.lapack import dpotrf, dtrtri
 
+from proofroll.elements.mechanism.joint import FACTS
+from proofroll.elements.mechanism.rotations import Array, crosses
+from proofroll.elements.mechanism.sampling import independent
 from proofroll.engines.pinocchio.joint_tree import JointTree
-from proofroll.mechanisms.joint import FACTS
-from proofroll.mechanisms.rotations import Array, crosses
-from proofroll.mechanisms.sampling import independent
 
 _NEARBY = 0.05  # rad or m: far enough from a singular start to see the rank that holds in general
 

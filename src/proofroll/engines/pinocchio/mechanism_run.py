@@ -10,15 +10,15 @@ import pinocchio as pin
 from proofroll.core.engine import Sample
 from proofroll.core.errors import Diverged
 from proofroll.core.integrators import INTEGRATORS
+from proofroll.elements.mechanism import Mechanism
+from proofroll.elements.mechanism.capabilities import require
+from proofroll.elements.mechanism.rotations import Array
+from proofroll.elements.mechanism.sampling import MechanismBuilt, independent, mechanism_of, unsaid
 from proofroll.engines.pinocchio.constraint_dynamics import ConstraintDynamics
 from proofroll.engines.pinocchio.joint_tree import AXIS_COLUMN, JointTree
 from proofroll.engines.pinocchio.loop_rows import LoopRows
 from proofroll.engines.pinocchio.null_space import NullSpace
 from proofroll.engines.pinocchio.settings import PinocchioSettings
-from proofroll.mechanisms import Mechanism
-from proofroll.mechanisms.capabilities import require
-from proofroll.mechanisms.rotations import Array
-from proofroll.mechanisms.sampling import MechanismBuilt, independent, mechanism_of, unsaid
 
 
 class MechanismRun:

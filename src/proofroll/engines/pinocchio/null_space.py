@@ -9,10 +9,10 @@ import numpy as np
 import pinocchio as pin
 
 from proofroll.core.engine import Regularised
+from proofroll.elements.mechanism.rotations import Array
 from proofroll.engines.pinocchio.joint_tree import LACKING, PROVIDES, JointTree
 from proofroll.engines.pinocchio.loop_rows import LoopRows, Rows
 from proofroll.engines.pinocchio.settings import PinocchioSettings
-from proofroll.mechanisms.rotations import Array
 
 
 class NullSpace:

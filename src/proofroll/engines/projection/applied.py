@@ -7,9 +7,9 @@ from typing import NamedTuple
 
 import numpy as np
 
+from proofroll.elements.mechanism import Joint, Mechanism
+from proofroll.elements.mechanism.rotations import Array
 from proofroll.engines.projection.connections import Bodies, Connections, Ends, cross, turned
-from proofroll.mechanisms import Joint, Mechanism
-from proofroll.mechanisms.rotations import Array
 
 _TURN = 2 * math.pi
 

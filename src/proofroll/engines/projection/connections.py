@@ -17,9 +17,9 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from proofroll.mechanisms import Mechanism
-from proofroll.mechanisms.joint import FACTS
-from proofroll.mechanisms.rotations import Array
+from proofroll.elements.mechanism import Mechanism
+from proofroll.elements.mechanism.joint import FACTS
+from proofroll.elements.mechanism.rotations import Array
 
 
 class Bodies(NamedTuple):

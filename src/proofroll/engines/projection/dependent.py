@@ -17,11 +17,11 @@ from typing import NamedTuple
 import numpy as np
 from scipy.linalg.lapack import dgesdd
 
+from proofroll.elements.mechanism import Mechanism, Tree
+from proofroll.elements.mechanism.rotations import Array, to_quaternion
+from proofroll.elements.mechanism.sampling import independent
 from proofroll.engines.projection.applied import Applied
 from proofroll.engines.projection.connections import Bodies, Connections, Ends, Rows
-from proofroll.mechanisms import Mechanism, Tree
-from proofroll.mechanisms.rotations import Array, to_quaternion
-from proofroll.mechanisms.sampling import independent
 
 _NEARBY = 0.05  # rad or m: far enough from a singular start to see the rank that holds in general
 

@@ -10,12 +10,12 @@ import numpy as np
 from proofroll.core.engine import Sample
 from proofroll.core.errors import Diverged, Refused
 from proofroll.core.integrators import INTEGRATORS
+from proofroll.elements.mechanism import Mechanism
+from proofroll.elements.mechanism.capabilities import ALL_JOINTS, ALL_LOOPS, FORCES, MechanismCapability, require
+from proofroll.elements.mechanism.rotations import Array
+from proofroll.elements.mechanism.sampling import WITH_AXIS, MechanismBuilt, independent, mechanism_of
 from proofroll.engines.projection.dependent import DependentCoordinates
 from proofroll.engines.projection.settings import ProjectionSettings
-from proofroll.mechanisms import Mechanism
-from proofroll.mechanisms.capabilities import ALL_JOINTS, ALL_LOOPS, FORCES, MechanismCapability, require
-from proofroll.mechanisms.rotations import Array
-from proofroll.mechanisms.sampling import WITH_AXIS, MechanismBuilt, independent, mechanism_of
 
 PROVIDES = frozenset(ALL_JOINTS | ALL_LOOPS | FORCES | {MechanismCapability.REDUNDANT})
 LACKING: Mapping[str, str] = {

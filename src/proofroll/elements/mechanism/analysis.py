@@ -1,0 +1,150 @@
+"""What the constraints of a mechanism allow: rank, redundancy, mobility, and which reactions they determine."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from proofroll.elements.mechanism.kinematics import Motion, Rows, Tree
+from proofroll.elements.mechanism.model import Mechanism
+from proofroll.elements.mechanism.rotations import Array, cross
+
+# At a pose closed to 1e-12 a dependent row shows as a relative singular value near 1e-12 or below, an independent one
+# of the mechanisms seen so far above 1e-3; the square-root middle leaves room to both.
+RANK = 1e-8
+NEARBY = 0.05  # rad or m: far enough from a singular start to see the rank that holds in general
+_ZERO = 1e-9  # relative: a component of a null vector that is zero but for round-off
+
+
+@dataclass(frozen=True)
+class Analysis:
+    """Result of :func:`analysed`.
+
+    Attributes:
+        rows: number of constraint rows of all loops.
+        rank: rank of the rows at a general pose; what a solver should fix.
+        rank_at_start: at the start; smaller where the start is a singular pose.
+        redundant: rows that follow from the others.
+        mobility: degrees of freedom at a general pose.
+        singular_start: whether the start is a singular pose.
+        gap: the relative singular values at the start on both sides of the rank: (smallest kept, largest dropped).
+        determinate: whether the equations of motion alone determine each component (Fx, Fy, Fz, Mx, My, Mz in world
+            axes, at the joint) of the wrench of each joint and then each loop, (joints + loops, 6).
+    """
+
+    rows: int
+    rank: int
+    rank_at_start: int
+    redundant: int
+    mobility: int
+    singular_start: bool
+    gap: tuple[float, float]
+    determinate: NDArray[np.bool_]
+
+
+def analysed(mechanism: Mechanism) -> Analysis:
+    """Rank, redundancy, mobility and determinate reactions, at the start and at a general pose near it."""
+    tree = Tree(mechanism)
+    q, v = mechanism.start()
+    motion = tree.at(q, v)
+    rows = tree.loop_rows(motion)
+    values = singular_values(rows.C)
+    at_start = rank_of(values)
+    near = _near(tree, q, rows.C)
+    near_rows = tree.loop_rows(near)
+    rank = max(at_start, rank_of(singular_values(near_rows.C)))
+    mask = determinate(tree, near, near_rows, rank)
+    if at_start == rank:
+        mask &= determinate(tree, motion, rows, rank)
+    relative = np.append(values / max(values.max(initial=0.0), 1e-300), 0.0)
+    return Analysis(
+        rows=len(rows.residual),
+        rank=rank,
+        rank_at_start=at_start,
+        redundant=len(rows.residual) - rank,
+        mobility=mechanism.nv - rank,
+        singular_start=at_start < rank,
+        gap=(float(relative[rank - 1]) if rank else 1.0, float(relative[rank]) if rank < len(relative) else 0.0),
+        determinate=mask,
+    )
+
+
+def singular_values(C: Array) -> Array:
+    """Singular values of constraint rows, largest first; none where there are no rows."""
+    return np.asarray(np.linalg.svd(C, compute_uv=False) if C.size else np.zeros(0), dtype=np.float64)
+
+
+def least(matrix: Array, right: Array) -> Array:
+    """The smallest x for which matrix·x is as near as can be to ``right``; weak directions (RANK) are left alone."""
+    return np.asarray(np.linalg.lstsq(matrix, right, rcond=RANK)[0], dtype=np.float64)
+
+
+def rank_of(values: Array) -> int:
+    """Number of singular values that are not zero but for round-off."""
+    return int((values > RANK * values.max(initial=0.0)).sum())
+
+
+def determinate(tree: Tree, motion: Motion, rows: Rows, rank: int) -> NDArray[np.bool_]:
+    """Which components of the wrenches of joints and then loops no null vector of Cᵀ changes, (joints + loops, 6)."""
+    mechanism = tree.mechanism
+    mask = np.ones((len(mechanism.joints) + len(mechanism.loops), 6), dtype=bool)
+    if len(rows.residual) == rank:
+        return mask
+    for null in np.linalg.svd(rows.C, full_matrices=True)[0][:, rank:].T:
+        wrenches = np.concatenate(reactions(tree, motion, rows, null, np.zeros((len(mechanism.bodies) + 1, 6))))
+        mask &= np.abs(wrenches) <= _ZERO * np.abs(wrenches).max()
+    return mask
+
+
+def reactions(tree: Tree, motion: Motion, rows: Rows, multipliers: Array, loads: Array) -> tuple[Array, Array]:
+    """Wrenches that joints and loops transmit, from what else acts on the bodies.
+
+    Args:
+        tree: the mechanism's.
+        motion: pose of all bodies.
+        rows: constraints of the loops there.
+        multipliers: one per row.
+        loads: force and moment about the world's origin that the joints must bring to each body but for the loops':
+            its inertia's minus gravity's and springs', N and N m, (bodies + 1, 6).
+
+    Returns:
+        Force and moment in world axes on the child at the joint (joints, 6), on body_b at the loop's point (loops, 6).
+    """
+    mechanism = tree.mechanism
+    needed = loads.copy()
+    of_loops = np.zeros((len(mechanism.loops), 6))
+    for number, loop in enumerate(mechanism.loops):
+        mine = rows.loop == number
+        force, torque = multipliers[mine] @ rows.force[mine], multipliers[mine] @ rows.torque[mine]
+        of_loops[number] = np.concatenate([force, torque])
+        at = tree.point(motion, loop.body_b, np.array(loop.position_b))[0]
+        about_origin = np.concatenate([force, torque + cross(at, force)])
+        needed[mechanism.body_index[loop.body_b]] -= about_origin
+        needed[mechanism.body_index[loop.body_a]] += about_origin
+    of_joints = np.zeros((len(mechanism.joints), 6))
+    for k in reversed(range(len(mechanism.joints))):
+        wrench = needed[tree.children[k]]
+        needed[tree.parents[k]] += wrench
+        of_joints[k, :3] = wrench[:3]
+        of_joints[k, 3:] = wrench[3:] - cross(motion.p_joint[k], wrench[:3])
+    return of_joints, of_loops
+
+
+def _near(tree: Tree, q: Array, C: Array) -> Motion:
+    """The mechanism at a pose near q that its loops allow and that no symmetry distinguishes."""
+    nv = tree.mechanism.nv
+    direction = 1.0 + np.modf(np.arange(1, nv + 1) * 0.6180339887498949)[0]  # golden ratio: no two alike
+    if C.size:
+        kernel = np.linalg.svd(C)[2][rank_of(singular_values(C)) :]
+        direction = kernel.T @ (kernel @ direction)
+    dv = NEARBY * direction / max(np.abs(direction).max(initial=0.0), 1e-300)
+    q = tree.moved(q, dv)
+    zero = np.zeros(nv)
+    for _ in range(20):
+        rows = tree.loop_rows(tree.at(q, zero))
+        if np.abs(rows.residual).max(initial=0.0) < 1e-14:
+            break
+        q = tree.moved(q, -least(rows.C, rows.residual))
+    return tree.at(q, zero)

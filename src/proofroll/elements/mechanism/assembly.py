@@ -1,0 +1,84 @@
+"""The start of a mechanism: loops closed, velocities consistent, able to move."""
+
+from __future__ import annotations
+
+from collections.abc import Collection
+from dataclasses import replace
+
+import numpy as np
+
+from proofroll.core.errors import InputError
+from proofroll.elements.mechanism.analysis import analysed, least
+from proofroll.elements.mechanism.joint import FACTS
+from proofroll.elements.mechanism.kinematics import Tree
+from proofroll.elements.mechanism.model import Mechanism
+
+CLOSED = 1e-12  # m, 1, m/s, 1/s: what round-off leaves of a loop that closes
+_ROUNDS = 50  # Newton's steps; from a fair guess it needs five
+_LARGEST = 0.5  # rad or m in one step: beyond it, the linearisation says nothing
+ADVICE = "correct q0, or give the joints that follow from the loops dependent = true and q0 as a guess"
+
+
+def assembled(mechanism: Mechanism, dependent: Collection[str]) -> Mechanism:
+    """The mechanism with q0 and v0 of some joints found from its loops.
+
+    Args:
+        mechanism: its q0 of these joints are guesses.
+        dependent: names of the joints that follow from the loops.
+
+    Raises:
+        InputError: one of them has coordinates that cannot be found.
+    """
+    if not dependent:
+        return mechanism
+    tree = Tree(mechanism)
+    q, v = mechanism.start()
+    free = np.concatenate([np.full(joint.nv, joint.name in dependent) for joint in mechanism.joints])
+    for _ in range(_ROUNDS):
+        rows = tree.loop_rows(tree.at(q, v))
+        dv = np.zeros(len(v))
+        dv[free] = -least(rows.C[:, free], rows.residual)
+        q = tree.moved(q, dv * min(1.0, _LARGEST / max(np.abs(dv).max(initial=0.0), 1e-300)))
+        if np.abs(dv).max(initial=0.0) < 1e-15:
+            break
+    C = tree.loop_rows(tree.at(q, v)).C
+    v[free] = -least(C[:, free], C[:, ~free] @ v[~free])
+    joints = tuple(
+        replace(joint, q0=tuple(q[at_q]), v0=tuple(v[at_v]))
+        for joint, at_q, at_v in zip(mechanism.joints, mechanism.q_slices, mechanism.v_slices, strict=True)
+    )
+    return replace(mechanism, joints=joints)
+
+
+def check_start(mechanism: Mechanism) -> None:
+    """The loops close at the start, the velocities keep them closed, and the mechanism can move.
+
+    Raises:
+        InputError: one of this is not so.
+    """
+    tree = Tree(mechanism)
+    q, v = mechanism.start()
+    motion = tree.at(q, v)
+    rows = tree.loop_rows(motion)
+    for number, loop in enumerate(mechanism.loops):
+        field, between = f"loops.{loop.name}", f"{loop.body_a} to {loop.body_b}"
+        mine = rows.loop == number
+        a, b = mechanism.body_index[loop.body_a], mechanism.body_index[loop.body_b]
+        apart = tree.point(motion, loop.body_b, np.array(loop.position_b))[0]
+        apart = apart - tree.point(motion, loop.body_a, np.array(loop.position_a))[0]
+        A, B = motion.R_WB[a] @ loop.frame_a, motion.R_WB[b] @ loop.frame_b
+        locked = FACTS[loop.kind].translations
+        distance = float(np.linalg.norm(apart if len(locked) == 3 else A[:, list(locked)].T @ apart))
+        if distance > CLOSED:
+            raise InputError(field, between, f"does not close: its points are {distance:.3g} m apart; {ADVICE}")
+        angle = float(np.abs(rows.residual[mine]).max(initial=0.0))
+        turned = len(FACTS[loop.kind].rotations) == 3 and np.trace(A.T @ B) < 1
+        if angle > CLOSED or turned:
+            turn = "half a turn" if turned else f"{angle:.3g} rad"
+            raise InputError(field, between, f"does not close: its axes are {turn} apart; {ADVICE}")
+        rate = float(np.abs(rows.C[mine] @ v).max(initial=0.0))
+        if rate > CLOSED * max(1.0, float(np.abs(v).max(initial=0.0))):
+            advice = f"v0 opens the loop at {rate:.3g} m/s (or rad/s); {ADVICE.replace('q0', 'v0', 1)}"
+            raise InputError(field, between, advice)
+    if analysed(mechanism).mobility == 0:
+        raise InputError("mechanism", f"{len(mechanism.joints)} joints", "it cannot move; free a joint or a loop")

@@ -1,0 +1,188 @@
+"""Joints of the tree and the facts of each kind."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from functools import cached_property
+from typing import Literal, NamedTuple
+
+import numpy as np
+
+from proofroll.core.errors import InputError
+from proofroll.elements.mechanism import checks, rotations
+from proofroll.elements.mechanism.checks import WORLD, ZERO, Vector, Z
+from proofroll.elements.mechanism.rotations import Array
+
+Kind = Literal["fixed", "revolute", "prismatic", "universal", "spherical", "planar", "free"]
+
+
+class Facts(NamedTuple):
+    """What a kind of joint is, in the frames A (on the parent) and B (on the child) whose z is the axis.
+
+    Attributes:
+        nq, nv: number of coordinates and of velocities.
+        translations: axes of A along which the joint's points may not separate.
+        rotations: pairs (axis of A, axis of B) that stay perpendicular.
+    """
+
+    nq: int
+    nv: int
+    translations: tuple[int, ...]
+    rotations: tuple[tuple[int, int], ...]
+
+
+_ALL, _PARALLEL, _EQUAL = (0, 1, 2), ((0, 2), (1, 2)), ((0, 1), (1, 2), (2, 0))
+FACTS: dict[str, Facts] = {
+    "fixed": Facts(0, 0, _ALL, _EQUAL),
+    "revolute": Facts(1, 1, _ALL, _PARALLEL),
+    "prismatic": Facts(1, 1, (0, 1), _EQUAL),
+    "universal": Facts(2, 2, _ALL, ((2, 0),)),
+    "spherical": Facts(4, 3, _ALL, ()),
+    "planar": Facts(3, 3, (2,), _PARALLEL),
+    "free": Facts(7, 6, (), ()),
+}
+WITH_AXIS = ("revolute", "prismatic", "universal", "planar")
+_WITH_QUATERNION = ("spherical", "free")
+# which kinds may have a law along their coordinates: there a coordinate, a rate or a unit is missing elsewhere
+_LAWS: dict[str, tuple[str, ...]] = {
+    "stiffness": ("revolute", "prismatic", "universal"),
+    "rest": ("revolute", "prismatic", "universal"),
+    "damping": ("revolute", "prismatic", "universal", "spherical"),
+    "friction": ("revolute", "prismatic", "universal"),
+    "torque": ("revolute", "prismatic"),
+    "armature": ("revolute", "prismatic"),
+}
+
+
+@dataclass(frozen=True)
+class Joint:
+    """A joint of the tree: it alone connects its child to its parent.
+
+    At q = 0 the child's axes are the parent's turned by ``orientation``. Two frames meet in the joint: A on the parent
+    and B on the child, both with z along the axis (:attr:`parent_frame`, :attr:`child_frame`). Coordinates, and
+    velocities as their rates where nothing else is said:
+
+    * revolute: angle about z; prismatic: B's origin along z of A;
+    * universal: angle about z of A (``axis``, fixed in the parent), then angle about x of B (``second_axis``, fixed in
+      the child), which is perpendicular to it;
+    * planar: B's origin along x and y of A, angle about z;
+    * spherical: unit quaternion wxyz of B in A; velocity: angular velocity relative to the parent, in the child's axes;
+    * free: B's origin in A, then a unit quaternion; velocity: linear, then angular, relative to the parent, both in the
+      child's axes.
+
+    Attributes:
+        name, kind: a unique name; one of :data:`FACTS`.
+        parent, child: names of bodies; the parent may be ``world``.
+        position: of the joint in the parent's frame, m.
+        orientation: roll, pitch, yaw (fixed axes x, y, z) of the child's frame against the parent's at q = 0, rad.
+        axis: in the child's frame; of revolute, prismatic, universal and planar joints (the plane's normal).
+        second_axis: in the child's frame, perpendicular to ``axis``: second axis of a universal joint, x of a planar
+            one; None: any perpendicular (x of the child, where it can be).
+        child_position: of the joint in the child's frame, m.
+        q0, v0: start; none given: zero.
+        stiffness, rest, damping: of a spring and damper along each coordinate, N m/rad or N/m (and ·s); rest is the
+            coordinate at which the spring is at rest.
+        friction: dry friction, N m or N.
+        torque: constant drive, N m or N.
+        armature: inertia of the drive, added to the coordinate's own, kg m² or kg.
+        limits: least and greatest coordinate of a revolute or prismatic joint, or None.
+    """
+
+    name: str
+    kind: Kind
+    parent: str
+    child: str
+    position: Vector = ZERO
+    orientation: Vector = ZERO
+    axis: Vector = Z
+    second_axis: Vector | None = None
+    child_position: Vector = ZERO
+    q0: tuple[float, ...] = ()
+    v0: tuple[float, ...] = ()
+    stiffness: float = 0.0
+    rest: float = 0.0
+    damping: float = 0.0
+    friction: float = 0.0
+    torque: float = 0.0
+    armature: float = 0.0
+    limits: tuple[float, float] | None = None
+
+    def __post_init__(self) -> None:
+        field = f"joints.{checks.name(self.name, 'joints')}"
+        check_kind(field, self.kind)
+        if self.parent == self.child:
+            raise InputError(f"{field}.child", self.child, "a joint connects two bodies; parent and child are the same")
+        if self.child == WORLD:
+            raise InputError(f"{field}.child", WORLD, "the world is nobody's child; exchange parent and child")
+        for key in ("position", "orientation", "child_position"):
+            checks.assign(self, **{key: checks.vector(f"{field}.{key}", getattr(self, key))})
+        checks.assign(self, axis=checks.axis(f"{field}.axis", self.axis))
+        if self.kind not in WITH_AXIS and (self.axis != Z or self.second_axis is not None):
+            raise InputError(f"{field}.axis", self.axis, f"a {self.kind} joint has no axis; remove it")
+        if self.second_axis is not None:
+            second = checks.axis(f"{field}.second_axis", self.second_axis)
+            if abs(np.dot(second, self.axis)) > 1e-9:
+                raise InputError(f"{field}.second_axis", self.second_axis, "must be perpendicular to axis")
+            checks.assign(self, second_axis=second)
+        self._check_start(field)
+        for key, kinds in _LAWS.items():
+            least = None if key in {"rest", "torque"} else 0.0
+            value = checks.number(f"{field}.{key}", getattr(self, key), at_least=least)
+            if value and self.kind not in kinds:
+                raise InputError(f"{field}.{key}", value, f"a {self.kind} joint has none; it is for {', '.join(kinds)}")
+            checks.assign(self, **{key: value})
+        if self.limits is not None:
+            low, high = checks.numbers(f"{field}.limits", self.limits, 2)
+            if self.nq != 1 or low >= high:
+                raise InputError(
+                    f"{field}.limits", self.limits, "give [least, greatest] of a joint with one coordinate"
+                )
+            checks.assign(self, limits=(low, high))
+
+    def _check_start(self, field: str) -> None:
+        zero = [0.0] * self.nq
+        if self.kind in _WITH_QUATERNION:
+            zero[-4] = 1.0
+        q0 = list(checks.numbers(f"{field}.q0", zero if _none(self.q0) else self.q0, self.nq))
+        if self.kind in _WITH_QUATERNION:
+            length = float(np.linalg.norm(q0[-4:]))
+            if length == 0.0:
+                raise InputError(f"{field}.q0", self.q0, "a quaternion of length zero is no rotation; give a unit one")
+            q0[-4:] = [component / length for component in q0[-4:]]
+        v0 = checks.numbers(f"{field}.v0", [0.0] * self.nv if _none(self.v0) else self.v0, self.nv)
+        checks.assign(self, q0=tuple(q0), v0=v0)
+
+    @property
+    def nq(self) -> int:
+        """Number of coordinates."""
+        return FACTS[self.kind].nq
+
+    @property
+    def nv(self) -> int:
+        """Number of velocities."""
+        return FACTS[self.kind].nv
+
+    @cached_property
+    def child_frame(self) -> Array:
+        """Axes of the joint's frame B in the child's axes, as columns: z is the axis."""
+        return rotations.frame_of_axis(self.axis, self.second_axis) if self.kind in WITH_AXIS else np.eye(3)
+
+    @cached_property
+    def parent_frame(self) -> Array:
+        """Axes of the joint's frame A in the parent's axes, as columns; A and B coincide at q = 0."""
+        frame: Array = rotations.from_rpy(self.orientation) @ self.child_frame
+        return frame
+
+
+def check_kind(field: str, kind: str) -> None:
+    """The kind is one of :data:`FACTS`.
+
+    Raises:
+        InputError: it is not.
+    """
+    if kind not in FACTS:
+        raise InputError(f"{field}.kind", kind, f"choose one of {', '.join(FACTS)}")
+
+
+def _none(values: object) -> bool:
+    return isinstance(values, tuple | list) and not values

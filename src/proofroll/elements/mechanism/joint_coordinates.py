@@ -1,0 +1,230 @@
+"""Route 1 of the truth: the tree in joint coordinates, its loops by projection on the null space of their rows.
+
+With M v̇ = b and C v̇ = −γ, the singular values of C L⁻ᵀ (M = L Lᵀ) split the velocities into directions that the loops
+allow and those they lock. The rank is fixed at the start, so that redundant rows cost nothing and never flicker. After
+each step the violations of Φ and C v are eliminated along the locked directions (Blajer 2002). Angular velocities of
+spherical and free joints are states in the child's axes, which keeps digits when a body spins fast.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+
+from proofroll.core.errors import Refused
+from proofroll.elements.mechanism.analysis import analysed, reactions
+from proofroll.elements.mechanism.kinematics import Motion, Rows, Tree
+from proofroll.elements.mechanism.model import Mechanism
+from proofroll.elements.mechanism.record import Record, gathered
+from proofroll.elements.mechanism.rotations import Array, cross, crosses, skews, to_quaternion
+from proofroll.elements.mechanism.stepping import integrated
+
+
+@dataclass(frozen=True)
+class Solution:
+    """Accelerations at one instant, with what they were found from.
+
+    Attributes:
+        acceleration: v̇, (nv).
+        multipliers: of the loops' rows, the smallest in norm where they are redundant.
+        motion, rows: kinematics.
+        split: (L⁻ᵀV, Uᵀ/S) of the locked directions: −product with a residual is the correction that removes it.
+        smallest: of the singular values that count, relative to the largest; zero at a singular pose.
+    """
+
+    acceleration: Array
+    multipliers: Array
+    motion: Motion
+    rows: Rows
+    split: tuple[Array, Array] | None
+    smallest: float
+
+
+class JointCoordinates:
+    """Equations of motion of a mechanism in the coordinates of its tree.
+
+    Args:
+        mechanism: any without dry friction.
+        rank: of the loops' rows; None: that of a general pose.
+
+    Raises:
+        Refused: the mechanism has dry friction, whose switching this route does not follow.
+    """
+
+    def __init__(self, mechanism: Mechanism, rank: int | None = None) -> None:
+        for joint in mechanism.joints:
+            if joint.friction:
+                raise Refused(f"dry friction in joint {joint.name} switches; no route of the truth follows it")
+        self.mechanism, self.tree = mechanism, Tree(mechanism)
+        self.rank = analysed(mechanism).rank if rank is None else rank
+        self._mass = np.array([body.mass for body in mechanism.bodies])
+        self._com = np.array([body.com for body in mechanism.bodies])
+        self._inertia = np.array([body.inertia for body in mechanism.bodies])
+        self._gravity = np.array(mechanism.gravity)
+        by_velocity = [joint for joint in mechanism.joints for _ in range(joint.nv)]
+        self._damping = np.array([joint.damping for joint in by_velocity])
+        self._torque = np.array([joint.torque for joint in by_velocity])
+        self._armature = np.diag([joint.armature for joint in by_velocity])
+        laws = zip(mechanism.joints, mechanism.q_slices, mechanism.v_slices, strict=True)
+        self._springs = [(joint.stiffness, joint.rest, at_q, at_v) for joint, at_q, at_v in laws if joint.stiffness]
+
+    def solve(self, q: Array, v: Array) -> Solution:
+        """Accelerations and multipliers for coordinates (nq) and velocities (nv)."""
+        motion = self.tree.at(q, v)
+        J, M, loads = self.inertial(motion)
+        b = self._torque - self._damping * v - np.einsum("nij,ni->j", J, loads)
+        for stiffness, rest, at_q, at_v in self._springs:
+            b[at_v] -= stiffness * (q[at_q] - rest)
+        for end, position, force in self._spring_forces(motion):
+            b += force @ self.tree.point(motion, end, position)[2]
+        rows = self.tree.loop_rows(motion)
+        into = np.linalg.inv(np.linalg.cholesky(M)).T  # M⁻¹ = into intoᵀ
+        free = into.T @ b
+        if not self.rank:
+            return Solution(into @ free, np.zeros(0), motion, rows, None, 1.0)
+        U, S, Vt = np.linalg.svd(rows.C @ into, full_matrices=False)
+        locked, back = Vt[: self.rank], U[:, : self.rank].T / S[: self.rank, None]
+        normal = -back @ rows.bias - locked @ free
+        locked_into = into @ locked.T
+        smallest = float(S[self.rank - 1] / S[0])
+        return Solution(
+            into @ free + locked_into @ normal, back.T @ normal, motion, rows, (locked_into, back), smallest
+        )
+
+    def run(self, times: Array, tolerance: float = 1e-14) -> Record:
+        """The motion at the given times, s, by DOP853.
+
+        Raises:
+            Diverged: the integration stops, e.g. at a singular pose.
+        """
+        nq, start = self.mechanism.nq, np.concatenate(self.mechanism.start())
+        states = integrated(self.rate, start, times, tolerance, self.eliminated)
+        return gathered(times, [self.sample(y[:nq], y[nq:]) for y in states])
+
+    def rate(self, _: float, y: Array) -> Array:
+        """Right-hand side for the state (q, v)."""
+        q, v = y[: self.mechanism.nq], y[self.mechanism.nq :]
+        return np.concatenate([self.tree.rate(q, v), self.solve(q, v).acceleration])
+
+    def run_rk4(self, times: Array, step: float = 2e-3) -> Record:
+        """The motion at the given times, s, by Runge-Kutta 4 in equal steps of at most ``step``, s.
+
+        Equal steps pass singular poses, before which an error control shrinks its steps for ever.
+        """
+        nq = self.mechanism.nq
+        return gathered(times, [self.sample(y[:nq], y[nq:]) for y in self.rk4_states(times, step)])
+
+    def rk4_states(self, times: Array, step: float) -> Iterator[Array]:
+        """The states (q, v) of :meth:`run_rk4`."""
+        y, now = np.concatenate(self.mechanism.start()), 0.0
+        for time in times:
+            steps = int(np.ceil((time - now) / step - 1e-9))
+            h = (time - now) / max(steps, 1)
+            for _ in range(steps):
+                k1 = self.rate(0.0, y)
+                k2 = self.rate(0.0, y + h / 2 * k1)
+                k3 = self.rate(0.0, y + h / 2 * k2)
+                y = self.eliminated(y + h / 6 * (k1 + 2 * k2 + 2 * k3 + self.rate(0.0, y + h * k3)))
+            now = time
+            yield y
+
+    def eliminated(self, y: Array) -> Array:
+        """The state with violations of the loops and of unit quaternions removed."""
+        nq = self.mechanism.nq
+        q, v = self.tree.normalised(y[:nq]), y[nq:]
+        if self.rank:
+            found = self.solve(q, v)
+            assert found.split is not None
+            into, back = found.split
+            v = v - into @ (back @ (found.rows.C @ v))
+            q = self.tree.moved(q, -into @ (back @ found.rows.residual))
+        return np.concatenate([q, v])
+
+    def sample(self, q: Array, v: Array) -> dict[str, Any]:
+        """What a :class:`~proofroll.elements.mechanism.record.Record` holds at one time."""
+        found = self.solve(q, v)
+        motion, rows, mechanism = found.motion, found.rows, self.mechanism
+        n = len(mechanism.bodies)
+        wrench = np.concatenate(reactions(self.tree, motion, rows, found.multipliers, self._needed(found)))
+        largest = [np.abs(rows.residual).max(initial=0.0), np.abs(rows.C @ v).max(initial=0.0)]
+        points = [self.tree.point(motion, point.body, np.array(point.position))[0] for point in mechanism.points]
+        return {
+            "p_WB": motion.p_WB[:n],
+            "v_WB": motion.v_WB[:n],
+            "q_WB": np.array([to_quaternion(R) for R in motion.R_WB[:n]]),
+            "w_WB": motion.w_WB[:n],
+            "q": q,
+            "v": v,
+            "wrench": wrench,
+            "points": np.array(points).reshape(-1, 3),
+            "energy": self._energy(motion, q),
+            "residual": np.array(largest),
+        }
+
+    def inertial(self, motion: Motion) -> tuple[Array, Array, Array]:
+        """Jacobians at the centres of mass, mass matrix, inertial and gravity wrenches at v̇ = 0."""
+        n = len(self._mass)
+        R, w = motion.R_WB[:n], motion.w_WB[:n]
+        arm = np.einsum("nij,nj->ni", R, self._com)
+        inertia = R @ self._inertia @ R.transpose(0, 2, 1)
+        J = motion.J[:n].copy()
+        J[:, :3] -= skews(arm) @ J[:, 3:]
+        weighted = np.concatenate([self._mass[:, None, None] * J[:, :3], inertia @ J[:, 3:]], axis=1)
+        nv = self.mechanism.nv
+        M = J.reshape(-1, nv).T @ weighted.reshape(-1, nv) + self._armature
+        return J, M, self._wrenches(motion.bias[:n], arm, inertia, w)
+
+    def _wrenches(self, acceleration: Array, arm: Array, inertia: Array, w: Array) -> Array:
+        """Force and moment about the centre of mass that move each body so, beyond gravity, (bodies, 6)."""
+        alpha = acceleration[:, 3:]
+        at_com = acceleration[:, :3] + crosses(alpha, arm) + crosses(w, crosses(w, arm))
+        force = self._mass[:, None] * (at_com - self._gravity)
+        spin = np.einsum("nij,nj->ni", inertia, w)
+        return np.concatenate([force, np.einsum("nij,nj->ni", inertia, alpha) + crosses(w, spin)], axis=1)
+
+    def _needed(self, found: Solution) -> Array:
+        """Wrenches about the world's origin that joints and loops bring to the bodies; the last is the world's."""
+        motion, n = found.motion, len(self._mass)
+        R = motion.R_WB[:n]
+        arm = np.einsum("nij,nj->ni", R, self._com)
+        acceleration = motion.J[:n] @ found.acceleration + motion.bias[:n]
+        inertia = R @ self._inertia @ R.transpose(0, 2, 1)
+        wrenches = self._wrenches(acceleration, arm, inertia, motion.w_WB[:n])
+        needed = np.zeros((n + 1, 6))
+        needed[:n] = wrenches
+        needed[:n, 3:] += crosses(motion.p_WB[:n] + arm, wrenches[:, :3])
+        for end, position, force in self._spring_forces(motion):
+            at = self.tree.point(motion, end, position)[0]
+            needed[self.mechanism.body_index[end]] -= np.concatenate([force, cross(at, force)])
+        return needed
+
+    def _spring_forces(self, motion: Motion) -> list[tuple[str, Array, Array]]:
+        """Body, position on it and force, world axes, of each end of each spring."""
+        found = []
+        for spring in self.mechanism.springs:
+            ends = [(spring.body_a, np.array(spring.position_a)), (spring.body_b, np.array(spring.position_b))]
+            (p_a, v_a, *_), (p_b, v_b, *_) = (self.tree.point(motion, body, position) for body, position in ends)
+            length = float(np.linalg.norm(p_b - p_a))
+            along = (p_b - p_a) / length
+            pull = spring.stiffness * (length - spring.length) + spring.damping * (along @ (v_b - v_a))
+            found += [(body, position, s * pull * along) for (body, position), s in zip(ends, (1, -1), strict=True)]
+        return found
+
+    def _energy(self, motion: Motion, q: Array) -> float:
+        n = len(self._mass)
+        R, w = motion.R_WB[:n], motion.w_WB[:n]
+        arm = np.einsum("nij,nj->ni", R, self._com)
+        v_com = motion.v_WB[:n] + crosses(w, arm)
+        spin = np.einsum("nji,nj->ni", R, w)
+        energy = 0.5 * self._mass @ (v_com**2).sum(axis=1) + 0.5 * np.einsum("ni,nij,nj", spin, self._inertia, spin)
+        energy -= self._mass @ ((motion.p_WB[:n] + arm) @ self._gravity)
+        for stiffness, rest, at_q, _ in self._springs:
+            energy += 0.5 * stiffness * ((q[at_q] - rest) ** 2).sum()
+        for spring in self.mechanism.springs:
+            ends = ((spring.body_a, spring.position_a), (spring.body_b, spring.position_b))
+            a, b = (self.tree.point(motion, body, np.array(position))[0] for body, position in ends)
+            energy += 0.5 * spring.stiffness * (np.linalg.norm(b - a) - spring.length) ** 2
+        return float(energy)

@@ -1,0 +1,108 @@
+"""The data of a mechanism: bodies, a tree of joints, loops that close it, springs, tracked points, gravity.
+
+SI units, angles in rad, world frame W with z up. Every body has a frame of its own; the frame of the world is the
+body ``world``. Each object checks itself and raises :class:`~proofroll.core.errors.InputError` with one line.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+from dataclasses import dataclass
+from functools import cached_property
+from itertools import pairwise
+from typing import Any
+
+import numpy as np
+
+from proofroll.core.errors import InputError
+from proofroll.elements.mechanism import checks
+from proofroll.elements.mechanism.checks import WORLD, Vector
+from proofroll.elements.mechanism.joint import Joint
+from proofroll.elements.mechanism.parts import Body, Loop, Point, Spring
+from proofroll.elements.mechanism.rotations import Array
+from proofroll.elements.mechanism.tree import check_masses, depth_first
+
+__all__ = ["WORLD", "Body", "Joint", "Loop", "Mechanism", "Point", "Spring"]
+
+
+@dataclass(frozen=True)
+class Mechanism:
+    """Bodies and what connects them.
+
+    Attributes:
+        bodies: in the order of the scene; arrays over bodies have this order.
+        joints: sorted depth-first from the world, whatever order is given; q and v have this order.
+        loops, springs, points: in the order of the scene.
+        gravity: acceleration in the world's axes, m/s².
+    """
+
+    bodies: tuple[Body, ...]
+    joints: tuple[Joint, ...]
+    loops: tuple[Loop, ...] = ()
+    springs: tuple[Spring, ...] = ()
+    points: tuple[Point, ...] = ()
+    gravity: Vector = (0.0, 0.0, -9.81)
+
+    def __post_init__(self) -> None:
+        for key in ("bodies", "joints", "loops", "springs", "points"):
+            checks.assign(self, **{key: tuple(getattr(self, key))})
+            _check_unique(key, getattr(self, key))
+        _check_unique("loops", self.joints + self.loops)  # results name both alike
+        names = {WORLD, *(body.name for body in self.bodies)}
+        for item in self.joints + self.loops + self.springs + self.points:
+            for key in ("parent", "child", "body_a", "body_b", "body"):
+                if getattr(item, key, WORLD) not in names:
+                    field = f"{type(item).__name__.lower()}s.{item.name}.{key}"
+                    raise InputError(field, getattr(item, key), f"there is no such body; choose from {_list(names)}")
+        checks.assign(self, joints=depth_first(self.bodies, self.joints))
+        checks.assign(self, gravity=checks.vector("gravity", self.gravity))
+        check_masses(self.bodies, self.joints)
+
+    @cached_property
+    def body_index(self) -> dict[str, int]:
+        """Position of each body in :attr:`bodies`; the world is at -1."""
+        return {WORLD: -1} | {body.name: index for index, body in enumerate(self.bodies)}
+
+    @property
+    def nq(self) -> int:
+        """Number of coordinates of the tree."""
+        return sum(joint.nq for joint in self.joints)
+
+    @property
+    def nv(self) -> int:
+        """Number of velocities of the tree."""
+        return sum(joint.nv for joint in self.joints)
+
+    @cached_property
+    def q_slices(self) -> tuple[slice, ...]:
+        """Where each joint's coordinates lie in q."""
+        return _slices(joint.nq for joint in self.joints)
+
+    @cached_property
+    def v_slices(self) -> tuple[slice, ...]:
+        """Where each joint's velocities lie in v."""
+        return _slices(joint.nv for joint in self.joints)
+
+    def start(self) -> tuple[Array, Array]:
+        """Coordinates (nq) and velocities (nv) of the tree at the start."""
+        return (
+            np.array([value for joint in self.joints for value in joint.q0]),
+            np.array([value for joint in self.joints for value in joint.v0]),
+        )
+
+
+def _slices(counts: Iterable[int]) -> tuple[slice, ...]:
+    ends = np.cumsum([0, *counts]).tolist()
+    return tuple(slice(a, b) for a, b in pairwise(ends))
+
+
+def _check_unique(kind: str, items: Iterable[Any]) -> None:
+    seen = set()
+    for item in items:
+        if item.name in seen:
+            raise InputError(f"{kind}.{item.name}.name", item.name, "this name is used twice; names must be unique")
+        seen.add(item.name)
+
+
+def _list(names: Iterable[str]) -> str:
+    return ", ".join(sorted(names))

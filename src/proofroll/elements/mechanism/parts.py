@@ -1,0 +1,136 @@
+"""Bodies, loops, springs and tracked points."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from functools import cached_property
+
+import numpy as np
+
+from proofroll.core.errors import InputError
+from proofroll.elements.mechanism import checks, rotations
+from proofroll.elements.mechanism.checks import WORLD, ZERO, Matrix, Vector, Z
+from proofroll.elements.mechanism.joint import Kind, check_kind
+from proofroll.elements.mechanism.rotations import Array
+
+
+@dataclass(frozen=True)
+class Body:
+    """A rigid body.
+
+    Attributes:
+        name: unique in the mechanism.
+        mass: kg.
+        com: centre of mass in the body's frame, m.
+        inertia: 3×3 about the centre of mass, in the body's axes, kg m²; may be given as three principal moments.
+    """
+
+    name: str
+    mass: float
+    com: Vector = ZERO
+    inertia: Matrix = (ZERO, ZERO, ZERO)
+
+    def __post_init__(self) -> None:
+        field = f"bodies.{checks.name(self.name, 'bodies')}"
+        if self.name == WORLD:
+            raise InputError("bodies.name", WORLD, "this name means the world; choose another")
+        inertia = checks.inertia(f"{field}.inertia", self.inertia)
+        if checks.number(f"{field}.mass", self.mass, at_least=0) == 0 and np.any(inertia):
+            raise InputError(f"{field}.inertia", self.inertia, "a body without mass has no inertia; give it a mass")
+        checks.assign(self, mass=float(self.mass), com=checks.vector(f"{field}.com", self.com), inertia=inertia)
+
+
+@dataclass(frozen=True)
+class Loop:
+    """A connection between two bodies of the tree that closes a loop; it has the kinds of joints, but no coordinates.
+
+    Its wrench is that on ``body_b``, as a joint's is that on its child.
+
+    Attributes:
+        name, kind: as for joints; any kind but free.
+        body_a, body_b: names of bodies, or ``world``.
+        position_a, position_b: the point of each body that the loop holds together, in its frame, m.
+        axis_a, axis_b: axis in the frame of each body; revolute, planar: parallel; universal: perpendicular;
+            prismatic: ``axis_a`` alone.
+        orientation: roll, pitch, yaw of body_b's frame against body_a's, held by fixed and prismatic loops, rad.
+    """
+
+    name: str
+    kind: Kind
+    body_a: str
+    body_b: str
+    position_a: Vector = ZERO
+    position_b: Vector = ZERO
+    axis_a: Vector = Z
+    axis_b: Vector = Z
+    orientation: Vector = ZERO
+
+    def __post_init__(self) -> None:
+        field = f"loops.{checks.name(self.name, 'loops')}"
+        check_kind(field, self.kind)
+        if self.kind == "free":
+            raise InputError(f"{field}.kind", self.kind, "a free loop holds nothing; remove it")
+        if self.body_a == self.body_b:
+            raise InputError(f"{field}.body_b", self.body_b, "a loop connects two bodies; these are the same")
+        for key in ("position_a", "position_b", "orientation"):
+            checks.assign(self, **{key: checks.vector(f"{field}.{key}", getattr(self, key))})
+        for key in ("axis_a", "axis_b"):
+            checks.assign(self, **{key: checks.axis(f"{field}.{key}", getattr(self, key))})
+
+    @cached_property
+    def frame_a(self) -> Array:
+        """Axes of the loop's frame on body_a in its axes, as columns; z is the axis."""
+        return rotations.frame_of_axis(self.axis_a)
+
+    @cached_property
+    def frame_b(self) -> Array:
+        """Axes of the loop's frame on body_b in its axes; it obeys the same rows with frame_a as a joint's frames."""
+        if self.kind in {"fixed", "prismatic"}:
+            frame: Array = rotations.from_rpy(self.orientation).T @ self.frame_a
+            return frame
+        if self.kind == "universal":  # the joint's row is: z of A perpendicular to x of B
+            return rotations.frame_of_axis(self.axis_b)[:, [2, 0, 1]]
+        return rotations.frame_of_axis(self.axis_b)
+
+
+@dataclass(frozen=True)
+class Spring:
+    """A straight spring and damper between two points; its force is stiffness·(L − length) + damping·L̇, as a pull.
+
+    Attributes:
+        name: unique among springs.
+        body_a, body_b: names of bodies, or ``world``.
+        position_a, position_b: its ends in the frame of each body, m.
+        stiffness, damping, length: N/m, N s/m, free length in m.
+    """
+
+    name: str
+    body_a: str
+    body_b: str
+    position_a: Vector = ZERO
+    position_b: Vector = ZERO
+    stiffness: float = 0.0
+    damping: float = 0.0
+    length: float = 0.0
+
+    def __post_init__(self) -> None:
+        field = f"springs.{checks.name(self.name, 'springs')}"
+        if self.body_a == self.body_b:
+            raise InputError(f"{field}.body_b", self.body_b, "a spring connects two bodies; these are the same")
+        for key in ("position_a", "position_b"):
+            checks.assign(self, **{key: checks.vector(f"{field}.{key}", getattr(self, key))})
+        for key in ("stiffness", "damping", "length"):
+            checks.assign(self, **{key: checks.number(f"{field}.{key}", getattr(self, key), at_least=0)})
+
+
+@dataclass(frozen=True)
+class Point:
+    """A point of a body that is tracked: name, name of its body (or ``world``), position in the body's frame, m."""
+
+    name: str
+    body: str
+    position: Vector = ZERO
+
+    def __post_init__(self) -> None:
+        field = f"points.{checks.name(self.name, 'points')}"
+        checks.assign(self, position=checks.vector(f"{field}.position", self.position))

@@ -1,0 +1,90 @@
+"""What an engine says about a mechanism besides its motion, and which mechanism a scene holds.
+
+A :class:`~proofroll.core.engine.Sample` of a mechanism has arrays over its bodies: origin of each body's frame, its
+velocity, orientation and angular velocity; and over its joints, followed by its loops: force and moment on the child
+(on body_b of a loop) at its joint point, world axes; NaN where the engine cannot say one of them.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+from typing import Any
+
+import numpy as np
+
+from proofroll.core.engine import Regularised
+from proofroll.core.errors import Refused
+from proofroll.elements.mechanism.model import Mechanism
+from proofroll.elements.mechanism.rotations import Array
+
+# Relative singular value below which a constraint row of an engine depends on the others; see analysis.RANK, of which
+# it is independent: an engine's rows have other units and weights.
+DEPENDENT = 1e-9
+WITH_AXIS = ("revolute", "prismatic", "universal", "planar")
+
+
+@dataclass(frozen=True)
+class MechanismBuilt:
+    """What the engine really built, read back from the engine at time 0 (never from the scene). None: it cannot say.
+
+    Attributes:
+        mass: of the bodies [kg], shape (bodies,).
+        com: centre of mass in the body's frame [m], shape (bodies, 3).
+        inertia: about the centre of mass, in the body's axes [kg m²], shape (bodies, 3, 3).
+        joint_position: of each joint in the world [m], shape (joints, 3).
+        joint_axis: its axis in the world, unit vectors, NaN for a joint without one, shape (joints, 3).
+        gravity: acceleration of gravity in the world [m/s²], shape (3,).
+        rows: number of the engine's constraint rows.
+        rank: number of independent ones among them.
+        mobility: velocities of the engine's model less ``rank``.
+        acceleration: of the origin of each body's frame [m/s²], shape (bodies, 3).
+        angular_acceleration: of each body in the world [rad/s²], shape (bodies, 3).
+        mass_matrix_error: largest difference between the engine's mass matrix and what its inverse dynamics needs for
+            unit accelerations, relative to its largest element; for an engine that has both.
+        regularised: names of these quantities that the model softens, with tolerance and reason; the tolerance of
+            ``acceleration`` and of ``angular_acceleration`` is relative to the largest component of any body.
+    """
+
+    mass: Array | None = None
+    com: Array | None = None
+    inertia: Array | None = None
+    joint_position: Array | None = None
+    joint_axis: Array | None = None
+    gravity: Array | None = None
+    rows: int | None = None
+    rank: int | None = None
+    mobility: int | None = None
+    acceleration: Array | None = None
+    angular_acceleration: Array | None = None
+    mass_matrix_error: float | None = None
+    regularised: Mapping[str, Regularised] = field(default_factory=dict)
+
+
+def mechanism_of(scene: Any) -> Mechanism:
+    """The mechanism of a scene that holds nothing else, or the mechanism itself.
+
+    Raises:
+        Refused: the scene holds something else.
+    """
+    if isinstance(scene, Mechanism):
+        return scene
+    found = [getattr(element, "mechanism", None) for element in scene.elements]
+    if len(found) != 1 or not isinstance(found[0], Mechanism):
+        raise Refused("needs a scene of one mechanism, and this formulation represents nothing else")
+    return found[0]
+
+
+def independent(rows: Array) -> int:
+    """Number of independent constraint rows, of any scale, shape (rows, velocities)."""
+    if not rows.size:
+        return 0
+    sizes = np.linalg.norm(rows, axis=1, keepdims=True)
+    values = np.linalg.svd(rows / np.where(sizes > 0, sizes, 1.0), compute_uv=False)
+    return int((values > DEPENDENT * values[0]).sum())
+
+
+def unsaid(mechanism: Mechanism) -> tuple[Array, Array]:
+    """Forces and moments of joints and loops of which nothing is known yet, shape (joints + loops, 3) each."""
+    count = len(mechanism.joints) + len(mechanism.loops)
+    return np.full((count, 3), np.nan), np.full((count, 3), np.nan)

@@ -1,0 +1,62 @@
+"""DOP853 that lands on given times and corrects the state after each step."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator
+
+import numpy as np
+from scipy.integrate import DOP853
+
+from proofroll.core.errors import Diverged
+from proofroll.elements.mechanism.rotations import Array
+
+_STALLED, _STALLED_STEPS = 1e-5, 20  # so many steps in a row, so small against the largest: no smooth motion needs them
+
+
+def integrated(
+    rate: Callable[[float, Array], Array],
+    start: Array,
+    times: Array,
+    tolerance: float,
+    corrected: Callable[[Array], Array] | None = None,
+    most_steps: int = 200_000,
+) -> Iterator[Array]:
+    """The state at each time; the solver steps exactly onto it, for its interpolation is of lower order.
+
+    Args:
+        rate: right-hand side.
+        start: state at time 0.
+        times: growing, s; the first may be 0.
+        tolerance: absolute and relative, of each step.
+        corrected: puts a state back on its constraints; applied after every step.
+        most_steps: that the whole way may take.
+
+    Raises:
+        Diverged: the steps become too small or too many, or the state is not finite.
+    """
+    # scipy needs an end; it is moved from sample to sample, so that the step size survives
+    solver = DOP853(rate, 0.0, start, float(times[-1]) or 1.0, rtol=1e-3, atol=tolerance)
+    solver.rtol = tolerance  # scipy accepts no less than 2.2e-14, which is its caution, not the method's limit
+    steps, largest, small = 0, 0.0, 0
+    for time in times:
+        if time > solver.t:
+            solver.t_bound, solver.status = float(time), "running"
+        while solver.t < time:
+            usual = solver.h_abs
+            message = solver.step()
+            steps += 1
+            if solver.status == "failed" or not np.isfinite(solver.y).all():
+                raise Diverged(f"DOP853 stopped at t = {solver.t:.6g} s: {message or 'the state is not finite'}")
+            landing = solver.status == "finished"
+            largest = max(largest, solver.step_size)
+            small = 0 if landing or solver.step_size > _STALLED * largest else small + 1
+            if small > _STALLED_STEPS:
+                raise Diverged(f"DOP853 stalls at t = {solver.t:.6g} s: its steps shrink, as at a singular pose")
+            if steps > most_steps:
+                raise Diverged(f"DOP853 needs more than {most_steps} steps; it reached t = {solver.t:.6g} s")
+            if landing:
+                solver.h_abs = max(solver.h_abs, usual)
+            if corrected is not None:
+                solver.y = corrected(solver.y)
+                solver.f = rate(solver.t, solver.y)
+        yield solver.y.copy()

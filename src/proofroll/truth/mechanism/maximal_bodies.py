@@ -1,0 +1,228 @@
+"""Bodies of route 2: each alone in space, with a position of its centre of mass and an attitude.
+
+A body that can only move in a plane has three coordinates, any other seven; nothing here knows joint coordinates.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+from scipy.spatial.transform import Rotation
+
+from proofroll.elements.mechanism.checks import WORLD
+from proofroll.elements.mechanism.joint import Joint
+from proofroll.elements.mechanism.model import Mechanism
+from proofroll.elements.mechanism.rotations import Array, frame_of_axis
+from proofroll.truth.mechanism.scalars import Scalar, add, cross, dot, mul, plus, scaled, turned, turned_back
+
+_PARALLEL = 1e-12  # how far axes of a plane mechanism may be from parallel: round-off
+
+
+@dataclass(frozen=True)
+class Placed:
+    """Start of one body: origin and velocity of its frame, rotation, angular velocity, world axes."""
+
+    p: Array
+    R: Rotation
+    v: Array
+    w: Array
+
+
+@dataclass(frozen=True)
+class View:
+    """A body at one instant, of scalars: centre of mass, rotation by rows, velocity, angular velocity, world axes."""
+
+    r: Sequence[Scalar]
+    R: Sequence[Sequence[Scalar]]
+    v: Sequence[Scalar]
+    w: Sequence[Scalar]
+
+
+_UNIT = ((1.0, 0.0, 0.0), (0.0, 1.0, 0.0), (0.0, 0.0, 1.0))
+GROUND = View((0.0,) * 3, _UNIT, (0.0,) * 3, (0.0,) * 3)
+
+
+class General:
+    """A body that can move anyhow: r, quaternion | v, ω in body axes."""
+
+    nx, nu = 7, 6
+
+    def __init__(self, mass: float, inertia: Array) -> None:
+        self.mass, self.inertia = mass, [[float(x) for x in row] for row in inertia]
+        self.inverse = np.zeros((6, 6))
+        self.inverse[:3, :3] = np.eye(3) / mass
+        self.inverse[3:, 3:] = np.linalg.inv(inertia)
+
+    def start(self, placed: Placed, com: Array) -> tuple[list[float], list[float]]:
+        """Coordinates and velocities of a placed body."""
+        arm = placed.R.apply(com)
+        attitude = placed.R.as_quat(scalar_first=True)
+        velocity = placed.v + np.cross(placed.w, arm)
+        return [*(placed.p + arm), *attitude], [*velocity, *placed.R.inv().apply(placed.w)]
+
+    def view(self, x: Sequence[Scalar], u: Sequence[Scalar], _: Mapping[str, Any]) -> View:
+        """The body for coordinates x, of a unit quaternion, and velocities u."""
+        a, b, c, d = x[3:]
+        R = (
+            (1.0 - 2.0 * (c * c + d * d), 2.0 * (b * c - a * d), 2.0 * (b * d + a * c)),
+            (2.0 * (b * c + a * d), 1.0 - 2.0 * (b * b + d * d), 2.0 * (c * d - a * b)),
+            (2.0 * (b * d - a * c), 2.0 * (c * d + a * b), 1.0 - 2.0 * (b * b + c * c)),
+        )
+        return View(x[:3], R, u[:3], turned(R, u[3:]))
+
+    def projected(self, view: View, force: Sequence[Scalar], moment: Sequence[Scalar]) -> list[Scalar]:
+        """What a force and a moment about the centre of mass, world axes, do along the velocities u."""
+        return [*force, *turned_back(view.R, moment)]
+
+    def gyroscopic(self, u: Sequence[Scalar]) -> list[Scalar]:
+        """Inertial force along the velocities at u̇ = 0."""
+        return [0.0, 0.0, 0.0, *scaled(-1.0, cross(u[3:], turned(self.inertia, u[3:])))]
+
+    def rate(self, x: Sequence[Scalar], u: Sequence[Scalar]) -> list[Scalar]:
+        """ẋ."""
+        (a, b, c, d), (p, q, r) = x[3:], u[3:]
+        return [
+            *u[:3],
+            -0.5 * (b * p + c * q + d * r),
+            0.5 * (a * p + c * r - d * q),
+            0.5 * (a * q + d * p - b * r),
+            0.5 * (a * r + b * q - c * p),
+        ]
+
+
+class Planar:
+    """A body that moves in a plane: two coordinates of the centre of mass and an angle, and their rates.
+
+    Args:
+        mass, inertia: kg, kg m² about the centre of mass in body axes.
+        plane: columns e1, e2 of the plane and its normal, world axes.
+        com: a place of the centre of mass, m.
+        R: its rotation where the angle is zero.
+    """
+
+    nx, nu = 3, 3
+
+    def __init__(self, mass: float, inertia: Array, plane: Array, com: Array, R: Rotation) -> None:
+        self.mass, self.zero = mass, R
+        normal = plane[:, 2]
+        moment = R.inv().apply(normal) @ inertia @ R.inv().apply(normal)
+        self.inverse = np.diag([1 / mass, 1 / mass, 1 / moment])
+        self.plane = plane
+        self._columns = [_clean(column) for column in plane.T]
+        self._height = _clean(normal * (normal @ com))
+        matrix, along = R.as_matrix(), np.outer(normal, normal) @ R.as_matrix()
+        around = np.cross(normal, np.eye(3)).T  # normal × each column
+        self._parts = [
+            [_clean(row) for row in part] for part in (matrix - along @ matrix, around @ matrix, along @ matrix)
+        ]
+
+    def start(self, placed: Placed, com: Array) -> tuple[list[float], list[float]]:
+        """Coordinates and velocities of a placed body."""
+        arm = placed.R.apply(com)
+        angle = float((placed.R * self.zero.inv()).as_rotvec() @ self.plane[:, 2])
+        velocity = placed.v + np.cross(placed.w, arm)
+        e1, e2, normal = self.plane.T
+        return [(placed.p + arm) @ e1, (placed.p + arm) @ e2, angle], [velocity @ e1, velocity @ e2, placed.w @ normal]
+
+    def view(self, x: Sequence[Scalar], u: Sequence[Scalar], functions: Mapping[str, Any]) -> View:
+        """The body for coordinates x and velocities u."""
+        c, s = functions["cos"](x[2]), functions["sin"](x[2])
+        R = [
+            [add(mul(c, a), mul(s, b), d) for a, b, d in zip(*rows, strict=True)]
+            for rows in zip(*self._parts, strict=True)
+        ]
+        e1, e2, normal = self._columns
+        r = plus(scaled(x[0], e1), scaled(x[1], e2), self._height)
+        return View(r, R, plus(scaled(u[0], e1), scaled(u[1], e2)), scaled(u[2], normal))
+
+    def projected(self, _: View, force: Sequence[Scalar], moment: Sequence[Scalar]) -> list[Scalar]:
+        """What a force and a moment about the centre of mass, world axes, do along the velocities u."""
+        e1, e2, normal = self._columns
+        return [dot(force, e1), dot(force, e2), dot(moment, normal)]
+
+    def gyroscopic(self, _: Sequence[Scalar]) -> list[Scalar]:
+        """Inertial force along the velocities at u̇ = 0."""
+        return [0.0, 0.0, 0.0]
+
+    def rate(self, _: Sequence[Scalar], u: Sequence[Scalar]) -> list[Scalar]:
+        """ẋ."""
+        return list(u)
+
+
+def placed_bodies(mechanism: Mechanism, at_zero: bool = False) -> dict[str, Placed]:
+    """Where all bodies are at the start, from the joints' own definition; at_zero: at q = 0, v = 0 instead."""
+    found = {WORLD: Placed(np.zeros(3), Rotation.identity(), np.zeros(3), np.zeros(3))}
+    for joint in mechanism.joints:
+        parent = found[joint.parent]
+        frame = parent.R * Rotation.from_euler("xyz", joint.orientation)
+        q = np.zeros(joint.nq) if at_zero else np.array(joint.q0)
+        v = np.zeros(joint.nv) if at_zero else np.array(joint.v0)
+        shift, turn, slide, spin = _moved(joint, q, v)  # shift in A's axes turned to the child's at q = 0; others there
+        at = parent.R.apply(joint.position) + frame.apply(shift)
+        R = frame * turn
+        w = parent.w + frame.apply(spin)
+        arm = -R.apply(joint.child_position)
+        v_joint = parent.v + np.cross(parent.w, at) + frame.apply(slide)
+        found[joint.child] = Placed(parent.p + at + arm, R, v_joint + np.cross(w, arm), w)
+    return found
+
+
+def _moved(joint: Joint, q: Array, v: Array) -> tuple[Array, Rotation, Array, Array]:
+    """Shift, turn and their rates of the child, in the axes that it has at q = 0."""
+    none, still = np.zeros(3), Rotation.identity()
+    e1, e2, e3 = joint.child_frame.T
+    if joint.kind == "revolute":
+        return none, Rotation.from_rotvec(q[0] * e3), none, v[0] * e3
+    if joint.kind == "prismatic":
+        return q[0] * e3, still, v[0] * e3, none
+    if joint.kind == "universal":
+        first = Rotation.from_rotvec(q[0] * e3)
+        return none, first * Rotation.from_rotvec(q[1] * e1), none, v[0] * e3 + v[1] * first.apply(e1)
+    if joint.kind == "planar":
+        return q[0] * e1 + q[1] * e2, Rotation.from_rotvec(q[2] * e3), v[0] * e1 + v[1] * e2, v[2] * e3
+    if joint.kind == "fixed":
+        return none, still, none, none
+    turn = Rotation.from_quat(q[-4:], scalar_first=True) if q[-4:].any() else still
+    shift, slide = (q[:3], turn.apply(v[:3])) if joint.kind == "free" else (none, none)
+    return shift, turn, slide, turn.apply(v[-3:])
+
+
+def made_bodies(mechanism: Mechanism, allow_planar: bool) -> list[General | Planar]:
+    """The bodies, plane ones with three coordinates where that is allowed."""
+    plane = _plane(mechanism) if allow_planar else None
+    if plane is None:
+        return [General(body.mass, np.array(body.inertia)) for body in mechanism.bodies]
+    placed = placed_bodies(mechanism, at_zero=True)
+    return [
+        Planar(
+            body.mass,
+            np.array(body.inertia),
+            plane,
+            placed[body.name].p + placed[body.name].R.apply(body.com),
+            placed[body.name].R,
+        )
+        for body in mechanism.bodies
+    ]
+
+
+def _plane(mechanism: Mechanism) -> Array | None:
+    """Frame of the plane in which all bodies move, its normal last; None where they do not."""
+    placed = placed_bodies(mechanism)
+    axes = [(joint, placed[joint.child].R.apply(joint.child_frame[:, 2])) for joint in mechanism.joints]
+    normals = [axis for joint, axis in axes if joint.kind in {"revolute", "planar"}]
+    if not normals or any(joint.kind in {"universal", "spherical", "free"} for joint in mechanism.joints):
+        return None
+    normal = normals[0]
+    for joint, axis in axes:
+        skewness = axis @ normal if joint.kind == "prismatic" else np.abs(np.cross(axis, normal)).max()
+        if joint.kind != "fixed" and abs(skewness) > _PARALLEL:
+            return None
+    return frame_of_axis(normal)
+
+
+def _clean(vector: Any) -> list[float]:
+    """Plain floats, with the round-off of a rotation removed from zeros and ones, so that they fold."""
+    return [float(round(x)) if abs(x - round(x)) < 1e-15 else float(x) for x in vector]

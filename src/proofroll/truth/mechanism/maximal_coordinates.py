@@ -1,0 +1,274 @@
+"""Route 2 of the truth: every body alone in space, held by constraint rows; no joint coordinate, no tree.
+
+It shares no kinematics with route 1. Taylor series (heyoka) integrate it where they can; DOP853 with projection, its
+rank fixed at the start and violations eliminated after each step, where rows are needed that depend on each other or
+heyoka is absent.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+from scipy.linalg import qr
+from scipy.spatial.transform import Rotation
+
+from proofroll.elements.mechanism.checks import WORLD
+from proofroll.elements.mechanism.joint import Joint
+from proofroll.elements.mechanism.model import Mechanism
+from proofroll.elements.mechanism.record import Record, gathered
+from proofroll.elements.mechanism.rotations import Array
+from proofroll.elements.mechanism.stepping import integrated
+from proofroll.truth.mechanism.maximal_bodies import View
+from proofroll.truth.mechanism.maximal_equations import Connection, Equations, MaximalEquations
+from proofroll.truth.mechanism.maximal_taylor import Taylor
+
+RANK = 1e-8  # see analysis.RANK; this route finds its own rank
+
+
+@dataclass(frozen=True)
+class Solved:
+    """Accelerations u̇ and multipliers at one state, with what eliminates violations."""
+
+    equations: Equations
+    acceleration: Array
+    multipliers: Array
+    C: Array
+    residual: Array
+    into: Array
+    back: Array
+
+
+class Numbers:
+    """The equations of :class:`MaximalEquations` in numbers, solved by projection with a fixed rank."""
+
+    def __init__(self, equations: MaximalEquations) -> None:
+        self.equations = equations
+        self._half = np.linalg.cholesky(equations.inverse_mass)
+        start = self.equations.start()
+        C = self._matrix(self.equations.at(start.tolist()))
+        values = np.linalg.svd(C @ self._half, compute_uv=False) if C.size else np.zeros(0)
+        self.rank = int((values > RANK * values.max(initial=0.0)).sum())
+
+    def independent_rows(self) -> list[int]:
+        """Numbers of as many rows as the rank, the most independent ones at the start."""
+        C = self._matrix(self.equations.at(self.equations.start().tolist())) @ self._half
+        if not C.size:
+            return []
+        return sorted(qr(C.T, mode="r", pivoting=True)[1][: self.rank].tolist())
+
+    def solve(self, state: Array) -> Solved:
+        """Accelerations and multipliers, the smallest where rows depend on each other."""
+        found = self.equations.at(state.tolist())
+        C, half = self._matrix(found), self._half
+        free = half.T @ np.array(found.force, dtype=float)
+        residual = np.array([row.residual for row in found.rows], dtype=float)
+        if not self.rank:
+            return Solved(
+                found, half @ free, np.zeros(len(C)), C, residual, np.zeros((len(half), 0)), np.zeros((0, len(C)))
+            )
+        U, S, Vt = np.linalg.svd(C @ half, full_matrices=False)
+        locked, back = Vt[: self.rank], U[:, : self.rank].T / S[: self.rank, None]
+        normal = -back @ np.array([row.bias for row in found.rows], dtype=float) - locked @ free
+        into = half @ locked.T
+        return Solved(found, half @ free + into @ normal, back.T @ normal, C, residual, into, back)
+
+    def normalised(self, state: Array) -> Array:
+        """The state with quaternions of unit length."""
+        state = state.copy()
+        for body, at in zip(self.equations.bodies, self.equations.x_slices, strict=True):
+            if body.nx == 7:
+                state[at][3:] /= np.linalg.norm(state[at][3:])
+        return state
+
+    def rate(self, _: float, state: Array) -> Array:
+        """Right-hand side."""
+        e, unit = self.equations, self.normalised(state)
+        found = self.solve(unit)
+        x, u = state[: e.nx], unit[e.nx : e.nx + e.nu]
+        moving = [
+            value
+            for body, at_x, at_u in zip(e.bodies, e.x_slices, e.u_slices, strict=True)
+            for value in body.rate(x[at_x].tolist(), u[at_u].tolist())
+        ]
+        return np.array([*moving, *found.acceleration, *found.equations.angle_rate], dtype=float)
+
+    def eliminated(self, state: Array) -> Array:
+        """The state with violations of rows and of unit quaternions removed."""
+        e, state = self.equations, self.normalised(state)
+        found = self.solve(state)
+        u = state[e.nx : e.nx + e.nu]
+        back = -found.into @ (found.back @ found.residual)
+        for body, at_x, at_u in zip(e.bodies, e.x_slices, e.u_slices, strict=True):
+            state[at_x] += np.array(body.rate(state[at_x].tolist(), back[at_u].tolist()), dtype=float)
+        u -= found.into @ (found.back @ (found.C @ u))
+        return self.normalised(state)
+
+    def _matrix(self, found: Equations) -> Array:
+        C = np.zeros((len(found.rows), self.equations.nu))
+        for number, row in enumerate(found.rows):
+            for place, value in row.coefficients.items():
+                C[number, place] = value
+        return C
+
+
+class MaximalCoordinates:
+    """Route 2 for one mechanism.
+
+    Args:
+        mechanism: see :class:`~proofroll.truth.mechanism.maximal_equations.MaximalEquations` for what is refused.
+    """
+
+    def __init__(self, mechanism: Mechanism) -> None:
+        self.mechanism = mechanism
+        self.lean = Numbers(MaximalEquations(mechanism, allow_planar=True))
+        self._whole = Numbers(MaximalEquations(mechanism, allow_planar=False))
+        self._compiled: dict[bool, Taylor] = {}
+
+    def taylor(self, long_double: bool = False) -> Taylor:
+        """The compiled integrator; the first call compiles, seconds.
+
+        Raises:
+            Missing: heyoka is not installed.
+        """
+        if long_double not in self._compiled:
+            self._compiled[long_double] = Taylor(self.lean.equations, self.lean.independent_rows(), long_double)
+        return self._compiled[long_double]
+
+    def run_taylor(self, times: Array, long_double: bool = False) -> Record:
+        """The motion at the given times, s, by Taylor series.
+
+        Raises:
+            Missing: heyoka is not installed.
+            Diverged: the integration stops.
+        """
+        return self.recorded(times, np.asarray(self.taylor(long_double).run(times), dtype=float))
+
+    def run_dop853(self, times: Array, tolerance: float = 1e-14) -> Record:
+        """The motion at the given times, s, by DOP853 with projection.
+
+        Raises:
+            Diverged: the integration stops.
+        """
+        lean = self.lean
+        states = integrated(lean.rate, lean.equations.start(), times, tolerance, lean.eliminated)
+        return self.recorded(times, np.array(list(states)))
+
+    def recorded(self, times: Array, states: Array) -> Record:
+        """What the states mean; reactions come from the complete rows of all bodies."""
+        return gathered(times, [self._sample(self.lean.normalised(state)) for state in states])
+
+    def _sample(self, state: Array) -> dict[str, Any]:
+        lean = self.lean.equations
+        views = lean.at(state.tolist()).views
+        whole = self._complete(views, state[lean.nx + lean.nu :])
+        found = self._whole.solve(whole)
+        u = whole[self._whole.equations.nx :][: self._whole.equations.nu]
+        n = len(self.mechanism.bodies)
+        arms = [np.array(view.R) @ body.com for view, body in zip(views, self.mechanism.bodies, strict=False)]
+        q, v = self._relative(views)
+        return {
+            "p_WB": np.array([np.array(views[i].r) - arms[i] for i in range(n)]),
+            "v_WB": np.array([np.array(views[i].v) - np.cross(views[i].w, arms[i]) for i in range(n)]),
+            "q_WB": whole[: 7 * n].reshape(n, 7)[:, 3:],
+            "w_WB": np.array([views[i].w for i in range(n)], dtype=float),
+            "q": q,
+            "v": v,
+            "wrench": self._wrenches(found),
+            "points": np.array([self._point(views, p.body, p.position) for p in self.mechanism.points]).reshape(-1, 3),
+            "energy": self._energy(views, state[lean.nx + lean.nu :]),
+            "residual": np.array([np.abs(found.residual).max(initial=0.0), np.abs(found.C @ u).max(initial=0.0)]),
+        }
+
+    def _complete(self, views: list[View], angles: Array) -> Array:
+        """The state of bodies with all their coordinates."""
+        x: list[float] = []
+        u: list[float] = []
+        for view in views[:-1]:
+            R = Rotation.from_matrix(np.array(view.R, dtype=float))
+            x += [*view.r, *R.as_quat(canonical=True, scalar_first=True)]
+            u += [*view.v, *R.inv().apply(np.array(view.w, dtype=float))]
+        return np.array([*x, *u, *angles])
+
+    def _wrenches(self, found: Solved) -> Array:
+        wrenches = np.zeros((len(self._whole.equations.connections), 6))
+        for row, multiplier in zip(found.equations.rows, found.multipliers, strict=True):
+            wrenches[row.connection] += multiplier * np.array([*row.force, *row.torque])
+        for number, (force, moment) in enumerate(found.equations.laws):
+            wrenches[number] += np.array([*force, *moment])
+        return wrenches
+
+    def _point(self, views: list[View], body: str, position: Any) -> Array:
+        i = self.mechanism.body_index[body]
+        com = np.zeros(3) if body == WORLD else np.array(self.mechanism.bodies[i].com)
+        point: Array = np.array(views[i].r) + np.array(views[i].R) @ (np.array(position) - com)
+        return point
+
+    def _energy(self, views: list[View], angles: Array) -> float:
+        energy = 0.0
+        for view, body in zip(views, self.mechanism.bodies, strict=False):
+            v, spin = np.array(view.v, dtype=float), np.array(view.R).T @ np.array(view.w, dtype=float)
+            energy += float(0.5 * body.mass * (v @ v) + 0.5 * spin @ np.array(body.inertia) @ spin)
+            energy -= body.mass * float(np.dot(self.mechanism.gravity, view.r))
+        for spring in self.mechanism.springs:
+            a, b = (
+                self._point(views, name, at)
+                for name, at in ((spring.body_a, spring.position_a), (spring.body_b, spring.position_b))
+            )
+            energy += 0.5 * spring.stiffness * float(np.linalg.norm(b - a) - spring.length) ** 2
+        for (k, _), angle in zip(self.lean.equations.angles, angles, strict=True):
+            joint = self.mechanism.joints[k]
+            energy += 0.5 * joint.stiffness * float(angle - joint.rest) ** 2
+        for joint, connection in zip(self.mechanism.joints, self.lean.equations.connections, strict=False):
+            if joint.kind == "prismatic":
+                d, _, A, _ = _between(connection, views)
+                energy += 0.5 * joint.stiffness * float(A[:, 2] @ d - joint.rest) ** 2
+        return energy
+
+    def _relative(self, views: list[View]) -> tuple[Array, Array]:
+        """Coordinates (angles within half a turn) and velocities of the tree's joints, from the bodies' own."""
+        q: list[float] = []
+        v: list[float] = []
+        for joint, connection in zip(self.mechanism.joints, self.lean.equations.connections, strict=False):
+            d, slide, A, B = _between(connection, views)
+            turning = np.array(views[connection.b].w, dtype=float) - np.array(views[connection.a].w, dtype=float)
+            found = _coordinates(joint, A.T @ d, A.T @ slide, A, B, turning)
+            q += found[0]
+            v += found[1]
+        return np.array(q), np.array(v)
+
+
+def _between(c: Connection, views: list[View]) -> tuple[Array, Array, Array, Array]:
+    """Distance of a connection's points, its rate as seen from a, and its frames, world axes."""
+    a, b = views[c.a], views[c.b]
+    R_a, R_b = np.array(a.R, dtype=float), np.array(b.R, dtype=float)
+    w_a, w_b = np.array(a.w, dtype=float), np.array(b.w, dtype=float)
+    arm_a, arm_b = R_a @ c.place_a, R_b @ c.place_b
+    d = np.array(b.r, dtype=float) + arm_b - np.array(a.r, dtype=float) - arm_a
+    v_b = np.array(b.v, dtype=float) + np.cross(w_b, arm_b)
+    v_a = np.array(a.v, dtype=float) + np.cross(w_a, arm_a + d)
+    return d, v_b - v_a, R_a @ np.array(c.frame_a), R_b @ np.array(c.frame_b)
+
+
+def _coordinates(
+    joint: Joint, d: Array, slide: Array, A: Array, B: Array, turning: Array
+) -> tuple[list[float], list[float]]:
+    """Coordinates and velocities of one joint; d and slide in the axes of A."""
+    S = A.T @ B
+    about_z, spin_z = float(np.arctan2(S[1, 0], S[0, 0])), float(A[:, 2] @ turning)
+    q: list[float] = []
+    v: list[float] = []
+    if joint.kind == "revolute":
+        q, v = [about_z], [spin_z]
+    elif joint.kind == "prismatic":
+        q, v = [d[2]], [slide[2]]
+    elif joint.kind == "universal":
+        q, v = [about_z, float(np.arctan2(S[2, 1], S[2, 2]))], [spin_z, float(B[:, 0] @ turning)]
+    elif joint.kind == "planar":
+        q, v = [d[0], d[1], about_z], [slide[0], slide[1], spin_z]
+    elif joint.kind in {"spherical", "free"}:
+        q, v = [*Rotation.from_matrix(S).as_quat(canonical=True, scalar_first=True)], [*(B.T @ turning)]
+    if joint.kind == "free":
+        q, v = [*d, *q], [*(S.T @ slide), *v]
+    return q, v

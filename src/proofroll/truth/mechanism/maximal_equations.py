@@ -1,0 +1,302 @@
+"""Equations of route 2: constraint rows and forces of bodies that are each alone in space.
+
+They are written once in plain additions and multiplications, so that numbers, long doubles and symbols pass through.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass
+from itertools import pairwise
+from typing import Any
+
+import numpy as np
+
+from proofroll.core.errors import Refused
+from proofroll.elements.mechanism.checks import WORLD
+from proofroll.elements.mechanism.joint import FACTS
+from proofroll.elements.mechanism.model import Mechanism
+from proofroll.elements.mechanism.rotations import Array
+from proofroll.truth.mechanism.maximal_bodies import GROUND, View, made_bodies, placed_bodies
+from proofroll.truth.mechanism.scalars import (
+    Scalar,
+    add,
+    cross,
+    dot,
+    is_zero,
+    minus,
+    mul,
+    plus,
+    product,
+    scaled,
+    sub,
+    turned,
+)
+
+FUNCTIONS: Mapping[str, Callable[[Any], Any]] = {"sin": math.sin, "cos": math.cos, "sqrt": math.sqrt}
+_NONE = (0.0, 0.0, 0.0)
+_Wrench = tuple[Sequence[Scalar], Sequence[Scalar]]
+_AXES = ((1.0, 0.0, 0.0), (0.0, 1.0, 0.0), (0.0, 0.0, 1.0))
+
+
+@dataclass(frozen=True)
+class Connection:
+    """A joint or loop between two bodies: places from the centres of mass, frames by rows, in body axes."""
+
+    kind: str
+    a: int
+    b: int
+    place_a: Sequence[float]
+    place_b: Sequence[float]
+    frame_a: Sequence[Sequence[float]]
+    frame_b: Sequence[Sequence[float]]
+
+
+@dataclass
+class Row:
+    """One constraint: Φ = 0, Σ coefficient·u = 0, Σ coefficient·u̇ + bias = 0, and what it applies to body b."""
+
+    residual: Scalar
+    coefficients: dict[int, Scalar]
+    bias: Scalar
+    connection: int
+    force: Sequence[Scalar]
+    torque: Sequence[Scalar]
+
+
+@dataclass(frozen=True)
+class Equations:
+    """M u̇ = force + Cᵀλ, C u̇ + bias = 0, and the rates of coordinates and of angles that springs remember.
+
+    ``laws``: force and moment of each joint's own spring, damper and drive on its child, at the joint, world axes.
+    """
+
+    rows: list[Row]
+    force: list[Scalar]
+    rate: list[Scalar]
+    angle_rate: list[Scalar]
+    views: list[View]
+    laws: list[tuple[list[Scalar], list[Scalar]]]
+
+
+class MaximalEquations:
+    """The mechanism as bodies, connections and springs.
+
+    Args:
+        mechanism: any without dry friction, armature, and bodies without mass.
+        allow_planar: give bodies of plane mechanisms three coordinates; their rows are those within the plane.
+
+    Raises:
+        Refused: the mechanism has something of that.
+    """
+
+    def __init__(self, mechanism: Mechanism, allow_planar: bool) -> None:
+        for joint in mechanism.joints:
+            if joint.friction or joint.armature:
+                raise Refused(f"joint {joint.name} has dry friction or armature; maximal coordinates have neither")
+        for body in mechanism.bodies:
+            if np.linalg.eigvalsh(body.inertia)[0] <= 0:
+                raise Refused(f"body {body.name} has a moment of inertia of zero; maximal coordinates divide by it")
+        self.mechanism, self.bodies = mechanism, made_bodies(mechanism, allow_planar)
+        self.x_slices = _slices([body.nx for body in self.bodies])
+        self.u_slices = _slices([body.nu for body in self.bodies])
+        self.nx, self.nu = self.x_slices[-1].stop, self.u_slices[-1].stop
+        self.inverse_mass = np.zeros((self.nu, self.nu))
+        for own, at in zip(self.bodies, self.u_slices, strict=True):
+            self.inverse_mass[at, at] = own.inverse
+        index = mechanism.body_index
+        self._com = {WORLD: np.zeros(3)} | {body.name: np.array(body.com) for body in mechanism.bodies}
+        self.connections = [
+            self._connection(j.kind, j.parent, j.child, j.position, j.child_position, j.parent_frame, j.child_frame)
+            for j in mechanism.joints
+        ] + [
+            self._connection(c.kind, c.body_a, c.body_b, c.position_a, c.position_b, c.frame_a, c.frame_b)
+            for c in mechanism.loops
+        ]
+        self._ends = [
+            (index[s.body_a], self._place(s.body_a, s.position_a), index[s.body_b], self._place(s.body_b, s.position_b))
+            for s in mechanism.springs
+        ]
+        # a spring on an angle needs its turns, which no attitude remembers
+        self.angles = [
+            (k, n)
+            for k, joint in enumerate(mechanism.joints)
+            if joint.stiffness and joint.kind in {"revolute", "universal"}
+            for n in range(joint.nq)
+        ]
+
+    def start(self) -> Array:
+        """Coordinates, velocities, remembered angles at the start, one after the other."""
+        placed = placed_bodies(self.mechanism)
+        starts = [
+            body.start(placed[data.name], np.array(data.com))
+            for body, data in zip(self.bodies, self.mechanism.bodies, strict=True)
+        ]
+        angles = [self.mechanism.joints[k].q0[n] for k, n in self.angles]
+        return np.array([s for x, _ in starts for s in x] + [s for _, u in starts for s in u] + angles)
+
+    def at(self, state: Sequence[Scalar], functions: Mapping[str, Any] = FUNCTIONS) -> Equations:
+        """The equations for a state as :meth:`start` gives it, of any scalars; quaternions of unit length."""
+        x, u, angles = state[: self.nx], state[self.nx : self.nx + self.nu], state[self.nx + self.nu :]
+        views = [
+            body.view(x[at_x], u[at_u], functions)
+            for body, at_x, at_u in zip(self.bodies, self.x_slices, self.u_slices, strict=True)
+        ]
+        views.append(GROUND)
+        force: list[Scalar] = []
+        rate: list[Scalar] = []
+        for body, at_x, at_u, view in zip(self.bodies, self.x_slices, self.u_slices, views, strict=False):
+            weight = [float(body.mass * g) for g in self.mechanism.gravity]
+            force += plus(body.gyroscopic(u[at_u]), body.projected(view, weight, _NONE))
+            rate += body.rate(x[at_x], u[at_u])
+        rows: list[Row] = []
+        laws, angle_rate = [], []
+        for number, connection in enumerate(self.connections):
+            rows += self._rows_of(number, connection, views)
+            if number < len(self.mechanism.joints):
+                own = [angle for angle, (k, _) in zip(angles, self.angles, strict=True) if k == number]
+                law, rates = self._law(number, connection, views, own, force)
+                laws.append(law)
+                angle_rate += rates
+        for spring, (a, place_a, b, place_b) in zip(self.mechanism.springs, self._ends, strict=True):
+            arm_a, arm_b = turned(views[a].R, place_a), turned(views[b].R, place_b)
+            d = minus(plus(views[b].r, arm_b), plus(views[a].r, arm_a))
+            length = functions["sqrt"](dot(d, d))
+            pull = spring.stiffness * (1.0 - spring.length / length)
+            if spring.damping:
+                slide = minus(_speed(views[b], arm_b), _speed(views[a], arm_a))
+                pull = add(pull, mul(spring.damping, dot(slide, d) / (length * length)))
+            self._apply(force, views, a, scaled(pull, d), arm_a)
+            self._apply(force, views, b, scaled(-1.0, scaled(pull, d)), arm_b)
+        return Equations(rows, force, rate, angle_rate, views, laws)
+
+    def _connection(
+        self, kind: str, a: str, b: str, at_a: Sequence[float], at_b: Sequence[float], frame_a: Array, frame_b: Array
+    ) -> Connection:
+        index = self.mechanism.body_index
+        places = (self._place(a, at_a), self._place(b, at_b))
+        return Connection(kind, index[a], index[b], *places, _rows(frame_a), _rows(frame_b))
+
+    def _place(self, body: str, position: Sequence[float]) -> list[float]:
+        return [float(value) for value in np.array(position) - self._com[body]]
+
+    def _apply(
+        self,
+        force: list[Scalar],
+        views: list[View],
+        body: int,
+        push: Sequence[Scalar],
+        arm: Sequence[Scalar],
+        moment: Sequence[Scalar] = _NONE,
+    ) -> None:
+        """Adds a force at an arm from the centre of mass, and a moment, to the forces along the velocities."""
+        if body < 0:
+            return
+        entries = self.bodies[body].projected(views[body], push, plus(cross(arm, push), moment))
+        for place, entry in enumerate(entries, self.u_slices[body].start):
+            force[place] = add(force[place], entry)
+
+    def _rows_of(self, number: int, c: Connection, views: list[View]) -> list[Row]:
+        a, b = views[c.a], views[c.b]
+        A, B = _columns(product(a.R, c.frame_a)), _columns(product(b.R, c.frame_b))
+        arm_a, arm_b = turned(a.R, c.place_a), turned(b.R, c.place_b)
+        d = minus(plus(b.r, arm_b), plus(a.r, arm_a))
+        towards = minus(cross(b.w, cross(b.w, arm_b)), cross(a.w, cross(a.w, arm_a)))
+        slide = minus(_speed(b, arm_b), _speed(a, arm_a))
+        rows = []
+        facts = FACTS[c.kind]
+        for k in facts.translations:
+            if len(facts.translations) == 3:  # along the world's axes
+                n: Sequence[Scalar] = _AXES[k]
+                bias, lever = dot(n, towards), arm_a
+            else:  # along axes that turn with a
+                n = A[k]
+                n_rate = cross(a.w, n)
+                bias = add(dot(n, towards), mul(2.0, dot(n_rate, slide)), dot(cross(a.w, n_rate), d))
+                lever = plus(arm_a, d)
+            on_b, on_a = cross(arm_b, n), scaled(-1.0, cross(lever, n))
+            rows.append(self._row(number, views, dot(n, d), bias, (n, on_b), (scaled(-1.0, n), on_a), (n, _NONE)))
+        for k, m in facts.rotations:
+            x, y = A[k], B[m]
+            t = cross(y, x)
+            x_rate, y_rate = cross(a.w, x), cross(b.w, y)
+            bias = add(dot(cross(a.w, x_rate), y), mul(2.0, dot(x_rate, y_rate)), dot(x, cross(b.w, y_rate)))
+            back = scaled(-1.0, t)
+            rows.append(self._row(number, views, dot(x, y), bias, (_NONE, t), (_NONE, back), (_NONE, t)))
+        return rows
+
+    def _row(
+        self,
+        number: int,
+        views: list[View],
+        residual: Scalar,
+        bias: Scalar,
+        on_b: _Wrench,
+        on_a: _Wrench,
+        given: _Wrench,
+    ) -> Row:
+        """A row from what its unit multiplier applies to each body, and what that is at the joint on b."""
+        c = self.connections[number]
+        coefficients: dict[int, Scalar] = {}
+        for body, (push, moment) in ((c.b, on_b), (c.a, on_a)):
+            if body >= 0:
+                entries = self.bodies[body].projected(views[body], push, moment)
+                for place, entry in enumerate(entries, self.u_slices[body].start):
+                    if not is_zero(entry):
+                        coefficients[place] = entry
+        return Row(residual, coefficients, bias, number, *given)
+
+    def _law(
+        self, number: int, c: Connection, views: list[View], angles: list[Scalar], force: list[Scalar]
+    ) -> tuple[tuple[list[Scalar], list[Scalar]], list[Scalar]]:
+        """Force and moment of a joint's own spring, damper and drive on its child, added to the forces; angle rates."""
+        joint, a, b = self.mechanism.joints[number], views[c.a], views[c.b]
+        push: list[Scalar] = [0.0, 0.0, 0.0]
+        moment: list[Scalar] = [0.0, 0.0, 0.0]
+        rates: list[Scalar] = []
+        if not (joint.stiffness or joint.damping or joint.torque):
+            return (push, moment), rates
+        arm_a, arm_b = turned(a.R, c.place_a), turned(b.R, c.place_b)
+        A, B = _columns(product(a.R, c.frame_a)), _columns(product(b.R, c.frame_b))
+        turning = minus(b.w, a.w)
+        d = minus(plus(b.r, arm_b), plus(a.r, arm_a))
+        if joint.kind == "spherical":
+            moment = scaled(-joint.damping, turning)
+        elif joint.kind == "prismatic":
+            slide = minus(minus(_speed(b, arm_b), _speed(a, arm_a)), cross(a.w, d))
+            push = scaled(_along(joint, dot(A[2], d), dot(A[2], slide)), A[2])
+        else:
+            axes = [A[2]] if joint.kind == "revolute" else [A[2], B[0]]
+            speeds = [dot(axis, turning) for axis in axes]
+            if joint.stiffness:
+                rates = speeds
+            for place, (axis, speed) in enumerate(zip(axes, speeds, strict=True)):
+                angle = angles[place] if joint.stiffness else 0.0
+                moment = plus(moment, scaled(_along(joint, angle, speed), axis))
+        self._apply(force, views, c.b, push, arm_b, moment)
+        self._apply(force, views, c.a, scaled(-1.0, push), plus(arm_a, d), scaled(-1.0, moment))
+        return (push, moment), rates
+
+
+def _along(joint: Any, q: Scalar, speed: Scalar) -> Scalar:
+    """A joint's own force along its coordinate."""
+    spring = mul(-joint.stiffness, sub(q, float(joint.rest))) if joint.stiffness else 0.0
+    return add(float(joint.torque), spring, mul(-joint.damping, speed) if joint.damping else 0.0)
+
+
+def _speed(view: View, arm: Sequence[Scalar]) -> list[Scalar]:
+    return plus(view.v, cross(view.w, arm))
+
+
+def _rows(matrix: Array) -> list[list[float]]:
+    return [[float(round(x)) if abs(x - round(x)) < 1e-15 else float(x) for x in row] for row in matrix]
+
+
+def _columns(matrix: Sequence[Sequence[Scalar]]) -> list[list[Scalar]]:
+    return [list(column) for column in zip(*matrix, strict=True)]
+
+
+def _slices(counts: Sequence[int]) -> list[slice]:
+    ends = np.cumsum([0, *counts]).tolist()
+    return [slice(a, b) for a, b in pairwise(ends)]

@@ -1,0 +1,137 @@
+"""The equations of route 2 as symbols, integrated by Taylor series (heyoka, an extra).
+
+The multipliers are solved for in symbols: C M⁻¹ Cᵀ = L D Lᵀ, sparse, eliminated in an order of little fill. That needs
+rows that do not depend on each other; they are chosen once, at the start.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import Any
+
+import numpy as np
+
+from proofroll.core.errors import Diverged, Missing
+from proofroll.elements.mechanism.rotations import Array
+from proofroll.truth.mechanism.maximal_equations import Equations, MaximalEquations, Row
+from proofroll.truth.mechanism.scalars import Scalar, add, is_zero, mul, sub
+
+try:
+    import heyoka
+except ImportError:  # no wheel for this platform
+    heyoka = None
+
+
+class Taylor:
+    """A compiled integrator of a mechanism; it starts anew on every run.
+
+    Args:
+        equations: the mechanism's.
+        rows: numbers of constraint rows that do not depend on each other and imply all others.
+        long_double: compute in long doubles.
+
+    Raises:
+        Missing: heyoka is not installed.
+    """
+
+    def __init__(self, equations: MaximalEquations, rows: Sequence[int], long_double: bool = False) -> None:
+        if heyoka is None:
+            raise Missing("Taylor series need heyoka: pip install 'proofroll[fast]'")
+        self._number = np.longdouble if long_double else float
+        state = [heyoka.make_vars(f"s{place}") for place in range(len(equations.start()))]
+        functions = {"sin": heyoka.sin, "cos": heyoka.cos, "sqrt": heyoka.sqrt}
+        found = equations.at(state, functions)
+        rates = [*found.rate, *accelerations(equations, found, [found.rows[k] for k in rows]), *found.angle_rate]
+        self._start = np.array([self._number(value) for value in equations.start()])
+        self._integrator = heyoka.taylor_adaptive(
+            [(name, _expression(value, self._number)) for name, value in zip(state, rates, strict=True)],
+            self._start,
+            fp_type=self._number,
+            compact_mode=True,
+        )
+
+    def run(self, times: Array) -> Array:
+        """States at the given times, s, (times, state).
+
+        Raises:
+            Diverged: the integration stops before the last.
+        """
+        integrator = self._integrator
+        integrator.state[:] = self._start
+        integrator.time = self._number(0)
+        grid = np.array([self._number(time) for time in [0.0, *times]])  # heyoka begins its grid where it stands
+        grid, first = (grid[1:], 0) if times[0] == 0 else (grid, 1)
+        outcome, *_, states = integrator.propagate_grid(grid)
+        states = states[first:]
+        if len(states) < len(times) or not np.isfinite(np.asarray(states, dtype=float)).all():
+            raise Diverged(f"Taylor series stopped at t = {float(integrator.time):.6g} s ({outcome})")
+        return np.asarray(states)
+
+
+def accelerations(equations: MaximalEquations, found: Equations, rows: Sequence[Row]) -> list[Scalar]:
+    """u̇ = M⁻¹(force + Cᵀλ), λ from (C M⁻¹ Cᵀ) λ = −bias − C M⁻¹ force, solved sparsely in the scalars themselves."""
+    inverse = equations.inverse_mass
+    blocks = [[(k, float(inverse[i, k])) for k in np.flatnonzero(inverse[i]).tolist()] for i in range(equations.nu)]
+    free = [add(*(mul(value, found.force[k]) for k, value in block)) for block in blocks]
+    weighted = [_times(row.coefficients, blocks) for row in rows]  # rows of C M⁻¹
+    m = len(rows)
+    touching = [set(weight) for weight in weighted]
+    A: dict[tuple[int, int], Scalar] = {}
+    for i in range(m):
+        for j in range(i + 1):
+            shared = touching[i] & rows[j].coefficients.keys()
+            if shared:
+                A[i, j] = add(*(mul(weighted[i][k], rows[j].coefficients[k]) for k in sorted(shared)))
+    right = [
+        sub(sub(0.0, row.bias), add(*(mul(value, free[k]) for k, value in row.coefficients.items()))) for row in rows
+    ]
+    multipliers = _solved(A, right)
+    result = list(free)
+    for weight, multiplier in zip(weighted, multipliers, strict=True):
+        for k, value in weight.items():
+            result[k] = add(result[k], mul(value, multiplier))
+    return result
+
+
+def _times(coefficients: dict[int, Scalar], blocks: list[list[tuple[int, float]]]) -> dict[int, Scalar]:
+    product: dict[int, Scalar] = {}
+    for i, coefficient in coefficients.items():
+        for k, value in blocks[i]:
+            product[k] = add(product.get(k, 0.0), mul(value, coefficient))
+    return {k: value for k, value in product.items() if not is_zero(value)}
+
+
+def _solved(A: dict[tuple[int, int], Scalar], right: list[Scalar]) -> list[Scalar]:
+    """X of the symmetric A x = right; A holds its lower triangle. Pivots are those with the fewest neighbours."""
+    entries = {frozenset(pair): value for pair, value in A.items() if not is_zero(value)}
+    neighbours: dict[int, set[int]] = {i: set() for i in range(len(right))}
+    for pair in entries:
+        if len(pair) == 2:
+            i, j = pair
+            neighbours[i].add(j)
+            neighbours[j].add(i)
+    b, order, factors = list(right), [], []
+    while neighbours:
+        pivot = min(neighbours, key=lambda i: (len(neighbours[i]), i))
+        others = sorted(neighbours.pop(pivot))
+        diagonal = entries[frozenset([pivot])]
+        factor = {i: entries[frozenset([pivot, i])] / diagonal for i in others}
+        for place, i in enumerate(others):
+            neighbours[i].discard(pivot)
+            for j in others[: place + 1]:
+                key = frozenset([i, j])
+                entries[key] = sub(entries.get(key, 0.0), mul(factor[i], entries[frozenset([pivot, j])]))
+                if i != j:
+                    neighbours[i].add(j)
+                    neighbours[j].add(i)
+            b[i] = sub(b[i], mul(factor[i], b[pivot]))
+        b[pivot] = 0.0 if is_zero(b[pivot]) else b[pivot] / diagonal
+        order.append(pivot)
+        factors.append(factor)
+    for pivot, factor in zip(reversed(order), reversed(factors), strict=True):
+        b[pivot] = sub(b[pivot], add(*(mul(value, b[i]) for i, value in factor.items())))
+    return b
+
+
+def _expression(value: Scalar, number: Any) -> Any:
+    return value if isinstance(value, heyoka.expression) else heyoka.expression(number(value))

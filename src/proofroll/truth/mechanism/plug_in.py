@@ -1,0 +1,69 @@
+"""The truth of a mechanism, as the harness asks for it."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from proofroll.core.arrays import FloatArray
+from proofroll.core.element import Element
+from proofroll.elements.mechanism.dataset import variables
+from proofroll.elements.mechanism.element import MechanismElement
+from proofroll.truth.mechanism.two_routes import find_truth
+
+if TYPE_CHECKING:
+    import xarray as xr
+
+# Which error bar of the routes belongs to a variable; that of energy and of rates is by what they are made from.
+_BARS = {
+    "p_WB": "p_WB", "v_WB": "v_WB", "w_WB": "w_WB", "q_WB": "q_WB", "attitudes": "q_WB", "positions": "points",
+    "forces": "wrench", "torques": "wrench", "energy": "energy", "energy_error": "energy",
+}  # fmt: skip
+_PREFIXES = {"q.": "q", "v.": "v", "force.": "wrench", "torque.": "wrench"}
+
+
+class MechanismTruth:
+    """See :class:`proofroll.core.truth.ElementTruth`."""
+
+    @staticmethod
+    def covers(element: Element) -> bool:
+        """Every mechanism; what two routes do not cover is refused with the reason."""
+        return isinstance(element, MechanismElement)
+
+    @staticmethod
+    def truth(element: Element, times: FloatArray, asks: Sequence[str]) -> xr.Dataset:  # noqa: ARG004 -- nothing can be asked for
+        """See :func:`proofroll.truth.mechanism.two_routes.find_truth`."""
+        assert isinstance(element, MechanismElement)  # it covers it
+        found = find_truth(element.mechanism, times)
+        record = found.record
+        force, torque = record.wrench[..., :3], record.wrench[..., 3:]
+        dataset = variables(
+            element,
+            np.asarray(times, dtype=np.float64),
+            record.p_WB,
+            record.v_WB,
+            record.w_WB,
+            record.q_WB,
+            force,
+            torque,
+        )
+        points = [point.name for point in element.mechanism.points]
+        for name, variable in dataset.data_vars.items():
+            field = _BARS.get(str(name)) or next((v for k, v in _PREFIXES.items() if str(name).startswith(k)), None)
+            if field is None and str(name).rpartition(".")[0] in points:
+                field = "points"
+            bar = "p_WB" if field == "points" and not points else field
+            size = float(np.nanmax(np.abs(variable.to_numpy()), initial=0.0))
+            variable.attrs["error_bar"] = float(found.bars[bar][-1]) if bar else 4 * np.finfo(float).eps * size
+        dataset.attrs["route"], *others = found.routes
+        dataset.attrs["second_route"] = ", ".join(others)
+        if found.checked_by is not None:
+            dataset.attrs["second_route"] += f", {found.checked_by[0]}"
+        if np.isfinite(found.horizon):
+            dataset.attrs["horizon"] = found.horizon
+            dataset.attrs["ill_posed"] = (
+                f"from {found.horizon:.4g} s on two precisions of one route differ: the motion is chaotic"
+            )
+        return dataset

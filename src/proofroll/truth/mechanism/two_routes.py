@@ -1,0 +1,224 @@
+"""The truth of a mechanism's motion: two routes that share no kinematics, their difference as an error bar.
+
+Routes: joint coordinates (DOP853 with projection), maximal coordinates (Taylor series in doubles and in long doubles;
+DOP853 without heyoka), and closed forms where there are any. The best of them is the truth, the others are its error
+bar. Where the two precisions differ by more than :data:`CHAOS`, the question is ill-posed; that time is the horizon.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+from typing import TYPE_CHECKING
+
+import numpy as np
+from numpy.typing import NDArray
+
+from proofroll.core.errors import Diverged, Missing, Refused
+from proofroll.elements.mechanism.analysis import analysed
+from proofroll.elements.mechanism.joint_coordinates import JointCoordinates
+from proofroll.elements.mechanism.model import Mechanism
+from proofroll.elements.mechanism.record import Record, gathered
+from proofroll.elements.mechanism.rotations import Array
+from proofroll.truth.mechanism.closed_forms import ClosedForm, closed_form
+from proofroll.truth.mechanism.maximal_coordinates import MaximalCoordinates
+
+if TYPE_CHECKING:
+    import xarray as xr
+
+FACTOR = 3.0  # of safety: the routes' difference estimates the error, it does not bound it
+CHAOS = 1e-9  # m, 1 (of quaternions): where two precisions differ by more, no number of digits is worth comparing
+BRANCH = 1e-3  # m, 1: chaos brings DOP853 this far only after it has parted the two precisions
+ROUND_OFF = 16 * float(np.finfo(float).eps)  # of a number that passed through some ten operations
+JUDGED = ("p_WB", "v_WB", "q_WB", "w_WB", "q", "v", "wrench", "points", "energy")
+
+
+@dataclass(frozen=True)
+class Truth:
+    """The motion that is taken to be true, and how well it is known.
+
+    Attributes:
+        record: the motion; from the first time at which the question is ill-posed on, its bars say so.
+        bars: error bar of each field of the record at each time, the largest over bodies and components so far, in
+            the field's unit, (times).
+        differences: largest difference between the two routes, by field, up to the horizon.
+        horizon: s; inf where it lies beyond the last time.
+        determinate: which components of the wrenches are, (joints + loops, 6).
+        routes: what was computed, the one taken first.
+        checked_by: a closed form that knows a part of the motion, and its largest difference from the truth.
+    """
+
+    record: Record
+    bars: dict[str, Array]
+    differences: dict[str, float]
+    horizon: float
+    determinate: NDArray[np.bool_]
+    routes: tuple[str, ...]
+    checked_by: tuple[str, float] | None
+
+
+def find_truth(mechanism: Mechanism, times: Array, tolerance: float = 1e-14) -> Truth:
+    """The truth at the given times.
+
+    Args:
+        mechanism: any that both routes cover.
+        times: growing, s; the first may be 0.
+        tolerance: of DOP853.
+
+    Raises:
+        Refused: fewer than two routes cover the mechanism; the text says why.
+    """
+    times = np.asarray(times, dtype=float)
+    found, form = analysed(mechanism), closed_form(mechanism)
+    first = JointCoordinates(mechanism, found.rank)
+    exact = _from_form(first, form, times) if form is not None and form.motion is not None else None
+    if exact is None and found.singular_start:
+        raise Refused("the start is a singular pose, where the motion may branch, and no closed form is known")
+    try:
+        one = first.run(times, tolerance)
+        two, precise, name = _second(MaximalCoordinates(mechanism), times, tolerance)
+        # route 1 alone counts turns; all others are put on its
+        two, precise = _matched(mechanism, one, two), _matched(mechanism, one, precise)
+        _check_branch(one, two, precise)
+        routes: tuple[str, ...] = (name, "joint coordinates, DOP853")
+        best = precise if exact is None else _matched(mechanism, one, exact)
+    except Diverged as stopped:
+        if exact is None:
+            raise Refused(f"no truth to the end: {stopped}; end before it") from None
+        one = two = precise = _matched(mechanism, exact, first.run_rk4(times))
+        best, routes = exact, ("joint coordinates, RK4",)
+    if exact is not None and form is not None:
+        routes = (f"closed form: {form.title}", *routes)
+    _check_limits(mechanism, best)
+    masked = replace(best, wrench=np.where(found.determinate, best.wrench, np.nan))
+    bars, differences = {}, {}
+    late = np.flatnonzero(_apart(precise, two) > CHAOS)
+    horizon = float(times[late[0]]) if len(late) else np.inf
+    for field in JUDGED:
+        values = getattr(masked, field)
+        others = [np.where(np.isnan(values), np.nan, getattr(record, field)) for record in (one, two, precise)]
+        difference = np.maximum(_largest(others[0] - values), _largest(others[0] - others[2]))
+        size = np.maximum.accumulate(_largest(values))
+        bar = FACTOR * difference + _largest(others[1] - others[2]) + ROUND_OFF * size
+        bars[field] = np.maximum.accumulate(bar)
+        differences[field] = float(difference[times < horizon].max(initial=0.0))
+    checked = None
+    if form is not None and form.motion is None:
+        checked = (form.title, float(_largest(form.part(times) - form.same(best)).max()))
+    return Truth(masked, bars, differences, horizon, found.determinate, routes, checked)
+
+
+def to_dataset(mechanism: Mechanism, truth: Truth) -> xr.Dataset:
+    """The truth with names and units, as the results of engines have them."""
+    import xarray as xr
+
+    record = truth.record
+    coordinates = {
+        "time": ("time", record.time, {"units": "s"}),
+        "body": [body.name for body in mechanism.bodies],
+        "joint": [*(joint.name for joint in mechanism.joints), *(loop.name for loop in mechanism.loops)],
+        "point": [point.name for point in mechanism.points],
+        "axis": ["x", "y", "z"],
+        "quaternion": ["w", "x", "y", "z"],
+        "component": ["Fx", "Fy", "Fz", "Mx", "My", "Mz"],
+    }
+    over = {
+        "p_WB": (("time", "body", "axis"), record.p_WB, "m"),
+        "v_WB": (("time", "body", "axis"), record.v_WB, "m/s"),
+        "w_WB": (("time", "body", "axis"), record.w_WB, "rad/s"),
+        "q_WB": (("time", "body", "quaternion"), record.q_WB, "1"),
+        "points": (("time", "point", "axis"), record.points, "m"),
+        "force": (("time", "joint", "axis"), record.wrench[..., :3], "N"),
+        "torque": (("time", "joint", "axis"), record.wrench[..., 3:], "N m"),
+        "energy": (("time",), record.energy, "J"),
+        "residual": (("time",), record.residual[:, 0], "1"),
+        "residual_rate": (("time",), record.residual[:, 1], "1/s"),
+        "determinate": (("joint", "component"), truth.determinate, "1"),
+    }
+    data = {name: (dims, values, {"units": unit}) for name, (dims, values, unit) in over.items()}
+    for joint, at_q, at_v in zip(mechanism.joints, mechanism.q_slices, mechanism.v_slices, strict=True):
+        sliding = joint.kind == "prismatic"
+        for sign, values, at, unit in (
+            ("q", record.q, at_q, "m" if sliding else "rad"),
+            ("v", record.v, at_v, "m/s" if sliding else "rad/s"),
+        ):
+            name, width = f"{sign}.{joint.name}", at.stop - at.start
+            mixed = {"units": "1" if width > 2 else unit}
+            dims = ("time",) if width == 1 else ("time", f"{sign}.{joint.name}.component")
+            if width:
+                data[name] = (dims, values[:, at.start] if width == 1 else values[:, at], mixed)
+    for field, bar in truth.bars.items():
+        data[f"bar_{field}"] = (("time",), bar, {"long_name": f"error bar of {field}"})
+    attributes: dict[str, float | str] = {"horizon": truth.horizon, "routes": "; ".join(truth.routes), "status": "done"}
+    if truth.checked_by is not None:
+        attributes["closed_form"] = "{}: {:.1e} apart".format(*truth.checked_by)
+    return xr.Dataset(data, coordinates, attributes)
+
+
+def _apart(one: Record, two: Record) -> Array:
+    """How far two motions are apart at each time, m and 1."""
+    return np.maximum(_largest(one.p_WB - two.p_WB), _largest(one.q_WB - two.q_WB))
+
+
+def _check_branch(one: Record, two: Record, precise: Record) -> None:
+    """Two routes that part while the precisions of one of them agree have taken different branches.
+
+    Raises:
+        Diverged: they have.
+    """
+    parted = np.flatnonzero((_apart(one, precise) > BRANCH) & (_apart(two, precise) < CHAOS))
+    if len(parted):
+        raise Diverged(f"the two routes part before t = {one.time[parted[0]]:.6g} s, as at a singular pose")
+
+
+def _check_limits(mechanism: Mechanism, record: Record) -> None:
+    """No joint leaves its limits, for no route follows a stop.
+
+    Raises:
+        Refused: one does.
+    """
+    for joint, at in zip(mechanism.joints, mechanism.q_slices, strict=True):
+        if joint.limits is not None:
+            low, high = joint.limits
+            beyond = np.flatnonzero((record.q[:, at] < low).any(axis=1) | (record.q[:, at] > high).any(axis=1))
+            if len(beyond):
+                time = record.time[beyond[0]]
+                raise Refused(f"joint {joint.name} passes its limit before t = {time:.6g} s; no route follows a stop")
+
+
+def _from_form(equations: JointCoordinates, form: ClosedForm, times: Array) -> Record:
+    assert form.motion is not None
+    return gathered(times, [equations.sample(q, v) for q, v in zip(*form.motion(times), strict=True)])
+
+
+def _second(route: MaximalCoordinates, times: Array, tolerance: float) -> tuple[Record, Record, str]:
+    """Route 2 in two precisions, the better one last, and its name."""
+    try:
+        double, long = route.run_taylor(times), route.run_taylor(times, long_double=True)
+    except Missing:
+        coarse = route.run_dop853(times, 10 * tolerance)
+        return coarse, route.run_dop853(times, tolerance), "maximal coordinates, DOP853"
+    return double, long, "maximal coordinates, Taylor series in long doubles"
+
+
+def _matched(mechanism: Mechanism, guide: Record, other: Record) -> Record:
+    """The other record with quaternions of the same sign and angles on the same turn as the guide's."""
+    q_WB = _same_sign(guide.q_WB, other.q_WB)
+    q = other.q.copy()
+    for joint, at in zip(mechanism.joints, mechanism.q_slices, strict=True):
+        if joint.kind in {"spherical", "free"}:
+            quaternion = slice(at.stop - 4, at.stop)
+            q[:, quaternion] = _same_sign(guide.q[:, quaternion], q[:, quaternion])
+        elif joint.kind in {"revolute", "universal", "planar"}:
+            angles = slice(at.stop - 1, at.stop) if joint.kind == "planar" else at
+            q[:, angles] += 2 * np.pi * np.round((guide.q[:, angles] - q[:, angles]) / (2 * np.pi))
+    return replace(other, q_WB=q_WB, q=q)
+
+
+def _same_sign(best: Array, other: Array) -> Array:
+    return np.where((best * other).sum(axis=-1, keepdims=True) < 0, -other, other)
+
+
+def _largest(values: Array) -> Array:
+    """Largest size at each time, of what is known."""
+    flat = np.abs(values.reshape(len(values), -1))
+    return np.asarray(np.where(np.isnan(flat), 0.0, flat).max(axis=1, initial=0.0), dtype=np.float64)

@@ -1,0 +1,232 @@
+import tomllib
+
+import numpy as np
+import pytest
+
+from proofroll.core.errors import InputError
+from proofroll.elements.mechanism.analysis import analysed
+from proofroll.elements.mechanism.reader import read_mechanism
+
+SLIDER_CRANK = """
+[parameters.crank]
+value = 0.15
+above = 0
+below = "$rod"
+[parameters.rod]
+value = 0.4
+above = 0
+[gravity]
+magnitude = 9.81
+direction = [0, -1, 0]
+[[bodies]]
+name = "crank"
+mass = 0.4
+com = ["= crank/2", 0, 0]
+inertia = [1e-4, "= 0.4*crank^2/12", "= 0.4*crank^2/12"]
+[[bodies]]
+name = "rod"
+mass = 0.8
+com = ["= rod/2", 0, 0]
+inertia = [1e-4, "= 0.8*rod^2/12", "= 0.8*rod^2/12"]
+[[bodies]]
+name = "slider"
+mass = 0.6
+inertia = [1e-3, 1e-3, 1e-3]
+[[joints]]
+name = "guide"
+kind = "prismatic"
+parent = "world"
+child = "slider"
+axis = [1, 0, 0]
+q0 = 0.5
+dependent = true
+[[joints]]
+name = "pin"
+kind = "revolute"
+parent = "crank"
+child = "rod"
+position = ["$crank", 0, 0]
+q0 = -1
+dependent = true
+[[joints]]
+name = "shaft"
+kind = "revolute"
+parent = "world"
+child = "crank"
+q0 = "= pi/4"
+v0 = 10
+[[loops]]
+name = "wrist"
+kind = "revolute"
+body_a = "rod"
+position_a = ["$rod", 0, 0]
+body_b = "slider"
+"""
+
+
+def content(text=SLIDER_CRANK):
+    """The tables of a file."""
+    return tomllib.loads(text)
+
+
+def test_dependent_joints_follow_from_the_loops():
+    """The slider stands and moves where plane geometry puts it, for any lengths."""
+    for crank, rod in ((0.15, 0.4), (0.1, 0.3)):
+        joints = {joint.name: joint for joint in read_mechanism(content(), crank=crank, rod=rod).joints}
+        angle = np.pi / 4
+        tilt = np.arcsin(-crank * np.sin(angle) / rod)
+        turning = -crank * np.cos(angle) * 10 / (rod * np.cos(tilt))
+        assert joints["guide"].q0[0] == pytest.approx(crank * np.cos(angle) + rod * np.cos(tilt), abs=1e-14)
+        speed = -crank * np.sin(angle) * 10 - rod * np.sin(tilt) * turning
+        assert joints["guide"].v0[0] == pytest.approx(speed, abs=1e-13)
+
+
+def test_joints_are_sorted_depth_first():
+    """Each joint comes after its parent's and before any other branch, whatever the file's order."""
+    assert [joint.name for joint in read_mechanism(content()).joints] == ["guide", "shaft", "pin"]
+
+
+def test_analysis_of_a_planar_loop_closed_by_a_revolute():
+    """It has one degree of freedom, three redundant rows, and only Fx, Fy, Mz are determinate."""
+    found = analysed(read_mechanism(content()))
+    assert (found.rows, found.rank, found.redundant, found.mobility, found.singular_start) == (5, 2, 3, 1, False)
+    assert (found.determinate == [True, True, False, False, False, True]).all()
+
+
+def test_repeat_writes_tables_with_an_index():
+    """A chain of n links has n bodies, each joint naming the one before it."""
+    text = """
+    [parameters.n]
+    value = 3
+    [gravity]
+    magnitude = 1
+    [[repeat]]
+    from = 1
+    count = "$n"
+    bodies = [{name = "link{i}", mass = "= i", inertia = [1, 1, 1]}]
+    joints = [{name = "j{i}", kind = "revolute", parent = "link{i-1}", child = "link{i}", position = ["= i/n", 0, 0]}]
+    [[bodies]]
+    name = "link0"
+    mass = 1
+    inertia = [1, 1, 1]
+    [[joints]]
+    name = "j0"
+    kind = "fixed"
+    parent = "world"
+    child = "link0"
+    """
+    mechanism = read_mechanism(content(text), n=4)
+    assert [body.name for body in mechanism.bodies] == ["link0", "link1", "link2", "link3", "link4"]
+    assert [joint.parent for joint in mechanism.joints] == ["world", "link0", "link1", "link2", "link3"]
+    assert mechanism.bodies[3].mass == 3
+    assert mechanism.joints[2].position == (0.5, 0, 0)
+
+
+ROD = '\n[[bodies]]\nname = "extra"\nmass = 1\ninertia = [1, 1, 1]\n'
+EXTRA = '\n[[joints]]\nname = "extra"\nkind = "{kind}"\nparent = "{parent}"\nchild = "{child}"\n{more}\n'
+
+
+def joint(parent, child, kind="revolute", more=""):
+    """One more joint."""
+    return EXTRA.format(parent=parent, child=child, kind=kind, more=more)
+
+
+BAD = {
+    "joint without its body": (SLIDER_CRANK + joint("crank", "ghost"), "joints.extra.child = 'ghost'.*no such body"),
+    "body without a joint": (SLIDER_CRANK + ROD, "bodies.extra.*no joint"),
+    "two parents": (SLIDER_CRANK + joint("slider", "rod"), "two parents, through pin and extra"),
+    "cycle": (
+        SLIDER_CRANK
+        + ROD
+        + ROD.replace("extra", "other")
+        + joint("extra", "other")
+        + joint("other", "extra").replace('"extra"\nkind', '"back"\nkind'),
+        "cycle",
+    ),
+    "child of itself": (SLIDER_CRANK + ROD + joint("extra", "extra"), "the same"),
+    "world as a child": (SLIDER_CRANK + joint("rod", "world"), "nobody's child"),
+    "loop that does not close": (
+        SLIDER_CRANK.replace("dependent = true", ""),
+        r"loops.wrist = 'rod to slider': does not close: its points are 0\.0\d+ m apart",
+    ),
+    "loop that cannot close": (
+        SLIDER_CRANK.replace('position_a = ["$rod", 0, 0]', "position_a = [0.05, 0, 0]"),
+        r"does not close: its points are 0\.0\d+ m apart",
+    ),
+    "triangle inequality": (SLIDER_CRANK.replace("[1e-3, 1e-3, 1e-3]", "[1, 1, 3]"), "triangle inequality: 3 > 1 . 1"),
+    "inertia not symmetric": (
+        SLIDER_CRANK.replace("[1e-3, 1e-3, 1e-3]", "[[1, 0.5, 0], [0, 1, 0], [0, 0, 1]]"),
+        "symmetric",
+    ),
+    "negative inertia": (SLIDER_CRANK.replace("[1e-3, 1e-3, 1e-3]", "[-1, 1, 1]"), "negative principal moment"),
+    "massless body that moves": (
+        SLIDER_CRANK.replace("mass = 0.6\ninertia = [1e-3, 1e-3, 1e-3]", "mass = 0"),
+        "bodies.slider.mass = 0.0: a body without mass can move",
+    ),
+    "moving body without inertia": (
+        SLIDER_CRANK.replace("inertia = [1e-3, 1e-3, 1e-3]", ""),
+        "positive moments of inertia",
+    ),
+    "negative mass": (SLIDER_CRANK.replace("mass = 0.6", "mass = -0.6"), "bodies.slider.mass.*at least 0"),
+    "axis of zero": (SLIDER_CRANK.replace("axis = [1, 0, 0]", "axis = [0, 0, 0]"), "joints.guide.axis.*no direction"),
+    "quaternion of zero": (
+        SLIDER_CRANK + ROD + joint("world", "extra", "spherical", "q0 = [0, 0, 0, 0]"),
+        "joints.extra.q0.*no rotation",
+    ),
+    "wrong number of coordinates": (SLIDER_CRANK.replace("q0 = 0.5", "q0 = [1, 2]"), "joints.guide.q0.*one number"),
+    "immobile": (
+        SLIDER_CRANK.replace("v0 = 10", "")
+        + '\n[[loops]]\nname = "lock"\nkind = "fixed"\nbody_a = "world"\nbody_b = "crank"\n'
+        'orientation = [0, 0, "= pi/4"]\n',
+        "mechanism = .*cannot move",
+    ),
+    "division by zero": (SLIDER_CRANK.replace("= crank/2", "= crank/0"), "bodies.0.com.0 = .* divides by zero"),
+    "function call": (SLIDER_CRANK.replace("= crank/2", "= sin(crank)"), "Function 'sin' not defined"),
+    "hostile expression": (SLIDER_CRANK.replace("= crank/2", "= __import__('os').getcwd()"), "bodies.0.com.0"),
+    "attribute": (SLIDER_CRANK.replace("= crank/2", "= crank.real.__class__"), "bodies.0.com.0"),
+    "huge power": (SLIDER_CRANK.replace("= crank/2", "= 9^9^9^9^9"), "bodies.0.com.0"),
+    "complex": (SLIDER_CRANK.replace("= crank/2", "= (0-1)^0.5"), "no finite real number"),
+    "text": (SLIDER_CRANK.replace("mass = 0.6", 'mass = "heavy"'), "bodies.slider.mass.*give one number"),
+    "ragged list": (SLIDER_CRANK.replace("q0 = 0.5", "q0 = [1, [2], 3]"), "joints.guide.q0.*give one number"),
+    "number beyond all bounds": (SLIDER_CRANK.replace("[1e-3,", f"[{10**400},"), "bodies.slider.inertia.*finite"),
+    "nan": (SLIDER_CRANK.replace("mass = 0.6", "mass = nan"), "bodies.slider.mass.*finite"),
+    "bool": (SLIDER_CRANK.replace("mass = 0.6", "mass = true"), "bodies.slider.mass.*give one number"),
+    "unknown key": (SLIDER_CRANK.replace("mass = 0.6", "mass = 0.6\ncolour = 3"), "bodies.2.colour.*no such key"),
+    "missing key": (SLIDER_CRANK.replace("mass = 0.6\n", ""), "bodies.2.mass.*required"),
+    "unknown parameter": (SLIDER_CRANK.replace("$crank", "$lenght"), "no such parameter; choose from crank, rod"),
+    "unknown kind": (SLIDER_CRANK.replace('"prismatic"', '"slider"'), "joints.guide.kind.*choose one of fixed"),
+    "name used twice": (SLIDER_CRANK.replace('"wrist"', '"pin"'), "used twice"),
+    "out of bounds": (SLIDER_CRANK.replace("value = 0.15", "value = 0.5"), "crank = 0.5: crank must be below 0.4"),
+    "no gravity": (SLIDER_CRANK.replace("[gravity]\nmagnitude = 9.81", "[gravity]"), "gravity.magnitude.*required"),
+    "axis where there is none": (
+        SLIDER_CRANK + ROD + joint("world", "extra", "spherical", "axis = [1, 0, 0]"),
+        "a spherical joint has no axis",
+    ),
+    "stiffness without a coordinate": (
+        SLIDER_CRANK + ROD + joint("world", "extra", "free", "stiffness = 1"),
+        "a free joint has none",
+    ),
+}
+
+
+@pytest.mark.parametrize("name", BAD)
+def test_bad_input_is_one_clear_line(name):
+    """Each mistake is an InputError of one line that names the field."""
+    text, message = BAD[name]
+    with pytest.raises(InputError, match=message) as raised:
+        read_mechanism(content(text))
+    assert "\n" not in str(raised.value)
+
+
+def test_inconsistent_velocities_are_refused():
+    """Speeds that would open a loop are refused with the speed at which it opens."""
+    whole = read_mechanism(content())
+    start = {joint.name: joint.q0[0] for joint in whole.joints}
+    text = SLIDER_CRANK.replace("dependent = true", "").replace("q0 = 0.5", f"q0 = {start['guide']!r}")
+    text = text.replace("q0 = -1", f"q0 = {start['pin']!r}")
+    with pytest.raises(InputError, match=r"loops.wrist = .*v0 opens the loop at 4\.\d+ m/s"):
+        read_mechanism(content(text))
+    assert (
+        read_mechanism(content(text.replace("v0 = 10", "v0 = 0"))).joints
+        == read_mechanism(content(SLIDER_CRANK.replace("v0 = 10", "v0 = 0"))).joints
+    )

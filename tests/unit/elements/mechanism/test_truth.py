@@ -1,0 +1,138 @@
+import tomllib
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from proofroll.core.errors import Refused
+from proofroll.elements.mechanism.joint_coordinates import JointCoordinates
+from proofroll.truth.mechanism import maximal_taylor
+from proofroll.truth.mechanism.two_routes import CHAOS, find_truth, to_dataset
+
+MODELS = Path(__file__).parents[3] / "models"
+
+
+@pytest.fixture(scope="module")
+def andrews(scene):
+    """Truth of Andrews' mechanism to the end of its 0.03 s."""
+    pytest.importorskip("heyoka")
+    return scene("andrews_squeezer"), find_truth(scene("andrews_squeezer"), np.array([0.0, 0.03]), 1e-12)
+
+
+def test_andrews_truth_has_the_agreed_digits(andrews):
+    """Coordinates agreed by three independent programs to 3e-13 lie within twice that."""
+    mechanism, truth = andrews
+    expected = {
+        "q1": 15.8107711951537,
+        "q2": -15.75637105841184,
+        "q3": 0.0408222401196458,
+        "q4": -0.534730116342080,  # the literature's Phi, of the other sign than Omega
+        "q5": 0.524409965879954,
+        "q7": 1.04808074104194,
+    }
+    for joint, at in zip(mechanism.joints, mechanism.q_slices, strict=True):
+        if joint.name in expected:
+            assert truth.record.q[-1, at][0] == pytest.approx(expected[joint.name], abs=1e-12)
+
+
+def test_published_digits_are_good_to_a_nanoradian_only(andrews):
+    """They differ from the truth by 1.1e-9 and 1.4e-9 rad, a hundred times its error bar and more."""
+    mechanism, truth = andrews
+    content = tomllib.loads((MODELS / "andrews_squeezer" / "scene.toml").read_text())
+    names = [joint.name for joint in mechanism.joints]
+    found = {
+        name: value - truth.record.q[-1, mechanism.q_slices[names.index(name[2:])]][0]
+        for name, value in content["published"][0].items()
+        if name.startswith("q.")
+    }
+    assert found == pytest.approx({"q.q1": 1.145e-9, "q.q2": -1.431e-9}, abs=5e-12)
+    assert truth.bars["q"][-1] < 1e-11
+
+
+def test_error_bar_covers_a_closed_form_that_had_no_part_in_it(scene):
+    """The nutation of a top by elliptic functions lies within the bar that two routes gave."""
+    pytest.importorskip("heyoka")
+    truth = find_truth(scene("heavy_top"), np.linspace(0, 0.5, 3))
+    title, difference = truth.checked_by
+    assert "nutation" in title
+    of_the_form = 1e-13  # elliptic functions in doubles: the roots of the cubic lose three digits
+    assert difference < truth.bars["q_WB"][-1] + of_the_form
+    assert truth.bars["q_WB"][-1] < 1e-11
+
+
+def test_chaos_has_a_horizon(scene):
+    """Doubles and long doubles part near 9 s; from then on the error bar says so."""
+    pytest.importorskip("heyoka")
+    truth = find_truth(scene("double_pendulum"), np.array([0.0, 4.0, 10.0, 11.0]), 1e-11)
+    assert truth.horizon == 10.0
+    assert truth.bars["points"][1] < 1e-7
+    assert truth.bars["points"][-1] > CHAOS
+
+
+def test_singular_poses_are_passed_by_the_closed_form(scene):
+    """Where error control stalls, the closed form is the truth and equal steps of another route its witness."""
+    truth = find_truth(scene("four_bar", windows=1), np.array([0.0, 1.5]))
+    assert truth.routes[0].startswith("closed form")
+    assert truth.bars["points"][-1] < 1e-8
+
+
+def test_singular_poses_without_a_closed_form_are_refused(scene):
+    """The reason and the time are said."""
+    with pytest.raises(Refused, match=r"no truth to the end: DOP853 stalls at t = .*; end before it"):
+        find_truth(scene("slider_crank", crank=0.3999999999999, speed=3.0), np.array([0.0, 2.0]))
+
+
+def test_a_joint_that_reaches_its_limit_is_refused(scene):
+    """No route follows a stop, so the truth ends there, and says where."""
+    pytest.importorskip("heyoka")
+    free = scene("pendulum", angle=0.5)
+    times = np.array([0.0, 0.8])
+    for limits, refused in (((-0.6, 0.6), False), ((-0.3, 0.6), True)):
+        mechanism = replace(free, joints=(replace(free.joints[0], limits=limits),))
+        if refused:
+            with pytest.raises(Refused, match=r"joint pivot passes its limit before t = 0.8 s"):
+                find_truth(mechanism, times)
+        else:
+            assert find_truth(mechanism, times).horizon == np.inf
+
+
+def test_routes_on_different_branches_are_no_truth(scene, monkeypatch):
+    """Should one route change its branch without a word, the difference is not taken for an error bar."""
+    pytest.importorskip("heyoka")
+    run = JointCoordinates.run
+
+    def flipped(self, times, tolerance):
+        record = run(self, times, tolerance)
+        return replace(record, p_WB=record.p_WB + 1e-2)
+
+    monkeypatch.setattr(JointCoordinates, "run", flipped)
+    with pytest.raises(Refused, match="the two routes part before t = "):
+        find_truth(scene("slider_crank"), np.array([0.0, 0.1]))
+
+
+def test_without_heyoka_the_second_route_is_dop853(scene, monkeypatch):
+    """The truth is still known by two routes, and says which."""
+    monkeypatch.setattr(maximal_taylor, "heyoka", None)
+    truth = find_truth(scene("oscillators"), np.array([0.0, 0.3]))
+    assert "maximal coordinates, DOP853" in truth.routes
+    assert truth.bars["q"][-1] < 1e-11
+
+
+def test_indeterminate_reactions_are_not_given(scene):
+    """Of planar loops closed by revolutes, only Fx, Fy, Mz carry numbers."""
+    pytest.importorskip("heyoka")
+    wrench = find_truth(scene("slider_crank"), np.array([0.0, 0.1])).record.wrench
+    assert (np.isnan(wrench) == [False, False, True, True, True, False]).all()
+
+
+def test_dataset_has_names_and_units(scene):
+    """Every variable with its unit, coordinates by joint, wrenches by joint and loop."""
+    pytest.importorskip("heyoka")
+    mechanism = scene("slider_crank")
+    data = to_dataset(mechanism, find_truth(mechanism, np.array([0.0, 0.1])))
+    assert all("units" in data[name].attrs for name in data.data_vars if not name.startswith("bar_"))
+    assert data["q.guide"].attrs["units"] == "m"
+    assert data["q.shaft"].dims == ("time",)
+    assert data["force"].sel(joint="wrist").shape == (2, 3)
+    assert list(data["point"].values) == ["slider"]
