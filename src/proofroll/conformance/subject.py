@@ -12,10 +12,11 @@ from unittest import SkipTest
 import numpy as np
 
 from proofroll.core.arrays import FloatArray
-from proofroll.core.engine import Sample, require_provided
+from proofroll.core.engine import Sample
 from proofroll.core.errors import Refused
 from proofroll.core.plugins import load_element_kinds
 from proofroll.core.scene import Scene
+from proofroll.core.several import build
 
 # Simulated time of a check of the motion [s]: the ball goes a sixth of a turn round the cylinder.
 _SPAN = 0.05
@@ -50,8 +51,7 @@ class Subject:
     def build(self) -> Any:
         """The engine at time 0; the check has nothing to look at if it refuses."""
         try:
-            require_provided(self.engine, self.settings.formulation, self.scene)
-            return self.engine.build(self.scene, self.settings)
+            return build(self.engine, self.scene, self.settings)
         except Refused as refusal:
             raise SkipTest(f"refused: {refusal}") from None
 

@@ -10,8 +10,8 @@ from typing import Any
 
 import numpy as np
 
-from proofroll.core.dataset import sample_of
 from proofroll.core.scene import Scene
+from proofroll.core.several import sample_of
 
 # Engines that compute in double precision reproduce the scene's numbers to this relative difference.
 EXACT = 1e-12

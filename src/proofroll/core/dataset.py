@@ -2,18 +2,17 @@
 
 from __future__ import annotations
 
-import dataclasses
 from collections.abc import Mapping, Sequence
 from types import MappingProxyType
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 import numpy as np
 
 from proofroll.core.arrays import FloatArray
 from proofroll.core.element import Element
-from proofroll.core.engine import Sample
 from proofroll.core.events import Event, with_events
 from proofroll.core.scene import Scene
+from proofroll.core.several import AnySample, sample_of
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -25,8 +24,8 @@ _SHARED = frozenset({"time", "xyz", "wxyz"})
 def from_samples(
     scene: Scene,
     times: FloatArray,
-    samples: Sequence[Sample],
-    between: Mapping[float, Sample] = MappingProxyType({}),
+    samples: Sequence[AnySample],
+    between: Mapping[float, AnySample] = MappingProxyType({}),
 ) -> xr.Dataset:
     """The trajectory of a run.
 
@@ -46,23 +45,6 @@ def from_samples(
         for element in scene.elements
     }
     return joined(scene, parts)
-
-
-def sample_of(scene: Scene, element: Element, sample: Sample) -> Sample:
-    """The part of a sample that belongs to one element; each of several has a contact for each body."""
-    if len(scene.elements) == 1:
-        return sample
-    first = 0
-    for other in scene.elements:
-        if other is element:
-            break
-        first += len(other.bodies)
-    own = slice(first, first + len(element.bodies))
-    cut: dict[str, Any] = {
-        item.name: None if getattr(sample, item.name) is None else np.asarray(getattr(sample, item.name))[own]
-        for item in dataclasses.fields(sample)
-    }
-    return Sample(**cut)
 
 
 def joined(scene: Scene, parts: Mapping[str, xr.Dataset]) -> xr.Dataset:

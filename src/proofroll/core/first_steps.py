@@ -10,11 +10,11 @@ import numpy as np
 
 from proofroll.core.arrays import FloatArray
 from proofroll.core.certificate import Line
-from proofroll.core.dataset import sample_of
 from proofroll.core.element import Element, FirstMotion
 from proofroll.core.engine import fixed_step
 from proofroll.core.errors import Diverged, Refused
 from proofroll.core.scene import Scene
+from proofroll.core.several import build, sample_of
 
 # Derivative at the first of equally spaced values, over the spacing: by a parabola, by a cubic.
 _PARABOLA = np.array([-3.0, 4.0, -1.0, 0.0]) / 2
@@ -41,7 +41,7 @@ def first_steps(kind: Any, scene: Scene, settings: Any) -> list[Line]:
     Raises:
         Diverged, Refused: by the engine.
     """
-    built = kind.build(scene, settings)
+    built = build(kind, scene, settings)
     lines = []
     for index, element in enumerate(scene.elements):
         start = element.first_motion
@@ -107,7 +107,7 @@ def derivable(kind: Any, scene: Scene, settings: Any) -> list[Line]:
 
 def _derivatives(kind: Any, scene: Scene, element: Element, settings: Any, h: float) -> tuple[FloatArray, FloatArray]:
     """Accelerations of all bodies' centres and turning at time 0, by a parabola and a cubic; (2, bodies, 3)."""
-    engine = kind.build(scene, settings)
+    engine = build(kind, scene, settings)
     samples = [sample_of(scene, element, engine.sample())]
     for steps in (1, 2, 3):
         engine.advance(steps * h)

@@ -60,8 +60,6 @@ class Scene:
         """What a formulation must be able to represent; no more than the scene needs."""
         needs = {need for element in self.elements for need in element.requires}
         asked = {element.asked(name) for element in self.elements for name in self.asks}
-        if len(self.elements) > 1:
-            needs.add(SEVERAL)
         return frozenset(needs | {need for need in asked if need})
 
     def label(self, element: Element, name: str) -> str:
@@ -103,7 +101,3 @@ class Scene:
                 if file.is_file() and file.suffix not in {".toml", ".md"}:
                     found.update(file.name.encode() + file.read_bytes())
         return found.hexdigest()[:16]
-
-
-# What a formulation must provide for a scene of several elements.
-SEVERAL = "several elements in one scene"

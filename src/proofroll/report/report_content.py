@@ -23,9 +23,9 @@ if TYPE_CHECKING:
 def report_content(outcomes: list[Outcome], store: Store, command: str) -> dict[str, Any]:
     """All that the report says, as plain data.
 
-    ``findings`` on the whole, ``comparisons``, ``awaited`` (titles of comparisons that are still being run), the entries
-    of further studies under the key of their kind, ``date`` and ``environment``. Paths of files are relative to the
-    folder of the report.
+    ``findings`` on the whole, ``comparisons``, ``awaited`` (titles of comparisons that are still being run), the
+    entries of further studies under the key of their kind, ``date`` and ``environment``. Paths of files are relative to
+    the folder of the report.
     """
     comparisons = []
     for outcome in outcomes:

@@ -11,12 +11,13 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from proofroll.core.arrays import FloatArray
-from proofroll.core.dataset import add_events, from_samples, sample_of
+from proofroll.core.dataset import add_events, from_samples
 from proofroll.core.element import Element, WatchesRuns
-from proofroll.core.engine import LocatesEvents, Sample, TellsRemarks
+from proofroll.core.engine import Sample, TellsRemarks
 from proofroll.core.errors import Diverged, lack_behind
 from proofroll.core.events import Event
 from proofroll.core.scene import Scene
+from proofroll.core.several import AnySample, events_of_engine, sample_of
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -91,11 +92,10 @@ def record(engine: Any, scene: Scene, times: FloatArray, probes: Iterable[float]
     """
     began, processor = time.perf_counter(), -time.process_time()
     inside = 0.0
-    bodies = sum(len(element.bodies) for element in scene.elements)
-    samples = [_finite(engine.sample(), 0.0, bodies)]
+    samples = [_finite(engine.sample(), 0.0, scene)]
     failure: str | None = None
     wall = 0.0
-    between: dict[float, Sample] = {}
+    between: dict[float, AnySample] = {}
     off = set(map(float, probes))
     watches = [(element, element.watch(scene.asks)) for element in scene.elements if isinstance(element, WatchesRuns)]
     for t in sorted({*times[1:].tolist(), *off}):
@@ -104,7 +104,7 @@ def record(engine: Any, scene: Scene, times: FloatArray, probes: Iterable[float]
             engine.advance(t)
             wall += time.perf_counter() - start
             inside += time.process_time() - before
-            sample = _finite(engine.sample(), t, bodies)
+            sample = _finite(engine.sample(), t, scene)
         except Diverged as error:
             if lack_behind(error):
                 raise
@@ -118,17 +118,20 @@ def record(engine: Any, scene: Scene, times: FloatArray, probes: Iterable[float]
             break  # from here on the model is another one than the scene
     processor += time.process_time()
     sampling = time.perf_counter() - began - wall, processor - inside
-    located = list(engine.events()) if isinstance(engine, LocatesEvents) else None
     ended: str | None = None
     events: list[tuple[Element, Sequence[Event]]] = []
     for element, watch in watches:
-        seen = watch.conclude(times, [sample_of(scene, element, sample) for sample in samples], located)
+        own = [sample_of(scene, element, sample) for sample in samples]
+        seen = watch.conclude(times, own, events_of_engine(engine, element))
         del samples[seen.samples :]
         if seen.events is not None:
             events.append((element, seen.events))
         if seen.ended:
             ended, failure = seen.ended, None
-    lacking = (element.lacks(samples, scene.asks) for element in scene.elements)
+    lacking = (
+        element.lacks([sample_of(scene, element, sample) for sample in samples], scene.asks)
+        for element in scene.elements
+    )
     failure = failure or next(filter(None, lacking), None)
     last = times[len(samples) - 1]
     dataset = from_samples(scene, times, samples, {at: sample for at, sample in between.items() if at < last})
@@ -147,7 +150,13 @@ def noticed(message: str) -> bool:
     return any(message.startswith(f"{name} {_NOT_FINITE}") for name in _SAMPLED)
 
 
-def _finite(sample: Sample, t: float, bodies: int) -> Sample:
+def _finite(sample: AnySample, t: float, scene: Scene) -> AnySample:
+    for element in scene.elements:
+        _check(sample_of(scene, element, sample), t, len(element.bodies))
+    return sample
+
+
+def _check(sample: Sample, t: float, bodies: int) -> None:
     for name in _SAMPLED:
         values = getattr(sample, name)
         if values is None:
@@ -161,4 +170,3 @@ def _finite(sample: Sample, t: float, bodies: int) -> Sample:
         # The sum of finite numbers is finite but for overflow; numpy's own question takes ten times as long.
         if not math.isfinite(sum(values.ravel().tolist())) and not np.all(np.isfinite(values)):
             raise Diverged(f"{name} {_NOT_FINITE} at {t:g} s")
-    return sample

@@ -31,9 +31,10 @@ def run(case: dict[str, Any], out: str) -> dict[str, Any]:
 
 def _run(case: Case, out: Path, spent: Spent) -> Result:
     from proofroll.core.certificate import Standing, certify, first_difference
-    from proofroll.core.engine import fixed_step, require_provided
+    from proofroll.core.engine import fixed_step
     from proofroll.core.first_steps import DERIVED, derivable
     from proofroll.core.plugins import load_engine, resolve_settings
+    from proofroll.core.several import build
     from proofroll.core.time_grid import time_grid
     from proofroll.files.netcdf import write
     from proofroll.files.scene_file import load_scene
@@ -49,8 +50,7 @@ def _run(case: Case, out: Path, spent: Spent) -> Result:
     settings = resolve_settings(kind, case.engine.settings)
     spent.on("loading")
     try:
-        require_provided(kind, settings.formulation, scene)
-        engine = kind.build(scene, settings)
+        engine = build(kind, scene, settings)
         spent.on("building")
         certificate = certify(engine, scene)
         if any(line.standing is Standing.NOT_REPORTED for line in certificate if line.quantity in DERIVED):

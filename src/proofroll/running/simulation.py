@@ -5,8 +5,9 @@ from __future__ import annotations
 import dataclasses
 from typing import TYPE_CHECKING, Any
 
+from proofroll.core import several
 from proofroll.core.certificate import certify, first_difference
-from proofroll.core.engine import fixed_step, require_provided
+from proofroll.core.engine import fixed_step
 from proofroll.core.errors import InputError, Refused
 from proofroll.core.plugins import load_engine, parse_engine, resolve_settings
 from proofroll.core.scene import Scene
@@ -47,8 +48,7 @@ def _resolved(scene: Scene, engine: str, settings: dict[str, Any]) -> tuple[Any,
 
 
 def _build(scene: Scene, kind: Any, settings: Any) -> Any:
-    require_provided(kind, settings.formulation, scene)
-    return kind.build(scene, settings)
+    return several.build(kind, scene, settings)
 
 
 def simulate(

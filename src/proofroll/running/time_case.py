@@ -6,6 +6,7 @@ import time
 from typing import Any
 
 from proofroll.core.errors import Diverged, Refused
+from proofroll.core.several import build
 from proofroll.running.case import Case
 
 # A clean run shorter than this is repeated, up to three times, so that its median means something.
@@ -34,7 +35,7 @@ def time_once(case: dict[str, Any], seconds: float) -> dict[str, Any]:
     start = time.perf_counter()
     while elapsed < seconds and time.perf_counter() - start < _MOST_BUILDING * seconds:
         try:
-            wall, t = _clean_run(kind.build(scene, settings), times, seconds - elapsed)
+            wall, t = _clean_run(build(kind, scene, settings), times, seconds - elapsed)
         except (Refused, Diverged) as error:
             return {"seconds_per_second": None, "message": str(error)}
         elapsed, simulated = elapsed + wall, simulated + t
@@ -64,7 +65,7 @@ def clean_runs(kind: Any, scene: Any, settings: Any, times: Any) -> tuple[list[f
     rates: list[float] = []
     spent = processor = 0.0
     while len(rates) < _TIMED_RUNS and spent < _TIMED_SECONDS:
-        engine, before = kind.build(scene, settings), time.process_time()
+        engine, before = build(kind, scene, settings), time.process_time()
         wall, t = _clean_run(engine, times, _ENOUGH_SECONDS)
         processor += time.process_time() - before
         rates.append(wall / t)

@@ -1,0 +1,34 @@
+"""Scenes of several elements: every formulation runs them, each element in a model of its own."""
+
+from __future__ import annotations
+
+import dataclasses
+
+import numpy as np
+import pytest
+
+from proofroll.core.dataset import observe
+from proofroll.core.scene import Scene
+from proofroll.files.scene_file import load_scene
+from proofroll.running.simulation import simulate
+
+
+@pytest.fixture
+def balls() -> Scene:
+    """The paper's ball, and one that rolls down a plane."""
+    scene, other = load_scene("sphere_in_cylinder"), load_scene("inclined_plane")
+    (one,), (two,) = scene.elements, other.elements
+    second = dataclasses.replace(two, ball=dataclasses.replace(two.ball, name="second"))
+    return dataclasses.replace(scene, elements=(one, second))
+
+
+@pytest.mark.parametrize("engine", ["projection", "reduced", "exudyn", "pinocchio"])
+def test_each_element_moves_as_it_does_alone(balls: Scene, engine: str) -> None:
+    """In a scene of two elements each follows, digit for digit, the path of a scene that holds it alone."""
+    both = observe(balls, simulate(balls, engine, until=0.1, every=0.05))
+    for element in balls.elements:
+        alone = dataclasses.replace(balls, elements=(element,))
+        seen = observe(alone, simulate(alone, engine, until=0.1, every=0.05))
+        for name in alone.observables:
+            if name in seen:
+                assert np.array_equal(both[balls.label(element, name)], seen[name]), name
