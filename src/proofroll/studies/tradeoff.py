@@ -16,7 +16,6 @@ from pathlib import Path
 
 import numpy as np
 
-from proofroll.core.errors import InputError
 from proofroll.running.case import Case, Result, Status
 from proofroll.running.runner import Runner
 from proofroll.running.stopwatch import Stopwatch
@@ -118,9 +117,7 @@ def tradeoff(
         InputError: something that does not exist, or a quantity that the scene does not have.
     """
     scene = question.loaded()
-    absent_because = scene.observable(question.quantity).absent
-    if absent_because:
-        raise InputError("quantity", question.quantity, absent_because)
+    scene.observable(question.quantity)
     curves, absent = curves_of(engines, runner.workers)
 
     def told(case: Case, _: Result) -> None:
