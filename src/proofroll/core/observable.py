@@ -31,6 +31,7 @@ class Observable:
         decides: whether a trade-off, a stability map and a recommendation go by it where nobody says by what.
         asked_for: whether a person may ask for a recommendation by it.
         hangs_on_events: whether it is a matter of luck where the time of an event is ill-posed.
+        absent: why no run of the scene has it, and what to change; empty: runs have it.
     """
 
     name: str
@@ -43,6 +44,7 @@ class Observable:
     decides: bool = False
     asked_for: bool = True
     hangs_on_events: bool = True
+    absent: str = ""
 
     @property
     def shown(self) -> str:

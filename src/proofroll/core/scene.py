@@ -80,11 +80,14 @@ class Scene:
         """The observable of this name.
 
         Raises:
-            InputError: no element has it; ``field`` says where it was named.
+            InputError: no element has it, or no run of these numbers; ``field`` says where it was named.
         """
         if name not in self.observables:
             raise InputError(field, name, f"there is no such observable; choose from {', '.join(self.observables)}")
-        return self.observables[name]
+        found = self.observables[name]
+        if found.absent:
+            raise InputError(field, name, found.absent)
+        return found
 
     @property
     def natural_time(self) -> float:

@@ -58,6 +58,9 @@ def table(body: RollingBall) -> tuple[Observable, ...]:
         )
     )
 
+    bounded = np.isfinite(body.contact.mu_static)
+    never = "" if bounded else "without bounded friction the ball never slips; --set mu_static=…"
+
     def residual(name: str, unit: str, meaning: str, floor: float, *, asked_for: bool = True) -> Observable:
         kind = Role.RESIDUAL
         return Observable(name, unit, meaning, kind, floor=floor, asked_for=asked_for, hangs_on_events=False)
@@ -77,11 +80,11 @@ def table(body: RollingBall) -> tuple[Observable, ...]:
             "slip",
             "m/s",
             "speed of the contact point along the wall",
-            Role.MOTION if np.isfinite(body.contact.mu_static) else Role.RESIDUAL,
+            Role.MOTION if bounded else Role.RESIDUAL,
             floor=speed,
         ),
         residual("creep", "m", "way slipped while sticking", a),
-        Observable("first_slip", "s", "time of the first slip", Role.EVENT),
+        Observable("first_slip", "s", "time of the first slip", Role.EVENT, absent=never),
         Observable("event_times", "s", "times of all events", Role.EVENT, asked_for=False),
         Observable("event_order", "events", "events of another kind than the truth's", Role.EVENT, asked_for=False),
     )
