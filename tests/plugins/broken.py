@@ -84,12 +84,12 @@ class Broken:
     """The projection method with a defect."""
 
     name: ClassVar[str] = "broken"
-    provides: ClassVar[Mapping[str, frozenset[str]]] = Projection.provides
     settings: ClassVar[type[BrokenSettings]] = BrokenSettings
     presets: ClassVar[Mapping[str, Mapping[str, BrokenSettings]]] = {
         name: {"matched": BrokenSettings(name)}
         for name in [f"{kind}_{defect}" for kind in ("open", "hidden") for defect in BUILT]
     }
+    provides: ClassVar[Mapping[str, frozenset[str]]] = dict.fromkeys(presets, Projection.provides["rotating_frame"])
 
     @staticmethod
     def version() -> str:
