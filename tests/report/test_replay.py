@@ -20,11 +20,12 @@ from scipy.spatial.transform import Rotation
 from proofroll.core.truth import truth
 from proofroll.elements.ball_on_surface.element import rolling_ball
 from proofroll.elements.ball_on_surface.report.poses import AWAY, SLIPS, STICKS, WIDEST_TURN, frame_times, poses
-from proofroll.elements.ball_on_surface.report.replay import LENGTH, described, replay_content
+from proofroll.elements.ball_on_surface.report.replay import LENGTH, replay_content
 from proofroll.elements.ball_on_surface.report.wall import middle, wall
 from proofroll.files.netcdf import read, write
 from proofroll.files.scene_file import load_scene
 from proofroll.report import replay_library
+from proofroll.report.growing_report import _described
 from proofroll.report.html import page
 from proofroll.report.plots import point_curves
 from proofroll.report.replay_library import thinned, three
@@ -418,7 +419,7 @@ def test_without_a_picture_the_values_follow_the_time(
     if lacking == "three.js":
         replay["library"] = None
     file = tmp_path / "report.html"
-    content = report_content([made[0]], made[1], "proofroll report") | {"replay": described(replay)}
+    content = report_content([made[0]], made[1], "proofroll report") | {"replay": _described(replay)}
     file.write_text(page(content, [point_curves(*made)], replay=replay), encoding="utf-8")
     blind = "HTMLCanvasElement.prototype.getContext = () => null;" if lacking == "WebGL" else ""
     opened = open_(file, before=blind)

@@ -87,7 +87,8 @@ def _sizes(scene: Scene, length: float, true: xr.Dataset) -> dict[str, float]:
     found: dict[str, float] = {}
     for element in scene.elements:
         start = element.first_motion
-        fall = (start.scale if start else element.length / element.natural_time**2) * length
+        pull = (start.pull or start.scale) if start else element.length / element.natural_time**2
+        fall = pull * length
         own = {"p_WB": fall * length / 2, "v_WB": fall, "w_WB": fall / element.length}
         found |= {scene.label(element, name): size for name, size in own.items()}
     wanted = [name for name, item in scene.observables.items() if item.role == Role.REACTION and item.headline]

@@ -66,12 +66,15 @@ class FirstMotion:
         angular_acceleration: likewise [rad/s²].
         scale: what accelerations are measured by, never zero [m/s²].
         moment: a time in which little happens: when an engine without a step is looked at first [s].
+        pull: acceleration by the loads alone [m/s²]. A fast start has many times that, and an error of the loads would
+            be small beside it, so short runs are measured by this; None: the scale.
     """
 
     acceleration: FloatArray
     angular_acceleration: FloatArray
     scale: float
     moment: float
+    pull: float | None = None
 
 
 @dataclass(frozen=True)

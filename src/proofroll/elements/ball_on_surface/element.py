@@ -155,6 +155,7 @@ class BallOnSurface:
             initial_angular_acceleration(body)[None, :],
             natural_acceleration(body),
             _PART * self.ball.radius / (speed or 1.0),
+            float(np.linalg.norm(body.gravity)) or None,
         )
 
     @property

@@ -26,7 +26,16 @@ class Reduced:
     """
 
     name: ClassVar[str] = "reduced"
-    provides: ClassVar[Mapping[str, frozenset[str]]] = dict.fromkeys(PRESETS, ROLLS)
+    provides: ClassVar[Mapping[str, frozenset[str]]] = {
+        "equations": ROLLS,
+        "closed_form": ROLLS - {BallCapability.ROLLING_RESISTANCE},
+    }
+    lacking: ClassVar[Mapping[str, Mapping[str, str]]] = {
+        "closed_form": {
+            BallCapability.ROLLING_RESISTANCE: "there is no closed form with rolling resistance; "
+            "take formulation=equations"
+        }
+    }
     settings: ClassVar[type[ReducedSettings]] = ReducedSettings
     presets: ClassVar[Mapping[str, Mapping[str, ReducedSettings]]] = PRESETS
     levels: ClassVar[Mapping[str, Level]] = {"equations": Level.REDUCED, "closed_form": Level.CLOSED_FORM}
