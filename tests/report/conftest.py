@@ -99,7 +99,7 @@ def made(tmp_path_factory: pytest.TempPathFactory) -> tuple[Outcome, Store]:
                     scale=sizes[name],
                     limit=None,
                 )
-                for name, values in observe(scene, dataset).items()
+                for name, curve in observe(scene, dataset).items()
                 if name in bounds
             ]
             line = {

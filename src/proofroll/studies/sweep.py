@@ -11,7 +11,7 @@ import numpy as np
 from proofroll.core.arrays import FloatArray
 from proofroll.core.engine import whole_steps
 from proofroll.core.errors import InputError, ProofrollError
-from proofroll.core.plugins import engine_names, parse_engine
+from proofroll.core.plugins import EngineSpec, engine_names, parse_engine
 from proofroll.core.scene import Scene
 from proofroll.files.netcdf import read
 from proofroll.files.scene_file import load_scene
@@ -159,19 +159,10 @@ def curves_of(
         except ProofrollError as error:
             absent[spec.name] = str(error)
             continue
-        levels: Mapping[str, str] = described.get("levels", {})
-        for formulation, presets in described["presets"].items():
-            if spec.options.get("formulation", formulation) != formulation:
-                continue
-            if requires and not requires & set(described["provides"][formulation]):
-                absent.setdefault(spec.name, "none of its formulations is for scenes of this kind")
-                continue
-            for preset in presets:
-                if spec.options.get("preset", preset) != preset:
-                    continue
-                options = {"formulation": formulation, "preset": preset, **spec.options}
-                inner = ",".join(f"{key}={value}" for key, value in options.items())
-                wanted.append((f"{spec.name}[{inner}]", levels.get(formulation)))
+        chosen, foreign = _chosen(spec, described, requires)
+        if foreign:
+            absent.setdefault(spec.name, "none of its formulations is for scenes of this kind")
+        wanted += chosen
         if any(parse_engine(name).name == spec.name for name, _ in wanted):
             absent.pop(spec.name, None)
         elif spec.name not in absent:
@@ -187,6 +178,27 @@ def curves_of(
         else:
             absent[name] = str(facts)
     return curves, absent
+
+
+def _chosen(
+    spec: EngineSpec, described: Mapping[str, Any], requires: frozenset[str]
+) -> tuple[list[tuple[str, str | None]], bool]:
+    """Formulations and presets that a specification means, each with its level; whether some are for other scenes."""
+    levels: Mapping[str, str] = described.get("levels", {})
+    chosen: list[tuple[str, str | None]] = []
+    foreign = False
+    for formulation, presets in described["presets"].items():
+        if spec.options.get("formulation", formulation) != formulation:
+            continue
+        if requires and not requires & set(described["provides"][formulation]):
+            foreign = True
+            continue
+        for preset in presets:
+            if spec.options.get("preset", preset) == preset:
+                options = {"formulation": formulation, "preset": preset, **spec.options}
+                inner = ",".join(f"{key}={value}" for key, value in options.items())
+                chosen.append((f"{spec.name}[{inner}]", levels.get(formulation)))
+    return chosen, foreign
 
 
 Progress = Callable[[Case, Result], None]

@@ -61,7 +61,7 @@ def certify(element: MechanismElement, built: MechanismBuilt, sample: Sample) ->
     compare("mobility", "1", element.analysis.mobility, built.mobility, 1.0)
     compare("error of the mass matrix", "1", 0.0, built.mass_matrix_error, 1.0)
     compare("position", "m", start.p_WB[0], sample.p_WB, size)
-    speed = element._speed  # noqa: SLF001 -- the element's own module
+    speed = element._speed
     compare("velocity", "m/s", start.v_WB[0], sample.v_WB, speed)
     compare("spin", "rad/s", start.w_WB[0], sample.w_WB, speed / size)
     if sample.q_WB is not None:
