@@ -13,6 +13,8 @@ import pytest
 from browsing import Visit
 from poison import Poison
 
+from proofroll.report.labels import symbol
+
 Visiting = Callable[..., AbstractContextManager[Visit]]
 
 FIRST = "figure[data-o='0'][data-p='0']"
@@ -91,7 +93,9 @@ def test_everything_that_others_write_is_shown_as_it_is_written(
         with visit(file) as seen:
             texts.append(" ".join(seen.page.evaluate(TEXT).split()))
     clean, bad = texts
-    found = [text for text in poison.said if len(text) > 9 and text in clean]
+    # Shown instead of a name, where the page does not know the quantity: it has the poison of that name.
+    instead = {symbol(name) for name in poison.said if symbol(name) != name}
+    found = [text for text in poison.said - instead if len(text) > 9 and text in clean]
     # A text within a longer one is shown as a part of that one.
     shown = [text for text in found if not any(text in other and text != other for other in found)]
     lost = [text for text in shown if " ".join(poison.dose(text).split()) not in bad]

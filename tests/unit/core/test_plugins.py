@@ -27,6 +27,7 @@ class Toy:
     """An engine that has nothing but settings."""
 
     name = "toy"
+    provides: Mapping[str, frozenset[str]] = {"free": frozenset(), "chart": frozenset()}
     settings = ToySettings
     presets: Mapping[str, Mapping[str, ToySettings]] = {
         "free": {"default": ToySettings("free", "default", 2e-3), "matched": ToySettings("free", "matched", 1e-3)},

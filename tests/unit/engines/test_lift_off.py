@@ -11,9 +11,10 @@ import pytest
 from proofroll import load_scene
 from proofroll.core.events import events_of
 from proofroll.core.scene import Scene
+from proofroll.core.time_grid import time_grid
 from proofroll.core.truth import truth
 from proofroll.elements.ball_on_surface.element import changed
-from proofroll.running.recording import record, time_grid
+from proofroll.running.recording import record
 from proofroll.running.simulation import build
 
 TIMES = time_grid(0.4, 5e-3)

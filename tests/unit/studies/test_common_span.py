@@ -11,9 +11,10 @@ import pytest
 from proofroll import load_scene
 from proofroll.core.dataset import observe, scales
 from proofroll.core.scene import Scene
+from proofroll.core.time_grid import time_grid
 from proofroll.core.truth import truth
 from proofroll.elements.ball_on_surface.element import changed
-from proofroll.running.recording import record, time_grid
+from proofroll.running.recording import record
 from proofroll.running.simulation import build
 from proofroll.studies.common_span import common_span
 from proofroll.studies.reference import Reference
