@@ -94,7 +94,7 @@ def test_everything_that_others_write_is_shown_as_it_is_written(
             texts.append(" ".join(seen.page.evaluate(TEXT).split()))
     clean, bad = texts
     # Shown instead of a name, where the page does not know the quantity: it has the poison of that name.
-    instead = {symbol(name) for name in poison.said if symbol(name) != name}
+    instead = {symbol(name) for name in poison.doses if symbol(name) != name}
     found = [text for text in poison.said - instead if len(text) > 9 and text in clean]
     # A text within a longer one is shown as a part of that one.
     shown = [text for text in found if not any(text in other and text != other for other in found)]
