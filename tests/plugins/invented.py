@@ -87,7 +87,9 @@ def stability_study() -> dict[str, Any]:
         "runs": 14, "boundaries": 2, "silent": 1, "refused": 0,
         "failures": {"sank in": 2}, "never_accurate": 1, "meanings": {},
         "points": [base, other], "explanations": [explained], "findings": ["good depends on mass, as it should not"],
-        "step_symbols": {}, "places": [], "absent": {}, "effort": {"values": 3, "steps": 75_000, "matched": True, "longest": None}, "measured": installed.measured(),
+        "step_symbols": {}, "places": [], "absent": {},
+        "effort": {"values": 3, "steps": 75_000, "matched": True, "longest": None},
+        "measured": installed.measured(),
     }  # fmt: skip
 
 
