@@ -58,6 +58,7 @@ def test_contents(wheel: Path) -> None:
         "proofroll/models/sphere_in_cylinder/scene.toml",
         "proofroll/models/inclined_plane/scene.toml",
         "proofroll/conformance/checks.py",
+        "proofroll/docs/examples/semi_implicit.py",
     ):
         assert name in names
     models = {path.relative_to(REPOSITORY).as_posix() for path in (REPOSITORY / "models").rglob("*") if path.is_file()}
@@ -65,8 +66,8 @@ def test_contents(wheel: Path) -> None:
     assert claims
     assert {f"proofroll/{name}" for name in models | claims} <= set(names)
     source = REPOSITORY / "src"
-    pages = {path.relative_to(source).as_posix() for path in source.rglob("templates/*") if path.is_file()}
-    assert {Path(page).parts[1] for page in pages} == {"report", "elements"}
+    pages = {path.relative_to(source).as_posix() for path in source.rglob("templates/**/*") if path.is_file()}
+    assert {Path(page).parts[1] for page in pages} == {"report", "elements", "cli"}
     assert pages <= set(names)
     assert any(name.endswith("LICENSE") for name in names)
     assert not any(name.startswith(("tests/", "proofroll/tests/")) for name in names)

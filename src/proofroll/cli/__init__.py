@@ -15,6 +15,7 @@ import proofroll
 from proofroll.cli.comparing import compare
 from proofroll.cli.ladder import ladder
 from proofroll.cli.lists import engines, scenes
+from proofroll.cli.new import new
 from proofroll.cli.options import ENGINE, INTERRUPTED, OK, USAGE, complain
 from proofroll.cli.recommend import recommend
 from proofroll.cli.report import report
@@ -32,6 +33,7 @@ app = typer.Typer(
 _STUDIES = (compare, report, tradeoff, recommend, ladder, stability)
 for _command in (scenes, engines, run, *_STUDIES):
     app.command()(_command)
+app.add_typer(new, name="new")
 for _point in sorted(entry_points(group="proofroll.commands"), key=lambda point: point.name):
     _added = _point.load()
     if isinstance(_added, typer.Typer):

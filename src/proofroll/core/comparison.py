@@ -122,9 +122,11 @@ class Comparison:
 
     Attributes:
         name: of the file, without ending.
-        title, question: for a person.
-        scene: name of the scene.
-        until, every: last time and sampling interval [s].
+        title: what is compared, in one line.
+        question: which the comparison answers.
+        scene: name of the scene, or path of its folder.
+        until: last time [s].
+        every: sampling interval [s].
         vary: parameter -> values; every combination is run.
         points: further combinations, each with parameters of its own.
         bands: tolerances by name.

@@ -13,7 +13,12 @@ from proofroll.core.bounds import bounded
 
 @dataclass(frozen=True)
 class Gravity:
-    """Uniform gravity: magnitude [m/s²] and direction (any length)."""
+    """Uniform gravity.
+
+    Attributes:
+        magnitude: acceleration [m/s^2].
+        direction: in the world, of any length.
+    """
 
     magnitude: float = field(metadata={"unit": "m/s^2"})
     direction: tuple[float, float, float] = field(default=(0.0, 0.0, -1.0), metadata={"unit": "1"})

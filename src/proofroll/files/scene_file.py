@@ -28,7 +28,10 @@ class Parameter:
 
     Attributes:
         value: default, or the name of the parameter whose value is the default.
-        unit, symbol, meaning, source: for a person.
+        unit: of the value; nothing is converted.
+        symbol: as equations write it.
+        meaning: what it is, in one line; messages say it.
+        source: where the number comes from.
         above, at_least, below, at_most: bounds, as numbers or names of other parameters.
         nonzero: why the value must not be zero.
         unbounded: whether inf is allowed.
@@ -51,7 +54,18 @@ class Parameter:
 
 @dataclass(frozen=True)
 class SceneFile:
-    """The contents of a ``scene.toml`` before parameters are set."""
+    """The contents of a ``scene.toml`` before parameters are set.
+
+    Attributes:
+        title: what the scene is, in one line.
+        source: where it comes from.
+        parameters: what a user sets by name.
+        gravity: the table that all kinds of elements share.
+        asks: what is wanted besides the motion, e.g. ``orientation``.
+        reason: why the scene is there, for a person.
+        duration: length of a run that shows what it is about [s].
+        tables: all others, which kinds of elements read.
+    """
 
     title: str
     source: str
@@ -60,7 +74,7 @@ class SceneFile:
     asks: list[str] = field(default_factory=list)
     reason: str = ""
     duration: float | None = None
-    tables: dict[str, Any] = field(default_factory=dict)  # all others, which kinds of elements read
+    tables: dict[str, Any] = field(default_factory=dict)
 
 
 @dataclass(frozen=True)

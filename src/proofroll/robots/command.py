@@ -1,4 +1,4 @@
-"""Robot files: whether engines hold the model that a file describes."""
+"""Robot files: whether engines hold the model that a file describes; what else can be checked is in the harness."""
 
 from __future__ import annotations
 
@@ -7,11 +7,12 @@ from typing import Annotated
 
 import typer
 
+from proofroll.cli.checking import check_text, is_text_check
 from proofroll.cli.options import CONTRADICTED, ENGINE, OK, Engines, Json, progress_bar, write_json
 
 
 def check(
-    file: Annotated[Path, typer.Argument(help="A robot file, URDF or MJCF.")],
+    file: Annotated[Path, typer.Argument(help="A robot file (URDF, MJCF), a scene, or a comparison or other study.")],
     engine: Engines = None,
     base: Annotated[str, typer.Option(help="What carries the root of a URDF: fixed or free.")] = "fixed",
     states: Annotated[int, typer.Option(min=1, max=1000, help="Random states that are compared.")] = 20,
@@ -20,7 +21,13 @@ def check(
     time_limit: Annotated[float, typer.Option(min=0.1, help="Wall seconds for each engine.")] = 120.0,
     as_json: Json = False,
 ) -> None:
-    """Read a robot file with every engine's own importer; exit 1 if one does not hold the model that it describes."""
+    """Check a scene or a comparison without running it, or a robot file with every engine's own importer.
+
+    Of a robot file: exit 1 if an engine does not hold the model that the file describes. The options are for these.
+    """
+    if is_text_check(file):
+        check_text(str(file), as_json)
+        return
     from proofroll.robots.check import check as checked
     from proofroll.robots.check import differs
 

@@ -40,13 +40,13 @@ class Entry:
     engines: dict[str, tuple[str, ...]]
 
 
-def read_gallery(path: Path | None = None) -> list[Entry]:
+def read_gallery(path: str | Path | None = None) -> list[Entry]:
     """The entries of the file.
 
     Raises:
         InputError: it is broken, or names a cause that there is not.
     """
-    path = path or data_folder("comparisons") / "robots.toml"
+    path = Path(path or data_folder("comparisons") / "robots.toml")
     known = {REFUSES, CRASHED, OPEN, *(hypothesis.id for hypothesis in hypotheses())}
     entries = []
     for item in read_toml(path).get("robots", []):

@@ -73,12 +73,13 @@ def claims_for(scene: str) -> TradeoffClaims | None:
     return next(found, None)
 
 
-def load_claims(path: Path) -> TradeoffClaims:
+def load_claims(path: str | Path) -> TradeoffClaims:
     """Reads a file.
 
     Raises:
         InputError: it is broken, or is about something else.
     """
+    path = Path(path)
     content = read_toml(path)
     if content.get("study") != STUDY:
         raise InputError(str(path), "study", f'only a file with study = "{STUDY}" is about a trade-off')

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable
+from collections.abc import Collection, Iterable, Mapping
 from dataclasses import dataclass, field
 
 import numpy as np
@@ -66,16 +66,7 @@ def plan(comparison: Comparison, engines: Iterable[str] = (), workers: Workers |
     if not rows:
         known = ", ".join(dict.fromkeys(parse_engine(row.engine).name for row in comparison.rows))
         raise InputError("engine", ", ".join(chosen), f"{comparison.name} compares {known}")
-    specs = [parse_engine(row.engine) for row in rows]
-    resolved = resolve(
-        [(spec.name, spec.options) for spec in specs] + [("truth", {})], workers, load_scene(comparison.scene).requires
-    )
-    truth_facts = resolved.pop()
-    if not isinstance(truth_facts, EngineFacts):
-        raise truth_facts
-    for (index, row), facts in zip(numbered.items(), resolved, strict=True):
-        if isinstance(facts, InputError):
-            raise facts.within(f"{comparison.name}.toml: rows.{index}.engine", row.engine)
+    resolved, truth_facts = row_facts(comparison, numbered, load_scene(comparison.scene).requires, workers)
     comparison = settled(comparison)
     rungs = _rungs(rows, resolved, workers)
     truths: dict[str, Case] = {}
@@ -93,6 +84,31 @@ def plan(comparison: Comparison, engines: Iterable[str] = (), workers: Workers |
             }
             runs.append(Planned(row, point, facts, ladder))
     return Plan(comparison, truths, runs)
+
+
+def row_facts(
+    comparison: Comparison, rows: Mapping[int, Row], requires: Collection[str], workers: Workers | None = None
+) -> tuple[list[EngineFacts | ProofrollError], EngineFacts]:
+    """The complete settings of rows, or why there are none, and those of the truth.
+
+    Args:
+        comparison: for messages.
+        rows: by their place in it.
+        requires: by the scene.
+        workers: processes in which engines are asked.
+
+    Raises:
+        InputError: an engine or setting that does not exist.
+    """
+    specs = [parse_engine(row.engine) for row in rows.values()]
+    resolved = resolve([(spec.name, spec.options) for spec in specs] + [("truth", {})], workers, requires)
+    truth = resolved.pop()
+    if not isinstance(truth, EngineFacts):
+        raise truth
+    for (index, row), facts in zip(rows.items(), resolved, strict=True):
+        if isinstance(facts, InputError):
+            raise facts.within(f"{comparison.name}.toml: rows.{index}.engine", row.engine)
+    return resolved, truth
 
 
 def _rungs(

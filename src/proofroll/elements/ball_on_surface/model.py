@@ -35,9 +35,11 @@ class Ball:
     """A rigid ball whose central inertia is the same about every axis.
 
     Attributes:
+        name: by which contacts and starts name it.
         radius: a [m].
         mass: m [kg].
         inertia_ratio: J / (m a²); 2/5 for a homogeneous ball, 2/3 for a thin shell.
+        shape: of the body; there is no other yet.
     """
 
     name: str
@@ -66,6 +68,7 @@ class Contact:
     """A ball that rolls on a surface.
 
     Attributes:
+        body, surface: names of a ball and of the surface that it touches.
         rolling_resistance: f, distance by which the normal force is shifted forward [m].
         mu_static: largest |F|/N while sticking [-]; inf: the ball never slips.
         mu_kinetic: |F|/N while slipping [-].
@@ -97,6 +100,7 @@ class InitialMotion:
     """Rolling without slip at time 0.
 
     Attributes:
+        body: name of a ball.
         coordinates: where on the surface, in its coordinates.
         velocity: of the centre along e2 and e3 [m/s]; the spin about e2 and e3 follows from rolling.
         spin: ω1, about the normal e1 [rad/s].

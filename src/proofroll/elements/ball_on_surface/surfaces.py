@@ -125,6 +125,8 @@ class Cylinder:
     """Inside of a circular cylinder; coordinates are the angle γ about its axis and the height z along it.
 
     Attributes:
+        name: by which contacts name it.
+        kind: which surface it is.
         radius: radius [m]; of the wall in a scene, of the centre's path after :meth:`offset`.
         tilt: rotation of the axis from the vertical about the world's y axis [rad].
     """
@@ -304,6 +306,8 @@ class Plane:
     """Plane through the world's origin; coordinates are the distances down the slope and across it.
 
     Attributes:
+        name: by which contacts name it.
+        kind: which surface it is.
         tilt: rotation from the horizontal about the world's y axis [rad]; positive descends along +x.
         height: distance of the ball's centre above the wall's surface [m]; 0 for the wall itself.
     """

@@ -125,7 +125,13 @@ class Spring:
 
 @dataclass(frozen=True)
 class Point:
-    """A point of a body that is tracked: name, name of its body (or ``world``), position in the body's frame, m."""
+    """A point of a body that is tracked.
+
+    Attributes:
+        name: unique among points.
+        body: name of its body, or ``world``.
+        position: in the body's frame, m.
+    """
 
     name: str
     body: str

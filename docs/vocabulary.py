@@ -1,0 +1,206 @@
+"""Writes docs/vocabulary.md: every key of scenes and files of studies, from the dataclasses that read them."""
+
+from __future__ import annotations
+
+import dataclasses
+import inspect
+import math
+import re
+import sys
+from collections.abc import Iterator
+from pathlib import Path
+from typing import Any, NamedTuple
+
+from proofroll.core import comparison
+from proofroll.core.gravity import Gravity
+from proofroll.elements.ball_on_surface import model as balls
+from proofroll.elements.ball_on_surface import regimes_study, surfaces
+from proofroll.elements.mechanism import model as mechanisms
+from proofroll.files.scene_file import Parameter, SceneFile
+from proofroll.studies import axes, claimed, claims, stability_claims
+
+ROOT = Path(__file__).resolve().parents[1]
+FILE = ROOT / "docs" / "vocabulary.md"
+
+
+class Table(NamedTuple):
+    """A table of a file: its header as TOML writes it, what reads it, fields that are no keys, and further keys."""
+
+    header: str
+    read_by: type[Any]
+    no_keys: tuple[str, ...] = ()
+    also: tuple[tuple[str, str, str, str], ...] = ()
+
+
+_OF_FILE = ("name",)
+CHAPTERS: dict[str, tuple[Table, ...]] = {
+    "A scene: `models/<scene>/scene.toml`": (
+        Table("", SceneFile, ("parameters", "gravity", "tables")),
+        Table("[parameters.NAME]", Parameter),
+        Table("[gravity]", Gravity),
+    ),
+    "A scene with balls on surfaces": (
+        Table("[[balls]]", balls.Ball),
+        Table("[[surfaces]]", surfaces.Cylinder),
+        Table("[[surfaces]]", surfaces.Plane),
+        Table("[[contacts]]", balls.Contact),
+        Table("[[initial]]", balls.InitialMotion),
+    ),
+    "A scene with a mechanism": (
+        Table("[[bodies]]", mechanisms.Body),
+        Table(
+            "[[joints]]",
+            mechanisms.Joint,
+            also=(
+                (
+                    "dependent",
+                    "bool",
+                    "false",
+                    "q0 and v0 are found from the loops; the q0 that is given is the guess.",
+                ),
+            ),
+        ),
+        Table("[[loops]]", mechanisms.Loop),
+        Table("[[springs]]", mechanisms.Spring),
+        Table("[[points]]", mechanisms.Point),
+    ),
+    "A comparison: `comparisons/*.toml` without `study`": (
+        Table("", comparison.Comparison, ("name", "vary", "brief", "bands", "rows", "left_out")),
+        Table("[[rows]]", comparison.Row, ("except_at",)),
+        Table("[[rows.except_at]]", comparison.ExceptAt),
+    ),
+    'A trade-off: `study = "tradeoff"`': (
+        Table("", claims.TradeoffClaims, (*_OF_FILE, "over", "parameters", "cheapest", "holds", "converges")),
+        Table("[[cheapest]]", claimed.Cheapest),
+        Table("[[holds]]", claimed.Holds),
+        Table("[[converges]]", claimed.Converges),
+    ),
+    'A stability map: `study = "stability"`': (
+        Table("", stability_claims.StabilityFile, (*_OF_FILE, "axes", "claims")),
+        Table("[[axes]]", axes.Axis, ("parameters",)),
+        Table("[axes.parameters.NAME]", axes.Term),
+        Table("[[claims]]", stability_claims.Claim),
+    ),
+    'A regime map: `study = "regimes"`': (
+        Table("", regimes_study.RegimesStudy, (*_OF_FILE, "speed", "mu_static")),
+        Table("[speed], [mu_static]", regimes_study.EvenValues),
+    ),
+}
+# What is read by no dataclass of its own.
+REST = {
+    "A scene with a mechanism": """### `[[repeat]]`
+
+Tables that differ by a number, written once: `index` (a name, by default `i`), `from` (by default 0), `count`, and the
+tables themselves, `[[repeat.bodies]]`, `[[repeat.joints]]` …; their texts may hold `{i}` or `{i-1}`, their
+formulas `i`.
+
+### `[[published]]`
+
+What somebody else found of the same mechanism; it is kept with the scene and moves nothing.
+""",
+    "A comparison: `comparisons/*.toml` without `study`": """### `[vary]`, `[brief]`
+
+Parameter = list of values. `[vary]`: every combination is run. `[brief]`: a report of everything has only these values.
+
+### `[tolerances.NAME]`
+
+`because` (required), and observable = a number with its unit, `"1e-3 m"`, or `"1 %"` of its size in the truth.
+""",
+    'A trade-off: `study = "tradeoff"`': """### `[parameters]`, `[over]`
+
+Parameter = value of the scene; parameter = values at whose every combination the best points are run too.
+""",
+}
+INTRODUCTION = """# The vocabulary of scenes and comparisons
+
+Written by `docs/vocabulary.py` from what reads the files; do not edit it. `proofroll check NAME` says whether a file is
+sound, and an unknown key is an error. SI units, angles in rad; nothing is converted. In a scene `"$name"` is the value
+of a parameter, and in a mechanism `"= mass*length^2/12"` is a formula of parameters with `+ - * / ^ ( )` and `pi`.
+"""
+
+
+def meanings(read_by: type[Any]) -> dict[str, str]:
+    """What each field means: its line under ``Attributes:`` in the docstring of the class."""
+    found: dict[str, str] = {}
+    section = (inspect.getdoc(read_by) or "").partition("Attributes:\n")[2].split("\n\n")[0]
+    for names, text in re.findall(r"^    ([\w, ]+): (.*(?:\n        .*)*)", section, flags=re.MULTILINE):
+        found |= dict.fromkeys(re.split(r", ", names), " ".join(text.split()))
+    return found
+
+
+def keys(table: Table) -> Iterator[tuple[str, str, str, str]]:
+    """Key, type, default and meaning of each line of a table."""
+    said = meanings(table.read_by)
+    for item in dataclasses.fields(table.read_by):
+        if item.name not in table.no_keys:
+            unit = item.metadata.get("unit")
+            text = (
+                re.sub(r":\w+:`~?(?:[\w.]+\.)?(\w+)`", r"`\1`", said[item.name]).replace("``", "`").replace("|", r"\|")
+            )
+            text += f" [{unit}]" if unit and f"[{unit}" not in text and "[" not in text else ""
+            yield item.name, _type(item.type), _default(item), text
+    yield from table.also
+
+
+def _type(annotation: Any) -> str:
+    text = annotation if isinstance(annotation, str) else getattr(annotation, "__name__", str(annotation))
+    known = {
+        "Vector": "[x, y, z]",
+        "Vector | None": "[x, y, z]",
+        "Matrix": "3×3 or [Ixx, Iyy, Izz]",
+        "Kind": "kind of joint",
+        "Tolerance": '"1e-3 m" or "1 %"',
+    }
+    text = re.sub(r"Literal\[([^]]*)\]", lambda found: found[1].replace(", ", " or "), text)
+    text = re.sub(r"\b(?:tuple|list)\[", "[", re.sub(r"\bstr\b", "text", text))
+    return known.get(text, text.replace(" | None", "").replace("Tolerance", '"1e-3 m"').replace("|", "or"))
+
+
+def _default(item: dataclasses.Field[Any]) -> str:
+    value = item.default
+    if value is dataclasses.MISSING:
+        value = dataclasses.MISSING if item.default_factory is dataclasses.MISSING else item.default_factory()
+    if value is dataclasses.MISSING:
+        return "required"
+    if value is None or value in ("", [], {}, ()):
+        return "none"
+    if isinstance(value, float) and math.isinf(value):
+        return "inf"
+    if isinstance(value, (list, tuple)):
+        return str([str(part) if isinstance(part, str) else part for part in value]).replace("'", '"')
+    return {True: "true", False: "false"}[value] if isinstance(value, bool) else f"{value}"
+
+
+def example(header: str, chapter: str, kind: object) -> str:
+    """The first such table of our own files, up to its empty line."""
+    folder, pattern = ("models", "*/scene.toml") if chapter.startswith("A scene") else ("comparisons", "*.toml")
+    start = re.escape(header.partition(",")[0]).replace("NAME", r"[\w./\"]+")
+    for path in sorted((ROOT / folder).glob(pattern)):
+        only = rf'kind = "{kind}"\n' if isinstance(kind, str) else ""
+        if found := re.search(rf"^{start}\n{only}(?:.+\n?)+", path.read_text(encoding="utf-8"), flags=re.MULTILINE):
+            return f"From `{path.relative_to(ROOT)}`:\n\n```toml\n{found[0].rstrip()}\n```\n"
+    return ""
+
+
+def document() -> str:
+    """The whole text."""
+    parts = [INTRODUCTION]
+    for chapter, tables in CHAPTERS.items():
+        parts.append(f"## {chapter}\n")
+        for table in tables:
+            kind = getattr(table.read_by, "kind", None)
+            named = f' with `kind = "{kind}"`' if isinstance(kind, str) else ""
+            parts.append(f"### {f'`{table.header}`{named}' if table.header else 'The file itself'}\n")
+            lines = ["| key | type | default | meaning |", "|---|---|---|---|"]
+            lines += [f"| `{key}` | {typed} | {default} | {text} |" for key, typed, default, text in keys(table)]
+            parts.append("\n".join(lines) + "\n")
+            if table.header and (shown := example(table.header, chapter, kind)):
+                parts.append(shown)
+        if chapter in REST:
+            parts.append(REST[chapter])
+    return "\n".join(parts)
+
+
+if __name__ == "__main__":
+    FILE.write_text(document(), encoding="utf-8")
+    sys.stdout.write(f"{FILE.relative_to(ROOT)} is written\n")

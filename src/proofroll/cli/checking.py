@@ -1,0 +1,112 @@
+"""Whether a scene, a comparison or the file of another study is sound: it is read, and nothing is run."""
+
+from __future__ import annotations
+
+import dataclasses
+import sys
+from collections.abc import Mapping
+from importlib.metadata import entry_points
+from pathlib import Path
+from typing import Any
+
+from proofroll.cli.options import write_json
+from proofroll.core.errors import InputError, choices
+
+# What reads the files of a study: the name of the entry point is the file's ``study``; it is given the path as text.
+READERS = "proofroll.study_readers"
+
+
+def is_text_check(name: Path) -> bool:
+    """Whether a path is a scene or the file of a study, or the name of one."""
+    return name.suffix in {"", ".toml"} or name.is_dir()
+
+
+def check_text(name: str, as_json: bool) -> None:
+    """Says in one line what a scene or the file of a study holds.
+
+    Raises:
+        InputError: the first thing that is wrong with it.
+    """
+    found = checked(name)
+    if as_json:
+        write_json(found)
+        return
+    counts = ", ".join(
+        f"{count} {what.removesuffix('s') if count == 1 else what}" for what, count in found["counts"].items()
+    )
+    needs = f"; engines must provide: {', '.join(found['requires'])}" if found["requires"] else ""
+    about = f"{found['scene']}, " if found["kind"] != "scene" and found["scene"] else ""
+    sys.stdout.write(f"{found['name']} is sound: {found['kind']}, {about}{counts}{needs}\n")
+
+
+def checked(name: str) -> dict[str, Any]:
+    """What a scene or file holds: kind, name, path, scene, counts of its parts, and what the scene requires.
+
+    Args:
+        name: of a scene, or path of its folder or ``scene.toml``; else name or path of a file of a study.
+
+    Raises:
+        InputError: there is no such thing, or the first thing that is wrong with it.
+    """
+    from proofroll.files.comparison_file import comparison_names
+    from proofroll.files.scene_file import scene_folder, scene_names
+    from proofroll.files.toml import named_file, study_of
+
+    path = Path(name)
+    scene = str(path.parent) if path.name == "scene.toml" and path.is_file() else name
+    try:
+        scene_folder(scene)
+    except InputError:
+        file = named_file(name)
+        if file is None:
+            advice = (
+                f"there is no such scene or file; the scenes are {choices(scene_names())}, "
+                f"the comparisons {choices(comparison_names())}"
+            )
+            raise InputError("check", name, advice) from None
+        return _comparison(file) if study_of(file) is None else _study(file, str(study_of(file)))
+    return _scene(scene)
+
+
+def _scene(name: str) -> dict[str, Any]:
+    from proofroll.files.scene_file import load_scene, read_scene_file
+
+    file, scene = read_scene_file(name), load_scene(name)
+    tables = {f"[[{key}]]": len(value) for key, value in file.tables.items() if isinstance(value, list)}
+    return {
+        "kind": "scene",
+        "name": scene.name,
+        "path": str(scene.folder / "scene.toml"),
+        "scene": scene.name,
+        "counts": {"parameters": len(file.parameters)} | tables,
+        "requires": sorted(scene.requires),
+    }
+
+
+def _comparison(path: Path) -> dict[str, Any]:
+    from proofroll.files.comparison_file import load_comparison
+    from proofroll.files.scene_file import load_scene
+    from proofroll.studies.planning import row_facts
+
+    found = load_comparison(str(path))
+    row_facts(found, dict(enumerate(found.rows)), load_scene(found.scene).requires)
+    counts = {"points": len(found.combinations()), "rows": len(found.rows), "tolerances": len(found.bands)}
+    return _content("comparison", path, found.scene, counts)
+
+
+def _study(path: Path, study: str) -> dict[str, Any]:
+    readers = {point.name: point for point in entry_points(group=READERS)}
+    if study not in readers:
+        raise InputError(f"{path.name}: study", study, f"nothing reads such a file; choose from {choices(readers)}")
+    found = readers[study].load()(str(path))
+    parts = {"entries": found} if isinstance(found, list) else vars(found) if dataclasses.is_dataclass(found) else {}
+    counts = {
+        f"[{key}]" if isinstance(value, Mapping) else f"[[{key}]]": len(value)
+        for key, value in parts.items()
+        if isinstance(value, (list, tuple, Mapping)) and value
+    }
+    return _content(study, path, getattr(found, "scene", ""), counts)
+
+
+def _content(kind: str, path: Path, scene: str, counts: Mapping[str, int]) -> dict[str, Any]:
+    return {"kind": kind, "name": path.stem, "path": str(path), "scene": scene, "counts": counts, "requires": []}

@@ -1,0 +1,128 @@
+"""Working starts: a scene, a comparison, a package with an engine."""
+
+from __future__ import annotations
+
+import keyword
+import re
+import sys
+from collections.abc import Mapping
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated
+
+import typer
+
+from proofroll.core.errors import InputError
+from proofroll.core.observable import Role
+
+if TYPE_CHECKING:
+    from proofroll.core.scene import Scene
+
+new = typer.Typer(help="Write a working start: a scene, a comparison, or an engine.", no_args_is_help=True)
+Name = Annotated[str, typer.Argument(help="Its name: letters, digits and _; the folder or file is named so.")]
+_TEMPLATES = Path(__file__).parent / "templates"
+_UNTIL, _EVERY = 1.0, 0.02
+
+
+@new.command()
+def scene(name: Name) -> None:
+    """Write a folder NAME with a scene.toml: a rod that swings, to be changed into your scene."""
+    folder = _fresh(name, name)
+    _write(folder / "scene.toml", _filled(_TEMPLATES / "scene.toml", {"name": name}))
+    _say(folder, f"proofroll check {folder}", f"proofroll run {folder} --engine truth")
+
+
+@new.command()
+def comparison(name: Name, scene: Annotated[str, typer.Option(help="The scene, or the path of its folder.")]) -> None:
+    """Write NAME.toml: every installed engine that can, held against the truth of a scene."""
+    from proofroll.files.scene_file import load_scene
+
+    file = _fresh(name, f"{name}.toml")
+    _write(file, _comparison(name, scene, load_scene(scene)))
+    _say(file, f"proofroll check {file}", f"proofroll compare {file}")
+
+
+@new.command()
+def engine(name: Name) -> None:
+    """Write a package NAME with a working engine, its entry point and its conformance test."""
+    from proofroll.files.data_folders import data_folder
+
+    folder = _fresh(name, name)
+    names = {"name": name, "Class": "".join(part.capitalize() for part in name.split("_")) or name}
+    for template in sorted((_TEMPLATES / "engine").rglob("*")):
+        if template.is_file():  # those end in .txt of which tools would think that they are files of this project
+            target = folder / template.relative_to(_TEMPLATES / "engine")
+            _write(target.with_suffix("") if target.suffix == ".txt" else target, _filled(template, names))
+    example = (data_folder("docs/examples") / "semi_implicit.py").read_text(encoding="utf-8")
+    source = example.replace("SemiImplicit", names["Class"]).replace("semi_implicit", name)
+    _write(folder / "src" / name / "__init__.py", source)
+    _say(folder, f"pip install --editable {folder}", f"pytest {folder}")
+
+
+def _fresh(name: str, path: str) -> Path:
+    """The path, of which nothing is there yet.
+
+    Raises:
+        InputError: the name is none, or something of that name is there.
+    """
+    if not re.fullmatch(r"[a-z][a-z0-9_]*", name) or keyword.iskeyword(name):
+        raise InputError("name", name, "write small letters, digits and _, a letter first")
+    if Path(path).exists():
+        raise InputError("name", path, "this is there already; choose another name or folder")
+    return Path(path)
+
+
+def _filled(template: Path, names: Mapping[str, str]) -> str:
+    text = template.read_text(encoding="utf-8")
+    for key, value in names.items():
+        text = text.replace(f"@{key}@", value)
+    return text
+
+
+def _write(path: Path, text: str) -> None:
+    path.parent.mkdir(parents=True, exist_ok=True)
+    path.write_text(text, encoding="utf-8")
+
+
+def _say(path: Path, *commands: str) -> None:
+    sys.stdout.write("\n".join([f"{path} is written. Next:", *(f"  {command}" for command in commands), ""]))
+
+
+def _comparison(name: str, where: str, loaded: Scene) -> str:
+    """The text of a comparison file: one percent of what moves, for each engine that can."""
+    from proofroll.core.plugins import engine_names
+
+    moves = [item for item in loaded.observables.items() if item[1].headline and item[1].role is Role.MOTION]
+    moves = moves or [(loaded.deciding, loaded.observable(loaded.deciding))]
+    bounds = "".join(
+        f'{_quoted(name)} = "{"1 %" if item.floor is not None else f"1e-3 {item.unit}"}"\n' for name, item in moves
+    )
+    able = [found for engine in engine_names() if (found := _able(engine, loaded))]
+    rows = "".join(f'\n[[rows]]\nengine = "{text}"\ntolerance = "close"\n' for text in able)
+    return (
+        f'title = "{name}"\nquestion = "Which engines agree with the truth?"\nscene = {_quoted(where)}\n'
+        f"until = {_UNTIL}\nevery = {_EVERY}\n\n"
+        "# Every combination of these values is run: [vary], then parameter = [value, value].\n\n"
+        "# How far an observable may be from the truth, and why. Every key is described in docs/vocabulary.md.\n"
+        f'[tolerances.close]\nbecause = "a first look; say here why this is close enough"\n'
+        f"{bounds}\n"
+        '# What is expected of each engine: expect = "agrees" unless it says another verdict, and because.\n' + rows
+    )
+
+
+def _quoted(text: str) -> str:
+    import json
+
+    return json.dumps(text)
+
+
+def _able(engine: str, loaded: Scene) -> str | None:
+    """The engine with its first formulation that can represent the scene, as files write it; None if none can."""
+    from proofroll.core.errors import ProofrollError
+    from proofroll.running.runner import describe
+
+    try:
+        provides = describe(engine)["provides"]
+    except ProofrollError:
+        return None
+    first = next((name for name, given in provides.items() if loaded.requires <= set(given)), None)
+    return first and f"{engine}[formulation={first}]"

@@ -1,0 +1,91 @@
+"""``proofroll check`` of scenes and studies: one line, and nothing is run."""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Callable
+from pathlib import Path
+
+import pytest
+
+from proofroll.files.data_folders import data_folder
+from proofroll.files.scene_file import scene_names
+from proofroll.running import runner
+from proofroll.running.runner import Runner
+
+Proofroll = Callable[..., tuple[int, str, str]]
+COMPARISONS = data_folder("comparisons")
+
+
+@pytest.fixture(autouse=True)
+def nothing_runs(monkeypatch: pytest.MonkeyPatch) -> None:
+    """A check that runs a case fails."""
+
+    def run(*_: object) -> None:
+        raise AssertionError("a case was run")
+
+    monkeypatch.setattr(Runner, "run", run)
+    monkeypatch.setattr(runner, "run_one", run)
+
+
+@pytest.mark.parametrize("name", scene_names())
+def test_every_scene_is_sound(proofroll: Proofroll, name: str) -> None:
+    """Each scene of the package passes with one line that counts its parameters."""
+    code, out, err = proofroll("check", name)
+    assert (code, err, out.count("\n")) == (0, "", 1)
+    assert out.startswith(f"{name} is sound: scene, ")
+    assert " parameters, " in out
+
+
+@pytest.mark.parametrize("path", sorted(COMPARISONS.glob("*.toml")), ids=lambda path: path.stem)
+def test_every_study_is_sound(proofroll: Proofroll, path: Path) -> None:
+    """Each file of a study of the package passes with one line, whatever it is for."""
+    code, out, err = proofroll("check", str(path))
+    assert (code, err, out.count("\n")) == (0, "", 1)
+    assert out.startswith(f"{path.stem} is sound: ")
+
+
+def test_json(proofroll: Proofroll) -> None:
+    """With --json it says what the thing is, where it lies, its parts, and what engines must provide."""
+    code, out, _ = proofroll("check", "inclined_plane", "--json")
+    found = json.loads(out)
+    assert (code, found["kind"], found["name"]) == (0, "scene", "inclined_plane")
+    assert Path(found["path"]).is_file()
+    assert found["counts"]["[[balls]]"] == 1
+    assert found["requires"] == ["rolling without slip"]
+
+
+def broken(tmp_path: Path, name: str, old: str, new: str) -> str:
+    """A copy of a study of the package with a slip of the pen."""
+    text = (COMPARISONS / name).read_text(encoding="utf-8")
+    assert old in text
+    (tmp_path / name).write_text(text.replace(old, new, 1), encoding="utf-8")
+    return str(tmp_path / name)
+
+
+@pytest.mark.parametrize(
+    ("name", "old", "new", "words"),
+    [
+        ("inclined_plane.toml", "formulation=euler", "formulation=eulr", ["rows.0.engine", "eulr"]),
+        ("inclined_plane.toml", 'gap = "1e-5 m"', 'gap = "1e-5 s"', ["gap", "its unit is m"]),
+        ("tradeoff.toml", 'quantity = "z"', 'quantity = "height"', ["quantity = 'height'"]),
+        ("stability_plane.toml", "values = [0.05,", "value = [0.05,", ["axes.0"]),
+        ("regimes.toml", "low = 1.0", "low = 9.0", ["speed", "low <= high"]),
+        ("regimes.toml", 'study = "regimes"', 'study = "regime"', ["study = 'regime'", "regimes"]),
+    ],
+)
+def test_a_slip_of_the_pen(
+    proofroll: Proofroll, tmp_path: Path, name: str, old: str, new: str, words: list[str]
+) -> None:
+    """What is wrong is said in one line, with its place, and the exit code is 2."""
+    code, out, err = proofroll("check", broken(tmp_path, name, old, new))
+    assert (code, out, err.count("\n")) == (2, "", 1)
+    for word in words:
+        assert word in err
+
+
+def test_neither_scene_nor_file(proofroll: Proofroll) -> None:
+    """A name of nothing is told what there is."""
+    code, out, err = proofroll("check", "sphere_in_cone")
+    assert (code, out, err.count("\n")) == (2, "", 1)
+    assert "sphere_in_cylinder" in err

@@ -1,0 +1,81 @@
+"""``proofroll new``: what it writes works at once."""
+
+from __future__ import annotations
+
+import os
+import subprocess
+import sys
+import tomllib
+from collections.abc import Callable
+from pathlib import Path
+
+import pytest
+
+from proofroll.files.comparison_file import load_comparison
+
+Proofroll = Callable[..., tuple[int, str, str]]
+
+
+@pytest.fixture(autouse=True)
+def folder(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
+    """An empty folder, in which the commands are given."""
+    place = tmp_path / "mine"
+    place.mkdir()
+    monkeypatch.chdir(place)
+    return place
+
+
+def test_a_scene(proofroll: Proofroll) -> None:
+    """A new scene is sound, and the truth covers it."""
+    assert proofroll("new", "scene", "rod")[0] == 0
+    assert proofroll("check", "rod")[0] == 0
+    code, out, err = proofroll("run", "rod", "--engine", "truth", "--until", "0.1", "--every", "0.05", "--json")
+    assert (code, err) == (0, "")
+    assert '"status": "done"' in out
+
+
+@pytest.mark.parametrize("scene", ["inclined_plane", "./rod"])
+def test_a_comparison(proofroll: Proofroll, scene: str) -> None:
+    """A new comparison is sound, of balls and of mechanisms, and has a row for each engine that can."""
+    assert proofroll("new", "scene", "rod")[0] == 0
+    assert proofroll("new", "comparison", "claim", "--scene", scene)[0] == 0
+    code, out, err = proofroll("check", "claim.toml")
+    assert (code, err) == (0, "")
+    assert out.startswith("claim is sound: comparison, ")
+    names = {row.engine.partition("[")[0] for row in load_comparison("claim.toml").rows}
+    assert {"projection", "mujoco", "exudyn", "pinocchio"} <= names
+    assert "absent" not in names
+    assert ("reduced" in names) == (scene == "inclined_plane")  # it has no equations of a rod
+
+
+def test_an_engine(proofroll: Proofroll, folder: Path) -> None:
+    """A new engine announces its class, and passes its own conformance test."""
+    assert proofroll("new", "engine", "my_engine")[0] == 0
+    project = tomllib.loads((folder / "my_engine" / "pyproject.toml").read_text(encoding="utf-8"))["project"]
+    assert project["entry-points"]["proofroll.engines"] == {"my_engine": "my_engine:MyEngine"}
+    install = ["pip", "install", "--quiet", "--no-deps", "--no-build-isolation", "--target", "site", "./my_engine"]
+    subprocess.run([sys.executable, "-m", *install], cwd=folder, capture_output=True, timeout=600, check=True)
+    done = subprocess.run(
+        [sys.executable, "-m", "pytest", "-q", "-p", "no:cacheprovider", "tests"],
+        cwd=folder / "my_engine",
+        env=os.environ | {"PYTHONPATH": str(folder / "site")},
+        capture_output=True,
+        text=True,
+        timeout=600,
+        check=False,
+    )
+    assert done.returncode == 0, done.stdout
+    assert " passed" in done.stdout
+
+
+@pytest.mark.parametrize("what", [["scene"], ["engine"], ["comparison", "--scene", "pendulum"]])
+def test_nothing_is_overwritten(proofroll: Proofroll, folder: Path, what: list[str]) -> None:
+    """What is there already stays, and so does a place that a name would lead out of the folder."""
+    file = folder / ("mine.toml" if what[0] == "comparison" else "mine")
+    file.write_text("dear to me")
+    for name in ("mine", "../mine", "Mine", "class"):
+        code, out, err = proofroll("new", what[0], name, *what[1:])
+        assert (code, out, err.count("\n")) == (2, "", 1)
+        assert "name = " in err
+    assert file.read_text() == "dear to me"
+    assert [path.name for path in folder.iterdir()] == [file.name]
