@@ -134,10 +134,11 @@ def write_report(outcomes: list[Outcome], store: Store, out: Path, command: str)
 def _replay(outcomes: list[Outcome], store: Store) -> dict[str, Any]:
     """The replay of the comparisons whose kind of element has one: of the first such kind."""
     kinds = {id(item): kind_of(load_scene(item.comparison.scene)) for item in outcomes}
-    first = next((kind for kind in kinds.values() if kind is not None), None)
-    if first is None:
-        return {"cases": []}
-    return first.replay([item for item in outcomes if kinds[id(item)] is first], store)
+    for kind in dict.fromkeys(kind for kind in kinds.values() if kind is not None):
+        found = kind.replay([item for item in outcomes if kinds[id(item)] is kind], store)
+        if found["cases"]:
+            return found
+    return {"cases": []}
 
 
 def _described(replay: dict[str, Any]) -> list[dict[str, Any]]:

@@ -24,10 +24,12 @@ class ReportKind(Protocol):
         template: in the folder ``templates`` beside the class's module, with the macro
             ``truth(comparison, number, index, truth)``: what is told of a truth besides its route; empty: nothing.
         names: further names that the template uses; no other kind has them.
+        caption: markup below the drawings.
     """
 
     template: ClassVar[str]
     names: ClassVar[Mapping[str, Any]]
+    caption: ClassVar[str]
 
     @staticmethod
     def covers(scene: Scene) -> bool:
@@ -35,7 +37,10 @@ class ReportKind(Protocol):
 
     @staticmethod
     def drawings(scenes: Sequence[Scene]) -> tuple[list[dict[str, Any]], str]:
-        """Drawings of a comparison's scene as plain data, for all its cases; and why there are none, if so."""
+        """Drawings of a comparison's scene for all its cases; and why there are none, if so.
+
+        Each is of the form that :meth:`proofroll.report.pen.Drawing.content` gives, with a ``label``: what it shows.
+        """
 
     @staticmethod
     def truth_facts(scene: Scene, dataset: xr.Dataset) -> dict[str, Any]:

@@ -49,7 +49,7 @@ def point_curves(outcome: Outcome, store: Store) -> list[dict[str, Any]]:
         truth = read(path)
         scene = load_scene(outcome.comparison.scene, **case.parameters)
         sizes = scales(scene, truth)
-        drawn = {key: item for key, item in scene.observables.items() if item.role in _DRAWN and key in truth}
+        drawn = {key: item for key, item in scene.observables.items() if item.role in _DRAWN and _curve(truth, key)}
         engines = _engines(outcome, store, name, list(drawn))
         entries.append(
             {
@@ -96,6 +96,11 @@ def _engines(outcome: Outcome, store: Store, point: str, drawn: list[str]) -> li
             assert run.case is not None  # it has a trajectory
             found.append((number, run, read_some(store.trajectory(run.case), drawn)))
     return found
+
+
+def _curve(truth: xr.Dataset, name: str) -> bool:
+    """Whether a variable is one curve over time; those of several, such as all reactions, are judged and not drawn."""
+    return name in truth and truth[name].dims == ("time",)
 
 
 def _has_trajectory(run: Run, store: Store) -> bool:

@@ -12,7 +12,10 @@ from proofroll.running.case import Case, Result
 
 
 def run_content(case: Case, result: Result, trajectory: Path) -> dict[str, Any]:
-    """A run as plain data; ``final`` is the state at the last sample, empty if there is none."""
+    """A run as plain data.
+
+    ``final`` is the state at the last sample, empty if there is none; ``absent`` says of variables without a value why.
+    """
     content: dict[str, Any] = {
         "scene": case.scene,
         "parameters": case.parameters,
@@ -23,6 +26,7 @@ def run_content(case: Case, result: Result, trajectory: Path) -> dict[str, Any]:
         "until": case.until,
         "final": {},
         "units": {},
+        "absent": {},
         "events": [],
         "wall_seconds": result.wall_seconds,
         "versions": result.versions,
@@ -34,6 +38,7 @@ def run_content(case: Case, result: Result, trajectory: Path) -> dict[str, Any]:
     curves = {name: variable for name, variable in dataset.data_vars.items() if variable.dims == ("time",)}
     content["final"] = {"time": float(dataset["time"][-1])} | {str(k): float(v[-1]) for k, v in curves.items()}
     content["units"] = {"time": "s"} | {str(name): variable.attrs["units"] for name, variable in curves.items()}
+    content["absent"] = {str(k): str(v.attrs["absent"]) for k, v in curves.items() if "absent" in v.attrs}
     if "smallest_N" in dataset.attrs:
         content["smallest_N"] = float(dataset.attrs["smallest_N"])
     content["events"] = [dataclasses.asdict(event) for event in events_of(dataset)]
@@ -60,10 +65,14 @@ def run_lines(content: dict[str, Any]) -> list[Any]:
     table.add_column("unit")
     if bars:
         table.add_column("error bar", justify="right")
-    for name, value in content["final"].items():
+    shown = {name: value for name, value in content["final"].items() if name not in content["absent"]}
+    for name, value in shown.items():
         bar = [f"{bars[name]:.1e}" if name in bars else ""] if bars else []
         table.add_row(name, f"{value:.12g}", content["units"][name], *bar)
     lines.append(table)
+    for reason in dict.fromkeys(content["absent"].values()):
+        without = [name for name, why in content["absent"].items() if why == reason]
+        lines.append(Text(f"{reason}: {', '.join(without)}"))
     if "smallest_N" in content:
         lines.append(Text(f"smallest normal force: {content['smallest_N']:.6g} N"))
     lines.append(Text(f"{content['wall_seconds']:.3g} s of wall time"))

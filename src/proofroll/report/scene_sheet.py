@@ -25,7 +25,8 @@ def scene_sheet(scene: str, points: Sequence[dict[str, float]]) -> dict[str, Any
 
     Returns:
         ``title``, ``source``; ``parameters``: for each ``symbol``, ``values``, ``unit``, ``meaning``, ``source``,
-        ``varied``; ``drawings``: as the kind of scene draws them, empty with the reason in ``undrawn``.
+        ``varied``; ``drawings``: as the kind of scene draws them, empty with the reason in ``undrawn``; ``caption``:
+        of the drawings, as markup.
     """
     file = read_scene_file(scene)
     drawn = [load_scene(scene, **point) for point in points] or [load_scene(scene)]
@@ -53,6 +54,7 @@ def scene_sheet(scene: str, points: Sequence[dict[str, float]]) -> dict[str, Any
         "parameters": parameters,
         "drawings": drawings,
         "undrawn": undrawn,
+        "caption": kind.caption if kind else "",
     }
 
 

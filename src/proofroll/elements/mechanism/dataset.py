@@ -16,6 +16,9 @@ if TYPE_CHECKING:
 
     from proofroll.elements.mechanism.element import MechanismElement
 
+# Why a variable has no value.
+UNDETERMINED, UNSAID = "not determined by the equations", "not given by the engine"
+
 
 def from_samples(element: MechanismElement, times: FloatArray, samples: Sequence[Sample]) -> xr.Dataset:
     """The variables of a run, from one sample per time [s]."""
@@ -47,7 +50,7 @@ def variables(
     Variables: ``p_WB`` [m], ``v_WB`` [m/s], ``w_WB`` [rad/s] over (time, body, xyz), ``q_WB`` over (time, body, wxyz);
     ``positions`` [m] of the tracked points; ``q.<joint>``, ``v.<joint>`` of joints with one coordinate;
     ``<point>.x|y|z`` [m]; ``force.<joint>.x|y|z`` [N] and ``torque.<joint>.x|y|z`` [N m] on the child, at the joint, in
-    world axes, NaN where the equations do not determine it or the engine cannot say it; ``forces``, ``torques``: the
+    world axes, NaN where the attribute ``absent`` says why; ``forces``, ``torques``: the
     determinate components of all; ``energy`` [J], ``energy_error`` [J], ``drift`` [m].
     """
     import xarray as xr
@@ -56,8 +59,9 @@ def variables(
     placed = Placed(mechanism, times, p_WB, v_WB, w_WB, _continuous(q_WB, element.start.q_WB[0]))
     found: dict[str, tuple[tuple[str, ...], FloatArray, dict[str, str]]] = {}
 
-    def put(name: str, values: FloatArray, unit: str, meaning: str, *dims: str) -> None:
-        found[name] = (("time", *dims), values, {"units": unit, "long_name": meaning})
+    def put(name: str, values: FloatArray, unit: str, meaning: str, *dims: str, absent: str = "") -> None:
+        attributes = {"units": unit, "long_name": meaning} | ({"absent": absent} if absent else {})
+        found[name] = (("time", *dims), values, attributes)
 
     put("p_WB", p_WB, "m", "origin of each body's frame in the world", "body", "xyz")
     put("v_WB", v_WB, "m/s", "velocity of that origin in the world", "body", "xyz")
@@ -81,7 +85,10 @@ def variables(
         for index, name in enumerate(names):
             for axis, letter in enumerate("xyz"):
                 meaning = f"{kind} on the child of {name}"
-                put(f"{kind}.{name}.{letter}", masked[:, index, axis], unit, meaning)
+                component = masked[:, index, axis]
+                absent = "" if known[index, axis] else UNDETERMINED
+                absent = absent or (UNSAID if np.all(np.isnan(component)) else "")
+                put(f"{kind}.{name}.{letter}", component, unit, meaning, absent=absent)
         if np.any(known):
             meaning = f"determinate components of the {kind}s on children"
             put(f"{kind}s", values[:, known], unit, meaning, f"{kind}_component")

@@ -21,6 +21,11 @@ class BallReport:
 
     template: ClassVar[str] = "slips.html"
     names: ClassVar[Mapping[str, Any]] = {"onsets": onset_tables}
+    caption: ClassVar[str] = (
+        "First the whole, to scale; then the ball enlarged, with its local frame at the contact: e<sub>1</sub> into "
+        "the wall, e<sub>2</sub> and e<sub>3</sub> along its coordinates. N, F<sub>2</sub>, F<sub>3</sub> are drawn "
+        "as forces on the ball, in their positive sense."
+    )
 
     @staticmethod
     def covers(scene: Scene) -> bool:
@@ -33,7 +38,11 @@ class BallReport:
         from proofroll.elements.ball_on_surface.report.drawings import overview
 
         shown = max((rolling_ball(scene) for scene in scenes), key=lambda body: body.contact.rolling_resistance)
-        found = [item.content() for item in overview(shown.wall, shown)]
+        labels = ("as a whole", "where the ball touches the wall")
+        found = [
+            item.content() | {"label": label}
+            for item, label in zip(overview(shown.wall, shown), labels, strict=False)
+        ]
         return found, "" if found else f"There is no drawing for a wall of the kind {type(shown.wall).__name__}."
 
     @staticmethod

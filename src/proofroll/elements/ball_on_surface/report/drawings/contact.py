@@ -6,7 +6,7 @@ import numpy as np
 
 from proofroll.core.arrays import FloatArray
 from proofroll.elements.ball_on_surface.model import RollingBall
-from proofroll.elements.ball_on_surface.report.drawings.pen import Drawing, View, beyond, circle, turn
+from proofroll.report.pen import Drawing, View, beyond, circle, turn
 
 _BALL = 84.0  # radius of the ball [px]
 # How far rolling resistance shifts the normal force, in radii: millimetres would not be seen.

@@ -9,7 +9,7 @@ import numpy as np
 from proofroll.core.arrays import FloatArray
 from proofroll.elements.ball_on_surface.model import RollingBall
 from proofroll.elements.ball_on_surface.report.drawings.contact import contact
-from proofroll.elements.ball_on_surface.report.drawings.pen import Drawing, View, beyond, turn
+from proofroll.report.pen import Drawing, View, beyond, turn
 from proofroll.elements.ball_on_surface.surfaces import Cylinder, Plane, Surface
 
 _SIZE = 128.0  # half the width of what is drawn of a wall [px]

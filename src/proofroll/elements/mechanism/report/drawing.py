@@ -1,0 +1,128 @@
+"""A mechanism at its start, drawn from its own data: bodies, joints, loops, springs and tracked points."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from proofroll.core.arrays import FloatArray
+from proofroll.elements.mechanism.element import MechanismElement
+from proofroll.elements.mechanism.joint import WITH_AXIS
+from proofroll.elements.mechanism.model import WORLD
+from proofroll.report.pen import Drawing, View, beyond
+
+_SIZE = 240.0  # of the mechanism in the picture [px]
+_JOINT, _MASS, _POINT = 4.0, 2.5, 3.0  # radii of what marks them [px]
+_GRAVITY = 44.0  # length of the arrow [px]
+_MOST_NAMES = 12  # of joints and loops: more would cover the drawing
+_OBLIQUE = (0.45, -0.85, 0.35)  # direction towards the viewer of what is not plane, world axes with z up
+_TEETH = 8  # of the zigzag of a spring
+
+
+def drawn(element: MechanismElement) -> Drawing:
+    """The skeleton of a mechanism: from each body's centre of mass a line to all that is fastened to the body."""
+    mechanism, start, picture = element.mechanism, element.start, Drawing()
+    at = _view(element)
+
+    def place(body: str, position: tuple[float, ...]) -> FloatArray:
+        return start.point(body, position)[0]
+
+    joints = [(j.name, j.kind, j.parent, j.position, j.child, j.child_position) for j in mechanism.joints]
+    loops = [(k.name, k.kind, k.body_a, k.position_a, k.body_b, k.position_b) for k in mechanism.loops]
+    fastened: dict[str, list[FloatArray]] = {body.name: [] for body in mechanism.bodies} | {WORLD: []}
+    for _, kind, a, at_a, b, at_b in [*joints, *loops]:
+        if kind != "free":
+            fastened[a].append(place(a, at_a))
+            fastened[b].append(place(b, at_b))
+    for spring in mechanism.springs:
+        ends = place(spring.body_a, spring.position_a), place(spring.body_b, spring.position_b)
+        picture.path(_zigzag(at(np.stack(ends))), "thin")
+        fastened[spring.body_a].append(ends[0])
+        fastened[spring.body_b].append(ends[1])
+    for point in mechanism.points:
+        fastened[point.body].append(place(point.body, point.position))
+    for body in mechanism.bodies:
+        com = place(body.name, body.com)
+        for end in fastened[body.name]:
+            picture.path(at(np.stack([com, end])), "line")
+        picture.disc(at(com).tolist(), _MASS, "ball")
+    for number, (name, kind, a, at_a, b, at_b) in enumerate([*joints, *loops]):
+        if kind == "free":
+            continue
+        here, there = place(a, at_a), place(b, at_b)
+        if kind == "prismatic":  # the line on which the child slides
+            way = there - here if np.linalg.norm(there - here) else 0.2 * element.length * _axis(element, number)
+            picture.path(at(np.stack([here - 0.3 * way, there + 0.3 * way])), "axis")
+        picture.disc(at(there).tolist(), _JOINT, "ghost" if number >= len(joints) else "wall")
+        if len(joints) + len(loops) <= _MOST_NAMES:
+            _name(picture, at(there), name, "letter", (0.0, -9.0))
+    for point in mechanism.points:
+        here = at(place(point.body, point.position))
+        picture.disc(here.tolist(), _POINT, "motion")
+        _name(picture, here, point.name, "motion-letter", (0.0, 16.0))
+    _gravity(picture, at, element)
+    return picture
+
+
+def _view(element: MechanismElement) -> View:
+    """Along the axes of the joints where all are parallel, else obliquely; gravity points down in the picture."""
+    mechanism = element.mechanism
+    axes = [_axis(element, n) for n, joint in enumerate(mechanism.joints) if joint.kind == "revolute"]
+    down = np.array(mechanism.gravity)
+    up = -down / np.linalg.norm(down) if np.any(down) else np.array([0.0, 0.0, 1.0])
+    viewer = _turned(np.array(_OBLIQUE), up)
+    plane = axes and all(np.linalg.norm(np.cross(axes[0], axis)) < 1e-6 for axis in axes)
+    slides = any(joint.kind not in {"revolute", "prismatic", "fixed"} for joint in mechanism.joints)
+    if plane and not slides:
+        viewer = axes[0] * (1.0 if float(axes[0] @ np.ones(3)) > 0 else -1.0)
+        if np.linalg.norm(np.cross(viewer, up)) < 1e-6:
+            up = np.array([0.0, 1.0, 0.0]) if abs(viewer[1]) < abs(viewer[2]) else np.array([0.0, 0.0, 1.0])
+    return View(viewer, up, _SIZE / element.length)
+
+
+def _turned(direction: FloatArray, up: FloatArray) -> FloatArray:
+    """A direction that is given for z up, for another direction that is up."""
+    first = np.eye(3)[int(np.argmin(np.abs(up)))]
+    across = np.cross(up, first)
+    across /= np.linalg.norm(across)
+    return np.asarray(np.stack([np.cross(across, up), across, up], axis=1) @ direction)
+
+
+def _axis(element: MechanismElement, number: int) -> FloatArray:
+    """The axis of a joint, or of a loop after them, in the world at the start."""
+    mechanism, count = element.mechanism, len(element.mechanism.joints)
+    if number < count:
+        joint = mechanism.joints[number]
+        assert joint.kind in WITH_AXIS  # the others are not asked
+        body, frame = joint.parent, joint.parent_frame
+    else:
+        loop = mechanism.loops[number - count]
+        body, frame = loop.body_a, loop.frame_a
+    return np.asarray(element.start.R_WB[0, mechanism.body_index[body]] @ frame[:, 2])
+
+
+def _zigzag(ends: FloatArray) -> FloatArray:
+    """A spring between two places of the picture, shape (2, 2)."""
+    along = ends[1] - ends[0]
+    across = 5.0 * np.array([-along[1], along[0]]) / (np.linalg.norm(along) or 1.0)
+    inner = [
+        ends[0] + (0.15 + 0.7 * (k + 0.5) / _TEETH) * along + (1 if k % 2 else -1) * across for k in range(_TEETH)
+    ]
+    return np.stack([ends[0], ends[0] + 0.15 * along, *inner, ends[0] + 0.85 * along, ends[1]])
+
+
+def _name(picture: Drawing, place: FloatArray, name: str, look: str, beside: tuple[float, float]) -> None:
+    """A name as it stands in files; the pen would take its underscores for indices."""
+    picture.text(place, name.replace("_", " "), look, beside)
+
+
+def _gravity(picture: Drawing, at: View, element: MechanismElement) -> None:
+    """The direction of gravity beside the mechanism; nothing where there is none."""
+    gravity = np.array(element.mechanism.gravity)
+    if not np.any(gravity):
+        return
+    x, y, width, _ = picture.content()["box"]
+    along = at(gravity / np.linalg.norm(gravity)) / at.scale
+    place = np.array([x + width + 14.0, y + 10.0])
+    ends = np.stack([place, place + _GRAVITY * along])
+    picture.arrow(ends, "force")
+    picture.text(beyond(ends), "g", "force-letter")

@@ -1,0 +1,60 @@
+"""Mechanisms in the report of a comparison."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from typing import TYPE_CHECKING, Any, ClassVar
+
+from proofroll.core.scene import Scene
+from proofroll.elements.mechanism.element import MechanismElement
+
+if TYPE_CHECKING:
+    import xarray as xr
+
+    from proofroll.running.store import Store
+    from proofroll.studies.compare import Outcome, Run
+
+
+class MechanismReport:
+    """See :class:`proofroll.report.kinds.ReportKind`."""
+
+    template: ClassVar[str] = ""
+    names: ClassVar[Mapping[str, Any]] = {}
+    caption: ClassVar[str] = (
+        "At the start, to scale. Filled dots are centres of mass, with a line to all that is fastened to the body; "
+        "circles are joints, dashed circles the loops that close the tree, zigzags springs, coloured circles the "
+        "tracked points."
+    )
+
+    @staticmethod
+    def covers(scene: Scene) -> bool:
+        """One mechanism alone."""
+        return len(scene.elements) == 1 and isinstance(scene.elements[0], MechanismElement)
+
+    @staticmethod
+    def drawings(scenes: Sequence[Scene]) -> tuple[list[dict[str, Any]], str]:
+        """The first case at its start."""
+        from proofroll.elements.mechanism.report.drawing import drawn
+
+        element = scenes[0].elements[0]
+        assert isinstance(element, MechanismElement)  # it covers no other
+        return [drawn(element).content() | {"label": "at the start"}], ""
+
+    @staticmethod
+    def truth_facts(scene: Scene, dataset: xr.Dataset) -> dict[str, Any]:  # noqa: ARG004 -- the protocol's
+        """Nothing besides its route and error bars."""
+        return {}
+
+    @staticmethod
+    def add_to_runs(content: dict[str, Any], runs: Sequence[Run], store: Store) -> None:
+        """Nothing."""
+
+    @staticmethod
+    def mark(content: dict[str, Any], curves: list[dict[str, Any]]) -> list[dict[str, Any]]:  # noqa: ARG004 -- the protocol's
+        """The curves as they are."""
+        return curves
+
+    @staticmethod
+    def replay(outcomes: Sequence[Outcome], store: Store) -> dict[str, Any]:  # noqa: ARG004 -- the protocol's
+        """None yet."""
+        return {"cases": []}
