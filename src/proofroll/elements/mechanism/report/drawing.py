@@ -24,11 +24,12 @@ def drawn(element: MechanismElement) -> Drawing:
     at = _view(element)
 
     def place(body: str, position: tuple[float, ...]) -> FloatArray:
-        return start.point(body, position)[0]
+        found: FloatArray = start.point(body, position)[0]
+        return found
 
     joints = [(j.name, j.kind, j.parent, j.position, j.child, j.child_position) for j in mechanism.joints]
     loops = [(k.name, k.kind, k.body_a, k.position_a, k.body_b, k.position_b) for k in mechanism.loops]
-    fastened: dict[str, list[FloatArray]] = {body.name: [] for body in mechanism.bodies} | {WORLD: []}
+    fastened: dict[str, list[FloatArray]] = {name: [] for name in (*(body.name for body in mechanism.bodies), WORLD)}
     for _, kind, a, at_a, b, at_b in [*joints, *loops]:
         if kind != "free":
             fastened[a].append(place(a, at_a))
@@ -104,9 +105,7 @@ def _zigzag(ends: FloatArray) -> FloatArray:
     """A spring between two places of the picture, shape (2, 2)."""
     along = ends[1] - ends[0]
     across = 5.0 * np.array([-along[1], along[0]]) / (np.linalg.norm(along) or 1.0)
-    inner = [
-        ends[0] + (0.15 + 0.7 * (k + 0.5) / _TEETH) * along + (1 if k % 2 else -1) * across for k in range(_TEETH)
-    ]
+    inner = [ends[0] + (0.15 + 0.7 * (k + 0.5) / _TEETH) * along + (1 if k % 2 else -1) * across for k in range(_TEETH)]
     return np.stack([ends[0], ends[0] + 0.15 * along, *inner, ends[0] + 0.85 * along, ends[1]])
 
 
