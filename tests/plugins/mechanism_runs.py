@@ -2,8 +2,6 @@
 
 import dataclasses
 import functools
-import tomllib
-from pathlib import Path
 
 import numpy as np
 
@@ -11,8 +9,8 @@ from proofroll.core.plugins import load_engine
 from proofroll.elements.mechanism import Tree
 from proofroll.elements.mechanism.analysis import analysed
 from proofroll.elements.mechanism.joint_coordinates import JointCoordinates
-from proofroll.elements.mechanism.reader import read_mechanism
 from proofroll.elements.mechanism.rotations import from_quaternion
+from proofroll.files.scene_file import load_scene
 
 # Every formulation for mechanisms: its engine, and the preset that is held against tight bounds.
 FORMULATIONS = {
@@ -23,13 +21,12 @@ FORMULATIONS = {
     "constraint_dynamics": ("pinocchio", "tuned"),
     "dependent": ("projection", "matched"),
 }
-MODELS = Path(__file__).parents[2] / "models"
 
 
 @functools.cache
 def model(name, **parameters):
     """The mechanism of a scene."""
-    return read_mechanism(tomllib.loads((MODELS / name / "scene.toml").read_text()), **parameters)
+    return load_scene(name, **parameters).elements[0].mechanism
 
 
 @functools.cache

@@ -8,7 +8,7 @@ from proofroll.elements.mechanism import Tree
 from proofroll.elements.mechanism.analysis import analysed
 from proofroll.elements.mechanism.reader import KINDS
 
-MODELS = Path(__file__).parents[3] / "models"
+MODELS = Path(__file__).parents[4] / "models"
 
 # rows of loops, their rank, degrees of freedom, determinate components of the wrenches of joints and loops
 EXPECTED = {

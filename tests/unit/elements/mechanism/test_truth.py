@@ -10,7 +10,7 @@ from proofroll.elements.mechanism.joint_coordinates import JointCoordinates
 from proofroll.truth.mechanism import maximal_taylor
 from proofroll.truth.mechanism.two_routes import CHAOS, find_truth, to_dataset
 
-MODELS = Path(__file__).parents[3] / "models"
+MODELS = Path(__file__).parents[4] / "models"
 
 
 @pytest.fixture(scope="module")
