@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from proofroll.core.errors import InputError
+from proofroll.core.errors import InputError, Missing
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -56,11 +56,14 @@ def draw_run(dataset: xr.Dataset, path: Path) -> None:
     Args:
         dataset: the run.
         path: the file; its ending says which kind.
+
+    Raises:
+        Missing: what draws it is not installed.
     """
-    if path.suffix.lower() == ".html":
-        _page(dataset, path)
-    else:
-        _picture(dataset, path)
+    try:
+        (_page if path.suffix.lower() == ".html" else _picture)(dataset, path)
+    except ModuleNotFoundError as error:
+        raise Missing(f"{error.name} is missing, which draws it: pip install 'proofroll[report]'") from None
 
 
 def _title(dataset: xr.Dataset) -> str:
