@@ -37,12 +37,11 @@ class Screen(Console):
 
     def print(self, *objects: Any, **options: Any) -> None:
         """See :class:`rich.console.Console`; of a table that is too wide, columns go below the others: none is cut."""
-        for item in objects:
-            if isinstance(item, Table):
-                for part in fitted(item, self):
-                    super().print(part, **options)
-            else:
-                super().print(item, **options)
+        if len(objects) == 1 and isinstance(objects[0], Table):
+            for part in fitted(objects[0], self):
+                super().print(part, **options)
+        else:
+            super().print(*objects, **options)
 
 
 _WIDEST = 10_000  # characters: the width at which nothing wraps

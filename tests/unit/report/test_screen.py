@@ -50,7 +50,9 @@ def test_a_table_is_never_cut(width: int, monkeypatch: pytest.MonkeyPatch, capsy
         table.add_column(f"name{index} [m/s]", justify="right", no_wrap=index % 2 == 0)
     table.add_row("pinocchio free_flyer matched", *numbers)
     console().print(table)
+    console().print()
     out = capsys.readouterr().out
+    assert out.endswith("\n\n")
     assert max(map(len, out.splitlines())) <= width
     assert "…" not in out
     for word in ("errors", "pinocchio", "free_flyer", "matched", *numbers):
