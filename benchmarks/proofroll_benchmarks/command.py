@@ -81,8 +81,8 @@ def reference(
     """The compiled models against the engines: how many times faster, at how large an error."""
     from proofroll_benchmarks.reference import reference as measured
 
-    with spinner("reference") as sign:
-        content: dict[str, Any] = measured(rounds, sign.update)
+    with spinner("reference") as say:
+        content: dict[str, Any] = measured(rounds, say)
     if as_json:
         write_json(content)
     else:

@@ -17,6 +17,7 @@ from proofroll.cli.ladder import ladder
 from proofroll.cli.lists import engines, scenes
 from proofroll.cli.new import new
 from proofroll.cli.options import ENGINE, INTERRUPTED, OK, USAGE, complain
+from proofroll.cli.plot import plot
 from proofroll.cli.recommend import recommend
 from proofroll.cli.report import report
 from proofroll.cli.run import run
@@ -31,7 +32,7 @@ app = typer.Typer(
     rich_markup_mode=None,
 )
 _STUDIES = (compare, report, tradeoff, recommend, ladder, stability)
-for _command in (scenes, engines, run, *_STUDIES):
+for _command in (scenes, engines, run, plot, *_STUDIES):
     app.command()(_command)
 app.add_typer(new, name="new")
 for _point in sorted(entry_points(group="proofroll.commands"), key=lambda point: point.name):

@@ -3,19 +3,25 @@
 from __future__ import annotations
 
 import json
+import os
 import sys
+import threading
+import time
 from collections.abc import Callable, Iterator
-from contextlib import contextmanager
+from contextlib import contextmanager, nullcontext
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Any
+from typing import TYPE_CHECKING, Annotated
 
 import typer
 
 from proofroll.core.errors import InputError
 
 if TYPE_CHECKING:
+    from rich.console import Console
+
     from proofroll.running.runner import Runner
 
+_SAID_EVERY = 10.0  # seconds between lines of progress where no bar can be shown
 OK, CONTRADICTED, USAGE, ENGINE, INTERRUPTED = 0, 1, 2, 3, 130
 
 Json = Annotated[bool, typer.Option("--json", help="Print one JSON document on standard output, nothing else.")]
@@ -37,16 +43,49 @@ def new_runner(out: Path, fresh: bool, jobs: int | None) -> Runner:
 
 @contextmanager
 def progress_bar(what: str, total: int | None = None) -> Iterator[Callable[..., None]]:
-    """A progress bar on standard error; call what it gives with a description and, if not 1, a count."""
+    """A progress bar on standard error; call what it gives with a description and, if not 1, a count.
+
+    Where standard error is no terminal, or nothing may move there, it is a line now and then.
+    """
     from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn, TimeElapsedColumn
 
+    columns = (TextColumn("{task.description}"), BarColumn(), MofNCompleteColumn(), TimeElapsedColumn())
+    console, moves = _standard_error()
+    with Progress(*columns, console=console, transient=True, disable=not moves) as progress:
+        task = progress.add_task(what, total=total)
+
+        def line() -> str:
+            now = progress.tasks[0]
+            return f"{now.description}: {now.completed:g}{'' if now.total is None else f' of {now.total:g}'}"
+
+        with nullcontext() if moves else _now_and_then(line):
+            yield lambda description, count=1: progress.update(task, advance=count, description=description)
+
+
+@contextmanager
+def _now_and_then(line: Callable[[], str]) -> Iterator[None]:
+    """A line on standard error every few seconds, with the seconds that have passed."""
+    start, ended = time.monotonic(), threading.Event()
+
+    def say() -> None:
+        while not ended.wait(_SAID_EVERY):
+            complain(f"{line()}, {time.monotonic() - start:.0f} s")
+
+    speaker = threading.Thread(target=say, daemon=True)
+    speaker.start()
+    try:
+        yield
+    finally:
+        ended.set()
+        speaker.join()
+
+
+def _standard_error() -> tuple[Console, bool]:
+    """The console on standard error, and whether signs may move on it: not in a pipe, nor under NO_COLOR."""
     from proofroll.report.screen import Screen
 
-    columns = (TextColumn("{task.description}"), BarColumn(), MofNCompleteColumn(), TimeElapsedColumn())
-    console = Screen(stderr=True)  # where it is no terminal, a bar would leave empty lines before an error
-    with Progress(*columns, console=console, transient=True, disable=not console.is_terminal) as progress:
-        task = progress.add_task(what, total=total)
-        yield lambda description, count=1: progress.update(task, advance=count, description=description)
+    console = Screen(stderr=True)
+    return console, console.is_terminal and not console.is_dumb_terminal and not os.environ.get("NO_COLOR")
 
 
 def assignments(texts: list[str], option: str = "--set") -> dict[str, str]:
@@ -71,11 +110,13 @@ def require_writable(path: Path) -> None:
     Store(path.parent)
 
 
-def spinner(text: str) -> Any:
-    """A sign on standard error that something is under way."""
-    from proofroll.report.screen import Screen
-
-    return Screen(stderr=True).status(text)
+@contextmanager
+def spinner(text: str) -> Iterator[Callable[[str], None]]:
+    """A sign on standard error that something is under way, whose text what it gives changes; as a progress bar."""
+    console, moves = _standard_error()
+    said = [text]
+    with console.status(text) if moves else _now_and_then(lambda: said[-1]) as sign:
+        yield said.append if sign is None else sign.update
 
 
 def write_json(content: object) -> None:

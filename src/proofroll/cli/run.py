@@ -29,6 +29,9 @@ def run(
     out: Annotated[Path | None, typer.Option(help="Write the trajectory to this netCDF file.")] = None,
     time_limit: Annotated[float, typer.Option(help="Wall seconds after which the run is ended.")] = 600.0,
     ask: Annotated[list[str] | None, typer.Option(help="What is wanted besides the motion: orientation.")] = None,
+    plot: Annotated[
+        Path | None, typer.Option(help="Draw the run to this file, by its ending: html, svg, png or pdf.")
+    ] = None,
     as_json: Json = False,
 ) -> None:
     """Run one scene in one engine."""
@@ -38,13 +41,17 @@ def run(
 
     from proofroll.core.time_grid import time_grid
     from proofroll.report.run import run_content, run_lines
+    from proofroll.report.run_plot import require_ending
     from proofroll.running.runner import run_one
     from proofroll.running.worker_pool import Workers
     from proofroll.studies.run_once import single_case
 
     time_grid(until, every)
-    if out is not None:
-        require_writable(out)
+    for file in (out, plot):
+        if file is not None:
+            require_writable(file)
+    if plot is not None:
+        require_ending(plot)
     # The result is read with xarray, half a second to import: done while the worker's process is busy.
     threading.Thread(target=importlib.import_module, args=("xarray",), daemon=True).start()
     workers = Workers()  # the process that tells the settings also makes the run
@@ -63,10 +70,17 @@ def run(
         with spinner(f"{scene} in {case.engine.name}"):
             result = run_one(case, target, workers)
         content = run_content(case, result, target)
+        if plot is not None and result.trajectory is not None:
+            from proofroll.files.netcdf import read
+            from proofroll.report.run_plot import draw_run
+
+            draw_run(read(target), plot)
+            content["plot"] = str(plot)
         if out is not None and result.trajectory is not None:
             from proofroll.running.store import move
 
             move(target, out)
+            content["trajectory"] = str(out)
     if as_json:
         write_json(content)
     else:

@@ -76,4 +76,7 @@ def run_lines(content: dict[str, Any]) -> list[Any]:
     if "smallest_N" in content:
         lines.append(Text(f"smallest normal force: {content['smallest_N']:.6g} N"))
     lines.append(Text(f"{content['wall_seconds']:.3g} s of wall time"))
+    for key in ("trajectory", "plot"):
+        if key in content:
+            lines.append(Text(f"The {key} is in {content[key]}."))
     return lines

@@ -2,11 +2,16 @@
 
 from __future__ import annotations
 
+import copy
+import dataclasses
 import re
 from collections.abc import Iterable
+from typing import Any
 
 from rich.console import Console, ConsoleOptions, RenderableType
+from rich.measure import Measurement
 from rich.segment import Segment
+from rich.table import Column, Table
 
 # Control characters but line feed, which is layout, and what reverses or ends a line in Unicode.
 _COMMANDS = re.compile("[\x00-\x09\x0b-\x1f\x7f-\x9f\u2028\u2029\u202a-\u202e\u2066-\u2069]")
@@ -29,3 +34,52 @@ class Screen(Console):
         """See :class:`rich.console.Console`."""
         for segment in super().render(renderable, options):
             yield segment if segment.control else Segment(printable(segment.text), segment.style)
+
+    def print(self, *objects: Any, **options: Any) -> None:
+        """See :class:`rich.console.Console`; of a table that is too wide, columns go below the others: none is cut."""
+        if len(objects) == 1 and isinstance(objects[0], Table):
+            for part in fitted(objects[0], self):
+                super().print(part, **options)
+        else:
+            super().print(*objects, **options)
+
+
+_WIDEST = 10_000  # characters: the width at which nothing wraps
+
+
+def fitted(table: Table, console: Console) -> list[Table]:
+    """The table as parts that are no wider than the console; each begins with the first column, and no word is cut."""
+    if not table.columns:
+        return [table]
+    _, right, _, left = table.padding
+    room, pad = console.width, left + right
+    sizes = [_size(column, console, room - pad) for column in table.columns]
+    groups: list[list[int]] = [[0]]
+    for index in range(1, len(sizes)):
+        if sum(sizes[i].minimum + pad for i in (*groups[-1], index)) > room and len(groups[-1]) > 1:
+            groups.append([0])
+        groups[-1].append(index)
+    parts = []
+    for number, group in enumerate(groups):
+        part = copy.copy(table)
+        free = max(0, room - sum(sizes[i].minimum + pad for i in group))
+        wanted = sum(sizes[i].span for i in group)
+        part.columns = []
+        for place, index in enumerate(group):
+            width = sizes[index].minimum + (min(free, wanted) * sizes[index].span // wanted if wanted else 0)
+            part.columns.append(
+                dataclasses.replace(table.columns[index], _index=place, width=width, min_width=None, no_wrap=False)
+            )
+        part.title = table.title if number == 0 else None
+        part.caption = table.caption if number == len(groups) - 1 else None
+        parts.append(part)
+    return parts
+
+
+def _size(column: Column, console: Console, most: int) -> Measurement:
+    """The least width at which no word of a column is cut (where lines do not break: no line), and the natural one."""
+    wide = console.options.update(width=_WIDEST)
+    found = [Measurement.get(console, wide, cell) for cell in (column.header, *column.cells)]
+    natural = max(item.maximum for item in found)
+    least = natural if column.no_wrap else max(*(item.minimum for item in found), min(column.min_width or 0, natural))
+    return Measurement(min(least, most), min(natural, most))

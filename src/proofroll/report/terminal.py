@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import os
 from typing import Any
 
 from rich.table import Table
@@ -27,9 +28,12 @@ _STYLES = {
 
 
 def console() -> Screen:
-    """The console for data, on standard output; never wider than 100 columns."""
+    """The console for data, on standard output: at most 100 columns of a terminal; in a pipe 100, or COLUMNS."""
     out = Screen(highlight=False)
-    out.width = min(out.width, WIDTH) if out.is_terminal else WIDTH
+    if out.is_terminal:
+        out.width = min(out.width, WIDTH)
+    elif not os.environ.get("COLUMNS", "").isdecimal():  # else rich has read it
+        out.width = WIDTH
     return out
 
 

@@ -7,6 +7,7 @@ import pytest
 from rich.table import Table
 
 from proofroll.report.screen import Screen, escaped, printable
+from proofroll.report.terminal import console
 
 COMMANDS = "\x1b]0;title\x07\x1b[2J\x9b31m\x00\x08\r\x7f\u202e\u2028"
 
@@ -36,3 +37,32 @@ def test_a_screen_obeys_its_own_styles_alone(coloured: bool) -> None:
     assert ("\x1b[31m" in shown) == coloured
     for command in ("\x1b]0", "\x1b[2J", "\x9b", "\x07", "\x00", "\r", "\u202e"):
         assert command not in shown
+
+
+@pytest.mark.parametrize("width", [24, 40, 60, 80, 100])
+def test_a_table_is_never_cut(width: int, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]) -> None:
+    """Whatever the width of a pipe, each word and number of a table is there whole, and no line is wider."""
+    monkeypatch.setenv("COLUMNS", str(width))
+    table = Table(title="errors", box=None, padding=(0, 1, 0, 0))
+    table.add_column("engine formulation setting", min_width=10, overflow="fold")
+    numbers = [f"{index + 1}.7e-{index + 10}" for index in range(8)]
+    for index in range(8):
+        table.add_column(f"name{index} [m/s]", justify="right", no_wrap=index % 2 == 0)
+    table.add_row("pinocchio free_flyer matched", *numbers)
+    console().print(table)
+    console().print()
+    out = capsys.readouterr().out
+    assert out.endswith("\n\n")
+    assert max(map(len, out.splitlines())) <= width
+    assert "…" not in out
+    for word in ("errors", "pinocchio", "free_flyer", "matched", *numbers):
+        assert word in out.split()
+    assert out.count("errors") == 1
+
+
+def test_a_pipe_has_the_width_that_it_is_given(monkeypatch: pytest.MonkeyPatch) -> None:
+    """In a pipe COLUMNS decides, and 100 where nothing is said."""
+    monkeypatch.setenv("COLUMNS", "133")
+    assert console().width == 133
+    monkeypatch.delenv("COLUMNS")
+    assert console().width == 100

@@ -1,0 +1,109 @@
+"""A run as a picture: every variable over time, with its unit; whatever the elements of its scene are."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from proofroll.core.errors import InputError, Missing
+
+if TYPE_CHECKING:
+    import xarray as xr
+
+ENDINGS = (".html", ".svg", ".png", ".pdf")
+_COLUMNS = 2
+
+
+def require_ending(path: Path) -> None:
+    """Raises InputError if the ending of a file names no kind of picture."""
+    if path.suffix.lower() not in ENDINGS:
+        raise InputError("plot", str(path), f"end the name of the file in one of {', '.join(ENDINGS)}")
+
+
+def read_run(path: Path) -> xr.Dataset:
+    """The run in a netCDF file.
+
+    Raises:
+        InputError: there is no such file, or it holds no run.
+    """
+    from proofroll.files.netcdf import read
+
+    try:
+        dataset = read(path)
+    except FileNotFoundError:
+        raise InputError("run", str(path), "there is no such file; proofroll run … --out writes one") from None
+    except (OSError, ValueError, TypeError, KeyError):
+        raise InputError("run", str(path), "this is no netCDF file; proofroll run … --out writes one") from None
+    if not curves(dataset):
+        raise InputError("run", str(path), "it has no variable over time; proofroll run … --out writes such a file")
+    return dataset
+
+
+def curves(dataset: xr.Dataset) -> list[str]:
+    """Names of the variables that have one number for each time, and a unit."""
+    return [str(name) for name, item in dataset.data_vars.items() if item.dims == ("time",) and _is_number(item)]
+
+
+def _is_number(item: xr.DataArray) -> bool:
+    return "units" in item.attrs and bool(np.issubdtype(item.dtype, np.number))
+
+
+def draw_run(dataset: xr.Dataset, path: Path) -> None:
+    """Draws every curve of a run in a panel of its own, over one axis of time.
+
+    Args:
+        dataset: the run.
+        path: the file; its ending says which kind.
+
+    Raises:
+        Missing: what draws it is not installed.
+    """
+    try:
+        (_page if path.suffix.lower() == ".html" else _picture)(dataset, path)
+    except ModuleNotFoundError as error:
+        raise Missing(f"{error.name} is missing, which draws it: pip install 'proofroll[report]'") from None
+
+
+def _title(dataset: xr.Dataset) -> str:
+    parts = (str(dataset.attrs.get(key, "")) for key in ("scene", "engine", "status"))
+    return ", ".join(filter(None, parts))
+
+
+def _picture(dataset: xr.Dataset, path: Path) -> None:
+    from matplotlib.figure import Figure
+
+    names = curves(dataset)
+    rows = -(-len(names) // _COLUMNS)
+    figure = Figure(figsize=(9, 1.7 * rows + 0.6), layout="constrained")
+    panels = figure.subplots(rows, _COLUMNS, sharex=True, squeeze=False).ravel()
+    for name, panel in zip(names, panels, strict=False):
+        panel.plot(dataset["time"], dataset[name], lw=1)
+        panel.set_title(f"{name} [{dataset[name].attrs['units']}]", fontsize=9, loc="left")
+        panel.tick_params(labelsize=7)
+    for panel in panels[len(names) :]:
+        panel.set_axis_off()
+    for panel in panels[-_COLUMNS:]:
+        panel.set_xlabel("time [s]", fontsize=8)
+    figure.suptitle(_title(dataset), fontsize=10)
+    figure.savefig(path)
+
+
+def _page(dataset: xr.Dataset, path: Path) -> None:
+    import plotly.graph_objects as go
+    from plotly.subplots import make_subplots
+
+    names = curves(dataset)
+    rows = -(-len(names) // _COLUMNS)
+    titles = [f"{name} [{dataset[name].attrs['units']}]" for name in names]
+    figure = make_subplots(
+        rows=rows, cols=_COLUMNS, subplot_titles=titles, shared_xaxes="all", vertical_spacing=min(0.06, 0.5 / rows)
+    )
+    time = dataset["time"].to_numpy()
+    for index, name in enumerate(names):
+        curve = go.Scatter(x=time, y=dataset[name].to_numpy(), name=name, mode="lines", hovertemplate="%{x} s: %{y}")
+        figure.add_trace(curve, row=index // _COLUMNS + 1, col=index % _COLUMNS + 1)
+    figure.update_xaxes(title_text="time [s]", row=rows)
+    figure.update_layout(title=_title(dataset), height=220 * rows + 120, showlegend=False, template="simple_white")
+    figure.write_html(path, include_plotlyjs=True)  # in the file, which then needs no network

@@ -1,0 +1,57 @@
+"""Progress on standard error: a bar on a terminal, a line now and then where nothing may move."""
+
+from __future__ import annotations
+
+import os
+import pty
+import subprocess
+import sys
+import time
+
+import pytest
+
+from proofroll.cli import options
+
+
+def test_a_pipe_gets_a_line_now_and_then(monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]) -> None:
+    """Long work says how far it is, in lines; short work says nothing."""
+    with options.progress_bar("runs", total=2) as advance:
+        advance("exudyn")
+    assert capsys.readouterr().err == ""
+    monkeypatch.setattr(options, "_SAID_EVERY", 0.05)
+    said = ""
+    with options.progress_bar("runs", total=2) as advance:
+        advance("exudyn")
+        while "exudyn: 1 of 2" not in said:  # ended by the limit of time of the tests
+            time.sleep(0.01)
+            said += capsys.readouterr().err
+    with options.spinner("pendulum in mujoco") as say:
+        say("building")
+        while "building" not in said:
+            time.sleep(0.01)
+            said += capsys.readouterr().err
+    assert "\x1b" not in said
+    assert all(line.startswith("proofroll: ") for line in said.splitlines())
+
+
+WORK = """
+from proofroll.cli.options import progress_bar, spinner
+with progress_bar("runs", total=2) as advance:
+    advance("exudyn")
+with spinner("pendulum"):
+    pass
+"""
+
+
+@pytest.mark.parametrize("no_color", [False, True])
+def test_no_color_moves_nothing(no_color: bool) -> None:
+    """On a terminal NO_COLOR leaves no escape codes, of colours or of the cursor; without it there is a bar."""
+    ours, theirs = pty.openpty()
+    environment = {key: value for key, value in os.environ.items() if key not in {"NO_COLOR", "TERM", "FORCE_COLOR"}}
+    environment |= {"TERM": "xterm"} | ({"NO_COLOR": "1"} if no_color else {})
+    subprocess.run([sys.executable, "-c", WORK], env=environment, stdout=theirs, stderr=theirs, timeout=120, check=True)
+    os.write(theirs, b"end")
+    said = os.read(ours, 1 << 16)
+    os.close(ours)
+    os.close(theirs)
+    assert (b"\x1b" in said) is not no_color
