@@ -7,7 +7,7 @@ from typing import Any
 
 import pytest
 
-import proofroll.report.scene_sheet
+from proofroll.elements.ball_on_surface.report import drawings
 from proofroll.files.scene_file import read_scene_file
 from proofroll.report.scene_sheet import scene_sheet
 
@@ -58,7 +58,7 @@ def test_rolling_resistance_is_drawn_where_any_case_has_it() -> None:
 
 def test_a_surface_without_a_drawing_says_so(monkeypatch: pytest.MonkeyPatch) -> None:
     """The parameters are there all the same."""
-    monkeypatch.setattr(proofroll.report.scene_sheet, "overview", lambda wall, body: [])  # noqa: ARG005 -- as it is called
+    monkeypatch.setattr(drawings, "overview", lambda wall, body: [])  # noqa: ARG005 -- as it is called
     sheet = scene_sheet("inclined_plane", [])
     assert sheet["drawings"] == []
     assert sheet["undrawn"] == "There is no drawing for a wall of the kind Plane."

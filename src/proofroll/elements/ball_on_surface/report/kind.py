@@ -40,8 +40,7 @@ class BallReport:
         shown = max((rolling_ball(scene) for scene in scenes), key=lambda body: body.contact.rolling_resistance)
         labels = ("as a whole", "where the ball touches the wall")
         found = [
-            item.content() | {"label": label}
-            for item, label in zip(overview(shown.wall, shown), labels, strict=False)
+            item.content() | {"label": label} for item, label in zip(overview(shown.wall, shown), labels, strict=False)
         ]
         return found, "" if found else f"There is no drawing for a wall of the kind {type(shown.wall).__name__}."
 

@@ -104,9 +104,7 @@ def _zigzag(ends: FloatArray) -> FloatArray:
     """A spring between two places of the picture, shape (2, 2)."""
     along = ends[1] - ends[0]
     across = 5.0 * np.array([-along[1], along[0]]) / (np.linalg.norm(along) or 1.0)
-    inner = [
-        ends[0] + (0.15 + 0.7 * (k + 0.5) / _TEETH) * along + (1 if k % 2 else -1) * across for k in range(_TEETH)
-    ]
+    inner = [ends[0] + (0.15 + 0.7 * (k + 0.5) / _TEETH) * along + (1 if k % 2 else -1) * across for k in range(_TEETH)]
     return np.stack([ends[0], ends[0] + 0.15 * along, *inner, ends[0] + 0.85 * along, ends[1]])
 
 

@@ -9,8 +9,8 @@ import numpy as np
 from proofroll.core.arrays import FloatArray
 from proofroll.elements.ball_on_surface.model import RollingBall
 from proofroll.elements.ball_on_surface.report.drawings.contact import contact
-from proofroll.report.pen import Drawing, View, beyond, turn
 from proofroll.elements.ball_on_surface.surfaces import Cylinder, Plane, Surface
+from proofroll.report.pen import Drawing, View, beyond, turn
 
 _SIZE = 128.0  # half the width of what is drawn of a wall [px]
 _LEVEL = 0.02  # angles below this have no arc [rad]
