@@ -79,7 +79,7 @@ class Yardstick:
         truth: the true run; None where there is none.
         name: of the deciding observable.
         true: its values; None where there is no truth.
-        scale: its range.
+        scale: its range, of several components the widest.
     """
 
     scene: Scene
@@ -95,7 +95,7 @@ class Yardstick:
         if truth is None:
             return cls(scene, None, name, None, 1.0)
         true = truth[name].to_numpy()
-        return cls(scene, truth, name, true, float(np.ptp(true)) or 1.0)
+        return cls(scene, truth, name, true, float(np.max(np.ptp(true, axis=0))) or 1.0)
 
 
 def judge(result: Result, dataset: xr.Dataset | None, yardstick: Yardstick) -> Outcome:
@@ -146,13 +146,14 @@ def _failed(
 
 
 def _errors(dataset: xr.Dataset, yardstick: Yardstick) -> FloatArray | None:
-    """Of the deciding observable at each sample, in parts of its range."""
+    """Of the deciding observable at each sample, of several components the largest, in parts of its range."""
     if yardstick.true is None:
         return None
     values = dataset[yardstick.name].to_numpy()
     with np.errstate(over="ignore", invalid="ignore"):
         errors = np.abs(values - yardstick.true[: len(values)]) / yardstick.scale
-    return np.where(np.isfinite(errors), errors, np.inf)
+    finite = np.where(np.isfinite(errors), errors, np.inf)
+    return np.asarray(finite.reshape(len(finite), -1).max(axis=1))
 
 
 def _first(dataset: xr.Dataset, yardstick: Yardstick, errors: FloatArray | None) -> tuple[str, float] | None:

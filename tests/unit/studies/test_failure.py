@@ -15,7 +15,7 @@ from proofroll.elements.ball_on_surface.element import rolling_ball
 from proofroll.elements.ball_on_surface.natural import natural_time
 from proofroll.files.scene_file import load_scene
 from proofroll.running.case import Result, Status
-from proofroll.studies.failure import Yardstick, judge, meanings
+from proofroll.studies.failure import LOST_PHASE, Yardstick, judge, meanings
 
 SCENE = load_scene("sphere_in_cylinder")
 TIMES = np.linspace(0.0, 3 * natural_time(rolling_ball(SCENE)), 25)
@@ -147,3 +147,17 @@ def test_resistance_stops_a_ball_and_does_not_drive_it_back(after: float, failur
     dataset, yardstick = rolling_down(after)
     outcome = judge(DONE, dataset, yardstick)
     assert (outcome.failure, outcome.stable, outcome.silent) == (failure, failure is None, failure is not None)
+
+
+def test_a_path_of_several_components() -> None:
+    """Where many components decide, each sample has one error, the largest, in parts of the widest range of one."""
+    scene = load_scene("pendulum")
+    times = np.linspace(0.0, 1.0, 5)
+    true = truth(scene, times)
+    yardstick = Yardstick.of(scene, true)
+    run = true.copy(deep=True)
+    run[scene.deciding][3] += 1.5 * yardstick.scale
+    outcome = judge(DONE, run, yardstick)
+    assert yardstick.scale == float(np.max(np.ptp(true[scene.deciding].to_numpy(), axis=0)))
+    assert (outcome.failure, outcome.time) == (LOST_PHASE, times[3])
+    assert outcome.error == pytest.approx(1.5)

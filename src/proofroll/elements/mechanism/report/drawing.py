@@ -24,12 +24,11 @@ def drawn(element: MechanismElement) -> Drawing:
     at = _view(element)
 
     def place(body: str, position: tuple[float, ...]) -> FloatArray:
-        found: FloatArray = start.point(body, position)[0]
-        return found
+        return np.asarray(start.point(body, position)[0])
 
     joints = [(j.name, j.kind, j.parent, j.position, j.child, j.child_position) for j in mechanism.joints]
     loops = [(k.name, k.kind, k.body_a, k.position_a, k.body_b, k.position_b) for k in mechanism.loops]
-    fastened: dict[str, list[FloatArray]] = {name: [] for name in (*(body.name for body in mechanism.bodies), WORLD)}
+    fastened: dict[str, list[FloatArray]] = {name: [] for name in (WORLD, *element.bodies)}
     for _, kind, a, at_a, b, at_b in [*joints, *loops]:
         if kind != "free":
             fastened[a].append(place(a, at_a))

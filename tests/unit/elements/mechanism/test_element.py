@@ -1,0 +1,207 @@
+"""A mechanism as an element: what is observed, what a certificate notices, and what a run says of it."""
+
+import dataclasses
+import json
+
+import numpy as np
+import pytest
+
+from proofroll.core.element import FirstMotion
+from proofroll.core.engine import Sample
+from proofroll.core.errors import InputError
+from proofroll.core.observable import Role
+from proofroll.elements.mechanism.dataset import UNDETERMINED, UNSAID
+from proofroll.elements.mechanism.element import ENERGY_GAIN, OPENED, MechanismElement
+from proofroll.elements.mechanism.sampling import MechanismBuilt
+from proofroll.files.scene_file import load_scene
+from proofroll.report.kinds import kind_of
+
+SCENES = ("pendulum", "slider_crank", "bricard", "heavy_top", "andrews_squeezer", "free_body", "gyroscope_cart")
+
+
+def element_of(name: str, **parameters: float) -> MechanismElement:
+    """The mechanism of a scene."""
+    (element,) = load_scene(name, **parameters).elements
+    assert isinstance(element, MechanismElement)
+    return element
+
+
+def right(element: MechanismElement) -> MechanismBuilt:
+    """What an engine says that has built the scene exactly."""
+    mechanism, start = element.mechanism, element.start
+    first = element.first_motion
+    assert isinstance(first, FirstMotion)
+    axes = [
+        start.R_WB[0, mechanism.body_index[j.parent]] @ j.parent_frame[:, 2] if j.kind == "revolute" else [np.nan] * 3
+        for j in mechanism.joints
+    ]
+    return MechanismBuilt(
+        mass=np.array([body.mass for body in mechanism.bodies]),
+        com=np.array([body.com for body in mechanism.bodies]),
+        inertia=np.array([body.inertia for body in mechanism.bodies]),
+        joint_position=np.array([start.point(j.child, j.child_position)[0] for j in mechanism.joints]),
+        joint_axis=np.array(axes),
+        gravity=np.array(mechanism.gravity),
+        mobility=element.analysis.mobility,
+        acceleration=first.acceleration,
+        angular_acceleration=first.angular_acceleration,
+    )
+
+
+def at_start(element: MechanismElement, **changed: object) -> Sample:
+    """The sample at time 0 that is the scene's."""
+    start = element.start
+    given = {"p_WB": start.p_WB[0], "v_WB": start.v_WB[0], "w_WB": start.w_WB[0], "q_WB": start.q_WB[0]}
+    return Sample(**(given | changed))
+
+
+def noticed(element: MechanismElement, built: MechanismBuilt, **changed: object) -> set[str]:
+    """Quantities whose line of the certificate fails."""
+    lines = element.certify(built, at_start(element, **changed))
+    return {line.quantity for line in lines if line.difference is not None and line.difference > line.tolerance}
+
+
+@pytest.mark.parametrize("name", SCENES)
+def test_observables_are_those_of_the_dataset(name: str) -> None:
+    """Each observable is a variable of a run with the unit that it declares, and has a size."""
+    element = element_of(name)
+    run = element.dataset(np.zeros(1), [at_start(element)], {})
+    for item in element.observables:
+        assert run[item.name].attrs["units"] == item.unit
+        assert item.floor is not None
+        assert item.floor > 0
+    assert sum(item.decides for item in element.observables) == 1
+
+
+def test_reactions_are_observed_where_some_are_determinate() -> None:
+    """An overconstrained ring has no determinate force, so that none can be asked for; a pendulum has all."""
+    roles = {item.name for item in element_of("bricard").observables if item.role == Role.REACTION}
+    assert "forces" not in roles
+    assert {item.name for item in element_of("pendulum").observables if item.role == Role.REACTION} == {
+        "forces",
+        "torques",
+    }
+
+
+@pytest.mark.parametrize("name", ["pendulum", "slider_crank"])
+def test_the_right_model_passes(name: str) -> None:
+    """No line of the certificate fails for a model that is the scene's."""
+    element = element_of(name)
+    assert noticed(element, right(element)) == set()
+
+
+@pytest.mark.parametrize(
+    ("changed", "quantity"),
+    [
+        (lambda built: {"mass": 2 * built.mass}, "mass"),
+        (lambda built: {"com": built.com + 1e-3}, "centre of mass"),
+        (lambda built: {"inertia": 1.01 * built.inertia}, "inertia"),
+        (lambda built: {"joint_axis": np.roll(built.joint_axis, 1, axis=1)}, "joint axes"),
+        (lambda built: {"joint_position": built.joint_position + 1e-3}, "joint positions"),
+        (lambda built: {"mobility": built.mobility + 1}, "mobility"),
+        (lambda built: {"gravity": -built.gravity}, "gravity"),
+        (lambda _: {"mass_matrix_error": 1e-3}, "error of the mass matrix"),
+        (lambda built: {"acceleration": 1.01 * built.acceleration}, "acceleration"),
+    ],
+)
+def test_a_wrong_model_is_noticed(changed, quantity: str) -> None:
+    """A certificate notices what is wrong, and nothing else."""
+    element = element_of("slider_crank")
+    built = right(element)
+    assert noticed(element, dataclasses.replace(built, **changed(built))) == {quantity}
+
+
+def test_a_wrong_start_is_noticed() -> None:
+    """Other velocities of the bodies fail; a quaternion of the other sign is the same orientation."""
+    element = element_of("slider_crank")
+    assert noticed(element, right(element), v_WB=element.start.v_WB[0] + 0.1) == {"velocity"}
+    assert noticed(element, right(element), q_WB=-element.start.q_WB[0]) == set()
+
+
+def test_a_reaction_without_value_says_why() -> None:
+    """What the equations do not determine, and what an engine does not give, have different reasons."""
+    element = element_of("slider_crank")
+    count = len(element.analysis.determinate)
+    given = element.dataset(np.zeros(1), [at_start(element, joint_force=np.ones((count, 3)))], {})
+    silent = element.dataset(np.zeros(1), [at_start(element)], {})
+    assert given["force.pin.z"].attrs["absent"] == UNDETERMINED
+    assert np.isnan(given["force.pin.z"]).all()
+    assert "absent" not in given["force.pin.x"].attrs
+    assert silent["force.pin.x"].attrs["absent"] == UNSAID
+    assert silent["force.pin.z"].attrs["absent"] == UNDETERMINED
+
+
+def test_reactions_in_part_are_not_observed() -> None:
+    """An engine that gives no reactions is judged by its motion, and those of time 0 are the certificate's."""
+    element = element_of("pendulum")
+    silent = element.dataset(np.arange(2.0), [at_start(element)] * 2, {})
+    full = {"joint_force": np.ones((1, 3)), "joint_torque": np.ones((1, 3))}
+    given = element.dataset(np.arange(2.0), [at_start(element, **full)] * 2, {})
+    assert "forces" not in element.observe(silent)
+    assert element.observe(given)["forces"].shape == (1, 3)
+    assert element.observe(given)["positions"].shape == (2, 1, 3)
+
+
+def test_signs_of_failure() -> None:
+    """A joint that opens shows, and so does energy from nowhere; the scene's own start shows neither."""
+    element = element_of("pendulum")
+    start = at_start(element)
+    apart = at_start(element, p_WB=start.p_WB + 0.5)
+    fast = at_start(element, w_WB=start.w_WB + 50.0)
+    run = element.dataset(np.arange(3.0), [start, apart, fast], {})
+    shown = {sign.name: sign.shown.tolist() for sign in element.signs(run, None)}
+    assert shown[OPENED] == [False, True, False]
+    assert shown[ENERGY_GAIN] == [False, True, True]
+    assert set(shown) == set(element.failures)
+
+
+@pytest.mark.parametrize("name", SCENES)
+def test_a_scene_is_drawn(name: str) -> None:
+    """The drawing has a dot for each body and a circle for each joint that holds something, all of them in its box."""
+    scene = load_scene(name)
+    element = element_of(name)
+    kind = kind_of(scene)
+    assert kind is not None
+    (drawing,), undrawn = kind.drawings([scene])
+    x, y, width, height = drawing["box"]
+    discs = [mark for mark in drawing["marks"] if "centre" in mark]
+    looks = [mark["look"] for mark in discs]
+    assert undrawn == ""
+    assert json.dumps(drawing, allow_nan=False)
+    assert looks.count("ball") == len(element.mechanism.bodies)
+    assert looks.count("wall") == sum(joint.kind != "free" for joint in element.mechanism.joints)
+    assert looks.count("ghost") == len(element.mechanism.loops)
+    assert all(x <= disc["centre"][0] <= x + width and y <= disc["centre"][1] <= y + height for disc in discs)
+
+
+def test_gravity_points_down_in_a_drawing() -> None:
+    """The pendulum hangs below its pivot when it hangs in the scene."""
+    scene = load_scene("pendulum", angle=0.0)
+    kind = kind_of(scene)
+    assert kind is not None
+    marks = kind.drawings([scene])[0][0]["marks"]
+    pivot = next(mark["centre"] for mark in marks if mark["look"] == "wall")
+    mass = next(mark["centre"] for mark in marks if mark["look"] == "ball")
+    assert mass[1] > pivot[1] + 50
+    assert mass[0] == pytest.approx(pivot[0], abs=0.2)
+
+
+@pytest.mark.parametrize(
+    ("old", "new", "said"),
+    [
+        ('parent = "world"', 'parent = "wall"', "there is no such body"),
+        ('mass = "$mass"', "mass = -1.0", "mass"),
+        ('kind = "revolute"', 'kind = "hinge"', "kind"),
+    ],
+)
+def test_bad_input_is_one_line(tmp_path, old: str, new: str, said: str) -> None:
+    """A file that holds no mechanism gives one line with the file and the place."""
+    from proofroll.files.data_folders import data_folder
+
+    text = (data_folder("models") / "pendulum" / "scene.toml").read_text()
+    assert old in text
+    (tmp_path / "scene.toml").write_text(text.replace(old, new))
+    with pytest.raises(InputError) as caught:
+        load_scene(str(tmp_path))
+    assert said in str(caught.value)
+    assert "\n" not in str(caught.value)
