@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 import os
+import re
 import subprocess
 import sys
 from collections.abc import Callable
@@ -163,6 +164,14 @@ def test_run_for_a_person(proofroll: Proofroll) -> None:
     assert ["gamma", "0", "rad"] in [line.split() for line in out.splitlines()]
     assert "smallest normal force: " in out
     assert max(map(len, out.splitlines())) <= 100
+
+
+def test_run_tells_events(proofroll: Proofroll) -> None:
+    """Each event stands with its bracket; of a long sequence the first ones do, and how many more there are."""
+    slips = ["run", "sphere_in_cylinder", "--engine", "truth", "--set", "mu_static=0.15"]
+    said = [" ".join(proofroll(*slips, "--until", until)[1].split()) for until in ("0.5", "4")]
+    assert re.search(r"events: slip at 0.176667992 ± \de-\d+ s, stick at 0.41209057\d ± \de-\d+ s \d", said[0])
+    assert re.search(r"stick at \S+ ± \de-\d+ s and 6 more", said[1])
 
 
 def test_run_writes_netcdf(proofroll: Proofroll, tmp_path: Path) -> None:

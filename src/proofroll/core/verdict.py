@@ -98,6 +98,7 @@ def judge(
     scale: float,
     limit: Limit | None,
     ladder: bool = False,
+    lost: str = "",
     doubt: Doubt = Doubt.NONE,
 ) -> Judgement:
     """Holds a curve and its limit of small steps against the true curve. The only place that gives a verdict.
@@ -112,13 +113,14 @@ def judge(
         scale: size of the observable in this case.
         limit: of small steps, or None if there is none.
         ladder: whether several steps were asked for; without a limit they then confirm nothing.
+        lost: the first of these steps that has no curve, and why, as a clause; empty if each has one.
         doubt: what an ill-posed question leaves to be judged.
     """
     error = _distance(values, true)
     # Below this nobody can tell a curve from the truth.
     floor = truth_error_bar + _ROUND_OFF * max(scale, float(np.max(np.abs(true), initial=0.0)))
     shown_unit = "" if unit == "1" else f" {unit}"
-    rungs = _Ladder(LimitFinding.NOT_SHOWN if ladder else LimitFinding.NO_LADDER)
+    rungs = _Ladder(LimitFinding.NOT_SHOWN if ladder else LimitFinding.NO_LADDER, lost=lost)
     if limit is not None:
         rungs = _read(limit, _distance(limit.values, true), tolerance, floor, shown_unit)
     verdict = Verdict.NOT_JUDGED if truth_error_bar > tolerance else _verdict(error, tolerance, rungs, doubt)
@@ -150,6 +152,7 @@ class _Ladder:
         leaves: whether finer steps leave the tolerance, with or without an order.
         wrong_within: whether the limit is within tolerance and yet shown not to be the truth.
         text: the numbers, for a person.
+        lost: without a limit, which step has no curve, and why.
     """
 
     finding: LimitFinding
@@ -159,6 +162,7 @@ class _Ladder:
     leaves: bool = False
     wrong_within: bool = False
     text: str = ""
+    lost: str = ""
 
 
 def _read(limit: Limit, error: float, tolerance: float, floor: float, unit: str) -> _Ladder:
@@ -199,7 +203,7 @@ def _reason(verdict: Verdict, error: float, tolerance: float, truth_error_bar: f
     if rungs.finding == LimitFinding.NO_LADDER:
         text += "; one step only, so the limit is unknown"
     elif not rungs.text:
-        text += "; no limit shown: not every step of the ladder gave such a curve"
+        text += f"; no limit shown: {rungs.lost or 'not every step of the ladder gave such a curve'}"
     else:
         text += f"; {'limit ' if rungs.finding == LimitFinding.WITHIN else ''}{rungs.finding}: {rungs.text}"
     return f"the question is ill-posed here; {text}" if verdict == Verdict.ILL_POSED else text

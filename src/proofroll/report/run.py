@@ -3,12 +3,15 @@
 from __future__ import annotations
 
 import dataclasses
+from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
 
 from proofroll.core.events import events_of
 from proofroll.files.netcdf import read
 from proofroll.running.case import Case, Result
+
+_EVENTS = 8  # of so many the terminal tells; the JSON document has all
 
 
 def run_content(case: Case, result: Result, trajectory: Path) -> dict[str, Any]:
@@ -48,6 +51,12 @@ def run_content(case: Case, result: Result, trajectory: Path) -> dict[str, Any]:
     return content
 
 
+def _told(event: Mapping[str, Any]) -> str:
+    """One event with its bracket."""
+    kind, bar = event["kind"].replace("_", "-"), 0.5 * (event["time_high"] - event["time_low"])
+    return f"{kind} at {event['time']:.9g} ± {bar:.1g} s"
+
+
 def run_lines(content: dict[str, Any]) -> list[Any]:
     """A run for a person, as things that rich prints."""
     from rich.table import Table
@@ -75,6 +84,10 @@ def run_lines(content: dict[str, Any]) -> list[Any]:
         lines.append(Text(f"{reason}: {', '.join(without)}"))
     if "smallest_N" in content:
         lines.append(Text(f"smallest normal force: {content['smallest_N']:.6g} N"))
+    if content["events"]:
+        said = ", ".join(_told(event) for event in content["events"][:_EVENTS])
+        more = len(content["events"]) - _EVENTS
+        lines.append(Text(f"events: {said}{f' and {more} more' if more > 0 else ''}"))
     lines.append(Text(f"{content['wall_seconds']:.3g} s of wall time"))
     for key in ("trajectory", "plot"):
         if key in content:

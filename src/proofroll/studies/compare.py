@@ -130,7 +130,7 @@ def evaluate(planned: Plan, results: dict[str, Result], runner: Runner) -> Outco
             if results[case.key].status == Status.DONE
         }
         band = comparison.bands[run.row.tolerance]
-        judgements = _judgements(run, band, references[name], trajectories)
+        judgements = _judgements(run, band, references[name], trajectories, _lost(run, results))
         missing = sorted({*band.bounds, *run.row.bound} - {judgement.observable for judgement in judgements})
         contradictions = _contradictions(comparison, run, judgements, missing)
         shared = references[name].shared(run.facts.shares)
@@ -177,7 +177,7 @@ def _of_another_scene(run: Planned, facts: EngineFacts, result: Result, sentence
 
 
 def _judgements(
-    run: Planned, band: Band, reference: Reference, trajectories: dict[float, xr.Dataset]
+    run: Planned, band: Band, reference: Reference, trajectories: dict[float, xr.Dataset], lost: str
 ) -> list[Judgement]:
     reference, trajectories = common_span(reference, trajectories)
     curves = {factor: reference.observed(dataset) for factor, dataset in trajectories.items()}
@@ -199,6 +199,7 @@ def _judgements(
             scale=reference.sizes.get(name, 1.0),
             limit=_limit(run, name, curves),
             ladder=_has_ladder(run, curve),
+            lost=lost,
             doubt=reference.doubt(name),
         )
         judgements.append(judgement)
@@ -217,6 +218,15 @@ def _limit(run: Planned, name: str, curves: dict[float, dict[str, FloatArray]]) 
     if run.facts.resolution != "dt":
         return tightest(values)
     return richardson(values, run.row.ladder, run.facts.order)
+
+
+def _lost(run: Planned, results: dict[str, Result]) -> str:
+    """The first step of the ladder that has no trajectory, and why; empty if each has one."""
+    for case in run.ladder.values():
+        result, name = results[case.key], case.engine.resolution
+        if result.status != Status.DONE and name is not None:
+            return f"{name} {case.engine.settings[name]:g} {result.status}: {result.message}"
+    return ""
 
 
 def _has_ladder(run: Planned, curve: FloatArray) -> bool:

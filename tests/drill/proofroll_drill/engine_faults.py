@@ -41,7 +41,7 @@ ENGINE_FAULTS = (
     EngineFault("raises in advance", "raises_in_advance", Status.CRASHED, _SINGULAR),
     EngineFault("raises in sample", "raises_in_sample", Status.CRASHED, _SINGULAR),
     EngineFault("returns NaN", "nan", Status.DIVERGED, "v_WB is not finite (NaN or overflow) at 0.05 s"),
-    EngineFault("returns wrong shapes", "wrong_shape", Status.DIVERGED, "p_WB with shape (1, 3) instead of (3,)"),
+    EngineFault("returns wrong shapes", "wrong_shape", Status.DIVERGED, "p_WB with shape (2,) instead of (3,)"),
     EngineFault("hangs", "hangs", Status.TIMEOUT, f"no result within {HANG:g} s"),
     EngineFault("allocates without end", "allocates", Status.CRASHED, f"needed more than {MEMORY:g} GB of memory"),
     EngineFault("segfaults", "segfaults", Status.CRASHED, "was killed by SIGSEGV"),

@@ -218,7 +218,7 @@ class Drill:
         if self._t == 0:
             return right
         self._do("sample")
-        wrong: dict[str, Any] = {"nan": {"v_WB": right.v_WB * np.nan}, "shape": {"p_WB": right.p_WB[None]}}
+        wrong: dict[str, Any] = {"nan": {"v_WB": right.v_WB * np.nan}, "shape": {"p_WB": right.p_WB[:2]}}
         return dataclasses.replace(right, **wrong.get(self._where, {}))
 
     def built(self) -> Any:

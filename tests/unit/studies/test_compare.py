@@ -137,6 +137,7 @@ def test_a_run_is_judged_by_its_own_ladder(tmp_path: Path) -> None:
     (run,) = judged(tmp_path / "crashed", comparison, the_truth, rungs=crashed).runs
     assert run.verdict is Verdict.UNCONFIRMED
     assert run.contradictions[0].startswith("alpha at speed=4 unconfirmed, expected: agrees (")
+    assert "no limit shown: dt 0.00025 diverged: NaN" in run.contradictions[0]  # which step is missing, and why
 
 
 def silent(_: Scene, dataset: xr.Dataset) -> xr.Dataset:

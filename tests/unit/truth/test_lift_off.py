@@ -69,6 +69,7 @@ def test_flight_is_a_parabola_with_constant_spin() -> None:
     )
     assert not np.any(np.diff(flies.w_WB, axis=0))
     assert not np.any(flies.N)
+    assert not np.any(np.signbit(flies.N))  # which a person would read as a pull
     assert float(flies.gap.min()) > 0
 
 

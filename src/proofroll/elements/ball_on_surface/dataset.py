@@ -104,7 +104,7 @@ def variables(
     put("slip", np.hypot(slip[:, 1], slip[:, 2]), "m/s", "speed of the contact point along the wall")
     if force is not None:
         local = np.einsum("tij,ti->tj", frame, force)
-        put("N", -local[:, 0], "N", "normal force")
+        put("N", 0.0 - local[:, 0], "N", "normal force")  # not -0 in flight
         put("F2", local[:, 1], "N", "friction on the ball along e2")
         put("F3", local[:, 2], "N", "friction on the ball along e3")
         with np.errstate(divide="ignore", invalid="ignore"):
