@@ -42,12 +42,14 @@ def read_run(path: Path) -> xr.Dataset:
 
 
 def curves(dataset: xr.Dataset) -> list[str]:
-    """Names of the variables that have one number for each time, and a unit."""
+    """Names of the variables that have one number for each time, and a unit; without those that have no value."""
     return [str(name) for name, item in dataset.data_vars.items() if item.dims == ("time",) and _is_number(item)]
 
 
 def _is_number(item: xr.DataArray) -> bool:
-    return "units" in item.attrs and bool(np.issubdtype(item.dtype, np.number))
+    if "units" not in item.attrs or not np.issubdtype(item.dtype, np.number):
+        return False
+    return bool(np.any(np.isfinite(item.to_numpy())))
 
 
 def draw_run(dataset: xr.Dataset, path: Path) -> None:

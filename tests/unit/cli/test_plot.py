@@ -7,6 +7,7 @@ from collections.abc import Callable
 from pathlib import Path
 
 import pytest
+import xarray as xr
 
 from proofroll.files.netcdf import read
 from proofroll.report.run_plot import curves
@@ -62,3 +63,19 @@ def test_bad_files(proofroll: Proofroll, tmp_path: Path) -> None:
         assert (code, out, err.count("\n")) == (2, "", 1)
         assert word in err
     assert [path.name for path in tmp_path.iterdir() if path.suffix in {".html", ".gif"}] == []
+
+
+def test_what_has_no_value_is_not_drawn() -> None:
+    """A variable without any value, of text or without a unit has no panel."""
+    times = [0.0, 1.0]
+    made = xr.Dataset(
+        {
+            "z": ("time", [1.0, float("nan")], {"units": "m"}),
+            "force": ("time", [float("nan")] * 2, {"units": "N"}),
+            "sticks": ("time", ["yes", "no"], {"units": "1"}),
+            "count": ("time", [1, 2]),
+            "p": (("time", "xyz"), [[0.0] * 3] * 2, {"units": "m"}),
+        },
+        {"time": times},
+    )
+    assert curves(made) == ["z"]
