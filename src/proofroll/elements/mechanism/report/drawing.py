@@ -45,6 +45,7 @@ def drawn(element: MechanismElement) -> Drawing:
         for end in fastened[body.name]:
             picture.path(at(np.stack([com, end])), "line")
         picture.disc(at(com).tolist(), _MASS, "ball")
+    named: dict[tuple[int, ...], list[str]] = {}
     for number, (name, kind, a, at_a, b, at_b) in enumerate([*joints, *loops]):
         if kind == "free":
             continue
@@ -53,8 +54,9 @@ def drawn(element: MechanismElement) -> Drawing:
             way = there - here if np.linalg.norm(there - here) else 0.2 * element.length * _axis(element, number)
             picture.path(at(np.stack([here - 0.3 * way, there + 0.3 * way])), "axis")
         picture.disc(at(there).tolist(), _JOINT, "ghost" if number >= len(joints) else "wall")
-        if len(joints) + len(loops) <= _MOST_NAMES:
-            _name(picture, at(there), name, "letter", (0.0, -9.0))
+        named.setdefault(tuple(np.round(at(there)).astype(int).tolist()), []).append(name)
+    for (x, y), names in named.items() if len(joints) + len(loops) <= _MOST_NAMES else ():
+        _name(picture, np.array([x, y]), ", ".join(names), "letter", (0.0, -9.0))
     for point in mechanism.points:
         here = at(place(point.body, point.position))
         picture.disc(here.tolist(), _POINT, "motion")
