@@ -137,17 +137,21 @@ def bench_adapters(
     progress: Callable[[str], None] | None = None,
 ) -> list[Row]:
     """All formulations of some engines, each with every variant, one worker process per engine."""
+    from proofroll.files.scene_file import load_scene
     from proofroll.running.runner import Worker, WorkerDied
     from proofroll_benchmarks.loops import announced
 
     rows: list[Row] = []
+    needed = load_scene(SCENE).requires
     for engine in engines:
         worker = Worker()
         try:
             try:
+                described = worker.request({"do": "describe", "engine": engine}, _LIMIT)
                 formulations = [
                     (name, preset if preset in presets else next(iter(presets)))
-                    for name, presets in worker.request({"do": "describe", "engine": engine}, _LIMIT)["presets"].items()
+                    for name, presets in described["presets"].items()
+                    if needed <= set(described["provides"][name])
                 ]
             except ProofrollError as error:
                 rows.append(Row(engine, "", preset, "", None, str(error)))

@@ -39,11 +39,12 @@ def study_cases(engines: Sequence[str], seconds: float = LEAST_SECONDS) -> list[
     Raises:
         ProofrollError: an engine cannot be asked.
     """
+    needed, described = load_scene(SCENE).requires, {name: describe(name) for name in engines}
     wanted = [
         (name, {"formulation": formulation, "preset": "matched"})
-        for name in engines
-        for formulation, presets in describe(name)["presets"].items()
-        if "matched" in presets
+        for name, said in described.items()
+        for formulation, presets in said["presets"].items()
+        if "matched" in presets and needed <= set(said["provides"][formulation])
     ]
     cases = []
     with Stopwatch() as stopwatch:

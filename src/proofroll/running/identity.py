@@ -20,7 +20,17 @@ from proofroll.running.case import EngineFacts
 FOUNDATION = ("core", "elements", "files", "running")
 # Modules and folders that only show results, wherever they lie.
 ASIDE = frozenset(
-    {"reproducer", "reproducer_source", "report", "onset_study", "regimes_study", "commands", "failure_program"}
+    {
+        "reproducer",
+        "reproducer_source",
+        "robot_reader",
+        "robot_compiled",
+        "report",
+        "onset_study",
+        "regimes_study",
+        "commands",
+        "failure_program",
+    }
 )
 
 

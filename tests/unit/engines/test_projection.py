@@ -168,7 +168,7 @@ def test_certificate_holds(scene, f, engine):
 
 def test_unbounded_friction_builds_nothing_for_slip():
     """Where friction is unbounded the ball has no mode but rolling, says nothing of sticking and has no events."""
-    assert BallCapability.BOUNDED_FRICTION in Projection.provides
+    assert BallCapability.BOUNDED_FRICTION in Projection.provides["euler"]
     engine = build(load("sphere_in_cylinder", speed=4), EXACT[1])
     engine.advance(0.1)
     assert not isinstance(engine._motion, Switching)

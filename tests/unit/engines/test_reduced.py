@@ -5,7 +5,6 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from proofroll.conformance.subject import scenes
 from proofroll.core.engine import Level, TellsLevels
 from proofroll.core.errors import Diverged, InputError, Refused
 from proofroll.core.gravity import Gravity
@@ -13,6 +12,7 @@ from proofroll.core.plugins import resolve_settings
 from proofroll.core.scene import Scene
 from proofroll.elements.ball_on_surface.compiled import library
 from proofroll.elements.ball_on_surface.element import changed, rolling_ball
+from proofroll.elements.ball_on_surface.kind import BallOnSurfaceKind
 from proofroll.elements.ball_on_surface.model import BallCapability
 from proofroll.engines.reduced import Reduced
 from proofroll.files.scene_file import load_scene
@@ -29,7 +29,11 @@ def tilted(**parameters: float) -> Scene:
     return changed(scene, gravity=Gravity(9.81, (0.2, -0.1, -0.9)))
 
 
-SCENES = {name: scene for name, scene in scenes().items() if name not in {"cylinder-slipping", "cylinder-oriented"}} | {
+SCENES = {
+    name: scene
+    for name, scene in BallOnSurfaceKind.conformance_scenes().items()
+    if name not in {"cylinder-slipping", "cylinder-oriented"}
+} | {
     "tilted": tilted(),
     "tilted-resisting": tilted(rolling_resistance=5e-4),
     "backwards": load_scene("sphere_in_cylinder", speed=-4.0, rolling_resistance=5e-4),

