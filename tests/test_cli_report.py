@@ -137,7 +137,7 @@ def test_a_page_after_the_first_comparison(
     varied = text.replace("{ speed = [4] }", "{ speed = [2, 4] }\nbrief = { speed = [4] }")
     files(tmp_path, first=f"order = 1\n{varied}", second=text.replace("A claim", "Another claim"))
     for module in ("comparison_file", "toml"):
-        monkeypatch.setattr(f"proofroll.files.{module}.data_folder", lambda _: tmp_path)
+        monkeypatch.setattr(f"proofroll.files.{module}.study_folders", lambda: (tmp_path,))
     pages = []
     write = Report.write
 

@@ -46,7 +46,9 @@ def test_every_fault_is_contained() -> None:
     rows = {row["fault"]: row for row in found["faults"]}
     assert rows.keys() == TRIED
     assert {name: row["problem"] for name, row in rows.items() if not row["contained"]} == {}
-    assert (done.returncode, done.stderr, found["tried"], found["contained"]) == (0, "", len(TRIED), len(TRIED))
+    assert (done.returncode, found["tried"], found["contained"]) == (0, len(TRIED), len(TRIED))
+    # How far it is may be said, where it takes long.
+    assert all(line.startswith("proofroll: ") and line.endswith(" s") for line in done.stderr.splitlines())
     for row in found["faults"]:
         assert row["said"]
         assert row["others_arrived"] == row["others"] > 0

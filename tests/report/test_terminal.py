@@ -25,8 +25,11 @@ def test_the_table_of_verdicts_is_plain_where_nobody_watches(written: tuple[dict
         assert row["verdict"] in text
 
 
-def test_the_console_is_as_wide_in_a_pipe_as_at_most_on_a_terminal() -> None:
-    """What stands in a log does not depend on the window it was made in."""
+def test_the_console_is_as_wide_in_a_pipe_as_at_most_on_a_terminal(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    """What stands in a log does not depend on the window it was made in, unless COLUMNS says so."""
+    monkeypatch.delenv("COLUMNS", raising=False)
     assert console().width == WIDTH
 
 

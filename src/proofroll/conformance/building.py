@@ -109,13 +109,14 @@ def samples_are_well_formed(subject: Subject) -> None:
 
 def _well_formed(sample: Sample, bodies: int, when: str) -> None:
     require(isinstance(sample, Sample), f"sample() gave {type(sample).__name__} instead of Sample {when}")
+    one = bodies == 1 and np.ndim(sample.p_WB) == np.ndim(sample.v_WB) == 1  # of one body the index may be left out
     for name, size in (("p_WB", 3), ("v_WB", 3), ("w_WB", 3), ("q_WB", 4), ("force", 3)):
         value = getattr(sample, name)
         if value is None and name in {"q_WB", "force"}:
             continue
         require(isinstance(value, np.ndarray), f"{name} is {type(value).__name__} instead of an array {when}")
-        shapes = [(size,), (1, size)] if bodies == 1 else [(bodies, size)]
-        require(value.shape in shapes, f"{name} has the shape {value.shape} instead of {shapes[0]} {when}")
+        shape = (size,) if one else (bodies, size)
+        require(value.shape == shape, f"{name} has the shape {value.shape} instead of {shape} {when}")
         require(value.dtype == np.float64, f"{name} is of type {value.dtype} instead of float64 {when}")
         require(np.all(np.isfinite(value)), f"{name} is {value} {when}")
     if sample.q_WB is not None:

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import dataclasses
 from functools import cache
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 from unittest import SkipTest
 
 import numpy as np
@@ -31,10 +31,14 @@ _MARGIN = 4.0
 _ROUND_OFF = 1e-8
 
 
-@cache
 def truth_scenes() -> dict[str, Scene]:
     """Scenes of every kind of element that show a frame taken for another."""
-    return {name: scene for kind in load_element_kinds() for name, scene in kind.truth_scenes().items()}
+    return {name: scene for kind in load_element_kinds() for name, scene in _truth_scenes(kind).items()}
+
+
+@cache
+def _truth_scenes(kind: Any) -> dict[str, Scene]:
+    return dict(kind.truth_scenes())
 
 
 def first_steps_fit_the_scene(subject: Subject) -> None:

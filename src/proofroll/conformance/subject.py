@@ -22,10 +22,14 @@ from proofroll.core.several import build
 _SPAN = 0.05
 
 
-@cache
 def scenes() -> dict[str, Scene]:
     """The scenes on which every kind of element has its engines checked; of each kind the most demanding first."""
-    return {name: scene for kind in load_element_kinds() for name, scene in kind.conformance_scenes().items()}
+    return {name: scene for kind in load_element_kinds() for name, scene in _scenes(kind).items()}
+
+
+@cache
+def _scenes(kind: Any) -> dict[str, Scene]:
+    return dict(kind.conformance_scenes())
 
 
 def require(condition: object, message: str) -> None:

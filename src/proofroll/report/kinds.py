@@ -24,7 +24,7 @@ class ReportKind(Protocol):
         template: in the folder ``templates`` beside the class's module, with the macro
             ``truth(comparison, number, index, truth)``: what is told of a truth besides its route; empty: nothing.
         names: further names that the template uses; no other kind has them.
-        caption: markup below the drawings.
+        caption: text below the drawings.
     """
 
     template: ClassVar[str]

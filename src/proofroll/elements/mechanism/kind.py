@@ -38,10 +38,10 @@ class MechanismKind:
 
     @staticmethod
     def conformance_scenes() -> Mapping[str, Scene]:
-        """A loop with inertia that changes, a chain, and a top: the most demanding first."""
+        """A loop with inertia that changes, a chain, a top, and a slide without a loop: the most demanding first."""
         from proofroll.files.scene_file import load_scene
 
-        names = ("slider_crank", "double_pendulum", "heavy_top", "pendulum")
+        names = ("slider_crank", "double_pendulum", "heavy_top", "pendulum", "oscillators")
         return {name: load_scene(name) for name in names}
 
     @staticmethod

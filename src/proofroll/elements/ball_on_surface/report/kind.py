@@ -22,9 +22,8 @@ class BallReport:
     template: ClassVar[str] = "slips.html"
     names: ClassVar[Mapping[str, Any]] = {"onsets": onset_tables}
     caption: ClassVar[str] = (
-        "First the whole, to scale; then the ball enlarged, with its local frame at the contact: e<sub>1</sub> into "
-        "the wall, e<sub>2</sub> and e<sub>3</sub> along its coordinates. N, F<sub>2</sub>, F<sub>3</sub> are drawn "
-        "as forces on the ball, in their positive sense."
+        "First the whole, to scale; then the ball enlarged, with its local frame at the contact: e₁ into the wall, e₂ "
+        "and e₃ along its coordinates. N, F₂, F₃ are drawn as forces on the ball, in their positive sense."
     )
 
     @staticmethod
