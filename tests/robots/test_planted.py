@@ -114,7 +114,7 @@ def test_real_engines(
     """An installed engine's own importer holds the file, or every difference is named with a proof."""
     kind = "urdf" if text.startswith("<robot") else "mjcf"
     spec = parse_engine(engine)
-    pytest.importorskip({"mujoco": "mujoco", "pinocchio": "pinocchio", "exudyn": "exudyn"}[spec.name])
+    pytest.importorskip(spec.name)
     path = tmp_path / f"robot.{'urdf' if kind == 'urdf' else 'xml'}"
     path.write_text(text)
     file, robot = _examined(path, base)

@@ -78,7 +78,7 @@ def _joints(robot: Robot) -> Iterator[Finding]:
         if number:
             yield Finding("warning", "joints", f"{name} on {number} of {len(robot.moving)}: {what}")
     if robot.mimics:
-        names = ", ".join(mimic.joint for mimic in robot.mimics[:3]) + (", …" if len(robot.mimics) > 3 else "")
+        names = _some([mimic.joint for mimic in robot.mimics])
         yield Finding(
             "warning", "joints", f"{len(robot.mimics)} follow another (mimic): {names}; engines differ in that"
         )
@@ -92,7 +92,7 @@ def _urdf(file: RobotFile, robot: Robot) -> Iterator[Finding]:
     bare = [name for name, source in robot.sources.items() if not source["inertial"]]
     carrying = [name for name in bare if robot.welded[name][0] in robot.columns]
     if carrying:
-        names = ", ".join(carrying[:3]) + (", …" if len(carrying) > 3 else "")
+        names = _some(carrying)
         yield Finding(
             "warning", "links", f"{len(carrying)} without <inertial>: {names}; engines invent different masses"
         )

@@ -93,11 +93,6 @@ class Closed(ABC):
         (a1, b1, c1), (a2, b2, c2), (a3, b3, c3) = self.second
         return a1 * uu + b1 * uv + c1 * vv, a2 * uu + b2 * uv + c2 * vv, a3 * uu + b3 * uv + c3 * vv
 
-    def frame_rate(self, u: float, v: float) -> tuple[float, float, float]:
-        """Angular velocity of the frame along its axes [rad/s]."""
-        (x1, x2, x3), (y1, y2, y3) = self.turn_u, self.turn_v
-        return x1 * u + y1 * v, x2 * u + y2 * v, x3 * u + y3 * v
-
     def moment(self, N: float, v2: float, v3: float) -> tuple[float, float]:
         """M2, M3 of the rolling resistance [N m]."""
         speed = math.hypot(v2, v3)

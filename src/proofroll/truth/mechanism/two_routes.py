@@ -8,7 +8,6 @@ bar. Where the two precisions differ by more than :data:`CHAOS`, the question is
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
-from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import NDArray
@@ -21,9 +20,6 @@ from proofroll.elements.mechanism.record import Record, gathered
 from proofroll.elements.mechanism.rotations import Array
 from proofroll.truth.mechanism.closed_forms import ClosedForm, closed_form
 from proofroll.truth.mechanism.maximal_coordinates import MaximalCoordinates
-
-if TYPE_CHECKING:
-    import xarray as xr
 
 FACTOR = 3.0  # of safety: the routes' difference estimates the error, it does not bound it
 CHAOS = 1e-9  # m, 1 (of quaternions): where two precisions differ by more, no number of digits is worth comparing
@@ -105,53 +101,6 @@ def find_truth(mechanism: Mechanism, times: Array, tolerance: float = 1e-14) -> 
     if form is not None and form.motion is None:
         checked = (form.title, float(_largest(form.part(times) - form.same(best)).max()))
     return Truth(masked, bars, differences, horizon, found.determinate, routes, checked)
-
-
-def to_dataset(mechanism: Mechanism, truth: Truth) -> xr.Dataset:
-    """The truth with names and units, as the results of engines have them."""
-    import xarray as xr
-
-    record = truth.record
-    coordinates = {
-        "time": ("time", record.time, {"units": "s"}),
-        "body": [body.name for body in mechanism.bodies],
-        "joint": [*(joint.name for joint in mechanism.joints), *(loop.name for loop in mechanism.loops)],
-        "point": [point.name for point in mechanism.points],
-        "axis": ["x", "y", "z"],
-        "quaternion": ["w", "x", "y", "z"],
-        "component": ["Fx", "Fy", "Fz", "Mx", "My", "Mz"],
-    }
-    over = {
-        "p_WB": (("time", "body", "axis"), record.p_WB, "m"),
-        "v_WB": (("time", "body", "axis"), record.v_WB, "m/s"),
-        "w_WB": (("time", "body", "axis"), record.w_WB, "rad/s"),
-        "q_WB": (("time", "body", "quaternion"), record.q_WB, "1"),
-        "points": (("time", "point", "axis"), record.points, "m"),
-        "force": (("time", "joint", "axis"), record.wrench[..., :3], "N"),
-        "torque": (("time", "joint", "axis"), record.wrench[..., 3:], "N m"),
-        "energy": (("time",), record.energy, "J"),
-        "residual": (("time",), record.residual[:, 0], "1"),
-        "residual_rate": (("time",), record.residual[:, 1], "1/s"),
-        "determinate": (("joint", "component"), truth.determinate, "1"),
-    }
-    data = {name: (dims, values, {"units": unit}) for name, (dims, values, unit) in over.items()}
-    for joint, at_q, at_v in zip(mechanism.joints, mechanism.q_slices, mechanism.v_slices, strict=True):
-        sliding = joint.kind == "prismatic"
-        for sign, values, at, unit in (
-            ("q", record.q, at_q, "m" if sliding else "rad"),
-            ("v", record.v, at_v, "m/s" if sliding else "rad/s"),
-        ):
-            name, width = f"{sign}.{joint.name}", at.stop - at.start
-            mixed = {"units": "1" if width > 2 else unit}
-            dims = ("time",) if width == 1 else ("time", f"{sign}.{joint.name}.component")
-            if width:
-                data[name] = (dims, values[:, at.start] if width == 1 else values[:, at], mixed)
-    for field, bar in truth.bars.items():
-        data[f"bar_{field}"] = (("time",), bar, {"long_name": f"error bar of {field}"})
-    attributes: dict[str, float | str] = {"horizon": truth.horizon, "routes": "; ".join(truth.routes), "status": "done"}
-    if truth.checked_by is not None:
-        attributes["closed_form"] = "{}: {:.1e} apart".format(*truth.checked_by)
-    return xr.Dataset(data, coordinates, attributes)
 
 
 def _apart(one: Record, two: Record) -> Array:

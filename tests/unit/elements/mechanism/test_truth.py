@@ -8,7 +8,7 @@ import pytest
 from proofroll.core.errors import Refused
 from proofroll.elements.mechanism.joint_coordinates import JointCoordinates
 from proofroll.truth.mechanism import maximal_taylor
-from proofroll.truth.mechanism.two_routes import CHAOS, find_truth, to_dataset
+from proofroll.truth.mechanism.two_routes import CHAOS, find_truth
 
 MODELS = Path(__file__).parents[4] / "models"
 
@@ -124,15 +124,3 @@ def test_indeterminate_reactions_are_not_given(scene):
     pytest.importorskip("heyoka")
     wrench = find_truth(scene("slider_crank"), np.array([0.0, 0.1])).record.wrench
     assert (np.isnan(wrench) == [False, False, True, True, True, False]).all()
-
-
-def test_dataset_has_names_and_units(scene):
-    """Every variable with its unit, coordinates by joint, wrenches by joint and loop."""
-    pytest.importorskip("heyoka")
-    mechanism = scene("slider_crank")
-    data = to_dataset(mechanism, find_truth(mechanism, np.array([0.0, 0.1])))
-    assert all("units" in data[name].attrs for name in data.data_vars if not name.startswith("bar_"))
-    assert data["q.guide"].attrs["units"] == "m"
-    assert data["q.shaft"].dims == ("time",)
-    assert data["force"].sel(joint="wrist").shape == (2, 3)
-    assert list(data["point"].values) == ["slider"]
