@@ -23,9 +23,6 @@ KNOWN: Mapping[str, Mapping[str, str]] = {
         "moves_as_the_truth[facets-default-slow]": "between two edges the force is another one",
         "moves_as_the_truth[facets-default-fast]": "as free, and each edge between two facets is a kick",
         "order_is_as_declared[facets-*]": "each edge between two facets is a kick, at another moment for every step",
-        "order_is_as_declared[joints-matched]": "a loop is a soft constraint whose time constant is some steps: it "
-        "takes velocities down to first order, positions to second; of a tree the order is 4",
-        "order_is_as_declared[joints-tuned]": "as joints-matched",
         "first_steps_fit_the_scene[joints-tuned-slider_crank]": "at a time constant of two steps a loop's force is off "
         "by a thousandth at every step, at ten steps by a hundred-thousandth",
         "moves_as_the_truth[joints-tuned-slider_crank]": "as its first steps",

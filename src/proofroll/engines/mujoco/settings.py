@@ -99,8 +99,8 @@ class MujocoSettings:
         to 2, for its torque uses a normal force that is extrapolated linearly in time. The same holds of the chart's
         other contacts and of J̇v.
         """
-        if self.formulation == "joints":  # of a tree; where a loop is closed by a soft constraint, positions have 2
-            return 4 if self.integrator == "RK4" else 1
+        if self.formulation == "joints":  # of velocities where a loop is a soft constraint; RK4 has 4 on a tree
+            return 1
         if self.time_constant is None and self.integrator != "RK4":
             return 1
         return 2 if self.curvature or self.formulation == "chart" else 1
