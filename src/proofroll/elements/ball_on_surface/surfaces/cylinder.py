@@ -1,0 +1,198 @@
+"""The inside of a circular cylinder."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass, field
+from functools import cached_property
+from typing import Literal
+
+import numpy as np
+import numpy.typing as npt
+
+from proofroll.core.arrays import FloatArray
+from proofroll.core.bounds import bounded
+from proofroll.core.errors import InputError
+from proofroll.elements.ball_on_surface.surfaces.surface import Generator
+from proofroll.elements.ball_on_surface.surfaces.tilt import components, tilted
+
+
+@dataclass(frozen=True)
+class Cylinder:
+    """Inside of a circular cylinder; coordinates are the angle γ about its axis and the height z along it.
+
+    Attributes:
+        name: by which contacts name it.
+        kind: which surface it is.
+        radius: radius [m]; of the wall in a scene, of the centre's path after :meth:`offset`.
+        tilt: rotation of the axis from the vertical about the world's y axis [rad].
+    """
+
+    name: str
+    radius: float = field(metadata={"unit": "m"})
+    tilt: float = field(default=0.0, metadata={"unit": "rad"})
+    kind: Literal["cylinder"] = "cylinder"
+
+    coordinates = ("gamma", "z")
+    units = ("rad", "m")
+    periods = (2 * np.pi, None)
+
+    def __post_init__(self) -> None:
+        """Refuses what is no cylinder.
+
+        Raises:
+            OutOfBounds: a radius that is not positive, or a number that is not finite.
+        """
+        bounded("radius", self.radius, above=0)
+        bounded("tilt", self.tilt)
+
+    @property
+    def length_scales(self) -> tuple[float, float]:
+        """See :class:`Surface`."""
+        return (self.radius, 1.0)
+
+    @property
+    def generators(self) -> tuple[Generator, Generator]:
+        """See :class:`Surface`."""
+        axis = components(tilted(self.tilt)[:, 2])
+        return (Generator("rotation", axis), Generator("translation", axis))
+
+    def offset(self, ball_radius: float) -> Cylinder:
+        """See :class:`Surface`."""
+        if not ball_radius < self.radius:
+            raise InputError("radius", ball_radius, f"the ball must be smaller than {self.name} with {self.radius:g} m")
+        return Cylinder(self.name, self.radius - ball_radius, self.tilt)
+
+    def position(self, u: npt.ArrayLike) -> FloatArray:
+        """See :class:`Surface`."""
+        gamma, z = np.moveaxis(np.asarray(u, dtype=np.float64), -1, 0)
+        c = self.radius
+        return np.stack([c * np.cos(gamma), c * np.sin(gamma), z], axis=-1) @ tilted(self.tilt).T
+
+    def tangents(self, u: npt.ArrayLike) -> FloatArray:
+        """See :class:`Surface`."""
+        frame = self.frame(u)
+        return np.stack([self.radius * frame[..., 1], frame[..., 2]], axis=-1)
+
+    def second(self, u: npt.ArrayLike) -> FloatArray:
+        """See :class:`Surface`."""
+        frame = self.frame(u)
+        result = np.zeros((*frame.shape[:-2], 3, 2, 2))
+        result[..., 0, 0] = -self.radius * frame[..., 0]
+        return result
+
+    def frame(self, u: npt.ArrayLike) -> FloatArray:
+        """See :class:`Surface`."""
+        gamma = np.asarray(u, dtype=np.float64)[..., 0]
+        if gamma.ndim == 0 and math.isfinite(gamma):
+            return self._frame(math.cos(gamma), math.sin(gamma))
+        cos, sin, zero, one = np.cos(gamma), np.sin(gamma), np.zeros_like(gamma), np.ones_like(gamma)
+        columns = [
+            np.stack([cos, sin, zero], axis=-1),
+            np.stack([-sin, cos, zero], axis=-1),
+            np.stack([zero, zero, one], axis=-1),
+        ]
+        return np.asarray(tilted(self.tilt) @ np.stack(columns, axis=-1), dtype=np.float64)
+
+    @cached_property
+    def _tilted(self) -> tuple[float, float]:
+        """Cosine and sine of the tilt."""
+        rotation = tilted(self.tilt)
+        return float(rotation[0, 0]), float(rotation[0, 2])
+
+    def _frame(self, cos: float, sin: float) -> FloatArray:
+        """The local frame at one angle, without the overhead of arrays."""
+        across, down = self._tilted
+        return np.array([[across * cos, -across * sin, down], [sin, cos, 0.0], [-down * cos, down * sin, across]])
+
+    def _around(self, x: float, y: float, z: float) -> tuple[float, float, float]:
+        """Distance from the axis [m], and cosine and sine of the angle about it, of one point."""
+        across, down = self._tilted
+        x = across * x - down * z
+        distance = math.sqrt(x * x + y * y)
+        size = distance or math.nan  # on the axis there is no direction
+        return distance, x / size, y / size
+
+    def nearby(self, x: float, y: float, z: float) -> tuple[float, float, float, float]:
+        """See :class:`Surface`."""
+        if not self.tilt:  # as in triad
+            distance = math.sqrt(x * x + y * y)
+            size = distance or math.nan
+            return self.radius - distance, x / size, y / size, 0.0
+        across, down = self._tilted
+        x = across * x - down * z  # as in _around, which would be a third of the cost here
+        distance = math.sqrt(x * x + y * y)
+        cos = x / (distance or math.nan)
+        return self.radius - distance, across * cos, y / (distance or math.nan), -down * cos
+
+    def triad(self, x: float, y: float, z: float) -> tuple[float, ...]:
+        """See :class:`Surface`."""
+        if not self.tilt:  # upright: the same with a third fewer products
+            distance = math.sqrt(x * x + y * y) or math.nan
+            cos, sin = x / distance, y / distance
+            return cos, sin, 0.0, -sin, cos, 0.0, 0.0, 0.0, 1.0
+        across, down = self._tilted
+        x = across * x - down * z
+        distance = math.sqrt(x * x + y * y) or math.nan
+        cos, sin = x / distance, y / distance
+        return across * cos, sin, -down * cos, -across * sin, cos, down * sin, down, 0.0, across
+
+    def normal_rate(self, p: tuple[float, float, float], v: tuple[float, float, float]) -> tuple[float, float, float]:
+        """See :class:`Surface`."""
+        across, down = self._tilted
+        distance, cos, sin = self._around(*p)
+        x, z = -across * sin, down * sin  # with cos, e2: along it alone the normal turns
+        rate = (x * v[0] + cos * v[1] + z * v[2]) / (distance or math.nan)
+        return rate * x, rate * cos, rate * z
+
+    def moving_triad(self, x: float, y: float, z: float, vx: float, vy: float, vz: float) -> tuple[float, ...]:
+        """See :class:`Surface`."""
+        across, down = self._tilted
+        x = across * x - down * z
+        distance = math.sqrt(x * x + y * y) or math.nan
+        cos, sin = x / distance, y / distance
+        x2, z2 = -across * sin, down * sin
+        rate = (x2 * vx + cos * vy + z2 * vz) / distance
+        e1_and_e2 = across * cos, sin, -down * cos, x2, cos, z2
+        return self.radius - distance, *e1_and_e2, down, 0.0, across, rate * x2, rate * cos, rate * z2
+
+    def _local(self, p_WB: npt.ArrayLike) -> FloatArray:
+        return np.asarray(np.asarray(p_WB, dtype=np.float64) @ tilted(self.tilt), dtype=np.float64)
+
+    def locate(self, p_WB: npt.ArrayLike) -> FloatArray:
+        """See :class:`Surface`."""
+        if np.ndim(p_WB) == 1:
+            x, y, z = np.asarray(p_WB, dtype=np.float64).tolist()
+            across, down = self._tilted
+            return np.array([math.atan2(y, across * x - down * z), down * x + across * z])
+        p = self._local(p_WB)
+        return np.stack([np.arctan2(p[..., 1], p[..., 0]), p[..., 2]], axis=-1)
+
+    def gap(self, p_WB: npt.ArrayLike) -> FloatArray:
+        """See :class:`Surface`."""
+        if np.ndim(p_WB) == 1:
+            return np.asarray(self.nearby(*np.asarray(p_WB).tolist())[0])
+        p = self._local(p_WB)
+        return np.asarray(self.radius - np.hypot(p[..., 0], p[..., 1]), dtype=np.float64)
+
+    def normal(self, p_WB: npt.ArrayLike) -> FloatArray:
+        """See :class:`Surface`."""
+        if np.ndim(p_WB) == 1:
+            return np.array(self.nearby(*np.asarray(p_WB).tolist())[1:])
+        p = self._local(p_WB)
+        radial = np.stack([p[..., 0], p[..., 1], np.zeros_like(p[..., 0])], axis=-1)
+        return np.asarray(radial / np.linalg.norm(radial, axis=-1, keepdims=True) @ tilted(self.tilt).T)
+
+    def normal_gradient(self, p_WB: npt.ArrayLike) -> FloatArray:
+        """See :class:`Surface`."""
+        if np.ndim(p_WB) == 1:
+            distance, cos, sin = self._around(*np.asarray(p_WB).tolist())
+            upright, down = self._tilted
+            ex, ey, ez = -upright * sin, cos, down * sin  # e2, along which alone the normal turns
+            rows = [[ex * ex, ex * ey, ex * ez], [ey * ex, ey * ey, ey * ez], [ez * ex, ez * ey, ez * ez]]
+            return np.array(rows) / distance
+        p = self._local(p_WB)
+        e1 = self.normal(p_WB)
+        axis = tilted(self.tilt)[:, 2]
+        across = np.eye(3) - np.outer(axis, axis) - e1[..., :, None] * e1[..., None, :]
+        return np.asarray(across / np.hypot(p[..., 0], p[..., 1])[..., None, None])

@@ -1,0 +1,101 @@
+"""What a surface is on which the centre of a ball moves; the modules beside this one are the only ones that know any.
+
+Each surface gives two independent descriptions of itself: a parametrisation (position, tangents, second
+derivatives; what constraint models need) and a signed distance with its derivatives (what contact models need).
+
+Local frame at a point, columns of :meth:`frame`:
+
+* ``e1`` unit normal, from the ball's centre towards the wall,
+* ``e2`` along the first coordinate, ``e3 = e1 × e2``.
+
+Array arguments may carry leading dimensions (``...``), e.g. time.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Literal, Protocol
+
+import numpy.typing as npt
+
+from proofroll.core.arrays import FloatArray
+
+
+@dataclass(frozen=True)
+class Generator:
+    """One of the two rigid motions that slide a homogeneous surface along itself.
+
+    Attributes:
+        kind: ``rotation`` about, or ``translation`` along, a line through the world origin.
+        axis: unit direction of that line in the world, shape (3,).
+    """
+
+    kind: Literal["rotation", "translation"]
+    axis: tuple[float, float, float]
+
+
+class Surface(Protocol):
+    """A surface that guides the centre of a ball. ``u`` are its two coordinates, shape (..., 2)."""
+
+    @property
+    def name(self) -> str:
+        """Name of the wall in the scene."""
+
+    @property
+    def coordinates(self) -> tuple[str, str]:
+        """Names of the two coordinates, e.g. ``("gamma", "z")``."""
+
+    @property
+    def units(self) -> tuple[str, str]:
+        """Units of the two coordinates, e.g. ``("rad", "m")``."""
+
+    @property
+    def periods(self) -> tuple[float | None, float | None]:
+        """Period of each coordinate after which the point repeats, or None."""
+
+    @property
+    def length_scales(self) -> tuple[float, float]:
+        """Metres travelled per unit of each coordinate, at most [m/unit]."""
+
+    @property
+    def generators(self) -> tuple[Generator, Generator] | None:
+        """Motions G1, G2 with p(u) = G1(u1) G2(u2) p(0) and frame(u) alike; None if not homogeneous."""
+
+    def offset(self, ball_radius: float) -> Surface:
+        """The surface on which the centre of a touching ball of this radius [m] moves."""
+
+    def position(self, u: npt.ArrayLike) -> FloatArray:
+        """p_WB: centre of the ball in the world [m], shape (..., 3)."""
+
+    def tangents(self, u: npt.ArrayLike) -> FloatArray:
+        """∂p/∂u [m/unit], shape (..., 3, 2)."""
+
+    def second(self, u: npt.ArrayLike) -> FloatArray:
+        """∂²p/∂u∂u [m/unit²], shape (..., 3, 2, 2)."""
+
+    def frame(self, u: npt.ArrayLike) -> FloatArray:
+        """Local frame with columns e1, e2, e3, shape (..., 3, 3)."""
+
+    def locate(self, p_WB: npt.ArrayLike) -> FloatArray:
+        """Coordinates u of the nearest point, shape (..., 2); a periodic coordinate is in (-period/2, period/2]."""
+
+    def gap(self, p_WB: npt.ArrayLike) -> FloatArray:
+        """Distance of the ball from the wall [m], shape (...); negative where it has sunk in."""
+
+    def normal(self, p_WB: npt.ArrayLike) -> FloatArray:
+        """e1 = -∇gap at any point near the surface, shape (..., 3)."""
+
+    def normal_gradient(self, p_WB: npt.ArrayLike) -> FloatArray:
+        """∂e1/∂p = -∇∇gap [1/m], shape (..., 3, 3)."""
+
+    def nearby(self, x: float, y: float, z: float) -> tuple[float, float, float, float]:
+        """Gap [m] and the components of e1 at one point, for loops that call it at every step."""
+
+    def triad(self, x: float, y: float, z: float) -> tuple[float, ...]:
+        """Components of e1, e2, e3 at one point, one after the other; as :meth:`nearby`."""
+
+    def normal_rate(self, p: tuple[float, float, float], v: tuple[float, float, float]) -> tuple[float, float, float]:
+        """(∂e1/∂p) v at one point p [m], for its velocity v [m/s]; as :meth:`nearby`."""
+
+    def moving_triad(self, x: float, y: float, z: float, vx: float, vy: float, vz: float) -> tuple[float, ...]:
+        """Gap [m], :meth:`triad` and :meth:`normal_rate` [1/s] in one call: 13 numbers, one after the other."""
