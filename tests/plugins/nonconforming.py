@@ -105,6 +105,12 @@ class Boastful(Tiny):
         return super().build(scene, settings)
 
 
+class Floating(Tiny):
+    """Provides what no scene requires, and nothing else."""
+
+    provides: ClassVar[Mapping[str, frozenset[str]]] = {"midpoint": frozenset({"levitation"})}
+
+
 class Silent(Tiny):
     """Refuses without a word."""
 
@@ -382,6 +388,7 @@ FAILS: Mapping[type[Tiny], str] = {
     Orderless: "resolution_and_order_are_told",
     Lax: "bad_settings_give_one_line",
     Boastful: "provides_what_it_says",
+    Floating: "provides_for_some_scene",
     Silent: "builds_or_refuses",
     Heavy: "certificate_holds",
     Doubled: "certificate_holds",

@@ -81,13 +81,15 @@ def run(
 
             move(target, out)
             content["trajectory"] = str(out)
+    done = content["status"] == "done"
+    if not done:
+        complain(f"{content['engine']} {content['status']}: {content['message']}")
     if as_json:
         write_json(content)
-    else:
+    elif done or content["final"]:
         from proofroll.report.terminal import console
 
         for line in run_lines(content):
             console().print(line)
-    if content["status"] != "done":
-        complain(f"{content['engine']} {content['status']}: {content['message']}")
+    if not done:
         raise typer.Exit(ENGINE)

@@ -10,7 +10,7 @@ from typing import Any
 from unittest import SkipTest
 
 from proofroll.conformance import building, declarations, motion, response
-from proofroll.conformance.subject import Subject, scenes
+from proofroll.conformance.subject import Subject, lacking, scenes
 
 # One per engine.
 _OF_ENGINES: tuple[Callable[[Any], None], ...] = (
@@ -22,14 +22,15 @@ _OF_ENGINES: tuple[Callable[[Any], None], ...] = (
     declarations.resolution_and_order_are_told,
     declarations.bad_settings_give_one_line,
     building.provides_what_it_says,
+    building.provides_for_some_scene,
 )
-# One per formulation, preset and scene.
+# One per formulation, preset and scene that requires nothing which the formulation does not provide.
 _OF_SCENES: tuple[Callable[[Subject], None], ...] = (
     building.builds_or_refuses,
     building.certificate_holds,
     building.builds_only_what_is_required,
 )
-# One per formulation, preset and scene that has a truth.
+# One per formulation, preset and such a scene that has a truth.
 _OF_TRUTHS: tuple[Callable[[Subject], None], ...] = (
     response.first_steps_fit_the_scene,
     response.moves_as_the_truth,
@@ -96,7 +97,7 @@ class Check:
 
 
 def checks(engine: Any, known: Mapping[str, str] | None = None) -> list[Check]:
-    """All checks of an engine.
+    """All checks of an engine: of each formulation, on the scenes that require nothing which it does not provide.
 
     Args:
         engine: the engine's class.
@@ -134,6 +135,8 @@ def _runs(engine: Any) -> Iterator[tuple[str, Callable[[], None]]]:
         for preset, settings in presets.items():
             for found, of_found in ((scenes(), _OF_SCENES), (response.truth_scenes(), _OF_TRUTHS)):
                 for (name, scene), check_scene in itertools.product(found.items(), of_found):
+                    if lacking(engine, formulation, scene):
+                        continue  # refused before it is built; that something is left `provides_for_some_scene` holds
                     subject = Subject(engine, settings, scene)
                     yield f"{check_scene.__name__}[{formulation}-{preset}-{name}]", _bound(check_scene, subject)
             for check_preset in _OF_PRESETS:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import dataclasses
 import math
+from collections.abc import Mapping
 from dataclasses import dataclass
 from functools import cache, cached_property
 from typing import Any
@@ -30,6 +31,12 @@ def scenes() -> dict[str, Scene]:
 @cache
 def _scenes(kind: Any) -> dict[str, Scene]:
     return dict(kind.conformance_scenes())
+
+
+def lacking(engine: Any, formulation: str, scene: Scene) -> frozenset[str]:
+    """What the scene requires and the formulation does not say it provides."""
+    provides = engine.provides.get(formulation, ()) if isinstance(engine.provides, Mapping) else ()
+    return scene.requires - frozenset(provides)
 
 
 def require(condition: object, message: str) -> None:

@@ -41,8 +41,10 @@ def richardson(curves: Sequence[FloatArray], steps: Sequence[float], declared: i
 
     The observed order p follows from the size of the two differences (Roache 1998, section 5.9). Where it is that of
     the scheme the ladder is asymptotic: the extrapolation removes the term h^p, then h^(p+1), and is trusted to twice
-    its last change. Where it is not, extrapolating would spread the error of the coarse curves; the finest curve then
-    stands for the limit, trusted to twice what the last refinement changed (more, where the order is below one).
+    its last change. So it is where curves show another whole order and differ by one shape, which scatter does not; the
+    bar then has what the rounding of that order changes, too. Elsewhere extrapolating would spread the error of the
+    coarse curves; the finest curve stands for the limit, trusted to twice what the last refinement changed (more, where
+    the order is below one).
 
     Args:
         curves: three arrays of one shape.
@@ -58,15 +60,19 @@ def richardson(curves: Sequence[FloatArray], steps: Sequence[float], declared: i
     if not np.isfinite(order) or order < _NO_CONVERGENCE:
         # The finest curve, as uncertain as the largest change seen; from one that vanishes at once no order follows.
         return Limit(fine, max(first, last), float("nan"), shown=last < first * (h[1] / h[0]) ** _NO_CONVERGENCE)
-    power = declared or max(1, round(order))
+    power, rounding = declared or max(1, round(order)), 0.0
     if abs(order - power) > _ASYMPTOTIC:
-        return Limit(fine, 2 * last * max(1.0, 1 / (h[1] ** order - 1)), order)
+        power = max(1, round(order))
+        of_one_shape = size((fine - middle) - (middle - coarse) * last / first) <= _ASYMPTOTIC * last
+        if abs(order - power) > _ASYMPTOTIC or not of_one_shape:
+            return Limit(fine, 2 * last * max(1.0, 1 / (h[1] ** order - 1)), order)
+        rounding = last * abs(1 / (h[1] ** order - 1) - 1 / (h[1] ** power - 1))
     before = middle + (middle - coarse) / ((h[0] / h[1]) ** power - 1)
     after = fine + (fine - middle) / (h[1] ** power - 1)
     # What the two extrapolations keep of the term h^(p+1)
     kept = [_kept(h[0], h[1], power), _kept(h[1], h[2], power)]
     values = after + (after - before) * kept[1] / (kept[0] - kept[1])
-    return Limit(values, 2 * size(values - after), order)
+    return Limit(values, 2 * max(size(values - after), rounding), order)
 
 
 def observed_order(first: float, last: float, steps: Sequence[float] | FloatArray) -> float:

@@ -30,7 +30,7 @@ class Verdict(StrEnum):
     INCOMPLETE = "incomplete"  # all that is reported agrees, but not all that is to be judged is reported
     CONVERGES = "converges"  # not yet, but the limit of small steps is within tolerance
     ILL_POSED = "ill-posed"  # here the answer hangs on less than the parameters are known to; nobody can be judged
-    NOT_JUDGED = "not-judged"  # the tolerance is below the truth's own error bar; nobody can be judged
+    NOT_JUDGED = "not-judged"  # there is no truth, or its own error bar exceeds the tolerance; nobody can be judged
     ANOTHER_SCENE = "another-scene"  # what was run is of another kind than the scene; it is shown and not judged
     DIFFERS = "differs"  # not this model at this step; what the ladder says is in LimitFinding
     FAILED = "failed"  # there is no result

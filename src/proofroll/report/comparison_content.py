@@ -79,8 +79,8 @@ def _tolerance(value: float, relative: bool) -> str:
 def _row(runs: list[Run]) -> dict[str, Any]:
     """Summary over the points of the parameters: the worst of everything."""
     first = runs[0]
-    # A point at which the question is ill-posed says nothing about an engine.
-    judged = [run for run in runs if run.verdict != Verdict.ILL_POSED] or runs
+    # A point at which the question is ill-posed, or has no answer, says nothing about an engine.
+    judged = [run for run in runs if run.verdict not in {Verdict.ILL_POSED, Verdict.NOT_JUDGED}] or runs
     names = list(dict.fromkeys(judgement.observable for run in judged for judgement in run.judgements))
     timings = [run.result.seconds_per_second for run in runs if run.result.seconds_per_second is not None]
     order = list(Verdict)

@@ -38,7 +38,7 @@ def _answer(content: dict[str, Any], found: list[Score]) -> str:
         "converges": ("needs", "need", "a finer step"),
         "ill-posed": ("is", "are", "beyond judgement somewhere, where the question is ill-posed"),
         "another-scene": ("is", "are", "of another kind than the scene, so not judged"),
-        "not-judged": ("is", "are", "held against a tolerance below the truth's own error bar, so not judged"),
+        "not-judged": ("is", "are", "not judged, for there is no truth, or none as exact as the tolerance"),
         "differs": ("differs", "differ", "somewhere, with no limit of small steps at the truth"),
         "failed": ("gives", "give", "no result somewhere"),
     }

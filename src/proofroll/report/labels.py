@@ -24,7 +24,7 @@ MEANINGS = {
     "converges": "not within tolerance yet, but the limit of small steps is: right physics, step too coarse",
     "ill-posed": "here the answer hangs on less than the parameters are known to: nobody is judged by it",
     "another-scene": "the model is of another kind than the scene: it is shown, and not judged",
-    "not-judged": "the truth's own error bar exceeds the tolerance: nobody is judged by it",
+    "not-judged": "there is no truth here, or its own error bar exceeds the tolerance: nobody is judged by it",
     "differs": "not within tolerance: another limit, no limit shown, or one step only; each says which",
     "failed": "there is no result; the row says why",
 }

@@ -16,6 +16,7 @@ class Status(StrEnum):
     DIVERGED = "diverged"
     REFUSED = "refused"
     ANOTHER_SCENE = "another scene"  # it ran, but what it ran is not this scene (KnowsAnotherScene)
+    NO_TRUTH = "no truth"  # it ran, but there is no truth to hold it against
     MISSING = "missing"
     CRASHED = "crashed"
     TIMEOUT = "timeout"

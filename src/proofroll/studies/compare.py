@@ -26,6 +26,8 @@ if TYPE_CHECKING:
 
 
 _ORDER = list(Verdict)
+# What a run is called that came to its end and cannot be judged; any other without a judgement failed.
+_UNJUDGED = {Status.ANOTHER_SCENE: Verdict.ANOTHER_SCENE, Status.NO_TRUTH: Verdict.NOT_JUDGED}
 
 
 def worst(judgements: Sequence[Judgement], missing: Collection[str] = ()) -> Verdict:
@@ -63,10 +65,8 @@ class Run:
     @property
     def verdict(self) -> Verdict:
         """The worst verdict of any observable; incomplete if all that is reported agrees but something is missing."""
-        if self.result.status == Status.ANOTHER_SCENE:
-            return Verdict.ANOTHER_SCENE
         if self.result.status != Status.DONE:
-            return Verdict.FAILED
+            return _UNJUDGED.get(self.result.status, Verdict.FAILED)
         return worst(self.judgements, self.missing)
 
 
@@ -113,9 +113,7 @@ def evaluate(planned: Plan, results: dict[str, Result], runner: Runner) -> Outco
         name = point_name(run.parameters)
         truth = results[planned.truths[name].key]
         if truth.status != Status.DONE:
-            status = Status.REFUSED if truth.status in LASTING else truth.status
-            nothing = Result(status, f"there is no truth here: {truth.message}", versions=result.versions)
-            judged.append(_failed(run, run.facts, nothing))
+            judged.append(_without_truth(run, run.facts, result, truth))
             continue
         if name not in references:
             scene = load_scene(comparison.scene, **run.parameters)
@@ -166,6 +164,16 @@ def _failed(run: Planned, facts: EngineFacts, result: Result) -> Run:
     expected = Verdict.FAILED in run.row.expected(run.parameters)
     sentence = f"{run.row.engine} at {point_name(run.parameters)} {result.status}: {result.message}"
     return Run(run.row, run.parameters, facts, result, [], [] if expected else [sentence], run.ladder[1.0])
+
+
+def _without_truth(run: Planned, facts: EngineFacts, result: Result, truth: Result) -> Run:
+    """A row at a point where the truth refuses, which says nothing about the engine; or where it was lost."""
+    refused = truth.status in LASTING
+    status = Status.NO_TRUTH if refused else truth.status
+    result = replace(result, status=status, message=f"there is no truth here: {truth.message}")
+    if not refused:
+        return _failed(run, facts, result)
+    return Run(run.row, run.parameters, facts, result, case=run.ladder[1.0])
 
 
 def _of_another_scene(run: Planned, facts: EngineFacts, result: Result, sentence: str) -> Run:

@@ -51,6 +51,15 @@ def test_an_error_that_vanishes_by_luck_at_one_step_is_no_agreement(declared: in
     assert "another limit: off by" in found.reason
 
 
+def test_a_clean_ladder_of_another_order_than_declared_shows_its_limit() -> None:
+    """Off by 1.5 mm (1 - h/1 ms) where 1 mm is allowed, declared of order 2: order 1 is seen, and the limit differs."""
+    off = [1.5e-3 * (1 - h) for h in (1.0, 0.5, 0.25)]
+    found = verdict_of(off[0], errors(*off, declared=2))
+    assert (found.verdict, found.limit) == (Verdict.DIFFERS, LimitFinding.ANOTHER)
+    assert found.limit_error == pytest.approx(1.5e-3)
+    assert found.order == pytest.approx(1)
+
+
 def test_a_ladder_that_does_not_tell_the_limit_confirms_nothing() -> None:
     """Within tolerance, with a limit known less well than the tolerance: agreement at this step, no more."""
     found = verdict_of(0.5e-3, errors(0.5e-3, 4e-3, -2e-3))
@@ -137,9 +146,10 @@ def test_converges_if_the_limit_is_the_truth() -> None:
 
 def test_a_ladder_is_never_too_clean() -> None:
     """An order of 1 to ten digits with a limit off by round-off converges, though its bar is smaller than that."""
-    found = verdict_of(0.01, Limit(TRUE + 2.7e-14, 9.3e-15, 0.99999999994))
-    assert found.verdict is Verdict.CONVERGES
-    assert found.remarks == (), "round-off of a curve is no other limit"
+    for off in (2.7e-14, 5e-13):  # 3 and 50 of its bars, below the truth's own
+        found = verdict_of(0.01, Limit(TRUE + off, 9.3e-15, 0.99999999994))
+        assert (found.verdict, found.limit) == (Verdict.CONVERGES, LimitFinding.WITHIN)
+        assert found.remarks == (), "round-off of a curve is no other limit"
 
 
 def test_a_limit_within_tolerance_is_convergence() -> None:

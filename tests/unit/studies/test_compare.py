@@ -20,6 +20,7 @@ from proofroll.core.verdict import Verdict
 from proofroll.elements.ball_on_surface.model import BallCapability
 from proofroll.files.netcdf import write
 from proofroll.files.scene_file import load_scene
+from proofroll.report.comparison_content import outcome_content
 from proofroll.running.case import Case, EngineFacts, Result, Status
 from proofroll.running.runner import Runner
 from proofroll.running.simulation import simulate
@@ -296,9 +297,26 @@ def test_neighbouring_points_have_truths_of_their_own(
     assert 1e-6 / 0.2 * comparison.until > TIGHT["gamma"].absolute(1.0)
 
 
-@pytest.mark.parametrize("status", [Status.REFUSED, Status.TIMEOUT])
-def test_a_point_without_a_truth(tmp_path: Path, status: Status) -> None:
-    """Where the truth cannot be had every row fails and says so; the other points are judged as ever."""
+def test_a_point_where_the_truth_refuses(tmp_path: Path) -> None:
+    """Where the truth refuses nobody is judged, with its reason; an engine that failed there failed all the same."""
+    rows = [ROW, dataclasses.replace(ROW, engine="beta")]
+    none = {4.0: Result(Status.REFUSED, "the ball is back on the wall")}
+    outcome = judged(tmp_path, claim(rows, [3.0, 4.0]), the_truth, none)
+    there = [run for run in outcome.runs if run.parameters["speed"] == 4.0]
+    assert outcome.contradictions == []
+    for run in there:
+        assert (run.verdict, run.judgements, run.missing) == (Verdict.NOT_JUDGED, [], [])
+        assert run.result.message == "there is no truth here: the ball is back on the wall"
+        assert run.result.trajectory is not None
+    content = outcome_content(outcome)
+    assert [row["verdict"] for row in content["rows"]] == ["agrees", "agrees"]
+    assert [row["verdicts"]["not-judged"] for row in content["rows"]] == [1, 1]
+    assert content["runs"][1]["reason"].startswith("no truth at speed=4: there is no truth here: the ball")
+
+
+@pytest.mark.parametrize("status", [Status.CRASHED, Status.TIMEOUT])
+def test_a_point_where_the_truth_is_lost(tmp_path: Path, status: Status) -> None:
+    """Where the truth crashed or hung every row fails and says so; the other points are judged as ever."""
     rows = [ROW, dataclasses.replace(ROW, engine="beta")]
     none = {4.0: Result(status, "the ball is back on the wall")}
     outcome = judged(tmp_path, claim(rows, [3.0, 4.0, 5.0]), the_truth, none)
