@@ -19,6 +19,7 @@ from proofroll.files.scene_file import load_scene
 from proofroll.running.case import Case, EngineFacts
 
 PLUGINS = Path(__file__).parent / "plugins"
+_METADATA = "Metadata-Version: 2.1\nName: throwaway\nVersion: 1.0\nRequires-Dist: no-such-library>=2\n"
 
 # The same examples on every machine: a red test stays red when it is run again.
 settings.register_profile(
@@ -59,7 +60,7 @@ def install_engines(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Callable
         site = tmp_path / "site"
         info = site / "throwaway-1.0.dist-info"
         info.mkdir(parents=True)
-        (info / "METADATA").write_text("Metadata-Version: 2.1\nName: throwaway\nVersion: 1.0\n")
+        (info / "METADATA").write_text(_METADATA)
         lines = [f"{name} = {target}" for name, target in engines.items()]
         (info / "entry_points.txt").write_text("\n".join(["[proofroll.engines]", *lines, ""]))
         places = [str(site), str(PLUGINS), *filter(None, [os.environ.get("PYTHONPATH")])]

@@ -2,11 +2,22 @@
 
 from __future__ import annotations
 
+from pathlib import Path
 from typing import Annotated, Any
 
 import typer
 
-from proofroll.cli.options import CONTRADICTED, ENGINE, Engines, Json, progress_bar, spinner, write_json
+from proofroll.cli.options import (
+    CONTRADICTED,
+    ENGINE,
+    Engines,
+    Json,
+    json_text,
+    progress_bar,
+    require_writable,
+    spinner,
+    write_json,
+)
 
 bench = typer.Typer(help="Measure speed, and what proofroll itself costs.", rich_markup_mode=None)
 
@@ -21,16 +32,22 @@ def adapters(
     ] = "matched",
     rounds: Rounds = 7,
     seconds: Annotated[float, typer.Option(min=1e-3, help="Least length of one measurement [s].")] = 0.1,
+    out: Annotated[Path | None, typer.Option(help="Write what --json prints to this file too.")] = None,
     as_json: Json = False,
 ) -> None:
     """Compare each adapter with the bare loop that a careful user of its engine would write."""
     from proofroll.core.plugins import engine_names, require_engine
+    from proofroll.running.store import write_text
     from proofroll_benchmarks.adapters import bench_adapters, content
 
     for name in engine or ():
         require_engine(name)
+    if out is not None:
+        require_writable(out)
     with progress_bar("adapters") as advance:
         found = content(bench_adapters(engine or engine_names(), preset, rounds, seconds, progress=advance))
+    if out is not None:
+        write_text(out, json_text(found))
     if as_json:
         write_json(found)
     else:

@@ -65,16 +65,16 @@ class MixedUp(Tiny):
 
 @dataclass(frozen=True)
 class OrderlessSettings(TinySettings):
-    """A step, but no order."""
+    """A step, and no whole order."""
 
     @property
-    def order(self) -> int | None:
-        """Not told."""
-        return None
+    def order(self) -> Any:
+        """Half an order."""
+        return 1.5
 
 
 class Orderless(Tiny):
-    """Does not say its order."""
+    """Says no order that is one."""
 
     settings = OrderlessSettings
     presets: ClassVar[Mapping[str, Mapping[str, Any]]] = {"midpoint": {"matched": OrderlessSettings()}}

@@ -119,12 +119,17 @@ def spinner(text: str) -> Iterator[Callable[[str], None]]:
         yield said.append if sign is None else sign.update
 
 
-def write_json(content: object) -> None:
-    """One JSON document on standard output."""
+def json_text(content: object) -> str:
+    """A JSON document."""
     from proofroll.files.json_data import plain
     from proofroll.report.screen import escaped
 
-    sys.stdout.write(escaped(json.dumps(plain(content), indent=1, ensure_ascii=False)) + "\n")
+    return escaped(json.dumps(plain(content), indent=1, ensure_ascii=False)) + "\n"
+
+
+def write_json(content: object) -> None:
+    """One JSON document on standard output."""
+    sys.stdout.write(json_text(content))
 
 
 def complain(text: str) -> None:

@@ -44,7 +44,7 @@ def recommend(
     It chooses among models of engines; solutions of the scene's own equations (closed form, reduced, projection) are
     told apart, unless --engine asks for them. Of the cheaper ones, which all fail, the most accurate is shown.
     """
-    from proofroll.core.plugins import parse_engine, require_engine
+    from proofroll.core.plugins import engine_names, parse_engine, require_engine
     from proofroll.report.tradeoff_tables import answer_lines
     from proofroll.studies.recommend import Wish
     from proofroll.studies.recommend import recommend as answered
@@ -58,6 +58,8 @@ def recommend(
     ranges = ranges_of(question, over) if over is not None else None
     study = _stored_study(question, engine or [], claims, ranges, out, jobs, measure_first=measure_first)
     answer = answered(study, wish)
+    known = {*study["absent"], *(point["engine"] for point in study["points"])}
+    answer["not_measured"] = [] if engine else [name for name in engine_names() if name not in known]
     if as_json:
         write_json(answer)
     else:
@@ -105,19 +107,23 @@ def _stored_study(
     *,
     measure_first: bool,
 ) -> dict[str, Any]:
-    """The stored curves, of all engines or of those that are asked for, or new ones if the user agrees.
+    """The stored curves, of all engines or of some with those that are asked for, or new ones if the user agrees.
 
     With ``ranges`` of parameters they must have been checked over these.
 
     Raises:
         InputError: there are none that hold here, and nobody agreed to measure them.
     """
+    from proofroll.studies.recommend import covers
     from proofroll.studies.study_store import kept
-    from proofroll.studies.tradeoff import stored
+    from proofroll.studies.tradeoff import restricted, stored
 
     reasons: list[str] = []
-    for path in (stored(out, question), stored(out, question, engines)):
+    for path in (stored(out, question), *restricted(out, question)):
         study, changes = kept(path)
+        if study is not None and not covers(study.get("engines", ()), engines):
+            changes = [f"what is stored is of {', '.join(study['engines'])}; choose among these with --engine"]
+            study = None
         if study is not None and ranges is not None and study["over"] != ranges:
             study, changes = None, ["the stored curves were not checked over these ranges"]
         if study is not None:

@@ -25,7 +25,9 @@ def run(
     engine: Annotated[str, typer.Option(help="truth, or name[key=value,…], e.g. mujoco[formulation=chart,dt=1e-4].")],
     settings: Set = None,
     until: Annotated[float, typer.Option(help="Last time [s].")] = 2.0,
-    every: Annotated[float, typer.Option(help="Interval between samples [s].")] = 0.01,
+    every: Annotated[
+        float | None, typer.Option(help="Interval between samples [s]; by default 0.01, or near it in whole steps.")
+    ] = None,
     out: Annotated[Path | None, typer.Option(help="Write the trajectory to this netCDF file.")] = None,
     time_limit: Annotated[float, typer.Option(help="Wall seconds after which the run is ended.")] = 600.0,
     ask: Annotated[list[str] | None, typer.Option(help="What is wanted besides the motion: orientation.")] = None,
@@ -39,14 +41,14 @@ def run(
     import tempfile
     import threading
 
-    from proofroll.core.time_grid import time_grid
+    from proofroll.core.time_grid import EVERY, time_grid
     from proofroll.report.run import run_content, run_lines
     from proofroll.report.run_plot import require_ending
     from proofroll.running.runner import run_one
     from proofroll.running.worker_pool import Workers
     from proofroll.studies.run_once import single_case
 
-    time_grid(until, every)
+    time_grid(until, EVERY if every is None else every)
     for file in (out, plot):
         if file is not None:
             require_writable(file)

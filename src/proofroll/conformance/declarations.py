@@ -73,7 +73,7 @@ def presets_are_complete(engine: Any) -> None:
 
 
 def resolution_and_order_are_told(engine: Any) -> None:
-    """Each preset names the setting that trades speed for accuracy, if any, and an order exactly if that is a step."""
+    """Each preset names the setting that trades speed for accuracy, if any, and an order only if that is a step."""
     for formulation, presets in engine.presets.items():
         for preset, settings in presets.items():
             where = f"presets[{formulation!r}][{preset!r}]"
@@ -89,7 +89,7 @@ def resolution_and_order_are_told(engine: Any) -> None:
             order = settings.order
             if settings.resolution == "dt":
                 whole = isinstance(order, int) and not isinstance(order, bool) and order > 0
-                require(whole, f"{where}.order is {order!r}; a method with a fixed step has a whole order")
+                require(whole or order is None, f"{where}.order is {order!r}, neither a whole order nor None")
             else:
                 require(order is None, f"{where}.order is {order!r}; with a tolerance there is none")
 

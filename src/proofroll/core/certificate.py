@@ -81,11 +81,12 @@ def first_difference(lines: list[Line]) -> str | None:
             continue
         if all(np.isnan(line.found)):
             return f"the engine's model does not say its {line.quantity}, which the scene requires"
+        found, expected = _told_apart(line.found, line.expected)
         refused = f"; {line.quantity} {line.because}" if line.tolerance == EXACT and line.because else ""
         return (
-            f"the engine's model differs from the scene: {line.quantity} is {_shown(line.found)} instead of "
-            f"{_shown(line.expected)} {line.unit} (relative difference {line.difference:.2g}, "
-            f"allowed {line.tolerance:.2g}){refused}"
+            f"the engine's model differs from the scene: {line.quantity} is {found} instead of "
+            f"{expected} {line.unit} (relative difference {line.difference:.2g}, "
+            f"allowed {line.tolerance:.2g}){refused}{_single(line)}"
         )
     return None
 
@@ -95,5 +96,18 @@ def not_reported(lines: Iterable[Mapping[str, Any]]) -> list[str]:
     return [str(line["quantity"]) for line in lines if line["standing"] == Standing.NOT_REPORTED]
 
 
-def _shown(values: tuple[float, ...]) -> str:
-    return ", ".join(f"{value:.6g}" for value in values)
+def _told_apart(found: tuple[float, ...], expected: tuple[float, ...]) -> tuple[str, str]:
+    """Both as text, with so many digits that they are not the same."""
+    for digits in range(6, 18):
+        one, other = (", ".join(f"{value:.{digits}g}" for value in values) for values in (found, expected))
+        if one != other:
+            break
+    return one, other
+
+
+def _single(line: Line) -> str:
+    """What a reader must know of numbers that are the scene's in single precision."""
+    if len(line.found) != len(line.expected):
+        return ""
+    one, other = np.array(line.found), np.array(line.expected, dtype=np.float32).astype(float)
+    return "; it is the same number in single precision (float32)" if np.array_equal(one, other) else ""

@@ -6,6 +6,7 @@ NaN, timeouts and files. An adapter knows surfaces and contact laws, never a sce
 
 from __future__ import annotations
 
+import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from enum import StrEnum
@@ -110,7 +111,7 @@ class Settings(Protocol):
 
     @property
     def order(self) -> int | None:
-        """Declared order of convergence in ``dt``; None with an adaptive step."""
+        """Order of convergence in ``dt`` that conformance holds it to; None: none is declared, or the step adapts."""
 
 
 class Engine(Protocol):
@@ -282,9 +283,12 @@ def whole_steps(start: float, end: float, dt: float) -> int:
     exact = (end - start) / dt
     steps = round(exact)
     if abs(exact - steps) > 1e-6 * max(1.0, abs(steps)):
+        near, less = max(1, steps) * dt, (end - start) / max(1, math.ceil(exact))
         raise InputError(
-            "dt", dt, f"no whole number of steps reaches {end:g} s; choose a step that divides the interval"
-        )
+            "dt", dt,
+            f"the run is sampled at {start:.6g} s and {end:.6g} s, and no whole number of steps lies between; "
+            f"sample every {near:.6g} s (`every`) or choose a step that divides the interval, as {less:.6g} s",
+        )  # fmt: skip
     return steps
 
 

@@ -2,7 +2,11 @@
 
 from __future__ import annotations
 
+import traceback
 from collections.abc import Iterable
+from pathlib import Path
+
+_PACKAGE = Path(__file__).parents[1]
 
 
 class ProofrollError(Exception):
@@ -39,6 +43,24 @@ class Missing(ProofrollError):  # noqa: N818 -- likewise: the engine is not inst
 
 class Diverged(ProofrollError):  # noqa: N818 -- a finding about the engine
     """The engine gave up or produced a state that is not finite; the text says when."""
+
+
+def place(error: BaseException) -> str:
+    """Where in an adapter an exception arose, as ``file:line in function``; empty if it did not arise in one.
+
+    It is the last line of the first package outside the harness: what that package calls knows no better.
+    """
+    frames = [frame for frame in traceback.extract_tb(error.__traceback__) if "importlib" not in frame.filename]
+    outside = [frame for frame in frames if not Path(frame.filename).is_relative_to(_PACKAGE) or _of_engine(frame)]
+    if not outside:
+        return ""
+    home = Path(outside[0].filename).parent
+    last = [frame for frame in outside if Path(frame.filename).is_relative_to(home)][-1]
+    return f"{'/'.join(Path(last.filename).parts[-2:])}:{last.lineno} in {last.name}"
+
+
+def _of_engine(frame: traceback.FrameSummary) -> bool:
+    return Path(frame.filename).is_relative_to(_PACKAGE / "engines")
 
 
 def lack_behind(error: BaseException) -> BaseException | None:

@@ -5,12 +5,14 @@ from __future__ import annotations
 import dataclasses
 import re
 from collections.abc import Collection, Mapping
+from contextlib import suppress
 from functools import cache
-from importlib.metadata import EntryPoint, entry_points
+from importlib.metadata import EntryPoint, PackageNotFoundError, entry_points, version
+from importlib.util import find_spec
 from typing import Any
 
 from proofroll.core.element import ElementKind
-from proofroll.core.errors import InputError, Missing
+from proofroll.core.errors import InputError, Missing, ProofrollError, place
 
 GROUP = "proofroll.engines"
 ELEMENTS = "proofroll.elements"
@@ -27,14 +29,47 @@ def load_engine(name: str) -> Any:
     Raises:
         InputError: no installed package announces such an engine.
         Missing: it is announced, but what it needs is not installed.
+        ProofrollError: it is announced, but what the entry point or an import names does not exist.
     """
     point = _entry_point(name)
     try:
         return point.load()
     except ModuleNotFoundError as error:
-        module = error.name or str(error)
-        how = f"pip install 'proofroll[{name}]'" if point.value.startswith("proofroll.") else f"pip install {module}"
-        raise Missing(f"{name} is not installed here ({module} is missing): {how}") from None
+        raise _not_found(point, error) from None
+    except AttributeError as error:
+        if place(error):  # arose inside the adapter
+            raise
+        raise ProofrollError(f"{name} is announced as {point.value}, but {error}: correct the entry point") from None
+
+
+def _not_found(point: EntryPoint, error: ModuleNotFoundError) -> ProofrollError:
+    """Whether a module is not installed, or only misspelt."""
+    module, where = error.name or str(error), place(error)
+    whole = f"imports {module} ({where})" if where else f"is announced as {point.value}"
+    top = module.partition(".")[0]
+    if top != module and find_spec(top) is not None:
+        return ProofrollError(f"{point.name} {whole}; {top} is installed, but has no such module: correct the name")
+    if point.value.startswith("proofroll."):
+        return Missing(
+            f"{point.name} is not installed here ({module} is missing): pip install 'proofroll[{point.name}]'"
+        )
+    lacking = [text for text in (point.dist.requires if point.dist else None) or [] if not _installed(text)]
+    if lacking:
+        needed = " ".join(f"'{text}'" for text in lacking)
+        return Missing(f"{point.name} is not installed here ({module} is missing): pip install {needed}")
+    return Missing(
+        f"{point.name} {whole}, which is not installed here: correct the name if it is misspelt, or pip install what "
+        f"has {module} and name that in the dependencies of {point.dist.name if point.dist else 'the package'}"
+    )
+
+
+def _installed(requirement: str) -> bool:
+    """Whether a distribution is there as a package's metadata requires it; of extras nobody asked for."""
+    name, _, condition = requirement.partition(";")
+    found = re.match(r"[\w.-]+", name)
+    with suppress(PackageNotFoundError):
+        return "extra" in condition or found is None or bool(version(found[0]))
+    return False
 
 
 @cache

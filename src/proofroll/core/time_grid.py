@@ -7,6 +7,16 @@ import numpy as np
 from proofroll.core.arrays import FloatArray
 from proofroll.core.errors import InputError
 
+# How far apart samples are where nobody says it [s].
+EVERY = 0.01
+
+
+def sampling_interval(step: float | None) -> float:
+    """Interval between samples where nobody gives one: :data:`EVERY`, or the nearest whole number of steps [s]."""
+    if step is None or abs(EVERY / step - round(EVERY / step)) <= 1e-6 * EVERY / step:
+        return EVERY
+    return max(1, round(EVERY / step)) * step
+
 
 def time_grid(until: float, every: float) -> FloatArray:
     """Sample times 0, every, 2 every, … and ``until`` [s].

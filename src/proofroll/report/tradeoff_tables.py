@@ -229,6 +229,8 @@ def answer_lines(answer: Mapping[str, Any]) -> Iterator[str]:
             yield f"{words}: {_line(answer[key], answer)}"
     yield "Costs are those of an engine through this adapter; another way to drive it may cost more or less."
     yield _checked(answer)
+    if answer.get("not_measured"):
+        yield f"Not among what was measured: {', '.join(answer['not_measured'])}."
     yield _measured(answer["measured"])
 
 

@@ -11,7 +11,7 @@ from proofroll.core.engine import fixed_step
 from proofroll.core.errors import InputError, Refused
 from proofroll.core.plugins import load_engine, parse_engine, resolve_settings
 from proofroll.core.scene import Scene
-from proofroll.core.time_grid import time_grid
+from proofroll.core.time_grid import EVERY, sampling_interval, time_grid
 from proofroll.running.identity import truth_version
 from proofroll.running.manifest import manifest, versions
 from proofroll.running.recording import off_grid, record
@@ -56,7 +56,7 @@ def simulate(
     engine: str = "truth",
     *,
     until: float = 2.0,
-    every: float = 0.01,
+    every: float | None = None,
     **settings: Any,
 ) -> xr.Dataset:
     """The trajectory of a scene in an engine, with units on every variable.
@@ -65,7 +65,7 @@ def simulate(
         scene: from :func:`proofroll.load_scene`.
         engine: ``truth``, ``name`` or ``name[key=value,…]``.
         until: last time [s].
-        every: interval between samples [s].
+        every: interval between samples [s]; by default 0.01 s, or the nearest whole number of steps.
         **settings: e.g. ``formulation="chart", dt=1e-4``.
 
     Returns:
@@ -78,7 +78,6 @@ def simulate(
         Missing: the engine is not installed.
         Refused: the engine cannot represent the scene, or built something else than the scene says.
     """
-    times = time_grid(until, every)
     spec = parse_engine(engine)
     if spec.name == "truth":
         options = {**spec.options, **settings}
@@ -86,11 +85,12 @@ def simulate(
             raise InputError("truth", ", ".join(options), "the truth has no settings; leave them out")
         from proofroll.core.truth import truth
 
-        found = truth(scene, times)
+        found = truth(scene, time_grid(until, EVERY if every is None else every))
         message = found.attrs.get("ill_posed", "two independent routes agree")
         found = found.assign_attrs(status="done", message=message)
         return found.assign_attrs(manifest("truth", {}, scene, versions("truth", truth_version())))
     kind, resolved = _resolved(scene, engine, settings)
+    times = time_grid(until, sampling_interval(fixed_step(resolved)) if every is None else every)
     built = _build(scene, kind, resolved)
     difference = first_difference(certify(built, scene))
     if difference is not None:

@@ -15,7 +15,7 @@ import sys
 from collections.abc import Callable
 from typing import Any
 
-from proofroll.core.errors import Diverged, InputError, Missing, ProofrollError, Refused
+from proofroll.core.errors import Diverged, InputError, Missing, ProofrollError, Refused, place
 from proofroll.running.case import Case
 from proofroll.running.ending import end_with, end_with_pipe
 from proofroll.running.identity import describe, resolve
@@ -96,9 +96,10 @@ def call(function: str, arguments: dict[str, Any]) -> dict[str, Any]:
 
 
 def one_line(error: BaseException) -> str:
-    """Kind and text of an exception in one line."""
-    text = " ".join(str(error).split())
-    return f"{type(error).__name__}: {text}"[:400] if text else type(error).__name__
+    """Kind and text of an exception in one line, and where in the engine's adapter it arose."""
+    text, where = " ".join(str(error).split()), place(error)
+    said = f"{type(error).__name__}: {text}"[:400] if text else type(error).__name__
+    return f"{said} ({where})" if where else said
 
 
 if __name__ == "__main__":

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable, Mapping
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any
 
@@ -159,6 +159,14 @@ def fits(point: _Point, text: str) -> bool:
     if point["engine"] != spec.name:
         return False
     return all(_same(point["settings"].get(key), value) for key, value in spec.options.items())
+
+
+def covers(measured: Sequence[str], asked: Sequence[str]) -> bool:
+    """Whether a study restricted to some engines (to none: of all) can answer about those that are asked for."""
+    if not measured or not asked:
+        return not measured
+    whole = {spec.name for spec in map(parse_engine, measured) if not spec.options}
+    return all(text in measured or parse_engine(text).name in whole for text in asked)
 
 
 def _same(value: object, text: str) -> bool:

@@ -7,6 +7,7 @@ from collections.abc import Mapping, Sequence
 
 from proofroll.core.errors import InputError, ProofrollError
 from proofroll.core.plugins import parse_engine
+from proofroll.core.time_grid import sampling_interval
 from proofroll.files.scene_file import load_scene
 from proofroll.running.case import Case
 from proofroll.running.runner import resolve
@@ -19,13 +20,14 @@ def single_case(
     engine: str,
     *,
     until: float,
-    every: float,
+    every: float | None,
     time_limit: float,
     asks: Sequence[str] = (),
     workers: Workers | None = None,
 ) -> Case:
     """The case of one run.
 
+    Without an interval ``every`` between samples it is that of :func:`proofroll.core.time_grid.sampling_interval`.
     The engine is asked in one of ``workers``, if they are given: the run can then go on in the same process.
 
     Raises:
@@ -40,6 +42,8 @@ def single_case(
     facts = resolve([(spec.name, spec.options)], workers, loaded.requires)[0]
     if isinstance(facts, ProofrollError):
         raise facts
+    if every is None:
+        every = sampling_interval(facts.settings["dt"] if facts.resolution == "dt" else None)
     return Case(
         scene=scene,
         parameters={name: loaded.parameters[name] for name in parameters},

@@ -18,16 +18,19 @@ _ASIDE = frozenset({"cli", "conformance", "report"})
 
 def versions() -> dict[str, str]:
     """Versions of proofroll, of what it can use, and of every package that announces an engine."""
-    # Requirements of all extras count, as far as they are installed.
-    names = {re.split(r"[\s;<>=!~\[(]", text, maxsplit=1)[0] for text in requires("proofroll") or []}
-    names |= {point.dist.name for point in entry_points(group=GROUP) if point.dist is not None}
+    names = _required() | {point.dist.name for point in entry_points(group=GROUP) if point.dist is not None}
     found = {}
-    for name in sorted(names | {"proofroll"}, key=str.lower):
+    for name in sorted(names, key=str.lower):
         try:
             found[name] = version(name)
         except PackageNotFoundError:
             continue
     return found
+
+
+def _required() -> set[str]:
+    """Names of proofroll and of all that it can use: requirements of all extras count."""
+    return {"proofroll"} | {re.split(r"[\s;<>=!~\[(]", text, maxsplit=1)[0] for text in requires("proofroll") or []}
 
 
 def code() -> str:
@@ -60,7 +63,10 @@ def changes(measured: dict[str, object]) -> list[str]:
     then, now = dict(measured.get("machine") or {}), machine()  # type: ignore[call-overload]
     found += [f"{key} {then.get(key)} then, {value} now" for key, value in now.items() if then.get(key) != value]
     then, now = dict(measured.get("versions") or {}), versions()  # type: ignore[call-overload]
+    own = _required()
     for name in sorted(then.keys() | now.keys(), key=str.lower):
+        if name not in then and name not in own:
+            continue  # a further engine, which was not measured and changes nothing of what was
         if then.get(name) != now.get(name):
             found.append(f"{name} {then.get(name, 'absent')} then, {now.get(name, 'absent')} now")
     if measured.get("code") != code():

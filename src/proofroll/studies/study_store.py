@@ -99,6 +99,7 @@ def make_tradeoff(
     found = tradeoff(question, runner, engines=engines, over=over, brief=brief, progress=progress)
     study = content(found)
     judged = claims if not engines else None
+    study["engines"] = sorted(engines)
     study["claims"] = {
         "file": claims.name if claims else None,
         "contradictions": judged.contradictions(study) if judged else [],

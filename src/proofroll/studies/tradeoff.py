@@ -231,7 +231,7 @@ def pareto_entries(
     return entries
 
 
-def stored(folder: Path, question: Question, engines: Iterable[str] = (), *, brief: bool = False) -> Path:
+def stored(folder: Path, question: Question, engines: Sequence[str] = (), *, brief: bool = False) -> Path:
     """Where the study of a question is stored under the folder of results.
 
     Args:
@@ -241,6 +241,13 @@ def stored(folder: Path, question: Question, engines: Iterable[str] = (), *, bri
         brief: likewise.
     """
     scene = question.loaded()
-    identity = json.dumps([scene.digest, question.until, *sorted(engines)])
-    digest = hashlib.sha256(identity.encode()).hexdigest()[:10]
-    return folder / "tradeoff" / f"{scene.name}-{digest}{'-brief' if brief else ''}.json"
+    parts = [[scene.digest, question.until], *([sorted(engines)] if engines else [])]
+    digests = (hashlib.sha256(json.dumps(part).encode()).hexdigest()[:10] for part in parts)
+    return folder / "tradeoff" / f"{'-'.join([scene.name, *digests])}{'-brief' if brief else ''}.json"
+
+
+def restricted(folder: Path, question: Question) -> list[Path]:
+    """Files of the studies of a question that are restricted to some engines."""
+    whole = stored(folder, question)
+    found = whole.parent.glob(f"{whole.stem}-*.json")
+    return sorted(path for path in found if not path.stem.endswith("-brief") and path.suffixes == [".json"])

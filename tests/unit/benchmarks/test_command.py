@@ -5,6 +5,7 @@ from __future__ import annotations
 import json
 import sys
 from collections.abc import Callable, Mapping
+from pathlib import Path
 
 import pytest
 
@@ -39,10 +40,12 @@ def proofroll(
     return run
 
 
-def test_adapters_json(proofroll: Proofroll) -> None:
+def test_adapters_json(proofroll: Proofroll, tmp_path: Path) -> None:
     """``--json`` has a ratio with its interval for the engine that was asked for, and says of each row what it is."""
-    code, out, err = proofroll("adapters", "--engine", "projection", *QUICK, "--json")
+    kept = tmp_path / "bench.json"
+    code, out, err = proofroll("adapters", "--engine", "projection", *QUICK, "--json", "--out", str(kept))
     assert code in (0, 1), err
+    assert kept.read_text(encoding="utf-8") == out
     found = json.loads(out)
     assert set(found) == {"goal", "scene", "every", "machine", "engines"}
     assert set(found["engines"]) == {"projection"}

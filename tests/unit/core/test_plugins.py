@@ -1,14 +1,16 @@
 from __future__ import annotations
 
 import dataclasses
+import sys
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
+from pathlib import Path
 from typing import Annotated, Any, Literal
 
 import pytest
 from annotated_types import Gt
 
-from proofroll.core.errors import InputError, Missing
+from proofroll.core.errors import InputError, Missing, ProofrollError
 from proofroll.core.plugins import EngineSpec, engine_names, load_engine, parse_engine, resolve_settings
 
 
@@ -138,5 +140,39 @@ def test_unknown_engine() -> None:
 def test_missing_engine_says_what_is_missing(install_engines: Callable[[Mapping[str, str]], None]) -> None:
     """An engine whose library is not installed says which, and how to get it."""
     install_engines({"absent": "no_such_module_anywhere:Engine"})
-    with pytest.raises(Missing, match=r"absent is not installed here \(no_such_module_anywhere is missing\): pip"):
+    with pytest.raises(
+        Missing, match=r"absent is not installed here \(no_such_module_anywhere is missing\): pip install 'no-such"
+    ):
         load_engine("absent")
+
+
+@pytest.mark.parametrize(
+    ("source", "entry", "kind", "words"),
+    [
+        ("import nupmy", "Engine", Missing, ["imports nupmy (site/mine.py:1 in <module>)", "if it is misspelt"]),
+        ("import numpy.linlag", "Engine", ProofrollError, ["numpy is installed, but has no such module"]),
+        ("", "Enigne", ProofrollError, ["mine is announced as mine:Enigne", "correct the entry point"]),
+    ],
+    ids=["module", "submodule", "class"],
+)
+def test_a_misspelt_name_is_not_a_library_that_is_missing(
+    tmp_path: Path,
+    monkeypatch: pytest.MonkeyPatch,
+    source: str,
+    entry: str,
+    kind: type[ProofrollError],
+    words: list[str],
+) -> None:
+    """Where all that a package requires is installed, a name that leads nowhere is said to be that, with its line."""
+    info = tmp_path / "site" / "mine-1.0.dist-info"
+    info.mkdir(parents=True)
+    (info / "METADATA").write_text("Metadata-Version: 2.1\nName: mine\nVersion: 1.0\nRequires-Dist: numpy\n")
+    (info / "entry_points.txt").write_text(f"[proofroll.engines]\nmine = mine:{entry}\n")
+    (info.parent / "mine.py").write_text(source)
+    monkeypatch.syspath_prepend(str(info.parent))
+    monkeypatch.delitem(sys.modules, "mine", raising=False)
+    with pytest.raises(kind) as caught:
+        load_engine("mine")
+    assert type(caught.value) is kind
+    for text in words:
+        assert text in str(caught.value)

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from proofroll.core.errors import InputError
-from proofroll.core.time_grid import time_grid
+from proofroll.core.time_grid import sampling_interval, time_grid
 
 
 @pytest.mark.parametrize(
@@ -24,6 +24,12 @@ def test_time_grid(until: float, every: float, times: list[float]) -> None:
     grid = time_grid(until, every)
     assert grid == pytest.approx(times, abs=1e-15)
     assert grid[-1] == until
+
+
+@pytest.mark.parametrize(("step", "every"), [(None, 0.01), (1e-3, 0.01), (1 / 240, 2 / 240), (0.03, 0.03)])
+def test_sampling_interval(step: float | None, every: float) -> None:
+    """Where nobody says how often to sample it is about every 0.01 s, at ends of steps."""
+    assert sampling_interval(step) == pytest.approx(every)
 
 
 def test_time_grid_ends_exactly() -> None:

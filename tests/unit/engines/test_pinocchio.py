@@ -270,7 +270,7 @@ def test_coming_to_rest_is_said() -> None:
         ("integrator=rk4", "rtol", "preset=default"),
         ("rtol=1e-16", "rtol", "greater than or equal"),
         ("preset=default,dt=0", "dt", "greater than 0"),
-        ("preset=default,dt=0.003", "dt", "whole number of steps"),
+        ("preset=default,dt=0.003", "dt", "no whole number of steps"),
         ("formulation=rigid", "formulation", "composite, free_flyer"),
         ("integrator=euler", "integrator", "'rk4'"),
         ("integrator=leapfrog", "integrator", "only contact"),

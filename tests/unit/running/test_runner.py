@@ -63,6 +63,8 @@ def test_each_engine_costs_its_own_case_alone(tmp_path: Path, make_case: MakeCas
         result = results[cases[name].key]
         assert (result.status, words in result.message) == (status, True), (name, result)
         assert "\n" not in result.message
+        # a line of the adapter is named exactly where an exception is not the engine's answer
+        assert ("(plugins/hostile.py:" in result.message) == (name == "raises"), result
     for name in ("oracle", "garbage", "not_a_number", "gives_up"):
         dataset = read(Runner(Store(tmp_path)).store.trajectory(cases[name]))
         assert dataset.sizes["time"] == (3 if results[cases[name].key].status is Status.DONE else 2)

@@ -8,6 +8,7 @@ import subprocess
 import sys
 from collections.abc import Callable, Mapping
 
+import numpy as np
 import pytest
 from hostile import ENTRY_POINTS
 
@@ -29,6 +30,15 @@ def test_three_lines() -> None:
     assert dataset.attrs["status"] == "done"
     assert dataset["gamma"].attrs["units"] == "rad"
     assert dataset["gamma"].to_numpy() == pytest.approx([0, 2.5, 5], abs=1e-12)
+
+
+def test_a_step_that_does_not_divide_a_hundredth_of_a_second() -> None:
+    """An engine whose usual step is 1/240 s runs as it is: without an interval, samples are where its steps end."""
+    scene, step = proofroll.load_scene("inclined_plane"), 1 / 240
+    dataset = proofroll.simulate(scene, "projection[preset=default]", until=0.1, dt=step)
+    assert dataset["time"].to_numpy() == pytest.approx(2 * step * np.arange(13))
+    with pytest.raises(InputError, match=r"is sampled at 0 s and 0\.01 s"):
+        proofroll.simulate(scene, "projection[preset=default]", until=0.1, every=0.01, dt=step)
 
 
 def test_the_truth_is_an_engine_too() -> None:

@@ -9,7 +9,7 @@ import pytest
 from proofroll.core.comparison import Tolerance
 from proofroll.core.errors import InputError
 from proofroll.report.tradeoff_tables import answer_lines, front_tables
-from proofroll.studies.recommend import Wish, recommend
+from proofroll.studies.recommend import Wish, covers, recommend
 
 
 def point(  # noqa: D103 -- one measured point
@@ -150,6 +150,24 @@ def test_what_fails_elsewhere_in_the_range_is_not_chosen(corners: Any, said: str
     assert answer["choice"]["engine"] == "slow"
     assert said in answer["first_failure"]["reason"]
     assert answer["checked"]["parameters"] == {"speed": [2.0, 6.0]}
+
+
+@pytest.mark.parametrize(
+    ("measured", "engines", "answered"),
+    [
+        ([], [], True),
+        ([], ["a"], True),
+        (["a", "b"], ["a"], True),
+        (["a", "b"], ["a[dt=1e-3]", "b"], True),
+        (["a[dt=1e-3]"], ["a[dt=1e-3]"], True),
+        (["a[dt=1e-3]"], ["a"], False),
+        (["a", "b"], ["a", "c"], False),
+        (["a"], [], False),
+    ],
+)
+def test_a_study_answers_about_each_of_its_engines(measured: list[str], engines: list[str], answered: bool) -> None:
+    """A study of some engines answers about any of these, and about no other; one of all answers about each."""
+    assert covers(measured, engines) == answered
 
 
 def test_nothing_beyond_what_was_measured() -> None:

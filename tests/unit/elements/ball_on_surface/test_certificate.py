@@ -185,6 +185,15 @@ def test_the_sentence_names_the_first_difference() -> None:
     )
 
 
+def test_a_number_in_single_precision_is_told_apart_from_the_one_it_was() -> None:
+    """Two numbers that differ are never shown alike, and the reason is named where it is single precision."""
+    single = Line("gap", "m", (0.2,), (float(np.float32(0.2)),), 1.5e-8, EXACT)
+    sentence = first_difference([single])
+    assert sentence is not None
+    assert "gap is 0.200000003 instead of 0.2 m" in sentence
+    assert sentence.endswith("in single precision (float32)")
+
+
 SLIPPING = load_scene("sphere_in_cylinder", rolling_resistance=5e-4, mu_static=0.35, mu_kinetic=0.25)
 FRICTION: dict[str, Any] = {
     "mu_static": 0.35,
