@@ -12,6 +12,7 @@ from proofroll.core.element import Element
 from proofroll.core.errors import InputError
 from proofroll.core.scene import Scene
 from proofroll.elements.ball_on_surface.element import BallOnSurface
+from proofroll.elements.ball_on_surface.model import BallCapability
 from proofroll.truth.onset import edge_between, onset
 from proofroll.truth.truth import truth
 
@@ -34,7 +35,7 @@ class BallOnSurfaceTruth:
         """See :func:`proofroll.truth.truth.truth`; with bounded friction also the conditioning of the first slip."""
         scene = Scene(element.name, "", (element,), asks=tuple(asks))
         found = truth(scene, times)
-        if "sticking" in found:
+        if "sticking" in found and BallCapability.SLIPPING_START not in element.requires:
             first = onset(scene, float(times[-1]))
             found.attrs["onset"] = json.dumps(dataclasses.asdict(first))
             if first.verdict == "ill-posed":

@@ -86,12 +86,14 @@ class Implicit:
                 return walk.leg(self, True, when, walk.cut(when), why)
         return walk.leg(self, True, until, walk.state, End.TIME)
 
-    def slip(self, time: float, state: FloatArray, until: float) -> Leg[FloatArray]:
+    def slip(self, time: float, state: FloatArray, until: float, slip: FloatArray | None = None) -> Leg[FloatArray]:
         """See :class:`Route`."""
+        if slip is not None:
+            state = np.concatenate([state[:6], slip])
         walk = _Walk(self._contact.system(sticking=False), time, state, until)
         length = min(self._first * self._pace, until - time)
         while walk.time < until:
-            started = bool(walk.steps)
+            started = bool(walk.steps) or slip is not None
             left = self._until_still(walk.state, False) if started else np.inf
             if left < _STILL * self._pace:
                 still = walk.state + left * self._contact.rates(walk.state[None, :], False)[0]

@@ -25,6 +25,13 @@ _FLOOR = 1e-4  # |u| at which the rest of a slip is extrapolated, relative to wh
 _APPROACH = 0.6  # part of the time left until the centre stands still that one step may take
 _STILL = 1e-9  # time left, relative to the pace of the motion, that is extrapolated
 
+BEGUN = 1e-8  # the same of a slip that does not begin from rest, relative to its initial |u|
+
+
+def direction(frame: FloatArray, slip: FloatArray) -> float:
+    """Angle of a slip in the world, shape (3,), from e2 towards e3 in the local frame [rad]."""
+    return float(np.arctan2(slip @ frame[:, 2], slip @ frame[:, 1]))
+
 
 class Polar:
     """Route in (u, u̇, ω1), joined while slipping by ln|u|, φ and the time t against τ with dt = |u| dτ.
@@ -106,14 +113,18 @@ class Polar:
                 return leg(piece.end + left, self.nudged(halted, np.zeros(3)), End.HALT)
         return leg(until, pieces[-1].last if pieces else state, End.TIME)
 
-    def slip(self, time: float, state: FloatArray, until: float) -> Leg[FloatArray]:
+    def slip(self, time: float, state: FloatArray, until: float, slip: FloatArray | None = None) -> Leg[FloatArray]:
         """See :class:`Route`."""
         strength, change = self._pull(state)
         pace = min(strength / change if change > 0 else np.inf, until - time, self._turning_back(state))
         # Below the last digits of the time a slip cannot be seen to grow.
         handover = max(self._handover * strength * pace, 64 * strength * np.spacing(time), np.finfo(float).tiny)
         lead: list[Piece] = []
-        why, begun, small = self._creep(lead, time, state, until, handover)
+        if slip is None:
+            why, begun, small = self._creep(lead, time, state, until, handover)
+        else:
+            why, begun, small = None, time, np.append(state, np.linalg.norm(slip))
+            handover = max(handover, BEGUN * small[5])
 
         def creeping(times: FloatArray) -> Motion:
             y = read(lead, times, np.append(state, 0.0))
@@ -121,7 +132,8 @@ class Polar:
 
         if why is not None:
             return Leg(time, begun, False, small[:5], why, creeping)
-        first = np.array([*small[:5], np.log(small[5]), self._slaved(small)[1], begun])
+        phi = self._slaved(small)[1] if slip is None else direction(self._body.surface.frame(state[:2]), slip)
+        first = np.array([*small[:5], np.log(small[5]), phi, begun])
         floor = np.log(_FLOOR * handover)
         pieces: list[Piece] = []
 

@@ -76,7 +76,7 @@ class Route(Protocol[State]):
         """How the legs are integrated, for a person."""
 
     def start(self) -> State:
-        """State at time 0, rolling without slip."""
+        """State at time 0; that the ball slips there is not part of it."""
 
     def excess(self, state: State) -> float:
         """(needed - available) / (needed + available) with the friction needed to stick and μs N [-]."""
@@ -87,8 +87,11 @@ class Route(Protocol[State]):
     def stick(self, time: float, state: State, until: float) -> Leg[State]:
         """Roll without slip from ``time`` to ``until`` at the latest [s]."""
 
-    def slip(self, time: float, state: State, until: float) -> Leg[State]:
-        """Slip, starting with the contact point at rest, from ``time`` to ``until`` at the latest [s]."""
+    def slip(self, time: float, state: State, until: float, slip: FloatArray | None = None) -> Leg[State]:
+        """Slip from ``time`` to ``until`` at the latest [s].
+
+        The contact point starts with the velocity ``slip`` in the world [m/s], shape (3,), or at rest (None).
+        """
 
     def world(self, state: State) -> tuple[FloatArray, FloatArray, FloatArray]:
         """p_WB [m], v_WB [m/s], w_WB [rad/s] of the state, each shape (3,)."""
@@ -141,11 +144,13 @@ def follow(body: RollingBall, route: Route[State], until: float) -> Path[State]:
         state = route.nudged(state, setting_off(body, route.world(state)[0]))
     if _pressed(body, *route.world(state)[:2]) < -_OFF_WALL * natural_acceleration(body):
         return _flight(body, route, state, time, until, legs, [("lift_off", time)])
-    sticking = not _must_slip(body, route, state)
+    slip = body.slip0 if np.any(body.slip0) else None
+    sticking = slip is None and not _must_slip(body, route, state)
     if not sticking:
         events.append(("slip", time))
     while True:
-        leg = (route.stick if sticking else route.slip)(time, state, until)
+        leg = route.stick(time, state, until) if sticking else route.slip(time, state, until, slip)
+        slip = None
         legs.append(leg)
         if not leg.end > time and leg.why is not End.TIME and len(legs) > 1 and legs[-2].end == legs[-2].start:
             raise Diverged(f"the truth makes no progress at {time:g} s, where sticking and slipping alternate at once")

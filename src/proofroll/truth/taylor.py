@@ -14,6 +14,7 @@ from proofroll.elements.ball_on_surface.model import RollingBall
 from proofroll.elements.ball_on_surface.motion import Motion, world_motion
 from proofroll.elements.ball_on_surface.surfaces import Cylinder, Plane
 from proofroll.truth.assemble import classic_step, joined
+from proofroll.truth.polar import BEGUN, direction
 from proofroll.truth.switching import End, Leg
 from proofroll.truth.taylor_model import Model, model
 
@@ -106,35 +107,43 @@ class Taylor:
 
         return Leg(time, run.end, True, run.last, End.TIME if run.event is None else _STICK_ENDS[run.event], motion)
 
-    def slip(self, time: float, state: FloatArray, until: float) -> Leg[FloatArray]:
+    def slip(self, time: float, state: FloatArray, until: float, slip: FloatArray | None = None) -> Leg[FloatArray]:
         """See :class:`Route`."""
         b2, b3, change, _ = self._model.drive(state, self._pars)
         strength = float(np.hypot(b2, b3))
         pace = min(strength / change if change > 0 else np.inf, until - time)
         handover = max(self._handover * strength * pace, np.finfo(float).tiny)
-        creep = _Run(self._model.creep, [*self._pars, handover], time, np.append(state, 0.0), until)
+        if slip is not None:
+            handover = max(handover, BEGUN * float(np.linalg.norm(slip)))
+        # One that does not begin from rest has no such start.
+        begin = until if slip is None else time
+        creep = _Run(self._model.creep, [*self._pars, handover], time, np.append(state, 0.0), begin)
 
         def creeping(times: FloatArray) -> Motion:
             states = creep.at(times)
             return self._motion(states[:, :5], states[:, 5], self._model.direction(states.T, self._pars)[0])
 
         small = creep.last
-        if creep.event != 0:  # the time is over, or the ball stands still before the handover
+        if slip is not None:
+            small = np.append(state, np.linalg.norm(slip))
+        elif creep.event != 0:  # the time is over, or the ball stands still before the handover
             why = End.TIME if creep.event is None else End.STILL
             return Leg(time, creep.end, False, small[:5], why, creeping)
         phi = self._model.direction(small, self._pars)[0]
+        if slip is not None:
+            phi = direction(self._body.surface.frame(state[:2] / self._scales), slip)
         first = np.array([*small[:5], np.log(small[5]), phi, creep.end])
-        slip = _Run(self._model.slip, [*self._pars, np.log(_FLOOR * handover), until], 0.0, first, np.inf)
+        run = _Run(self._model.slip, [*self._pars, np.log(_FLOOR * handover), until], 0.0, first, np.inf)
 
         def slipping(times: FloatArray) -> Motion:
-            states = _at_times(slip, times)
+            states = _at_times(run, times)
             return self._motion(states[:, :5], np.exp(states[:, 5]), states[:, 6])
 
         def motion(times: FloatArray) -> Motion:
             return joined(times, creep.end, creeping, slipping)
 
-        why = _SLIP_ENDS[slip.event or 0]
-        end, last = (float(slip.last[7]), slip.last[:5]) if why is not End.STILL else self._stood_still(slip.last)
+        why = _SLIP_ENDS[run.event or 0]
+        end, last = (float(run.last[7]), run.last[:5]) if why is not End.STILL else self._stood_still(run.last)
         if end >= until:
             why, end = End.TIME, until
         return Leg(time, end, False, last, why, motion)

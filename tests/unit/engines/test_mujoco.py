@@ -293,6 +293,8 @@ def test_leaning_ring_of_boxes_stands_where_the_wall_is() -> None:
         (CYLINDER, "facets", "default"),
         (PLANE, "chart", "matched"),
         (PLANE, "free", "default"),
+        ("slide_to_roll", "chart", "matched"),
+        ("slide_to_roll", "free", "default"),
     ],
 )
 def test_numbers_in_the_files_are_the_scenes(scene: str, formulation: str, preset: str) -> None:

@@ -14,7 +14,7 @@ import numpy as np
 from proofroll.core.arrays import FloatArray
 from proofroll.core.element import FailedRun, FirstMotion, OptionalTerm, RunWatch, Sign, StepNumber
 from proofroll.core.engine import Sample
-from proofroll.core.errors import Refused
+from proofroll.core.errors import InputError, Refused
 from proofroll.core.gravity import Gravity
 from proofroll.core.observable import Observable
 from proofroll.core.scene import Scene
@@ -56,6 +56,16 @@ class BallOnSurface:
     start: InitialMotion
     gravity: Gravity
 
+    def __post_init__(self) -> None:
+        """Refuses a slip that nothing could ever brake.
+
+        Raises:
+            InputError: the ball starts slipping, and friction without bound would stop it at once.
+        """
+        if math.isinf(self.contact.mu_static) and np.any(self.rolling.slip0):
+            advice = "a ball that starts slipping needs a number for mu_static, or leave its tangential_spin out"
+            raise InputError("tangential_spin", self.start.tangential_spin, advice)
+
     @property
     def name(self) -> str:
         """Name of the ball."""
@@ -76,6 +86,8 @@ class BallOnSurface:
             needs.add(BallCapability.BOUNDED_FRICTION)
         if self.surface.kind != "plane":
             needs.add(BallCapability.CURVED_SURFACE)
+        if np.any(self.rolling.slip0):
+            needs.add(BallCapability.SLIPPING_START)
         return frozenset(needs)
 
     optional: ClassVar[frozenset[str]] = frozenset(
@@ -99,6 +111,8 @@ class BallOnSurface:
         frame = surface.frame(u0)
         v0 = frame[:, 1:] @ np.asarray(self.start.velocity)
         w0 = self.start.spin * frame[:, 0] - np.cross(frame[:, 0], v0) / self.ball.radius
+        if self.start.tangential_spin is not None:
+            w0 = frame @ (self.start.spin, *self.start.tangential_spin)
         return RollingBall(
             ball=self.ball,
             contact=self.contact,
@@ -263,7 +277,8 @@ class BallOnSurface:
         if "mu_static" in parameters:
             unbounded = dict.fromkeys((n for n in ("mu_static", "mu_kinetic") if n in parameters), math.inf)
             if math.isfinite(self.contact.mu_static):
-                found.append(OptionalTerm("bounded friction", "the scene bounds it", {}, unbounded))
+                if BallCapability.SLIPPING_START not in self.requires:  # which has no motion without a bound
+                    found.append(OptionalTerm("bounded friction", "the scene bounds it", {}, unbounded))
             else:
                 far = _FAR * (float(np.nanmax(truth["needed_friction"].to_numpy())) or 1.0)
                 because = f"the scene has no bound; here one of {far:.3g}, {_FAR:g} times what rolling needs"

@@ -58,7 +58,10 @@ class BallOnSurfaceKind:
             if any(contact.body == other.body for other in found.contacts[:index]):
                 raise InputError(f"{where}: contacts.{index}.body", contact.body, "a ball touches one surface")
             ball = balls[contact.body]
-            elements.append(BallOnSurface(ball, surfaces[contact.surface], contact, starts[ball.name], gravity))
+            try:
+                elements.append(BallOnSurface(ball, surfaces[contact.surface], contact, starts[ball.name], gravity))
+            except InputError as error:
+                raise error.within(f"{where}: initial", ball.name) from None
         for name in balls.keys() - {contact.body for contact in found.contacts}:
             raise InputError(
                 f"{where}: contacts", name, "this ball touches no surface; add a contact or remove the ball"

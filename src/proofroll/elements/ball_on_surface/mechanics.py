@@ -70,8 +70,12 @@ def initial_response(body: RollingBall) -> tuple[FloatArray, FloatArray]:
     Newton-Euler with rolling without slip, solved for the nine unknowns p̈, ω̇, (N, F2, F3) together; the rows of
     the last three equations are the constraints differentiated, using the signed distance and its derivatives.
     Where that needs more friction than there is, the ball begins to slip against it: N is the same, for friction
-    along the wall does not change it. A ball at rest stays so where rolling resistance and friction can hold it.
+    along the wall does not change it. A ball at rest stays so where rolling resistance and friction can hold it. A
+    ball that starts slipping has kinetic friction against its slip.
     """
+    if np.any(body.slip0):
+        force = _slipping_force(body)
+        return force / body.ball.mass + body.gravity, force
     if stands(body, body.v0) and stays(body, body.p0):
         return np.zeros(3), -body.ball.mass * body.gravity
     acceleration, _, force = newton_euler(body, body.p0, _way(body), body.w0)
@@ -94,6 +98,14 @@ def initial_angular_acceleration(body: RollingBall) -> FloatArray:
     moment = body.ball.radius * np.cross(e1, force)
     moment += resistance_moment(body.contact.rolling_resistance, -force @ e1, e1, _way(body))
     return np.asarray(moment / body.ball.inertia)
+
+
+def _slipping_force(body: RollingBall) -> FloatArray:
+    """Force of the wall on a ball that starts slipping [N], shape (3,)."""
+    e1 = body.surface.normal(body.p0)
+    bend = float(body.v0 @ body.surface.normal_gradient(body.p0) @ body.v0)
+    press = body.ball.mass * (float(e1 @ body.gravity) + bend)
+    return np.asarray(-press * e1 - body.contact.mu_kinetic * press * body.slip0 / np.linalg.norm(body.slip0))
 
 
 def _way(body: RollingBall) -> FloatArray:

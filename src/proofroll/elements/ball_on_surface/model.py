@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 from dataclasses import dataclass, field
 from enum import StrEnum
+from functools import cached_property
 from typing import Literal
 
 import numpy as np
@@ -12,6 +13,9 @@ import numpy as np
 from proofroll.core.arrays import FloatArray
 from proofroll.core.bounds import OutOfBounds, bounded
 from proofroll.elements.ball_on_surface.surfaces import Surface
+
+# Part of the speeds that make it up below which an initial slip is the round-off of rolling.
+_ROUND_OFF = 1e-12
 
 
 class BallCapability(StrEnum):
@@ -22,6 +26,7 @@ class BallCapability(StrEnum):
     ROLLING_RESISTANCE = "rolling resistance"
     BOUNDED_FRICTION = "bounded friction (slip)"
     ORIENTATION = "the ball's orientation"
+    SLIPPING_START = "a start that slips"
 
 
 ROLLS: frozenset[str] = frozenset(
@@ -97,19 +102,22 @@ class Contact:
 
 @dataclass(frozen=True)
 class InitialMotion:
-    """Rolling without slip at time 0.
+    """How a ball starts at time 0: rolling without slip, unless its spin is given.
 
     Attributes:
         body: name of a ball.
         coordinates: where on the surface, in its coordinates.
-        velocity: of the centre along e2 and e3 [m/s]; the spin about e2 and e3 follows from rolling.
+        velocity: of the centre along e2 and e3 [m/s].
         spin: ω1, about the normal e1 [rad/s].
+        tangential_spin: ω2 and ω3, about e2 and e3 [rad/s]; left out: those of rolling without slip. Rolling along e2
+            with the speed V has ω3 = -V/a, along e3 ω2 = V/a; with anything else the ball starts slipping.
     """
 
     body: str
     coordinates: tuple[float, float] = (0.0, 0.0)
     velocity: tuple[float, float] = field(default=(0.0, 0.0), metadata={"unit": "m/s"})
     spin: float = field(default=0.0, metadata={"unit": "rad/s"})
+    tangential_spin: tuple[float, float] | None = field(default=None, metadata={"unit": "rad/s"})
 
     def __post_init__(self) -> None:
         """Refuses what is no number.
@@ -117,8 +125,8 @@ class InitialMotion:
         Raises:
             OutOfBounds: a value that is not finite.
         """
-        for name in ("coordinates", "velocity"):
-            for value in getattr(self, name):
+        for name in ("coordinates", "velocity", "tangential_spin"):
+            for value in getattr(self, name) or ():
                 bounded(name, value)
         bounded("spin", self.spin)
 
@@ -151,3 +159,11 @@ class RollingBall:
     def udot0(self) -> FloatArray:
         """Initial rates of the surface coordinates, shape (2,)."""
         return np.asarray(np.linalg.pinv(self.surface.tangents(self.u0)) @ self.v0)
+
+    @cached_property
+    def slip0(self) -> FloatArray:
+        """Initial velocity of the contact point in the world [m/s], shape (3,); exactly zero where it is round-off."""
+        spinning = self.ball.radius * np.cross(self.w0, self.surface.normal(self.p0))
+        slip = self.v0 + spinning
+        sizes = np.linalg.norm(self.v0) + np.linalg.norm(spinning)
+        return np.asarray(slip if np.linalg.norm(slip) > _ROUND_OFF * sizes else np.zeros(3))

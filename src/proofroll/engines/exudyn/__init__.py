@@ -46,7 +46,7 @@ class Exudyn:
 
     name: ClassVar[str] = "exudyn"
     provides: ClassVar[Mapping[str, frozenset[str]]] = {
-        "generic": ROLLS | {BallCapability.BOUNDED_FRICTION},
+        "generic": ALL_OF_A_BALL - {BallCapability.ORIENTATION},
         "carrier": ROLLS | {BallCapability.ORIENTATION},
         "rolling_disc": ROLLS | {BallCapability.ORIENTATION},
         "contact": ALL_OF_A_BALL,

@@ -20,7 +20,7 @@ from proofroll.core.engine import Built, Regularised, Sample
 from proofroll.core.errors import Refused
 from proofroll.core.events import Event
 from proofroll.elements.ball_on_surface.events import EventKind
-from proofroll.elements.ball_on_surface.mechanics import natural_acceleration, newton_euler
+from proofroll.elements.ball_on_surface.mechanics import initial_response, natural_acceleration, newton_euler
 from proofroll.elements.ball_on_surface.model import BallCapability, RollingBall
 from proofroll.engines.exudyn.ball import add_ball
 from proofroll.engines.exudyn.integration import Integration, new_system
@@ -56,7 +56,8 @@ class Contact:
         stiffness, self.zone, self._grip = settings.penalty
         mu = law.mu_kinetic if self.bounded else self._grip
         e1 = body.surface.frame(body.u0)[:, 0]
-        force = newton_euler(body, body.p0, body.v0, body.w0)[2]
+        slips = bool(np.any(body.slip0))
+        force = initial_response(body)[1] if slips else newton_euler(body, body.p0, body.v0, body.w0)[2]
         N = float(-force @ e1)
         if N <= 0:
             raise Refused("nothing presses the ball against the wall at time 0, so its contact is not closed")
@@ -65,7 +66,7 @@ class Contact:
         needed = float(np.linalg.norm(friction))
         if needed > mu * N and not self.bounded:
             raise Refused("rolling needs more friction than grip at time 0; use a larger grip")
-        creep = -self.zone * friction / (max(mu * N, needed) or 1.0)
+        creep = np.zeros(3) if slips else -self.zone * friction / (max(mu * N, needed) or 1.0)
         sunk = N / stiffness
         if sunk >= body.ball.radius:
             raise Refused(f"the load presses the ball {sunk:.3g} m into so soft a wall; use a larger stiffness")
@@ -80,7 +81,8 @@ class Contact:
         )
         self.data = self.system.AddNode(
             items.NodeGenericData(
-                initialCoordinates=[-sunk, float(np.linalg.norm(creep)), 0.0, 0.0], numberOfDataCoordinates=4
+                initialCoordinates=[-sunk, float(np.linalg.norm(body.slip0 + creep)), 0.0, 0.0],
+                numberOfDataCoordinates=4,
             )
         )
         self.contact = self.system.AddObject(
@@ -102,7 +104,7 @@ class Contact:
         self._softened = _softened(body, settings, creep, N, mu, hollow)
         self._t, self._events = 0.0, []
         self._left: tuple[float, float] | None = None
-        self._sticks = needed <= mu * N
+        self._sticks = needed <= mu * N and not slips
         if not self._sticks:
             self._events.append(Event("slip", 0.0, 0.0, 0.0))
         self.system.SetPostStepUserFunction(self._watch)

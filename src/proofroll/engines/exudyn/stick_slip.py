@@ -11,6 +11,8 @@ import dataclasses
 import math
 from typing import Any, NamedTuple, Protocol
 
+import numpy as np
+
 from proofroll.core.arrays import FloatArray
 from proofroll.core.engine import whole_steps
 from proofroll.core.errors import Diverged
@@ -90,7 +92,7 @@ class StickSlip:
         self._place_matters, self._shortest = model.place_matters, 0.5 * settings.dt
         self._watching, self._stopped = False, False
         self.system.SetPostStepUserFunction(self._watch)
-        if self._margin(self.state.touch) < 0:
+        if np.any(body.slip0) or self._margin(self.state.touch) < 0:
             self._switch("slip", 0.0, 0.0, 0.0)
         self._restart()
 

@@ -73,7 +73,7 @@ class Mujoco:
     provides: ClassVar[Mapping[str, frozenset[str]]] = {
         "chart": ALL_OF_A_BALL,
         "free": ALL_OF_A_BALL,
-        "facets": ALL_OF_A_BALL - {BallCapability.BOUNDED_FRICTION},
+        "facets": ALL_OF_A_BALL - {BallCapability.BOUNDED_FRICTION, BallCapability.SLIPPING_START},
         "joints": mechanism.PROVIDES,
     }
     lacking: ClassVar[Mapping[str, Mapping[str, str]]] = {

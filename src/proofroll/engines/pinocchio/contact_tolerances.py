@@ -44,6 +44,12 @@ def softened(
         missing = {name: value / natural for name, value in _missing_bend(body).items()}
         if max(missing.values()) > rough:
             reasons.append("for the length of a step the wall is a plane, and at time 0 it does not yet bend the path")
+    if slip := float(np.linalg.norm(body.slip0)):
+        # An impulse opposes the slip at the end of its step, whose direction may have changed by then.
+        turned = _MARGIN * dt * float(np.linalg.norm(initial_response(body)[1])) / body.ball.mass / slip
+        turned *= (1 + 1 / body.ball.inertia_ratio) * min(body.contact.mu_kinetic, 1.0)
+        missing = {name: value + turned for name, value in missing.items()}
+        reasons.append("an impulse opposes the slip at its end, which turns")
     because = "; ".join(reasons)
     result = {name: Regularised(value + rough, because) for name, value in missing.items()}
     if unbounded is not None:

@@ -57,6 +57,7 @@ class Mechanism(ABC):
         q0, v0: joint configuration and velocity at time 0.
         q_scale, v_scale: natural sizes of their components, for tolerances.
         faint: size of normal force that is round-off [N].
+        slips0: whether the ball starts slipping.
     """
 
     ball: int
@@ -69,6 +70,7 @@ class Mechanism(ABC):
         self._radius = body.ball.radius
         self._f = body.contact.rolling_resistance
         self._mu_kinetic = body.contact.mu_kinetic
+        self.slips0 = bool(np.any(body.slip0))
         self.model: Any = pin.Model()
         self.model.gravity.linear = body.gravity
         gravity = float(np.linalg.norm(body.gravity))

@@ -33,6 +33,8 @@ _FLOOR = 1e-6
 # The least values of both, relative to the speed that friction gives while the ball turns by a radian: a slip that
 # barely begins has no |b| to measure by, and |u| below round-off never ends.
 _LEAST_HANDOVER, _LEAST_FLOOR = 1e-10, 1e-14
+# The same of a slip that does not begin from rest, relative to its first |u|.
+_BEGUN = 1e-9
 # Part of the time that is left until |u| = 0 which one step may take.
 _APPROACH = 0.7
 # Span over which the turning of b is measured, relative to the time in which the ball turns by a radian.
@@ -97,7 +99,12 @@ class AdaptiveStickSlip(Adaptive):
         self.events: list[Event] = []
         self._monitored = 0.0, 0.0, 0.0
         y = self._joined(self.q, self.v)
-        if self._excess(y) > 0:
+        if mechanism.slips0:
+            self._record("slip", 0.0, 0.0)
+            self._creep(y)  # sets the scales of this slip, too
+            self._mode = Mode.SLIDING
+            self._floor = max(self._floor, _BEGUN * self._speed(y)[0])
+        elif self._excess(y) > 0:
             self._record("slip", 0.0, 0.0)
             self._creep(y)
 

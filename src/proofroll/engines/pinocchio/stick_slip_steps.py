@@ -30,7 +30,7 @@ class FixedStickSlip(FixedStep):
         self.mu_static = contact.mu_static
         self.events: list[Event] = []
         self._excess, self._normal_force = excess(mechanism, self._data, self.q, self.v, self.mu_static)
-        self.sticking = self._excess <= 0
+        self.sticking = self._excess <= 0 and not mechanism.slips0
         self._free = self._without_friction()
         if not self.sticking:
             self.events.append(Event("slip", 0.0, 0.0, 0.0))

@@ -121,7 +121,8 @@ class Projection:
             pace = Pace(speed, body.ball.radius / speed, stepper.stability, stepper.reach)
             self._friction = Friction(self._ball, body.contact)
             hooks = Hooks(self._check, self._renewed)
-            self._motion = Switching(self._friction, stepper, x, scales, pace, hooks, self._eliminate)
+            slip = frame[:, 1:].T @ body.slip0 if np.any(body.slip0) else None
+            self._motion = Switching(self._friction, stepper, x, scales, pace, hooks, self._eliminate, slip)
         else:
             self._motion = INTEGRATORS[settings.integrator](self._ball.rates, self._accept, x, scales, resolution)
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable
 from typing import NamedTuple
 
@@ -53,17 +54,19 @@ class Switching:
         pace: Pace,
         hooks: Hooks,
         eliminate: bool,
+        slip: FloatArray | None = None,
     ) -> None:
         """Starts at time 0 in the mode that the state x asks for.
 
         Args:
             friction: the ball and its law.
             stepper: new.
-            x: coordinates and velocities, rolling without slip.
+            x: coordinates and velocities.
             scales: natural size of each component of x.
             pace: of the motion.
             hooks: see there.
             eliminate: remove the violation of what C v shall be after each step.
+            slip: velocity of the contact point along e2 and e3 [m/s], shape (2,); None: it stands still.
         """
         self.stepper = stepper
         self.events: list[Event] = []
@@ -75,7 +78,12 @@ class Switching:
         self._lost: str | None = None
         self.mode: Mode = self._stick
         self._survey = Survey(())
-        self._settle(0.0, 0.0, x, was_sticking=True)
+        if slip is None:
+            self._settle(0.0, 0.0, x, was_sticking=True)
+        else:
+            self._event("slip", 0.0, 0.0)
+            size, angle = math.hypot(*slip.tolist()), math.atan2(slip[1], slip[0])
+            self._enter(self._free, 0.0, np.concatenate([x, [size, angle]]))
 
     @property
     def x(self) -> FloatArray:
