@@ -4,11 +4,18 @@ from __future__ import annotations
 
 import dataclasses
 import json
+from collections.abc import Callable
+from contextlib import AbstractContextManager
 from pathlib import Path
 
+import numpy as np
 import pytest
+from browsing import Visit
+from scipy.spatial.transform import Rotation
 
+from proofroll.elements.mechanism.report.replay import _turned
 from proofroll.files.comparison_file import load_comparison
+from proofroll.files.netcdf import read
 from proofroll.report.growing_report import write_report
 from proofroll.report.plots import point_curves
 from proofroll.running.runner import Runner
@@ -42,7 +49,7 @@ def test_only_single_curves_are_drawn(compared: tuple[Outcome, Store, Path]) -> 
 
 @pytest.mark.slow
 def test_the_page_shows_the_mechanism(compared: tuple[Outcome, Store, Path]) -> None:
-    """The scene's drawing is on the page with its own caption, and nothing speaks of balls or of a replay."""
+    """The scene's drawing is on the page with its own caption, and nothing speaks of balls."""
     outcome, store, folder = compared
     content = write_report([outcome], store, folder, "proofroll report slider_crank")
     page = (folder / "report.html").read_text()
@@ -52,5 +59,38 @@ def test_the_page_shows_the_mechanism(compared: tuple[Outcome, Store, Path]) -> 
     assert f'aria-label="{sheet["title"]}, at the start"' in page
     assert sheet["caption"] in page
     assert "where the ball touches" not in page
-    assert content["replay"] == []
+    (case,) = content["replay"]
+    assert [run["frames"] for run in case["runs"]] == [case["frames"]] * 2
     assert all(verdict["verdict"] == "agrees" for verdict in content["comparisons"][0]["rows"])
+
+
+@pytest.mark.slow
+def test_a_mechanism_is_replayed(
+    compared: tuple[Outcome, Store, Path], visit: Callable[..., AbstractContextManager[Visit]]
+) -> None:
+    """In a browser the picture moves with the time, and the values beside it are those of the stored truth."""
+    outcome, store, folder = compared
+    write_report([outcome], store, folder, "proofroll report slider_crank")
+    with visit(folder / "report.html") as opened:
+        opened.page.evaluate("document.querySelector('.replay').scrollIntoView()")
+        opened.page.wait_for_selector(".replay[data-ready]")
+        canvas, line = (opened.page.locator(f'.replay [data-part="{name}"]') for name in ("canvas", "time"))
+        before = canvas.screenshot()
+        line.evaluate("(line) => { line.value = line.max; line.dispatchEvent(new Event('input')); }")
+        opened.page.evaluate("() => new Promise((done) => requestAnimationFrame(() => requestAnimationFrame(done)))")
+        assert canvas.screenshot() != before
+        shown = opened.page.locator('.replay [data-part="values"]').inner_text().replace("−", "-").split()
+        true = read(store.trajectory(next(iter(outcome.truths.values()))))
+        assert abs(float(shown[shown.index("slider.x") + 1]) - float(true["slider.x"][-1])) < 1e-4
+        assert opened.messages == []
+
+
+def test_bodies_turn_as_often_as_their_spin_says() -> None:
+    """Between two samples more than half a turn apart the frames go the way of the spin, all of it."""
+    grid, rate = np.linspace(0.0, 1.0, 11), np.array([30.0, -40.0, 10.0])
+    turned = Rotation.from_rotvec(grid[:, None] * rate) * Rotation.from_rotvec([0.3, 0.1, -0.2])
+    times = np.linspace(0.0, 1.0, 101)
+    found = _turned(grid, turned.as_quat(scalar_first=True), np.tile(rate, (11, 1)), times)
+    exact = Rotation.from_rotvec(times[:, None] * rate) * Rotation.from_rotvec([0.3, 0.1, -0.2])
+    assert (Rotation.from_quat(found, scalar_first=True) * exact.inv()).magnitude().max() < 1e-9
+    assert np.linalg.norm(rate) * 0.1 > np.pi, "the samples alone would not show it"

@@ -19,8 +19,9 @@ from scipy.spatial.transform import Rotation
 
 from proofroll.core.truth import truth
 from proofroll.elements.ball_on_surface.element import rolling_ball
-from proofroll.elements.ball_on_surface.report.poses import AWAY, SLIPS, STICKS, WIDEST_TURN, frame_times, poses
-from proofroll.elements.ball_on_surface.report.replay import LENGTH, replay_content
+from proofroll.elements.ball_on_surface.report.kind import BallReport
+from proofroll.elements.ball_on_surface.report.poses import AWAY, SLIPS, STICKS, poses
+from proofroll.elements.ball_on_surface.report.replay import LENGTH
 from proofroll.elements.ball_on_surface.report.wall import middle, wall
 from proofroll.files.netcdf import read, write
 from proofroll.files.scene_file import load_scene
@@ -28,6 +29,7 @@ from proofroll.report import replay_library
 from proofroll.report.growing_report import _described
 from proofroll.report.html import page
 from proofroll.report.plots import point_curves
+from proofroll.report.replay import WIDEST_TURN, frame_times
 from proofroll.report.replay_library import thinned, three
 from proofroll.report.report_content import report_content
 
@@ -37,6 +39,11 @@ SPEED, UNTIL, EVERY = 4.0, 1.0, 0.02
 def sampled(dataset: Any) -> dict[str, Any]:
     """A dataset as the replay reads it from its file."""
     return {str(name): variable.to_numpy() for name, variable in dataset.variables.items()}
+
+
+def times_of(data: Any) -> Any:
+    """The frames of a ball's replay [s]."""
+    return frame_times(data["time"][-1], np.linalg.norm(data["w_WB"], axis=1).max())
 
 
 @pytest.fixture(scope="module")
@@ -59,7 +66,7 @@ def spin(body: Any, t: float) -> Any:
 def test_the_true_ball_turns_as_its_spin_says(rolling: Any) -> None:
     """Frames between samples half a turn apart hold the orientation that the closed form's spin integrates to."""
     body, data = rolling
-    times = frame_times(data)
+    times = times_of(data)
     found = poses(body, data, times, integrate=True).q_WB
 
     def rate(t: float, q: Any) -> Any:
@@ -76,8 +83,8 @@ def test_the_true_ball_turns_as_its_spin_says(rolling: Any) -> None:
 def test_an_engine_keeps_its_own_orientation(rolling: Any) -> None:
     """At its samples an engine's orientation is its own, in between its spin carries it; without one it has none."""
     body, data = rolling
-    assert poses(body, data, frame_times(data)).q_WB is None
-    times = frame_times(data)
+    assert poses(body, data, times_of(data)).q_WB is None
+    times = times_of(data)
     offset = Rotation.from_rotvec([0.3, -0.5, 0.2])  # an orientation that no quadrature from the identity would find
     turned = poses(body, data, np.union1d(times, data["time"]), integrate=True)
     assert turned.q_WB is not None
@@ -134,7 +141,7 @@ def test_the_contact_changes_at_the_events_and_not_at_the_samples(rolling: Any) 
 @pytest.mark.parametrize(("rate", "until"), [(0.0, 1.0), (160.0, 2.0), (240.0, 4.0), (1e4, 1.0)])
 def test_frames_are_close_enough_to_see_which_way_it_turns(rate: float, until: float) -> None:
     """Sixty a second at least, and never as much as half a turn from one frame to the next."""
-    times = frame_times({"time": np.array([0.0, until]), "w_WB": np.full((2, 3), rate / np.sqrt(3))})
+    times = frame_times(until, rate)
     assert (times[0], times[-1]) == (0.0, until)
     assert np.diff(times).max() * rate <= WIDEST_TURN * (1 + 1e-9)
     assert np.diff(times).max() <= 1 / 60 + 1e-12
@@ -143,7 +150,7 @@ def test_frames_are_close_enough_to_see_which_way_it_turns(rate: float, until: f
 def test_a_run_that_ends_early_is_shown_until_then(rolling: Any) -> None:
     """No frame is made up beyond the last sample, also where there is but one."""
     body, data = rolling
-    times = frame_times(data)
+    times = times_of(data)
     for count in (1, 2, 30):
         found = poses(body, {name: values[:count] for name, values in data.items()}, times, integrate=True)
         assert found.time[-1] <= data["time"][count - 1] + 1e-12
@@ -181,15 +188,15 @@ def test_numbers_survive_being_packed() -> None:
 
 def test_every_truth_is_a_case_with_the_default_settings_as_ghosts(made: Any) -> None:
     """One ghost of each engine is shown at first: the default one where there is one; the numbers fill what is said."""
-    content = replay_content([made[0]], made[1])
+    content = BallReport.replay([made[0]], made[1])
     assert [case["label"] for case in content["cases"]] == ["speed=3", "speed=4"]
     assert content["start"] == 1, "the scene as its file has it"
     for case, numbers in zip(content["cases"], content["packed"], strict=True):
-        names = {ball["name"]: ball["shown"] for ball in case["balls"]}
+        names = {ball["name"]: ball["shown"] for ball in case["runs"]}
         assert names == {"truth": True, "alpha fine default (dt 1e-3)": True, "beta only (dt 1e-3)": True}
         bytes_said = sum(4 * width * length for _, _, width, length, _ in case["arrays"])
         assert len(gzip.decompress(base64.b64decode(numbers))) == bytes_said
-    silent = next(i for i, ball in enumerate(content["cases"][0]["balls"]) if ball["name"].startswith("beta"))
+    silent = next(i for i, ball in enumerate(content["cases"][0]["runs"]) if ball["name"].startswith("beta"))
     held = {name for name, ball, *_ in content["cases"][0]["arrays"] if ball == silent}
     assert held == {"p"}, "neither forces nor an orientation are invented"
 
@@ -205,7 +212,7 @@ def test_the_furthest_of_the_other_settings_is_there_if_it_is_seen(made: Any) ->
         dataset = read(file)
         dataset["p_WB"] = dataset["p_WB"] + 1e-3
         write(dataset, file)
-        balls = replay_content([outcome], store)["cases"][0]["balls"]
+        balls = BallReport.replay([outcome], store)["cases"][0]["runs"]
     finally:
         file.write_bytes(kept)
     assert {ball["name"]: ball["shown"] for ball in balls}["alpha fine matched (dt 1e-3)"] is False
@@ -222,17 +229,17 @@ def test_a_ball_that_flies_off_is_dropped_where_it_leaves(made: Any) -> None:
         dataset = read(file)
         dataset["p_WB"][25:] = dataset["p_WB"][25:] * 1e9
         write(dataset, file)
-        ball = next(b for b in replay_content([outcome], store)["cases"][0]["balls"] if b["name"].startswith("beta"))
+        ball = next(b for b in BallReport.replay([outcome], store)["cases"][0]["runs"] if b["name"].startswith("beta"))
     finally:
         file.write_bytes(kept)
-    assert 0 < ball["frames"] < replay_content([outcome], store)["cases"][0]["frames"]
+    assert 0 < ball["frames"] < BallReport.replay([outcome], store)["cases"][0]["frames"]
     assert "leaves the picture" in ball["message"]
 
 
 def test_report_json_names_what_is_replayed(written: Any) -> None:
     """Names, settings and trajectories of the ghosts are in report.json; their poses are not."""
     content = json.loads((written[1] / "report.json").read_text(encoding="utf-8"))
-    balls = content["replay"][0]["balls"]
+    balls = content["replay"][0]["runs"]
     assert balls[0]["name"] == "truth"
     assert all(ball["trajectory"].endswith(".nc") for ball in balls)
     assert all(ball["settings"]["dt"] == 1e-3 for ball in balls[1:])
@@ -274,16 +281,16 @@ def test_without_three_js_there_is_no_library(what: str, monkeypatch: pytest.Mon
 def test_what_engines_and_files_say_stays_text(made: Any, parse: Callable[[str], Any]) -> None:
     """Markup in a title, a point, a name or a message makes no element."""
     evil = "</script><script>alert(1)</script><img src=x onerror=alert(2)>"
-    replay = replay_content([made[0]], made[1])
+    replay = BallReport.replay([made[0]], made[1])
     case = replay["cases"][0]
     case |= {"group": evil, "label": evil, "scene": evil}
-    case["balls"][1] |= {"name": evil, "message": evil}
+    case["runs"][1] |= {"name": evil, "message": evil}
     html = page(report_content([made[0]], made[1], "proofroll report"), [point_curves(*made)], replay=replay)
     elements = parse(html)
     assert "img" not in {tag for tag, _ in elements.tags}
-    assert not any("alert(1)" in script and "balls" not in script for script in elements.scripts)
-    known = next(script for script in elements.scripts if '"balls"' in script)
-    assert json.loads(known)[0]["balls"][1]["message"] == evil
+    assert not any("alert(1)" in script and '"runs"' not in script for script in elements.scripts)
+    known = next(script for script in elements.scripts if '"arrays"' in script)
+    assert json.loads(known)[0]["runs"][1]["message"] == evil
 
 
 # ---- in a browser ----
@@ -386,9 +393,9 @@ def test_the_replay_obeys(written: Any, open_: Callable[..., Visit]) -> None:
     part(opened, "forces").uncheck()
     bare = picture(opened)
     assert bare != turned
-    opened.page.locator('[data-part="balls"] input').first.uncheck()
+    opened.page.locator('[data-part="runs"] input').first.uncheck()
     settle(opened)
-    assert opened.page.locator('[data-part="balls"] tr.off').count() == 1
+    assert opened.page.locator('[data-part="runs"] tr.off').count() == 1
     part(opened, "case").select_option("0")
     until(opened, lambda shown: shown == 0)
     assert picture(opened) != bare
@@ -415,7 +422,7 @@ def test_without_a_picture_the_values_follow_the_time(
     lacking: str, made: Any, tmp_path: Path, open_: Callable[..., Visit]
 ) -> None:
     """One sentence says what is missing; time and values run, and nothing fails."""
-    replay = replay_content([made[0]], made[1])
+    replay = BallReport.replay([made[0]], made[1])
     if lacking == "three.js":
         replay["library"] = None
     file = tmp_path / "report.html"

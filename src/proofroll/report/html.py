@@ -55,6 +55,7 @@ def page(
             pictures=pictures,
             styles=[styles(comparison["rows"]) for comparison in content["comparisons"]],
             replay=replay or {"cases": []},
+            replay_scripts=[kind.replay_script for kind in report_kinds() if kind.replay_script],
             data=packed(json.dumps(drawn, allow_nan=False, separators=(",", ":"))),
             plotly=_plotly(),
         )

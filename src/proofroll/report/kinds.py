@@ -25,11 +25,14 @@ class ReportKind(Protocol):
             ``truth(comparison, number, index, truth)``: what is told of a truth besides its route; empty: nothing.
         names: further names that the template uses; no other kind has them.
         caption: text below the drawings.
+        replay_script: beside the template, what draws its cases of the replay in a browser; empty: it has none. See
+            ``replay.js`` for what it is given and what it gives.
     """
 
     template: ClassVar[str]
     names: ClassVar[Mapping[str, Any]]
     caption: ClassVar[str]
+    replay_script: ClassVar[str]
 
     @staticmethod
     def covers(scene: Scene) -> bool:
@@ -56,7 +59,7 @@ class ReportKind(Protocol):
 
     @staticmethod
     def replay(outcomes: Sequence[Outcome], store: Store) -> dict[str, Any]:
-        """What the replay draws of these comparisons: ``cases``, and the rest as its own part of the page wants it."""
+        """What the replay draws of these comparisons, from :func:`proofroll.report.replay.replay_content`."""
 
 
 @cache

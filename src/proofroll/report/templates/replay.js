@@ -1,5 +1,7 @@
 "use strict";
-// The replay: unpacks a case, follows the time, writes the values and draws the balls. Without WebGL it only writes.
+// The replay: unpacks a case, follows the time, and lets the kind of scene write its values and draw its bodies. Without
+// WebGL it only writes. `replayed` holds what each kind of scene brings: columns, rows, write, compare, build, draw, key
+// and reach, made from the tools of `replay` below.
 (() => {
   const root = document.querySelector(".replay");
   if (!root) return;
@@ -11,9 +13,8 @@
     element.append(...children);
     return element;
   };
-  const STATES = [["slips", "≋ slips"], ["sticks", "● sticks"], ["away", "○ off the wall"]];
 
-  let cases, library, shown, time = 0, playing = false, last = 0, queued = false;
+  let cases, library, shown, kind, time = 0, playing = false, last = 0, queued = false;
   let view = null, stage = null;         // the camera, and what is drawn; null until there is something
 
   // ---- numbers ----
@@ -34,17 +35,18 @@
 
   async function load(number) {
     const spec = cases[number], bytes = await unpacked(root.querySelector(`[data-numbers="${number}"]`).textContent);
-    const balls = spec.balls.map((ball) => ({ ...ball })), common = {};
+    const runs = spec.runs.map((run) => ({ ...run })), common = {};
     let at = 0;
-    for (const [name, ball, width, length, step] of spec.arrays) {
-      (ball < 0 ? common : balls[ball])[name] = { width, length, values: thick(bytes, at, width, length, step) };
+    for (const [name, run, width, length, step] of spec.arrays) {
+      (run < 0 ? common : runs[run])[name] = { width, length, values: thick(bytes, at, width, length, step) };
       at += 4 * width * length;
     }
-    return { ...spec, ...common, balls };
+    return { ...spec, ...common, runs };
   }
 
   const place = () => (shown.frames < 2 ? 0 : (time / shown.until) * (shown.frames - 1));
-  const until = (ball) => (shown.frames < 2 ? shown.until : (shown.until * (ball.frames - 1)) / (shown.frames - 1));
+  const until = (run) => (shown.frames < 2 ? shown.until : (shown.until * (run.frames - 1)) / (shown.frames - 1));
+  const there = (run) => time <= until(run) + 1e-9;
 
   // Between frames: straight, for what may jump, or smooth, for a path (Catmull-Rom).
   function straight({ values, width, length }) {
@@ -65,92 +67,69 @@
   // ---- words ----
   const fixed = (value, digits) => (Number.isFinite(value) ? value.toFixed(digits).replace(/^-(0(\.0*)?)$/, "$1").replace("-", "−") : "–");
   const digits = (size, least) => Math.max(0, least - 1 - Math.floor(Math.log10(Math.max(size, 1e-12))));
-  const state = (ball) => (ball.state ? STATES[held(ball.state)] : null);
+
+  // The cells of the values of the truth, in the order of their names.
+  function values(names) {
+    ui.values.replaceChildren();
+    return names.map((name) => {
+      const cell = make("dd");
+      ui.values.append(make("dt", {}, name), cell);
+      return cell;
+    });
+  }
 
   function rows() {
-    const bounded = shown.friction.static !== null;
-    ui.contact.hidden = !bounded;
-    ui.balls.replaceChildren(...shown.balls.slice(1).map((ball, index) => {
+    const columns = kind.columns(), head = ({ name, unit, number, title }) => {
+      const cell = make("th", { scope: "col", ...(number ? { class: "n" } : {}), ...(title ? { title } : {}) }, name);
+      if (unit) cell.append(" ", make("small", {}, unit));
+      return cell;
+    };
+    ui.head.replaceChildren(
+      head({ name: "ghost" }), head({ name: "off by", unit: "mm", number: true, title: shown.off }), ...columns.map(head),
+    );
+    ui.runs.replaceChildren(...shown.runs.slice(1).map((run) => {
       const box = make("input", { type: "checkbox" });
-      box.checked = ball.shown;
-      box.addEventListener("change", () => { ball.shown = box.checked; update(); });
-      const name = make("label", {}, box, make("i", { class: `replay-dot e${ball.colour}` }), make("span", {}, ball.name.replace(/-(?=\d)/g, "\u2011")));  // 1e-3 stays in one line
-      const cells = ["n", "n", "n", ""].map((kind) => make("td", { class: kind }));
-      cells[3].hidden = !bounded;
-      cells[3].append(make("span", { "aria-hidden": "true" }), make("span", { class: "vh" }));
-      ball.cells = cells;
-      ball.line = make("tr", {}, make("th", { scope: "row" }, name), ...cells);
-      return ball.line;
+      box.checked = run.shown;
+      box.addEventListener("change", () => { run.shown = box.checked; update(); });
+      const name = make("label", {}, box, make("i", { class: `replay-dot e${run.colour}` }), make("span", {}, run.name.replace(/-(?=\d)/g, "\u2011")));  // 1e-3 stays in one line
+      run.cells = [make("td", { class: "n" }), ...columns.map(({ number }) => (
+        number ? make("td", { class: "n" }) : make("td", {}, make("span", { "aria-hidden": "true" }), make("span", { class: "vh" }))
+      ))];
+      run.line = make("tr", {}, make("th", { scope: "row" }, name), ...run.cells);
+      return run.line;
     }));
-    const plain = shown.balls.slice(1).filter((ball) => !ball.q).map((ball) => ball.name);
-    const notes = shown.balls.filter((ball) => ball.message).map((ball) => `${ball.name}: ${ball.message}.`);
-    if (plain.length) notes.push(`Without marks, for the run did not follow the ball's orientation: ${plain.join(", ")}.`);
-    if (!shown.balls[0].press) notes.push("The truth gives no forces here.");
-    ui.notes.textContent = notes.join(" ");
+    const notes = shown.runs.filter((run) => run.message).map((run) => `${run.name}: ${run.message}.`);
     ui.events.replaceChildren(...(shown.events.length ? ["The truth:"] : []), ...shown.events.filter((event) => event.time !== null).map((event) => {
       const button = make("button", { type: "button" }, `${event.kind} ${event.time.toFixed(3)} s`);
       button.addEventListener("click", () => { stop(); go(event.time); });
       return button;
     }));
-    // Where the true ball slips, on a strip under the time line.
-    const { state: known } = shown.balls[0], stops = [];
-    for (let i = 0; known && i < known.length; i++) {
-      const colour = known.values[i] === 1 ? "var(--sticks)" : "var(--slips)";
-      if (i === 0 || known.values[i] !== known.values[i - 1]) {
-        if (i) stops.push(`${stops.at(-1).split(" ")[0]} ${(100 * i) / (known.length - 1)}%`);
-        stops.push(`${colour} ${(100 * i) / (known.length - 1)}%`);
-      }
-    }
-    ui.strip.style.background = known ? `linear-gradient(90deg, ${stops.join(", ")}, ${stops.at(-1).split(" ")[0]} 100%)` : "";
-    const [a, b] = shown.coordinates;
-    const names = [a, b].map(({ symbol, unit }) => [symbol, unit]);
-    ui.values.replaceChildren();
-    ui.cells = [...names, ["N", "normal force"], ["F", "friction"], ["F/N", "needed friction"], ["contact", ""]].map(([name]) => {
-      const cell = make("dd");
-      ui.values.append(make("dt", {}, name), cell);
-      return cell;
-    });
-    ui.meter = make("span", { class: "replay-meter", "aria-hidden": "true" }, make("i"), make("b"));
+    ui.strip.style.background = "";
+    kind.rows(notes);
+    ui.notes.textContent = notes.join(" ");
     ui.time.max = shown.until;
+    ui.speed.value = shown.speed;
   }
 
+  // In millimetres; below `least` nothing is seen.
+  const distance = (mm, least) => (mm < least ? `< ${least}` : fixed(mm, Math.max(0, -Math.log10(least) - (mm >= 1000 * least))));
+
   function write() {
-    const truth = shown.balls[0];
-    ui.clock.textContent = `${time.toFixed(3)} of ${Number(shown.until.toPrecision(6))} s`;
+    ui.clock.textContent = `${time.toFixed(shown.until < 0.1 ? 5 : 3)} of ${Number(shown.until.toPrecision(6))} s`;
     if (document.activeElement !== ui.time || playing) ui.time.value = time;
-    ui.time.setAttribute("aria-valuetext", `${time.toFixed(3)} seconds`);
-    const u = smooth(truth.coordinates);
-    shown.coordinates.forEach(({ unit }, k) => { ui.cells[k].textContent = `${fixed(u[k], 4)} ${unit}`; });
-    const [, , press, pull, ratio, contact] = ui.cells;
-    const { static: most, kinetic } = shown.friction;
-    if (truth.press) {
-      const N = straight(truth.press)[0], F = straight(truth.pull)[0], needed = F / N;
-      press.textContent = `${fixed(N, digits(N, 4))} N`;
-      pull.textContent = `${fixed(F, digits(N, 4))} N`;
-      const bound = most === null ? "" : ` of μ ${Number(most.toPrecision(4))}${kinetic !== most ? `, ${Number(kinetic.toPrecision(4))} while it slips` : ""}`;
-      ratio.replaceChildren(`${fixed(needed, 4)}${bound}`, ui.meter);
-      ui.meter.firstChild.style.width = `${Math.min(100, (80 * needed) / most)}%`;  // the bound is at four fifths
-      ui.meter.hidden = most === null || !Number.isFinite(needed);
-    }
-    const now = state(truth);
-    ui.meter.className = `replay-meter ${now ? now[0] : ""}`;
-    contact.replaceChildren(make("b", { class: now ? now[0] : "" }, now ? now[1] : "rolls without slip, friction unbounded"));
-    const centre = smooth(truth.p);
-    for (const ball of shown.balls.slice(1)) {
-      const there = time <= until(ball) + 1e-9, p = smooth(ball.p), word = state(ball);
-      const off = 1000 * Math.hypot(...p.map((x, k) => x - centre[k]));
-      const presses = ball.press && time > 0;  // a reaction at time 0 is the start's: contacts that begin unloaded have none yet
-      const texts = there ? [
-        off < 0.1 ? "< 0.1" : fixed(off, off < 100 ? 1 : 0),
-        presses ? fixed(straight(ball.press)[0], 1) : "–",
-        presses ? fixed(straight(ball.pull)[0] / straight(ball.press)[0], 3) : "–",
-      ] : ["gone", "–", "–"];
-      texts.forEach((text, k) => { ball.cells[k].textContent = text; });
-      const [sign, words] = [there && word ? word[1][0] : "–", there && word ? word[1].slice(2) : "not known"];
-      ball.cells[3].className = there && word ? word[0] : "";
-      ball.cells[3].title = ball.cells[3].lastChild.textContent = words;
-      ball.cells[3].firstChild.textContent = sign;
-      ball.line.classList.toggle("off", !ball.shown);
+    ui.time.setAttribute("aria-valuetext", `${time.toFixed(shown.until < 0.1 ? 5 : 3)} seconds`);
+    kind.write();
+    for (const run of shown.runs.slice(1)) {
+      const here = there(run), { off, texts, sign } = kind.compare(run, here);
+      const told = [here ? distance(1000 * off, shown.least) : "gone", ...texts.map((text) => (here ? text : "–"))];
+      told.forEach((text, k) => { run.cells[k].textContent = text; });
+      const cell = run.cells[told.length];
+      if (cell) {
+        cell.className = sign.look;
+        cell.title = cell.lastChild.textContent = sign.words;
+        cell.firstChild.textContent = sign.sign;
+      }
+      run.line.classList.toggle("off", !run.shown);
     }
   }
 
@@ -206,25 +185,9 @@
 
   const colour = (name) => new view.T.Color(css(name));
 
-  // Octants in two tones, and a band where the first meridian is: what turns is seen to turn.
-  function marks(light, dark, band) {
-    const tile = document.createElement("canvas");
-    [tile.width, tile.height] = [512, 256];
-    const pen = tile.getContext("2d");
-    for (let i = 0; i < 4; i++) for (let j = 0; j < 2; j++) {
-      pen.fillStyle = (i + j) % 2 ? dark : light;
-      pen.fillRect(128 * i, 128 * j, 128, 128);
-    }
-    pen.fillStyle = band;
-    pen.fillRect(0, 0, 10, 256);
-    pen.fillRect(502, 0, 10, 256);
-    const texture = new view.T.CanvasTexture(tile);
-    texture.anisotropy = view.renderer.capabilities.getMaxAnisotropy();
-    return texture;
-  }
-
-  function arrow() {
-    const { T } = view, r = 0.055 * shown.radius;
+  // An arrow of shaft radius `r`.
+  function arrow(r) {
+    const { T } = view;
     const material = new T.MeshBasicMaterial({ depthTest: false, transparent: true });
     const shaft = new T.Mesh(new T.LatheGeometry([new T.Vector2(r, 0), new T.Vector2(r, 1)], 12), material);
     const head = new T.Mesh(new T.ConeGeometry(3 * r, 8 * r, 16).translate(0, -4 * r, 0), material);
@@ -243,110 +206,70 @@
     } };
   }
 
-  function wall() {
-    const { T } = view, { rows: n, columns: m, lines } = shown.wall, faces = [], edges = [];
-    for (let i = 0; i < n; i++) for (let j = 0; j < m; j++) {
-      const a = i * m + j;
-      if (i + 1 < n && j + 1 < m) faces.push(a, a + m, a + 1, a + 1, a + m, a + m + 1);
-      if (i % lines[0] === 0 && j + 1 < m) edges.push(a, a + 1);
-      if (j % lines[1] === 0 && i + 1 < n) edges.push(a, a + m);
-    }
-    const shape = new T.BufferGeometry().setIndex(faces);
-    shape.setAttribute("position", new T.BufferAttribute(shown.points.values, 3));
-    shape.setAttribute("normal", new T.BufferAttribute(shown.outward.values.map((x) => -x), 3));
-    const grid = new T.BufferGeometry().setIndex(edges);
-    grid.setAttribute("position", shape.getAttribute("position"));
-    const side = { color: colour("--wall"), transparent: true, depthWrite: false, polygonOffset: true, polygonOffsetFactor: 1, polygonOffsetUnits: 1 };
-    const parts = [
-      new T.Mesh(shape, new T.MeshLambertMaterial({ ...side, opacity: 0.75, side: T.FrontSide })),   // seen from the ball
-      new T.Mesh(shape, new T.MeshLambertMaterial({ ...side, opacity: 0.1, side: T.BackSide })),     // seen from behind
-      new T.LineSegments(grid, new T.LineBasicMaterial({ color: colour("--grid"), transparent: true, opacity: 0.35, depthWrite: false })),
-    ];
-    parts.forEach((item, k) => { item.renderOrder = k === 1 ? 6 : -3 + k; });
-    return parts;
+  // A line along the last four tenths of a second of a path: that of the point whose coordinates begin at `column`.
+  function path(scene, { values, width, length }, column, tone) {
+    const { T } = view, points = new Float32Array(3 * length);
+    for (let i = 0; i < length; i++) for (let k = 0; k < 3; k++) points[3 * i + k] = values[i * width + column + k];
+    const shape = new T.BufferGeometry();
+    shape.setAttribute("position", new T.BufferAttribute(points, 3));
+    const line = new T.Line(shape, new T.LineBasicMaterial({ color: new T.Color(tone) }));
+    line.frustumCulled = false;
+    scene.add(line);
+    return { show(run, x) {
+      line.visible = ui.paths.checked && (run.shown || run === shown.runs[0]);
+      const end = Math.min(Math.floor(x) + 1, run.frames), from = Math.max(0, end - Math.ceil((shown.tail * shown.frames) / shown.until));
+      shape.setDrawRange(from, end - from);
+    } };
   }
 
-  // The trace of the true contact on the wall, a ribbon in the colour of what the contact did.
-  function trace() {
-    const { T } = view, truth = shown.balls[0], n = truth.contact.length, at = truth.contact.values, up = truth.normal.values;
-    const points = new Float32Array(6 * n), tones = new Float32Array(6 * n), faces = [];
-    const [free, slip] = [colour("--muted"), colour("--slips")];
-    const side = new T.Vector3(), way = new T.Vector3(), e1 = new T.Vector3();
-    for (let i = 0; i < n; i++) {
-      const [j, k] = [Math.max(i - 1, 0), Math.min(i + 1, n - 1)];
-      way.fromArray(at, 3 * k).sub(side.fromArray(at, 3 * j)).normalize();
-      side.crossVectors(e1.fromArray(up, 3 * i), way).multiplyScalar(0.09 * shown.radius);
-      for (const sign of [0, 1]) for (let x = 0; x < 3; x++)
-        points[6 * i + 3 * sign + x] = at[3 * i + x] + (2 * sign - 1) * side.getComponent(x) - 0.01 * shown.radius * e1.getComponent(x);
-      const tone = truth.state && truth.state.values[i] !== 1 ? slip : free;
-      tone.toArray(tones, 6 * i);
-      tone.toArray(tones, 6 * i + 3);
-      if (i + 1 < n) faces.push(2 * i, 2 * i + 1, 2 * i + 2, 2 * i + 2, 2 * i + 1, 2 * i + 3);
-    }
-    const shape = new T.BufferGeometry().setIndex(faces);
-    shape.setAttribute("position", new T.BufferAttribute(points, 3));
-    shape.setAttribute("color", new T.BufferAttribute(tones, 3));
-    return new T.Mesh(shape, new T.MeshBasicMaterial({ vertexColors: true, side: T.DoubleSide }));
+  // The orientation now of the body whose quaternion begins at `column`, scalar first.
+  function turn(quaternion, { values, width, length }, column) {
+    const x = place(), i = Math.min(Math.floor(x), Math.max(length - 2, 0)), j = Math.min(i + 1, length - 1);
+    const read = (k) => { const v = values.subarray(width * k + column); return new view.T.Quaternion(v[1], v[2], v[3], v[0]).normalize(); };
+    quaternion.slerpQuaternions(read(i), read(j), Math.min(1, x - i));
   }
 
   function build() {
-    const { T } = view, truth = shown.balls[0], scene = new T.Scene();
+    const { T } = view, scene = new T.Scene();
     stage?.scene.traverse((item) => { item.geometry?.dispose(); item.material?.map?.dispose(); item.material?.dispose(); });
-    const box = new T.Box3().setFromArray(truth.p.values).expandByScalar(shown.radius);
-    const size = 0.5 * box.getSize(new T.Vector3()).length();
-    const largest = truth.press ? Math.max(...truth.press.values) : 0;
-    stage = {
-      scene, size, centre: box.getCenter(new T.Vector3()), perNewton: largest > 0 ? (5 * shown.radius) / largest : 0,
-    };
-    scene.add(new T.HemisphereLight(0xffffff, 0x8899aa, 0.75), view.camera, ...wall());
+    stage = { scene };
+    scene.add(new T.HemisphereLight(0xffffff, 0x8899aa, 0.75), view.camera);
     const lamp = new T.DirectionalLight(0xffffff, 0.45);
     lamp.position.set(0.4, 0.7, 1);
     view.camera.clear().add(lamp);
-    stage.balls = shown.balls.map((ball, index) => {
-      const ghost = index > 0, radius = shown.radius * (ghost ? 0.97 : 1);
-      const own = ghost ? css(`--e${ball.colour}`) : "";
-      const map = !ghost ? marks(css("--light"), css("--dark"), css("--link")) : ball.q ? marks(own, `#${new T.Color(own).lerp(new T.Color(css("--paper")), 0.55).getHexString()}`, css("--paper")) : null;
-      const material = new T.MeshPhongMaterial({ map, shininess: 25, specular: 0x333333, ...(map ? {} : { color: new T.Color(own) }), ...(ghost ? { transparent: true, opacity: 0.5, depthWrite: false } : {}) });
-      const mesh = new T.Mesh(new T.SphereGeometry(radius, 48, 32), material);
-      mesh.renderOrder = ghost ? 3 : 0;
-      scene.add(mesh);
-      if (!ghost) return { mesh };
-      const path = new T.BufferGeometry();
-      path.setAttribute("position", new T.BufferAttribute(ball.p.values, 3));
-      const line = new T.Line(path, new T.LineBasicMaterial({ color: new T.Color(own) }));
-      line.frustumCulled = false;
-      scene.add(line);
-      return { mesh, line };
-    });
-    stage.trace = trace();
-    stage.disc = new T.Mesh(new T.CircleGeometry(0.3 * shown.radius, 24), new T.MeshBasicMaterial({ side: T.DoubleSide, depthTest: false, transparent: true }));
-    stage.disc.renderOrder = 9;
-    stage.push = arrow();
-    stage.rub = arrow();
-    scene.add(stage.trace, stage.disc, stage.push.group, stage.rub.group);
+    Object.assign(stage, kind.build(scene));
     key();
   }
 
+  const SIGNS = { arrow: "M1 5H19M14 1L20 5L14 9", line: "M1 5H21" };
   function key() {
-    const bounded = Boolean(shown.balls[0].state);
-    ui["key-forces"].hidden = !stage.perNewton;
-    ui["key-slips"].hidden = !bounded;
-    ui["key-friction"].style.color = bounded ? "var(--sticks)" : "var(--link)";
-    ui.scale.textContent = stage.perNewton ? Number((0.01 / stage.perNewton).toPrecision(2)) : "";
+    const drawn = (path) => {
+      const sign = document.createElementNS("http://www.w3.org/2000/svg", "svg"), stroke = document.createElementNS("http://www.w3.org/2000/svg", "path");
+      for (const [name, value] of Object.entries({ width: 22, height: 10, "aria-hidden": "true" })) sign.setAttribute(name, value);
+      for (const [name, value] of Object.entries({ d: path, fill: "none", stroke: "currentColor", "stroke-width": 2 })) stroke.setAttribute(name, value);
+      sign.append(stroke);
+      return sign;
+    };
+    const forces = stage.perNewton ? Number((0.01 / stage.perNewton).toPrecision(2)) : "";
+    ui.key.replaceChildren(...kind.key(forces).map(({ sign, text, tone }) => {
+      const picture = make("span", {}, drawn(SIGNS[sign]));
+      picture.style.color = tone ?? "";
+      return make("span", {}, picture, text);
+    }));
     ui.key.hidden = false;
   }
 
-  // The camera that shows the whole path, or, where the ball would be lost in it, follows.
+  // The camera that shows the whole path, or, where a body would be lost in it, follows.
   function reset() {
-    ui.follow.checked = stage.size > 22 * shown.radius;
-    view.turn = -1.15;
-    view.lift = 0.5;
-    const reach = ui.follow.checked ? 14 * shown.radius : stage.size;
+    const reach = kind.reach(stage.size);
+    ui.follow.checked = reach < stage.size;
+    view.turn = shown.from[0];
+    view.lift = shown.from[1];
     view.distance = (0.86 * reach) / Math.sin((view.camera.fov * Math.PI) / 360);
   }
 
   function draw() {
-    const { T, renderer, camera } = view, truth = shown.balls[0];
+    const { T, renderer, camera } = view;
     const width = ui.canvas.parentNode.clientWidth, height = ui.canvas.parentNode.clientHeight;
     if (!width || !height) return;
     renderer.setSize(width, height, false);
@@ -358,43 +281,22 @@
     camera.far = 4 * reach + 4 * stage.size;
     camera.updateProjectionMatrix();
     camera.lookAt(target);
-
-    const x = place(), turn = new T.Quaternion(), next = new T.Quaternion();
-    shown.balls.forEach((ball, index) => {
-      const { mesh, line } = stage.balls[index], there = time <= until(ball) + 1e-9 && (index === 0 || ball.shown);
-      mesh.visible = there;
-      if (line) {
-        line.visible = ui.paths.checked && ball.shown;
-        const end = Math.min(Math.floor(x) + 1, ball.frames), from = Math.max(0, end - Math.ceil((0.4 * shown.frames) / shown.until));
-        line.geometry.setDrawRange(from, end - from);
-      }
-      if (!there) return;
-      mesh.position.set(...smooth(ball.p));
-      if (!ball.q) return;
-      const last = ball.frames - 1, i = Math.min(Math.floor(x), Math.max(last - 1, 0)), j = Math.min(i + 1, last);
-      const read = (to, k) => { const v = ball.q.values; return to.set(v[4 * k + 1], v[4 * k + 2], v[4 * k + 3], v[4 * k]).normalize(); };
-      mesh.quaternion.slerpQuaternions(read(turn, i), read(next, j), Math.min(1, x - i));
-    });
-
-    stage.trace.visible = ui.paths.checked;
-    stage.trace.geometry.setDrawRange(0, 6 * Math.floor(x));
-    const contact = new T.Vector3(...smooth(truth.contact)), e1 = new T.Vector3(...straight(truth.normal)).normalize();
-    const word = state(truth), tone = word ? colour(word[0] === "sticks" ? "--sticks" : "--slips") : colour("--link");
-    stage.disc.visible = !word || word[0] !== "away";
-    stage.disc.position.copy(contact);
-    stage.disc.quaternion.setFromUnitVectors(new T.Vector3(0, 0, 1), e1);
-    stage.disc.material.color.copy(tone);
-    if (truth.press) {
-      stage.push.point(contact, e1.clone().multiplyScalar(-straight(truth.press)[0]), colour("--ink"));
-      stage.rub.point(contact, new T.Vector3(...straight(truth.friction)), tone);
-    }
+    kind.draw(place());
     renderer.render(stage.scene, camera);
   }
+
+  const replay = {
+    ui, css, make, straight, smooth, held, fixed, digits, values, colour, arrow, path, turn,
+    visible: (run) => there(run) && (run === shown.runs[0] || run.shown),
+    get shown() { return shown; }, get time() { return time; }, get view() { return view; },
+  };
+  const kinds = Object.fromEntries(Object.entries(replayed).map(([name, made]) => [name, made(replay)]));
 
   // ---- what a person does ----
   async function choose() {
     stop();
     shown = await load(Number(ui.case.value));
+    kind = kinds[shown.kind];
     time = 0;
     rows();
     if (view) { build(); reset(); }
@@ -407,7 +309,7 @@
     ui.time.addEventListener("input", () => { stop(); time = Number(ui.time.value); update(); });
     ui.reset.addEventListener("click", () => { if (view) reset(); update(); });
     for (const box of [ui.follow, ui.forces, ui.paths]) box.addEventListener("change", update);
-    const zoom = (factor) => { if (view) view.distance = Math.max(4 * shown.radius, Math.min(20 * stage.size, view.distance * factor)); update(); };
+    const zoom = (factor) => { if (view) view.distance = Math.max(4 * shown.scale, Math.min(20 * stage.size, view.distance * factor)); update(); };
     const orbit = (turn, lift) => { if (!view) return; view.turn += turn; view.lift = Math.max(-1.5, Math.min(1.5, view.lift + lift)); update(); };
     ui.nearer.addEventListener("click", () => zoom(0.8));
     ui.further.addEventListener("click", () => zoom(1.25));

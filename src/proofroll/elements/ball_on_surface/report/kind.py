@@ -21,6 +21,7 @@ class BallReport:
 
     template: ClassVar[str] = "slips.html"
     names: ClassVar[Mapping[str, Any]] = {"onsets": onset_tables}
+    replay_script: ClassVar[str] = "replay_ball.js"
     caption: ClassVar[str] = (
         "First the whole, to scale; then the ball enlarged, with its local frame at the contact: e₁ into the wall, e₂ "
         "and e₃ along its coordinates. N, F₂, F₃ are drawn as forces on the ball, in their positive sense."
@@ -61,6 +62,7 @@ class BallReport:
     @staticmethod
     def replay(outcomes: Sequence[Outcome], store: Store) -> dict[str, Any]:
         """Balls rolling on their wall."""
-        from proofroll.elements.ball_on_surface.report.replay import replay_content
+        from proofroll.elements.ball_on_surface.report.replay import drawn, seen
+        from proofroll.report.replay import replay_content
 
-        return replay_content(list(outcomes), store)
+        return replay_content(list(outcomes), store, "ball", seen, drawn)

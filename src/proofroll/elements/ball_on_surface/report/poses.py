@@ -26,11 +26,6 @@ NEEDED = (
     "event_time",
 )  # fmt: skip
 
-# Frames per second of the motion that no eye misses, and the most that a replay keeps where that is enough.
-LEAST_PER_SECOND, MOST_FRAMES = 60, 600
-# The ball's turn from one frame to the next [rad]: what is smooth, and what must never be passed, for beyond half a
-# turn the shorter way from one orientation to the next is the wrong one.
-SMOOTH_TURN, WIDEST_TURN = 1.2, 2.5
 # Steps of the quadrature of the spin from one frame to the next; with 1.2 rad a frame its error is below 1e-5 rad.
 _SUBSTEPS = 4
 
@@ -61,14 +56,6 @@ class Poses:
     press: FloatArray | None
     friction: FloatArray | None
     state: npt.NDArray[np.uint8] | None
-
-
-def frame_times(truth: Sampled) -> FloatArray:
-    """Evenly spaced times of the frames [s], shape (n,): so many that the true ball is seen to turn the right way."""
-    until = float(truth["time"][-1])
-    turned = until * float(np.linalg.norm(truth["w_WB"], axis=1).max())
-    wanted = max(LEAST_PER_SECOND * until, turned / SMOOTH_TURN)
-    return np.linspace(0.0, until, 1 + int(np.ceil(max(min(wanted, MOST_FRAMES), turned / WIDEST_TURN, 1.0))))
 
 
 def poses(body: RollingBall, sampled: Sampled, times: FloatArray, *, integrate: bool = False) -> Poses:

@@ -6,8 +6,8 @@ import numpy as np
 
 from proofroll.core.arrays import FloatArray
 from proofroll.elements.mechanism.element import MechanismElement
+from proofroll.elements.mechanism.fastened import fastened
 from proofroll.elements.mechanism.joint import WITH_AXIS
-from proofroll.elements.mechanism.model import WORLD
 from proofroll.report.pen import Drawing, View, beyond
 
 _SIZE = 240.0  # of the mechanism in the picture [px]
@@ -21,29 +21,21 @@ _TEETH = 8  # of the zigzag of a spring
 def drawn(element: MechanismElement) -> Drawing:
     """The skeleton of a mechanism: from each body's centre of mass a line to all that is fastened to the body."""
     mechanism, start, picture = element.mechanism, element.start, Drawing()
-    at = _view(element)
+    at = View(*direction(element), _SIZE / element.length)
 
     def place(body: str, position: tuple[float, ...]) -> FloatArray:
         return np.asarray(start.point(body, position)[0])
 
     joints = [(j.name, j.kind, j.parent, j.position, j.child, j.child_position) for j in mechanism.joints]
     loops = [(k.name, k.kind, k.body_a, k.position_a, k.body_b, k.position_b) for k in mechanism.loops]
-    fastened: dict[str, list[FloatArray]] = {name: [] for name in (WORLD, *element.bodies)}
-    for _, kind, a, at_a, b, at_b in [*joints, *loops]:
-        if kind != "free":
-            fastened[a].append(place(a, at_a))
-            fastened[b].append(place(b, at_b))
     for spring in mechanism.springs:
         ends = place(spring.body_a, spring.position_a), place(spring.body_b, spring.position_b)
         picture.path(_zigzag(at(np.stack(ends))), "thin")
-        fastened[spring.body_a].append(ends[0])
-        fastened[spring.body_b].append(ends[1])
-    for point in mechanism.points:
-        fastened[point.body].append(place(point.body, point.position))
+    ends_of = fastened(mechanism)
     for body in mechanism.bodies:
         com = place(body.name, body.com)
-        for end in fastened[body.name]:
-            picture.path(at(np.stack([com, end])), "line")
+        for end in ends_of[body.name]:
+            picture.path(at(np.stack([com, place(body.name, end)])), "line")
         picture.disc(at(com).tolist(), _MASS, "ball")
     named: dict[tuple[int, ...], list[str]] = {}
     for number, (name, kind, a, at_a, b, at_b) in enumerate([*joints, *loops]):
@@ -65,8 +57,11 @@ def drawn(element: MechanismElement) -> Drawing:
     return picture
 
 
-def _view(element: MechanismElement) -> View:
-    """Along the axes of the joints where all are parallel, else obliquely; gravity points down in the picture."""
+def direction(element: MechanismElement) -> tuple[FloatArray, FloatArray]:
+    """Towards the viewer, and up in the picture, both in the world.
+
+    Along the axes of the joints where all are parallel, else obliquely; gravity points down in the picture.
+    """
     mechanism = element.mechanism
     axes = [_axis(element, n) for n, joint in enumerate(mechanism.joints) if joint.kind == "revolute"]
     down = np.array(mechanism.gravity)
@@ -78,7 +73,7 @@ def _view(element: MechanismElement) -> View:
         viewer = axes[0] * (1.0 if float(axes[0] @ np.ones(3)) > 0 else -1.0)
         if np.linalg.norm(np.cross(viewer, up)) < 1e-6:
             up = np.array([0.0, 1.0, 0.0]) if abs(viewer[1]) < abs(viewer[2]) else np.array([0.0, 0.0, 1.0])
-    return View(viewer, up, _SIZE / element.length)
+    return viewer / np.linalg.norm(viewer), up
 
 
 def _turned(direction: FloatArray, up: FloatArray) -> FloatArray:

@@ -20,6 +20,7 @@ class MechanismReport:
 
     template: ClassVar[str] = ""
     names: ClassVar[Mapping[str, Any]] = {}
+    replay_script: ClassVar[str] = "replay_mechanism.js"
     caption: ClassVar[str] = (
         "At the start, to scale. Filled dots are centres of mass, with a line to all that is fastened to the body; "
         "circles are joints, dashed circles the loops that close the tree, zigzags springs, coloured circles the "
@@ -55,6 +56,9 @@ class MechanismReport:
         return curves
 
     @staticmethod
-    def replay(outcomes: Sequence[Outcome], store: Store) -> dict[str, Any]:  # noqa: ARG004 -- the protocol's
-        """None yet."""
-        return {"cases": []}
+    def replay(outcomes: Sequence[Outcome], store: Store) -> dict[str, Any]:
+        """Bodies and joints in motion."""
+        from proofroll.elements.mechanism.report.replay import drawn, seen
+        from proofroll.report.replay import replay_content
+
+        return replay_content(list(outcomes), store, "mechanism", seen, drawn)

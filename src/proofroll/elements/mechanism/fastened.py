@@ -1,0 +1,27 @@
+"""Where joints, loops, springs and tracked points are fastened to the bodies of a mechanism."""
+
+from __future__ import annotations
+
+from proofroll.elements.mechanism.checks import Vector
+from proofroll.elements.mechanism.model import WORLD, Mechanism
+
+
+def fastened(mechanism: Mechanism) -> dict[str, list[Vector]]:
+    """For each body, and for the world at the end, the points in its own frame where something is fastened [m].
+
+    A free joint fastens nothing.
+    """
+    found: dict[str, list[Vector]] = {name: [] for name in [*(body.name for body in mechanism.bodies), WORLD]}
+    for joint in mechanism.joints:
+        if joint.kind != "free":
+            found[joint.parent].append(joint.position)
+            found[joint.child].append(joint.child_position)
+    for loop in mechanism.loops:
+        found[loop.body_a].append(loop.position_a)
+        found[loop.body_b].append(loop.position_b)
+    for spring in mechanism.springs:
+        found[spring.body_a].append(spring.position_a)
+        found[spring.body_b].append(spring.position_b)
+    for point in mechanism.points:
+        found[point.body].append(point.position)
+    return found

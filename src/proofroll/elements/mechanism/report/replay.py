@@ -1,0 +1,168 @@
+"""Mechanisms in the replay: bodies as rods, their joints, springs and tracked points, and what the joints transmit."""
+
+from __future__ import annotations
+
+import dataclasses
+import math
+from typing import Any
+
+import numpy as np
+import numpy.typing as npt
+from scipy.interpolate import CubicHermiteSpline
+from scipy.spatial.transform import Rotation
+
+from proofroll.core.arrays import FloatArray
+from proofroll.core.scene import Scene
+from proofroll.elements.mechanism.element import MechanismElement
+from proofroll.elements.mechanism.fastened import fastened
+from proofroll.elements.mechanism.model import WORLD
+from proofroll.elements.mechanism.placed import Placed
+from proofroll.elements.mechanism.report.drawing import direction
+from proofroll.files.json_data import plain
+from proofroll.files.netcdf import read_some
+from proofroll.report.labels import symbol, unit
+from proofroll.report.replay import SPEEDS, Numbers, Replayed, frame_times
+
+# Thickness of what is drawn, and what looks right, as parts of the mechanism's length.
+_SCALE, _SEEN = 0.035, 1e-3
+# A mechanism that is further from the true one than this many lengths has left the picture.
+_FAR = 20.0
+_TURN = 2.0**-14  # to which a quaternion is rounded
+_ROUNDED = 2.0**-17  # to which a length is, as a part of the mechanism's, and a force as a part of the largest
+_LASTS = 4.0  # how long a replay should last at least [s]
+_TAIL = 0.15  # part of the motion that a path shows
+_ASIDE = (0.3, 0.25)  # how far the camera stands aside of the drawing's view, that depth is seen [rad]
+_STEEPEST = 1.3  # of the camera above the horizon [rad]
+_MOST_READINGS = 6
+_MOTION = ("time", "p_WB", "v_WB", "w_WB", "q_WB")
+
+
+def seen(scene: Scene) -> float:
+    """How far a body can be off and look right [m]."""
+    return _SEEN * _element(scene).length
+
+
+def drawn(replayed: Replayed) -> tuple[dict[str, Any], list[int], Numbers]:
+    """What the replay draws of a mechanism: see :data:`proofroll.report.replay.Drawer`."""
+    element = _element(replayed.scene)
+    mechanism, length = element.mechanism, element.length
+    bodies, skeleton = [*element.bodies, WORLD], fastened(mechanism)
+    joints = [(joint.name, joint.child, joint.child_position) for joint in mechanism.joints if joint.kind != "free"]
+    joints += [(loop.name, loop.body_b, loop.position_b) for loop in mechanism.loops]
+    names = [f"force.{name}.{axis}" for name, *_ in joints for axis in "xyz"]
+    readings = _readings(element)
+    true = read_some(replayed.file, [*_MOTION, *names, *(name for name, _ in readings)])
+    fastest = float(np.linalg.norm(true["w_WB"], axis=-1).max())
+    times = frame_times(float(true["time"][-1]), fastest)
+    placed = _placed(element, true, times)
+    ghosts = [
+        _reachable(_placed(element, read_some(ghost.file, list(_MOTION)), times), placed, length)
+        for ghost in replayed.ghosts
+    ]
+    least = 2.0 ** math.floor(math.log2(length * _ROUNDED))
+    numbers = Numbers()
+    coms = {body.name: body.com for body in mechanism.bodies}
+    com = np.stack([placed.point(*place) for place in coms.items()], axis=1)
+    ends = [placed.point(body, at) for body, places in skeleton.items() for at in places]
+    numbers.put("middle", -1, com.mean(axis=1), least)
+    numbers.put("extent", 0, np.concatenate([com, *(end[:, None] for end in ends)], axis=1).reshape(-1, 3), least)
+    shown = _columns(true, [name for name, _ in readings], times)
+    numbers.put("readings", 0, shown, 2.0**-20 * (float(np.abs(shown).max(initial=0.0)) or 1.0))
+    force = _columns(true, names, times)
+    largest = float(np.abs(force).max(initial=0.0))
+    numbers.put("force", 0, force if largest else None, _ROUNDED * largest)
+    for run, motion in enumerate([placed, *ghosts]):
+        numbers.put("p", run, motion.p_WB, least)
+        numbers.put("q", run, motion.q_WB, _TURN)
+        numbers.put("points", run, motion.points, least)
+    index = {name: number for number, name in enumerate(bodies)}
+    until = float(times[-1])
+    case = {
+        "until": until,
+        "frames": times.size,
+        "speed": max((speed for speed in SPEEDS if until / speed >= _LASTS), default=SPEEDS[0]),
+        "from": _camera(element),
+        "tail": _TAIL * until,
+        "least": 10.0 ** math.floor(math.log10(1e3 * _SEEN * length)),
+        "off": "largest distance of a tracked point from the true one",
+        "scale": _SCALE * length,
+        "events": [],
+        "readings": [{"symbol": symbol(name), "unit": unit(text), "size": float(np.abs(shown[:, column]).max())}
+                     for column, (name, text) in enumerate(readings)],
+        "bodies": [{"com": coms.get(name), "rods": [[coms[name], at] for at in skeleton[name] if name in coms]}
+                   for name in bodies],
+        "joints": [{"body": index[body], "at": at} for _, body, at in joints],
+        "springs": [[index[s.body_a], s.position_a, index[s.body_b], s.position_b] for s in mechanism.springs],
+    }  # fmt: skip
+    return dict(plain(case)), [motion.time.size for motion in ghosts], numbers
+
+
+def _element(scene: Scene) -> MechanismElement:
+    element = scene.elements[0]
+    assert isinstance(element, MechanismElement)  # its kind of report covers no other
+    return element
+
+
+def _readings(element: MechanismElement) -> list[tuple[str, str]]:
+    """Name and unit of the values that stand beside the picture: of tracked points, then of joints."""
+    points = [(f"{point.name}.{axis}", "m") for point in element.mechanism.points for axis in "xyz"]
+    units = {"revolute": "rad", "prismatic": "m"}
+    joints = [(f"q.{joint.name}", units[joint.kind]) for joint in element.mechanism.joints if joint.kind in units]
+    return (points + joints)[:_MOST_READINGS]
+
+
+def _camera(element: MechanismElement) -> tuple[float, float]:
+    """Where the camera stands: about the vertical and above the horizon [rad]."""
+    x, y, z = direction(element)[0]
+    lift = math.asin(max(-1.0, min(1.0, z))) + (_ASIDE[1] if z < 0.5 else -_ASIDE[1])
+    upright = math.hypot(x, y) < 1e-6  # seen from above
+    turn = -math.pi / 2 if upright else math.atan2(y, x)
+    return turn + _ASIDE[0], max(-_STEEPEST, min(_STEEPEST, lift))
+
+
+def _columns(sampled: dict[str, npt.NDArray[Any]], names: list[str], times: FloatArray) -> FloatArray:
+    """Variables at the frames, 0 where they have no value, shape (n, names)."""
+    found = [np.interp(times, sampled["time"], np.nan_to_num(sampled[name])) for name in names]
+    return np.stack(found, axis=1) if found else np.zeros((times.size, 0))
+
+
+def _placed(element: MechanismElement, sampled: dict[str, npt.NDArray[Any]], times: FloatArray) -> Placed:
+    """A stored motion at the frames that it reaches."""
+    grid = sampled["time"]
+    if grid.size < 2:  # it ended before its first step
+        return Placed(element.mechanism, times[:1], *(sampled[name][:1] for name in _MOTION[1:]))
+    times = times[times <= grid[-1] * (1 + 1e-12)]
+    p_WB = np.asarray(CubicHermiteSpline(grid, sampled["p_WB"], sampled["v_WB"])(times))
+    v_WB, w_WB = (np.zeros_like(p_WB) for _ in range(2))  # not drawn
+    q_WB = np.stack(
+        [_turned(grid, sampled["q_WB"][:, n], sampled["w_WB"][:, n], times) for n in range(p_WB.shape[1])], axis=1
+    )
+    return Placed(element.mechanism, times, p_WB, v_WB, w_WB, q_WB)
+
+
+def _turned(grid: FloatArray, q: FloatArray, w: FloatArray, times: FloatArray) -> FloatArray:
+    """Orientations between samples, with as many turns between two of them as the spin says, shape (n, 4)."""
+    stored = Rotation.from_quat(q, scalar_first=True)
+    turn = (stored[1:] * stored[:-1].inv()).as_rotvec()
+    said = (w[1:] + w[:-1]) / 2 * np.diff(grid)[:, None]
+    angle = np.linalg.norm(turn, axis=1, keepdims=True)
+    # Where nothing is left of the turn its axis is that of the spin.
+    axis = np.where(angle > 1e-9, turn, said)
+    axis = axis / np.maximum(np.linalg.norm(axis, axis=1, keepdims=True), 1e-300)
+    whole = np.round((np.sum(said * axis, axis=1, keepdims=True) - angle) / (2 * np.pi))
+    turn = turn + 2 * np.pi * whole * axis
+    at = np.clip(np.searchsorted(grid, times, side="right") - 1, 0, grid.size - 2)
+    part = (times - grid[at]) / np.diff(grid)[at]
+    found = Rotation.from_rotvec(part[:, None] * turn[at]) * stored[at]
+    return np.asarray(found.as_quat(scalar_first=True))
+
+
+def _reachable(motion: Placed, true: Placed, length: float) -> Placed:
+    """The frames until a mechanism leaves the picture for good: what grows without bound draws nothing."""
+    count = motion.time.size
+    off = np.linalg.norm(motion.p_WB - true.p_WB[:count], axis=-1).max(axis=-1) > _FAR * length
+    if not off[-1]:
+        return motion
+    last = 1 + int(np.flatnonzero(~off).max(initial=0))
+    kept = {name: getattr(motion, name)[:last] for name in ("time", *_MOTION[1:])}
+    return dataclasses.replace(motion, **kept)

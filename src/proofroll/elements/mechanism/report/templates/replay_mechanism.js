@@ -1,0 +1,134 @@
+// A mechanism in the replay: bodies as rods between their joints, joints, springs, tracked points, reactions.
+replayed.mechanism = (replay) => {
+  const { ui, css, straight, smooth, fixed, digits, colour } = replay;
+  let cells, stage;
+
+  // ---- words ----
+  const columns = () => [];
+
+  function rows(notes) {
+    const { shown } = replay;
+    if (!shown.runs[0].force) notes.push("No reaction is determinate here, so none is drawn.");
+    cells = replay.values(shown.readings.map(({ symbol }) => symbol));
+  }
+
+  function write() {
+    const { shown } = replay, read = shown.runs[0].readings ? smooth(shown.runs[0].readings) : [];
+    read.forEach((value, k) => {
+      const { unit, size } = shown.readings[k];
+      cells[k].textContent = `${fixed(value, Math.min(6, digits(size || 1, 4)))} ${unit}`;
+    });
+  }
+
+  const compare = (run) => {
+    const own = smooth(run.points), true_ = smooth(replay.shown.runs[0].points);
+    let off = 0;
+    for (let k = 0; k < own.length; k += 3) off = Math.max(off, Math.hypot(own[k] - true_[k], own[k + 1] - true_[k + 1], own[k + 2] - true_[k + 2]));
+    return { off, texts: [] };
+  };
+
+  // ---- picture ----
+  function rod(from, to, radius, material) {
+    const { T } = replay.view, a = new T.Vector3(...from), along = new T.Vector3(...to).sub(a), length = along.length();
+    const mesh = new T.Mesh(new T.CylinderGeometry(radius, radius, Math.max(length, 1e-9), 12).translate(0, length / 2, 0), material);
+    mesh.position.copy(a);
+    if (length > 0) mesh.quaternion.setFromUnitVectors(new T.Vector3(0, 1, 0), along.normalize());
+    return mesh;
+  }
+
+  function dot(at, radius, material) {
+    const mesh = new replay.view.T.Mesh(new replay.view.T.SphereGeometry(radius, 20, 14), material);
+    mesh.position.set(...at);
+    return mesh;
+  }
+
+  // One group for each body, whose frame it is; what is fastened to the world has the last.
+  function skeleton(scene, index) {
+    const { T } = replay.view, { shown } = replay, ghost = index > 0, size = shown.scale;
+    const tone = new T.Color(ghost ? css(`--e${shown.runs[index].colour}`) : css("--dark"));
+    const look = { shininess: 25, specular: 0x333333, ...(ghost ? { transparent: true, opacity: 0.5, depthWrite: false } : {}) };
+    const material = new T.MeshPhongMaterial({ color: tone, ...look }), joint = new T.MeshPhongMaterial({ color: colour("--link"), ...look });
+    const groups = shown.bodies.map(({ rods, com }) => {
+      const group = new T.Group();
+      for (const [from, to] of rods) group.add(rod(from, to, (ghost ? 0.2 : 0.22) * size, material));
+      // What has no length shows by its axes that it turns.
+      if (com && rods.every(([from, to]) => Math.hypot(...from.map((x, k) => x - to[k])) < 0.5 * size)) {
+        const axes = new T.AxesHelper(2.5 * size);
+        axes.position.set(...com);
+        group.add(axes);
+      }
+      if (com) group.add(dot(com, (ghost ? 0.42 : 0.46) * size, material));
+      scene.add(group);
+      return group;
+    });
+    if (!ghost) for (const { body, at } of shown.joints) groups[body].add(dot(at, 0.34 * size, joint));
+    groups.forEach((group) => group.traverse((item) => { item.renderOrder = ghost ? 3 : 0; }));
+    const springs = shown.springs.map(() => {
+      const shape = new T.BufferGeometry();
+      shape.setAttribute("position", new T.BufferAttribute(new Float32Array(6), 3));
+      const line = new T.Line(shape, new T.LineBasicMaterial({ color: tone, transparent: ghost, opacity: ghost ? 0.5 : 1 }));
+      line.frustumCulled = false;
+      scene.add(line);
+      return line;
+    });
+    return { groups, springs };
+  }
+
+  function build(scene) {
+    const { T } = replay.view, { shown } = replay, truth = shown.runs[0];
+    const box = new T.Box3().setFromArray(truth.extent.values).expandByScalar(shown.scale);
+    const size = 0.5 * box.getSize(new T.Vector3()).length();
+    stage = { runs: shown.runs.map((_, index) => skeleton(scene, index)), arrows: [] };
+    stage.paths = shown.runs.map((run, index) => {
+      const tone = css(index ? `--e${run.colour}` : "--link");
+      return Array.from({ length: run.points.width / 3 }, (_, k) => replay.path(scene, run.points, 3 * k, tone));
+    });
+    let largest = 0;
+    if (truth.force) {
+      stage.arrows = Array.from({ length: truth.force.width / 3 }, () => replay.arrow(0.12 * shown.scale));
+      stage.arrows.forEach(({ group }) => scene.add(group));
+      // The scale is that of the nineteenth of twenty largest: what is passed at a singular pose would hide the rest.
+      const sizes = Array.from({ length: truth.force.length * stage.arrows.length }, (_, k) => Math.hypot(...truth.force.values.subarray(3 * k, 3 * k + 3)));
+      largest = sizes.sort((a, b) => a - b)[Math.floor(0.95 * (sizes.length - 1))];
+    }
+    return { size, centre: box.getCenter(new T.Vector3()), perNewton: largest > 0 ? (8 * shown.scale) / largest : 0 };
+  }
+
+  function draw(x) {
+    const { T } = replay.view, { shown } = replay;
+    shown.runs.forEach((run, index) => {
+      const { groups, springs } = stage.runs[index], there = replay.visible(run), world = groups.length - 1;
+      for (const path of stage.paths[index]) path.show(run, x);
+      groups.forEach((group) => { group.visible = there; });
+      springs.forEach((line) => { line.visible = there; });
+      if (!there) return;
+      const at = smooth(run.p);
+      for (let body = 0; body < world; body++) {
+        groups[body].position.set(...at.slice(3 * body, 3 * body + 3));
+        replay.turn(groups[body].quaternion, run.q, 4 * body);
+        groups[body].updateMatrixWorld();
+      }
+      shown.springs.forEach(([a, from, b, to], k) => {
+        const ends = [[a, from], [b, to]].flatMap(([body, point]) => groups[body].localToWorld(new T.Vector3(...point)).toArray());
+        springs[k].geometry.attributes.position.array.set(ends);
+        springs[k].geometry.attributes.position.needsUpdate = true;
+      });
+    });
+    const { force } = shown.runs[0], now = force ? straight(force) : [];
+    stage.arrows.forEach((arrow, k) => {
+      const { body, at } = shown.joints[k];
+      const from = stage.runs[0].groups[body].localToWorld(new T.Vector3(...at));
+      arrow.point(from, new T.Vector3(...now.slice(3 * k, 3 * k + 3)), colour("--ink"));
+    });
+  }
+
+  const key = (forces) => [
+    ...(forces ? [{ sign: "arrow", text: `force of a joint on its child, what of it is determinate (1 cm is ${forces} N)` }] : []),
+    { sign: "line", text: "path of a tracked point", tone: "var(--link)" },
+  ];
+
+  // The camera follows where the mechanism would be lost in its way.
+  const reach = (size) => (size > 75 * replay.shown.scale ? 30 * replay.shown.scale : size);
+
+  return { columns, rows, write, compare, build, draw, key, reach };
+};

@@ -1,0 +1,261 @@
+"""The replay: which cases and which runs it shows, and their numbers packed for the page. Kinds of scenes draw them."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from proofroll.core.arrays import FloatArray
+from proofroll.core.scene import Scene
+from proofroll.files.json_data import plain
+from proofroll.files.netcdf import read_some
+from proofroll.files.scene_file import load_scene
+from proofroll.report.comparison_content import by_row, outcome_content
+from proofroll.report.labels import names
+from proofroll.report.replay_library import packed, thinned, three
+from proofroll.report.styles import styles
+from proofroll.running.case import Case, Status
+from proofroll.running.store import Store
+from proofroll.studies.compare import Outcome, Run
+from proofroll.studies.planning import point_name
+
+# How fast a person can let it run, over real time.
+SPEEDS = (0.001, 0.003, 0.01, 0.03, 0.1, 0.25, 0.5, 1.0)
+# Frames per second of the motion that no eye misses, the fewest of a replay that is slowed down, and the most that it
+# keeps where that is enough.
+LEAST_PER_SECOND, LEAST_FRAMES, MOST_FRAMES = 60, 120, 600
+# A body's turn from one frame to the next [rad]: what is smooth, and what must never be passed, for beyond half a
+# turn the shorter way from one orientation to the next is the wrong one.
+SMOOTH_TURN, WIDEST_TURN = 1.2, 2.5
+
+
+@dataclass(frozen=True)
+class Ghost:
+    """A run that can be shown beside the truth.
+
+    Attributes:
+        run: the run.
+        name, colour: as in the figures of its comparison.
+        distance: of its bodies from the true ones, at most [m].
+        file: its trajectory.
+    """
+
+    run: Run
+    name: str
+    colour: int
+    distance: float
+    file: Path
+
+    @property
+    def engine(self) -> str:
+        """Name of the engine."""
+        assert self.run.facts is not None  # it ran
+        return self.run.facts.name
+
+    @property
+    def default(self) -> bool:
+        """Whether it is what a user gets by writing the obvious model."""
+        assert self.run.facts is not None  # it ran
+        return self.run.facts.settings.get("preset") == "default"
+
+    def ending(self, reached: float) -> str:
+        """Why it is not there until the end, where its last frame is at ``reached`` [s]."""
+        reason = "it leaves the picture" if self.run.result.status == Status.DONE else self.run.result.message
+        return f"until {reached:.3g} s: {reason}"
+
+
+@dataclass(frozen=True)
+class Replayed:
+    """One truth and the runs beside it.
+
+    Attributes:
+        scene: with the parameters of the case.
+        file: the truth's trajectory.
+        ghosts: what stands beside it.
+    """
+
+    scene: Scene
+    file: Path
+    ghosts: list[Ghost]
+
+
+@dataclass
+class Numbers:
+    """What the page unpacks: names and shapes of arrays, and their numbers one after the other.
+
+    Attributes:
+        arrays: name, number of the run (0: the truth) or -1, width, length, step of each.
+        content: the numbers, thinned (:func:`proofroll.report.replay_library.thinned`).
+    """
+
+    arrays: list[tuple[str, int, int, int, float]] = field(default_factory=list)
+    content: bytearray = field(default_factory=bytearray)
+
+    def put(self, name: str, run: int, values: FloatArray | None, step: float) -> None:
+        """Adds an array whose first axis is time; nothing where there is none.
+
+        Args:
+            name: what the page calls it.
+            run: whose it is; -1: of all.
+            values: shape (n, ...).
+            step: to which it is rounded, in its unit.
+        """
+        if values is not None:
+            rows = values.reshape(len(values), -1)
+            self.arrays.append((name, run, rows.shape[1], len(rows), step))
+            self.content.extend(thinned(rows, step))
+
+
+# What a kind of scene makes of a truth: its part of the case, how many frames each ghost has, and the numbers.
+Drawer = Callable[[Replayed], tuple[dict[str, Any], list[int], Numbers]]
+
+
+def replay_content(
+    outcomes: list[Outcome], store: Store, kind: str, seen: Callable[[Scene], float], draw: Drawer
+) -> dict[str, Any]:
+    """Everything that the replay draws, as plain data.
+
+    There is one case for each truth of the comparisons. Its ghosts are what the engines make of it with ``default``
+    settings, and of each engine the other setting whose bodies are furthest from the true ones, if that is seen. At
+    first, of each engine the ``default`` one is shown that is furthest off.
+
+    Args:
+        outcomes: comparisons of scenes of one kind.
+        store: with their trajectories.
+        kind: under which name the page's program knows how to draw them.
+        seen: how far a body of a scene can be off and look right [m].
+        draw: what is drawn of a truth and its ghosts.
+
+    Returns:
+        ``library``: from :func:`proofroll.report.replay_library.three`; ``speeds``; ``start``: number of the case to
+        begin with; ``cases``; ``packed``: the numbers of each case.
+    """
+    found: dict[str, tuple[Case, list[tuple[Outcome, str]]]] = {}
+    for outcome in outcomes:
+        for point, case in outcome.truths.items():
+            if store.trajectory(case).is_file():
+                found.setdefault(case.key, (case, []))[1].append((outcome, point))
+    looks = {id(outcome): _looks(outcome) for outcome in outcomes}
+    cases, numbers = [], []
+    for case, shared in found.values():
+        scene = load_scene(case.scene, **case.parameters)
+        true = read_some(store.trajectory(case), ["p_WB"])["p_WB"]
+        ghosts = [
+            ghost
+            for outcome, point in shared
+            for ghost in _ghosts(_runs(outcome, point, store), looks[id(outcome)], true, store)
+        ]
+        ghosts = _chosen(ghosts, seen(scene))
+        # The comparison that has most to show at this point names the case.
+        title = max(shared, key=lambda pair: len(_runs(pair[0], pair[1], store)))[0].comparison.title
+        own, frames, drawn = draw(Replayed(scene, store.trajectory(case), ghosts))
+        said = {"kind": kind, "group": title, "label": point_name(case.parameters) or scene.title, "scene": scene.title}
+        cases.append(said | own | {"runs": _told(case, ghosts, own, frames, store), "arrays": drawn.arrays})
+        numbers.append(packed(bytes(drawn.content)))
+    plainest = [load_scene(case.scene).digest == case.scene_digest for case, _ in found.values()]
+    start = plainest.index(True) if any(plainest) else 0
+    return {"library": three(), "speeds": SPEEDS, "start": start, "cases": cases, "packed": numbers}
+
+
+def joined(parts: list[dict[str, Any]]) -> dict[str, Any]:
+    """The replays of several kinds of scenes as one; the first begins."""
+    parts = [part for part in parts if part["cases"]]
+    if not parts:
+        return {"cases": []}
+    cases, numbers = [[item for part in parts for item in part[key]] for key in ("cases", "packed")]
+    return parts[0] | {"cases": cases, "packed": numbers}
+
+
+def frame_times(until: float, fastest: float) -> FloatArray:
+    """Evenly spaced times of the frames [s], shape (n,): so many that the fastest body is seen to turn the right way.
+
+    Args:
+        until: the last time [s].
+        fastest: largest angular velocity of the truth [rad/s].
+    """
+    turned = until * fastest
+    wanted = max(LEAST_PER_SECOND * until, turned / SMOOTH_TURN, LEAST_FRAMES)
+    return np.linspace(0.0, until, 1 + int(np.ceil(max(min(wanted, MOST_FRAMES), turned / WIDEST_TURN))))
+
+
+def _told(
+    case: Case, ghosts: list[Ghost], drawn: dict[str, Any], frames: list[int], store: Store
+) -> list[dict[str, Any]]:
+    """The truth and its ghosts in words; of each engine the one furthest off is shown at first."""
+    first = {ghost.engine: ghost for ghost in reversed(ghosts)}  # the one furthest off comes first
+    until, whole = drawn["until"], drawn["frames"]
+    truth = {"name": "truth", "colour": -1, "shown": True, "frames": whole, "message": ""}
+    return [
+        truth | {"trajectory": _name(store.trajectory(case), store)},
+        *(
+            {
+                "name": ghost.name,
+                "colour": ghost.colour,
+                "shown": first[ghost.engine] is ghost,
+                "frames": count,
+                "message": ghost.ending(until * (count - 1) / max(1, whole - 1)) if count < whole else "",
+                "trajectory": _name(ghost.file, store),
+                "settings": plain(ghost.run.facts.settings if ghost.run.facts else {}),
+            }
+            for ghost, count in zip(ghosts, frames, strict=True)
+        ),
+    ]
+
+
+def _name(file: Path, store: Store) -> str:
+    return f"{store.folder.name}/{file.name}"
+
+
+def _runs(outcome: Outcome, point: str, store: Store) -> list[tuple[int, Run]]:
+    """Number of the row and the run, for all runs at a point that have a trajectory."""
+    return [
+        (number, run)
+        for number, runs in enumerate(by_row(outcome).values())
+        for run in runs
+        if point_name(run.parameters) == point and run.result.trajectory is not None and _file(run, store).is_file()
+    ]
+
+
+def _looks(outcome: Outcome) -> list[tuple[str, int]]:
+    """Name and colour of each row, as in the comparison's figures."""
+    rows = outcome_content(outcome)["rows"]
+    return [(name, style["colour"]) for name, style in zip(names(rows), styles(rows), strict=True)]
+
+
+def _ghosts(runs: list[tuple[int, Run]], looks: list[tuple[str, int]], true: FloatArray, store: Store) -> list[Ghost]:
+    ghosts = []
+    for number, run in runs:
+        path = read_some(_file(run, store), ["p_WB"])["p_WB"]
+        count = min(len(path), len(true))  # a run that ended early has fewer samples
+        distance = float(np.linalg.norm(path[:count] - true[:count], axis=-1).max())
+        ghosts.append(Ghost(run, *looks[number], distance, _file(run, store)))
+    return ghosts
+
+
+def _chosen(ghosts: list[Ghost], seen: float) -> list[Ghost]:
+    """By engine in the order of the comparisons, the furthest from the truth first; each run once.
+
+    All that are ``default``, and of the others the furthest, if it is off by more than ``seen`` [m] or there is none.
+    """
+    once = {_key(ghost.run): ghost for ghost in reversed(ghosts)}  # the first comparison's name stays
+    chosen = []
+    for engine in dict.fromkeys(ghost.engine for ghost in ghosts):
+        own = sorted((ghost for ghost in once.values() if ghost.engine == engine), key=lambda ghost: -ghost.distance)
+        default = [ghost for ghost in own if ghost.default]
+        other = [ghost for ghost in own if not ghost.default][:1]
+        chosen += default + [ghost for ghost in other if ghost.distance > seen or not default]
+    return chosen
+
+
+def _key(run: Run) -> str:
+    assert run.case is not None  # it has a trajectory
+    return run.case.key
+
+
+def _file(run: Run, store: Store) -> Path:
+    assert run.case is not None  # it has a trajectory
+    return store.trajectory(run.case)
