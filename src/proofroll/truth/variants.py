@@ -37,8 +37,8 @@ def with_contact(
 
 
 def at_speed(body: RollingBall, speed: float) -> RollingBall:
-    """The ball with another initial speed of its centre [m/s] in the same direction, its spin about e1 unchanged."""
+    """The ball with another initial speed of its centre [m/s] in the same direction; it rolls, ω1 is unchanged."""
     e1 = body.surface.normal(body.p0)
     v0 = speed * body.v0 / np.linalg.norm(body.v0)
     w0 = (body.w0 @ e1) * e1 - np.cross(e1, v0) / body.ball.radius
-    return replace(body, v0=v0, w0=w0)
+    return replace(body, v0=v0, w0=w0, slip0=np.zeros(3))

@@ -38,6 +38,8 @@ ASKED: Mapping[str, BallCapability] = {"orientation": BallCapability.ORIENTATION
 _RESISTANCE = 0.02
 # An engine without a step is looked at after this part of the time in which its ball rolls by one radius.
 _PART = 1e-2
+# Part of the speed below which an initial slip is the round-off of rolling.
+_ROUND_OFF = 1e-12
 # Friction that is bounded far away from what rolling needs: this many times as much.
 _FAR = 10.0
 
@@ -111,8 +113,12 @@ class BallOnSurface:
         frame = surface.frame(u0)
         v0 = frame[:, 1:] @ np.asarray(self.start.velocity)
         w0 = self.start.spin * frame[:, 0] - np.cross(frame[:, 0], v0) / self.ball.radius
+        slip0 = np.zeros(3)
         if self.start.tangential_spin is not None:
-            w0 = frame @ (self.start.spin, *self.start.tangential_spin)
+            given = frame @ (self.start.spin, *self.start.tangential_spin)
+            slip = self.ball.radius * np.cross(given - w0, frame[:, 0])
+            if np.linalg.norm(slip) > _ROUND_OFF * np.linalg.norm(v0):
+                w0, slip0 = given, slip
         return RollingBall(
             ball=self.ball,
             contact=self.contact,
@@ -123,6 +129,7 @@ class BallOnSurface:
             p0=surface.position(u0),
             v0=v0,
             w0=w0,
+            slip0=slip0,
         )
 
     @cached_property

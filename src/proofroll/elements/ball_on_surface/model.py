@@ -5,7 +5,6 @@ from __future__ import annotations
 import math
 from dataclasses import dataclass, field
 from enum import StrEnum
-from functools import cached_property
 from typing import Literal
 
 import numpy as np
@@ -13,9 +12,6 @@ import numpy as np
 from proofroll.core.arrays import FloatArray
 from proofroll.core.bounds import OutOfBounds, bounded
 from proofroll.elements.ball_on_surface.surfaces import Surface
-
-# Part of the speeds that make it up below which an initial slip is the round-off of rolling.
-_ROUND_OFF = 1e-12
 
 
 class BallCapability(StrEnum):
@@ -143,6 +139,7 @@ class RollingBall:
         gravity: acceleration of gravity in the world [m/s²], shape (3,).
         u0: initial surface coordinates, shape (2,).
         p0, v0, w0: initial centre [m], velocity [m/s] and angular velocity [rad/s] in the world, shape (3,).
+        slip0: initial velocity of the contact point in the world [m/s], shape (3,); exactly zero where the ball rolls.
     """
 
     ball: Ball
@@ -154,16 +151,9 @@ class RollingBall:
     p0: FloatArray
     v0: FloatArray
     w0: FloatArray
+    slip0: FloatArray = field(default_factory=lambda: np.zeros(3))
 
     @property
     def udot0(self) -> FloatArray:
         """Initial rates of the surface coordinates, shape (2,)."""
         return np.asarray(np.linalg.pinv(self.surface.tangents(self.u0)) @ self.v0)
-
-    @cached_property
-    def slip0(self) -> FloatArray:
-        """Initial velocity of the contact point in the world [m/s], shape (3,); exactly zero where it is round-off."""
-        spinning = self.ball.radius * np.cross(self.w0, self.surface.normal(self.p0))
-        slip = self.v0 + spinning
-        sizes = np.linalg.norm(self.v0) + np.linalg.norm(spinning)
-        return np.asarray(slip if np.linalg.norm(slip) > _ROUND_OFF * sizes else np.zeros(3))
