@@ -14,7 +14,8 @@ from typing import Any, NamedTuple
 from proofroll.core import comparison
 from proofroll.core.gravity import Gravity
 from proofroll.elements.ball_on_surface import model as balls
-from proofroll.elements.ball_on_surface import regimes_study, surfaces
+from proofroll.elements.ball_on_surface import regimes_study
+from proofroll.elements.ball_on_surface.surfaces.catalogue import surface_kinds
 from proofroll.elements.mechanism import model as mechanisms
 from proofroll.files.scene_file import Parameter, SceneFile
 from proofroll.studies import axes, claimed, claims, stability_claims
@@ -41,8 +42,7 @@ CHAPTERS: dict[str, tuple[Table, ...]] = {
     ),
     "A scene with balls on surfaces": (
         Table("[[balls]]", balls.Ball),
-        Table("[[surfaces]]", surfaces.Cylinder),
-        Table("[[surfaces]]", surfaces.Plane),
+        *(Table("[[surfaces]]", kind) for kind in surface_kinds()),
         Table("[[contacts]]", balls.Contact),
         Table("[[initial]]", balls.InitialMotion),
     ),

@@ -1,7 +1,8 @@
 """Newton's and Euler's equations in the world as compiled Taylor series (heyoka): the second route where it is long.
 
 The nine states (p, v, ω), their equations and their constraints are those of :func:`proofroll.truth.rolling.unreduced`;
-of the wall only the direction of its normal and how that turns are used. Differentiating e1·v = 0 and
+of the wall only the direction of its normal and how that turns are used; of a declared surface they are
+derivatives of its distance, which heyoka takes of the formula itself. Differentiating e1·v = 0 and
 v + a ω × e1 = 0 leaves, with Newton's m (v̇ - g) = F and Euler's κ m a² ω̇ = a e1 × F,
 
     e1·v̇ = -ė1·v,      (1 + κ) v̇ = g - κ a ω × ė1 along the wall,      κ a ω̇ = e1 × (v̇ - g).
@@ -24,14 +25,14 @@ from proofroll.elements.ball_on_surface.compiled import library
 from proofroll.elements.ball_on_surface.mechanics import newton_euler
 from proofroll.elements.ball_on_surface.model import RollingBall
 from proofroll.elements.ball_on_surface.motion import Motion
-from proofroll.elements.ball_on_surface.surfaces import Cylinder, Plane
+from proofroll.elements.ball_on_surface.surfaces import Cylinder, Declared, Plane, Surface
 
 _local = threading.local()
 
 
 def available(body: RollingBall) -> bool:
-    """Whether heyoka is installed, and has these equations: of a cylinder or plane that does not resist rolling."""
-    known = isinstance(body.surface, (Cylinder, Plane)) and not body.contact.rolling_resistance
+    """Whether heyoka is installed, and has these equations: of a surface that does not resist rolling."""
+    known = isinstance(body.surface, (Cylinder, Plane, Declared)) and not body.contact.rolling_resistance
     return known and library.available()
 
 
@@ -42,19 +43,18 @@ def unreduced(body: RollingBall, times: FloatArray) -> Motion:
         Diverged: the series could not be continued.
     """
     surface = body.surface
-    turns = isinstance(surface, Cylinder)
     if not hasattr(_local, "integrators"):
         _local.integrators = cache(_compiled)  # an integrator holds a state and must not be shared between threads
-    series = copy.copy(_local.integrators(turns))
+    # Cylinders and planes of all sizes share an integrator each.
+    series = copy.copy(_local.integrators(surface if isinstance(surface, Declared) else type(surface)))
     e1 = surface.normal(body.p0)
-    geometry = np.zeros(4)
+    values = [body.ball.radius, body.ball.inertia_ratio, *body.gravity]
     if isinstance(surface, Cylinder):
         axis = np.asarray(surface.generators[1].axis)
-        geometry = np.array([*axis, np.sign(e1 @ (body.p0 - (body.p0 @ axis) * axis))])
-    else:
-        geometry[:3] = e1
-    values = [body.ball.radius, body.ball.inertia_ratio, *body.gravity, *geometry]
-    series.pars[:] = values[: len(series.pars)]
+        values += [*axis, np.sign(e1 @ (body.p0 - (body.p0 @ axis) * axis))]
+    elif isinstance(surface, Plane):
+        values += e1.tolist()
+    series.pars[:] = values
     series.time, series.state[:] = float(times[0]), np.concatenate([body.p0, body.v0, body.w0])
     states = series.propagate_grid(np.asarray(times, dtype=np.float64))[-1] if len(times) > 1 else series.state[None, :]
     if len(states) < len(times) or not np.all(np.isfinite(states)):
@@ -64,8 +64,8 @@ def unreduced(body: RollingBall, times: FloatArray) -> Motion:
     return Motion(p, v, w, force, "unreduced Newton-Euler, Taylor series")
 
 
-def _compiled(turns: bool) -> Any:
-    """The integrator, on a cylinder if the normal ``turns``, else on a plane."""
+def _compiled(surface: Declared | type[Surface]) -> Any:
+    """The integrator on a declared surface, or on any cylinder or plane."""
     import heyoka as hy
 
     p, v, w = (hy.make_vars(*(f"{name}{axis}" for axis in "xyz")) for name in "pvw")
@@ -82,7 +82,11 @@ def _compiled(turns: bool) -> Any:
         along = dot(x, axis)
         return [one - along * other for one, other in zip(x, axis, strict=True)]
 
-    if turns:
+    if isinstance(surface, Declared):
+        away = surface.distance(*p)
+        e1 = [-hy.diff(away, x) for x in p]
+        e1_rate = [dot([hy.diff(component, x) for x in p], v) for component in e1]
+    elif surface is Cylinder:
         radial = across(p, k)
         distance = hy.sqrt(dot(radial, radial))
         e1 = [outward * x / distance for x in radial]

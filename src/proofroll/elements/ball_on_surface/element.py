@@ -25,7 +25,7 @@ from proofroll.elements.ball_on_surface.model import (
     InitialMotion,
     RollingBall,
 )
-from proofroll.elements.ball_on_surface.surfaces import AnySurface
+from proofroll.elements.ball_on_surface.surfaces import Surface
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -53,7 +53,7 @@ class BallOnSurface:
     """
 
     ball: Ball
-    surface: AnySurface
+    surface: Surface
     contact: Contact
     start: InitialMotion
     gravity: Gravity
@@ -86,7 +86,8 @@ class BallOnSurface:
             needs.add(BallCapability.ROLLING_RESISTANCE)
         if math.isfinite(self.contact.mu_static):
             needs.add(BallCapability.BOUNDED_FRICTION)
-        if self.surface.kind != "plane":
+        flat = self.surface.generators is not None and all(one.kind == "translation" for one in self.surface.generators)
+        if not flat:
             needs.add(BallCapability.CURVED_SURFACE)
         if np.any(self.rolling.slip0):
             needs.add(BallCapability.SLIPPING_START)

@@ -5,7 +5,7 @@ from __future__ import annotations
 import dataclasses
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
-from typing import Annotated, Any, ClassVar
+from typing import TYPE_CHECKING, Annotated, Any, ClassVar, Union, cast
 
 from pydantic import Field
 
@@ -15,8 +15,14 @@ from proofroll.core.numbers import Numbers
 from proofroll.core.scene import Scene
 from proofroll.elements.ball_on_surface.element import BallOnSurface, changed
 from proofroll.elements.ball_on_surface.model import Ball, Contact, InitialMotion
-from proofroll.elements.ball_on_surface.surfaces import AnySurface
+from proofroll.elements.ball_on_surface.surfaces import Declared, Surface
+from proofroll.elements.ball_on_surface.surfaces.catalogue import surface_kinds
 from proofroll.files.validation import strict, units_of, validated
+
+if TYPE_CHECKING:
+    AnySurface = Surface
+else:
+    AnySurface = Union[surface_kinds()]  # noqa: UP007 -- of a tuple
 
 
 @dataclass(frozen=True)
@@ -29,7 +35,7 @@ class BallTables:
     surfaces: tuple[Annotated[AnySurface, Field(discriminator="kind")], ...] = field(default=())
 
 
-strict(BallTables, Ball, Contact, InitialMotion, *AnySurface.__args__)
+strict(BallTables, Ball, Contact, InitialMotion, *surface_kinds())
 
 
 class BallOnSurfaceKind:
@@ -37,7 +43,7 @@ class BallOnSurfaceKind:
 
     name: ClassVar[str] = "ball_on_surface"
     tables: ClassVar[tuple[str, ...]] = ("balls", "surfaces", "contacts", "initial")
-    units: ClassVar[Mapping[str, str]] = units_of(Ball, Contact, InitialMotion, *AnySurface.__args__)
+    units: ClassVar[Mapping[str, str]] = units_of(Ball, Contact, InitialMotion, *surface_kinds())
 
     @staticmethod
     def read(tables: Mapping[str, Any], gravity: Gravity, numbers: Numbers, where: str) -> Sequence[BallOnSurface]:
@@ -48,6 +54,9 @@ class BallOnSurfaceKind:
         balls = {ball.name: ball for ball in found.balls}
         surfaces = {surface.name: surface for surface in found.surfaces}
         _check_names(found, where)
+        for surface in found.surfaces:
+            if isinstance(surface, Declared):
+                surface.checked()
         starts = {start.body: start for start in found.initial}
         elements = []
         for index, contact in enumerate(found.contacts):
@@ -100,7 +109,7 @@ def _turned(scene: Scene, gamma: float, tilt: float, **motion: Any) -> Scene:
     (element,) = scene.elements
     assert isinstance(element, BallOnSurface)
     start = dataclasses.replace(element.start, coordinates=(gamma, 0.1), **motion)
-    return changed(scene, start=start, surface=dataclasses.replace(element.surface, tilt=tilt))
+    return changed(scene, start=start, surface=dataclasses.replace(cast(Any, element.surface), tilt=tilt))
 
 
 def _check_names(found: BallTables, where: str) -> None:

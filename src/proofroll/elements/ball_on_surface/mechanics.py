@@ -12,6 +12,7 @@ import numpy.typing as npt
 from proofroll.core.arrays import FloatArray
 from proofroll.elements.ball_on_surface.model import RollingBall
 from proofroll.elements.ball_on_surface.resting import setting_off, stands, stays
+from proofroll.elements.ball_on_surface.surfaces import Declared
 
 
 def slip_velocity(radius: float, e1: FloatArray, v_WB: FloatArray, w_WB: FloatArray) -> FloatArray:
@@ -41,10 +42,15 @@ def always_pressed(body: RollingBall) -> bool:
     """Whether the wall presses the ball wherever its centre is and however fast: then nothing can lift it off.
 
     N / m = e1 · g + v · (∂e1/∂p) v: so it is where no normal points against gravity and the wall nowhere bends away.
-    Looked at around the surface's periodic coordinates; along the others it is taken to be the same everywhere.
+    Looked at around the surface's periodic coordinates; along the others it is taken to be the same everywhere. Of a
+    declared surface the whole domain is looked at.
     """
-    around = [np.zeros(1) if period is None else np.linspace(0, period, 64) for period in body.surface.periods]
-    p_WB = body.surface.position(body.u0 + np.stack(np.meshgrid(*around), axis=-1).reshape(-1, 2))
+    if isinstance(body.surface, Declared):
+        u = body.surface.places()
+    else:
+        around = [np.zeros(1) if period is None else np.linspace(0, period, 64) for period in body.surface.periods]
+        u = body.u0 + np.stack(np.meshgrid(*around), axis=-1).reshape(-1, 2)
+    p_WB = body.surface.position(u)
     gravity, bends = body.surface.normal(p_WB) @ body.gravity, np.linalg.eigvalsh(body.surface.normal_gradient(p_WB))
     round_off = 1e-12 * float(np.linalg.norm(body.gravity))
     return bool(np.min(gravity) >= -round_off and np.min(bends) >= -1e-12 * max(float(np.max(bends)), 1.0))

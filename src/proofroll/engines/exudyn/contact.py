@@ -208,7 +208,8 @@ def _softened(
     """
     a, m, J = body.ball.radius, body.ball.mass, body.ball.inertia
     stiffness, zone, _ = settings.penalty
-    speed, spin = float(np.linalg.norm(body.v0)), float(np.linalg.norm(body.w0))
+    spin, fall = float(np.linalg.norm(body.w0)), math.sqrt(a * float(np.linalg.norm(body.gravity)))
+    speed = float(np.linalg.norm(body.v0)) or fall or 1.0  # what the certificate measures speeds by
     slip = float(np.linalg.norm(creep))
     crept = "friction is proportional to the slip velocity, so the ball creeps in order to be held"
     # Some roundings of the distance between the centres, and of the velocity at the contact.
@@ -222,8 +223,8 @@ def _softened(
         "gap in the engine": Regularised(
             (press / stiffness + distance) / a + ROUND_OFF, "the contact presses as deep as the ball has sunk in"
         ),
-        "slip": Regularised(1.000001 * slip / (speed or 1.0) + ROUND_OFF, crept),
-        "spin": Regularised(1.000001 * slip / a / max(spin, (speed or 1.0) / a) + ROUND_OFF, crept),
+        "slip": Regularised(1.000001 * slip / speed + ROUND_OFF, crept),
+        "spin": Regularised(1.000001 * slip / a / max(spin, speed / a) + ROUND_OFF, crept),
         "N": Regularised(N / (m * natural) + ROUND_OFF, stiff),
         **{name: Regularised(F / (m * natural) + ROUND_OFF, stiff) for name in ("F2", "F3", "acceleration")},
         # The moment a F about the centre, over J.

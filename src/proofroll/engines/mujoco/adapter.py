@@ -138,7 +138,7 @@ class Mujoco:
         if bounded:
             check_coefficients(body.contact, settings)
         forget_callbacks()
-        spec = read_spec(scene, settings.formulation)
+        spec = read_spec(scene, body, settings.formulation)
         write_physics(spec, body, settings)
         _FORMULATIONS[settings.formulation].write(spec, body)
         return cls(compiled(spec), body, settings)
@@ -152,7 +152,7 @@ class Mujoco:
             raise Refused("there is no program for mechanisms yet")
         body = rolling_ball(scene)
         built = cls._build_ball(scene, settings)
-        spec = read_spec(scene, settings.formulation)
+        spec = read_spec(scene, body, settings.formulation)
         write_physics(spec, body, settings)
         _FORMULATIONS[settings.formulation].write(spec, body)
         compiled(spec)

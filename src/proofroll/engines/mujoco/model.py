@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from pathlib import Path
 from typing import Any
 
 import mujoco
@@ -16,6 +17,7 @@ from proofroll.engines.mujoco.contact import MEMORY
 from proofroll.engines.mujoco.friction import MEMORY as SLIP_MEMORY
 from proofroll.engines.mujoco.friction import condim, corrects
 from proofroll.engines.mujoco.settings import MujocoSettings, friction_coefficients, impedance, time_constant
+from proofroll.engines.mujoco.written import written
 
 _INTEGRATORS = {
     "Euler": mujoco.mjtIntegrator.mjINT_EULER,
@@ -25,15 +27,15 @@ _INTEGRATORS = {
 _CONES = {"pyramidal": mujoco.mjtCone.mjCONE_PYRAMIDAL, "elliptic": mujoco.mjtCone.mjCONE_ELLIPTIC}
 
 
-def read_spec(scene: Scene, formulation: str) -> Any:
-    """The scene's file for this formulation.
+def read_spec(scene: Scene, body: RollingBall, formulation: str) -> Any:
+    """The scene's file for this formulation, or where it has none a model of the same structure.
 
     Raises:
-        Refused: the scene has none, or MuJoCo cannot read it.
+        Refused: MuJoCo cannot read the file, or there is no model without one.
     """
     path = scene.folder / f"mujoco_{formulation}.xml"
-    if not path.is_file():
-        raise Refused(f"the scene {scene.name} has no model {path.name}")
+    if scene.folder == Path() or not path.is_file():
+        return mujoco.MjSpec.from_string(written(body, scene.name, formulation))
     try:
         return mujoco.MjSpec.from_file(str(path))
     except ValueError as error:

@@ -10,6 +10,7 @@ import numpy.typing as npt
 
 from proofroll.core.arrays import FloatArray
 from proofroll.elements.ball_on_surface.model import RollingBall
+from proofroll.elements.ball_on_surface.surfaces import Declared
 
 # Divisions of a coordinate that comes round, and every how many of them a line is drawn: every 30 degrees.
 _ROUND, _ROUND_LINES = 72, 6
@@ -44,6 +45,9 @@ def wall(body: RollingBall, u: FloatArray) -> Wall:
         body: the scene's ball.
         u: the path in the surface's coordinates, shape (n, 2).
     """
+    # Equal coordinates of the wall and of the centre's surface need not lie opposite.
+    u = body.wall.locate(body.surface.position(u))
+    domain = body.wall.domain if isinstance(body.wall, Declared) else ((-math.inf, math.inf),) * 2
     grids: list[npt.NDArray[np.floating]] = []
     every, spacing = [], []
     for column, (period, scale) in enumerate(zip(body.surface.periods, body.surface.length_scales, strict=True)):
@@ -54,6 +58,7 @@ def wall(body: RollingBall, u: FloatArray) -> Wall:
             continue
         margin = _MARGIN * body.ball.radius / scale
         low, high = float(u[:, column].min()) - margin, float(u[:, column].max()) + margin
+        low, high = max(low, domain[column][0]), min(high, domain[column][1])
         step = _round_step(max(2 * body.ball.radius / scale, (high - low) / _MOST_LINES))
         grids.append(np.arange(math.floor(low / step), math.ceil(high / step) + 1) * step)
         every.append(1)

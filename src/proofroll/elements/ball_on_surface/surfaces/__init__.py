@@ -1,9 +1,9 @@
 """Surfaces on which the centre of a ball moves: a file for each, and what they have in common."""
 
+from proofroll.elements.ball_on_surface.surfaces.bowl import Bowl
 from proofroll.elements.ball_on_surface.surfaces.cylinder import Cylinder
+from proofroll.elements.ball_on_surface.surfaces.declared import Declared
 from proofroll.elements.ball_on_surface.surfaces.plane import Plane
 from proofroll.elements.ball_on_surface.surfaces.surface import Generator, Surface
 
-AnySurface = Cylinder | Plane
-
-__all__ = ["AnySurface", "Cylinder", "Generator", "Plane", "Surface"]
+__all__ = ["Bowl", "Cylinder", "Declared", "Generator", "Plane", "Surface"]

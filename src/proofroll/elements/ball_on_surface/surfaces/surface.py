@@ -42,6 +42,10 @@ class Surface(Protocol):
         """Name of the wall in the scene."""
 
     @property
+    def kind(self) -> str:
+        """Which surface it is, as scenes write it."""
+
+    @property
     def coordinates(self) -> tuple[str, str]:
         """Names of the two coordinates, e.g. ``("gamma", "z")``."""
 

@@ -1,4 +1,4 @@
-"""A scene as a whole, drawn by the kind of its wall: the one place where drawings tell surfaces apart."""
+"""A scene as a whole, drawn by the kind of its wall. Surfaces without a drawing of their own are in :mod:`net`."""
 
 from __future__ import annotations
 
@@ -12,7 +12,7 @@ from proofroll.elements.ball_on_surface.report.drawings.contact import contact
 from proofroll.elements.ball_on_surface.surfaces import Cylinder, Plane, Surface
 from proofroll.report.pen import Drawing, View, beyond, turn
 
-_SIZE = 128.0  # half the width of what is drawn of a wall [px]
+SIZE = 128.0  # half the width of what is drawn of a wall [px]
 _LEVEL = 0.02  # angles below this have no arc [rad]
 
 
@@ -31,7 +31,7 @@ def overview(wall: Surface, body: RollingBall) -> list[Drawing]:  # noqa: ARG001
 def _cylinder(wall: Cylinder, body: RollingBall) -> list[Drawing]:
     """A cylinder cut open: axis, radii, the circle of the centre, the ball at its start and somewhere below."""
     b, surface = wall.radius, body.surface
-    drawn, at = Drawing(), View(_direction(-68, 24), (0, 0, 1), _SIZE / b)
+    drawn, at = Drawing(), View(direction(-68, 24), (0, 0, 1), SIZE / b)
     top, bottom, here = 0.62 * b, -1.3 * b, (2.55, -0.72 * b)
     _tube(drawn, at, wall, top, bottom)
     drawn.path(at(surface.position(_ring(turn(0, 2 * np.pi), 0.0))), "hidden", closed=True)
@@ -58,7 +58,7 @@ def _cylinder(wall: Cylinder, body: RollingBall) -> list[Drawing]:
     leader = at(centre) + np.outer([0.0, radius, radius + 20.0], [0.9, 0.44])
     drawn.path(leader, "thin")
     drawn.text(leader[-1], "a", beside=(8.0, 5.0))
-    _gravity(drawn, at, body, at(-1.35 * b * _right(at)))
+    gravity(drawn, at, body, at(-1.35 * b * right(at)))
     return [drawn, contact(body, (-0.6, -0.72, 0.36), (0, 0, 1))]
 
 
@@ -67,7 +67,7 @@ def _plane(wall: Plane, body: RollingBall) -> list[Drawing]:
     """A slope with its angle, the ball on it, and its speeds down and across."""
     a, surface = body.ball.radius, body.surface
     size = 6.0 * a
-    drawn, at = Drawing(), View(_direction(-62, 22), (0, 0, 1), _SIZE / size)
+    drawn, at = Drawing(), View(direction(-62, 22), (0, 0, 1), SIZE / size)
     corners = [(-0.8, -0.7), (1.3, -0.7), (1.3, 0.7), (-0.8, 0.7)]
     low, high = (wall.position(size * np.array(u)) for u in (corners[2], corners[3]))
     drawn.path(at([wall.position(size * np.array(u)) for u in corners]), "wall", closed=True)
@@ -85,7 +85,7 @@ def _plane(wall: Plane, body: RollingBall) -> list[Drawing]:
     rim = at(start) + np.outer([0.0, a * at.scale, a * at.scale + 14.0], [-0.7, -0.7])
     drawn.path(rim, "thin")
     drawn.text(rim[-1], "a", beside=(-6.0, -2.0))
-    _gravity(drawn, at, body, at(-1.15 * size * _right(at)))
+    gravity(drawn, at, body, at(-1.15 * size * right(at)))
     return [drawn, contact(body, (-0.42, 0.4, 0.8), (-1, 0, 0))]
 
 
@@ -105,7 +105,7 @@ def _slope(drawn: Drawing, at: View, low: FloatArray, high: FloatArray) -> None:
     drawn.text(arc[len(arc) // 2], "α", beside=(-10.0, 5.0))
 
 
-def _right(at: View) -> FloatArray:
+def right(at: View) -> FloatArray:
     """The level direction that is to the right in the picture."""
     across = np.cross(np.array([0.0, 0.0, 1.0]), np.asarray(at.viewer, dtype=np.float64))
     return np.asarray(across / np.linalg.norm(across))
@@ -147,7 +147,7 @@ def _radius(
     drawn.text(ends.mean(axis=0) + beside, symbol)
 
 
-def _gravity(drawn: Drawing, at: View, body: RollingBall, place: FloatArray) -> None:
+def gravity(drawn: Drawing, at: View, body: RollingBall, place: FloatArray) -> None:
     """The direction of gravity at a place of the picture; nothing where there is none."""
     size = float(np.linalg.norm(body.gravity))
     if not size:
@@ -159,7 +159,7 @@ def _gravity(drawn: Drawing, at: View, body: RollingBall, place: FloatArray) -> 
     drawn.text(beyond(ends), "g", "force-letter")
 
 
-def _direction(azimuth: float, elevation: float) -> tuple[float, float, float]:
+def direction(azimuth: float, elevation: float) -> tuple[float, float, float]:
     """Towards a viewer at these angles [deg]."""
     az, el = np.radians([azimuth, elevation])
     return float(np.cos(el) * np.cos(az)), float(np.cos(el) * np.sin(az)), float(np.sin(el))

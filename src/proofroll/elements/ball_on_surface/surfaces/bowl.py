@@ -1,0 +1,74 @@
+"""The inside of a sphere."""
+
+from __future__ import annotations
+
+import dataclasses
+from dataclasses import dataclass, field
+from typing import Any, Literal
+
+import numpy as np
+import numpy.typing as npt
+
+from proofroll.core.arrays import FloatArray
+from proofroll.core.bounds import bounded
+from proofroll.core.errors import InputError
+from proofroll.elements.ball_on_surface.surfaces.declared import Declared
+from proofroll.elements.ball_on_surface.surfaces.formula import sqrt
+
+
+@dataclass(frozen=True)
+class Bowl(Declared):
+    """Inside of a sphere about the world's origin; coordinates are those of its stereographic projection from the top.
+
+    They are regular everywhere else, also at the bottom, where an angle about the axis is not: xi along x and eta
+    against y, in metres at the bottom.
+
+    Attributes:
+        name: by which contacts name it.
+        kind: which surface it is.
+        radius: radius [m]; of the wall in a scene, of the sphere of the centre after :meth:`offset`.
+    """
+
+    name: str
+    radius: float = field(metadata={"unit": "m"})
+    kind: Literal["bowl"] = "bowl"
+
+    coordinates = ("xi", "eta")
+    units = ("m", "m")
+
+    def __post_init__(self) -> None:
+        """Refuses what is no bowl.
+
+        Raises:
+            OutOfBounds: a radius that is not positive.
+        """
+        bounded("radius", self.radius, above=0)
+
+    @property
+    def domain(self) -> tuple[tuple[float, float], tuple[float, float]]:
+        """See :class:`Declared`."""
+        equator = 2 * self.radius
+        return (-equator, equator), (-equator, equator)
+
+    def offset(self, ball_radius: float) -> Bowl:
+        """See :class:`Surface`."""
+        if not ball_radius < self.radius:
+            raise InputError("radius", ball_radius, f"the ball must be smaller than {self.name} with {self.radius:g} m")
+        return dataclasses.replace(self, radius=self.radius - ball_radius)
+
+    def point(self, u1: Any, u2: Any) -> tuple[Any, Any, Any]:
+        """See :class:`Declared`."""
+        x, y = u1 / (2 * self.radius), u2 / (2 * self.radius)
+        square = x * x + y * y
+        size = self.radius / (1.0 + square)
+        return 2.0 * x * size, -2.0 * y * size, (square - 1.0) * size
+
+    def distance(self, x: Any, y: Any, z: Any) -> Any:
+        """See :class:`Declared`."""
+        return self.radius - sqrt(x * x + y * y + z * z)
+
+    def locate(self, p_WB: npt.ArrayLike) -> FloatArray:
+        """See :class:`Surface`."""
+        p = np.asarray(p_WB, dtype=np.float64)
+        below = np.linalg.norm(p, axis=-1, keepdims=True) - p[..., 2:]
+        return np.asarray(2 * self.radius * p[..., :2] / below * [1.0, -1.0])

@@ -1,0 +1,20 @@
+"""All kinds of surfaces that a scene can name: those here, and those that other packages announce."""
+
+from __future__ import annotations
+
+from functools import cache
+from importlib.metadata import entry_points
+from typing import Any
+
+from proofroll.elements.ball_on_surface.surfaces.bowl import Bowl
+from proofroll.elements.ball_on_surface.surfaces.cylinder import Cylinder
+from proofroll.elements.ball_on_surface.surfaces.plane import Plane
+
+GROUP = "proofroll.surfaces"
+
+
+@cache
+def surface_kinds() -> tuple[type[Any], ...]:
+    """The classes: dataclasses that follow :class:`Surface`, most easily by way of :class:`Declared`."""
+    announced = sorted(entry_points(group=GROUP), key=lambda point: point.name)
+    return (Cylinder, Plane, Bowl, *(point.load() for point in announced))

@@ -1,0 +1,216 @@
+"""Surfaces that are declared by a position and a distance; everything else that engines ask follows from these."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Sequence
+from functools import cached_property, lru_cache
+from typing import Any
+
+import numpy as np
+import numpy.typing as npt
+
+from proofroll.core.arrays import FloatArray
+from proofroll.core.errors import InputError
+from proofroll.elements.ball_on_surface.surfaces.formula import differentiated
+from proofroll.elements.ball_on_surface.surfaces.surface import Generator
+
+# Places along each coordinate at which a declaration is checked, and from which the nearest point is looked for.
+_PLACES = 17
+# What round-off may leave of a declaration that agrees with itself, relative to the surface's size.
+_CLOSE = 1e-9
+_NEWTON = 12
+
+
+class Declared:
+    """Base of surfaces of which a subclass, a frozen dataclass, says these, with ``name`` and ``kind`` as its fields.
+
+    * ``coordinates``, ``units``, ``periods``, ``domain``, in such an order that the product of the tangents points to
+      the wall;
+    * :meth:`point` and :meth:`distance`, in ``+ - * /``, ``**`` and the functions of
+      :mod:`proofroll.elements.ball_on_surface.surfaces.formula`, so that they can be differentiated;
+    * :meth:`offset`, and where it is known, which is faster, :meth:`locate`.
+
+    Tangents, curvature, frame and normal are derivatives.
+    """
+
+    name: str
+    kind: str
+    coordinates: tuple[str, str]
+    units: tuple[str, str]
+    periods: tuple[float | None, float | None] = (None, None)
+    generators: tuple[Generator, Generator] | None = None
+
+    @property
+    def domain(self) -> tuple[tuple[float, float], tuple[float, float]]:
+        """Least and largest value of each coordinate, where the surface is looked at and drawn; of an angle a turn."""
+        raise NotImplementedError
+
+    def offset(self, ball_radius: float) -> Declared:
+        """See :class:`Surface`."""
+        raise NotImplementedError
+
+    def point(self, u1: Any, u2: Any) -> tuple[Any, Any, Any]:
+        """Components of the place in the world with the coordinates u [m]."""
+        raise NotImplementedError
+
+    def distance(self, x: Any, y: Any, z: Any) -> Any:
+        """Distance of a place in the world from the surface [m]: positive where balls are, negative behind the wall."""
+        raise NotImplementedError
+
+    def checked(self) -> None:
+        """Holds the two descriptions against each other all over the domain.
+
+        Raises:
+            InputError: a point of the surface is not at distance zero, or the distance is none.
+        """
+        u = self.places()
+        p = self.position(u)
+        size = float(np.max(np.ptp(p, axis=0)))
+        off = float(np.max(np.abs(self.gap(p))))
+        if not off <= _CLOSE * size:
+            raise InputError(
+                f"{self.name}: distance", off, "the points of the surface are not at distance zero from it"
+            )
+        if not np.min(np.einsum("ni,ni->n", self.frame(u)[..., 0], self.normal(p))) > 0:
+            names = ", ".join(self.coordinates)
+            raise InputError(
+                f"{self.name}: coordinates", names, "the product of their tangents leads away from the wall; swap them"
+            )
+        slope = np.linalg.norm(self.normal(p), axis=-1)
+        worst = float(slope[np.argmax(np.abs(slope - 1))])
+        if not abs(worst - 1) <= _CLOSE:
+            raise InputError(
+                f"{self.name}: distance", worst, "a distance grows by one metre per metre along the normal"
+            )
+        missed = float(np.max(np.linalg.norm(self.position(self.locate(p)) - p, axis=-1)))
+        if not missed <= _CLOSE * size:
+            raise InputError(f"{self.name}: locate", missed, "the coordinates of a point do not lead back to it")
+
+    def places(self) -> FloatArray:
+        """Coordinates all over the domain but for its edges [rad or m], shape (n, 2)."""
+        inner = (np.arange(_PLACES) + 0.5) / _PLACES
+        axes = [low + (high - low) * inner for low, high in self.domain]
+        return np.stack(np.meshgrid(*axes, indexing="ij"), axis=-1).reshape(-1, 2)
+
+    @cached_property
+    def length_scales(self) -> tuple[float, float]:
+        """See :class:`Surface`: of an angle its largest radius; 1 of a length."""
+        lengths = np.linalg.norm(self.tangents(self.places()), axis=-2).max(axis=0)
+        first, second = (1.0 if unit == "m" else float(x) for unit, x in zip(self.units, lengths, strict=True))
+        return first, second
+
+    def position(self, u: npt.ArrayLike) -> FloatArray:
+        """See :class:`Surface`."""
+        return self._bent(u, 0, 1)[..., 0]
+
+    def _bent(self, u: npt.ArrayLike, first: int, count: int) -> FloatArray:
+        """Derivatives of x, y and z by the coordinates: from one of the six of each on, shape (..., 3, count)."""
+        u = np.asarray(u, dtype=np.float64)
+        parts = _chart(self)[0](*u.tolist()) if u.ndim == 1 else _chart(self)[1](u[..., 0], u[..., 1])
+        wanted = [parts[6 * axis + index] for axis in range(3) for index in range(first, first + count)]
+        return _stacked(wanted, u.shape[:-1]).reshape(*u.shape[:-1], 3, count)
+
+    def tangents(self, u: npt.ArrayLike) -> FloatArray:
+        """See :class:`Surface`."""
+        return self._bent(u, 1, 2)
+
+    def second(self, u: npt.ArrayLike) -> FloatArray:
+        """See :class:`Surface`."""
+        return self._bent(u, 3, 3)[..., [[0, 1], [1, 2]]]
+
+    def frame(self, u: npt.ArrayLike) -> FloatArray:
+        """See :class:`Surface`."""
+        if np.ndim(u) == 1:  # without the overhead of arrays
+            parts = _chart(self)[0](*np.asarray(u).tolist())
+            columns = _triad(*parts[1::6], *parts[2::6])
+            return np.array(columns).reshape(3, 3).T
+        tangents = self.tangents(u)
+        across = np.cross(tangents[..., 0], tangents[..., 1])
+        e1 = across / np.linalg.norm(across, axis=-1, keepdims=True)
+        e2 = tangents[..., 0] / np.linalg.norm(tangents[..., 0], axis=-1, keepdims=True)
+        return np.stack([e1, e2, np.cross(e1, e2)], axis=-1)
+
+    def locate(self, p_WB: npt.ArrayLike) -> FloatArray:
+        """See :class:`Surface`: Newton's method for the nearest point, from the nearest of many."""
+        p = np.asarray(p_WB, dtype=np.float64)
+        flat, known = p.reshape(-1, 3), self.places()
+        u = known[np.argmin(np.linalg.norm(flat[:, None] - self.position(known)[None], axis=-1), axis=1)]
+        for _ in range(_NEWTON):
+            off, tangents = self.position(u) - flat, self.tangents(u)
+            bent = np.einsum("ni,nijk->njk", off, self.second(u)) + np.swapaxes(tangents, -1, -2) @ tangents
+            u = u - np.linalg.solve(bent, np.einsum("nij,ni->nj", tangents, off)[..., None])[..., 0]
+        for column, period in enumerate(self.periods):
+            if period is not None:
+                u[:, column] -= period * np.ceil(u[:, column] / period - 0.5)
+        return np.asarray(u.reshape(*p.shape[:-1], 2))
+
+    def _away(self, p_WB: npt.ArrayLike, first: int, count: int) -> FloatArray:
+        """Derivatives of the distance by x, y and z: ``count`` of the ten from one on, shape (..., count)."""
+        p = np.asarray(p_WB, dtype=np.float64)
+        parts = _field(self)[0](*p.tolist()) if p.ndim == 1 else _field(self)[1](p[..., 0], p[..., 1], p[..., 2])
+        return _stacked(parts[first : first + count], p.shape[:-1])
+
+    def gap(self, p_WB: npt.ArrayLike) -> FloatArray:
+        """See :class:`Surface`."""
+        return self._away(p_WB, 0, 1)[..., 0]
+
+    def normal(self, p_WB: npt.ArrayLike) -> FloatArray:
+        """See :class:`Surface`."""
+        return -self._away(p_WB, 1, 3)
+
+    def normal_gradient(self, p_WB: npt.ArrayLike) -> FloatArray:
+        """See :class:`Surface`."""
+        return -self._away(p_WB, 4, 6)[..., [[0, 1, 2], [1, 3, 4], [2, 4, 5]]]
+
+    def nearby(self, x: float, y: float, z: float) -> tuple[float, float, float, float]:
+        """See :class:`Surface`."""
+        gap, x1, y1, z1, *_ = _field(self)[0](x, y, z)
+        return gap, -x1, -y1, -z1
+
+    def triad(self, x: float, y: float, z: float) -> tuple[float, ...]:
+        """See :class:`Surface`."""
+        return self.moving_triad(x, y, z, 0.0, 0.0, 0.0)[1:10]
+
+    def normal_rate(self, p: tuple[float, float, float], v: tuple[float, float, float]) -> tuple[float, float, float]:
+        """See :class:`Surface`."""
+        *_, xx, xy, xz, yy, yz, zz = _field(self)[0](*p)
+        x, y, z = v
+        return -(xx * x + xy * y + xz * z), -(xy * x + yy * y + yz * z), -(xz * x + yz * y + zz * z)
+
+    def moving_triad(self, x: float, y: float, z: float, vx: float, vy: float, vz: float) -> tuple[float, ...]:
+        """See :class:`Surface`."""
+        gap, x1, y1, z1, xx, xy, xz, yy, yz, zz = _field(self)[0](x, y, z)
+        place = _chart(self)[0](*self.locate(np.array([x, y, z])).tolist())
+        x2, y2, z2 = place[1], place[7], place[13]
+        size = math.sqrt(x2 * x2 + y2 * y2 + z2 * z2) or math.nan
+        x1, y1, z1, x2, y2, z2 = -x1, -y1, -z1, x2 / size, y2 / size, z2 / size
+        e3 = (y1 * z2 - z1 * y2, z1 * x2 - x1 * z2, x1 * y2 - y1 * x2)
+        rate = -(xx * vx + xy * vy + xz * vz), -(xy * vx + yy * vy + yz * vz), -(xz * vx + yz * vy + zz * vz)
+        return gap, x1, y1, z1, x2, y2, z2, *e3, *rate
+
+
+# The surface is the key, as its own attributes would have to be pickled with it.
+@lru_cache
+def _chart(surface: Declared) -> tuple[Callable[..., Any], Callable[..., Any]]:
+    return differentiated(surface.point, 2)
+
+
+@lru_cache
+def _field(surface: Declared) -> tuple[Callable[..., Any], Callable[..., Any]]:
+    return differentiated(surface.distance, 3)
+
+
+def _triad(x2: float, y2: float, z2: float, x: float, y: float, z: float) -> tuple[float, ...]:
+    """Components of e1, e2, e3 from the two tangents; NaN where they have no direction."""
+    x1, y1, z1 = y2 * z - z2 * y, z2 * x - x2 * z, x2 * y - y2 * x
+    across, along = math.sqrt(x1 * x1 + y1 * y1 + z1 * z1) or math.nan, math.sqrt(x2 * x2 + y2 * y2 + z2 * z2)
+    x1, y1, z1, x2, y2, z2 = x1 / across, y1 / across, z1 / across, x2 / along, y2 / along, z2 / along
+    return x1, y1, z1, x2, y2, z2, y1 * z2 - z1 * y2, z1 * x2 - x1 * z2, x1 * y2 - y1 * x2
+
+
+def _stacked(parts: Sequence[Any], shape: tuple[int, ...]) -> FloatArray:
+    """Numbers and arrays as one array with a last axis for them."""
+    if not shape:
+        return np.array(parts)
+    return np.stack([np.broadcast_to(np.asarray(part, dtype=np.float64), shape) for part in parts], axis=-1)

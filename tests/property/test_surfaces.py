@@ -1,0 +1,83 @@
+"""Closed forms on surfaces, at random parameters: of the equations at one instant, which cost no integration."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from proofroll.core.gravity import Gravity
+from proofroll.core.scene import Scene
+from proofroll.elements.ball_on_surface.element import BallOnSurface
+from proofroll.elements.ball_on_surface.mechanics import newton_euler
+from proofroll.elements.ball_on_surface.model import Ball, Contact, InitialMotion, RollingBall
+from proofroll.elements.ball_on_surface.rolling_equations import reduced_rates, start
+from proofroll.elements.ball_on_surface.surfaces import Bowl
+from proofroll.truth.truth import truth
+
+G = 9.81
+
+
+def rolling(surface: Any, ratio: float, u0: Any, velocity: Any, spin: float, a: float = 0.025) -> RollingBall:
+    """A ball of 1 kg that starts so."""
+    return element(surface, ratio, u0, velocity, spin, a).rolling
+
+
+def element(surface: Any, ratio: float, u0: Any, velocity: Any, spin: float, a: float = 0.025) -> BallOnSurface:
+    """The same as an element of a scene."""
+    start_ = InitialMotion("ball", tuple(u0), tuple(velocity), spin)
+    return BallOnSurface(Ball("ball", a, 1.0, ratio), surface, Contact("ball", "wall"), start_, Gravity(G, (0, 0, -1)))
+
+
+def steady_rate(k: float, a: float, rho: float, slope: float, spin: float) -> float:
+    """Rate W of a steady circle: (1 + k) ρ W² cos β - k a W ω_n sin β = g sin β (Routh 1905), ω_n the outward spin."""
+    A, B, C = (1 + k) * rho * np.cos(slope), -k * a * spin * np.sin(slope), -G * np.sin(slope)
+    return float((-B + np.sqrt(B * B - 4 * A * C)) / (2 * A))
+
+
+def held_circle(body: RollingBall, W: float) -> None:
+    """Both descriptions of the surface give the acceleration of the circle about the axis, and a spin that stays."""
+    rho = np.array([*body.p0[:2], 0.0])
+    acceleration, _, _ = newton_euler(body, body.p0, body.v0, body.w0)
+    assert acceleration == pytest.approx(-(W**2) * rho, abs=1e-9 * G)
+    rates, _, force = reduced_rates(body, start(body))
+    assert force / body.ball.mass + body.gravity == pytest.approx(-(W**2) * rho, abs=1e-9 * G)
+    assert rates[4] == pytest.approx(0.0, abs=1e-9 * abs(W) ** 2 + 1e-9)
+
+
+ratios, spins = st.floats(0.1, 0.66), st.floats(-60.0, 60.0)
+
+
+@settings(max_examples=30, deadline=None)
+@given(radius=st.floats(0.06, 3.0), slope=st.floats(0.05, 1.3), k=ratios, spin=spins, around=st.floats(-3, 3))
+def test_steady_circles_in_a_bowl(radius: float, slope: float, k: float, spin: float, around: float) -> None:
+    """A ball at the rate of the closed form goes on in its circle, wherever it is and however it spins."""
+    a, reach = 0.025, radius - 0.025
+    W = steady_rate(k, a, reach * np.sin(slope), slope, spin)
+    u = 2 * reach * np.tan(slope / 2) * np.array([np.cos(around), -np.sin(around)])
+    speed = W * reach * np.sin(slope)
+    frame = Bowl("wall", reach).frame(u)
+    forward = np.array([-np.sin(around), np.cos(around), 0.0])
+    held_circle(rolling(Bowl("wall", radius), k, u, speed * (frame[:, 1:].T @ forward), spin), W)
+
+
+def test_a_small_swing_passes_the_bottom_of_a_bowl() -> None:
+    """From rest it swings at ω² = g/((1 + k)(R - a)), through the bottom, with an error bar near round-off."""
+    amplitude, R, a, k = 1e-4, 0.225, 0.025, 0.4
+    scene = Scene("swing", "", (element(Bowl("wall", R), k, (amplitude, 0.0), (0.0, 0.0), 0.0),))
+    t = np.linspace(0, 1.0, 51)
+    found = truth(scene, t)
+    expected = amplitude * np.cos(np.sqrt(G / ((1 + k) * (R - a))) * t)
+    assert found["xi"].to_numpy() == pytest.approx(expected, abs=1e-5 * amplitude)
+    assert found["xi"].attrs["error_bar"] < 1e-10 * amplitude
+    assert np.abs(found["eta"]).max() == 0.0
+
+
+def test_a_ball_through_the_bottom_is_the_limit_of_balls_that_pass_it(times: np.ndarray) -> None:
+    """Nothing happens at the bottom: with a side speed of 1e-6 m/s the motion is the same to as much."""
+    scenes = [Scene("s", "", (element(Bowl("wall", 0.225), 0.4, (0.1, 0), (0.0, v), 0.0),)) for v in (0.0, 1e-6)]
+    straight, beside = (truth(scene, times[:51]) for scene in scenes)
+    assert np.abs(straight["p_WB"] - beside["p_WB"]).max() < 1e-5

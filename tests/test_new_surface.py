@@ -1,0 +1,146 @@
+"""A surface of another package, said by a position and a distance, goes through run, compare, drawing and replay."""
+
+from __future__ import annotations
+
+import importlib
+import json
+import os
+from collections.abc import Callable, Iterator
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from proofroll.core import plugins
+from proofroll.elements.ball_on_surface import kind
+from proofroll.elements.ball_on_surface.element import rolling_ball
+from proofroll.elements.ball_on_surface.report.drawings import overview
+from proofroll.elements.ball_on_surface.report.wall import wall
+from proofroll.elements.ball_on_surface.surfaces.catalogue import surface_kinds
+from proofroll.files.scene_file import load_scene
+
+PLUGINS = Path(__file__).parent / "plugins"
+Proofroll = Callable[..., tuple[int, str, str]]
+SCENE = """
+title = "A ball in a trough"
+source = "invented"
+
+[parameters.radius]
+value = 0.3
+unit = "m"
+meaning = "inner radius of the trough"
+source = "invented"
+
+[gravity]
+magnitude = 9.81
+direction = [0, 0, -1]
+
+[[balls]]
+name = "ball"
+radius = 0.02
+mass = 0.1
+
+[[surfaces]]
+kind = "trough"
+name = "wall"
+radius = "$radius"
+
+[[contacts]]
+body = "ball"
+surface = "wall"
+
+[[initial]]
+body = "ball"
+coordinates = [0.4, 0.0]
+velocity = [0.1, 0.3]
+spin = 5.0
+"""
+COMPARISON = """
+title = "A trough"
+question = "Does anybody's surface go through?"
+scene = {scene!r}
+until = 0.1
+every = 0.02
+
+[tolerances.fine]
+because = "half a swing of 0.1 m by schemes of second order"
+angle = "1e-3 rad"
+way = "1e-3 m"
+gap = "1e-4 m"
+
+[[rows]]
+engine = "projection[formulation=rotating_frame]"
+tolerance = "fine"
+
+[[rows]]
+engine = "mujoco[formulation=free,preset=tuned]"
+tolerance = "fine"
+ladder = [2, 1, 0.5]
+"""
+
+
+def _look_again() -> None:
+    """What is installed is looked up once in a process."""
+    surface_kinds.cache_clear()
+    importlib.reload(kind)
+    plugins.load_element_kinds.cache_clear()
+
+
+@pytest.fixture
+def trough(
+    proofroll: Proofroll,  # noqa: ARG001 -- it announces its engines first
+    tmp_path: Path,
+    monkeypatch: pytest.MonkeyPatch,
+) -> Iterator[Path]:
+    """The folder of a scene with a trough, which is announced as an installed package would."""
+    info = tmp_path / "site3" / "troughs-1.0.dist-info"
+    info.mkdir(parents=True)
+    (info / "METADATA").write_text("Metadata-Version: 2.1\nName: troughs\nVersion: 1.0\n")
+    (info / "entry_points.txt").write_text("[proofroll.surfaces]\ntrough = trough:Trough\n")
+    places = [str(info.parent), str(PLUGINS), os.environ.get("PYTHONPATH", "")]
+    monkeypatch.setenv("PYTHONPATH", os.pathsep.join(places))
+    monkeypatch.syspath_prepend(str(info.parent))
+    _look_again()
+    folder = tmp_path / "rolling"
+    folder.mkdir()
+    (folder / "scene.toml").write_text(SCENE)
+    yield folder
+    monkeypatch.undo()
+    _look_again()
+
+
+def test_compare(proofroll: Proofroll, trough: Path) -> None:
+    """The truth has its error bar by two routes, and engines that know any surface agree with it."""
+    file = trough.parent / "trough.toml"
+    file.write_text(COMPARISON.format(scene=str(trough)))
+    code, out, err = proofroll("compare", str(file), "--json", "--out", str(trough.parent / "out"))
+    assert code == 0, err + out
+    document = json.loads(out)
+    content = document.get("comparisons", [document])[0]
+    assert {run["status"] for run in content["runs"]} == {"done"}
+
+
+@pytest.mark.usefixtures("proofroll")
+def test_it_is_drawn_and_replayed(trough: Path) -> None:
+    """The drawing has the coordinates' names, and the replay's wall lies on the trough, within its ends."""
+    body = rolling_ball(load_scene(str(trough)))
+    whole = overview(body.wall, body)[0].content()
+    texts = {part["text"] for mark in whole["marks"] for part in mark.get("parts", ())}
+    assert {"angle", "way", "v", "g"} <= texts
+    built = wall(body, np.array([[0.4, 0.0], [-0.4, 0.1]]))
+    assert np.abs(body.wall.gap(built.points)).max() < 1e-12
+    assert np.abs(built.points[..., 1]).max() <= 0.3
+
+
+def test_a_distance_that_is_none_is_refused(
+    proofroll: Proofroll, trough: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """A declaration that contradicts itself gets one line that says how, before anything runs."""
+    from trough import Trough
+
+    monkeypatch.setattr(Trough, "distance", lambda self, x, y, z: self.radius**2 - y * y - z * z)  # noqa: ARG005
+    (trough / "scene.toml").write_text(SCENE.replace("0.3", "0.31"))  # of formulas once made nothing changes
+    code, _, err = proofroll("check", str(trough))
+    assert code == 2
+    assert "wall: distance" in err
+    assert "one metre per metre" in err
