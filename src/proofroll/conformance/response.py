@@ -83,7 +83,11 @@ def _moved(subject: Subject, times: FloatArray, true: xr.Dataset) -> dict[str, F
         engine.advance(t)
         samples.append(engine.sample())
     found = from_samples(subject.scene, times, samples)
-    return {name: found[name].to_numpy()[1:] for name in _sizes(subject.scene, times[-1], true) if name in found}
+    moved = {name: found[name].to_numpy()[1:] for name in _sizes(subject.scene, times[-1], true) if name in found}
+    reactions = {name for name, item in subject.scene.observables.items() if item.role == Role.REACTION}
+    return {  # what an engine does not say of reactions is no error
+        name: values for name, values in moved.items() if name not in reactions or not np.any(np.isnan(values))
+    }
 
 
 def _sizes(scene: Scene, length: float, true: xr.Dataset) -> dict[str, float]:

@@ -1,0 +1,44 @@
+"""Drake: a ball by its terms, mechanisms as continuous and as discrete plants."""
+
+from __future__ import annotations
+
+import importlib.metadata
+from collections.abc import Mapping
+from typing import Any, ClassVar
+
+from proofroll.core.scene import Scene
+from proofroll_drake import ball, mechanism
+from proofroll_drake.ball import DrakeBall
+from proofroll_drake.mechanism import DrakeMechanism
+from proofroll_drake.settings import PRESETS, DrakeSettings
+
+
+class Drake:
+    """Drake's multibody plant through pydrake. See :class:`proofroll.core.engine.Engine`."""
+
+    name: ClassVar[str] = "drake"
+    provides: ClassVar[Mapping[str, frozenset[str]]] = {
+        "terms": ball.PROVIDES,
+        "continuous": mechanism.CONTINUOUS,
+        "discrete": mechanism.DISCRETE,
+    }
+    lacking: ClassVar[Mapping[str, Mapping[str, str]]] = {"terms": {}} | mechanism.LACKING
+    inherent: ClassVar[Mapping[str, Mapping[str, str]]] = {"terms": ball.INHERENT}
+    settings: ClassVar[type[DrakeSettings]] = DrakeSettings
+    presets: ClassVar[Mapping[str, Mapping[str, DrakeSettings]]] = PRESETS
+
+    @staticmethod
+    def version() -> str:
+        """Of the package."""
+        return importlib.metadata.version("drake")
+
+    @staticmethod
+    def build(scene: Scene, settings: DrakeSettings) -> Any:
+        """The model of the formulation."""
+        kind = DrakeBall if settings.formulation == "terms" else DrakeMechanism
+        return kind.build(scene, settings)
+
+    @staticmethod
+    def caveat(settings: DrakeSettings) -> str:
+        """What is not Drake's own."""
+        return "rolling and integration are ours, around Drake's terms" if settings.formulation == "terms" else ""

@@ -1,0 +1,213 @@
+"""A mechanism as a plant of Drake: continuous, with Drake's integrators, or discrete, with its SAP solver and loops."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from typing import Any
+
+import numpy as np
+from pydrake.math import RigidTransform, RotationMatrix
+from pydrake.multibody.plant import DiscreteContactApproximation, MultibodyPlant
+from pydrake.multibody.tree import (
+    LinearSpringDamper,
+    PrismaticSpring,
+    RevoluteSpring,
+    RotationalInertia,
+    SpatialInertia,
+)
+from pydrake.systems.analysis import ResetIntegratorFromFlags, Simulator
+
+from proofroll.core.engine import Regularised, Sample, whole_steps
+from proofroll.core.errors import Diverged, Refused
+from proofroll.core.scene import Scene
+from proofroll.elements.mechanism import WORLD, Joint, Mechanism
+from proofroll.elements.mechanism.capabilities import ALL_JOINTS, FORCES, MechanismCapability
+from proofroll.elements.mechanism.loop_points import held_points
+from proofroll.elements.mechanism.sampling import WITH_AXIS, MechanismBuilt, mechanism_of
+from proofroll_drake.joints import connect, start
+from proofroll_drake.settings import DrakeSettings
+
+_CAPABILITY = MechanismCapability
+CONTINUOUS: frozenset[str] = ALL_JOINTS | FORCES | {_CAPABILITY.ARMATURE}
+DISCRETE: frozenset[str] = CONTINUOUS | {
+    _CAPABILITY.FIXED_LOOP, _CAPABILITY.REVOLUTE_LOOP, _CAPABILITY.SPHERICAL_LOOP, _CAPABILITY.REDUNDANT
+}  # fmt: skip
+_LOOPS = "a continuous plant of Drake has no constraints; take formulation=discrete"
+LACKING: Mapping[str, Mapping[str, str]] = {
+    "continuous": dict.fromkeys(DISCRETE - CONTINUOUS, _LOOPS),
+    "discrete": {_CAPABILITY.JOINT_FRICTION: "Drake reads dry friction and does not use it"},
+}
+_SOFT = "Drake's SAP solver makes constraints as stiff as its step can carry, and no stiffer; the first step shows it"
+
+
+class DrakeMechanism:
+    """See :class:`proofroll.core.engine.Engine` for the methods."""
+
+    def __init__(self, mechanism: Mechanism, settings: DrakeSettings) -> None:
+        self._mechanism, self._settings, self._steps = mechanism, settings, 0
+        self._plant = plant = MultibodyPlant(settings.dt or 0.0)
+        if settings.dt:
+            plant.set_discrete_contact_approximation(DiscreteContactApproximation.kSap)
+            plant.SetUseSampledOutputPorts(False)  # reactions of the state as it is, not of the step that led to it
+        plant.mutable_gravity_field().set_gravity_vector(mechanism.gravity)
+        self._bodies = {WORLD: plant.world_body()} | {body.name: self._body(body) for body in mechanism.bodies}
+        self._joints = [connect(plant, self._bodies, joint) for joint in mechanism.joints]
+        self._add_forces()
+        self._close_loops()
+        plant.Finalize()
+        self._simulator = None if settings.dt else Simulator(plant)
+        self._context = self._simulator.get_mutable_context() if self._simulator else plant.CreateDefaultContext()
+        drive = np.zeros(plant.num_velocities())
+        for joint, built in zip(mechanism.joints, self._joints, strict=True):
+            start(plant, self._context, joint, built)
+            if joint.torque:
+                drive[built.velocity_start()] = joint.torque
+        plant.get_applied_generalized_force_input_port().FixValue(self._context, drive)
+        if self._simulator:
+            integrator = ResetIntegratorFromFlags(self._simulator, settings.integrator or "runge_kutta5", 0.1)
+            integrator.set_target_accuracy(settings.rtol)
+            self._simulator.Initialize()
+
+    @classmethod
+    def build(cls, scene: Scene, settings: DrakeSettings) -> DrakeMechanism:
+        """See :class:`proofroll.core.engine.Engine`."""
+        return cls(mechanism_of(scene), settings)
+
+    def _body(self, body: Any) -> Any:
+        (xx, xy, xz), (_, yy, yz), (_, _, zz) = body.inertia
+        if not body.mass:
+            raise Refused(f"{body.name} has no mass; here each body needs one")
+        inertia = SpatialInertia.MakeFromCentralInertia(body.mass, body.com, RotationalInertia(xx, yy, zz, xy, xz, yz))
+        return self._plant.AddRigidBody(body.name, inertia)
+
+    def _add_forces(self) -> None:
+        """Springs of joints and between points, and inertias of drives."""
+        plant = self._plant
+        for joint, built in zip(self._mechanism.joints, self._joints, strict=True):
+            if joint.stiffness:
+                kinds = {"revolute": RevoluteSpring, "prismatic": PrismaticSpring}
+                if joint.kind not in kinds:
+                    raise Refused(f"{joint.name}: Drake has no spring for a {joint.kind} joint")
+                plant.AddForceElement(kinds[joint.kind](built, joint.rest, joint.stiffness))
+            if joint.armature:
+                actuator = plant.AddJointActuator(joint.name, built)
+                actuator.set_default_rotor_inertia(joint.armature)
+                actuator.set_default_gear_ratio(1.0)
+        for spring in self._mechanism.springs:
+            if not spring.length:
+                raise Refused(f"{spring.name}: Drake's springs have a free length that is not zero")
+            ends = (self._bodies[spring.body_a], spring.position_a, self._bodies[spring.body_b], spring.position_b)
+            plant.AddForceElement(LinearSpringDamper(*ends, spring.length, spring.stiffness, spring.damping))
+
+    def _close_loops(self) -> None:
+        bodies = dict(self._bodies)
+        if any(WORLD in (loop.body_a, loop.body_b) for loop in self._mechanism.loops):
+            bodies[WORLD] = self._ground()
+        for loop in self._mechanism.loops:
+            a, b = bodies[loop.body_a], bodies[loop.body_b]
+            if loop.kind == "fixed":
+                frames = [
+                    RigidTransform(RotationMatrix(frame), place)
+                    for frame, place in ((loop.frame_a, loop.position_a), (loop.frame_b, loop.position_b))
+                ]
+                self._plant.AddWeldConstraint(a, frames[0], b, frames[1])
+                continue
+            for far in held_points(self._mechanism, loop):
+                on_a = np.array(loop.position_a) + far * loop.frame_a[:, 2]
+                on_b = np.array(loop.position_b) + far * loop.frame_b[:, 2]
+                self._plant.AddBallConstraint(a, on_a, b, on_b)
+
+    def _ground(self) -> Any:
+        """A body that is welded to the world: a ball constraint with the world itself ends the process (1.51.1)."""
+        inertia = SpatialInertia.MakeFromCentralInertia(1.0, np.zeros(3), RotationalInertia(1.0, 1.0, 1.0))
+        ground = self._plant.AddRigidBody("ground of loops", inertia)
+        self._plant.WeldFrames(self._plant.world_frame(), ground.body_frame())
+        return ground
+
+    def advance(self, t: float) -> None:
+        """See :class:`proofroll.core.engine.Engine`."""
+        dt = self._settings.dt
+        try:
+            if self._simulator:
+                self._simulator.AdvanceTo(t)
+                return
+            for _ in range(whole_steps(self._steps * dt, t, dt)):
+                self._context.SetDiscreteState(self._plant.EvalUniquePeriodicDiscreteUpdate(self._context))
+                self._steps += 1
+                self._context.SetTime(self._steps * dt)
+        except RuntimeError as error:
+            raise Diverged(f"Drake: {' '.join(str(error).split())} (t = {t:g} s)") from None
+
+    def sample(self) -> Sample:
+        """See :class:`proofroll.core.engine.Engine`."""
+        plant, context = self._plant, self._context
+        bodies = [self._bodies[body.name] for body in self._mechanism.bodies]
+        poses = [plant.EvalBodyPoseInWorld(context, body) for body in bodies]
+        rates = [plant.EvalBodySpatialVelocityInWorld(context, body) for body in bodies]
+        force, torque = self._reactions()
+        return Sample(
+            np.array([pose.translation() for pose in poses]),
+            np.array([rate.translational() for rate in rates]),
+            np.array([rate.rotational() for rate in rates]),
+            np.array([pose.rotation().ToQuaternion().wxyz() for pose in poses]),
+            joint_force=force,
+            joint_torque=torque,
+        )
+
+    def _reactions(self) -> tuple[Any, Any]:
+        """Force and moment on the child of each joint; Drake gives them along the joint's axes on the child [N, N m].
+
+        Those of loops are not told.
+        """
+        count = len(self._joints) + len(self._mechanism.loops)
+        force, torque = np.full((count, 3), np.nan), np.full((count, 3), np.nan)
+        told = self._plant.get_reaction_forces_output_port().Eval(self._context)
+        for number, built in enumerate(self._joints):
+            R = built.frame_on_child().CalcPoseInWorld(self._context).rotation().matrix()
+            found = told[int(built.index())]
+            force[number] = R @ found.translational()
+            torque[number] = R @ found.rotational()
+        return force, torque
+
+    def built(self) -> MechanismBuilt:
+        """See :class:`proofroll.core.engine.Engine`."""
+        plant, context = self._plant, self._context
+        bodies = [self._bodies[body.name] for body in self._mechanism.bodies]
+        inertias = [body.default_spatial_inertia() for body in bodies]
+        frames = [built.frame_on_child().CalcPoseInWorld(context) for built in self._joints]
+        places = np.array([frame.translation() for frame in frames])
+        rates: dict[str, Any] = {}
+        if self._simulator:
+            found = [plant.EvalBodySpatialAccelerationInWorld(context, body) for body in bodies]
+            rates["acceleration"] = np.array([rate.translational() for rate in found])
+            rates["angular_acceleration"] = np.array([rate.rotational() for rate in found])
+        loops = bool(self._mechanism.loops)
+        soft = {name: Regularised(1.0, _SOFT) for name in ("acceleration", "angular_acceleration") if loops}
+        return MechanismBuilt(
+            mass=np.array([inertia.get_mass() for inertia in inertias]),
+            com=np.array([inertia.get_com() for inertia in inertias]),
+            inertia=np.array([_central(inertia) for inertia in inertias]),
+            joint_position=places,
+            joint_axis=np.array(
+                [_axis(context, *pair) for pair in zip(self._mechanism.joints, self._joints, strict=True)]
+            ),
+            gravity=np.array(plant.gravity_field().gravity_vector()),
+            mobility=None if loops else plant.num_velocities(),
+            regularised=soft,
+            **rates,
+        )
+
+
+def _axis(context: Any, joint: Joint, built: Any) -> Any:
+    """The joint's axis in the world; NaN where it has none."""
+    if joint.kind not in WITH_AXIS:
+        return np.full(3, np.nan)
+    column = 0 if joint.kind == "universal" else 2  # see joints.connect
+    return built.frame_on_parent().CalcPoseInWorld(context).rotation().matrix()[:, column]
+
+
+def _central(inertia: Any) -> Any:
+    """About the centre of mass [kg m²]."""
+    c = np.array(inertia.get_com())
+    about_origin = np.array(inertia.CalcRotationalInertia().CopyToFullMatrix3())
+    return about_origin - inertia.get_mass() * (c @ c * np.eye(3) - np.outer(c, c))

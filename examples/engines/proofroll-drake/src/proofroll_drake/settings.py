@@ -1,0 +1,64 @@
+"""What a user can choose of Drake."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from typing import Annotated, Literal
+
+from annotated_types import Gt, Le
+
+from proofroll.core.errors import InputError
+
+
+@dataclass(frozen=True)
+class DrakeSettings:
+    """Settings of Drake.
+
+    Attributes:
+        formulation: ``terms``, a ball by Drake's mass matrix, bias and Jacobian; ``continuous`` and ``discrete``,
+            mechanisms as a plant of that kind.
+        preset: ``default`` or ``matched``.
+        integrator: of the continuous plant, by Drake's name.
+        rtol: tolerance of integration, except of the discrete plant.
+        dt: step of the discrete plant [s].
+    """
+
+    formulation: Literal["terms", "continuous", "discrete"] = "continuous"
+    preset: Literal["default", "matched"] = "matched"
+    integrator: Literal["runge_kutta3", "runge_kutta5"] | None = None
+    rtol: Annotated[float, Gt(0), Le(1)] | None = None
+    dt: Annotated[float, Gt(0)] | None = None
+
+    def __post_init__(self) -> None:
+        """Refuses what does not belong together.
+
+        Raises:
+            InputError: a step where there is a tolerance, or the other way round.
+        """
+        wanted, other = ("dt", "rtol") if self.formulation == "discrete" else ("rtol", "dt")
+        if getattr(self, wanted) is None:
+            raise InputError(f"drake: {wanted}", None, f"{self.formulation} needs it; give a positive number")
+        if getattr(self, other) is not None:
+            raise InputError(f"drake: {other}", getattr(self, other), f"{self.formulation} has none; leave it out")
+
+    @property
+    def resolution(self) -> str:
+        """What trades speed for accuracy."""
+        return "dt" if self.formulation == "discrete" else "rtol"
+
+    @property
+    def order(self) -> int | None:
+        """Of the discrete plant's semi-implicit Euler."""
+        return 1 if self.formulation == "discrete" else None
+
+
+PRESETS: Mapping[str, Mapping[str, DrakeSettings]] = {
+    "terms": {"matched": DrakeSettings("terms", "matched", rtol=1e-12)},
+    "continuous": {
+        # what a Simulator has if nobody chooses
+        "default": DrakeSettings("continuous", "default", "runge_kutta3", 1e-3),
+        "matched": DrakeSettings("continuous", "matched", "runge_kutta5", 1e-10),
+    },
+    "discrete": {"default": DrakeSettings("discrete", "default", dt=1e-3)},
+}

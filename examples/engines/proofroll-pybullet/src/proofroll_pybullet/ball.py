@@ -1,0 +1,214 @@
+"""A free ball against a static plane that is posed anew before each step, tangent to the wall at the contact.
+
+PyBullet has no concave wall that is smooth. Its own contact solver finds the normal impulse, and that of friction in a
+cone; the wall's normal is that at the start of the step (semi-implicit Euler, first order).
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from typing import Any
+
+import numpy as np
+import pybullet
+
+from proofroll.core.engine import Built, Regularised, Sample, whole_steps
+from proofroll.core.errors import Diverged, Refused
+from proofroll.core.events import Event
+from proofroll.core.scene import Scene
+from proofroll.elements.ball_on_surface.element import rolling_ball
+from proofroll.elements.ball_on_surface.mechanics import natural_acceleration
+from proofroll.elements.ball_on_surface.model import BallCapability, RollingBall
+from proofroll_pybullet.settings import PybulletSettings
+from proofroll_pybullet.world import connected, gravity_of
+
+PROVIDES: frozenset[str] = frozenset(BallCapability)
+INHERENT = {BallCapability.ORIENTATION: "every rigid body of PyBullet has one"}
+# Friction without bound needs a number; in double precision this one leaves the cone's other numbers their digits.
+UNBOUNDED = 1e6
+# Nearer to the cone than this is on it: what repetitions of the solver leave.
+_ON_CONE = 1 - 1e-6
+_FLAT = "for the length of a step the wall is a plane, and the first step does not yet know that it bends"
+_NUMBER = f"PyBullet's cone needs a number, here {UNBOUNDED:g}"
+
+
+class PybulletBall:
+    """See :class:`proofroll.core.engine.Engine` for the methods."""
+
+    def __init__(self, body: RollingBall, settings: PybulletSettings) -> None:
+        if body.contact.mu_static != body.contact.mu_kinetic:
+            raise Refused("PyBullet has one coefficient of friction, for sticking and for slipping")
+        self._body, self._settings, self._steps = body, settings, 0
+        self._bounded = math.isfinite(body.contact.mu_static)
+        self._events: list[Event] = []
+        self._status = "stick"
+        self._client = client = connected(self, body.gravity.tolist(), settings)
+        mu = body.contact.mu_static if self._bounded else UNBOUNDED
+        self._ball = self._sphere(mu)
+        shape = pybullet.createCollisionShape(pybullet.GEOM_PLANE, planeNormal=[0, 0, 1], physicsClientId=client)
+        self._plane = pybullet.createMultiBody(0, shape, physicsClientId=client)
+        pybullet.changeDynamics(self._plane, -1, lateralFriction=1, physicsClientId=client)
+        if settings.preset == "matched":
+            pybullet.changeDynamics(
+                self._ball, -1, linearDamping=0, angularDamping=0, restitution=0, maxJointVelocity=1e9,
+                activationState=pybullet.ACTIVATION_STATE_DISABLE_SLEEPING, physicsClientId=client,
+            )  # fmt: skip
+        pybullet.resetBaseVelocity(self._ball, body.v0.tolist(), body.w0.tolist(), physicsClientId=client)
+        self._normal_force = 0.0
+        if body.contact.rolling_resistance:
+            self._normal_force = self._first_normal_force()
+
+    @classmethod
+    def build(cls, scene: Scene, settings: PybulletSettings) -> PybulletBall:
+        """See :class:`proofroll.core.engine.Engine`."""
+        return cls(rolling_ball(scene), settings)
+
+    def _sphere(self, mu: float) -> int:
+        body, client = self._body, self._client
+        shape = pybullet.createCollisionShape(pybullet.GEOM_SPHERE, radius=body.ball.radius, physicsClientId=client)
+        ball: int = pybullet.createMultiBody(
+            body.ball.mass, shape, basePosition=body.p0.tolist(), physicsClientId=client
+        )
+        inertia = [body.ball.inertia] * 3
+        pybullet.changeDynamics(ball, -1, localInertiaDiagonal=inertia, lateralFriction=mu, physicsClientId=client)
+        return ball
+
+    def advance(self, t: float) -> None:
+        """See :class:`proofroll.core.engine.Engine`."""
+        dt = self._settings.dt
+        for _ in range(whole_steps(self._steps * dt, t, dt)):
+            self._step()
+            self._steps += 1
+            if self._bounded:
+                self._follow((self._steps - 1) * dt, self._steps * dt)
+
+    def _step(self) -> None:
+        """One step, with the plane where the wall is now, and the moment of rolling resistance."""
+        p, _ = self._pose()
+        surface = self._body.surface
+        gap, *e1 = surface.nearby(*p)
+        if not math.isfinite(gap):
+            raise Diverged(f"PyBullet's ball is nowhere at t = {self._steps * self._settings.dt:g} s")
+        reach = self._body.ball.radius + gap
+        foot = [x + reach * n for x, n in zip(p, e1, strict=True)]
+        pybullet.resetBasePositionAndOrientation(self._plane, foot, _upright(*e1), physicsClientId=self._client)
+        if self._body.contact.rolling_resistance:
+            torque = self._resistance(np.array(e1))
+            pybullet.applyExternalTorque(
+                self._ball, -1, torque.tolist(), pybullet.WORLD_FRAME, physicsClientId=self._client
+            )
+        pybullet.stepSimulation(physicsClientId=self._client)
+        if self._body.contact.rolling_resistance:
+            self._normal_force = self._contact()[0]
+
+    def _resistance(self, e1: Any) -> Any:
+        """Moment against rolling, with the normal force of the step before; no more than stops the ball [N m]."""
+        ball, f = self._body.ball, self._body.contact.rolling_resistance
+        v = np.array(self._velocities()[0])
+        speed = float(np.linalg.norm(v))
+        if not speed:
+            return np.zeros(3)
+        most = (1 + ball.inertia_ratio) * ball.mass * ball.radius * speed / self._settings.dt
+        return min(f * self._normal_force, most) * np.cross(e1, v) / speed
+
+    def _first_normal_force(self) -> float:
+        """That of a first step, which is then taken back [N]."""
+        state = pybullet.saveState(physicsClientId=self._client)
+        self._step()
+        pybullet.restoreState(state, physicsClientId=self._client)
+        pybullet.removeState(state, physicsClientId=self._client)
+        return self._normal_force
+
+    def _follow(self, start: float, end: float) -> None:
+        """Notes where friction begins and ceases to reach its cone [s]."""
+        status = self._sticks()
+        if status != self._status:
+            self._events.append(Event(status, 0.5 * (start + end), start, end))
+            self._status = status
+
+    def _sticks(self) -> str:
+        N, friction = self._contact()
+        if not N > 0:
+            return self._status
+        reached = float(np.linalg.norm(friction)) >= _ON_CONE * self._body.contact.mu_static * N
+        return "slip" if reached else "stick"
+
+    def _contact(self) -> tuple[float, Any]:
+        """Normal force and friction on the ball in the last step [N]."""
+        points = pybullet.getContactPoints(self._ball, self._plane, physicsClientId=self._client)
+        if not points:
+            return 0.0, np.zeros(3)
+        _, _, _, _, _, _, _, _, _, N, f1, d1, f2, d2 = points[0]
+        return float(N), f1 * np.array(d1) + f2 * np.array(d2)
+
+    def _pose(self) -> tuple[Sequence[float], Sequence[float]]:
+        """Centre [m] and orientation, scalar last."""
+        found: tuple[Sequence[float], Sequence[float]] = pybullet.getBasePositionAndOrientation(
+            self._ball, physicsClientId=self._client
+        )
+        return found
+
+    def _velocities(self) -> tuple[Sequence[float], Sequence[float]]:
+        """Of the centre [m/s], and angular [rad/s]."""
+        found: tuple[Sequence[float], Sequence[float]] = pybullet.getBaseVelocity(
+            self._ball, physicsClientId=self._client
+        )
+        return found
+
+    def sample(self) -> Sample:
+        """See :class:`proofroll.core.engine.Engine`; the force is that of the last step, and none at time 0."""
+        p, q = self._pose()
+        v, w = self._velocities()
+        force = None
+        if self._steps:
+            N, friction = self._contact()
+            plane = pybullet.getBasePositionAndOrientation(self._plane, physicsClientId=self._client)[1]
+            normal = np.array(pybullet.getMatrixFromQuaternion(plane)).reshape(3, 3)[:, 2]
+            force = N * normal + friction
+        sticking = self._status == "stick" if self._bounded else None
+        return Sample(np.array(p), np.array(v), np.array(w), np.roll(q, 1), force, sticking)
+
+    def built(self) -> Built:
+        """See :class:`proofroll.core.engine.Engine`."""
+        told = pybullet.getDynamicsInfo(self._ball, -1, physicsClientId=self._client)
+        mu = float(told[1]) * float(pybullet.getDynamicsInfo(self._plane, -1, physicsClientId=self._client)[1])
+        shape = pybullet.getCollisionShapeData(self._ball, -1, physicsClientId=self._client)[0]
+        f = self._body.contact.rolling_resistance
+        terms = {BallCapability.ORIENTATION}
+        terms |= {BallCapability.BOUNDED_FRICTION} if self._bounded else set()
+        terms |= {BallCapability.ROLLING_RESISTANCE} if f else set()
+        soft = {"acceleration": Regularised(min(1.0, self._bend()), _FLAT)}
+        if not self._bounded:
+            soft |= {f"1 / {kind} friction": Regularised(1 / UNBOUNDED, _NUMBER) for kind in ("static", "kinetic")}
+        return Built(
+            mass=float(told[0]),
+            inertia=np.array(told[2], dtype=np.float64),
+            gravity=gravity_of(self._client),
+            ball_radius=float(shape[3][0]),
+            rolling_resistance=f,
+            mu_static=mu,
+            mu_kinetic=mu,
+            terms=frozenset(terms),
+            regularised=soft,
+        )
+
+    def _bend(self) -> float:
+        """Most of the acceleration that the wall's bend can make at time 0, over what moves the ball there."""
+        body = self._body
+        turning = float(np.linalg.norm(body.surface.normal_gradient(body.p0) @ body.v0))
+        fastest = float(np.linalg.norm(body.v0)) + body.ball.radius * float(np.linalg.norm(body.w0))
+        return turning * fastest / natural_acceleration(body)
+
+    def events(self) -> tuple[Event, ...]:
+        """See :class:`proofroll.core.engine.LocatesEvents`; none with unbounded friction."""
+        return tuple(self._events)
+
+
+def _upright(x: float, y: float, z: float) -> list[float]:
+    """A quaternion, scalar last, that turns the z axis to the opposite of this unit vector."""
+    if z > 0:  # each of the two has its pole on the other half of the sphere
+        half = math.sqrt(0.5 * (1 + z))
+        return [half, 0.0, -x / (2 * half), y / (2 * half)]
+    half = math.sqrt(0.5 * (1 - z))
+    return [y / (2 * half), -x / (2 * half), 0.0, half]

@@ -1,0 +1,35 @@
+"""PyBullet: contact of a ball by its own solver, and mechanisms as multibodies that its importer of URDF makes."""
+
+from __future__ import annotations
+
+import importlib.metadata
+from collections.abc import Mapping
+from typing import Any, ClassVar
+
+from proofroll.core.scene import Scene
+from proofroll_pybullet import ball, mechanism
+from proofroll_pybullet.ball import PybulletBall
+from proofroll_pybullet.mechanism import PybulletMechanism
+from proofroll_pybullet.settings import PRESETS, PybulletSettings
+
+
+class Pybullet:
+    """PyBullet through its Python module; semi-implicit Euler. See :class:`proofroll.core.engine.Engine`."""
+
+    name: ClassVar[str] = "pybullet"
+    provides: ClassVar[Mapping[str, frozenset[str]]] = {"plane": ball.PROVIDES, "urdf": mechanism.PROVIDES}
+    lacking: ClassVar[Mapping[str, Mapping[str, str]]] = {"plane": {}, "urdf": mechanism.LACKING}
+    inherent: ClassVar[Mapping[str, Mapping[str, str]]] = {"plane": ball.INHERENT}
+    settings: ClassVar[type[PybulletSettings]] = PybulletSettings
+    presets: ClassVar[Mapping[str, Mapping[str, PybulletSettings]]] = PRESETS
+
+    @staticmethod
+    def version() -> str:
+        """Of the package."""
+        return importlib.metadata.version("pybullet")
+
+    @staticmethod
+    def build(scene: Scene, settings: PybulletSettings) -> Any:
+        """The model of the formulation."""
+        models = {"plane": PybulletBall, "urdf": PybulletMechanism}
+        return models[settings.formulation].build(scene, settings)

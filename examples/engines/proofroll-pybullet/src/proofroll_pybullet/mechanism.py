@@ -1,0 +1,188 @@
+"""A mechanism as a multibody that PyBullet's importer of URDF makes; loops as its point-to-point constraints.
+
+Poses of links come out of PyBullet in single precision, so bodies are placed by the joints' coordinates, which do not.
+"""
+
+from __future__ import annotations
+
+import math
+import tempfile
+from collections.abc import Mapping
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pybullet
+
+from proofroll.core.engine import Regularised, Sample, whole_steps
+from proofroll.core.errors import Diverged, Refused
+from proofroll.core.scene import Scene
+from proofroll.elements.mechanism import WORLD, Body, Joint, Mechanism, Tree
+from proofroll.elements.mechanism.capabilities import MechanismCapability
+from proofroll.elements.mechanism.loop_points import held_points
+from proofroll.elements.mechanism.rotations import from_quaternion, to_quaternion
+from proofroll.elements.mechanism.sampling import MechanismBuilt, mechanism_of
+from proofroll_pybullet.settings import PybulletSettings
+from proofroll_pybullet.world import connected, gravity_of
+
+_CAPABILITY = MechanismCapability
+PROVIDES: frozenset[str] = frozenset(
+    {
+        _CAPABILITY.FIXED, _CAPABILITY.REVOLUTE, _CAPABILITY.PRISMATIC, _CAPABILITY.SPHERICAL,
+        _CAPABILITY.REVOLUTE_LOOP, _CAPABILITY.SPHERICAL_LOOP, _CAPABILITY.REDUNDANT, _CAPABILITY.JOINT_SPRINGS,
+    }
+)  # fmt: skip
+LACKING: Mapping[str, str] = {
+    _CAPABILITY.SPRINGS: "PyBullet has no springs between points",
+    _CAPABILITY.UNIVERSAL: "URDF has no such joint",
+    _CAPABILITY.JOINT_FRICTION: "PyBullet reads dry friction from a URDF and does not use it",
+}
+_TYPES = {"fixed": "fixed", "revolute": "continuous", "prismatic": "prismatic", "spherical": "spherical"}
+_ROWS = "a loop's rows are those of the step's start, and the first step does not yet know that they turn"
+_LARGE = 1e9  # of a limit that is none: force [N], speed, travel [m]
+
+
+class PybulletMechanism:
+    """See :class:`proofroll.core.engine.Engine` for the methods."""
+
+    def __init__(self, mechanism: Mechanism, settings: PybulletSettings) -> None:
+        for body in mechanism.bodies:
+            if not body.mass:
+                raise Refused(f"{body.name} has no mass; PyBullet would take it for a part of the world")
+        self._mechanism, self._settings, self._steps = mechanism, settings, 0
+        self._tree = Tree(mechanism)
+        self._client = client = connected(self, mechanism.gravity, settings)
+        with tempfile.TemporaryDirectory() as folder:
+            file = Path(folder) / "mechanism.urdf"
+            file.write_text(urdf(mechanism), encoding="utf-8")
+            flags = pybullet.URDF_USE_INERTIA_FROM_FILE  # else it weighs collision shapes, of which there are none
+            self._robot = pybullet.loadURDF(str(file), useFixedBase=True, flags=flags, physicsClientId=client)
+        count = pybullet.getNumJoints(self._robot, physicsClientId=client)
+        told = [pybullet.getJointInfo(self._robot, index, physicsClientId=client) for index in range(count)]
+        self._links = {info[12].decode(): index for index, info in enumerate(told)} | {WORLD: -1}
+        self._joints = [self._links[joint.child] for joint in mechanism.joints]
+        self._forced = [joint for joint in mechanism.joints if joint.torque or joint.stiffness or joint.damping]
+        for joint, index in zip(mechanism.joints, self._joints, strict=True):
+            self._start(joint, index)
+        for loop in mechanism.loops:
+            for far in held_points(mechanism, loop):  # one point alone leaves a revolute loop in space free to turn
+                on_a = self._from_com(loop.body_a, loop.position_a + far * loop.frame_a[:, 2])
+                on_b = self._from_com(loop.body_b, loop.position_b + far * loop.frame_b[:, 2])
+                held = pybullet.createConstraint(
+                    self._robot, self._links[loop.body_a], self._robot, self._links[loop.body_b],
+                    pybullet.JOINT_POINT2POINT, [0, 0, 1], on_a, on_b, physicsClientId=client,
+                )  # fmt: skip
+                pybullet.changeConstraint(held, maxForce=_LARGE, physicsClientId=client)
+
+    @classmethod
+    def build(cls, scene: Scene, settings: PybulletSettings) -> PybulletMechanism:
+        """See :class:`proofroll.core.engine.Engine`."""
+        return cls(mechanism_of(scene), settings)
+
+    def _start(self, joint: Joint, index: int) -> None:
+        """Puts a joint where it starts, without the motor that PyBullet gives it to hold it."""
+        robot, client = self._robot, self._client
+        if self._settings.preset == "matched":
+            pybullet.changeDynamics(
+                robot, index, linearDamping=0, angularDamping=0, jointDamping=0, maxJointVelocity=_LARGE,
+                physicsClientId=client,
+            )  # fmt: skip
+        if joint.nv == 1:
+            pybullet.resetJointState(robot, index, joint.q0[0], joint.v0[0], physicsClientId=client)
+            pybullet.setJointMotorControl2(robot, index, pybullet.VELOCITY_CONTROL, force=0, physicsClientId=client)
+        elif joint.nv == 3:
+            q = [*joint.q0[1:], joint.q0[0]]
+            pybullet.resetJointStateMultiDof(robot, index, q, list(joint.v0), physicsClientId=client)
+            pybullet.setJointMotorControlMultiDof(
+                robot, index, pybullet.POSITION_CONTROL, targetPosition=[0, 0, 0, 1], positionGain=0, velocityGain=0,
+                force=[0, 0, 0], physicsClientId=client,
+            )  # fmt: skip
+
+    def _from_com(self, body: str, position: Any) -> list[float]:
+        """A point of a body against its centre of mass, as PyBullet wants pivots."""
+        if body == WORLD:
+            return list(position)
+        return list(np.array(position) - self._mechanism.bodies[self._mechanism.body_index[body]].com)
+
+    def advance(self, t: float) -> None:
+        """See :class:`proofroll.core.engine.Engine`."""
+        dt, client = self._settings.dt, self._client
+        for _ in range(whole_steps(self._steps * dt, t, dt)):
+            for joint in self._forced:
+                index = self._links[joint.child]
+                q, v, *_ = pybullet.getJointState(self._robot, index, physicsClientId=client)
+                force = joint.torque - joint.stiffness * (q - joint.rest) - joint.damping * v
+                pybullet.setJointMotorControl2(
+                    self._robot, index, pybullet.TORQUE_CONTROL, force=force, physicsClientId=client
+                )
+            pybullet.stepSimulation(physicsClientId=client)
+            self._steps += 1
+        if not all(map(math.isfinite, self._state()[1])):
+            raise Diverged(f"PyBullet's joint velocities are not finite at t = {t:g} s")
+
+    def _state(self) -> tuple[Any, Any]:
+        """Coordinates and velocities of the tree."""
+        q: list[float] = []
+        v: list[float] = []
+        for joint, index in zip(self._mechanism.joints, self._joints, strict=True):
+            if joint.nv == 1:
+                place, rate, *_ = pybullet.getJointState(self._robot, index, physicsClientId=self._client)
+                q, v = [*q, place], [*v, rate]
+            elif joint.nv == 3:
+                turned, rates, *_ = pybullet.getJointStateMultiDof(self._robot, index, physicsClientId=self._client)
+                q, v = [*q, turned[3], *turned[:3]], [*v, *rates]
+        return np.array(q), np.array(v)
+
+    def sample(self) -> Sample:
+        """See :class:`proofroll.core.engine.Engine`; PyBullet's reactions of chains are not those, so none is given."""
+        motion = self._tree.at(*self._state())
+        turned = np.array([to_quaternion(R) for R in motion.R_WB[:-1]])
+        return Sample(motion.p_WB[:-1], motion.v_WB[:-1], motion.w_WB[:-1], turned)
+
+    def built(self) -> MechanismBuilt:
+        """See :class:`proofroll.core.engine.Engine`."""
+        mass, com, inertia = [], [], []
+        for body in self._mechanism.bodies:
+            told = pybullet.getDynamicsInfo(self._robot, self._links[body.name], physicsClientId=self._client)
+            x, y, z, w = told[4]
+            R = from_quaternion((w, x, y, z))
+            mass.append(told[0])
+            com.append(np.array(told[3]) + _joint_of(self._mechanism, body).child_position)
+            inertia.append(R @ np.diag(told[2]) @ R.T)
+        moves = bool(self._mechanism.loops) and bool(np.any(self._mechanism.start()[1]))
+        soft = {name: Regularised(1.0, _ROWS) for name in ("acceleration", "angular_acceleration") if moves}
+        return MechanismBuilt(
+            np.array(mass), np.array(com), np.array(inertia), gravity=gravity_of(self._client), regularised=soft
+        )
+
+
+def urdf(mechanism: Mechanism) -> str:
+    """The bodies and joints as a URDF, whose links have their frames where their joints are, along the bodies' axes."""
+    base = {WORLD: np.zeros(3)} | {
+        body.name: np.array(_joint_of(mechanism, body).child_position) for body in mechanism.bodies
+    }
+    parts = [f'<robot name="mechanism"><link name="{WORLD}"/>']
+    for body in mechanism.bodies:
+        (xx, xy, xz), (_, yy, yz), (_, _, zz) = body.inertia
+        parts.append(
+            f'<link name="{body.name}"><inertial><origin xyz="{_numbers(body.com - base[body.name])}"/>'
+            f'<mass value="{body.mass!r}"/><inertia ixx="{xx!r}" ixy="{xy!r}" ixz="{xz!r}" iyy="{yy!r}" iyz="{yz!r}" '
+            f'izz="{zz!r}"/></inertial></link>'
+        )
+    for joint in mechanism.joints:
+        place = _numbers(joint.position - base[joint.parent])
+        limit = f'<limit lower="{-_LARGE}" upper="{_LARGE}" effort="{_LARGE}" velocity="{_LARGE}"/>'
+        parts.append(
+            f'<joint name="{joint.name}" type="{_TYPES[joint.kind]}"><parent link="{joint.parent}"/>'
+            f'<child link="{joint.child}"/><origin xyz="{place}" rpy="{_numbers(joint.orientation)}"/>'
+            f'<axis xyz="{_numbers(joint.axis)}"/>{limit}</joint>'
+        )
+    return "\n".join([*parts, "</robot>"])
+
+
+def _joint_of(mechanism: Mechanism, body: Body) -> Joint:
+    return next(joint for joint in mechanism.joints if joint.child == body.name)
+
+
+def _numbers(values: Any) -> str:
+    return " ".join(repr(float(value)) for value in values)

@@ -1,0 +1,42 @@
+"""What a user can choose of PyBullet."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from typing import Annotated, ClassVar, Literal
+
+from annotated_types import Gt
+
+
+@dataclass(frozen=True)
+class PybulletSettings:
+    """Settings of PyBullet.
+
+    Attributes:
+        formulation: ``plane``, a ball against a plane posed anew in each step; ``urdf``, a mechanism as a URDF.
+        preset: ``default``: PyBullet's own options and its own step; ``matched``: no damping, slack or bound on spin.
+        dt: step [s].
+        iterations: of the solver of contacts and loops.
+    """
+
+    formulation: Literal["plane", "urdf"] = "plane"
+    preset: Literal["default", "matched"] = "matched"
+    dt: Annotated[float, Gt(0)] = 1e-3
+    iterations: Annotated[int, Gt(0)] = 200
+
+    resolution: ClassVar[str] = "dt"
+
+    @property
+    def order(self) -> int | None:
+        """Of semi-implicit Euler; none is declared where springs and slack of fixed size are in the way."""
+        return 1 if self.preset == "matched" else None
+
+
+PRESETS: Mapping[str, Mapping[str, PybulletSettings]] = {
+    name: {
+        "default": PybulletSettings(name, "default", 1 / 240, 50),
+        "matched": PybulletSettings(name, "matched"),
+    }
+    for name in ("plane", "urdf")
+}
