@@ -4,7 +4,8 @@ from __future__ import annotations
 
 import os
 import sys
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Iterator, Mapping
+from functools import cache
 from pathlib import Path
 from typing import Any
 
@@ -12,6 +13,8 @@ import numpy as np
 import pytest
 from hostile import ENTRY_POINTS
 from hypothesis import HealthCheck, settings
+from no_skips import pytest_make_collect_report, pytest_runtest_makereport  # noqa: F401 -- hooks, which pytest finds here
+from warm_workers import WarmWorkers
 
 from proofroll import cli
 from proofroll.core.scene import Scene
@@ -52,17 +55,49 @@ def scene(request: pytest.FixtureRequest) -> Scene:
     return load_scene(name, **parameters)
 
 
+@pytest.fixture(scope="session")
+def warm_workers() -> Iterator[WarmWorkers]:
+    """The worker processes of this pytest process."""
+    workers = WarmWorkers()
+    yield workers
+    workers.close()
+
+
+@pytest.fixture(autouse=True)
+def share_workers(request: pytest.FixtureRequest, warm_workers: WarmWorkers) -> Iterator[None]:
+    """Tests share worker processes, unless they are about these."""
+    if request.node.get_closest_marker("own_workers"):
+        yield
+    else:
+        with warm_workers.lent():
+            yield
+
+
+@pytest.fixture(scope="session")
+def site_of(tmp_path_factory: pytest.TempPathFactory) -> Callable[[Mapping[str, str]], Path]:
+    """Makes a folder in which engines of ``tests/plugins`` are announced: one for all who want the same ones."""
+
+    @cache
+    def made(engines: frozenset[tuple[str, str]]) -> Path:
+        site = tmp_path_factory.mktemp("site")
+        info = site / "throwaway-1.0.dist-info"
+        info.mkdir()
+        (info / "METADATA").write_text(_METADATA)
+        lines = [f"{name} = {target}" for name, target in sorted(engines)]
+        (info / "entry_points.txt").write_text("\n".join(["[proofroll.engines]", *lines, ""]))
+        return site
+
+    return lambda engines: made(frozenset(engines.items()))
+
+
 @pytest.fixture
-def install_engines(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Callable[[Mapping[str, str]], None]:
+def install_engines(
+    site_of: Callable[[Mapping[str, str]], Path], monkeypatch: pytest.MonkeyPatch
+) -> Callable[[Mapping[str, str]], None]:
     """Announces engines of ``tests/plugins`` as an installed package would, to this process and to its workers."""
 
     def install(engines: Mapping[str, str]) -> None:
-        site = tmp_path / "site"
-        info = site / "throwaway-1.0.dist-info"
-        info.mkdir(parents=True)
-        (info / "METADATA").write_text(_METADATA)
-        lines = [f"{name} = {target}" for name, target in engines.items()]
-        (info / "entry_points.txt").write_text("\n".join(["[proofroll.engines]", *lines, ""]))
+        site = site_of(engines)
         places = [str(site), str(PLUGINS), *filter(None, [os.environ.get("PYTHONPATH")])]
         monkeypatch.setenv("PYTHONPATH", os.pathsep.join(places))
         monkeypatch.syspath_prepend(str(site))

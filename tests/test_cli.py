@@ -461,6 +461,7 @@ def test_describing_an_engine_is_light(engine: str) -> None:
     assert {"xarray", "pandas", "scipy.integrate", "scipy.spatial", "scipy.optimize"} & set(found["modules"]) == set()
 
 
+@pytest.mark.own_workers
 def test_a_run_takes_one_process(proofroll: Proofroll, monkeypatch: pytest.MonkeyPatch) -> None:
     """The process that tells the engine's settings also makes the run: starting another costs as much as both."""
     started = []

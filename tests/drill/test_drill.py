@@ -2,21 +2,26 @@
 
 from __future__ import annotations
 
+import contextlib
 import io
 import json
 import os
+import signal
 import subprocess
 import sys
-from collections.abc import Iterator
+import threading
+from collections.abc import Callable, Iterator
 from pathlib import Path
 
 import pytest
 
 from proofroll.core.plugins import engine_names
 from proofroll.running.case import Case, Result
+from proofroll.running.memory import descendants
 from proofroll.running.store import Store
-from proofroll_drill import engine_faults
+from proofroll_drill import engine_faults, process_faults
 from proofroll_drill.engine_faults import ENGINE_FAULTS, drill_damage, drill_engine, prepare
+from proofroll_drill.faults import within
 from proofroll_drill.row import Drilled, drilled
 from proofroll_drill.site import Site, site
 from proofroll_drill.table import drill_table
@@ -87,6 +92,84 @@ def test_a_half_result_that_is_left(place: tuple[Site, Path], monkeypatch: pytes
     assert not row.contained
     assert "what was said is not one sentence with 'ended well'" in row.problem
     assert "was left in the folder" in row.problem
+
+
+# Run by Python before any program of the drill: takes a safeguard out of proofroll in every process that is started.
+TAKEN_OUT = {
+    "whole files": """
+import contextlib
+import proofroll.files.atomic
+
+@contextlib.contextmanager
+def in_place(path):
+    yield path
+
+proofroll.files.atomic.replacing = in_place
+""",
+    "the watch over the parent": """
+import proofroll.running.ending
+
+proofroll.running.ending.end_with = lambda parent: None
+""",
+    "the end by the system": """
+import proofroll.running.ending
+
+proofroll.running.ending.end_with_pipe = lambda pipe: None
+""",
+}
+
+
+@pytest.mark.parametrize(
+    ("taken_out", "drill", "problem"),
+    [
+        ("whole files", process_faults.drill_storing, "a stored result was lost or changed"),
+        ("the watch over the parent", process_faults.drill_pool, "a process of the pool lives on"),
+        ("the end by the system", process_faults.drill_killed_in_c, "a process of the engine lives on"),
+    ],
+)
+def test_a_safeguard_that_is_taken_out(
+    place: tuple[Site, Path],
+    monkeypatch: pytest.MonkeyPatch,
+    taken_out: str,
+    drill: Callable[[Site, Path], Drilled],
+    problem: str,
+) -> None:
+    """Without whole files, or without what ends a process with its parent, the fault that needs it is not contained."""
+    here, sound = place
+    customised = here.folder / "customised"
+    customised.mkdir(exist_ok=True)
+    (customised / "sitecustomize.py").write_text(TAKEN_OUT[taken_out])
+    monkeypatch.setenv("PYTHONPATH", os.pathsep.join([str(customised), os.environ["PYTHONPATH"]]))
+    monkeypatch.setattr("proofroll_drill.site.GONE", 2.0)
+    try:
+        row = drill(here, sound)
+    finally:
+        _end_what_is_left(here)
+    assert not row.contained
+    assert problem in row.problem
+
+
+def _end_what_is_left(here: Site) -> None:
+    """Ends the processes of a drill that outlived whoever started them."""
+    own = {os.getpid(), *descendants(os.getpid())}
+    for place in Path("/proc").glob("[0-9]*/environ"):
+        with contextlib.suppress(OSError):
+            if int(place.parent.name) not in own and f"={here.folder}\0".encode() in place.read_bytes():
+                os.kill(int(place.parent.name), signal.SIGKILL)
+
+
+def test_a_fault_that_catches_the_drill_itself() -> None:
+    """What hangs or raises in a drill is a row that is not contained, and the others go on."""
+    never = threading.Event()
+    row = within("hangs", never.wait, 0.1)  # type: ignore[arg-type]  # it gives no row
+    assert (row.contained, row.hung, row.problem) == (False, True, "the drill itself hung for 0.1 s")
+    never.set()
+
+    def fails() -> Drilled:
+        raise OSError("no room")
+
+    row = within("fails", fails)
+    assert (row.contained, row.hung, row.said) == (False, False, "OSError: no room")
 
 
 SOUND = {

@@ -2,6 +2,9 @@
 
 from __future__ import annotations
 
+import os
+import sys
+
 import typer
 
 from proofroll.cli.options import CONTRADICTED, OK, Json, progress_bar, write_json
@@ -33,4 +36,7 @@ def faults(as_json: Json = False) -> None:
 
         console().print(drill_table(rows))
         console().print(f"{len(rows)} faults tried, {contained} contained.")
+    if any(row.hung for row in rows):  # to end as usual would wait for the thread that hangs
+        sys.stdout.flush()
+        os._exit(CONTRADICTED)
     raise typer.Exit(OK if contained == len(rows) else CONTRADICTED)

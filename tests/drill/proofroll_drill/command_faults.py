@@ -71,7 +71,7 @@ def drill_interrupt(site: Site, sound: Path) -> Drilled:
         missing=1,
         problems={
             f"the exit code was {ended.code}": ended.code != 130,
-            f"it took {took:.0f} s to end": took > LIMIT / 4,
+            f"it took {took:.0f} s to end": took > LIMIT / 2,
             f"{', '.join(left)} was left in the folder": bool(left),
             "a process of the engine lives on": alive,
         },

@@ -10,12 +10,11 @@ from pathlib import Path
 
 from proofroll.running.case import Case
 from proofroll.running.memory import descendants
+from proofroll_drill import site as site_module
 from proofroll_drill.processes import alive, command, end, run, start, wait_until
 from proofroll_drill.row import Drilled, drilled
 from proofroll_drill.site import BEFORE, SCENE, Site, contents
 
-# How long the processes of a pool may take to end [s].
-_GONE = 10.0
 # Two processes compute for longer than they are left alone, and the first result of theirs is told.
 _MAP = """
 import sys
@@ -106,7 +105,7 @@ def drill_pool(site: Site, sound: Path) -> Drilled:
     wait_until(lambda: begun.exists() or process.poll() is not None)
     pool = descendants(process.pid)
     process.kill()
-    ended = wait_until(lambda: not any(map(alive, pool)), _GONE)
+    ended = wait_until(lambda: not any(map(alive, pool)), site_module.GONE)
     for number in filter(alive, pool):
         os.kill(number, signal.SIGKILL)
     said = end(process).said.partition(":")[0]  # Python may go on about what its processes shared

@@ -21,6 +21,7 @@ class Drilled:
         missing: how many results the next run had to make.
         recomputed: how many it made.
         problem: why it is not contained; empty if it is.
+        hung: whether the drill itself hangs because of it, so that a thread of it may never end.
     """
 
     fault: str
@@ -33,6 +34,7 @@ class Drilled:
     missing: int
     recomputed: int
     problem: str
+    hung: bool = False
 
 
 def drilled(

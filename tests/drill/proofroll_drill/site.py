@@ -34,8 +34,8 @@ HANG = 1.5
 _LIMIT = 60.0
 # Enough for any engine of the drill, start-up included, and little enough that no machine suffers [GB].
 MEMORY = 0.5
-# How long a process that was ended may take to be gone [s].
-_GONE = 5.0
+# How long a process that was ended may take to be gone, on a machine that may have much else to do [s].
+GONE = 60.0
 
 _CLAIM = """
 title = "The drill"
@@ -105,7 +105,7 @@ class Site:
     def alive(self, formulation: str) -> bool:
         """Whether a process in which the fault happened, or a child of it, goes on living."""
         path = self.folder / f"alive-{formulation}"
-        deadline = time.monotonic() + _GONE
+        deadline = time.monotonic() + GONE
         while path.exists():
             with path.open() as file, contextlib.suppress(BlockingIOError):
                 fcntl.flock(file, fcntl.LOCK_EX | fcntl.LOCK_NB)

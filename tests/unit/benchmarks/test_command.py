@@ -17,6 +17,8 @@ Proofroll = Callable[..., tuple[int, str, str]]
 QUICK = ("--rounds", "2", "--seconds", "0.005")
 INTERVAL = {"value", "low", "high", "confidence"}
 
+pytestmark = pytest.mark.own_workers
+
 
 @pytest.fixture
 def proofroll(

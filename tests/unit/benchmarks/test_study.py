@@ -12,6 +12,8 @@ from proofroll.running.runner import Runner
 from proofroll.running.store import Store
 from proofroll_benchmarks.study import account, first_answer
 
+pytestmark = pytest.mark.own_workers
+
 
 def test_shares_add_up() -> None:
     """All causes together, with what no case accounts for, are the whole of wall time × workers."""

@@ -19,7 +19,10 @@ from proofroll.running.case import Status
 from proofroll.running.process import Worker, WorkerDied, end_all
 
 # Where a worker stands is read from /proc; without it memory is not watched either.
-pytestmark = pytest.mark.skipif(not Path("/proc/self/statm").exists(), reason="the system has no /proc")
+pytestmark = [
+    pytest.mark.skipif(not Path("/proc/self/statm").exists(), reason="the system has no /proc"),
+    pytest.mark.own_workers,
+]
 
 HEAD = """
 import json, os, signal, subprocess, sys, time

@@ -20,6 +20,8 @@ from proofroll.running.runner import Runner, WorkerDied, describe, resolve, run_
 from proofroll.running.store import Store
 from proofroll.studies.run_once import single_case
 
+pytestmark = pytest.mark.own_workers
+
 MakeCase = Callable[..., Case]
 
 

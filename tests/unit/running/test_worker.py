@@ -22,6 +22,8 @@ from proofroll.running import identity
 from proofroll.running.case import Case
 
 # A process between the test and the worker, in the middle of a case that hangs.
+pytestmark = pytest.mark.own_workers
+
 PARENT = """
 import json, sys
 from proofroll.running.runner import Worker

@@ -12,6 +12,8 @@ from proofroll.running.store import Store
 from proofroll.running.worker_pool import Workers
 from proofroll.studies.run_once import single_case
 
+pytestmark = pytest.mark.own_workers
+
 ASK = {"do": "resolve", "engine": "truth", "options": {}}
 
 

@@ -1,0 +1,45 @@
+"""Where ``PROOFROLL_NO_SKIPS`` is set, as ``.ci/run`` does, a test that is skipped fails.
+
+A person may lack an engine, heyoka or a browser; where all of them are installed, a skip would hide that one is not.
+A check of conformance that has nothing to look at raises ``unittest.SkipTest`` and stays one.
+"""
+
+from __future__ import annotations
+
+import os
+import unittest
+from collections.abc import Iterator
+from typing import Any
+
+import pytest
+
+VARIABLE = "PROOFROLL_NO_SKIPS"
+# What no installation mends.
+_EXCUSED = ("root may write anywhere", "this system lets nobody mount a small disk", "a plane needs no facets")
+
+
+def _unexcused(report: Any) -> str:
+    """Why something was skipped that should not be; empty if nothing was."""
+    if not os.environ.get(VARIABLE) or report.outcome != "skipped" or hasattr(report, "wasxfail"):
+        return ""
+    reason = str(report.longrepr[2] if isinstance(report.longrepr, tuple) else report.longrepr)
+    return "" if any(text in reason for text in _EXCUSED) else f"{reason} ({VARIABLE} is set, so this is a failure)"
+
+
+@pytest.hookimpl(wrapper=True, tryfirst=True)
+def pytest_runtest_makereport(call: pytest.CallInfo[None]) -> Iterator[None]:
+    """Of a test, or of what it needs."""
+    nothing_to_see = call.excinfo is not None and call.excinfo.errisinstance(unittest.SkipTest)  # pytest replaces it
+    report: Any = yield
+    if not nothing_to_see and (reason := _unexcused(report)):
+        report.outcome, report.longrepr = "failed", reason
+    return report
+
+
+@pytest.hookimpl(wrapper=True)
+def pytest_make_collect_report() -> Iterator[None]:
+    """Of a whole module, by ``importorskip`` at its head."""
+    report: Any = yield
+    if reason := _unexcused(report):
+        report.outcome, report.longrepr = "failed", reason
+    return report

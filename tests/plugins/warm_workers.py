@@ -1,0 +1,77 @@
+"""Worker processes that all tests of a pytest process share: to start one costs more than most of what it is asked.
+
+A worker is lent again where everything is as it was when it started: the engine that it has loaded, the memory that it
+may have, the folder and the environment. Tests of the processes themselves are marked ``own_workers`` and share none.
+"""
+
+from __future__ import annotations
+
+import os
+import threading
+from collections.abc import Iterator
+from contextlib import contextmanager
+from weakref import WeakKeyDictionary
+
+import pytest
+
+from proofroll.running.process import Worker
+from proofroll.running.worker_pool import Workers
+
+# Idle ones that are kept, some hundred MB each; of more, the one that has waited longest is ended.
+_MOST = 8
+# What every test has otherwise, and no worker reads.
+_PASSING = {"PYTEST_CURRENT_TEST", "COLUMNS"}
+
+_Place = tuple[str, float | None, str, frozenset[tuple[str, str]]]
+
+
+class WarmWorkers:
+    """Those that are idle."""
+
+    def __init__(self) -> None:
+        self._lock = threading.Lock()
+        self._idle: list[tuple[_Place, Worker]] = []
+        self._began: WeakKeyDictionary[Worker, _Place] = WeakKeyDictionary()
+
+    @contextmanager
+    def lent(self) -> Iterator[None]:
+        """Meanwhile whoever wants a worker gets one of these, and gives it back instead of ending it."""
+        take = Workers.take
+
+        def warm(workers: Workers, engine: str) -> Worker:
+            environment = frozenset(item for item in os.environ.items() if item[0] not in _PASSING)
+            place = (engine, workers._memory, os.getcwd(), environment)
+            found = None if engine in dict(workers._idle) else self._take(place)
+            worker = found or take(workers, engine)
+            self._began.setdefault(worker, place)
+            return worker
+
+        def give_back(idle: list[tuple[str, Worker]]) -> None:
+            while idle:
+                self._keep(*idle.pop())
+
+        with pytest.MonkeyPatch.context() as patch:
+            patch.setattr(Workers, "take", warm)
+            patch.setattr("proofroll.running.worker_pool._close", give_back)
+            yield
+
+    def _take(self, place: _Place) -> Worker | None:
+        with self._lock:
+            index = next((index for index, (where, _) in enumerate(self._idle) if where == place), None)
+            return None if index is None else self._idle.pop(index)[1]
+
+    def _keep(self, engine: str, worker: Worker) -> None:
+        place = self._began.get(worker)
+        if place is None or place[0] != engine or worker._ended():
+            worker.close()
+            return
+        with self._lock:
+            self._idle.append((place, worker))
+            surplus = [self._idle.pop(0)[1]] if len(self._idle) > _MOST else []
+        for old in surplus:
+            old.close()
+
+    def close(self) -> None:
+        """Ends them."""
+        while self._idle:
+            self._idle.pop()[1].close()
