@@ -97,6 +97,11 @@ formulas `i`.
 ### `[[published]]`
 
 What somebody else found of the same mechanism; it is kept with the scene and moves nothing.
+
+### `unmodelled`
+
+At the top of the file: a list of texts, what the mechanism has besides and nothing here models. The truth and every
+engine refuse the scene and say so.
 """,
     "A comparison: `comparisons/*.toml` without `study`": """### `[vary]`, `[brief]`
 

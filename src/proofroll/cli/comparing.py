@@ -16,6 +16,8 @@ from proofroll.cli.options import (
     Jobs,
     Json,
     Out,
+    Set,
+    assignments,
     complain,
     new_runner,
     progress_bar,
@@ -23,23 +25,31 @@ from proofroll.cli.options import (
 )
 
 if TYPE_CHECKING:
+    from proofroll.core.comparison import Comparison
     from proofroll.running.runner import Runner
     from proofroll.studies.compare import Outcome
 
 
 def compare(
-    comparison: Annotated[str, typer.Argument(help="A comparison file, e.g. comparisons/paper.toml, or its name.")],
+    comparison: Annotated[
+        str,
+        typer.Argument(help="A comparison file, e.g. comparisons/paper.toml, or its name; or a scene, a robot file."),
+    ],
     engine: Engines = None,
+    settings: Set = None,
     out: Out = Path("out"),
     fresh: Fresh = False,
     jobs: Jobs = None,
     as_json: Json = False,
 ) -> None:
-    """Hold the engines of a comparison file against the truth; exit 1 if a verdict contradicts the file."""
-    from proofroll.files.comparison_file import load_comparison
+    """Hold the engines of a comparison file against the truth; exit 1 if a verdict contradicts the file.
+
+    Of a scene or a robot file every formulation that can represent it is run, and nothing is claimed. --set is for
+    these.
+    """
     from proofroll.report.comparison_content import outcome_content
 
-    loaded = load_comparison(comparison)
+    loaded = _asked(comparison, assignments(settings or []))
     outcomes = outcomes_of([loaded], engine or [], new_runner(out, fresh, jobs))
     content = outcome_content(outcomes[0])
     if as_json:
@@ -47,6 +57,27 @@ def compare(
     else:
         print_outcome(content)
     raise typer.Exit(exit_code(outcomes))
+
+
+def _asked(name: str, parameters: dict[str, str]) -> Comparison:
+    """The comparison of this name, or that of a scene about which no file says anything.
+
+    Raises:
+        InputError: there is neither, or parameters are set of a comparison, which has its own.
+    """
+    from proofroll.core.errors import InputError
+    from proofroll.files.comparison_file import load_comparison
+    from proofroll.files.scene_file import is_scene
+    from proofroll.files.scene_sources import source_of
+    from proofroll.files.toml import named_file
+
+    if source_of(name) is not None or (named_file(name) is None and is_scene(name)):
+        from proofroll.studies.first_look import compared
+
+        return compared(name, parameters)
+    if parameters:
+        raise InputError("--set", next(iter(parameters)), "a comparison file has its own points; name a scene instead")
+    return load_comparison(name)
 
 
 def outcomes_of(comparisons: list[Any], engines: list[str], runner: Runner, stage: str = "") -> list[Outcome]:

@@ -12,7 +12,6 @@ from typing import TYPE_CHECKING, Annotated
 import typer
 
 from proofroll.core.errors import InputError
-from proofroll.core.observable import Role
 
 if TYPE_CHECKING:
     from proofroll.core.scene import Scene
@@ -89,22 +88,22 @@ def _say(path: Path, *commands: str) -> None:
 
 def _comparison(name: str, where: str, loaded: Scene) -> str:
     """The text of a comparison file: one percent of what moves, for each engine that can."""
-    from proofroll.core.plugins import engine_names
+    from proofroll.studies.first_look import able, bounds
 
-    moves = [item for item in loaded.observables.items() if item[1].headline and item[1].role is Role.MOTION]
-    moves = moves or [(loaded.deciding, loaded.observable(loaded.deciding))]
-    bounds = "".join(
-        f'{_quoted(name)} = "{"1 %" if item.floor is not None else f"1e-3 {item.unit}"}"\n' for name, item in moves
+    lines = (
+        f'{_quoted(key)} = "{100 * item.value:g} %"\n'
+        if item.relative
+        else f'{_quoted(key)} = "{item.value:g} {item.unit}"\n'
+        for key, item in bounds(loaded).items()
     )
-    able = [found for engine in engine_names() if (found := _able(engine, loaded))]
-    rows = "".join(f'\n[[rows]]\nengine = "{text}"\ntolerance = "close"\n' for text in able)
+    rows = "".join(f'\n[[rows]]\nengine = "{text}"\ntolerance = "close"\n' for text in able(loaded, first=True))
     return (
         f'title = "{name}"\nquestion = "Which engines agree with the truth?"\nscene = {_quoted(where)}\n'
         f"until = {_UNTIL}\nevery = {_EVERY}\n\n"
         "# Every combination of these values is run: [vary], then parameter = [value, value].\n\n"
         "# How far an observable may be from the truth, and why. Every key is described in docs/vocabulary.md.\n"
         f'[tolerances.close]\nbecause = "a first look; say here why this is close enough"\n'
-        f"{bounds}\n"
+        f"{''.join(lines)}\n"
         '# What is expected of each engine: expect = "agrees" unless it says another verdict, and because.\n' + rows
     )
 
@@ -113,16 +112,3 @@ def _quoted(text: str) -> str:
     import json
 
     return json.dumps(text)
-
-
-def _able(engine: str, loaded: Scene) -> str | None:
-    """The engine with its first formulation that can represent the scene, as files write it; None if none can."""
-    from proofroll.core.errors import ProofrollError
-    from proofroll.running.runner import describe
-
-    try:
-        provides = describe(engine)["provides"]
-    except ProofrollError:
-        return None
-    first = next((name for name, given in provides.items() if loaded.requires <= set(given)), None)
-    return first and f"{engine}[formulation={first}]"

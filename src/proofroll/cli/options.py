@@ -29,7 +29,7 @@ Out = Annotated[Path, typer.Option("--out", help="Folder for results; what is th
 Fresh = Annotated[bool, typer.Option("--fresh", help="Run every case again, whatever is stored.")]
 Jobs = Annotated[int | None, typer.Option("--jobs", min=1, help="Workers at once; by default one per core.")]
 Engines = Annotated[list[str] | None, typer.Option("--engine", help="Restrict to an engine; may be repeated.")]
-SceneName = Annotated[str, typer.Argument(help="Name of a scene, or path of a folder with a scene.toml.")]
+SceneName = Annotated[str, typer.Argument(help="A scene: its name, a folder with a scene.toml, or a robot file.")]
 Set = Annotated[list[str] | None, typer.Option("--set", help="parameter=value in SI units; repeat.")]
 
 

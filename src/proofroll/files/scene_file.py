@@ -1,4 +1,7 @@
-"""Reads ``models/<scene>/scene.toml`` into a :class:`~proofroll.core.scene.Scene`, with the user's parameters set."""
+"""Reads ``models/<scene>/scene.toml`` into a :class:`~proofroll.core.scene.Scene`, with the user's parameters set.
+
+A file of another format that somebody reads (:mod:`proofroll.files.scene_sources`), a robot's, is a scene likewise.
+"""
 
 from __future__ import annotations
 
@@ -18,6 +21,7 @@ from proofroll.core.numbers import Numbers
 from proofroll.core.plugins import load_element_kinds
 from proofroll.core.scene import Scene
 from proofroll.files.data_folders import data_folder
+from proofroll.files.scene_sources import source_of
 from proofroll.files.toml import read_toml
 from proofroll.files.validation import strict, units_of, validated
 
@@ -106,12 +110,26 @@ def read_scene_file(name: str) -> SceneFile:
     """The scene's file, checked against the vocabulary.
 
     Args:
-        name: a folder under ``models/``, or the path of a folder that holds a ``scene.toml``.
+        name: a folder under ``models/``, or the path of a folder that holds a ``scene.toml``, or of a robot's file.
 
     Raises:
         InputError: there is no such scene, or its file is broken.
     """
-    return _parse(scene_folder(name) / "scene.toml")
+    return _read(name, {})[0]
+
+
+def _read(name: str, given: Mapping[str, object]) -> tuple[SceneFile, dict[str, float], Path]:
+    """The scene's file, the value of each parameter, and where the file is."""
+    other = source_of(name)
+    if other is None:
+        path = scene_folder(name) / "scene.toml"
+        file = _parse(path)
+        return file, _values(file, given), path
+    source, path = other
+    file = _checked({"gravity": {}, **source.content(path)}, path)
+    values = _values(file, given)
+    tables = dict(source.tables(path, values))
+    return dataclasses.replace(file, gravity=tables.pop("gravity"), tables=tables), values, path
 
 
 def scene_folder(name: str) -> Path:
@@ -129,11 +147,19 @@ def scene_folder(name: str) -> Path:
     raise InputError("scene", name, f"there is no such scene; choose one of {', '.join(scene_names())}")
 
 
+def is_scene(name: str) -> bool:
+    """Whether a scene or a file that holds one has this name; it may be broken."""
+    try:
+        return source_of(name) is not None or bool(scene_folder(name))
+    except InputError:
+        return False
+
+
 def load_scene(name: str, /, *, asks: Any = (), **parameters: float) -> Scene:
     """The scene with some of its parameters set, SI units.
 
     Args:
-        name: a folder under ``models/``, e.g. ``sphere_in_cylinder``, or the path of such a folder.
+        name: a folder under ``models/``, e.g. ``sphere_in_cylinder``, or a path: of such a folder, of a robot's file.
         asks: names of what is wanted besides the motion and what the scene's own file asks for, e.g.
             ``("orientation",)``. (Typed as Any, for type checkers would not let numbers be unpacked beside it.)
         **parameters: e.g. ``speed=3.3``; see ``proofroll scenes``.
@@ -141,18 +167,17 @@ def load_scene(name: str, /, *, asks: Any = (), **parameters: float) -> Scene:
     Raises:
         InputError: unknown scene or parameter, or a value that makes no sense; or nothing of that name can be asked.
     """
-    folder = scene_folder(name)
-    file = _parse(folder / "scene.toml")
-    values = _values(file, parameters)
-    where = str(folder / "scene.toml")
+    file, values, path = _read(name, parameters)
+    own = path.name == "scene.toml"
+    where = str(path)
     numbers = Numbers(values, {name: item.unit for name, item in file.parameters.items()})
     gravity = {"gravity": numbers.filled(file.gravity, f"{where}: gravity", units_of(Gravity))}
     return Scene(
-        name=folder.name,
+        name=path.parent.name if own else path.stem,
         title=file.title,
         elements=_elements(file.tables, validated(_GravityTable, gravity, where).gravity, numbers, where),
         parameters=values,
-        folder=folder,
+        folder=path.parent if own else Path(),
         asks=tuple(dict.fromkeys([*file.asks, *_names(asks)])),
     )
 
@@ -188,7 +213,11 @@ def _names(asks: object) -> list[str]:
 
 
 def _parse(path: Path) -> SceneFile:
-    content = read_toml(path)
+    return _checked(read_toml(path), path)
+
+
+def _checked(content: Mapping[str, Any], path: Path) -> SceneFile:
+    """The content of a file with all that can be said without the values of parameters."""
     own = {key: value for key, value in content.items() if key in _OWN}
     tables = {key: value for key, value in content.items() if key not in _OWN}
     file = validated(SceneFile, own | {"tables": tables}, str(path))

@@ -8,6 +8,7 @@ from typing import Any
 from rich.table import Table
 from rich.text import Text
 
+from proofroll.core.verdict import Verdict
 from proofroll.report.labels import SYMBOLS, caveat_lines, headlines, names, verdict_text
 from proofroll.report.screen import Screen
 from proofroll.report.study_parts import further, part_kinds
@@ -106,7 +107,7 @@ def closing_lines(content: dict[str, Any]) -> list[str]:
             f"{len(content['contradictions'])} findings contradict what {content['name']} expects (!! above); first:"
         )
         lines += [f"  {sentence}" for sentence in content["contradictions"][:5]]
-    else:
+    elif any(len(row["expected"]) < len(Verdict) for row in rows):  # else nothing is claimed
         lines.append("Every verdict is as the comparison file expects.")
     return [*lines, *caveat_lines(content["rows"])]
 

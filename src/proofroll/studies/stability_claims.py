@@ -11,11 +11,12 @@ from pydantic import ConfigDict, TypeAdapter, ValidationError
 
 from proofroll.core.errors import InputError
 from proofroll.core.plugins import parse_engine
-from proofroll.files.scene_file import load_scene
+from proofroll.files.scene_file import load_scene, read_scene_file
 from proofroll.files.toml import read_toml, study_files
 from proofroll.files.validation import first_problem
 from proofroll.studies.axes import Axis, Term
 from proofroll.studies.failure import meanings
+from proofroll.studies.first_look import axes_of
 from proofroll.studies.stability_content import dependence
 from proofroll.studies.step_numbers import step_numbers
 
@@ -150,19 +151,18 @@ class StabilityFile:
 
 
 def file_for(scene: str) -> StabilityFile:
-    """The file about a scene, or the file at a path that ends in ``.toml``.
+    """The file about a scene, or the file at a path that ends in ``.toml``; without one its parameters are the axes.
 
     Raises:
-        InputError: there is none, or it is broken.
+        InputError: there is no such scene, or the file is broken.
     """
     if scene.endswith(".toml"):
         return _load(Path(scene))
     for path, content in study_files(STUDY):
         if content.get("scene") == scene:
             return _load(path)
-    load_scene(scene)
-    advice = f'no file under comparisons/ has study = "{STUDY}" and this scene; write one, or give the path of yours'
-    raise InputError("scene", scene, advice)
+    question = "Up to which step or tolerance is each engine stable, and up to which is it right to 1 %?"
+    return StabilityFile(Path(scene).stem, read_scene_file(scene).title, question, scene, axes_of(scene))
 
 
 def _load(path: Path) -> StabilityFile:

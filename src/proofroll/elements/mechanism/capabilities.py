@@ -47,10 +47,11 @@ ALL_LOOPS = frozenset(item for item in MechanismCapability if item.name.endswith
 FORCES = frozenset({MechanismCapability.SPRINGS, MechanismCapability.JOINT_SPRINGS})
 
 
-def required(mechanism: Mechanism) -> frozenset[MechanismCapability]:
+def required(mechanism: Mechanism) -> frozenset[str]:
     """What a mechanism asks of a formulation; redundancy of its rows, which is found by analysis, is not among it."""
     capability = MechanismCapability
-    needs = {capability[joint.kind.upper()] for joint in mechanism.joints}
+    needs: set[str] = {*mechanism.unmodelled}
+    needs |= {capability[joint.kind.upper()] for joint in mechanism.joints}
     needs |= {capability[f"{loop.kind.upper()}_LOOP"] for loop in mechanism.loops}
     if mechanism.springs:
         needs.add(capability.SPRINGS)

@@ -160,7 +160,7 @@ class JointCoordinates:
             "v": v,
             "wrench": wrench,
             "points": np.array(points).reshape(-1, 3),
-            "energy": self._energy(motion, q),
+            "energy": self._energy(motion, q) + float(0.5 * v @ self._armature @ v),
             "residual": np.array(largest),
         }
 

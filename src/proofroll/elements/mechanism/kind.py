@@ -17,7 +17,16 @@ class MechanismKind:
     """See :class:`proofroll.core.element.ElementKind`."""
 
     name: ClassVar[str] = "mechanism"
-    tables: ClassVar[tuple[str, ...]] = ("bodies", "joints", "loops", "springs", "points", "repeat", "published")
+    tables: ClassVar[tuple[str, ...]] = (
+        "bodies",
+        "joints",
+        "loops",
+        "springs",
+        "points",
+        "repeat",
+        "published",
+        "unmodelled",
+    )
     units: ClassVar[Mapping[str, str]] = {
         "inertia": "kg m^2",
         "stiffness": "N/m",

@@ -34,6 +34,7 @@ class Mechanism:
         joints: sorted depth-first from the world, whatever order is given; q and v have this order.
         loops, springs, points: in the order of the scene.
         gravity: acceleration in the world's axes, m/s².
+        unmodelled: what else its source has, in a few words each; every route and engine refuses it.
     """
 
     bodies: tuple[Body, ...]
@@ -42,11 +43,13 @@ class Mechanism:
     springs: tuple[Spring, ...] = ()
     points: tuple[Point, ...] = ()
     gravity: Vector = (0.0, 0.0, -9.81)
+    unmodelled: tuple[str, ...] = ()
 
     def __post_init__(self) -> None:
         for key in ("bodies", "joints", "loops", "springs", "points"):
             checks.assign(self, **{key: tuple(getattr(self, key))})
             _check_unique(key, getattr(self, key))
+        checks.assign(self, unmodelled=tuple(self.unmodelled))
         _check_unique("loops", self.joints + self.loops)  # results name both alike
         names = {WORLD, *(body.name for body in self.bodies)}
         for item in self.joints + self.loops + self.springs + self.points:

@@ -40,7 +40,7 @@ def made_mechanism(content: Mapping[str, Any], gravity: checks.Vector, values: M
     """The mechanism of a scene file, its loops closed, able to move.
 
     Args:
-        content: the tables bodies, joints, loops, springs, points and repeat.
+        content: the tables bodies, joints, loops, springs, points and repeat, and the list of texts unmodelled.
         gravity: acceleration in the world's axes [m/s²].
         values: the parameters.
 
@@ -58,7 +58,7 @@ def made_mechanism(content: Mapping[str, Any], gravity: checks.Vector, values: M
     made = {kind: tuple(_made(KINDS[kind], field, table) for field, table in tables[kind]) for kind in KINDS}
     if not made["bodies"]:
         raise InputError("bodies", "none", "a mechanism needs a body; add a [[bodies]] table")
-    mechanism = Mechanism(gravity=gravity, **made)
+    mechanism = Mechanism(gravity=gravity, unmodelled=_texts(content, "unmodelled"), **made)
     names = {joint.name for joint, follows in zip(made["joints"], dependent, strict=True) if follows}
     mechanism = assembled(mechanism, names)
     check_start(mechanism)
@@ -138,3 +138,10 @@ def _tables(content: Mapping[str, Any], key: str) -> list[Any]:
     if not isinstance(tables, list):
         raise InputError(key, tables, f"give a list of tables, [[{key}]]")
     return tables
+
+
+def _texts(content: Mapping[str, Any], key: str) -> tuple[str, ...]:
+    texts = content.get(key, [])
+    if not isinstance(texts, list) or not all(isinstance(text, str) for text in texts):
+        raise InputError(key, texts, "give a list of texts")
+    return tuple(texts)

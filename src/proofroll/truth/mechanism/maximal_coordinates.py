@@ -7,6 +7,7 @@ heyoka is absent.
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Any
 
@@ -21,7 +22,7 @@ from proofroll.elements.mechanism.record import Record, gathered
 from proofroll.elements.mechanism.rotations import Array
 from proofroll.elements.mechanism.stepping import integrated
 from proofroll.truth.mechanism.maximal_bodies import View
-from proofroll.truth.mechanism.maximal_equations import Connection, Equations, MaximalEquations
+from proofroll.truth.mechanism.maximal_equations import Connection, Equations, MaximalEquations, Row
 from proofroll.truth.mechanism.maximal_taylor import Taylor
 
 RANK = 1e-8  # see analysis.RANK; this route finds its own rank
@@ -45,15 +46,16 @@ class Numbers:
 
     def __init__(self, equations: MaximalEquations) -> None:
         self.equations = equations
-        self._half = np.linalg.cholesky(equations.inverse_mass)
+        self._mass = np.linalg.inv(equations.inverse_mass)
+        self._inverse_root = np.linalg.cholesky(equations.inverse_mass)
         start = self.equations.start()
-        C = self._matrix(self.equations.at(start.tolist()))
-        values = np.linalg.svd(C @ self._half, compute_uv=False) if C.size else np.zeros(0)
+        C = self._matrix(self.equations.at(start.tolist()).rows)
+        values = np.linalg.svd(C @ self._inverse_root, compute_uv=False) if C.size else np.zeros(0)
         self.rank = int((values > RANK * values.max(initial=0.0)).sum())
 
     def independent_rows(self) -> list[int]:
         """Numbers of as many rows as the rank, the most independent ones at the start."""
-        C = self._matrix(self.equations.at(self.equations.start().tolist())) @ self._half
+        C = self._matrix(self.equations.at(self.equations.start().tolist()).rows) @ self._inverse_root
         if not C.size:
             return []
         return sorted(qr(C.T, mode="r", pivoting=True)[1][: self.rank].tolist())
@@ -61,8 +63,13 @@ class Numbers:
     def solve(self, state: Array) -> Solved:
         """Accelerations and multipliers, the smallest where rows depend on each other."""
         found = self.equations.at(state.tolist())
-        C, half = self._matrix(found), self._half
-        free = half.T @ np.array(found.force, dtype=float)
+        C, half, force = self._matrix(found.rows), self._inverse_root, np.array(found.force, dtype=float)
+        if found.drives:
+            G = self._matrix([drive.row for drive in found.drives])
+            inertia = np.array([drive.inertia for drive in found.drives])
+            half = np.linalg.inv(np.linalg.cholesky(self._mass + (G.T * inertia) @ G)).T
+            force = force - G.T @ (inertia * np.array([drive.row.bias for drive in found.drives], dtype=float))
+        free = half.T @ force
         residual = np.array([row.residual for row in found.rows], dtype=float)
         if not self.rank:
             return Solved(
@@ -105,9 +112,9 @@ class Numbers:
         u -= found.into @ (found.back @ (found.C @ u))
         return self.normalised(state)
 
-    def _matrix(self, found: Equations) -> Array:
-        C = np.zeros((len(found.rows), self.equations.nu))
-        for number, row in enumerate(found.rows):
+    def _matrix(self, rows: Sequence[Row]) -> Array:
+        C = np.zeros((len(rows), self.equations.nu))
+        for number, row in enumerate(rows):
             for place, value in row.coefficients.items():
                 C[number, place] = value
         return C
@@ -124,6 +131,7 @@ class MaximalCoordinates:
         self.mechanism = mechanism
         self.lean = Numbers(MaximalEquations(mechanism, allow_planar=True))
         self._whole = Numbers(MaximalEquations(mechanism, allow_planar=False))
+        self._armature = np.array([joint.armature for joint in mechanism.joints for _ in range(joint.nv)])
         self._compiled: dict[bool, Taylor] = {}
 
     def taylor(self, long_double: bool = False) -> Taylor:
@@ -177,7 +185,7 @@ class MaximalCoordinates:
             "v": v,
             "wrench": self._wrenches(found),
             "points": np.array([self._point(views, p.body, p.position) for p in self.mechanism.points]).reshape(-1, 3),
-            "energy": self._energy(views, state[lean.nx + lean.nu :]),
+            "energy": self._energy(views, state[lean.nx + lean.nu :]) + float(0.5 * self._armature @ v**2),
             "residual": np.array([np.abs(found.residual).max(initial=0.0), np.abs(found.C @ u).max(initial=0.0)]),
         }
 
@@ -195,6 +203,9 @@ class MaximalCoordinates:
         wrenches = np.zeros((len(self._whole.equations.connections), 6))
         for row, multiplier in zip(found.equations.rows, found.multipliers, strict=True):
             wrenches[row.connection] += multiplier * np.array([*row.force, *row.torque])
+        for row, inertia in found.equations.drives:
+            rate = sum(value * found.acceleration[k] for k, value in row.coefficients.items()) + row.bias
+            wrenches[row.connection] -= inertia * rate * np.array([*row.force, *row.torque])
         for number, (force, moment) in enumerate(found.equations.laws):
             wrenches[number] += np.array([*force, *moment])
         return wrenches

@@ -9,7 +9,7 @@ import math
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from itertools import pairwise
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 
@@ -65,11 +65,19 @@ class Row:
     torque: Sequence[Scalar]
 
 
+class Drive(NamedTuple):
+    """The armature of a joint whose rate is Σ coefficient·u of the row: λ = −inertia·(Σ coefficient·u̇ + bias)."""
+
+    row: Row
+    inertia: float
+
+
 @dataclass(frozen=True)
 class Equations:
     """M u̇ = force + Cᵀλ, C u̇ + bias = 0, and the rates of coordinates and of angles that springs remember.
 
-    ``laws``: force and moment of each joint's own spring, damper and drive on its child, at the joint, world axes.
+    ``drives``: the armature of joints. ``laws``: force and moment of each joint's own spring, damper and drive on its
+    child, at the joint, world axes.
     """
 
     rows: list[Row]
@@ -78,13 +86,14 @@ class Equations:
     angle_rate: list[Scalar]
     views: list[View]
     laws: list[tuple[list[Scalar], list[Scalar]]]
+    drives: list[Drive]
 
 
 class MaximalEquations:
     """The mechanism as bodies, connections and springs.
 
     Args:
-        mechanism: any without dry friction, armature, and bodies without mass.
+        mechanism: any without dry friction and bodies without mass.
         allow_planar: give bodies of plane mechanisms three coordinates; their rows are those within the plane.
 
     Raises:
@@ -93,8 +102,8 @@ class MaximalEquations:
 
     def __init__(self, mechanism: Mechanism, allow_planar: bool) -> None:
         for joint in mechanism.joints:
-            if joint.friction or joint.armature:
-                raise Refused(f"joint {joint.name} has dry friction or armature; maximal coordinates have neither")
+            if joint.friction:
+                raise Refused(f"joint {joint.name} has dry friction; no route of the truth follows its switching")
         for body in mechanism.bodies:
             if np.linalg.eigvalsh(body.inertia)[0] <= 0:
                 raise Refused(f"body {body.name} has a moment of inertia of zero; maximal coordinates divide by it")
@@ -169,7 +178,12 @@ class MaximalEquations:
                 pull = add(pull, mul(spring.damping, dot(slide, d) / (length * length)))
             self._apply(force, views, a, scaled(pull, d), arm_a)
             self._apply(force, views, b, scaled(-1.0, scaled(pull, d)), arm_b)
-        return Equations(rows, force, rate, angle_rate, views, laws)
+        drives = [
+            Drive(self._rate_row(number, joint.kind, views), float(joint.armature))
+            for number, joint in enumerate(self.mechanism.joints)
+            if joint.armature
+        ]
+        return Equations(rows, force, rate, angle_rate, views, laws, drives)
 
     def _connection(
         self, kind: str, a: str, b: str, at_a: Sequence[float], at_b: Sequence[float], frame_a: Array, frame_b: Array
@@ -203,20 +217,16 @@ class MaximalEquations:
         arm_a, arm_b = turned(a.R, c.place_a), turned(b.R, c.place_b)
         d = minus(plus(b.r, arm_b), plus(a.r, arm_a))
         towards = minus(cross(b.w, cross(b.w, arm_b)), cross(a.w, cross(a.w, arm_a)))
-        slide = minus(_speed(b, arm_b), _speed(a, arm_a))
         rows = []
         facts = FACTS[c.kind]
         for k in facts.translations:
-            if len(facts.translations) == 3:  # along the world's axes
-                n: Sequence[Scalar] = _AXES[k]
-                bias, lever = dot(n, towards), arm_a
-            else:  # along axes that turn with a
-                n = A[k]
-                n_rate = cross(a.w, n)
-                bias = add(dot(n, towards), mul(2.0, dot(n_rate, slide)), dot(cross(a.w, n_rate), d))
-                lever = plus(arm_a, d)
-            on_b, on_a = cross(arm_b, n), scaled(-1.0, cross(lever, n))
-            rows.append(self._row(number, views, dot(n, d), bias, (n, on_b), (scaled(-1.0, n), on_a), (n, _NONE)))
+            if len(facts.translations) < 3:
+                rows.append(self._sliding(number, views, A[k]))
+                continue
+            n: Sequence[Scalar] = _AXES[k]  # along the world's axes
+            on_b, on_a = cross(arm_b, n), scaled(-1.0, cross(arm_a, n))
+            given = ((n, on_b), (scaled(-1.0, n), on_a), (n, _NONE))
+            rows.append(self._row(number, views, dot(n, d), dot(n, towards), *given))
         for k, m in facts.rotations:
             x, y = A[k], B[m]
             t = cross(y, x)
@@ -225,6 +235,30 @@ class MaximalEquations:
             back = scaled(-1.0, t)
             rows.append(self._row(number, views, dot(x, y), bias, (_NONE, t), (_NONE, back), (_NONE, t)))
         return rows
+
+    def _rate_row(self, number: int, kind: str, views: list[View]) -> Row:
+        """The rate of a revolute or prismatic joint's coordinate as a row; its wrench acts along the coordinate."""
+        c = self.connections[number]
+        a, b = views[c.a], views[c.b]
+        axis = _columns(product(a.R, c.frame_a))[2]
+        back = scaled(-1.0, axis)
+        if kind == "revolute":
+            bias = dot(cross(a.w, axis), minus(b.w, a.w))
+            return self._row(number, views, 0.0, bias, (_NONE, axis), (_NONE, back), (_NONE, axis))
+        return self._sliding(number, views, axis)
+
+    def _sliding(self, number: int, views: list[View], n: Sequence[Scalar]) -> Row:
+        """How far two points are apart along an axis that turns with body a, as a row."""
+        c = self.connections[number]
+        a, b = views[c.a], views[c.b]
+        arm_a, arm_b = turned(a.R, c.place_a), turned(b.R, c.place_b)
+        d = minus(plus(b.r, arm_b), plus(a.r, arm_a))
+        towards = minus(cross(b.w, cross(b.w, arm_b)), cross(a.w, cross(a.w, arm_a)))
+        slide = minus(_speed(b, arm_b), _speed(a, arm_a))
+        n_rate = cross(a.w, n)
+        bias = add(dot(n, towards), mul(2.0, dot(n_rate, slide)), dot(cross(a.w, n_rate), d))
+        on_b, on_a = cross(arm_b, n), scaled(-1.0, cross(plus(arm_a, d), n))
+        return self._row(number, views, dot(n, d), bias, (n, on_b), (scaled(-1.0, n), on_a), (n, _NONE))
 
     def _row(
         self,

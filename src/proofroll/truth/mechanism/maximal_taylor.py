@@ -22,6 +22,11 @@ except ImportError:  # no wheel for this platform
     heyoka = None
 
 
+# States of a system whose compilation is optimised; measured on trees of bodies in space, thirteen states each: seven
+# bodies compile in 0.6 s of processor time, or optimised in 4 s, and run for a second of motion in 0.2 s or 0.08 s.
+_SMALL = 60
+
+
 class Taylor:
     """A compiled integrator of a mechanism; it starts anew on every run.
 
@@ -48,6 +53,8 @@ class Taylor:
             self._start,
             fp_type=self._number,
             compact_mode=True,
+            # optimising a large system costs ten times what it saves
+            opt_level=3 if len(state) <= _SMALL else 0,
         )
 
     def run(self, times: Array) -> Array:
@@ -69,7 +76,11 @@ class Taylor:
 
 
 def accelerations(equations: MaximalEquations, found: Equations, rows: Sequence[Row]) -> list[Scalar]:
-    """u̇ = M⁻¹(force + Cᵀλ), λ from (C M⁻¹ Cᵀ) λ = −bias − C M⁻¹ force, solved sparsely in the scalars themselves."""
+    """u̇ = M⁻¹(force + Cᵀλ), λ from (C M⁻¹ Cᵀ) λ = −bias − C M⁻¹ force, solved sparsely in the scalars themselves.
+
+    A drive is one row more, which yields by λ/inertia.
+    """
+    rows = [*rows, *(drive.row for drive in found.drives)]
     inverse = equations.inverse_mass
     blocks = [[(k, float(inverse[i, k])) for k in np.flatnonzero(inverse[i]).tolist()] for i in range(equations.nu)]
     free = [add(*(mul(value, found.force[k]) for k, value in block)) for block in blocks]
@@ -82,6 +93,8 @@ def accelerations(equations: MaximalEquations, found: Equations, rows: Sequence[
             shared = touching[i] & rows[j].coefficients.keys()
             if shared:
                 A[i, j] = add(*(mul(weighted[i][k], rows[j].coefficients[k]) for k in sorted(shared)))
+    for i, drive in enumerate(found.drives, m - len(found.drives)):
+        A[i, i] = add(A[i, i], 1.0 / drive.inertia)
     right = [
         sub(sub(0.0, row.bias), add(*(mul(value, free[k]) for k, value in row.coefficients.items()))) for row in rows
     ]

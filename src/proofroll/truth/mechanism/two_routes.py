@@ -63,6 +63,8 @@ def find_truth(mechanism: Mechanism, times: Array, tolerance: float = 1e-14) -> 
     Raises:
         Refused: fewer than two routes cover the mechanism; the text says why.
     """
+    if mechanism.unmodelled:
+        raise Refused(f"no route of the truth has {', '.join(mechanism.unmodelled)}")
     times = np.asarray(times, dtype=float)
     found, form = analysed(mechanism), closed_form(mechanism)
     first = JointCoordinates(mechanism, found.rank)

@@ -1,0 +1,57 @@
+"""Files of other formats that hold a scene; who reads them is announced by entry points ``proofroll.scene_sources``."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from functools import cache
+from importlib.metadata import entry_points
+from pathlib import Path
+from typing import Any, ClassVar, Protocol
+
+GROUP = "proofroll.scene_sources"
+
+
+class SceneSource(Protocol):
+    """Reads files of a format as scenes.
+
+    Attributes:
+        endings: of the files that it reads, with the dot, in small letters.
+    """
+
+    endings: ClassVar[tuple[str, ...]]
+
+    @staticmethod
+    def content(path: Path) -> Mapping[str, Any]:
+        """What a ``scene.toml`` would say of the scene: title, source, parameters, reason, duration.
+
+        Raises:
+            InputError: the file is broken; the first thing that is wrong with it.
+        """
+
+    @staticmethod
+    def tables(path: Path, values: Mapping[str, float]) -> Mapping[str, Any]:
+        """The tables of a ``scene.toml``, gravity among them, with numbers in place of parameters.
+
+        Args:
+            path: of the file.
+            values: of its parameters.
+
+        Raises:
+            InputError: no scene has what the file says with these parameters.
+        """
+
+
+def source_of(name: str) -> tuple[type[SceneSource], Path] | None:
+    """Who reads the file of this name, and the file; None: it is none of another format."""
+    path = Path(name)
+    source = _sources().get(path.suffix.lower())
+    try:
+        return (source, path) if source is not None and path.is_file() else None
+    except (OSError, ValueError):  # too long for a file system, or a zero byte
+        return None
+
+
+@cache
+def _sources() -> dict[str, type[SceneSource]]:
+    found = (point.load() for point in entry_points(group=GROUP))
+    return {ending: source for source in found for ending in source.endings}

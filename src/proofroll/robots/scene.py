@@ -1,0 +1,187 @@
+"""A robot file as a scene: its tree of links, released from a random pose, passive, under gravity.
+
+Links that fixed joints hold together are one body, in the frame of the link that the moving joint carries. What moves
+nothing by itself (actuators, contacts, looks) is left out.
+"""
+
+from __future__ import annotations
+
+import tempfile
+from collections.abc import Iterator, Mapping
+from functools import lru_cache
+from pathlib import Path
+from typing import Any, ClassVar
+from xml.etree.ElementTree import Element, tostring
+
+import numpy as np
+from scipy.spatial.transform import Rotation
+
+from proofroll.core.errors import InputError
+from proofroll.elements.mechanism.rotations import to_rpy
+from proofroll.robots.judging import TIME_LIMIT, meaning
+from proofroll.robots.model import WORLD, Array, Joint, Robot
+from proofroll.robots.reading import write
+from proofroll.robots.robot_file import BASES, RobotFile, open_robot
+from proofroll.robots.states import States, random_states
+
+_DURATION = 1.0  # s: an arm falls through much of its reach, and few are chaotic so early
+# Parameters: default, unit, meaning, bounds.
+_RELEASE: dict[str, tuple[float, str, str, dict[str, Any]]] = {
+    "seed": (0, "1", "which random pose and velocities the robot is released with", {"at_least": 0, "integer": True}),
+    "speed": (1.0, "1", "largest random velocity of a joint in rad/s or m/s", {"at_least": 0}),
+}
+_SWITCH: dict[str, Any] = {"at_least": 0, "at_most": 1, "integer": True}
+_FACTORS = {
+    "damping": "damping of the joints in parts of the file's",
+    "friction": "dry friction of the joints in parts of the file's",
+    "armature": "armature of the joints in parts of the file's",
+    "stiffness": "stiffness of the joints in parts of the file's",
+}
+
+
+class RobotScenes:
+    """See :class:`proofroll.files.scene_sources.SceneSource`."""
+
+    endings: ClassVar[tuple[str, ...]] = (".urdf", ".xml")
+
+    @staticmethod
+    def content(path: Path) -> dict[str, Any]:
+        """Title, source and parameters of a robot's scene."""
+        file, robot = _robot(path, "fixed")
+        parameters = dict(_RELEASE)
+        gravity = float(np.linalg.norm(robot.gravity))
+        parameters["gravity"] = (gravity, "m/s^2", "acceleration of gravity", {"at_least": 0})
+        if file.kind == "urdf":
+            parameters["free_base"] = (0, "1", "whether nothing holds the root (1), or the world does (0)", _SWITCH)
+        for law, words in _FACTORS.items():
+            if any(getattr(joint, law) for joint in robot.moving):
+                parameters[law] = (1.0, "1", words, {"at_least": 0})
+        left_out = ["actuators", "contacts"]
+        if any(joint.lower is not None or joint.upper is not None for joint in robot.moving):
+            parameters["limits"] = (0, "1", "whether the joints have their stops (1) or turn through them (0)", _SWITCH)
+            left_out.append("stops of joints (unless limits=1)")
+        if next(_couplings(file, robot), None) is not None:
+            parameters["couplings"] = (1, "1", "whether what couples joints besides the tree is asked for", _SWITCH)
+        return {
+            "title": f"{robot.name}, released from a random pose",
+            "source": f"{path.name}, {file.kind.upper()}",
+            "reason": f"How engines move this robot when nothing drives it; without {', '.join(left_out)}",
+            "duration": _DURATION,
+            "parameters": {
+                name: {"value": value, "unit": unit, "meaning": words, "source": path.name, **bounds}
+                for name, (value, unit, words, bounds) in parameters.items()
+            },
+        }
+
+    @staticmethod
+    def tables(path: Path, values: Mapping[str, float]) -> dict[str, Any]:
+        """Gravity, bodies, joints and tracked points.
+
+        Raises:
+            InputError: nothing in the file moves.
+        """
+        file, robot = _robot(path, BASES[int(values.get("free_base", 0))])
+        if not robot.moving:
+            hint = "; try --set free_base=1" if file.kind == "urdf" and not values["free_base"] else ""
+            raise InputError("file", str(path), f"nothing in it moves{hint}")
+        start = random_states(robot, 1, int(values["seed"]))
+        names = _names(robot)
+        gravity = robot.gravity if robot.gravity.any() else np.array([0.0, 0.0, -1.0])
+        bodies = [(names[joint.child], robot.groups[joint.name]) for joint in robot.moving]
+        carriers = {robot.welded[joint.parent][0] for joint in robot.moving}
+        return {
+            "gravity": {"magnitude": values["gravity"], "direction": gravity.tolist()},
+            "bodies": [
+                {"name": name, "mass": body.mass, "com": body.com.tolist(), "inertia": body.inertia.tolist()}
+                for name, body in bodies
+            ],
+            "joints": [_joint(robot, joint, names, start, values) for joint in robot.moving],
+            "points": [
+                {"name": name, "body": name, "position": body.com.tolist()}
+                for joint, (name, body) in zip(robot.moving, bodies, strict=True)
+                if joint.name not in carriers
+            ],
+            "unmodelled": [
+                f"{what} (couplings=0 leaves it out)" for what in _couplings(file, robot) if values["couplings"]
+            ],
+        }
+
+
+def _robot(path: Path, base: str) -> tuple[RobotFile, Robot]:
+    file = open_robot(path, base)
+    return file, _meant(file.path, file.kind, base, tostring(file.root))
+
+
+@lru_cache(maxsize=8)
+def _meant(path: Path, kind: str, base: str, content: bytes) -> Robot:
+    """What a file means; MJCF is compiled in a process, which is worth remembering."""
+    from xml.etree.ElementTree import fromstring
+
+    file = RobotFile(path, kind, fromstring(content), base)
+    with tempfile.TemporaryDirectory() as folder:
+        return meaning(file, write(file, Path(folder)), TIME_LIMIT)[0]
+
+
+def _names(robot: Robot) -> dict[str, str]:
+    """Names of links in the scene, where ``world`` is what does not move."""
+    names = {joint.child: joint.child for joint in robot.moving}
+    if "world" in names:
+        free = ("world_link" + "_" * number for number in range(len(robot.bodies) + 1))
+        names["world"] = next(name for name in free if name not in robot.bodies)
+    return names
+
+
+def _joint(
+    robot: Robot, joint: Joint, names: Mapping[str, str], start: States, values: Mapping[str, float]
+) -> dict[str, Any]:
+    """A joint between what its parent and its child are welded to."""
+    home, p, R = robot.welded[joint.parent]
+    carrier = next((other.child for other in robot.moving if other.name == home), WORLD)
+    table: dict[str, Any] = {"name": joint.name, "kind": joint.kind}
+    table |= {"parent": "world" if home == WORLD else names[carrier], "child": names[joint.child]}
+    table["child_position"] = joint.child_position.tolist()
+    laws = {law: values[law] * getattr(joint, law) for law in _FACTORS if getattr(joint, law)}
+    v = values["speed"] * start.velocity[joint.name][0]
+    if joint.kind == "free":  # its coordinates are of the world, whatever it hangs on
+        turned = start.rotation[joint.name][0]
+        q = [*start.position[joint.name][0], *_quaternion(turned)]
+        return table | laws | {"q0": q, "v0": [*(turned.T @ v[:3]), *(turned.T @ v[3:])]}
+    table["position"] = (p + R @ joint.position).tolist()
+    table["orientation"] = list(to_rpy(R @ joint.rotation))
+    if joint.kind == "spherical":
+        table |= {"q0": list(_quaternion(start.rotation[joint.name][0]))}
+    else:
+        table |= {"axis": joint.axis.tolist(), "q0": [float(start.angle[joint.name][0])], "rest": joint.rest}
+    table |= laws | {"v0": v.tolist()}
+    if values.get("limits") and joint.lower is not None and joint.upper is not None and joint.lower < joint.upper:
+        table["limits"] = [joint.lower, joint.upper]
+    return table
+
+
+def _quaternion(R: Array) -> Any:
+    return Rotation.from_matrix(R).as_quat(scalar_first=True).tolist()
+
+
+def _couplings(file: RobotFile, robot: Robot) -> Iterator[str]:
+    """What of a robot no scene of bodies and joints has, each as a clause."""
+    for mimic in robot.mimics:
+        yield f"joint {mimic.joint} following {mimic.other} (mimic)"
+    if file.kind != "mjcf":
+        return
+    followers = {mimic.joint for mimic in robot.mimics}
+    for constraints in file.root.iter("equality"):
+        for item in constraints:
+            if item.get("joint1") not in followers:
+                yield f"the equality constraint {_called(item)}"
+    for tendons in file.root.iter("tendon"):
+        for item in tendons:
+            if any(item.get(key) not in {None, "0"} for key in ("stiffness", "damping", "frictionloss", "armature")):
+                yield f"the tendon {_called(item)}"
+    for option in file.root.iter("option"):
+        for key in ("density", "viscosity"):
+            if option.get(key) not in {None, "0"}:
+                yield f"a medium of {key} {option.get(key)}"
+
+
+def _called(item: Element) -> str:
+    return f"{item.tag} {item.get('name', '')}".strip()

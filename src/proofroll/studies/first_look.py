@@ -1,0 +1,94 @@
+"""A scene about which no file says anything: what can be asked of it all the same."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from typing import Any
+
+from proofroll.core.comparison import Band, Comparison, Row, Tolerance
+from proofroll.core.errors import ProofrollError
+from proofroll.core.observable import Role
+from proofroll.core.plugins import engine_names
+from proofroll.core.scene import Scene
+from proofroll.core.verdict import Verdict
+from proofroll.files.scene_file import load_scene, read_scene_file
+from proofroll.studies.axes import Axis, Term
+
+_UNTIL, _SAMPLES = 1.0, 50
+_CLOSE = "close"
+_BECAUSE = "nobody has said what to expect of this scene"
+# Along an axis a parameter is taken to these parts of its default, where its bounds allow.
+_PARTS = (0.1, 1.0, 10.0)
+
+
+def compared(name: str, parameters: Mapping[str, Any]) -> Comparison:
+    """Every formulation of every installed engine that can, held against the truth of a scene, with nothing claimed.
+
+    Args:
+        name: of the scene.
+        parameters: that the user sets.
+
+    Raises:
+        InputError: there is no such scene, or a parameter makes no sense.
+    """
+    file, scene = read_scene_file(name), load_scene(name, **parameters)
+    until = file.duration or _UNTIL
+    rows = [Row(engine, _CLOSE, list(Verdict), because=_BECAUSE) for engine in able(scene)]
+    return Comparison(
+        name=scene.name,
+        title=file.title,
+        question=f"Which engines agree with the truth? {file.reason}".strip(),
+        scene=name,
+        until=until,
+        every=until / _SAMPLES,
+        vary={key: [scene.parameters[key]] for key in parameters},
+        bands={_CLOSE: Band("one per cent is what an eye sees of a motion: a first look", bounds(scene))},
+        rows=rows,
+    )
+
+
+def bounds(scene: Scene) -> dict[str, Tolerance]:
+    """One per cent of what moves; where that has no size of its own, a thousandth of its unit."""
+    moves = {key: item for key, item in scene.observables.items() if item.headline and item.role is Role.MOTION}
+    moves = moves or {scene.deciding: scene.observable(scene.deciding)}
+    return {
+        key: Tolerance(0.01, True) if item.floor is not None else Tolerance(1e-3, False, item.unit)
+        for key, item in moves.items()
+    }
+
+
+def able(scene: Scene, *, first: bool = False) -> list[str]:
+    """Formulations of installed engines that can represent the scene, as files write them; ``first``: one of each."""
+    from proofroll.running.runner import describe
+
+    found = []
+    for engine in engine_names():
+        try:
+            provides = describe(engine)["provides"]
+        except ProofrollError:
+            continue
+        fitting = [name for name, given in provides.items() if scene.requires <= set(given)]
+        found += [f"{engine}[formulation={name}]" for name in fitting[: 1 if first else None]]
+    return found
+
+
+def axes_of(name: str) -> list[Axis]:
+    """Axes of a stability map: each parameter of the scene that is no count and not zero, and the length of the run."""
+    file = read_scene_file(name)
+    values = load_scene(name).parameters
+    found = []
+    for key, item in file.parameters.items():
+        if item.integer or not values[key]:
+            continue
+        allowed = [part for part in _PARTS if _loads(name, key, part * values[key])]
+        if len(allowed) > 1:
+            found.append(Axis(key, "1", f"{item.meaning}, in parts of the default", allowed, {key: Term(key)}))
+    return [*found, Axis("horizon", "swings", "length of the run in natural times", [1.0, 3.0], horizon=True)]
+
+
+def _loads(name: str, key: str, value: float) -> bool:
+    try:
+        load_scene(name, **{key: value})
+    except ProofrollError:
+        return False
+    return True

@@ -1,0 +1,170 @@
+"""Robot files as scenes: the same mechanics as the file's, judged by the truth in every engine that can, or refused."""
+
+from __future__ import annotations
+
+import dataclasses
+import json
+from pathlib import Path
+
+import numpy as np
+import pytest
+from robot_templates import inertial, mjcf, spherical, urdf
+from typer.testing import CliRunner
+
+from proofroll import load_scene, simulate
+from proofroll.cli import app
+from proofroll.core.errors import InputError, Refused
+from proofroll.core.truth import truth
+from proofroll.elements.mechanism.joint_coordinates import JointCoordinates
+from proofroll.robots.gallery import locate, read_gallery
+from proofroll.robots.judging import TIME_LIMIT, meaning
+from proofroll.robots.reading import write
+from proofroll.robots.robot_file import open_robot
+from proofroll.robots.states import random_states
+from proofroll.robots.two_formulations import world_jacobians
+
+EVERY_KIND = """<mujoco model="mobile"><worldbody>
+<body name="lone" pos="2 0 0" euler="0 30 0"><joint name="k0" type="ball" pos="0.1 0 0"/>
+<geom type="box" pos="0.1 0.2 0" size="0.1 0.2 0.3"/></body>
+<body name="carrier" pos="0 0 1"><freejoint name="root"/><geom type="box" pos="0.1 0 0" size="0.3 0.2 0.1"/>
+<body name="bracket" pos="0.2 0.1 0" euler="10 0 20"><geom type="sphere" size="0.1"/>
+<body name="upper" pos="0.1 0.2 0.3" euler="10 20 30">
+<joint name="k1" type="hinge" axis="0 0.6 0.8" armature="0.3" damping="0.2" stiffness="4" springref="20"/>
+<geom type="capsule" fromto="0 0 0 0.1 0.2 0.4" size="0.05"/>
+<body name="lower" pos="0.1 0.2 0.4" euler="-20 5 40">
+<joint name="k2" type="slide" axis="1 0 1" armature="0.4" damping="1"/>
+<geom type="box" pos="0.05 0 0.1" size="0.05 0.07 0.11"/></body></body></body></body></worldbody></mujoco>"""
+FILES = {
+    "arm.urdf": (urdf(tool=inertial(mass="0.4"), first='<dynamics damping="0.3"/>'), {"speed": 2.0, "seed": 3}),
+    "floating.urdf": (urdf(), {"free_base": 1, "seed": 1}),
+    "moving.xml": (EVERY_KIND, {}),
+}
+
+
+@pytest.fixture
+def robot(tmp_path: Path):
+    """Writes a robot file."""
+
+    def written(name: str, text: str) -> str:
+        (tmp_path / name).write_text(text)
+        return str(tmp_path / name)
+
+    return written
+
+
+@pytest.mark.parametrize("name", FILES)
+def test_a_robot_moves_as_its_file_says(robot, name):
+    """Accelerations of the scene at its start are those of the file's robot by world Jacobians, damping included."""
+    text, parameters = FILES[name]
+    path = robot(name, text)
+    mechanism = load_scene(path, **parameters).elements[0].mechanism
+    found = JointCoordinates(mechanism).solve(*mechanism.start()).acceleration
+    file = open_robot(Path(path), "free" if parameters.get("free_base") else "fixed")
+    whole = meaning(file, write(file, Path(path).parent), TIME_LIMIT)[0]
+    state = random_states(whole, 1, int(parameters.get("seed", 0)))
+    speed = parameters.get("speed", 1)
+    state = dataclasses.replace(state, velocity={name: speed * v for name, v in state.velocity.items()})
+    dynamics, v = world_jacobians(whole, state), state.stacked(state.velocity, whole)[0]
+    columns = [joint for joint in whole.moving for _ in range(joint.dofs)]
+    springs = [
+        joint.stiffness * (state.angle[joint.name][0] - joint.rest) if joint.stiffness else 0.0 for joint in columns
+    ]
+    forces = -dynamics.h[0] - np.array([joint.damping for joint in columns]) * v - springs
+    acceleration = np.linalg.solve(dynamics.M[0], forces)
+    for joint, at in zip(mechanism.joints, mechanism.v_slices, strict=True):
+        want = acceleration[whole.columns[joint.name]]
+        if joint.kind == "free":  # there in the world's axes, here in the child's, which turn
+            R, w = state.rotation[joint.name][0], state.velocity[joint.name][0][3:]
+            want = np.concatenate([R.T @ (want[:3] - np.cross(w, state.velocity[joint.name][0][:3])), R.T @ want[3:]])
+        assert found[at] == pytest.approx(want, rel=1e-9, abs=1e-9)
+
+
+@pytest.mark.parametrize("name", FILES)
+def test_engines_follow_the_truth_of_a_robot(robot, name):
+    """MuJoCo, Pinocchio and Exudyn's constrained bodies move each robot as both routes of the truth, or refuse it."""
+    pytest.importorskip("heyoka")
+    text, parameters = FILES[name]
+    scene = load_scene(robot(name, text), **parameters)
+    true = truth(scene, np.linspace(0, 0.2, 3))
+    assert true.positions.attrs["error_bar"] < 1e-12
+    for engine, tolerance in (("mujoco", 1e-8), ("pinocchio", 1e-8), ("exudyn", 1e-3)):
+        if (engine, name) == ("exudyn", "moving.xml"):
+            with pytest.raises(Refused, match="inertia of drives, and Exudyn's joints between bodies have no inertia"):
+                simulate(scene, "exudyn[formulation=redundant]", until=0.2)
+            continue
+        run = simulate(scene, engine, until=0.2, every=0.1)
+        for quantity in ("positions", "forces", "torques", "attitudes"):
+            scale = float(np.nanmax(np.abs(true[quantity])))
+            if quantity in run and not np.isnan(run[quantity]).any():
+                assert float(np.abs(run[quantity] - true[quantity]).max()) < tolerance * max(scale, 1), (
+                    engine,
+                    quantity,
+                )
+
+
+def test_what_no_scene_has_is_refused_by_name(robot):
+    """A mimic joint, dry friction, a massless moving link, an impossible inertia, a tendon: one line that names it."""
+    times = np.array([0.0, 0.1])
+    mimic = robot("mimic.urdf", urdf(third='<mimic joint="j1" multiplier="2"/>'))
+    for ask in (lambda scene: truth(scene, times), lambda scene: simulate(scene, "mujoco", until=0.1)):
+        with pytest.raises(Refused, match=r"joint j3 following j1 \(mimic\) \(couplings=0 leaves it out\)"):
+            ask(load_scene(mimic))
+    assert "j3" in {joint.name for joint in load_scene(mimic, couplings=0).elements[0].mechanism.joints}
+    rough = robot("rough.urdf", urdf(second='<dynamics friction="2"/>'))
+    with pytest.raises(Refused, match="dry friction in joint j2"):
+        truth(load_scene(rough), times)
+    assert load_scene(rough, friction=0).requires < load_scene(rough).requires
+    tendon = mjcf(extra="").replace(
+        "<actuator>", '<tendon><fixed name="cord" stiffness="3"><joint joint="k1" coef="1"/></fixed></tendon><actuator>'
+    )
+    with pytest.raises(Refused, match="the tendon fixed cord"):
+        truth(load_scene(robot("tendon.xml", tendon)), times)
+    for name, text, said in (
+        ("massless.urdf", urdf(tip=""), r"bodies.tip.mass.*can move here"),
+        (
+            "broken.urdf",
+            urdf(tip=spherical("1", "0.1").replace('izz="0.1"', 'izz="0.9"')),
+            "bodies.tip.inertia.*triangle",
+        ),
+        ("still.urdf", urdf(kinds=("fixed", "fixed", "fixed")), "nothing in it moves; try --set free_base=1"),
+    ):
+        with pytest.raises(InputError, match=said):
+            load_scene(robot(name, text))
+
+
+def test_stops_are_there_when_asked_for(robot):
+    """With limits=1 a motion that passes a stop has no truth, and the joint and the time are named."""
+    pytest.importorskip("heyoka")
+    scene = load_scene(robot("arm.urdf", urdf()), limits=1, speed=3)
+    with pytest.raises(Refused, match=r"joint j\d passes its limit before t = "):
+        truth(scene, np.linspace(0, 1, 11))
+
+
+def test_commands_take_a_robot_file_for_a_scene(robot, tmp_path):
+    """Run, compare and stability start from the file alone; compare holds every engine that is asked to the truth."""
+    path = robot("arm.urdf", urdf())
+    out = ["--out", str(tmp_path / "out"), "--json"]
+    run = CliRunner().invoke(app, ["run", path, "--engine", "mujoco", "--until", "0.1", "--json"])
+    assert run.exit_code == 0, run.output
+    assert json.loads(run.stdout)["status"] == "done"
+    compared = CliRunner().invoke(app, ["compare", path, "--engine", "mujoco", "--set", "speed=0.5", *out])
+    assert compared.exit_code == 0, compared.output
+    content = json.loads(compared.stdout)
+    assert {row["verdict"] for row in content["rows"]} == {"agrees"}
+    assert content["vary"] == {"speed": [0.5]}
+    from proofroll.studies.stability_claims import file_for
+
+    assert {"speed", "gravity", "horizon"} <= {axis.name for axis in file_for(path).axes}
+
+
+def test_a_robot_of_the_gallery():
+    """The whole ur5 of a package falls in Pinocchio as the truth says."""
+    pytest.importorskip("heyoka")
+    path = next(locate(entry) for entry in read_gallery() if entry.name == "ur5")
+    if path is None:
+        pytest.skip("its package is not installed")
+    scene = load_scene(str(path))
+    assert len(scene.elements[0].bodies) == 6
+    times = np.array([0.0, 0.1])
+    run = simulate(scene, "pinocchio", until=0.1, every=0.1)
+    assert float(np.abs(run.positions - truth(scene, times).positions).max()) < 1e-9
