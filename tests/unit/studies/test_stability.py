@@ -377,11 +377,13 @@ def test_broken_files(tmp_path: Path, old: str, new: str, words: str) -> None:
 
 
 def test_a_scene_without_a_file(tmp_path: Path) -> None:
-    """A scene for which nobody wrote axes gives advice instead of an empty map."""
+    """A scene for which nobody wrote axes has its own parameters, in parts of their defaults that its bounds allow."""
     folder = tmp_path / "my_scene"
     shutil.copytree(load_scene("inclined_plane").folder, folder)
-    with pytest.raises(InputError, match="comparisons"):
-        file_for(str(folder))
+    axes, scene = file_for(str(folder)).axes, load_scene(str(folder))
+    assert axes[-1].horizon
+    assert {axis.name for axis in axes[:-1]} <= set(scene.parameters)
+    assert all(scene.parameters[axis.name] and 1.0 in axis.values for axis in axes[:-1])
 
 
 @pytest.mark.parametrize("scene", ["sphere_in_cylinder", "inclined_plane"])
