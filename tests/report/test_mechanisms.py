@@ -36,12 +36,14 @@ def compared(tmp_path_factory: pytest.TempPathFactory) -> tuple[Outcome, Store, 
 
 @pytest.mark.slow
 def test_only_single_curves_are_drawn(compared: tuple[Outcome, Store, Path]) -> None:
-    """Coordinates of points and joints have curves and differences; an array over many components has none."""
+    """Coordinates of points and joints and determinate reactions have curves; an array of many components has none."""
     outcome, store, _ = compared
     (entry,) = point_curves(outcome, store)
     drawn = {item["name"]: item for item in entry["observables"]}
     assert {"slider.x", "q.shaft"} <= set(drawn)
     assert not {"positions", "attitudes", "forces", "torques"} & set(drawn)
+    assert {"force.guide.y", "force.pin.x"} <= set(drawn)
+    assert not {"force.guide.x", "force.guide.z"} & set(drawn), "one is zero, the other not determinate"
     (curve,) = drawn["slider.x"]["engines"]
     assert len(curve["difference"]) == len(entry["time"])
     assert 0 < max(map(abs, curve["difference"])) < 1e-6

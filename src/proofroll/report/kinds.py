@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING, Any, ClassVar, Protocol
 if TYPE_CHECKING:
     import xarray as xr
 
+    from proofroll.core.observable import Observable
     from proofroll.core.scene import Scene
     from proofroll.running.store import Store
     from proofroll.studies.compare import Outcome, Run
@@ -52,6 +53,10 @@ class ReportKind(Protocol):
     @staticmethod
     def add_to_runs(content: dict[str, Any], runs: Sequence[Run], store: Store) -> None:
         """Gives the runs of a comparison's content what the kind knows of them."""
+
+    @staticmethod
+    def curves(scene: Scene, truth: xr.Dataset) -> Sequence[Observable]:
+        """What is drawn over time besides the scene's own observables, and judged within one of them."""
 
     @staticmethod
     def mark(content: dict[str, Any], curves: list[dict[str, Any]]) -> list[dict[str, Any]]:

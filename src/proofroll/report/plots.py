@@ -13,6 +13,7 @@ from proofroll.core.dataset import scales
 from proofroll.core.observable import Observable, Role
 from proofroll.files.netcdf import read, read_some
 from proofroll.files.scene_file import load_scene
+from proofroll.report.kinds import kind_of
 from proofroll.report.labels import symbol, unit
 from proofroll.studies.compare import Outcome, Run
 from proofroll.studies.planning import point_name
@@ -49,7 +50,10 @@ def point_curves(outcome: Outcome, store: Store) -> list[dict[str, Any]]:
         truth = read(path)
         scene = load_scene(outcome.comparison.scene, **case.parameters)
         sizes = scales(scene, truth)
-        drawn = {key: item for key, item in scene.observables.items() if item.role in _DRAWN and _curve(truth, key)}
+        kind = kind_of(scene)
+        further = {item.name: item for item in kind.curves(scene, truth)} if kind is not None else {}
+        known = scene.observables | further
+        drawn = {key: item for key, item in known.items() if item.role in _DRAWN and _curve(truth, key)}
         engines = _engines(outcome, store, name, list(drawn))
         entries.append(
             {

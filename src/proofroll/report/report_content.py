@@ -11,6 +11,7 @@ from proofroll.files.scene_file import load_scene
 from proofroll.report.comparison_content import environment, outcome_content
 from proofroll.report.evidence import add_evidence
 from proofroll.report.findings import findings
+from proofroll.report.growth import growth
 from proofroll.report.kinds import kind_of
 from proofroll.report.study_parts import part_kinds
 from proofroll.report.summary import three_sentences
@@ -38,6 +39,7 @@ def report_content(outcomes: list[Outcome], store: Store, command: str) -> dict[
         if kind is not None:
             kind.add_to_runs(content, outcome.runs, store)
         add_evidence(content, outcome)
+        content["growth"] = growth(content)
         comparisons.append(content)
     versions: dict[str, str] = {}
     for outcome in outcomes:
@@ -63,6 +65,7 @@ def _truths(outcome: Outcome, store: Store) -> list[dict[str, Any]]:
             "point": name,
             "parameters": case.parameters,
             "trajectory": f"{store.folder.name}/{path.name}",
+            "wall_seconds": result.wall_seconds if (result := store.get(case)) is not None else None,
         }
         if path.is_file():
             dataset = read(path)

@@ -12,6 +12,7 @@ from proofroll.elements.ball_on_surface.report import onset_tables, onsets
 if TYPE_CHECKING:
     import xarray as xr
 
+    from proofroll.core.observable import Observable
     from proofroll.running.store import Store
     from proofroll.studies.compare import Outcome, Run
 
@@ -53,6 +54,11 @@ class BallReport:
     def add_to_runs(content: dict[str, Any], runs: Sequence[Run], store: Store) -> None:
         """Their slips."""
         onsets.add_events(content, list(runs), store)
+
+    @staticmethod
+    def curves(scene: Scene, truth: xr.Dataset) -> Sequence[Observable]:  # noqa: ARG004 -- the protocol's
+        """None: each is judged by itself."""
+        return ()
 
     @staticmethod
     def mark(content: dict[str, Any], curves: list[dict[str, Any]]) -> list[dict[str, Any]]:

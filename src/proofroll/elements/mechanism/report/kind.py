@@ -11,6 +11,7 @@ from proofroll.elements.mechanism.element import MechanismElement
 if TYPE_CHECKING:
     import xarray as xr
 
+    from proofroll.core.observable import Observable
     from proofroll.running.store import Store
     from proofroll.studies.compare import Outcome, Run
 
@@ -49,6 +50,15 @@ class MechanismReport:
     @staticmethod
     def add_to_runs(content: dict[str, Any], runs: Sequence[Run], store: Store) -> None:
         """Nothing."""
+
+    @staticmethod
+    def curves(scene: Scene, truth: xr.Dataset) -> Sequence[Observable]:
+        """Forces and torques of joints and loops; their arrays are judged as a whole."""
+        from proofroll.elements.mechanism.report.reactions import reactions
+
+        element = scene.elements[0]
+        assert isinstance(element, MechanismElement)  # it covers no other
+        return reactions(element, truth)
 
     @staticmethod
     def mark(content: dict[str, Any], curves: list[dict[str, Any]]) -> list[dict[str, Any]]:  # noqa: ARG004 -- the protocol's
