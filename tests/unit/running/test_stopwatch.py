@@ -16,25 +16,17 @@ from proofroll.studies.run_once import single_case
 
 
 def test_a_finer_step_costs_more() -> None:
-    """A step a hundred times smaller takes several times longer per simulated second, however busy the machine is."""
-    with Stopwatch() as stopwatch:
-        coarse, fine = (
-            stopwatch(
-                single_case(
-                    "sphere_in_cylinder",
-                    {},
-                    f"exudyn[formulation=generic,dt={dt}]",
-                    until=0.2,
-                    every=0.02,
-                    time_limit=60,
-                ),
-                seconds=0.02,
-            )
-            for dt in (1e-3, 1e-5)
+    """A step a hundred times smaller takes several times longer per simulated second, in the least disturbed of runs."""
+    coarse, fine = (
+        single_case(
+            "sphere_in_cylinder", {}, f"exudyn[formulation=generic,dt={dt}]", until=0.2, every=0.02, time_limit=60
         )
-    assert coarse is not None
-    assert fine is not None
-    assert fine > 3 * coarse
+        for dt in (1e-3, 1e-5)
+    )
+    with Stopwatch() as stopwatch:
+        costs = [(stopwatch(coarse, seconds=0.02) or 0.0, stopwatch(fine, seconds=0.02) or 0.0) for _ in range(4)]
+    least, most = (min(cost) for cost in zip(*costs, strict=True))
+    assert 0 < 3 * least < most
 
 
 def test_what_cannot_be_built_has_no_speed() -> None:
