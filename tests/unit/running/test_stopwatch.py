@@ -16,7 +16,7 @@ from proofroll.studies.run_once import single_case
 
 
 def test_a_finer_step_costs_more() -> None:
-    """A step a hundred times smaller takes several times longer per simulated second, in the least disturbed of runs."""
+    """A step a hundred times smaller takes several times longer per simulated second, in the best of four runs."""
     coarse, fine = (
         single_case(
             "sphere_in_cylinder", {}, f"exudyn[formulation=generic,dt={dt}]", until=0.2, every=0.02, time_limit=60
