@@ -9,13 +9,16 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
+from proofroll.core.errors import ProofrollError
+from proofroll.core.events import events_of
 from proofroll.core.gravity import Gravity
 from proofroll.core.scene import Scene
 from proofroll.elements.ball_on_surface.element import BallOnSurface
 from proofroll.elements.ball_on_surface.mechanics import newton_euler
 from proofroll.elements.ball_on_surface.model import Ball, Contact, InitialMotion, RollingBall
 from proofroll.elements.ball_on_surface.rolling_equations import reduced_rates, start
-from proofroll.elements.ball_on_surface.surfaces import Bowl
+from proofroll.elements.ball_on_surface.surfaces import Bowl, Cone, Torus
+from proofroll.files.scene_file import load_scene
 from proofroll.truth.truth import truth
 
 G = 9.81
@@ -62,6 +65,45 @@ def test_steady_circles_in_a_bowl(radius: float, slope: float, k: float, spin: f
     frame = Bowl("wall", reach).frame(u)
     forward = np.array([-np.sin(around), np.cos(around), 0.0])
     held_circle(rolling(Bowl("wall", radius), k, u, speed * (frame[:, 1:].T @ forward), spin), W)
+
+
+@settings(max_examples=30, deadline=None)
+@given(way=st.floats(0.06, 3.0), slope=st.floats(0.05, 1.4), k=ratios, spin=spins, around=st.floats(-3, 3))
+def test_steady_circles_in_a_cone(way: float, slope: float, k: float, spin: float, around: float) -> None:
+    """As in a bowl, on a wall whose curvature changes with the way from the tip."""
+    W = steady_rate(k, 0.025, way * np.cos(slope), slope, spin)
+    held_circle(rolling(Cone("wall", slope), k, (around, way), (W * way * np.cos(slope), 0.0), spin), W)
+
+
+@settings(max_examples=30, deadline=None)
+@given(ring=st.floats(0.2, 3.0), wire=st.floats(0.01, 0.1), slope=st.floats(0.05, 1.4), k=ratios, spin=spins)
+def test_steady_circles_on_a_ring(ring: float, wire: float, slope: float, k: float, spin: float) -> None:
+    """As in a bowl, leaning inward on a wire: the formula does not ask whether the wall is hollow."""
+    a = 0.025
+    rho = ring - (wire + a) * np.sin(slope)
+    W = steady_rate(k, a, rho, slope, spin)
+    held_circle(rolling(Torus("wall", ring, wire), k, (0.3, -slope), (W * rho, 0.0), spin), W)
+
+
+def test_a_ball_on_the_rim_leaves_it_in_both_routes() -> None:
+    """It leaves where N reaches zero, and falls on a parabola with the spin that it has."""
+    scene = load_scene("torus_rim", speed=1.0)
+    t = np.linspace(0, 0.7, 71)
+    found = truth(scene, t)
+    (event,) = events_of(found)
+    assert event.kind == "lift_off"
+    assert event.time_high - event.time_low < 1e-9
+    falls = t > event.time
+    z_second = np.diff(found["p_WB"].to_numpy()[falls][:, 2], 2) / 0.01**2
+    assert z_second == pytest.approx(-G, abs=1e-8)
+    assert np.ptp(found["w_WB"].to_numpy()[falls], axis=0) == pytest.approx(0.0, abs=1e-9)
+    assert float(found["gap"][-1]) > 0.1
+
+
+def test_a_ball_that_rolls_into_the_tip_of_a_cone_is_no_endless_run() -> None:
+    """There the wall has no direction: whatever is said of it, it is said."""
+    with pytest.raises(ProofrollError):
+        truth(load_scene("cone", speed=0.0, normal_spin=0.0), np.linspace(0, 2.0, 21))
 
 
 def test_a_small_swing_passes_the_bottom_of_a_bowl() -> None:

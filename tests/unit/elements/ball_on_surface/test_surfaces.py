@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 from scipy.spatial.transform import Rotation
 
-from proofroll.elements.ball_on_surface.surfaces import Bowl, Cylinder, Generator, Plane
+from proofroll.elements.ball_on_surface.surfaces import Bowl, Cone, Cylinder, Generator, Plane, Torus
 
 STEP = 1e-5  # [m or rad]; a central difference is then off by STEP² and by round-off/STEP, both below 1e-9
 CLOSE = 1e-9
@@ -17,10 +17,12 @@ SURFACES = [
     Plane("wall"),
     Plane("wall", tilt=0.35).offset(0.025),
     Bowl("wall", 1.3).offset(0.025),
+    Cone("wall", 0.6).offset(0.025),
+    Torus("wall", 1.0, 0.3).offset(0.2),
 ]
 
 
-@pytest.fixture(params=SURFACES, ids=["cylinder", "cylinder-tilted", "plane", "plane-tilted", "bowl"])
+@pytest.fixture(params=SURFACES, ids=["cylinder", "cylinder-tilted", "plane", "plane-tilted", "bowl", "cone", "torus"])
 def surface(request: pytest.FixtureRequest) -> Any:
     """Surfaces of all kinds, upright and tilted."""
     return request.param
@@ -29,7 +31,7 @@ def surface(request: pytest.FixtureRequest) -> Any:
 @pytest.fixture
 def u() -> np.ndarray:
     """Points of a surface, less than half a turn around."""
-    return np.random.default_rng(1).uniform(-3, 3, (20, 2))
+    return np.random.default_rng(1).uniform([-3, 0.3], [3, 3], (20, 2))
 
 
 def differentiated(function: Any, x: np.ndarray) -> np.ndarray:
@@ -129,7 +131,7 @@ def test_both_descriptions_have_one_curvature(surface: Any, u: np.ndarray) -> No
 
 def test_offset(u: np.ndarray) -> None:
     """The surface of the centre lies one ball's radius from the wall, towards the inside."""
-    for wall in (Cylinder("wall", 0.225, tilt=0.1), Plane("wall", tilt=0.1), Bowl("wall", 0.225)):
+    for wall in (Cylinder("wall", 0.225, tilt=0.1), Plane("wall", tilt=0.1), Bowl("wall", 0.225), Cone("wall", 0.4)):
         assert wall.gap(wall.offset(0.025).position(u)) == pytest.approx(0.025, abs=1e-15)
 
 
@@ -161,14 +163,22 @@ def test_cylinder_coordinates() -> None:
 
 @pytest.mark.parametrize(
     "surface",
-    [Cylinder("wall", 0.2), Cylinder("wall", 0.2, 0.4), Plane("wall", 0.35, 0.025), Bowl("wall", 0.3)],
-    ids=["cylinder", "tilted", "plane", "bowl"],
+    [
+        Cylinder("wall", 0.2),
+        Cylinder("wall", 0.2, 0.4),
+        Plane("wall", 0.35, 0.025),
+        Bowl("wall", 0.3),
+        Cone("wall", 0.4),
+        Torus("wall", 0.3, 0.2),
+    ],
+    ids=["cylinder", "tilted", "plane", "bowl", "cone", "torus"],
 )
 def test_one_point_is_as_many(surface: Any) -> None:
     """Geometry at a single point, which takes another way for speed, is that of arrays of points."""
     rng = np.random.default_rng(0)
     for _ in range(20):
         p, v, u = rng.normal(size=3), rng.normal(size=3), rng.normal(size=2)
+        p[2] = abs(p[2])  # not behind the tip of a cone
         for name in ("normal", "gap", "normal_gradient", "locate"):
             one, many = getattr(surface, name)(p), getattr(surface, name)(p[None])[0]
             assert np.shape(one) == np.shape(many)

@@ -4,6 +4,7 @@ from proofroll.elements.ball_on_surface.surfaces.bowl import Bowl
 from proofroll.elements.ball_on_surface.surfaces.cylinder import Cylinder
 from proofroll.elements.ball_on_surface.surfaces.declared import Declared
 from proofroll.elements.ball_on_surface.surfaces.plane import Plane
+from proofroll.elements.ball_on_surface.surfaces.revolved import Cone, Revolved, Torus
 from proofroll.elements.ball_on_surface.surfaces.surface import Generator, Surface
 
-__all__ = ["Bowl", "Cylinder", "Declared", "Generator", "Plane", "Surface"]
+__all__ = ["Bowl", "Cone", "Cylinder", "Declared", "Generator", "Plane", "Revolved", "Surface", "Torus"]

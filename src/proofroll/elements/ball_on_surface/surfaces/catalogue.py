@@ -9,6 +9,7 @@ from typing import Any
 from proofroll.elements.ball_on_surface.surfaces.bowl import Bowl
 from proofroll.elements.ball_on_surface.surfaces.cylinder import Cylinder
 from proofroll.elements.ball_on_surface.surfaces.plane import Plane
+from proofroll.elements.ball_on_surface.surfaces.revolved import Cone, Torus
 
 GROUP = "proofroll.surfaces"
 
@@ -17,4 +18,4 @@ GROUP = "proofroll.surfaces"
 def surface_kinds() -> tuple[type[Any], ...]:
     """The classes: dataclasses that follow :class:`Surface`, most easily by way of :class:`Declared`."""
     announced = sorted(entry_points(group=GROUP), key=lambda point: point.name)
-    return (Cylinder, Plane, Bowl, *(point.load() for point in announced))
+    return (Cylinder, Plane, Bowl, Cone, Torus, *(point.load() for point in announced))

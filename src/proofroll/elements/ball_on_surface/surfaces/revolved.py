@@ -1,0 +1,171 @@
+"""Surfaces of revolution about the world's z axis, from a profile curve."""
+
+from __future__ import annotations
+
+import dataclasses
+import math
+from dataclasses import dataclass, field
+from typing import Any, Literal
+
+import numpy as np
+import numpy.typing as npt
+
+from proofroll.core.arrays import FloatArray
+from proofroll.core.bounds import OutOfBounds, bounded
+from proofroll.core.errors import InputError
+from proofroll.elements.ball_on_surface.surfaces.declared import Declared
+from proofroll.elements.ball_on_surface.surfaces.formula import cos, sin, sqrt
+
+
+class Revolved(Declared):
+    """A profile curve in the half-plane of radius r and height z, turned about the axis by the angle gamma.
+
+    A subclass says :meth:`profile`, :meth:`away` and :meth:`along` of the curve, and ``extent``. The second coordinate
+    leads along the curve so that the ball is to its left, seen with r to the right and z upwards.
+    """
+
+    units: tuple[str, str] = ("rad", "m")
+    periods: tuple[float | None, float | None] = (2 * math.pi, None)
+
+    @property
+    def extent(self) -> tuple[float, float]:
+        """Least and largest value of the second coordinate, where the surface is looked at and drawn."""
+        raise NotImplementedError
+
+    def profile(self, s: Any) -> tuple[Any, Any]:
+        """Radius and height of a point of the curve [m]."""
+        raise NotImplementedError
+
+    def away(self, r: Any, z: Any) -> Any:
+        """Distance from the curve [m], positive where balls are."""
+        raise NotImplementedError
+
+    def along(self, r: FloatArray, z: FloatArray) -> FloatArray:
+        """The coordinate of the nearest point of the curve."""
+        raise NotImplementedError
+
+    @property
+    def domain(self) -> tuple[tuple[float, float], tuple[float, float]]:
+        """See :class:`Declared`."""
+        return (-math.pi, math.pi), self.extent
+
+    def point(self, u1: Any, u2: Any) -> tuple[Any, Any, Any]:
+        """See :class:`Declared`."""
+        r, z = self.profile(u2)
+        return r * cos(u1), r * sin(u1), z
+
+    def distance(self, x: Any, y: Any, z: Any) -> Any:
+        """See :class:`Declared`."""
+        return self.away(sqrt(x * x + y * y), z)
+
+    def locate(self, p_WB: npt.ArrayLike) -> FloatArray:
+        """See :class:`Surface`."""
+        x, y, z = np.moveaxis(np.asarray(p_WB, dtype=np.float64), -1, 0)
+        return np.stack([np.arctan2(y, x), self.along(np.hypot(x, y), z)], axis=-1)
+
+
+@dataclass(frozen=True)
+class Cone(Revolved):
+    """Inside of a cone that opens upwards; coordinates are the angle about its axis and the way from its tip.
+
+    Attributes:
+        name: by which contacts name it.
+        kind: which surface it is.
+        slope: of the wall from the horizontal [rad].
+        length: from the tip to the rim, along the wall [m]; only drawn.
+        tip: height of the tip [m]; 0 for the wall itself.
+    """
+
+    name: str
+    slope: float = field(metadata={"unit": "rad"})
+    length: float = field(default=1.0, metadata={"unit": "m"})
+    tip: float = field(default=0.0, metadata={"unit": "m"})
+    kind: Literal["cone"] = "cone"
+
+    coordinates = ("gamma", "s")
+
+    def __post_init__(self) -> None:
+        """Refuses what is no cone.
+
+        Raises:
+            OutOfBounds: a slope that is not between 0 and a right angle, or a length that is not positive.
+        """
+        bounded("slope", self.slope, above=0)
+        if not self.slope < math.pi / 2:
+            raise OutOfBounds("slope", self.slope, "the value must be below a right angle")
+        bounded("length", self.length, above=0)
+        bounded("tip", self.tip)
+
+    @property
+    def extent(self) -> tuple[float, float]:
+        """See :class:`Revolved`."""
+        return 0.0, self.length
+
+    def offset(self, ball_radius: float) -> Cone:
+        """See :class:`Surface`."""
+        return dataclasses.replace(self, tip=self.tip + ball_radius / math.cos(self.slope))
+
+    def profile(self, s: Any) -> tuple[Any, Any]:
+        """See :class:`Revolved`."""
+        return s * math.cos(self.slope), s * math.sin(self.slope) + self.tip
+
+    def away(self, r: Any, z: Any) -> Any:
+        """See :class:`Revolved`."""
+        return (z - self.tip) * math.cos(self.slope) - r * math.sin(self.slope)
+
+    def along(self, r: FloatArray, z: FloatArray) -> FloatArray:
+        """See :class:`Revolved`."""
+        return np.asarray(r * math.cos(self.slope) + (z - self.tip) * math.sin(self.slope))
+
+
+@dataclass(frozen=True)
+class Torus(Revolved):
+    """Outside of a ring of round wire; coordinates are the angle about its axis and that around the wire.
+
+    Attributes:
+        name: by which contacts name it.
+        kind: which surface it is.
+        ring_radius: of the wire's middle from the axis [m].
+        wire_radius: radius of the wire [m]; of the centre's surface after :meth:`offset`.
+    """
+
+    name: str
+    ring_radius: float = field(metadata={"unit": "m"})
+    wire_radius: float = field(metadata={"unit": "m"})
+    kind: Literal["torus"] = "torus"
+
+    coordinates = ("gamma", "theta")
+    units = ("rad", "rad")
+    periods = (2 * math.pi, 2 * math.pi)
+    extent = (-math.pi, math.pi)
+
+    def __post_init__(self) -> None:
+        """Refuses what is no ring.
+
+        Raises:
+            OutOfBounds: a radius that is not positive, or a wire that fills its ring.
+        """
+        bounded("ring_radius", self.ring_radius, above=0)
+        bounded("wire_radius", self.wire_radius, above=0)
+        if not self.wire_radius < self.ring_radius:
+            raise OutOfBounds("wire_radius", self.wire_radius, f"the value must be below {self.ring_radius:g}")
+
+    def offset(self, ball_radius: float) -> Torus:
+        """See :class:`Surface`."""
+        if not ball_radius + self.wire_radius < self.ring_radius:
+            room = self.ring_radius - self.wire_radius
+            raise InputError("radius", ball_radius, f"the ball must be smaller than the {room:g} m inside {self.name}")
+        return dataclasses.replace(self, wire_radius=self.wire_radius + ball_radius)
+
+    def profile(self, s: Any) -> tuple[Any, Any]:
+        """See :class:`Revolved`: from the top of the wire, outwards."""
+        return sin(s) * self.wire_radius + self.ring_radius, cos(s) * self.wire_radius
+
+    def away(self, r: Any, z: Any) -> Any:
+        """See :class:`Revolved`."""
+        across = r - self.ring_radius
+        return sqrt(across * across + z * z) - self.wire_radius
+
+    def along(self, r: FloatArray, z: FloatArray) -> FloatArray:
+        """See :class:`Revolved`."""
+        return np.arctan2(r - self.ring_radius, z)
