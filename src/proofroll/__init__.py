@@ -13,17 +13,23 @@ from proofroll.core.errors import Diverged, InputError, Missing, ProofrollError,
 if TYPE_CHECKING:
     from proofroll.files.scene_file import load_scene
     from proofroll.running.simulation import simulate
+    from proofroll.studies.judging import judge_run as judge
 
-__all__ = ["Diverged", "InputError", "Missing", "ProofrollError", "Refused", "load_scene", "simulate"]
+__all__ = ["Diverged", "InputError", "Missing", "ProofrollError", "Refused", "judge", "load_scene", "simulate"]
 __version__ = "0.1.0"
 
-_HOMES = {"load_scene": "proofroll.files.scene_file", "simulate": "proofroll.running.simulation"}
+_HOMES = {
+    "judge": ("proofroll.studies.judging", "judge_run"),
+    "load_scene": ("proofroll.files.scene_file", "load_scene"),
+    "simulate": ("proofroll.running.simulation", "simulate"),
+}
 
 
 def __getattr__(name: str) -> Any:
     if name not in _HOMES:
         raise AttributeError(f"module 'proofroll' has no attribute {name!r}")
-    return getattr(import_module(_HOMES[name]), name)
+    module, own = _HOMES[name]
+    return getattr(import_module(module), own)
 
 
 def __dir__() -> list[str]:

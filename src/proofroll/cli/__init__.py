@@ -13,6 +13,7 @@ import typer
 
 import proofroll
 from proofroll.cli.comparing import compare
+from proofroll.cli.judge import judge
 from proofroll.cli.ladder import ladder
 from proofroll.cli.lists import engines, scenes
 from proofroll.cli.new import new
@@ -32,7 +33,7 @@ app = typer.Typer(
     rich_markup_mode=None,
 )
 _STUDIES = (compare, report, tradeoff, recommend, ladder, stability)
-for _command in (scenes, engines, run, plot, *_STUDIES):
+for _command in (scenes, engines, run, judge, plot, *_STUDIES):
     app.command()(_command)
 app.add_typer(new, name="new")
 for _point in sorted(entry_points(group="proofroll.commands"), key=lambda point: point.name):

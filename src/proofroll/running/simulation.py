@@ -20,12 +20,12 @@ if TYPE_CHECKING:
     import xarray as xr
 
 
-def build(scene: Scene, engine: str, **settings: Any) -> Any:
+def build(scene: Scene, engine: Any, **settings: Any) -> Any:
     """The scene in the engine at time 0, after checking that the engine can represent it.
 
     Args:
         scene: from :func:`proofroll.load_scene`.
-        engine: ``name`` or ``name[key=value,…]``.
+        engine: ``name``, ``name[key=value,…]``, or the class, which no package needs to announce.
         **settings: the engine's settings, besides those in brackets.
 
     Raises:
@@ -37,8 +37,10 @@ def build(scene: Scene, engine: str, **settings: Any) -> Any:
     return _build(scene, kind, resolved)
 
 
-def _resolved(scene: Scene, engine: str, settings: dict[str, Any]) -> tuple[Any, Any]:
+def _resolved(scene: Scene, engine: Any, settings: dict[str, Any]) -> tuple[Any, Any]:
     """The engine's class, and its complete settings."""
+    if not isinstance(engine, str):
+        return engine, resolve_settings(engine, settings, scene.requires)
     spec = parse_engine(engine)
     for key, value in settings.items():
         if key in spec.options:
@@ -53,7 +55,7 @@ def _build(scene: Scene, kind: Any, settings: Any) -> Any:
 
 def simulate(
     scene: Scene,
-    engine: str = "truth",
+    engine: Any = "truth",
     *,
     until: float = 2.0,
     every: float | None = None,
@@ -63,7 +65,7 @@ def simulate(
 
     Args:
         scene: from :func:`proofroll.load_scene`.
-        engine: ``truth``, ``name`` or ``name[key=value,…]``.
+        engine: ``truth``, ``name``, ``name[key=value,…]``, or the class, which no package needs to announce.
         until: last time [s].
         every: interval between samples [s]; by default 0.01 s, or the nearest whole number of steps.
         **settings: e.g. ``formulation="chart", dt=1e-4``.
@@ -78,8 +80,8 @@ def simulate(
         Missing: the engine is not installed.
         Refused: the engine cannot represent the scene, or built something else than the scene says.
     """
-    spec = parse_engine(engine)
-    if spec.name == "truth":
+    spec = parse_engine(engine) if isinstance(engine, str) else None
+    if spec is not None and spec.name == "truth":
         options = {**spec.options, **settings}
         if options:
             raise InputError("truth", ", ".join(options), "the truth has no settings; leave them out")
@@ -100,5 +102,12 @@ def simulate(
         status="done" if recording.failure is None else "diverged",
         message=recording.message(until),
         wall_seconds=recording.wall_seconds,
-        **manifest(spec.name, dataclasses.asdict(resolved), scene, versions(spec.name, kind.version())),
+        **manifest(kind.name, dataclasses.asdict(resolved), scene, versions(kind.name, kind.version())),
     )
+
+
+def recorded(engine: Any, scene: Scene, *, until: float = 2.0, every: float | None = None) -> xr.Dataset:
+    """The trajectory of an engine that is built already, at time 0; see :func:`simulate`."""
+    recording = record(engine, scene, time_grid(until, EVERY if every is None else every))
+    status = "done" if recording.failure is None else "diverged"
+    return recording.dataset.assign_attrs(status=status, message=recording.message(until))

@@ -1,0 +1,36 @@
+"""A trajectory of anybody's against the truth of a scene."""
+
+from __future__ import annotations
+
+import sys
+from pathlib import Path
+from typing import Annotated
+
+import typer
+
+from proofroll.cli.options import CONTRADICTED, OK, Json, Set, assignments, spinner, write_json
+
+
+def judge(
+    run: Annotated[Path, typer.Argument(help="netCDF file with time [s] and the state, or variables of the truth.")],
+    scene: Annotated[str, typer.Option(help="The scene, or the path of its folder.")],
+    settings: Set = None,
+    tolerance: Annotated[
+        list[str] | None, typer.Option(help="variable='1 %' of its scale, or variable='1e-3 m'; repeat.")
+    ] = None,
+    because: Annotated[str, typer.Option(help="Why that is close enough.")] = "",
+    as_json: Json = False,
+) -> None:
+    """Hold a trajectory from anywhere against the truth of a scene; exit 1 if it differs."""
+    from proofroll.files.scene_file import load_scene
+    from proofroll.studies.judging import judge_run
+
+    loaded = load_scene(scene, **assignments(settings or []))  # type: ignore[arg-type]  # text is checked there
+    bounds = assignments(tolerance, "--tolerance") if tolerance else None
+    with spinner(f"the truth of {loaded.name}"):
+        found = judge_run(run, loaded, bounds, because=because)
+    if as_json:
+        write_json(found.content())
+    else:
+        sys.stdout.write(f"{found}\n")
+    raise typer.Exit(OK if found.agrees else CONTRADICTED)

@@ -1,0 +1,16 @@
+"""What pytest gets from this package: a fixture, of which nothing is loaded before a test asks for it."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from typing import Any
+
+import pytest
+
+
+@pytest.fixture(scope="session")
+def assert_agrees() -> Callable[..., Any]:
+    """:func:`proofroll.testing.assert_agrees`: an engine, or a trajectory, against the truth of a scene."""
+    from proofroll.testing import assert_agrees as function
+
+    return function

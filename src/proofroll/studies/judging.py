@@ -1,0 +1,273 @@
+"""A trajectory of anybody's against the truth of a scene, and the words for how it stands."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from proofroll.core.arrays import FloatArray
+from proofroll.core.comparison import Tolerance
+from proofroll.core.dataset import from_samples
+from proofroll.core.engine import Sample
+from proofroll.core.errors import InputError
+from proofroll.core.observable import Role
+from proofroll.core.scene import Scene
+from proofroll.core.truth import truth
+from proofroll.core.verdict import Doubt, Judgement, Verdict, judge
+from proofroll.files.scene_file import load_scene
+from proofroll.studies.common_span import common_span
+from proofroll.studies.reference import Reference
+
+if TYPE_CHECKING:
+    import xarray as xr
+
+Run = Any
+"""An ``xarray.Dataset``, the path of a netCDF file, or arrays by name, ``time`` [s] among them."""
+_STATE = ("p_WB", "v_WB", "w_WB")
+_USUAL = Tolerance(0.01, True)
+_MOST_TRUTHS = 64
+_truths: dict[tuple[str, bytes], xr.Dataset] = {}
+
+
+@dataclass(frozen=True)
+class Compared:
+    """One quantity of a trajectory.
+
+    Attributes:
+        judgement: see :class:`proofroll.core.verdict.Judgement`.
+        at: when it is farthest from the truth [s]; None of what has no time.
+    """
+
+    judgement: Judgement
+    at: float | None
+
+    @property
+    def agrees(self) -> bool:
+        """Whether it is within its tolerance of the truth, and the truth known well enough to say so."""
+        return self.judgement.verdict is Verdict.AGREES
+
+    def __str__(self) -> str:
+        """What differs, by how much and when, how much may, and how well the truth is known."""
+        found = self.judgement
+        unit = "" if found.unit == "1" else f" {found.unit}"
+        when = "" if self.at is None else f" at {self.at:.4g} s"
+        said = f"{found.observable} is off by {found.error:.3g}{unit}{when}, allowed {found.tolerance:.3g}{unit}"
+        if not np.isfinite(found.error):
+            said = f"{found.observable} is not finite, or has not as many values as the truth"
+        bar = f"the truth is known to {found.truth_error_bar:.2g}{unit}"
+        if found.verdict is Verdict.NOT_JUDGED:
+            bar = f"not judged, for {bar} only"
+        return f"{said}; {bar}" + ("; the question is ill-posed here" if found.verdict is Verdict.ILL_POSED else "")
+
+
+@dataclass(frozen=True)
+class Judged:
+    """A trajectory held against the truth of a scene.
+
+    Attributes:
+        scene: its name.
+        compared: each quantity that was judged, the farthest from its tolerance first.
+        because: why the tolerances are what they are; empty if nobody says.
+    """
+
+    scene: str
+    compared: tuple[Compared, ...]
+    because: str = ""
+
+    @property
+    def agrees(self) -> bool:
+        """Whether every quantity does."""
+        return all(item.agrees for item in self.compared)
+
+    def __str__(self) -> str:
+        """One line, and one for each quantity."""
+        why = f" (tolerance: {self.because})" if self.because else ""
+        head = f"{'agrees with' if self.agrees else 'differs from'} the truth of {self.scene}{why}"
+        return "\n".join([head, *(f"  {'ok' if item.agrees else '!!'} {item}" for item in self.compared)])
+
+    def content(self) -> dict[str, Any]:
+        """As plain data."""
+        names = ("observable", "unit", "error", "tolerance", "truth_error_bar", "scale")
+        rows = [
+            {name: getattr(item.judgement, name) for name in names}
+            | {"at": item.at, "verdict": item.judgement.verdict.value}
+            for item in self.compared
+        ]
+        return {"scene": self.scene, "agrees": self.agrees, "because": self.because, "compared": rows}
+
+
+def judge_run(
+    run: Run, scene: str | Scene, tolerance: Mapping[str, object] | str | float | None = None, *, because: str = ""
+) -> Judged:
+    """Holds a trajectory against the truth of a scene at the trajectory's own times.
+
+    Args:
+        run: from :func:`proofroll.simulate`, the path of a netCDF file, or arrays by name: ``time`` [s], and the state
+            (``p_WB``, ``v_WB``, ``w_WB``, as in :class:`proofroll.core.engine.Sample`, one row for each time; for
+            mechanisms ``q_WB``), or variables that the truth has, as ``q.hinge``, ``tip.x``, ``positions``, ``z``.
+        scene: name, path of a folder, or :func:`proofroll.load_scene`.
+        tolerance: by name of the observable or variable, ``"1 %"`` of its scale, ``"1e-3 m"``, or a number in its unit;
+            one alone is for what decides the scene, or for the only variable. None: 1 % of each main quantity.
+        because: why that is close enough.
+
+    Raises:
+        InputError: something that was given does not exist or makes no sense.
+        Refused, Diverged: there is no truth of this scene.
+    """
+    scene = load_scene(scene) if isinstance(scene, str) else scene
+    dataset = _dataset(run, scene)
+    reference = Reference.of(scene, _truth(scene, dataset["time"].to_numpy()))
+    observed: dict[str, FloatArray] = {}
+    if "scene_digest" in dataset.attrs:  # all variables of a run
+        reference, cut = common_span(reference, {0: dataset})
+        dataset, observed = cut[0], reference.observed(cut[0])
+    bounds = _bounds(tolerance, reference, observed, [str(name) for name in dataset.data_vars])
+    compared = [_compared(name, bound, reference, observed, dataset) for name, bound in bounds.items()]
+    compared.sort(key=lambda item: item.judgement.error / item.judgement.tolerance, reverse=True)
+    return Judged(scene.name, tuple(compared), because)
+
+
+def _dataset(run: Run, scene: Scene) -> xr.Dataset:
+    """The trajectory as a dataset with ``time``; everything that follows from the state, where that is given."""
+    import xarray as xr
+
+    if isinstance(run, str | Path):
+        from proofroll.files.netcdf import read
+
+        try:
+            run = read(Path(run))
+        except (OSError, ValueError) as error:
+            raise InputError("run", str(run), f"it cannot be read as netCDF-3 ({error})") from None
+    given = {str(name): np.asarray(run[name]) for name in run} if not isinstance(run, xr.Dataset) else None
+    if given is not None:
+        if "time" not in given:
+            raise InputError("run", ", ".join(given), "it has no time; add the times in s as time")
+        dims = {name: ("time", *(f"{name}_{axis}" for axis in range(1, np.ndim(v)))) for name, v in given.items()}
+        _check_lengths(given)
+        run = xr.Dataset(
+            {name: (dims[name], v) for name, v in given.items() if name != "time"}, {"time": given["time"]}
+        )
+    elif "time" not in run.variables:
+        raise InputError("run", ", ".join(map(str, run.variables)), "it has no time; add the times in s as time")
+    made_of = run.attrs.get("scene_digest")
+    if made_of is not None and made_of != scene.digest:
+        advice = f"it is a run of {run.attrs.get('scene')} with other numbers; give those parameters here too"
+        raise InputError("scene", scene.name, advice)
+    times = run["time"].to_numpy()
+    if not (times.size and np.all(np.isfinite(times)) and times[0] >= 0 and np.all(np.diff(times) > 0)):
+        raise InputError("run", "time", "give times in s that rise from 0 or later")
+    return run if made_of is not None else _completed(run, scene, times)
+
+
+def _check_lengths(given: Mapping[str, Any]) -> None:
+    count = np.shape(given["time"])[0] if np.ndim(given["time"]) == 1 else 0
+    for name, values in given.items():
+        if np.ndim(values) == 0 or len(values) != count:
+            raise InputError(
+                "run", name, f"its shape is {np.shape(values)}; give one row for each of the {count} times"
+            )
+
+
+def _completed(run: xr.Dataset, scene: Scene, times: FloatArray) -> xr.Dataset:
+    """With all that follows from the state, if that is given; a scene of several elements is judged by variables."""
+    if not all(name in run for name in _STATE) or len(scene.elements) > 1 or times[0] > 0:
+        return run
+    names = [name for name in (*_STATE, "q_WB", "force", "joint_force", "joint_torque") if name in run]
+    arrays = {name: np.asarray(run[name].to_numpy(), dtype=np.float64) for name in names}
+    samples = [Sample(**{name: values[index] for name, values in arrays.items()}) for index in range(len(times))]
+    try:
+        return from_samples(scene, times, samples)
+    except (ValueError, TypeError) as error:
+        shapes = ", ".join(f"{name} {values.shape}" for name, values in arrays.items())
+        raise InputError("run", shapes, f"these are no states of {scene.name} ({error})") from None
+
+
+def _truth(scene: Scene, times: FloatArray) -> xr.Dataset:
+    """The truth at these times, which tests ask for again and again."""
+    key = scene.digest, times.tobytes()
+    if key not in _truths:
+        late = times[0] > 0
+        found = truth(scene, np.concatenate([[0.0], times]) if late else times)
+        _truths[key] = found.isel(time=slice(1, None)) if late else found
+        while len(_truths) > _MOST_TRUTHS:
+            del _truths[next(iter(_truths))]
+    return _truths[key]
+
+
+def _bounds(
+    given: Mapping[str, object] | str | float | None,
+    reference: Reference,
+    observed: Mapping[str, FloatArray],
+    variables: Sequence[str],
+) -> dict[str, Tolerance]:
+    """What is judged, and how far it may be off: observables of a whole run, else variables that the truth has too."""
+    scene = reference.scene
+    able = list(dict.fromkeys([*observed, *(name for name in variables if _comparable(reference, name))]))
+    if not able:
+        known = ", ".join(str(name) for name in reference.dataset.data_vars if _comparable(reference, str(name)))
+        raise InputError("run", ", ".join(variables), f"the truth has none of these; it has {known}")
+    if given is None:
+        main = [name for name in observed if scene.observables[name].headline]
+        return dict.fromkeys(main or able, _USUAL)
+    if not isinstance(given, Mapping):
+        if len(able) > 1 and scene.deciding not in able:
+            raise InputError("tolerance", given, f"say of which variable: {', '.join(able)}")
+        given = {scene.deciding if scene.deciding in able else able[0]: given}
+    if not given:
+        raise InputError("tolerance", "{}", "say how far what may be off")
+    for name in given:
+        if name not in able:
+            raise InputError("tolerance", name, f"this trajectory has {', '.join(able)}")
+    return {name: _tolerance(name, text, _unit(reference, name)) for name, text in given.items()}
+
+
+def _tolerance(name: str, given: object, unit: str) -> Tolerance:
+    if isinstance(given, int | float) and not isinstance(given, bool):
+        given = f"{given!r} {unit}"
+    text = str(given).strip()
+    found = Tolerance.parse(f"tolerance of {name}", text if " " in text else text.replace("%", " %"))
+    if not found.relative and found.unit != unit:
+        raise InputError(f"tolerance of {name}", given, f"its unit is {unit}")
+    return found
+
+
+def _comparable(reference: Reference, name: str) -> bool:
+    return name in reference.dataset.data_vars and "error_bar" in reference.dataset[name].attrs
+
+
+def _unit(reference: Reference, name: str) -> str:
+    item = reference.scene.observables.get(name)
+    return item.unit if item else str(reference.dataset[name].attrs["units"])
+
+
+def _compared(
+    name: str, bound: Tolerance, reference: Reference, observed: Mapping[str, FloatArray], dataset: xr.Dataset
+) -> Compared:
+    item = reference.scene.observables.get(name)
+    if name in observed:
+        values = observed[name]
+        true, bar = reference.true(name, values)
+        scale, doubt = reference.sizes.get(name, 1.0), reference.doubt(name)
+    else:
+        values, truth_of = dataset[name].to_numpy(), reference.dataset[name]
+        true, bar = truth_of.to_numpy(), float(truth_of.attrs["error_bar"])
+        if item and item.role is Role.REACTION and dataset["time"].to_numpy()[0] == 0:
+            true, values = true[1:], values[1:]  # several engines define reactions only after a first step
+        scale, doubt = reference.sizes.get(name) or float(np.ptp(true)) or 1.0, Doubt.NONE
+    found = judge(
+        name, _unit(reference, name), values, true,
+        truth_error_bar=bar, tolerance=bound.absolute(scale), scale=scale, limit=None, doubt=doubt,
+    )  # fmt: skip
+    return Compared(found, _farthest(values, true, dataset["time"].to_numpy()))
+
+
+def _farthest(values: FloatArray, true: FloatArray, times: FloatArray) -> float | None:
+    """When two curves are farthest apart [s]."""
+    if values.shape != true.shape or not values.size or len(values) not in {len(times), len(times) - 1}:
+        return None
+    apart = np.abs(values - true).reshape(len(values), -1).max(axis=1)
+    return float(times[len(times) - len(values) :][int(np.argmax(apart))]) if np.all(np.isfinite(apart)) else None

@@ -1,0 +1,173 @@
+"""Agreement in other people's tests: :mod:`proofroll.testing`, ``proofroll judge``, and the pytest plug-in."""
+
+from __future__ import annotations
+
+import json
+import re
+import subprocess
+import sys
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+from scipy.integrate import solve_ivp
+from tiny import Tiny
+
+import proofroll
+from proofroll.core.engine import Sample
+from proofroll.core.errors import InputError
+from proofroll.files.netcdf import write
+from proofroll.testing import assert_agrees
+
+Proofroll = Callable[..., tuple[int, str, str]]
+BECAUSE = "a first look"
+
+
+def swing(gravity: float = 9.81) -> dict[str, np.ndarray]:
+    """Somebody's own pendulum, as arrays: a rod of a metre, let go at 2.8 rad from hanging down."""
+    scene = proofroll.load_scene("pendulum")
+    start = scene.elements[0].mechanism.joints[0].q0[0]  # type: ignore[attr-defined]  # a mechanism has joints
+    times = np.linspace(0, 1, 21)
+    found = solve_ivp(
+        lambda _, x: [x[1], -1.5 * gravity * np.sin(x[0])], (0, 1), [start, 0], t_eval=times, rtol=1e-10, atol=1e-12
+    )
+    return {"time": times, "q.pivot": found.y[0]}
+
+
+def test_an_engine_that_agrees_says_what_was_found() -> None:
+    """An engine by its name agrees, and the answer has error, tolerance and the truth's error bar."""
+    found = assert_agrees("pendulum", "projection", tolerance={"positions": "1e-3 m"}, because=BECAUSE, until=0.2)
+    (compared,) = found.compared
+    assert compared.judgement.error < 1e-3
+    assert 0 < compared.judgement.truth_error_bar < 1e-9
+    assert str(found).startswith(
+        "agrees with the truth of pendulum (tolerance: a first look)\n  ok positions is off by"
+    )
+
+
+class Drifting(Tiny):
+    """Half a degree a second, which nobody announces as a plug-in."""
+
+    def sample(self) -> Sample:
+        """The right state, further along the cylinder."""
+        right = super().sample()
+        return Sample(right.p_WB + np.array([0, 0, 0.01 * self.t]), right.v_WB, right.w_WB, force=right.force)
+
+
+def test_what_differs_is_told_with_numbers() -> None:
+    """A class needs no entry point; of one that is wrong the message says what, how much, when, and the bounds."""
+    scene = proofroll.load_scene("sphere_in_cylinder")
+    assert assert_agrees(scene, Tiny, tolerance="1e-3 m", because=BECAUSE, until=0.2)
+    with pytest.raises(AssertionError) as caught:
+        assert_agrees(scene, Drifting, tolerance={"z": "1e-3 m", "gamma": "1 %"}, because=BECAUSE, until=0.2)
+    head, first, second = str(caught.value).splitlines()
+    assert head == "tiny differs from the truth of sphere_in_cylinder (tolerance: a first look)"
+    assert first.startswith("  !! z is off by 0.002 m at 0.2 s, allowed 0.001 m; the truth is known to ")
+    assert second.startswith("  ok gamma is off by")
+
+
+def test_an_engine_that_is_built_already() -> None:
+    """An instance is run from where it stands."""
+    scene = proofroll.load_scene("sphere_in_cylinder")
+    built = Tiny.build(scene, Tiny.settings())
+    assert_agrees(scene, built, tolerance="1e-3 m", because=BECAUSE, until=0.1)
+
+
+def test_a_tolerance_below_the_truths_own_bar_passes_nothing() -> None:
+    """Where the truth is not known well enough nobody agrees, and the message says how well it is known."""
+    with pytest.raises(AssertionError, match="not judged, for the truth is known to"):
+        assert_agrees("pendulum", "truth", tolerance={"positions": "1e-30 m"}, because=BECAUSE, until=0.1)
+
+
+@pytest.mark.parametrize(
+    ("change", "words"),
+    [
+        ({"because": " "}, "say why"),
+        ({"tolerance": {"q.pivto": "1 %"}}, "this trajectory has "),
+        ({"tolerance": {"positions": "1e-3 rad"}}, "its unit is m"),
+        ({"tolerance": "close"}, "write a number and a unit"),
+        ({"tolerance": {}}, "say how far"),
+    ],
+)
+def test_what_makes_no_sense_is_one_line(change: dict[str, Any], words: str) -> None:
+    """A tolerance of nothing, of another unit or without a reason is told in one line."""
+    given = {"tolerance": "1 %", "because": BECAUSE, "until": 0.1} | change
+    with pytest.raises(InputError, match=words) as caught:
+        assert_agrees("pendulum", "projection", **given)
+    assert "\n" not in str(caught.value)
+
+
+def test_arrays_of_ones_own_are_judged() -> None:
+    """An angle over time, from anywhere, is held against the truth at its own times; a wrong gravity shows."""
+    assert proofroll.judge(swing(), "pendulum", "1e-6 rad", because=BECAUSE).agrees
+    late = {name: values[3:] for name, values in swing().items()}
+    assert proofroll.judge(late, "pendulum", 1e-6).agrees
+    wrong = proofroll.judge(swing(gravity=9.8), "pendulum", "1e-6 rad")
+    assert not wrong.agrees
+    assert "q.pivot is off by" in str(wrong)
+
+
+def test_the_state_alone_is_enough() -> None:
+    """From place, velocity and spin of a ball everything else follows, as it does for an engine."""
+    run = proofroll.simulate(proofroll.load_scene("inclined_plane"), "projection", until=0.2, every=0.02)
+    state = {name: run[name].to_numpy() for name in ("time", "p_WB", "v_WB", "w_WB")}
+    assert proofroll.judge(state, "inclined_plane", {"p_WB": "1e-3 m"}).agrees
+
+
+@pytest.mark.parametrize(
+    ("run", "words"),
+    [
+        ({"q.pivot": [0.0]}, "it has no time"),
+        ({"time": [0.0, 0.1], "q.pivot": [0.0]}, "one row for each of the 2 times"),
+        ({"time": [0.1, 0.0], "q.pivot": [0.0, 0.0]}, "rise from 0"),
+        ({"time": [0.0, 0.1], "angle": [0.0, 0.0]}, "the truth has none of these; it has .*q.pivot"),
+        ("nowhere.nc", "cannot be read"),
+    ],
+)
+def test_a_trajectory_that_is_none(run: Any, words: str) -> None:
+    """What cannot be judged is told in one line, with what is missing."""
+    with pytest.raises(InputError, match=words):
+        proofroll.judge(run, "pendulum")
+
+
+def test_the_command(proofroll: Proofroll, tmp_path: Path) -> None:
+    """A file of somebody's is judged: exit 0 if it agrees, 1 if not, with the numbers as JSON; 2 for another scene."""
+    import xarray as xr
+
+    right, wrong, own = (tmp_path / f"{name}.nc" for name in ("right", "wrong", "own"))
+    for file, gravity in ((right, 9.81), (wrong, 9.7)):
+        arrays = swing(gravity)
+        write(xr.Dataset({"q.pivot": ("time", arrays["q.pivot"])}, {"time": arrays["time"]}), file)
+    given = ["--scene", "pendulum", "--tolerance", "q.pivot=1e-6 rad", "--because", BECAUSE]
+    code, out, err = proofroll("judge", str(right), *given)
+    assert (code, err) == (0, "")
+    assert out.startswith("agrees with the truth of pendulum (tolerance: a first look)")
+    code, out, _ = proofroll("judge", str(wrong), *given, "--json")
+    found = json.loads(out)
+    assert (code, found["agrees"], found["compared"][0]["verdict"]) == (1, False, "differs")
+    documented = (Path(__file__).parents[1] / "docs" / "json.md").read_text(encoding="utf-8")
+    section = documented.partition("## `judge --json`")[2].partition("\n## ")[0]
+    assert set(re.findall(r"^\| `(\w+)` \|", section, flags=re.MULTILINE)) == set(found)
+    assert found["compared"][0].keys() == set(re.findall(r"`(\w+)`", section.strip().splitlines()[-1])) - {"compared"}
+    assert proofroll("run", "pendulum", "--engine", "projection", "--until", "0.1", "--out", str(own))[0] == 0
+    assert proofroll("judge", str(own), "--scene", "pendulum")[0] == 0
+    code, _, err = proofroll("judge", str(own), "--scene", "pendulum", "--set", "gravity=9.7")
+    assert code == 2
+    assert "it is a run of pendulum with other numbers" in err
+
+
+def test_the_plug_in_costs_nothing_until_it_is_used(tmp_path: Path) -> None:
+    """Pytest starts without loading anything heavy of this package; a test that takes the fixture gets the function."""
+    (tmp_path / "test_mine.py").write_text(
+        "import sys\n"
+        "def test_light():\n"
+        "    assert 'proofroll.pytest_plugin' in sys.modules\n"
+        "    assert not {'numpy', 'scipy', 'xarray', 'pydantic'} & set(sys.modules)\n"
+        "def test_mine(assert_agrees):\n"
+        "    assert_agrees('pendulum', 'projection', tolerance='1 %', because='a look', until=0.1)\n"
+    )
+    command = [sys.executable, "-m", "pytest", "-q", "-p", "no:cacheprovider", "-p", "no:hypothesispytest", "."]
+    done = subprocess.run(command, cwd=tmp_path, capture_output=True, text=True, check=False, timeout=600)
+    assert "2 passed" in done.stdout, done.stdout
