@@ -13,23 +13,22 @@ from proofroll.core.errors import Diverged, InputError, Missing, ProofrollError,
 if TYPE_CHECKING:
     from proofroll.files.scene_file import load_scene
     from proofroll.running.simulation import simulate
-    from proofroll.studies.judging import judge_run as judge
+    from proofroll.studies.judging import judge
 
 __all__ = ["Diverged", "InputError", "Missing", "ProofrollError", "Refused", "judge", "load_scene", "simulate"]
 __version__ = "0.1.0"
 
 _HOMES = {
-    "judge": ("proofroll.studies.judging", "judge_run"),
-    "load_scene": ("proofroll.files.scene_file", "load_scene"),
-    "simulate": ("proofroll.running.simulation", "simulate"),
+    "judge": "proofroll.studies.judging",
+    "load_scene": "proofroll.files.scene_file",
+    "simulate": "proofroll.running.simulation",
 }
 
 
 def __getattr__(name: str) -> Any:
     if name not in _HOMES:
         raise AttributeError(f"module 'proofroll' has no attribute {name!r}")
-    module, own = _HOMES[name]
-    return getattr(import_module(module), own)
+    return getattr(import_module(_HOMES[name]), name)
 
 
 def __dir__() -> list[str]:

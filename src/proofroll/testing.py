@@ -14,7 +14,7 @@ from proofroll.core.errors import InputError
 from proofroll.core.scene import Scene
 from proofroll.files.scene_file import load_scene
 from proofroll.running.simulation import recorded, simulate
-from proofroll.studies.judging import Judged, judge_run
+from proofroll.studies.judging import Judged, judge
 
 __all__ = ["Judged", "assert_agrees"]
 
@@ -63,7 +63,7 @@ def assert_agrees(
     status = run.attrs.get("status", "done") if hasattr(run, "attrs") else "done"
     if status != "done":
         raise AssertionError(f"{name} {status} on {scene.name}: {run.attrs['message']}")
-    found = judge_run(run, scene, tolerance, because=because)
+    found = judge(run, scene, tolerance, because=because)
     if not found.agrees:
         raise AssertionError(f"{name} {found}")
     return found

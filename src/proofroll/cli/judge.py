@@ -23,12 +23,12 @@ def judge(
 ) -> None:
     """Hold a trajectory from anywhere against the truth of a scene; exit 1 if it differs."""
     from proofroll.files.scene_file import load_scene
-    from proofroll.studies.judging import judge_run
+    from proofroll.studies import judging
 
     loaded = load_scene(scene, **assignments(settings or []))  # type: ignore[arg-type]  # text is checked there
     bounds = assignments(tolerance, "--tolerance") if tolerance else None
     with spinner(f"the truth of {loaded.name}"):
-        found = judge_run(run, loaded, bounds, because=because)
+        found = judging.judge(run, loaded, bounds, because=because)
     if as_json:
         write_json(found.content())
     else:

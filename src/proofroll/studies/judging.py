@@ -17,7 +17,8 @@ from proofroll.core.errors import InputError
 from proofroll.core.observable import Role
 from proofroll.core.scene import Scene
 from proofroll.core.truth import truth
-from proofroll.core.verdict import Doubt, Judgement, Verdict, judge
+from proofroll.core.verdict import Doubt, Judgement, Verdict
+from proofroll.core.verdict import judge as judge_curve
 from proofroll.files.scene_file import load_scene
 from proofroll.studies.common_span import common_span
 from proofroll.studies.reference import Reference
@@ -100,7 +101,7 @@ class Judged:
         return {"scene": self.scene, "agrees": self.agrees, "because": self.because, "compared": rows}
 
 
-def judge_run(
+def judge(
     run: Run, scene: str | Scene, tolerance: Mapping[str, object] | str | float | None = None, *, because: str = ""
 ) -> Judged:
     """Holds a trajectory against the truth of a scene at the trajectory's own times.
@@ -258,7 +259,7 @@ def _compared(
         if item and item.role is Role.REACTION and dataset["time"].to_numpy()[0] == 0:
             true, values = true[1:], values[1:]  # several engines define reactions only after a first step
         scale, doubt = reference.sizes.get(name) or float(np.ptp(true)) or 1.0, Doubt.NONE
-    found = judge(
+    found = judge_curve(
         name, _unit(reference, name), values, true,
         truth_error_bar=bar, tolerance=bound.absolute(scale), scale=scale, limit=None, doubt=doubt,
     )  # fmt: skip
