@@ -15,6 +15,7 @@ from proofroll.elements.ball_on_surface.model import BallCapability, RollingBall
 from proofroll.elements.ball_on_surface.surfaces import Surface
 from proofroll.engines.exudyn.local_frame import curvature
 from proofroll.engines.exudyn.native import Output, items, loads
+from proofroll.engines.exudyn.resistance import slow
 
 
 @dataclass(frozen=True)
@@ -120,7 +121,7 @@ def _resistance(rolling: RollingBall, node: Any) -> Any:
     (k22, k23), (_, k33) = curvature(rolling.surface, rolling.u0).tolist()
     twist = 2 * k23
     bend = None if rolling.surface.generators is not None else _bend(rolling.surface)
-    m = rolling.ball.mass
+    m, least = rolling.ball.mass, slow(rolling)
     gx, gy, gz = rolling.gravity.tolist()
     position, velocity = Output.Position, Output.Velocity
 
@@ -130,7 +131,7 @@ def _resistance(rolling: RollingBall, node: Any) -> Any:
         vx, vy, vz = output(node, velocity).tolist()
         x1, y1, z1, x2, y2, z2, x3, y3, z3 = triad(x, y, z)
         v2, v3 = vx * x2 + vy * y2 + vz * z2, vx * x3 + vy * y3 + vz * z3
-        speed = math.hypot(v2, v3)
+        speed = max(math.hypot(v2, v3), least)
         if not speed:
             return [0.0, 0.0, 0.0]
         # v·(∂e1/∂p)v, of which a homogeneous surface has the same coefficients everywhere

@@ -14,7 +14,7 @@ from typing import NamedTuple
 from proofroll.core.errors import Refused
 from proofroll.elements.ball_on_surface.model import RollingBall
 from proofroll.engines.exudyn.local_frame import curvature
-from proofroll.engines.exudyn.resistance import resistance_moment
+from proofroll.engines.exudyn.resistance import resistance_moment, slow
 
 # A slip that the needed friction would change within this part of a step is the round-off of a rolling constraint.
 AT_REST = 1e-6
@@ -91,7 +91,7 @@ def needed_function(body: RollingBall) -> NeededAt:
     moment M of the rolling resistance; N = m (v·ė1 + e1·g), as the ball stays on the wall.
     """
     a, m, f = body.ball.radius, body.ball.mass, body.contact.rolling_resistance
-    beta, lever = mobility(body), body.ball.radius / body.ball.inertia
+    least, beta, lever = slow(body), mobility(body), body.ball.radius / body.ball.inertia
     (k22, k23), (k32, k33) = curvature(body.surface, body.u0).tolist()
 
     def needed(v2: float, v3: float, w1: float, g1: float, g2: float, g3: float) -> tuple[float, float, float]:
@@ -99,7 +99,7 @@ def needed_function(body: RollingBall) -> NeededAt:
         N = m * (v2 * turn2 + v3 * turn3 + g1)
         free2, free3 = g2 - a * w1 * turn3, g3 + a * w1 * turn2
         if f:
-            M2, M3 = resistance_moment(f, N, v2, v3)
+            M2, M3 = resistance_moment(f, N, v2, v3, least)
             free2 += lever * M3
             free3 -= lever * M2
         return N, -free2 / beta, -free3 / beta

@@ -12,7 +12,7 @@ from proofroll.core.errors import Refused
 from proofroll.elements.ball_on_surface.model import RollingBall
 from proofroll.engines.exudyn.friction import Sliding
 from proofroll.engines.exudyn.local_frame import LocalGeometry
-from proofroll.engines.exudyn.resistance import resistance_moment
+from proofroll.engines.exudyn.resistance import resistance_moment, slow
 
 # The distance towards the wall, its two coordinates, and three whose rates are the spin.
 SIZE = 6
@@ -41,7 +41,7 @@ def quadratic_terms(body: RollingBall, local: LocalGeometry) -> list[tuple[int, 
 
 def force_function(body: RollingBall, local: LocalGeometry, friction: Sliding | None) -> Any:
     """Right-hand side of M q̈ + Cᵀλ = Q as plain floats: Exudyn calls it for every residual."""
-    f = body.contact.rolling_resistance
+    f, least = body.contact.rolling_resistance, slow(body)
     tangents = local.tangents
     (t2u, t2v), (t3u, t3v) = tangents[1:].tolist()
     scaled = body.ball.mass * base(local)
@@ -57,7 +57,7 @@ def force_function(body: RollingBall, local: LocalGeometry, friction: Sliding | 
         N = result[0]  # along the distance nothing accelerates
         if f:
             v2, v3 = t2u * rates[1] + t2v * rates[2], t3u * rates[1] + t3v * rates[2]
-            M2, M3 = resistance_moment(f, N, v2, v3)
+            M2, M3 = resistance_moment(f, N, v2, v3, least)
             result[4] += M2
             result[5] += M3
         if friction is not None and friction.direction is not None:

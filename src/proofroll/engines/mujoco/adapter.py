@@ -242,12 +242,12 @@ class Mujoco:
     def _lever(self, data: Any) -> float:
         """Lever f [m]: of the torque that acts, by the normal force; where neither can be, of the law of the torque.
 
-        A ball at rest has no direction of rolling, and a start at depth zero may have no normal force yet.
+        A ball that the torque stops at once takes less of it, and a start at depth zero may have no normal force yet.
         """
         torque = float(np.linalg.norm(data.xfrc_applied[self._ball, 3:]))
         N = -float(contact_force(self._model, data, self._geom) @ self._body.surface.normal(data.xpos[self._ball]))
         least = _PRESSED * self._body.ball.mass * natural_acceleration(self._body)
-        if least < N and (torque > 0 or np.any(self._body.v0)):
+        if least < N and not self._formulation.resistance.stops(N, float(np.linalg.norm(self._body.v0))):
             return torque / N
         return self._formulation.resistance.lever()
 

@@ -35,7 +35,7 @@ class Chart:
         self._model = model
         self._friction = friction
         self._corrects = corrects(body.contact, settings)
-        self.resistance = Resistance(body.contact.rolling_resistance)
+        self.resistance = Resistance.of(body, settings.dt)
         self._ball = model.body("ball").id
         self._wall = model.geom("wall").id
         self._touch = model.site("touch").id

@@ -11,6 +11,7 @@ import mujoco
 import numpy as np
 
 from proofroll.core.arrays import FloatArray
+from proofroll.elements.ball_on_surface.model import RollingBall
 
 # Numbers of user data that foreseen_normal_force keeps.
 MEMORY = 4
@@ -66,9 +67,25 @@ class Resistance:
 
     Attributes:
         f: how far the normal force is shifted forward [m].
+        stopping: torque that takes 1 m/s from a ball that rolls within a step: (1 + κ) m a / dt [N s].
+        pull: what gravity would add to the velocity of a ball that rolls within a step: dt g / (1 + κ) [m/s].
     """
 
     f: float
+    stopping: float
+    pull: tuple[float, float, float]
+
+    @classmethod
+    def of(cls, body: RollingBall, dt: float) -> Resistance:
+        """That of the scene at the step ``dt`` [s]."""
+        rolls = 1 + body.ball.inertia_ratio
+        x, y, z = (dt / rolls * body.gravity).tolist()
+        stopping = rolls * body.ball.mass * body.ball.radius / dt
+        return cls(body.contact.rolling_resistance, stopping, (x, y, z))
+
+    def stops(self, N: float, speed: float) -> bool:
+        """Whether the whole torque at ``N`` [N] would stop a ball with this speed [m/s] within the step."""
+        return self.stopping * speed <= self.f * N
 
     def apply(self, torque: Any, N: float, e1: Sequence[float], v: Sequence[float]) -> None:
         """Writes the moment -f N (v/V) × e1 [N m] into ``torque``.
@@ -85,18 +102,29 @@ class Resistance:
         v0, v1, v2 = v
         e0, e1_, e2 = e1
         speed = math.hypot(v0, v1, v2)
-        if speed == 0:
-            torque[:] = 0.0
+        if self.stopping * speed <= self.f * N:
+            self.stop(torque, N, e1, v)
             return
         scale = -self.f * N / speed
         torque[0] = scale * (v1 * e2 - v2 * e1_)
         torque[1] = scale * (v2 * e0 - v0 * e2)
         torque[2] = scale * (v0 * e1_ - v1 * e0)
 
+    def stop(self, torque: Any, N: float, e1: Sequence[float], v: Sequence[float]) -> None:
+        """As :meth:`apply`, of a ball that stops within the step that begins with the velocity ``v`` [m/s].
+
+        The moment is no more than ends the motion with the step, or the ball would go back and forth for ever.
+        """
+        inward = sum(one * other for one, other in zip(self.pull, e1, strict=True))
+        ahead = [one + pull - inward * normal for one, pull, normal in zip(v, self.pull, e1, strict=True)]
+        speed = math.hypot(*ahead)
+        scale = -min(self.f * N / speed, self.stopping) if speed else 0.0
+        torque[:] = [scale * component for component in cross(ahead, e1)]
+
     def lever(self) -> float:
-        """The lever that the torque has at a normal force of 1 N and a speed of 1 m/s [m]."""
+        """The lever that the torque has at a normal force of 1 N and a speed at which the ball goes on [m]."""
         torque = np.zeros(3)
-        self.apply(torque, 1.0, (1.0, 0.0, 0.0), (0.0, 1.0, 0.0))
+        self.apply(torque, 1.0, (1.0, 0.0, 0.0), (0.0, 1.0 + 2 * self.f / self.stopping, 0.0))
         return float(np.linalg.norm(torque))
 
 

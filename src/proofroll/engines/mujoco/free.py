@@ -17,9 +17,6 @@ from proofroll.engines.mujoco.friction import BoundedFriction, corrects
 from proofroll.engines.mujoco.model import pose, quaternion_of, tangent_plane
 from proofroll.engines.mujoco.settings import MujocoSettings, normal_lead, own_share, velocity_lag
 
-# A velocity that is this part of what half a step adds to it is round-off, and has no direction: the ball is at rest.
-_AT_REST = 1e-6
-
 
 class Free:
     """The ball on a free joint; the wall a mocap body, which MuJoCo treats as fixed wherever it is put.
@@ -39,7 +36,7 @@ class Free:
         self._edits = settings.curvature or corrects(body.contact, settings)
         self._surface = body.surface
         self._radius = body.ball.radius
-        self.resistance = Resistance(body.contact.rolling_resistance)
+        self.resistance = Resistance.of(body, settings.dt)
         self._ball = model.body("ball").id
         self._wall = model.geom("wall").id
         self._curvature = settings.curvature
@@ -127,9 +124,11 @@ class Free:
         mujoco.mju_quatZ2Vec(data.mocap_quat[0], -e1)
         if self.resistance.f:
             foreseen = foreseen_normal_force(data, N)
-            if self._half and np.linalg.norm(rates[:3]) < _AT_REST * self._half * np.linalg.norm(trend[:3]):
-                rates[:3] = 0.0
-            self.resistance.apply(data.xfrc_applied[self._ball, 3:], foreseen, e1.tolist(), rates[:3].tolist())
+            torque, along = data.xfrc_applied[self._ball, 3:], rates[:3].tolist()
+            if self._half and self.resistance.stops(foreseen, math.hypot(*along)):
+                self.resistance.stop(torque, foreseen, e1.tolist(), data.qvel[:3].tolist())
+            else:
+                self.resistance.apply(torque, foreseen, e1.tolist(), along)
         return rates, trend, N
 
     def _edit(self, data: Any, rates: FloatArray, trend: FloatArray, N: float) -> None:
@@ -164,12 +163,12 @@ class Facets:
         self,
         model: Any,
         body: RollingBall,
-        settings: MujocoSettings,  # noqa: ARG002 -- the same call for every formulation
+        settings: MujocoSettings,
         friction: BoundedFriction | None,  # noqa: ARG002 -- refused before
     ) -> None:
         self._model = model
         self._surface = body.surface
-        self.resistance = Resistance(body.contact.rolling_resistance)
+        self.resistance = Resistance.of(body, settings.dt)
         self._ball = model.body("ball").id
         wall = model.body("wall")
         axis = np.zeros(9)

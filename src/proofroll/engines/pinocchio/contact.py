@@ -75,6 +75,9 @@ class ContactSteps:
             Refused: Pinocchio's solver does not find the first impulse.
         """
         self._surface, self._f = body.surface, body.contact.rolling_resistance
+        rolls = 1 + body.ball.inertia_ratio
+        # Of a ball that rolls: moment per rate of its speed [N s²], and acceleration by gravity [m/s²].
+        self._stopping, self._pull = rolls * body.ball.mass * body.ball.radius, (body.gravity / rolls).tolist()
         self.dt, self.leapfrog = float(settings.dt or 0.0), settings.integrator == "leapfrog"
         self.solver, self.tolerance = settings.solver or "pgs", float(settings.solver_tolerance or 0.0)
         self.contact = PlaneContact(body, self.solver, self.tolerance)
@@ -152,7 +155,7 @@ class ContactSteps:
         torque, normal_force, centred = self._no_torque, self._normal_force, self.leapfrog and self.started
         for number in range(_REPEATS):
             if f:
-                torque = self.resistance(triad, along, normal_force)
+                torque = self.resistance(triad, along, normal_force, span)
             free = v + span * pin.aba(model, data, q, v, torque)
             impulse, found, status = self._solved(delassus, jacobian.dot(free) + shift)
             after = free + to_joints.dot(impulse)
@@ -166,13 +169,24 @@ class ContactSteps:
                 along = (0.5 * (v + after)[:3]).tolist()
         return Kick(after, impulse, found, status)
 
-    def resistance(self, triad: Sequence[float], v: Sequence[float], normal_force: float) -> FloatArray:
-        """Rolling resistance on the joints [N m], shape (6,); zero where the ball, at ``v`` [m/s], rests."""
+    def resistance(
+        self, triad: Sequence[float], v: Sequence[float], normal_force: float, span: float = 0.0
+    ) -> FloatArray:
+        """Rolling resistance on the joints [N m], shape (6,), of a ball at ``v`` [m/s].
+
+        No more than ends the motion within the ``span`` [s] of the kick, or the ball would go back and forth for ever.
+        """
         x, y, z, *_ = triad
         vx, vy, vz = v
-        torque, speed = np.zeros(6), math.sqrt(vx * vx + vy * vy + vz * vz)
+        torque, speed, most = np.zeros(6), math.sqrt(vx * vx + vy * vy + vz * vz), math.inf
+        if span and self._stopping * speed <= self._f * normal_force * span:
+            most = self._stopping / span
+            x0, y0, z0, gx, gy, gz = *self.v[:3].tolist(), *self._pull
+            inward = span * (gx * x + gy * y + gz * z)
+            vx, vy, vz = x0 + span * gx - inward * x, y0 + span * gy - inward * y, z0 + span * gz - inward * z
+            speed = math.sqrt(vx * vx + vy * vy + vz * vz)
         if speed > 0:
-            f = self._f * normal_force / speed
+            f = min(self._f * normal_force / speed, most)
             moment = np.array((f * (y * vz - z * vy), f * (z * vx - x * vz), f * (x * vy - y * vx)))
             torque[3:] = self.contact.turned.T.dot(moment)
         return torque
