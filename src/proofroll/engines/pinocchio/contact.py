@@ -181,7 +181,7 @@ class ContactSteps:
         torque, speed, most = np.zeros(6), math.sqrt(vx * vx + vy * vy + vz * vz), math.inf
         if span and self._stopping * speed <= self._f * normal_force * span:
             most = self._stopping / span
-            x0, y0, z0, gx, gy, gz = *self.v[:3].tolist(), *self._pull
+            (gx, gy, gz), (x0, y0, z0) = self._pull, self.v[:3].tolist()
             inward = span * (gx * x + gy * y + gz * z)
             vx, vy, vz = x0 + span * gx - inward * x, y0 + span * gy - inward * y, z0 + span * gz - inward * z
             speed = math.sqrt(vx * vx + vy * vy + vz * vz)
