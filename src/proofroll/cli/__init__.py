@@ -13,9 +13,9 @@ import typer
 
 import proofroll
 from proofroll.cli.comparing import compare
-from proofroll.cli.judge import judge
+for _command in (scenes, run, judge, plot, *_STUDIES):
 from proofroll.cli.ladder import ladder
-from proofroll.cli.lists import engines, scenes
+from proofroll.cli.lists import scenes
 from proofroll.cli.new import new
 from proofroll.cli.options import ENGINE, INTERRUPTED, OK, USAGE, complain
 from proofroll.cli.plot import plot
@@ -33,9 +33,10 @@ app = typer.Typer(
     rich_markup_mode=None,
 )
 _STUDIES = (compare, report, tradeoff, recommend, ladder, stability)
-for _command in (scenes, engines, run, judge, plot, *_STUDIES):
+for _command in (scenes, run, judge, plot, *_STUDIES):
     app.command()(_command)
 app.add_typer(new, name="new")
+app.add_typer(engines, name="engines")
 for _point in sorted(entry_points(group="proofroll.commands"), key=lambda point: point.name):
     _added = _point.load()
     if isinstance(_added, typer.Typer):

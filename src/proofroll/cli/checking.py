@@ -89,7 +89,7 @@ def _comparison(path: Path) -> dict[str, Any]:
     from proofroll.studies.planning import row_facts
 
     found = load_comparison(str(path))
-    row_facts(found, dict(enumerate(found.rows)), load_scene(found.scene).requires)
+    row_facts(found, list(enumerate(found.rows)), load_scene(found.scene).requires)
     counts = {"points": len(found.combinations()), "rows": len(found.rows), "tolerances": len(found.bands)}
     return _content("comparison", path, found.scene, counts)
 

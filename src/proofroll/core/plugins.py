@@ -23,23 +23,50 @@ def engine_names() -> list[str]:
     return sorted({point.name for point in entry_points(group=GROUP)})
 
 
+def plain_name(name: str) -> str:
+    """``mujoco`` of ``mujoco`` and of ``mujoco@3.8.1``."""
+    return name.partition("@")[0]
+
+
+def place_of(name: str) -> str:
+    """The part after ``@``: the other interpreter in which an engine runs; empty: this one."""
+    return name.partition("@")[2]
+
+
 def load_engine(name: str) -> Any:
-    """The engine's class.
+    """The engine's class, in this process.
 
     Raises:
-        InputError: no installed package announces such an engine.
-        Missing: it is announced, but what it needs is not installed.
+        InputError: no installed package announces such an engine, or it is one of another interpreter.
+        Missing: it is announced, but what it needs is not installed, or older than its adapter supports.
         ProofrollError: it is announced, but what the entry point or an import names does not exist.
     """
+    if place_of(name):
+        advice = "an engine of another interpreter cannot be loaded into this one; use the command line, or leave @ out"
+        raise InputError("engine", name, advice)
     point = _entry_point(name)
     try:
-        return point.load()
+        found = point.load()
     except ModuleNotFoundError as error:
         raise _not_found(point, error) from None
     except AttributeError as error:
         if place(error):  # arose inside the adapter
             raise
         raise ProofrollError(f"{name} is announced as {point.value}, but {error}: correct the entry point") from None
+    oldest = getattr(found, "oldest", "")
+    if oldest and release(found.version()) < release(oldest):
+        said = f"{name} {found.version()} is older than its adapter supports, {oldest}"
+        ours = point.value.startswith("proofroll.")
+        raise Missing(f"{said}; pip install --upgrade 'proofroll[{name}]'" if ours else f"{said}; install a later one")
+    return found
+
+
+def release(version: str) -> tuple[int, ...]:
+    """The numbers of a version, ``1.13.6.dev1`` -> (1, 13, 6), without zeros at the end; for comparing."""
+    numbers = [int(part) for part in re.match(r"[\d.]*", version)[0].split(".") if part]  # type: ignore[index]  # matches ""
+    while numbers and numbers[-1] == 0:
+        numbers.pop()
+    return tuple(numbers)
 
 
 def _not_found(point: EntryPoint, error: ModuleNotFoundError) -> ProofrollError:
@@ -80,8 +107,12 @@ def load_element_kinds() -> tuple[type[ElementKind], ...]:
 
 
 def require_engine(name: str) -> None:
-    """Raises InputError if no installed package announces such an engine; nothing is loaded."""
-    _entry_point(name)
+    """Raises InputError if no installed package announces such an engine; nothing is loaded.
+
+    Of another interpreter nothing is known here.
+    """
+    if not place_of(name):
+        _entry_point(name)
 
 
 def _entry_point(name: str) -> EntryPoint:
@@ -96,7 +127,7 @@ class EngineSpec:
     """An engine as the user writes it, ``mujoco[formulation=chart,dt=1e-4]``.
 
     Attributes:
-        name: of the engine.
+        name: of the engine, with the place of another interpreter, ``mujoco@3.8.1``.
         options: the settings that were given, as text or numbers.
     """
 
@@ -110,14 +141,19 @@ class EngineSpec:
 
 
 def parse_engine(text: str) -> EngineSpec:
-    """Reads ``name`` or ``name[key=value,…]``.
+    """Reads ``name`` or ``name[key=value,…]``; ``name@place`` runs in another interpreter.
 
     Raises:
         InputError: the text has another form.
     """
-    match = re.fullmatch(r"\s*([\w-]+)\s*(?:\[(.*)\])?\s*", text, flags=re.DOTALL)
+    match = re.fullmatch(
+        r"\s*([\w-]+(?:@[^\s\[\]@](?:[^\[\]@]*[^\s\[\]@])?)?)\s*(?:\[(.*)\])?\s*", text, flags=re.DOTALL
+    )
     if match is None:
-        raise InputError("engine", text, "write name or name[key=value,key=value]")
+        advice = "write name or name[key=value,key=value]"
+        if "@" in text:
+            advice = "write name@PYTHON or name@LABEL, then [key=value,key=value]; the place has no @ and no brackets"
+        raise InputError("engine", text, advice)
     options: dict[str, str] = {}
     for part in filter(None, (piece.strip() for piece in (match[2] or "").split(","))):
         key, equals, value = part.partition("=")

@@ -13,7 +13,7 @@ from typing import Any
 import numpy as np
 
 from proofroll.core.errors import InputError, Missing
-from proofroll.core.plugins import EngineSpec, parse_engine
+from proofroll.core.plugins import EngineSpec, parse_engine, place_of
 from proofroll.robots import reading
 from proofroll.robots.body_recursion import body_recursion
 from proofroll.robots.judging import TIME_LIMIT, judged, meaning, unread
@@ -24,7 +24,8 @@ from proofroll.robots.robot_file import RobotFile, open_robot
 from proofroll.robots.states import States, random_states
 from proofroll.robots.two_formulations import poses
 from proofroll.robots.urdf import BASE_JOINT
-from proofroll.running.process import Worker, WorkerDied
+from proofroll.running.interpreters import start
+from proofroll.running.process import WorkerDied
 
 
 def check(
@@ -56,7 +57,7 @@ def check(
     """
     specs = [parse_engine(text) for text in engines or reading.reader_names()]
     for spec in specs:
-        if spec.name not in reading.reader_names():
+        if not place_of(spec.name) and spec.name not in reading.reader_names():
             raise InputError(
                 "engine", spec.name, f"it reads no robot files; choose one of {', '.join(reading.reader_names())}"
             )
@@ -135,7 +136,7 @@ def _row(
 ) -> dict[str, Any]:
     """One engine."""
     try:
-        with Worker() as worker:
+        with start(spec.name) as worker:
             answer = reading.ask(worker, spec.name, request, folder, limit)
     except Missing as error:
         if asked:

@@ -12,7 +12,7 @@ from xml.etree.ElementTree import Element, tostring
 import numpy as np
 
 from proofroll.core.errors import InputError
-from proofroll.core.plugins import EngineSpec
+from proofroll.core.plugins import EngineSpec, plain_name
 from proofroll.robots import reading
 from proofroll.robots.explain import explain
 from proofroll.robots.layers import LAYERS, TOLERANCE, Truth, differences
@@ -57,7 +57,7 @@ def judged(
         for layer, value in found.items()
     }
     recompiled = _Recompiler(file)
-    causes, unexplained = explain(file, truth, torques, answer.reading, spec.name, tolerances, recompiled)
+    causes, unexplained = explain(file, truth, torques, answer.reading, plain_name(spec.name), tolerances, recompiled)
     holds = all(item["holds"] for item in layers.values())
     return row | {
         "status": "holds" if holds else ("differs" if unexplained else "explained"),

@@ -18,6 +18,7 @@ from proofroll.robots.model import Robot
 from proofroll.robots.plain_data import plain, robot_from, states_from
 from proofroll.robots.protocol import GROUP, Reading, Request
 from proofroll.robots.robot_file import RobotFile
+from proofroll.running.loading import here
 from proofroll.running.process import Worker
 
 _BY_JOINT = ("mass", "com", "inertia", "position", "rotation")
@@ -91,7 +92,7 @@ def read_robot(engine: str, asked: str, arrays: str) -> dict[str, Any]:
     """The worker's side: reads, evaluates, and writes the arrays to a file."""
     from proofroll.running.worker import one_line
 
-    reader = load_reader(engine)
+    reader = load_reader(here(engine))
     content = json.loads(Path(asked).read_text(encoding="utf-8"))
     request = Request(
         **content

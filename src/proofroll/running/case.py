@@ -8,6 +8,8 @@ from dataclasses import asdict, dataclass, field
 from enum import StrEnum
 from typing import Any
 
+from proofroll.core.plugins import plain_name
+
 
 class Status(StrEnum):
     """How a case ended."""
@@ -31,7 +33,7 @@ class EngineFacts:
     """What an engine says of itself with some settings.
 
     Attributes:
-        name: of the engine.
+        name: of the engine, with the place of another interpreter in which it runs, ``mujoco@3.8.1``.
         version: of the engine.
         code: hash of the adapter and of everything that it runs on, so that stored results never outlive a change.
         settings: complete settings, by name.
@@ -39,6 +41,8 @@ class EngineFacts:
         order: declared order of convergence, or None.
         shares: routes of the truth whose equations it rests on, see :class:`proofroll.core.engine.SharesEquations`.
         caveat: what of these settings is not the engine's own, to be said wherever it is judged; empty: nothing.
+        libraries: versions of Python, numpy and scipy, on which the last digits hang; in another interpreter also a
+            hash of all its packages.
     """
 
     name: str
@@ -49,6 +53,7 @@ class EngineFacts:
     order: int | None = None
     shares: list[str] = field(default_factory=list)
     caveat: str = ""
+    libraries: dict[str, str] = field(default_factory=dict)
 
 
 @dataclass(frozen=True)
@@ -78,9 +83,10 @@ class Case:
 
     @property
     def key(self) -> str:
-        """Hash of all that decides the result."""
+        """Hash of all that decides the result; where an interpreter lies does not, what it has does."""
         left_out = {"time_limit"} | (set() if self.asks else {"asks"})
         content = {name: value for name, value in asdict(self).items() if name not in left_out}
+        content["engine"]["name"] = plain_name(self.engine.name)
         return hashlib.sha256(json.dumps(content, sort_keys=True).encode()).hexdigest()[:24]
 
     @classmethod
@@ -101,12 +107,13 @@ class Result:
         seconds_per_second: median wall seconds per simulated second of clean runs that only advance, or None.
         timings: of the single clean runs, wall seconds per simulated second.
         certificate: lines of the certificate, as dictionaries.
-        versions: of the engine, of proofroll and of Python.
+        versions: of the engine, of proofroll, Python, numpy and scipy, as the process that ran it has them.
         trajectory: file of the trajectory in the store, or None if there is none.
         checksum: sha256 of that file.
         spent: where the wall time of the case went, by cause [s]; ``advance`` and ``clean runs`` are the engine's.
             Empty in records from before it was measured.
         processor: the same in seconds of the worker's processor, which others on the machine do not lengthen [s].
+        interpreter: path of the Python that ran it.
     """
 
     status: Status
@@ -120,6 +127,7 @@ class Result:
     checksum: str | None = None
     spent: dict[str, float] = field(default_factory=dict)
     processor: dict[str, float] = field(default_factory=dict)
+    interpreter: str = ""
 
     @classmethod
     def from_dict(cls, content: dict[str, Any]) -> Result:

@@ -6,6 +6,7 @@ import contextlib
 import dataclasses
 import hashlib
 import inspect
+import sys
 from collections.abc import Sequence
 from importlib import metadata
 from pathlib import Path
@@ -37,9 +38,9 @@ ASIDE = frozenset(
 def describe(engine: str) -> dict[str, Any]:
     """What an engine is and provides, and where its formulations stand on the ladder of models."""
     from proofroll.core.engine import CannotLeaveOut, TellsLevels
-    from proofroll.core.plugins import load_engine
+    from proofroll.running.loading import load
 
-    kind = load_engine(engine)
+    kind = load(engine)
     presets = {
         formulation: {preset: dataclasses.asdict(settings) for preset, settings in by_preset.items()}
         for formulation, by_preset in kind.presets.items()
@@ -47,6 +48,7 @@ def describe(engine: str) -> dict[str, Any]:
     return {
         "name": engine,
         "version": kind.version(),
+        "interpreter": sys.executable,
         "provides": {formulation: sorted(names) for formulation, names in kind.provides.items()},
         "presets": presets,
         "summary": (inspect.getdoc(kind) or "").split("\n", 1)[0],
@@ -66,9 +68,11 @@ def resolve(engine: str, options: dict[str, Any], requires: Sequence[str] = ()) 
         code = digest([Path(inspect.getfile(truth)).parent for truth in load_truths()])
         return dataclasses.asdict(EngineFacts("truth", truth_version(), code, {}))
     from proofroll.core.engine import SharesEquations, TellsCaveats
-    from proofroll.core.plugins import load_engine, resolve_settings
+    from proofroll.core.plugins import place_of, resolve_settings
+    from proofroll.running.handshake import libraries
+    from proofroll.running.loading import load
 
-    kind = load_engine(engine)
+    kind = load(engine)
     settings = resolve_settings(kind, options, requires)
     source = Path(inspect.getfile(kind))
     package = (source.parent / "__init__.py").is_file() and source.parent.name != "engines"
@@ -81,6 +85,7 @@ def resolve(engine: str, options: dict[str, Any], requires: Sequence[str] = ()) 
         order=settings.order,
         shares=list(kind.shares.get(settings.formulation, ())) if isinstance(kind, SharesEquations) else [],
         caveat=kind.caveat(settings) if isinstance(kind, TellsCaveats) else "",
+        libraries=libraries(place_of(engine)),
     )
     return dataclasses.asdict(facts)
 

@@ -12,6 +12,7 @@ import sys
 import threading
 import time
 from collections.abc import Mapping
+from pathlib import Path
 from types import TracebackType
 from typing import Any, Self
 
@@ -24,6 +25,16 @@ from proofroll.running.starving import starved
 _ONE_THREAD = dict.fromkeys(
     ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS", "NUMEXPR_NUM_THREADS", "VECLIB_MAXIMUM_THREADS"),
     "1",
+)
+# What makes a Python find other modules than its own, or start another one: of this one's, none is meant for that one.
+_OF_THIS_PYTHON = (
+    "PYTHONPATH",
+    "PYTHONHOME",
+    "PYTHONEXECUTABLE",
+    "PYTHONPLATLIBDIR",
+    "PYTHONSTARTUP",
+    "PYTHONUSERBASE",
+    "__PYVENV_LAUNCHER__",
 )
 # How often memory and life are looked at [s]: a look costs less than 0.1 ms, and memory fills at some GB/s.
 _TICK = 0.1
@@ -53,17 +64,24 @@ def end_all() -> None:
         worker.shoot()
 
 
+def environment_of_another() -> dict[str, str]:
+    """The environment of a process in another interpreter, which shall find its own modules and no others."""
+    kept = {name: value for name, value in os.environ.items() if name not in _OF_THIS_PYTHON}
+    return kept | {"PYTHONSAFEPATH": "1"}  # or ``-m`` would look in the working folder first
+
+
 class Worker:
     """A worker process; restarted by making a new one.
 
     Args:
         memory: how much it may have, its children included [GB]; by default :func:`memory.memory_limit`.
+        python: another interpreter in which it runs; by default this one.
 
     Attributes:
         waited: wall seconds for the last answer; for the first one from the start of the process [s].
     """
 
-    def __init__(self, memory: float | None = None) -> None:
+    def __init__(self, memory: float | None = None, python: Path | None = None) -> None:
         self._began, self.waited = time.perf_counter(), 0.0
         self._memory = memory or memory_limit()
         self._ending = threading.Lock()
@@ -75,12 +93,12 @@ class Worker:
         self._descriptors = [*self._open, self._life]
         try:
             self._process = subprocess.Popen(
-                [sys.executable, "-m", "proofroll.running.worker", str(writer), str(os.getpid()), str(life)],
+                [python or sys.executable, "-m", "proofroll.running.worker", str(writer), str(os.getpid()), str(life)],
                 stdin=subprocess.PIPE,
                 stdout=log,
                 stderr=log,
                 pass_fds=(writer, life),
-                env=os.environ | _ONE_THREAD,
+                env=(environment_of_another() if python else os.environ) | _ONE_THREAD,
                 text=True,
                 start_new_session=True,  # Ctrl-C reaches the parent alone, which then ends its workers
             )

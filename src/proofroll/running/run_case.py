@@ -5,11 +5,13 @@ from __future__ import annotations
 import dataclasses
 import gc
 import statistics
+import sys
 import time
 from pathlib import Path
 from typing import Any
 
 from proofroll.core.errors import Diverged, ProofrollError, Refused, lack_behind
+from proofroll.core.plugins import plain_name
 from proofroll.running.case import Case, Result, Status
 from proofroll.running.manifest import manifest
 from proofroll.running.manifest import versions as made_with
@@ -21,7 +23,7 @@ def run(case: dict[str, Any], out: str) -> dict[str, Any]:
     """Runs a case and writes its trajectory to ``out``; everything the case says comes back as a result."""
     spent = Spent()
     try:
-        answer = dataclasses.asdict(_run(Case.from_dict(case), Path(out), spent))
+        answer = dataclasses.asdict(_run(Case.from_dict(case), Path(out), spent)) | {"interpreter": sys.executable}
     finally:
         gc.collect()  # the next case of this process starts clean,
         gc.freeze()  # and need not look again at what stays: the modules
@@ -33,21 +35,19 @@ def _run(case: Case, out: Path, spent: Spent) -> Result:
     from proofroll.core.certificate import Standing, certify, first_difference
     from proofroll.core.engine import fixed_step
     from proofroll.core.first_steps import DERIVED, derivable
-    from proofroll.core.plugins import load_engine, resolve_settings
     from proofroll.core.several import build
     from proofroll.core.time_grid import time_grid
     from proofroll.files.netcdf import write
-    from proofroll.files.scene_file import load_scene
+    from proofroll.running.loading import loaded, scene_of
     from proofroll.running.recording import off_grid, record
 
-    versions = made_with(case.engine.name, case.engine.version)
-    scene = load_scene(case.scene, asks=case.asks, **case.parameters)
+    scene = scene_of(case)
     times = time_grid(case.until, case.every)
     if case.engine.name == "truth":
         spent.on("loading")
-        return _run_truth(scene, times, out, versions)
-    kind = load_engine(case.engine.name)
-    settings = resolve_settings(kind, case.engine.settings)
+        return _run_truth(scene, times, out, made_with("truth", case.engine.version))
+    kind, settings = loaded(case)
+    versions = made_with(plain_name(case.engine.name), kind.version())
     spent.on("loading")
     try:
         engine = build(kind, scene, settings)

@@ -14,6 +14,7 @@ from pathlib import Path
 from typing import Any
 
 from proofroll.core.errors import InputError, Missing, ProofrollError
+from proofroll.core.plugins import plain_name
 from proofroll.running.case import Case, EngineFacts, Result, Status
 from proofroll.running.process import Worker, WorkerDied
 from proofroll.running.store import Store
@@ -53,7 +54,11 @@ def resolve(
             if other != name:
                 continue
             request = {"do": "resolve", "engine": name, "options": dict(options), "requires": sorted(requires)}
-            worker = lent.take(name)
+            try:
+                worker = lent.take(name)
+            except ProofrollError as error:  # another interpreter that does not serve
+                found[index] = error
+                continue
             try:
                 found[index] = EngineFacts(**worker.request(request, _START_UP_SECONDS))
             except WorkerDied as error:
@@ -249,7 +254,12 @@ class Runner:
                     worker = None
                 engine = case.engine.name
                 if worker is None:
-                    worker = self.workers.take(engine)
+                    try:
+                        worker = self.workers.take(engine)
+                    except (InputError, Missing, WorkerDied) as error:  # another interpreter, gone since it was asked
+                        status = error.status if isinstance(error, WorkerDied) else Status.MISSING
+                        arrived.put((case, _lost(case, WorkerDied(status, str(error)))))
+                        continue
                     self._busy.add(worker)
                     if self._stopping.is_set():  # whoever stops us may not have seen this worker
                         break
@@ -281,7 +291,9 @@ class Runner:
             try:
                 result = _ask(worker, case, written)
             except InputError as error:  # a step that does not divide the grid, say: this case's own affair
-                result = Result(Status.REFUSED, str(error), versions={case.engine.name: case.engine.version})
+                result = Result(
+                    Status.REFUSED, str(error), versions={plain_name(case.engine.name): case.engine.version}
+                )
             except WorkerDied as error:  # where the disk is full the name for a while means nothing to a person
                 said = str(error).replace(str(written.absolute()), str(self.store.trajectory(case)))
                 raise WorkerDied(error.status, said) from None
@@ -296,6 +308,10 @@ def _ask(worker: Worker, case: Case, out: Path) -> Result:
     request = {"do": "run", "case": dataclasses.asdict(case), "out": str(out.absolute())}  # an engine may change folder
     try:
         found = Result.from_dict(worker.request(request, case.time_limit))
+        name = plain_name(case.engine.name)
+        ran = found.versions.get(name)
+        if ran != case.engine.version:
+            raise WorkerDied(Status.CRASHED, f"version {ran} of {name} ran, and {case.engine.version} had answered")
         waited = worker.waited - sum(found.spent.values())  # a new process starts, and messages go to and fro
         return dataclasses.replace(found, spent=found.spent | {"process start": waited})
     except Missing as error:
@@ -303,7 +319,7 @@ def _ask(worker: Worker, case: Case, out: Path) -> Result:
 
 
 def _lost(case: Case, error: WorkerDied) -> Result:
-    return Result(error.status, str(error), versions={case.engine.name: case.engine.version})
+    return Result(error.status, str(error), versions={plain_name(case.engine.name): case.engine.version})
 
 
 def run_one(case: Case, out: Path, workers: Workers | None = None) -> Result:

@@ -6,6 +6,7 @@ import dataclasses
 from types import TracebackType
 from typing import Self
 
+from proofroll.core.errors import ProofrollError
 from proofroll.running.case import Case
 from proofroll.running.process import Worker, WorkerDied
 from proofroll.running.worker_pool import Workers
@@ -30,7 +31,10 @@ class Stopwatch:
         """Wall seconds per simulated second of a case, from clean runs that only advance; None: it did not run."""
         name = case.engine.name
         if name not in self._workers:
-            self._workers[name] = self._lent.take(name)
+            try:
+                self._workers[name] = self._lent.take(name)
+            except ProofrollError:  # another interpreter that does not serve any more
+                return None
         request = {"do": "time", "case": dataclasses.asdict(case), "seconds": seconds}
         try:
             rate = self._workers[name].ask(request, _LIMIT).get("seconds_per_second")

@@ -20,17 +20,15 @@ _MOST_BUILDING = 5.0
 
 def time_once(case: dict[str, Any], seconds: float) -> dict[str, Any]:
     """One measurement of a case's speed: clean runs for about this many wall seconds, one after another."""
-    from proofroll.core.plugins import load_engine, resolve_settings
     from proofroll.core.time_grid import time_grid
-    from proofroll.files.scene_file import load_scene
+    from proofroll.running.loading import loaded, scene_of
 
     wanted = Case.from_dict(case)
-    scene = load_scene(wanted.scene, asks=wanted.asks, **wanted.parameters)
+    scene = scene_of(wanted)
     times = time_grid(wanted.until, wanted.every)
     if wanted.engine.name == "truth":
         return _time_truth(scene, times, seconds)
-    kind = load_engine(wanted.engine.name)
-    settings = resolve_settings(kind, wanted.engine.settings)
+    kind, settings = loaded(wanted)
     elapsed = simulated = 0.0
     start = time.perf_counter()
     while elapsed < seconds and time.perf_counter() - start < _MOST_BUILDING * seconds:

@@ -18,6 +18,7 @@ from typing import Any
 from proofroll.core.errors import Diverged, InputError, Missing, ProofrollError, Refused, place
 from proofroll.running.case import Case
 from proofroll.running.ending import end_with, end_with_pipe
+from proofroll.running.handshake import hello
 from proofroll.running.identity import describe, resolve
 from proofroll.running.memory import volunteer
 from proofroll.running.run_case import run
@@ -43,6 +44,7 @@ def main(answers: int, parent: int, life: int) -> None:
 
 def _answer(request: dict[str, Any]) -> dict[str, Any]:
     actions: dict[str, Callable[..., dict[str, Any]]] = {
+        "hello": hello,
         "describe": describe,
         "resolve": resolve,
         "run": run,
@@ -50,9 +52,11 @@ def _answer(request: dict[str, Any]) -> dict[str, Any]:
         "reproduce": reproduce,
         "call": call,
     }
-    action = actions[request.pop("do")]
+    name = request.pop("do")
     try:
-        return action(**request)
+        if name not in actions:
+            raise InputError("do", name, f"this worker knows {', '.join(actions)}")
+        return actions[name](**request)
     except InputError as error:
         value = error.value if isinstance(error.value, (bool, int, float, str)) else str(error.value)
         return {"error": "input", "field": error.field, "value": value, "advice": error.advice}
@@ -67,19 +71,17 @@ def _answer(request: dict[str, Any]) -> dict[str, Any]:
 def reproduce(case: dict[str, Any]) -> dict[str, Any]:
     """The engine's own program for a case, or why there is none."""
     from proofroll.core.engine import Reproduces
-    from proofroll.core.plugins import load_engine, resolve_settings
-    from proofroll.files.scene_file import load_scene
+    from proofroll.running.loading import loaded, scene_of
 
     wanted = Case.from_dict(case)
-    kind = load_engine(wanted.engine.name)
+    kind, settings = loaded(wanted)
     if not isinstance(kind, Reproduces):
         return {
             "program": None,
             "message": f"{wanted.engine.name} offers no program of its own",
         }
     try:
-        settings = resolve_settings(kind, wanted.engine.settings)
-        program = kind.reproducer(load_scene(wanted.scene, **wanted.parameters), settings)
+        program = kind.reproducer(scene_of(wanted), settings)
     except Refused as error:
         return {"program": None, "message": str(error)}
     return {"program": program, "message": ""}

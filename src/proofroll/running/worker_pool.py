@@ -7,6 +7,7 @@ import weakref
 from collections.abc import Iterator
 from contextlib import contextmanager
 
+from proofroll.running.interpreters import start
 from proofroll.running.process import Worker
 
 # Idle workers that are kept, some hundred MB each; of more, the one that has waited longest is ended.
@@ -27,12 +28,16 @@ class Workers:
         self._end = weakref.finalize(self, _close, self._idle)
 
     def take(self, engine: str) -> Worker:
-        """A worker that has this engine loaded, or a new one."""
+        """A worker that has this engine loaded, or a new one.
+
+        Raises:
+            InputError, Missing, WorkerDied: the engine's interpreter does not serve, see :func:`interpreters.start`.
+        """
         with self._lock:
             for index, (name, _) in enumerate(self._idle):
                 if name == engine:
                     return self._idle.pop(index)[1]
-        return Worker(self._memory)
+        return start(engine, self._memory)
 
     def keep(self, engine: str, worker: Worker) -> None:
         """Takes back a worker that has answered all that it was asked."""

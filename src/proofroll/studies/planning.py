@@ -2,14 +2,14 @@
 
 from __future__ import annotations
 
-from collections.abc import Collection, Iterable, Mapping
-from dataclasses import dataclass, field
+from collections.abc import Collection, Iterable, Sequence
+from dataclasses import dataclass, field, replace
 
 import numpy as np
 
 from proofroll.core.comparison import Comparison, Row
 from proofroll.core.errors import InputError, ProofrollError
-from proofroll.core.plugins import parse_engine
+from proofroll.core.plugins import parse_engine, place_of, plain_name
 from proofroll.core.scene import Scene
 from proofroll.files.scene_file import load_scene
 from proofroll.running.case import Case, EngineFacts
@@ -52,17 +52,20 @@ def plan(comparison: Comparison, engines: Iterable[str] = (), workers: Workers |
 
     Args:
         comparison: from :func:`proofroll.files.comparison_file.load_comparison`.
-        engines: names of engines to which it is restricted; all if empty.
+        engines: names of engines to which it is restricted; all if empty. ``mujoco@3.8.1`` runs the rows of
+            mujoco there.
         workers: processes in which they are asked.
 
     Raises:
         InputError: an engine or setting that does not exist.
     """
-    chosen = set(engines)
-    numbered = {
-        i: row for i, row in enumerate(comparison.rows) if not chosen or parse_engine(row.engine).name in chosen
-    }
-    rows = list(numbered.values())
+    chosen = list(dict.fromkeys(engines))
+    numbered = [
+        (i, row) for i, row in enumerate(comparison.rows) if not chosen or parse_engine(row.engine).name in chosen
+    ]
+    for name in filter(place_of, chosen):
+        numbered += [(i, moved) for i, row in enumerate(comparison.rows) if (moved := _moved(row, name))]
+    rows = [row for _, row in numbered]
     if not rows:
         known = ", ".join(dict.fromkeys(parse_engine(row.engine).name for row in comparison.rows))
         raise InputError("engine", ", ".join(chosen), f"{comparison.name} compares {known}")
@@ -86,26 +89,34 @@ def plan(comparison: Comparison, engines: Iterable[str] = (), workers: Workers |
     return Plan(comparison, truths, runs)
 
 
+def _moved(row: Row, name: str) -> Row | None:
+    """A row of an engine in another interpreter, ``mujoco@3.8.1``; None: it is one of another engine."""
+    spec = parse_engine(row.engine)
+    if spec.name != plain_name(name):
+        return None
+    return replace(row, engine=str(replace(spec, name=name)))
+
+
 def row_facts(
-    comparison: Comparison, rows: Mapping[int, Row], requires: Collection[str], workers: Workers | None = None
+    comparison: Comparison, rows: Sequence[tuple[int, Row]], requires: Collection[str], workers: Workers | None = None
 ) -> tuple[list[EngineFacts | ProofrollError], EngineFacts]:
     """The complete settings of rows, or why there are none, and those of the truth.
 
     Args:
         comparison: for messages.
-        rows: by their place in it.
+        rows: with their place in it.
         requires: by the scene.
         workers: processes in which engines are asked.
 
     Raises:
         InputError: an engine or setting that does not exist.
     """
-    specs = [parse_engine(row.engine) for row in rows.values()]
+    specs = [parse_engine(row.engine) for _, row in rows]
     resolved = resolve([(spec.name, spec.options) for spec in specs] + [("truth", {})], workers, requires)
     truth = resolved.pop()
     if not isinstance(truth, EngineFacts):
         raise truth
-    for (index, row), facts in zip(rows.items(), resolved, strict=True):
+    for (index, row), facts in zip(rows, resolved, strict=True):
         if isinstance(facts, InputError):
             raise facts.within(f"{comparison.name}.toml: rows.{index}.engine", row.engine)
     return resolved, truth

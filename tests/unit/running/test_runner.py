@@ -229,7 +229,7 @@ def test_manifest(tmp_path: Path, make_case: MakeCase) -> None:
     assert json.loads(attributes["versions"]) == result.versions
     assert {"engine", "status", "message", "machine", "scene", "scene_digest"} <= set(attributes)
     assert attributes["engine"] == "oracle"
-    assert result.versions.keys() == {"oracle", "proofroll", "python"}
+    assert result.versions.keys() == {"oracle", "proofroll", "python", "numpy", "scipy"}
     assert all(line["holds"] for line in result.certificate)
 
 

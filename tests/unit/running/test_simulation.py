@@ -64,7 +64,7 @@ def test_a_trajectory_says_how_it_was_made(engine: str) -> None:
     found = proofroll.simulate(scene, engine, until=0.1, every=0.1)
     assert found.attrs["engine"] == engine
     assert json.loads(found.attrs["parameters"]) == dict(scene.parameters) | {"mu_static": math.inf}
-    assert json.loads(found.attrs["versions"]).keys() == {engine, "proofroll", "python"}
+    assert json.loads(found.attrs["versions"]).keys() == {engine, "proofroll", "python", "numpy", "scipy"}
     assert "dt" in json.loads(found.attrs["settings"]) or engine == "truth"
 
 

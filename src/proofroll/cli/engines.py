@@ -1,0 +1,93 @@
+"""Engines: what there is, and environments of other versions."""
+
+from __future__ import annotations
+
+import sys
+from concurrent.futures import ThreadPoolExecutor
+from typing import Annotated, Any
+
+import typer
+
+from proofroll.cli.options import Json, spinner, write_json
+from proofroll.core.errors import Missing, ProofrollError
+
+engines = typer.Typer(help="List the engines, and make environments of other versions.", rich_markup_mode=None)
+
+
+@engines.callback(invoke_without_command=True)
+def listed(context: typer.Context, as_json: Json = False) -> None:
+    """List the engines: what is installed, what each provides, and why one is missing.
+
+    Environments made by ``add`` are among them, as ``NAME@LABEL``; any command that takes ``--engine`` takes these.
+    """
+    if context.invoked_subcommand is not None:
+        return
+    from proofroll.core.plugins import engine_names
+    from proofroll.running.environments import remembered
+
+    names = [*engine_names(), *(f"{item.name}@{item.label}" for item in remembered())]
+    with ThreadPoolExecutor() as pool:
+        found = list(pool.map(_described, names))
+    if as_json:
+        write_json(found)
+        return
+    from rich.table import Table
+
+    from proofroll.report.terminal import console
+
+    table = Table(box=None, pad_edge=False)
+    for column in ("engine", "version", "formulations (settings)", "provides"):
+        table.add_column(column)
+    for item in found:
+        if item["status"] != "installed":
+            table.add_row(item["name"], item["status"], item["message"], "")
+            continue
+        formulations = "\n".join(f"{name} ({', '.join(presets)})" for name, presets in item["presets"].items())
+        if "@" in item["name"]:
+            table.add_row(item["name"], item["version"], item["interpreter"], "")
+            continue
+        table.add_row(
+            item["name"], item["version"], formulations, "\n".join(sorted(set().union(*item["provides"].values())))
+        )
+    console().print(table)
+
+
+@engines.command()
+def add(
+    name: Annotated[str, typer.Argument(help="Name of the engine, e.g. mujoco.")],
+    requirement: Annotated[list[str], typer.Option(help="What is installed, as pip reads it, e.g. mujoco==3.8.1.")],
+    label: Annotated[str, typer.Option(help="Remember it as NAME@LABEL; by default the version that is pinned.")] = "",
+    python: Annotated[str, typer.Option(help="Its Python, e.g. python3.12; by default the one that runs this.")] = "",
+) -> None:
+    """Make an environment with an engine of another version and this proofroll, and remember it.
+
+    It is kept below PROOFROLL_ENGINES, by default XDG_DATA_HOME/proofroll/engines.
+    """
+    from proofroll.running.make_environment import add as made
+
+    with spinner(f"{name}: making an environment") as say:
+        found = made(name, requirement, label, python, lambda text: say(f"{name}: {text}"))
+    sys.stdout.write(f"{name}@{found.label}: {name} {found.version}, Python {found.interpreter}, in {found.folder}\n")
+
+
+@engines.command()
+def remove(
+    environment: Annotated[list[str], typer.Argument(help="NAME@LABEL of an environment; several may be given.")],
+) -> None:
+    """Forget environments and delete their folders."""
+    from proofroll.running.environments import remove as removed
+
+    for item in environment:
+        removed(item)
+        sys.stdout.write(f"{item} is removed\n")
+
+
+def _described(name: str) -> dict[str, Any]:
+    from proofroll.running.runner import describe
+
+    try:
+        return {"status": "installed", **describe(name)}
+    except Missing as error:
+        return {"name": name, "status": "missing", "message": str(error)}
+    except ProofrollError as error:
+        return {"name": name, "status": "broken", "message": str(error)}

@@ -1,0 +1,160 @@
+"""Environments of engines in other versions, made by ``proofroll engines add`` and kept where a person's data are.
+
+One folder for each: ``NAME/LABEL/`` with the virtual environment ``venv`` and the stamp ``engine.json``, which is
+written last: what has none is a half, and is made anew. An environment is never changed in place, so that its label
+goes on meaning what was installed.
+"""
+
+from __future__ import annotations
+
+import contextlib
+import json
+import os
+import re
+import shutil
+from collections.abc import Iterator
+from dataclasses import asdict, dataclass, field
+from pathlib import Path
+
+from proofroll.core.errors import InputError, ProofrollError, choices
+from proofroll.core.plugins import place_of, plain_name
+
+VARIABLE = "PROOFROLL_ENGINES"
+STAMP = "engine.json"
+_LABEL = r"\w[\w.+-]*"
+
+
+@dataclass(frozen=True)
+class Environment:
+    """A remembered environment.
+
+    Attributes:
+        name, label: of the engine ``NAME@LABEL``.
+        folder: where it lies.
+        version: of the engine, as the engine said when it was made.
+        requirements: with which it was made.
+        interpreter: version of its Python.
+        packages: all that are installed in it, ``name==version``.
+    """
+
+    name: str
+    label: str
+    folder: Path
+    version: str = ""
+    requirements: list[str] = field(default_factory=list)
+    interpreter: str = ""
+    packages: list[str] = field(default_factory=list)
+
+    @property
+    def python(self) -> Path:
+        """Its Python."""
+        return self.folder / "venv" / "bin" / "python"
+
+    def stamp(self) -> None:
+        """Remembers it."""
+        from proofroll.files.atomic import replacing
+
+        said = asdict(self) | {"folder": str(self.folder)}
+        with replacing(self.folder / STAMP) as temporary:
+            temporary.write_text(json.dumps(said, indent=1), encoding="utf-8")
+
+
+def root() -> Path:
+    """Where environments are kept: ``PROOFROLL_ENGINES``, or ``proofroll/engines`` below ``XDG_DATA_HOME``."""
+    chosen = os.environ.get(VARIABLE)
+    if chosen:
+        return Path(chosen).expanduser().absolute()
+    data = Path(os.environ.get("XDG_DATA_HOME", ""))
+    # The specification says that a relative path is none.
+    return (data if data.is_absolute() else Path.home() / ".local" / "share") / "proofroll" / "engines"
+
+
+def remembered() -> list[Environment]:
+    """All that are remembered, by name and label."""
+    found = (_read(stamp.parent) for stamp in sorted(root().glob(f"*/*/{STAMP}")))
+    return [item for item in found if item is not None]
+
+
+def find(name: str, label: str) -> Environment | None:
+    """The environment ``name@label``, or None."""
+    return _read(place(name, label)) if re.fullmatch(_LABEL, label) else None
+
+
+def place(name: str, label: str) -> Path:
+    """The folder of an environment.
+
+    Raises:
+        InputError: the label is no name of a folder.
+    """
+    if not re.fullmatch(_LABEL, label):
+        raise InputError("label", label, "use letters, digits, dots, hyphens and plus signs, e.g. 3.8.1")
+    return root() / name / label
+
+
+def remove(engine: str) -> None:
+    """Forgets an environment ``NAME@LABEL`` and deletes its folder; also what is left of one that was not finished.
+
+    Raises:
+        InputError: there is none.
+        ProofrollError: it cannot be deleted.
+    """
+    known = [f"{item.name}@{item.label}" for item in remembered()]
+    folder = place(plain_name(engine), place_of(engine)) if place_of(engine) else None
+    if folder is None or not folder.is_dir():
+        there_are = f"choose from {choices(known)}" if known else "there is none"
+        raise InputError("environment", engine, f"no such environment is remembered; {there_are}")
+    with making(folder):
+        delete(folder)
+
+
+def delete(folder: Path) -> None:
+    """Deletes the folder of an environment, its stamp first, so that a half that is left is not taken for a whole.
+
+    Raises:
+        ProofrollError: it cannot be deleted.
+    """
+    try:
+        (folder / STAMP).unlink(missing_ok=True)
+        if folder.is_symlink():
+            folder.unlink()
+        elif folder.exists():
+            shutil.rmtree(folder)
+    except OSError as error:
+        raise ProofrollError(f"{folder} cannot be deleted ({error.strerror or error})") from None
+    with contextlib.suppress(OSError):
+        folder.parent.rmdir()  # of the engine's last one
+
+
+@contextlib.contextmanager
+def making(folder: Path) -> Iterator[None]:
+    """Keeps other processes from making or deleting the same environment meanwhile.
+
+    Raises:
+        ProofrollError: another process does, or the place cannot be written.
+    """
+    import fcntl
+
+    try:
+        root().mkdir(parents=True, exist_ok=True)
+        lock = os.open(root() / f".{folder.parent.name}@{folder.name}.lock", os.O_CREAT | os.O_RDWR, 0o644)
+    except OSError as error:
+        said = f"{root()} cannot be written ({error.strerror or error}); choose another place by {VARIABLE}"
+        raise ProofrollError(said) from None
+    try:
+        fcntl.flock(lock, fcntl.LOCK_EX | fcntl.LOCK_NB)
+    except BlockingIOError:
+        os.close(lock)
+        raise ProofrollError(f"{folder} is being made or deleted by another process; wait for it") from None
+    try:
+        yield
+    finally:
+        os.close(lock)  # the file stays: were it deleted, two processes could hold locks of the same name
+
+
+def _read(folder: Path) -> Environment | None:
+    try:
+        said = json.loads((folder / STAMP).read_text(encoding="utf-8"))
+        kept = {key: said[key] for key in ("version", "requirements", "interpreter", "packages")}
+        return Environment(folder.parent.name, folder.name, folder, **kept)  # it may have been moved
+    except (OSError, ValueError, KeyError, TypeError):
+        return None

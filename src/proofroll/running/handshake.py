@@ -1,0 +1,66 @@
+"""What a worker says first, so that nobody takes the numbers of another proofroll, or of another place, for its own."""
+
+from __future__ import annotations
+
+import hashlib
+import platform
+import sys
+from collections.abc import Mapping
+from functools import cache
+from importlib import metadata
+from typing import Any
+
+import proofroll
+
+# Of requests and answers; see docs/worker_protocol.md.
+PROTOCOL = 1
+
+
+def hello(place: str) -> dict[str, Any]:
+    """Who this worker is. From now on it is the one for engines ``NAME@place``, and for no other.
+
+    Args:
+        place: as a person wrote it after ``@``.
+    """
+    from proofroll.running import loading
+
+    loading.settle(place)
+    return own() | {"interpreter": sys.executable, "python": platform.python_version()}
+
+
+@cache
+def own() -> dict[str, Any]:
+    """Protocol, version and code of this proofroll."""
+    from proofroll.running.identity import digest
+
+    return {"protocol": PROTOCOL, "proofroll": proofroll.__version__, "code": digest([])}
+
+
+def mismatch(answer: Mapping[str, Any]) -> str:
+    """Why a worker with this answer cannot serve here; empty: it can.
+
+    Its code must be the same, not only its version: it reads the scene, certifies and records.
+    """
+    mine = own()
+    if answer.get("protocol") != PROTOCOL:
+        return f"speaks protocol {answer.get('protocol')} of workers, and this proofroll speaks {PROTOCOL}"
+    if answer.get("proofroll") != mine["proofroll"]:
+        return f"has proofroll {answer.get('proofroll')}, and this is {mine['proofroll']}"
+    if answer.get("code") != mine["code"]:
+        return f"has other code of proofroll {mine['proofroll']} than this one"
+    return ""
+
+
+def libraries(place: str) -> dict[str, str]:
+    """What besides an engine and its adapter decides the last digits of its results.
+
+    Args:
+        place: of this worker; in another interpreter all its packages count, for engines bring libraries of their own.
+    """
+    found = {"python": platform.python_version()}
+    for name in ("numpy", "scipy"):
+        found[name] = metadata.version(name)
+    if place:
+        packages = sorted({f"{item.name}=={item.version}" for item in metadata.distributions()})
+        found["packages"] = hashlib.sha256("\n".join(packages).encode()).hexdigest()[:12]
+    return found

@@ -1,0 +1,126 @@
+"""Where an engine ``NAME@PLACE`` runs: a worker in another Python, which has proofroll and the engine."""
+
+from __future__ import annotations
+
+import contextlib
+import json
+import os
+import shutil
+import subprocess
+from pathlib import Path
+
+from proofroll.core.errors import InputError, Missing, ProofrollError, choices
+from proofroll.core.plugins import place_of, plain_name
+from proofroll.running import environments
+from proofroll.running.case import Status
+from proofroll.running.handshake import mismatch
+from proofroll.running.process import Worker, WorkerDied, environment_of_another
+
+# A first start reads the packages of another interpreter from a cold disk; one that does not answer hangs [s].
+HELLO_SECONDS = 60.0
+# What a Python is asked that did not answer as a worker; one of any age understands it [s].
+_PROBE = """
+import sys, json
+try:
+    import proofroll
+    found = proofroll.__version__
+except Exception:
+    found = None
+print(json.dumps([list(sys.version_info[:3]), found]))
+"""
+_PROBE_SECONDS = 20.0
+OLDEST = (3, 11)
+
+
+def start(engine: str, memory: float | None = None) -> Worker:
+    """A worker for an engine, in the interpreter that its name says.
+
+    Args:
+        engine: ``NAME``, which runs in this interpreter, or ``NAME@PLACE``.
+        memory: see :class:`Worker`.
+
+    Raises:
+        InputError: there is no such place.
+        Missing: there is no Python, or none that has this proofroll.
+        WorkerDied: it crashed or hung before it answered.
+    """
+    place = place_of(engine)
+    if not place:
+        return Worker(memory)
+    python = python_at(engine)
+    worker = Worker(memory, python)
+    try:
+        answer = worker.request({"do": "hello", "place": place}, HELLO_SECONDS)
+    except ProofrollError as error:
+        worker.close()
+        raise _explained(engine, python, error) from None
+    except BaseException:
+        worker.close()
+        raise
+    if wrong := mismatch(answer):
+        worker.close()
+        raise Missing(f"{engine}: {python} {wrong}; {_install(engine)}")
+    return worker
+
+
+def python_at(engine: str) -> Path:
+    """The Python of an engine ``NAME@PLACE``: a path, a remembered label, or a command.
+
+    Raises:
+        InputError: there is no such thing.
+        Missing: a remembered environment is gone.
+    """
+    name, place = plain_name(engine), place_of(engine)
+    if os.sep in place or place.startswith(("~", ".")):
+        # Not resolved: the Python of a virtual environment is a link, and followed it is another interpreter.
+        path = Path(os.path.abspath(Path(place).expanduser()))
+        if path.is_dir():
+            path = path / "bin" / "python"
+        if not path.exists():
+            raise InputError("engine", engine, f"there is no {path}; give the path of a Python")
+        if not path.is_file() or not os.access(path, os.X_OK):
+            raise InputError("engine", engine, f"{path} is no program; give the path of a Python")
+        return path
+    remembered = environments.find(name, place)
+    if remembered is not None:
+        if not os.access(remembered.python, os.X_OK):
+            again = f"proofroll engines remove {name}@{place}, and add it again"
+            raise Missing(f"{engine}: its environment is gone ({remembered.python} is no program): {again}")
+        return remembered.python
+    command = shutil.which(place)
+    if command is None:
+        known = choices(item.label for item in environments.remembered() if item.name == name)
+        there_are = f"there are {known}" if known else "there is none of this engine"
+        advice = f"no environment has this label ({there_are}); {_install(engine)}"
+        raise InputError("engine", engine, advice)
+    return Path(command)
+
+
+def _install(engine: str) -> str:
+    return f"proofroll engines add {plain_name(engine)} --requirement PACKAGE==VERSION makes one that has all"
+
+
+def _explained(engine: str, python: Path, error: ProofrollError) -> ProofrollError:
+    """Why a worker did not say who it is, as far as the Python itself can tell."""
+    if isinstance(error, WorkerDied) and error.status == Status.TIMEOUT:
+        return WorkerDied(error.status, f"{engine}: {python} did not answer within {HELLO_SECONDS:g} s")
+    with contextlib.suppress(OSError, subprocess.SubprocessError, ValueError, TypeError, LookupError):
+        told = subprocess.run(
+            [python, "-c", _PROBE],
+            capture_output=True,
+            text=True,
+            timeout=_PROBE_SECONDS,
+            env=environment_of_another(),
+            cwd=os.sep,
+            stdin=subprocess.DEVNULL,
+            check=True,
+        ).stdout
+        version, has = json.loads(told.splitlines()[-1])
+        written = ".".join(map(str, version))
+        if tuple(version[:2]) < OLDEST:
+            least = ".".join(map(str, OLDEST))
+            return Missing(f"{engine}: {python} is Python {written}, and proofroll needs {least} or later")
+        if has is None:
+            return Missing(f"{engine}: {python} (Python {written}) has no proofroll; {_install(engine)}")
+        return Missing(f"{engine}: proofroll {has} of {python} did not answer as a worker of this one: {error}")
+    return WorkerDied(Status.CRASHED, f"{engine}: {python} did not answer as a Python with proofroll: {error}")

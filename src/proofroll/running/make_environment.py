@@ -1,0 +1,228 @@
+"""Makes the environment of an engine in another version: a virtual environment with the engine and this proofroll."""
+
+from __future__ import annotations
+
+import base64
+import contextlib
+import hashlib
+import json
+import os
+import re
+import shutil
+import signal
+import subprocess
+import sys
+import tempfile
+import zipfile
+from collections.abc import Callable, Sequence
+from importlib import metadata
+from pathlib import Path
+
+from proofroll.core.errors import InputError, ProofrollError
+from proofroll.core.plugins import GROUP, release
+from proofroll.running import environments
+from proofroll.running.environments import Environment
+from proofroll.running.interpreters import OLDEST
+from proofroll.running.process import environment_of_another
+from proofroll.running.runner import describe
+
+_PACKAGES = """
+import json, platform
+from importlib.metadata import distributions
+found = sorted({f"{item.name}=={item.version}" for item in distributions()})
+print(json.dumps([platform.python_version(), found]))
+"""
+_WORDS = 400  # of what pip says the end is shown [characters]
+
+
+def label_of(requirements: Sequence[str]) -> str:
+    """The label where none is given: the version that the first requirement pins; else empty."""
+    pinned = re.fullmatch(r"\s*[\w.-]+(?:\[[^\]]*\])?\s*==\s*(\w[\w.+-]*)\s*", requirements[0])
+    return pinned[1] if pinned else ""
+
+
+def add(
+    name: str,
+    requirements: Sequence[str],
+    label: str = "",
+    python: str = "",
+    tell: Callable[[str], None] | None = None,
+) -> Environment:
+    """Makes an environment and remembers it once its engine has been imported there.
+
+    Args:
+        name: of the engine.
+        requirements: as pip reads them, e.g. ``mujoco==3.8.1``.
+        label: by which it is remembered, ``NAME@LABEL``; by default the version that the first requirement pins.
+        python: command or path of its Python; by default this one.
+        tell: called with what is being done.
+
+    Raises:
+        InputError: something given makes no sense, or the label is taken.
+        ProofrollError: it cannot be made; nothing is left of it.
+    """
+    tell = tell or (lambda _: None)
+    if not re.fullmatch(r"[\w-]+", name):
+        raise InputError("engine", name, "give the plain name of an engine, e.g. mujoco")
+    for text in requirements:
+        if text.lstrip().startswith("-"):
+            raise InputError("--requirement", text, "give a requirement, e.g. mujoco==3.8.1, not an option of pip")
+    pinned = label_of(requirements) if requirements else ""
+    label = label or pinned
+    if not label:
+        raise InputError("--label", label, "no version is pinned by ==; say by which label it shall be remembered")
+    folder = environments.place(name, label)
+    taken = environments.find(name, label)
+    if taken is not None:
+        advice = f"it is there already ({', '.join(taken.requirements)}); proofroll engines remove {name}@{label} first"
+        raise InputError("label", label, advice)
+    base = _interpreter(python)
+    with environments.making(folder):
+        environments.delete(folder)  # a half that an interrupted process left
+        try:
+            made = _made(name, label, folder, base, requirements, tell)
+            if pinned == label and release(made.version) != release(label):
+                raise ProofrollError(f"{name} there is version {made.version}, not {label}; look at the requirements")
+            made.stamp()
+        except BaseException:
+            environments.delete(folder)
+            raise
+    return made
+
+
+def _made(
+    name: str, label: str, folder: Path, base: Path, requirements: Sequence[str], tell: Callable[[str], None]
+) -> Environment:
+    venv = folder / "venv"
+    with tempfile.TemporaryDirectory() as wheels:
+        wanted = [*_carried(name, Path(wheels)), *requirements]
+        tell(f"making {venv}")
+        uv = shutil.which("uv")
+        try:
+            if uv:
+                _install_by_uv(uv, venv, base, wanted, tell)
+            else:
+                raise ProofrollError("there is no uv")
+        except ProofrollError as error:
+            if uv:
+                tell(f"{error}; trying pip")
+            environments.delete(folder)
+            folder.mkdir(parents=True)
+            _call([base, "-m", "venv", venv])
+            tell(f"installing {', '.join(requirements)} and proofroll")
+            _call([venv / "bin" / "python", "-m", "pip", "install", "--quiet", "--only-binary", ":all:", *wanted])
+    tell(f"importing {name}")
+    python = venv / "bin" / "python"
+    try:
+        version = describe(f"{name}@{python}")["version"]
+    except ProofrollError as error:
+        said = str(error).replace(f"{name}@{python}: ", "")
+        raise ProofrollError(f"{name} does not work with {', '.join(requirements)}: {said}") from None
+    interpreter, packages = json.loads(_call([python, "-c", _PACKAGES]))
+    return Environment(name, label, folder, version, list(requirements), interpreter, packages)
+
+
+def _install_by_uv(uv: str, venv: Path, base: Path, wanted: Sequence[str], tell: Callable[[str], None]) -> None:
+    _call([uv, "venv", "--quiet", "--python", base, venv])
+    tell("installing by uv")
+    target = str(venv / "bin" / "python")
+    _call([uv, "pip", "install", "--quiet", "--python", target, "--only-binary", ":all:", *wanted])
+
+
+def _interpreter(python: str) -> Path:
+    """The Python from which an environment is made.
+
+    Raises:
+        InputError: it is none, or too old.
+    """
+    if not python:
+        return Path(sys.executable)
+    found = shutil.which(str(Path(python).expanduser()))
+    if found is None:
+        raise InputError("--python", python, "there is no such program; give the command or the path of a Python")
+    try:
+        # A command may be a script around the real one, as pyenv's are.
+        told = _call(
+            [found, "-c", "import sys; print(sys.executable); print(sys.version_info[0], sys.version_info[1])"]
+        )
+        executable, version = told.splitlines()[-2:]
+        numbers = tuple(map(int, version.split()))
+    except (ProofrollError, ValueError) as error:
+        raise InputError("--python", python, f"it does not run as a Python: {error}") from None
+    if numbers < OLDEST:
+        least = ".".join(map(str, OLDEST))
+        raise InputError(
+            "--python", python, f"it is Python {version.replace(' ', '.')}; proofroll needs {least} or later"
+        )
+    return Path(executable)
+
+
+def _carried(name: str, wheels: Path) -> list[str]:
+    """This proofroll and the package of the engine's adapter, as arguments of pip: the same code as here."""
+    names = ["proofroll"]
+    for point in metadata.entry_points(group=GROUP):
+        if point.name == name and point.dist is not None and point.dist.name not in names:
+            names.append(point.dist.name)
+    return [str(_wheel(metadata.distribution(item), wheels)) for item in names]
+
+
+def _wheel(item: metadata.Distribution, folder: Path) -> Path:
+    """An installed package as a wheel again, from the list of its files (PEP 376, PEP 427).
+
+    Of one that was installed to be edited these are the path of its source, which is then shared.
+
+    Raises:
+        ProofrollError: the package has no such list.
+    """
+    files = [file for file in item.files or () if ".." not in file.parts and "__pycache__" not in file.parts]
+    info = next((file.parts[0] for file in files if file.parts[0].endswith(".dist-info")), None)
+    if info is None:
+        raise ProofrollError(f"{item.name} was installed without a list of its files; install it by pip")
+    written = re.sub(r"[-_.]+", "_", item.name)
+    path = folder / f"{written}-{item.version}-py3-none-any.whl"
+    records = []
+    with zipfile.ZipFile(path, "w", zipfile.ZIP_DEFLATED) as archive:
+        for file in files:
+            if file.parts[0] == info and file.name in {"RECORD", "INSTALLER", "REQUESTED", "direct_url.json"}:
+                continue
+            content = Path(str(item.locate_file(file))).read_bytes()
+            archive.writestr(str(file), content)
+            seal = base64.urlsafe_b64encode(hashlib.sha256(content).digest()).rstrip(b"=").decode()
+            records.append(f"{file},sha256={seal},{len(content)}")
+        archive.writestr(f"{info}/RECORD", "\n".join([*records, f"{info}/RECORD,,", ""]))
+    return path
+
+
+def _call(command: Sequence[str | Path]) -> str:
+    """What a program prints; it ends, with all that it started, when this process is interrupted.
+
+    Raises:
+        ProofrollError: it failed; the last lines that it wrote are said.
+    """
+    try:
+        process = subprocess.Popen(
+            command,
+            stdout=subprocess.PIPE,
+            stderr=subprocess.PIPE,
+            stdin=subprocess.DEVNULL,
+            env=environment_of_another(),
+            start_new_session=True,
+            text=True,
+            errors="replace",
+        )
+    except OSError as error:
+        raise ProofrollError(f"{command[0]} cannot be started ({error.strerror or error})") from None
+    try:
+        printed, said = process.communicate()
+    except BaseException:
+        with contextlib.suppress(ProcessLookupError):
+            os.killpg(process.pid, signal.SIGKILL)
+        process.wait()
+        raise
+    if process.returncode:
+        errors = [line for line in said.splitlines() if line.startswith("ERROR:")]
+        words = " ".join(" ".join(errors or said.splitlines() or printed.splitlines()).split())[-_WORDS:]
+        program = Path(str(command[0])).name
+        what = " ".join(str(item) for item in command[1:4] if str(item).isascii() and len(str(item)) < 20)
+        raise ProofrollError(f"{program} {what} failed ({process.returncode}): {words}")
+    return printed

@@ -1,0 +1,72 @@
+"""An engine whose versions differ, as installed packages do: in order, in what they refuse, in their defaults."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from importlib import metadata
+from typing import Any, ClassVar, Literal, Self
+
+from tiny import Tiny, TinySettings
+
+from proofroll.core.engine import whole_steps
+from proofroll.core.errors import Refused
+from proofroll.core.plugins import release
+from proofroll.core.scene import Scene
+from proofroll.elements.ball_on_surface.model import ROLLS
+
+DISTRIBUTION = "aged"
+
+
+def age() -> tuple[int, ...]:
+    """The version that is installed where this runs."""
+    return release(metadata.version(DISTRIBUTION))
+
+
+@dataclass(frozen=True)
+class AgedSettings(TinySettings):
+    """A step, and one of two models."""
+
+    formulation: Literal["midpoint", "walls"] = "midpoint"  # type: ignore[assignment]  # more than Tiny has
+
+    @property
+    def order(self) -> int:
+        """Two since version 2."""
+        return 2 if age() >= (2,) else 1
+
+
+class Aged(Tiny):
+    """The midpoint rule from version 2 on, Euler's before, which also had no walls."""
+
+    name: ClassVar[str] = "aged"
+    oldest: ClassVar[str] = "1.0"
+    provides: ClassVar[Mapping[str, frozenset[str]]] = {"midpoint": ROLLS, "walls": ROLLS}
+    settings: ClassVar[type[Any]] = AgedSettings
+    presets: ClassVar[Mapping[str, Mapping[str, Any]]] = {
+        "midpoint": {"matched": AgedSettings()},
+        "walls": {"matched": AgedSettings("walls")},
+    }
+
+    @staticmethod
+    def version() -> str:
+        """See :class:`proofroll.core.engine.Engine`."""
+        return metadata.version(DISTRIBUTION)
+
+    @staticmethod
+    def defaults() -> dict[str, Any]:
+        """See :class:`proofroll.core.engine.TellsDefaults`."""
+        return {"iterations": 100 if age() >= (2,) else 50, "gravity": -9.81}
+
+    @classmethod
+    def build(cls, scene: Scene, settings: Any) -> Self:
+        """No walls before version 2."""
+        if settings.formulation == "walls" and age() < (2,):
+            raise Refused("walls came with version 2")
+        return super().build(scene, settings)
+
+    def advance(self, t: float) -> None:
+        """See :class:`proofroll.core.engine.Engine`."""
+        for _ in range(whole_steps(self.t, t, self.dt)):
+            stage = self.x + self.dt / 2 * self.rates(self.x) if age() >= (2,) else self.x
+            self.x = self.x + self.dt * self.rates(stage)
+        self.t = t
