@@ -471,7 +471,7 @@ def test_a_run_takes_one_process(proofroll: Proofroll, monkeypatch: pytest.Monke
             started.append(self)
             super().__init__(*arguments)
 
-    monkeypatch.setattr("proofroll.running.worker_pool.Worker", Counted)
+    monkeypatch.setattr("proofroll.running.interpreters.Worker", Counted)
     code, _, err = proofroll("run", "sphere_in_cylinder", "--engine", "reduced", "--until", "0.1", "--json")
     assert (code, len(started)) == (0, 1), err
 

@@ -13,7 +13,8 @@ import typer
 
 import proofroll
 from proofroll.cli.comparing import compare
-for _command in (scenes, run, judge, plot, *_STUDIES):
+from proofroll.cli.engines import engines
+from proofroll.cli.judge import judge
 from proofroll.cli.ladder import ladder
 from proofroll.cli.lists import scenes
 from proofroll.cli.new import new
@@ -24,6 +25,7 @@ from proofroll.cli.report import report
 from proofroll.cli.run import run
 from proofroll.cli.stability import stability
 from proofroll.cli.tradeoff import tradeoff
+from proofroll.cli.versions import versions
 from proofroll.core.errors import InputError, Missing, ProofrollError
 
 app = typer.Typer(
@@ -32,7 +34,7 @@ app = typer.Typer(
     pretty_exceptions_enable=False,
     rich_markup_mode=None,
 )
-_STUDIES = (compare, report, tradeoff, recommend, ladder, stability)
+_STUDIES = (compare, report, tradeoff, recommend, ladder, stability, versions)
 for _command in (scenes, run, judge, plot, *_STUDIES):
     app.command()(_command)
 app.add_typer(new, name="new")

@@ -228,6 +228,26 @@ class TellsCaveats(Protocol):
 
 
 @runtime_checkable
+class TellsDefaults(Protocol):
+    """What an engine has besides, if it can say what it takes where nobody chooses: for comparing its versions."""
+
+    @staticmethod
+    def defaults() -> Mapping[str, Any]:
+        """Read from the engine itself: name -> number, text or list of numbers."""
+
+
+@runtime_checkable
+class SupportsFrom(Protocol):
+    """What an engine has besides, if its adapter does not run on every version of it.
+
+    Attributes:
+        oldest: version of the engine from which on it does; an older one is refused with both versions.
+    """
+
+    oldest: ClassVar[str]
+
+
+@runtime_checkable
 class Reproduces(Protocol):
     """What an engine has besides, if it can write a program that shows its behaviour without proofroll."""
 

@@ -12,6 +12,7 @@ from importlib.util import find_spec
 from typing import Any
 
 from proofroll.core.element import ElementKind
+from proofroll.core.engine import SupportsFrom
 from proofroll.core.errors import InputError, Missing, ProofrollError, place
 
 GROUP = "proofroll.engines"
@@ -53,7 +54,7 @@ def load_engine(name: str) -> Any:
         if place(error):  # arose inside the adapter
             raise
         raise ProofrollError(f"{name} is announced as {point.value}, but {error}: correct the entry point") from None
-    oldest = getattr(found, "oldest", "")
+    oldest = found.oldest if isinstance(found, SupportsFrom) else ""
     if oldest and release(found.version()) < release(oldest):
         said = f"{name} {found.version()} is older than its adapter supports, {oldest}"
         ours = point.value.startswith("proofroll.")

@@ -11,6 +11,8 @@ from importlib import metadata
 from typing import Any
 
 import proofroll
+from proofroll.core.plugins import place_of
+from proofroll.running.program import path_of
 
 # Of requests and answers; see docs/worker_protocol.md.
 PROTOCOL = 1
@@ -51,16 +53,20 @@ def mismatch(answer: Mapping[str, Any]) -> str:
     return ""
 
 
-def libraries(place: str) -> dict[str, str]:
+def libraries(engine: str) -> dict[str, str]:
     """What besides an engine and its adapter decides the last digits of its results.
 
     Args:
-        place: of this worker; in another interpreter all its packages count, for engines bring libraries of their own.
+        engine: with its place; in another interpreter all its packages count, for engines bring libraries of their
+            own, and of a program the program itself.
     """
+    program = path_of(engine)
+    if program is not None:
+        return {"program": hashlib.sha256(program.read_bytes()).hexdigest()[:12]}
     found = {"python": platform.python_version()}
     for name in ("numpy", "scipy"):
         found[name] = metadata.version(name)
-    if place:
+    if place_of(engine):
         packages = sorted({f"{item.name}=={item.version}" for item in metadata.distributions()})
         found["packages"] = hashlib.sha256("\n".join(packages).encode()).hexdigest()[:12]
     return found

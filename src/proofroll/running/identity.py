@@ -15,6 +15,7 @@ from typing import Any
 import proofroll
 from proofroll.core.errors import InputError
 from proofroll.core.truth import load_truths
+from proofroll.files.json_data import plain
 from proofroll.running.case import EngineFacts
 
 # Folders on which every result rests; reports and the command line are not among them.
@@ -37,7 +38,7 @@ ASIDE = frozenset(
 
 def describe(engine: str) -> dict[str, Any]:
     """What an engine is and provides, and where its formulations stand on the ladder of models."""
-    from proofroll.core.engine import CannotLeaveOut, TellsLevels
+    from proofroll.core.engine import CannotLeaveOut, TellsDefaults, TellsLevels
     from proofroll.running.loading import load
 
     kind = load(engine)
@@ -57,6 +58,7 @@ def describe(engine: str) -> dict[str, Any]:
         "inherent": {key: dict(terms) for key, terms in kind.inherent.items()}
         if isinstance(kind, CannotLeaveOut)
         else {},
+        "defaults": plain(dict(kind.defaults())) if isinstance(kind, TellsDefaults) else {},
     }
 
 
@@ -68,7 +70,7 @@ def resolve(engine: str, options: dict[str, Any], requires: Sequence[str] = ()) 
         code = digest([Path(inspect.getfile(truth)).parent for truth in load_truths()])
         return dataclasses.asdict(EngineFacts("truth", truth_version(), code, {}))
     from proofroll.core.engine import SharesEquations, TellsCaveats
-    from proofroll.core.plugins import place_of, resolve_settings
+    from proofroll.core.plugins import resolve_settings
     from proofroll.running.handshake import libraries
     from proofroll.running.loading import load
 
@@ -85,7 +87,7 @@ def resolve(engine: str, options: dict[str, Any], requires: Sequence[str] = ()) 
         order=settings.order,
         shares=list(kind.shares.get(settings.formulation, ())) if isinstance(kind, SharesEquations) else [],
         caveat=kind.caveat(settings) if isinstance(kind, TellsCaveats) else "",
-        libraries=libraries(place_of(engine)),
+        libraries=libraries(engine),
     )
     return dataclasses.asdict(facts)
 

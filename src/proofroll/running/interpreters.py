@@ -15,6 +15,7 @@ from proofroll.running import environments
 from proofroll.running.case import Status
 from proofroll.running.handshake import mismatch
 from proofroll.running.process import Worker, WorkerDied, environment_of_another
+from proofroll.running.program import PREFIX
 
 # A first start reads the packages of another interpreter from a cold disk; one that does not answer hangs [s].
 HELLO_SECONDS = 60.0
@@ -45,7 +46,7 @@ def start(engine: str, memory: float | None = None) -> Worker:
         WorkerDied: it crashed or hung before it answered.
     """
     place = place_of(engine)
-    if not place:
+    if not place or place.startswith(PREFIX):  # a program is started by a worker of ours
         return Worker(memory)
     python = python_at(engine)
     worker = Worker(memory, python)

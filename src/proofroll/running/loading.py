@@ -9,6 +9,7 @@ from proofroll.core.plugins import load_engine, place_of, plain_name, resolve_se
 from proofroll.core.scene import Scene
 from proofroll.files.scene_file import load_scene
 from proofroll.running.case import Case
+from proofroll.running.program import engine, path_of
 
 # What this process was told that it is: the part after ``@`` of the engines that it runs; empty: none.
 _settled = ""
@@ -26,11 +27,13 @@ def here(name: str) -> str:
 
 
 def load(name: str) -> Any:
-    """The class of an engine ``NAME`` or ``NAME@PLACE``.
+    """The class of an engine ``NAME``, ``NAME@PLACE`` or ``NAME@program:PATH``.
 
     Raises:
         InputError, Missing: see :func:`proofroll.core.plugins.load_engine`; or this process is at another place.
     """
+    if path_of(name) is not None:
+        return engine(name)
     try:
         return load_engine(here(name))
     except (InputError, Missing) as error:

@@ -90,6 +90,17 @@ def add(
     return made
 
 
+def package_of(engine: str) -> str:
+    """The package that brings an engine: what the adapter's package requires for the extra of its name, else empty."""
+    for point in metadata.entry_points(group=GROUP):
+        if point.name != engine or point.dist is None:
+            continue
+        for text in point.dist.requires or []:
+            if re.search(rf"extra\s*==\s*['\"]{re.escape(engine)}['\"]", text):
+                return re.split(r"[\s;<>=!~\[(]", text, maxsplit=1)[0]
+    return ""
+
+
 def _made(
     name: str, label: str, folder: Path, base: Path, requirements: Sequence[str], tell: Callable[[str], None]
 ) -> Environment:

@@ -1,0 +1,143 @@
+"""One engine in two versions."""
+
+from __future__ import annotations
+
+import os
+import re
+from collections.abc import Callable
+from importlib.metadata import entry_points
+from pathlib import Path
+from typing import Annotated, Any
+
+import typer
+
+from proofroll.cli.options import (
+    CONTRADICTED,
+    ENGINE,
+    OK,
+    Fresh,
+    Jobs,
+    Json,
+    Out,
+    complain,
+    new_runner,
+    progress_bar,
+    spinner,
+    write_json,
+)
+from proofroll.core.errors import InputError, ProofrollError
+
+# What else than a scene or a comparison can be held against two versions, by the ending of its file.
+SUBJECTS = "proofroll.version_subjects"
+
+
+def versions(
+    engine: Annotated[str, typer.Argument(help="Name of the engine, e.g. mujoco.")],
+    old: Annotated[str, typer.Argument(help="A version, a label of `proofroll engines`, or the path of a Python.")],
+    new: Annotated[str, typer.Argument(help="The version to which it is compared, likewise.")],
+    subject: Annotated[
+        str, typer.Argument(help="A comparison, a scene or a robot file; by default all comparisons.")
+    ] = "",
+    rounds: Annotated[int, typer.Option(min=0, help="Rounds of timing; 0: no speed.")] = 20,
+    out: Out = Path("out"),
+    fresh: Fresh = False,
+    jobs: Jobs = None,
+    as_json: Json = False,
+) -> None:
+    """Run the same cases in two versions of an engine and show what changed; exit 1 if a verdict did.
+
+    Environments that are missing are made, as by `proofroll engines add`. Speed never decides the exit code.
+    """
+    from proofroll.report.versions_content import lines, page, robot_table, table
+
+    readers = {point.name: point for point in entry_points(group=SUBJECTS)}
+    robot = readers.get(Path(subject).suffix.removeprefix("."))
+    if robot is None:
+        from proofroll.studies.versions import comparisons_about
+
+        comparisons = comparisons_about(subject, engine)  # before minutes are spent on environments
+    sides = _place(engine, old), _place(engine, new)
+    if sides[0] == sides[1]:
+        raise InputError("new", new, f"both are {sides[0]}; name two versions")
+    if robot is not None:
+        with spinner(f"{engine} {old} and {new}"):
+            content: dict[str, Any] = robot.load()(subject, *sides)
+    else:
+        from proofroll.studies.versions import compared
+
+        runner = new_runner(out, fresh, jobs)
+        with progress_bar("cases") as advance:
+            content = compared(sides, comparisons, runner, rounds, advance)
+    _keep(content, page(content), out)
+    if as_json:
+        write_json(content)
+    else:
+        from proofroll.report.terminal import console
+
+        terminal = console()
+        terminal.width = min(terminal.width, 80)
+        terminal.print(table(content) if robot is None else robot_table(content))
+        for line in lines(content):
+            terminal.print(line, markup=False)
+        terminal.print(f"The page is in {_file(content, out)}.html.", markup=False)
+    if content["lost"]:
+        raise typer.Exit(ENGINE)
+    raise typer.Exit(CONTRADICTED if content["changed"] else OK)
+
+
+def _file(content: dict[str, Any], out: Path) -> Path:
+    """Where page and document are kept, without an ending."""
+    words = ["versions", content["engine"], content["old"]["version"], content["new"]["version"]]
+    return out / re.sub(r"[^\w.+-]", "_", "-".join(map(str, words)))
+
+
+def _keep(content: dict[str, Any], page: str, out: Path) -> None:
+    import json
+
+    from proofroll.files.json_data import plain
+    from proofroll.running.store import write_text
+
+    out.mkdir(parents=True, exist_ok=True)
+    file = _file(content, out)
+    write_text(file.with_name(f"{file.name}.html"), page)
+    write_text(file.with_name(f"{file.name}.json"), json.dumps(plain(content), indent=1, ensure_ascii=False))
+
+
+def _place(engine: str, text: str) -> str:
+    """The engine ``NAME`` or ``NAME@PLACE`` that a person means by a version, a label or a path; made if need be."""
+    from proofroll.core.plugins import engine_names, release
+    from proofroll.running import environments
+    from proofroll.running.runner import describe
+
+    if os.sep in text or text.startswith(("~", ".")) or environments.find(engine, text) is not None:
+        return f"{engine}@{text}"
+    if engine in engine_names() and release(describe(engine)["version"]) == release(text):
+        return engine
+    if not re.fullmatch(r"\d[\w.+]*", text):
+        raise InputError("version", text, f"no environment of {engine} has this label; see proofroll engines")
+    return _made(engine, text)
+
+
+def _made(engine: str, version: str) -> str:
+    """The environment of a version, made now.
+
+    Raises:
+        ProofrollError: it cannot be made; the text says how a person could.
+    """
+    from proofroll.running.make_environment import add, package_of
+
+    package = package_of(engine)
+    by_hand = f"proofroll engines add {engine} --requirement {package or 'PACKAGE'}=={version}"
+    if not package:
+        raise InputError("engine", engine, f"no environment of {version} is remembered; {by_hand}")
+    complain(f"no environment of {engine} {version} is remembered: making one, as {by_hand} does")
+
+    def tell(say: Callable[[str], None]) -> None:
+        add(engine, [f"{package}=={version}"], tell=lambda text: say(f"{engine} {version}: {text}"))
+
+    try:
+        with spinner(f"{engine} {version}") as say:
+            tell(say)
+    except ProofrollError as error:
+        raise ProofrollError(f"{error}; when that is mended, or with more requirements: {by_hand}") from None
+    return f"{engine}@{version}"

@@ -1,0 +1,158 @@
+"""One engine in two versions, for a person: a table, sentences, and a page."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Mapping
+from typing import Any
+
+from rich.table import Table
+from rich.text import Text
+
+from proofroll.report.labels import SYMBOLS, number
+
+_MOST = 12  # sentences of a kind on the terminal; the JSON document has all
+
+
+def heading(content: Mapping[str, Any]) -> str:
+    """What is compared, in one line."""
+    old, new = content["old"]["version"], content["new"]["version"]
+    return f"{content['engine']} {old} → {new}: {', '.join(content['comparisons'])}"
+
+
+def answer(content: Mapping[str, Any]) -> str:
+    """What changed, in one sentence."""
+    if content["robot"] is not None:
+        said = f"{len(content['changed'])} changes in how they hold {content['robot']['file']}"
+        return said if content["changed"] else f"Both hold {content['robot']['file']} alike."
+    cases = content["cases"]
+    changed = sum(bool(case["changed"]) for case in cases)
+    kinds = [case["numbers"]["kind"] for case in cases if case["numbers"]]
+    parts = [f"{count} with {what}" for what, count in (
+        ("the same bits", kinds.count("same bits")),
+        ("differences of round-off", kinds.count("round-off")),
+        ("other numbers", kinds.count("changed")),
+        ("no numbers in one or both", len(cases) - len(kinds)),
+    ) if count]  # fmt: skip
+    verdicts = f"{changed} of {len(cases)} cases have another verdict" if changed else "no verdict changed"
+    return f"{len(cases)} cases: {', '.join(parts)}; {verdicts}."
+
+
+def verdicts_text(row: Mapping[str, Any]) -> str:
+    """How many cases had which verdict, then and now."""
+    before, after = (_counts(row["verdicts"][side]) for side in ("old", "new"))
+    return before if before == after else f"{before} → {after}"
+
+
+def _counts(verdicts: Mapping[str, int]) -> str:
+    return " ".join(f"{SYMBOLS[word]}{verdicts[word]}" for word in SYMBOLS if word in verdicts)
+
+
+def numbers_text(row: Mapping[str, Any]) -> str:
+    """The largest difference of any case."""
+    found = row["numbers"]
+    if found is None:
+        return "–"
+    return "same" if found["kind"] == "same bits" else f"{number(found['relative'])} {found['quantity']}"
+
+
+def order_text(row: Mapping[str, Any]) -> str:
+    """The declared order, then and now."""
+    old, new = (row["declared_order"][side] for side in ("old", "new"))
+    shown = ["–" if item is None else str(item) for item in (old, new)]
+    return shown[0] if old == new else " → ".join(shown)
+
+
+def speed_text(row: Mapping[str, Any]) -> str:
+    """Time of the new version over that of the old one, with its interval."""
+    found = row["speed"]
+    return "" if found is None else f"{found['value']:.2f} [{found['low']:.2f}, {found['high']:.2f}]"
+
+
+def table(content: Mapping[str, Any]) -> Table:
+    """One line for each setting of each comparison."""
+    made = Table(title=Text(heading(content)), title_justify="left", box=None, padding=(0, 1, 0, 0))
+    made.add_column("setting", overflow="fold", min_width=16)
+    made.add_column("verdicts")
+    made.add_column("numbers", justify="right")
+    made.add_column("order", no_wrap=True)
+    if any(row["speed"] for row in content["rows"]):
+        made.add_column("time", no_wrap=True)
+    before = ""
+    for row in content["rows"]:
+        if row["comparison"] != before and len(content["comparisons"]) > 1:
+            made.add_row(Text(row["comparison"], style="bold"))
+        before = row["comparison"]
+        style = "red" if row["changed"] else "yellow" if (row["numbers"] or {}).get("kind") == "changed" else ""
+        cells = [short(row["setting"]), verdicts_text(row), numbers_text(row), order_text(row), speed_text(row)]
+        made.add_row(*(Text(cell, style=style) for cell in cells[: len(made.columns)]))
+    return made
+
+
+def robot_table(content: Mapping[str, Any]) -> Table:
+    """One line for each layer of a robot's check."""
+    made = Table(title=Text(heading(content)), title_justify="left", box=None, padding=(0, 1, 0, 0))
+    for column in ("layer", content["old"]["version"], content["new"]["version"]):
+        made.add_column(str(column))
+    for layer in content["robot"]["layers"]:
+        shown = ["–" if layer[side] is None else layer[side] for side in ("old", "new")]
+        made.add_row(Text(layer["layer"], style="red" if layer["changed"] else ""), *shown)
+    return made
+
+
+def short(setting: str) -> str:
+    """Settings in few characters: formulation and preset without their keys."""
+    parts = (part.split("=", 1) for part in setting.split(", "))
+    return " ".join(part[-1] if part[0] in {"formulation", "preset"} else "=".join(part) for part in parts)
+
+
+def lines(content: Mapping[str, Any], most: int | None = _MOST) -> Iterator[str]:
+    """What changed, in sentences; ``!!`` before those that decide the exit code."""
+    yield from _some([f"!! {sentence}" for sentence in content["changed"]], most)
+    orders = [
+        f"{row['comparison']}: {short(row['setting'])}: observed order of {order['quantity']} "
+        f"{order['old']:.2f} → {order['new']:.2f}"
+        for row in content["rows"]
+        for order in row["orders"][:1]
+    ]
+    yield from _some(orders, most)
+    defaults = [
+        f"default {item['name']}: {_value(item['old'])} → {_value(item['new'])}" for item in content["defaults"]
+    ]
+    yield from _some(defaults, most)
+    yield from (f"?? {sentence}" for sentence in content["lost"])
+    yield answer(content)
+
+
+def _value(value: Any) -> str:
+    return "none" if value is None else str(value)
+
+
+def _some(sentences: list[str], most: int | None) -> Iterator[str]:
+    yield from sentences[:most]
+    if most is not None and len(sentences) > most:
+        yield f"   and {len(sentences) - most} more"
+
+
+def page(content: Mapping[str, Any]) -> str:
+    """The HTML page; everything from engines and files is escaped."""
+    import jinja2
+
+    templates = jinja2.Environment(
+        loader=jinja2.PackageLoader("proofroll.report"),
+        autoescape=True,
+        undefined=jinja2.StrictUndefined,
+        trim_blocks=True,
+        lstrip_blocks=True,
+    )
+    cells = [
+        (row, [short(row["setting"]), verdicts_text(row), numbers_text(row), order_text(row), speed_text(row)])
+        for row in content["rows"]
+    ]
+    text = templates.get_template("versions.html").render(
+        content=content,
+        heading=heading(content),
+        answer=answer(content),
+        rows=cells,
+        sentences=list(lines(content, None)),
+    )
+    return text.encode("utf-8", "replace").decode("utf-8")  # a lone surrogate from an engine's message

@@ -1,0 +1,234 @@
+"""An engine that is a program of its own, in any language: ``NAME@program:PATH``. See docs/worker_protocol.md."""
+
+from __future__ import annotations
+
+import dataclasses
+import json
+import os
+import subprocess
+from collections.abc import Mapping
+from functools import cache
+from pathlib import Path
+from typing import Any, ClassVar, Self
+
+import numpy as np
+
+from proofroll.core.engine import Sample, fixed_step, whole_steps
+from proofroll.core.errors import Diverged, InputError, ProofrollError, Refused
+from proofroll.core.plugins import place_of, plain_name
+from proofroll.core.scene import Scene
+from proofroll.files.json_data import plain
+
+PREFIX = "program:"
+PROTOCOL = 1
+# Of a line that is no answer so much is shown [characters].
+_SHOWN = 80
+
+
+def path_of(name: str) -> Path | None:
+    """The program of an engine ``NAME@program:PATH``; None: it is none.
+
+    Raises:
+        InputError: there is no such program.
+    """
+    place = place_of(name)
+    if not place.startswith(PREFIX):
+        return None
+    path = Path(os.path.abspath(Path(place.removeprefix(PREFIX)).expanduser()))
+    if not path.is_file() or not os.access(path, os.X_OK):
+        raise InputError("engine", name, f"{path} is no program; give the path of one that can be executed")
+    return path
+
+
+class Pipe:
+    """A running program: one request a line on its standard input, one answer a line on its standard output."""
+
+    def __init__(self, path: Path) -> None:
+        self._path = path
+        try:
+            self._process = subprocess.Popen(
+                [path], stdin=subprocess.PIPE, stdout=subprocess.PIPE, text=True, encoding="utf-8", errors="replace"
+            )
+        except OSError as error:
+            raise ProofrollError(f"{path} cannot be started ({error.strerror or error})") from None
+
+    def ask(self, request: Mapping[str, Any]) -> dict[str, Any]:
+        """One request, one answer.
+
+        Raises:
+            Refused, Diverged: the program says so.
+            ProofrollError: it ended, or its line is no answer.
+        """
+        process = self._process
+        assert process.stdin is not None  # both were opened with pipes
+        assert process.stdout is not None
+        try:
+            process.stdin.write(json.dumps(request) + "\n")
+            process.stdin.flush()
+            line = process.stdout.readline()
+        except (OSError, ValueError):
+            line = ""
+        if not line:
+            code = process.wait()
+            raise ProofrollError(f"{self._path.name} ended ({code}) instead of answering {request['do']}")
+        try:
+            answer = json.loads(line)
+        except ValueError:
+            answer = None
+        if not isinstance(answer, dict):
+            shown = line.strip()[:_SHOWN]
+            raise ProofrollError(f"{self._path.name} answered {request['do']} with {shown!r}, which is no JSON object")
+        if "refused" in answer:
+            raise Refused(str(answer["refused"]))
+        if "diverged" in answer:
+            raise Diverged(str(answer["diverged"]))
+        return answer
+
+    def close(self) -> None:
+        """Ends the program."""
+        self._process.kill()
+        self._process.communicate()
+
+
+class _Built:
+    """What the program says that it built; None: nothing."""
+
+    regularised: ClassVar[Mapping[str, Any]] = {}
+
+    def __init__(self, said: Mapping[str, Any]) -> None:
+        values = {
+            key: np.asarray(value, dtype=float) if isinstance(value, list) else value for key, value in said.items()
+        }
+        self.terms = frozenset(values.pop("terms")) if "terms" in values else None
+        self.__dict__.update(values)
+
+    def __getattr__(self, name: str) -> None:
+        if name.startswith("__"):
+            raise AttributeError(name)
+
+
+class Program:
+    """The protocol of engines, spoken through a pipe; :func:`engine` makes a class of it for each program."""
+
+    name: ClassVar[str]
+    path: ClassVar[Path]
+    told: ClassVar[Mapping[str, Any]]
+    provides: ClassVar[Mapping[str, frozenset[str]]]
+    settings: ClassVar[type[Any]]
+    presets: ClassVar[Mapping[str, Mapping[str, Any]]]
+
+    @classmethod
+    def version(cls) -> str:
+        """As the program says."""
+        return str(cls.told["version"])
+
+    @classmethod
+    def build(cls, scene: Scene, settings: Any) -> Self:
+        """Starts the program anew and sends it the scene and the settings."""
+        return cls(scene, settings)
+
+    def __init__(self, scene: Scene, settings: Any) -> None:
+        self._pipe, self._step = Pipe(self.path), fixed_step(settings)
+        (element,) = scene.elements  # of several, each is built alone
+        content = {"kind": type(element).__name__, "name": element.name} | plain(dataclasses.asdict(element))  # type: ignore[call-overload]  # elements are dataclasses
+        try:
+            request = {"do": "build", "scene": content, "asks": scene.asks, "settings": dataclasses.asdict(settings)}
+            self._last = self._pipe.ask(request)
+            self._built = _Built(self._last.get("built") or {})
+            self.sample()
+        except BaseException:
+            self._pipe.close()
+            raise
+
+    def advance(self, t: float) -> None:
+        """See :class:`proofroll.core.engine.Engine`; a program is never asked for a time between its steps."""
+        if self._step is not None:
+            whole_steps(0.0, t, self._step)
+        self._last = self._pipe.ask({"do": "advance", "to": t})
+
+    def sample(self) -> Sample:
+        """The sample that came with the last answer."""
+        said = self._last.get("sample")
+        names = {item.name for item in dataclasses.fields(Sample)}
+        if not isinstance(said, dict) or not {"p_WB", "v_WB", "w_WB"} <= said.keys() <= names:
+            raise ProofrollError(
+                f"{self.path.name} gave no sample with p_WB, v_WB, w_WB, and of {', '.join(names)} only"
+            )
+        arrays = {
+            key: np.asarray(value, dtype=float)
+            for key, value in said.items()
+            if value is not None and key != "sticking"
+        }
+        return Sample(**arrays, sticking=said.get("sticking"))
+
+    def built(self) -> _Built:
+        """What the program said when it was built."""
+        return self._built
+
+    def __del__(self) -> None:
+        if hasattr(self, "_pipe"):
+            self._pipe.close()
+
+
+@cache
+def engine(name: str) -> type[Program]:
+    """The class of an engine ``NAME@program:PATH``, from what the program says of itself.
+
+    Raises:
+        InputError: there is no such program.
+        ProofrollError: it does not say what it is, or is another engine.
+    """
+    path = path_of(name)
+    assert path is not None  # the caller looked
+    pipe = Pipe(path)
+    try:
+        told = pipe.ask({"do": "describe", "protocol": PROTOCOL})
+    finally:
+        pipe.close()
+    if told.get("protocol") != PROTOCOL:
+        raise ProofrollError(
+            f"{path.name} speaks protocol {told.get('protocol')}, and this proofroll speaks {PROTOCOL}"
+        )
+    if not isinstance(told.get("name"), str):
+        raise ProofrollError(f"{path.name} does not say its name, as docs/worker_protocol.md says")
+    if told["name"] != plain_name(name):
+        raise InputError("engine", name, f"{path.name} is {told['name']}; write {told['name']}@{place_of(name)}")
+    try:
+        settings = _settings(told["formulations"])
+        return type(
+            "Program",
+            (Program,),
+            {
+                "__module__": __name__,
+                "name": plain_name(name),
+                "path": path,
+                "told": {"version": told["version"]},
+                "provides": {key: frozenset(item["provides"]) for key, item in told["formulations"].items()},
+                "settings": settings,
+                "presets": {
+                    key: {preset: settings(key, preset, **values) for preset, values in item["presets"].items()}
+                    for key, item in told["formulations"].items()
+                },
+            },
+        )
+    except (KeyError, TypeError, AttributeError, StopIteration) as error:
+        said = f"{path.name} does not describe itself as docs/worker_protocol.md says ({type(error).__name__}: {error})"
+        raise ProofrollError(said) from None
+
+
+def _settings(formulations: Mapping[str, Any]) -> type[Any]:
+    """The class of a program's settings: formulation, preset, and all that its presets name."""
+    values: dict[str, Any] = {}
+    for item in formulations.values():
+        for preset in item["presets"].values():
+            values |= preset
+    orders = {key: item.get("order") for key, item in formulations.items()}
+    first = next(iter(formulations))
+    fields: list[Any] = [("formulation", str, first), ("preset", str, next(iter(formulations[first]["presets"])))]
+    fields += [
+        (key, float if isinstance(value, (int, float)) and not isinstance(value, bool) else type(value), value)
+        for key, value in values.items()
+    ]
+    resolution = next((key for key in ("dt", "rtol") if key in values), None)
+    own = {"resolution": resolution, "order": property(lambda self: orders[self.formulation])}
+    return dataclasses.make_dataclass("Settings", fields, frozen=True, namespace=own)
