@@ -28,7 +28,7 @@ sub sample {
              q_WB => [[cos($angle / 2), 0, 0, sin($angle / 2)]] };
 }
 
-my %form = (provides => ["revolute joints"], order => 4, presets => { matched => { dt => 0.01 } });
+my %form = (provides => ["revolute joints"], order => 4, presets => { matched => { dt => 0.002 } });
 while (defined(my $line = <STDIN>)) {
     my ($asked, $answer) = (decode_json($line));
     if ($asked->{do} eq "describe") {

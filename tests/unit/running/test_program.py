@@ -1,0 +1,111 @@
+"""Engines that are programs in another language, spoken to through a pipe."""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any
+
+import pytest
+from other_pythons import script
+
+from proofroll.core.certificate import certify, first_difference
+from proofroll.core.errors import Diverged, InputError, ProofrollError, Refused
+from proofroll.core.plugins import resolve_settings
+from proofroll.files.scene_file import load_scene
+from proofroll.running.program import engine
+
+ROD = Path(__file__).resolve().parents[3] / "examples" / "workers" / "rod.pl"
+CLAIM = f"""title = "A rod in Perl"
+question = "Is a program in another language an engine?"
+scene = "pendulum"
+until = 2
+every = 0.2
+timed = false
+[tolerances.close]
+because = "the classical Runge-Kutta method leaves far less of a turn at this step"
+positions = "1e-5 m"
+energy_error = "1e-6 J"
+[[rows]]
+engine = "rod@program:{ROD}"
+tolerance = "close"
+order = {{ positions = [3.8, 4.2] }}
+"""
+FORMULATIONS = {"one": {"provides": ["revolute joints"], "order": 1, "presets": {"matched": {"dt": 0.01}}}}
+DESCRIBED = json.dumps({"protocol": 1, "name": "rod", "version": "1", "formulations": FORMULATIONS})
+STANDS = '{"sample": {"p_WB": [[0, 0, 0]], "v_WB": [[0, 0, 0]], "w_WB": [[0, 0, 0]]}, "built": {"mass": [7]}}'
+
+
+def answering(folder: Path, build: str, advance: str = "exit 0") -> str:
+    """A program of the shell that says this to every request of a kind, as an engine."""
+    cases = f"*describe*) echo '{DESCRIBED}';; *build*) {build};; *) {advance};;"
+    program = script(folder / "rod", f'while read -r line; do case "$line" in {cases} esac; done')
+    return f"rod@program:{program}"
+
+
+def built(name: str, scene: str = "pendulum", **options: Any) -> Any:
+    """The scene in an engine that is a program."""
+    kind = engine(name)
+    return kind.build(load_scene(scene), resolve_settings(kind, options))
+
+
+def test_a_program_in_perl_is_judged(proofroll: Callable[..., Any], tmp_path: Path) -> None:
+    """The example agrees with the truth, at the order that it declares."""
+    claim = tmp_path / "rod.toml"
+    claim.write_text(CLAIM, encoding="utf-8")
+    code, out, err = proofroll("compare", str(claim), "--out", str(tmp_path / "out"), "--json")
+    assert code == 0, err
+    (row,) = json.loads(out)["rows"]
+    assert (row["verdict"], row["declared_order"]) == ("agrees", 4)
+
+
+def test_a_program_refuses_what_it_cannot_represent() -> None:
+    """Its own reason is the refusal, and no time between its steps is asked for."""
+    with pytest.raises(Refused, match="more than one body"):
+        built(f"rod@program:{ROD}", "double_pendulum")
+    with pytest.raises(InputError, match="choose a step that divides the interval"):
+        built(f"rod@program:{ROD}", dt=0.003).advance(0.05)
+
+
+@pytest.mark.parametrize(
+    ("advance", "error", "says"),
+    [
+        ("exit 3", ProofrollError, r"rod ended \(3\) instead of answering advance"),
+        ("echo hello", ProofrollError, "rod answered advance with 'hello', which is no JSON object"),
+        ("""echo '{"diverged": "gave up"}'""", Diverged, "gave up"),
+    ],
+)
+def test_what_a_program_answers_is_told(tmp_path: Path, advance: str, error: type[ProofrollError], says: str) -> None:
+    """Whatever a program answers, the error says what it was."""
+    with pytest.raises(error, match=says):
+        built(answering(tmp_path, f"echo '{STANDS}'", advance)).advance(0.01)
+
+
+def test_what_a_program_built_is_certified(tmp_path: Path) -> None:
+    """A wrong model is found before it is run; no sample at all is an error."""
+    wrong = built(answering(tmp_path, f"echo '{STANDS}'"))
+    assert "mass is 7 instead of 1 kg" in str(first_difference(certify(wrong, load_scene("pendulum"))))
+    (tmp_path / "other").mkdir()
+    with pytest.raises(ProofrollError, match="rod gave no sample with p_WB"):
+        built(answering(tmp_path / "other", """echo '{"sample": {"p_WB": [[0, 0, 0]]}}'"""))
+
+
+@pytest.mark.parametrize(
+    ("text", "error", "says"),
+    [
+        (None, InputError, "is no program"),
+        ("exit 0", ProofrollError, r"ended \(0\) instead of answering describe"),
+        ("cat", ProofrollError, "does not say its name"),
+        ("""read x; echo '{"protocol": 2, "name": "rod"}'""", ProofrollError, "speaks protocol 2, and this"),
+        ("""read x; echo '{"protocol": 1, "name": "bar"}'""", InputError, "is bar; write bar@program:"),
+        ("""read x; echo '{"protocol": 1, "name": "rod", "version": "1"}'""", ProofrollError, "does not describe"),
+    ],
+)
+def test_a_program_that_is_no_engine_says_so(
+    tmp_path: Path, text: str | None, error: type[ProofrollError], says: str
+) -> None:
+    """One line for each way not to be one."""
+    program = tmp_path / "rod" if text is None else script(tmp_path / "rod", text)
+    with pytest.raises(error, match=says):
+        engine(f"rod@program:{program}")
