@@ -29,10 +29,10 @@ def builds_or_refuses(subject: Subject) -> None:
 
 
 def provides_what_it_says(engine: Any) -> None:
-    """For each capability that a formulation provides it builds some scene that needs it, with some preset."""
+    """Of the scenes that it can represent and that need a capability it builds some, with some preset."""
     for formulation, provides in engine.provides.items():
         for capability in sorted(provides):
-            needing = [scene for scene in scenes().values() if capability in scene.requires]
+            needing = [scene for scene in scenes().values() if capability in scene.requires <= provides]
             refusals = [_refusal(engine, formulation, scene) for scene in needing]
             if needing and all(refusals):
                 said = "; ".join(f"{scene.name}: {why}" for scene, why in zip(needing, refusals, strict=True))

@@ -39,6 +39,8 @@ def certify(element: MechanismElement, built: MechanismBuilt, sample: Sample) ->
             lines.append(Line(quantity, unit, tuple(np.ravel(want).tolist()), (), None, COMPOSED))
             return
         got = np.asarray(given, dtype=np.float64)
+        if len(mechanism.bodies) == 1 and got.size == want.size:
+            got = got.reshape(want.shape)  # of one body the index may be left out
         known = ~np.isnan(want) & ~np.isnan(got) if got.shape == want.shape else np.zeros(0, dtype=bool)
         difference = float(np.max(np.abs(got - want)[known], initial=0.0)) / scale if known.size else float("inf")
         tolerance, because = _allowed(quantity, built.regularised)
@@ -65,8 +67,9 @@ def certify(element: MechanismElement, built: MechanismBuilt, sample: Sample) ->
     compare("velocity", "m/s", start.v_WB[0], sample.v_WB, speed)
     compare("spin", "rad/s", start.w_WB[0], sample.w_WB, speed / size)
     if sample.q_WB is not None:
-        signs = np.sign(np.sum(sample.q_WB * start.q_WB[0], axis=-1, keepdims=True))
-        compare("orientation", "1", start.q_WB[0], sample.q_WB * signs, 1.0)
+        turned = np.reshape(sample.q_WB, start.q_WB[0].shape)
+        signs = np.sign(np.sum(turned * start.q_WB[0], axis=-1, keepdims=True))
+        compare("orientation", "1", start.q_WB[0], turned * signs, 1.0)
     compare("acceleration", "m/s^2", found.acceleration, built.acceleration, found.scale)
     compare(
         "angular acceleration", "rad/s^2", found.angular_acceleration, built.angular_acceleration, _turning(element)

@@ -47,10 +47,10 @@ class MechanismKind:
 
     @staticmethod
     def conformance_scenes() -> Mapping[str, Scene]:
-        """A loop with inertia that changes, a chain, a top, and a slide without a loop: the most demanding first."""
+        """A loop with inertia that changes, a chain, a top, a slide without a loop, a free body: the hardest first."""
         from proofroll.files.scene_file import load_scene
 
-        names = ("slider_crank", "double_pendulum", "heavy_top", "pendulum", "oscillators")
+        names = ("slider_crank", "double_pendulum", "heavy_top", "pendulum", "oscillators", "free_body")
         return {name: load_scene(name) for name in names}
 
     @staticmethod

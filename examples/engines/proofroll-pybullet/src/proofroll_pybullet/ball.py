@@ -80,7 +80,7 @@ class PybulletBall:
         for _ in range(whole_steps(self._steps * dt, t, dt)):
             self._step()
             self._steps += 1
-            if self._bounded:
+            if self._bounded and self._steps > 1:  # in the first step a wall that bends does not press yet
                 self._follow((self._steps - 1) * dt, self._steps * dt)
 
     def _step(self) -> None:

@@ -1,0 +1,64 @@
+"""What authors of engines may build on: the table in docs/write_an_engine.md, and packages that keep to it."""
+
+from __future__ import annotations
+
+import ast
+import importlib
+import re
+from pathlib import Path
+
+import pytest
+
+from proofroll.core import engine
+
+ROOT = Path(__file__).resolve().parents[1]
+PAGE = (ROOT / "docs" / "write_an_engine.md").read_text(encoding="utf-8")
+PACKAGES = sorted((ROOT / "examples" / "engines").iterdir())
+
+
+def table(title: str) -> dict[str, set[str]]:
+    """First column of a section's table -> names in code in its second."""
+    section = PAGE.partition(f"\n## {title}\n")[2].partition("\n## ")[0]
+    rows = re.findall(r"^\| `([\w.]+)` \| (.*) \|$", section, flags=re.MULTILINE)
+    return {name: set(re.findall(r"`(\w+)`", names)) for name, names in rows}
+
+
+PROTOCOLS = set(table("What an engine may say besides"))
+NAMES = table("Names to build on")
+
+
+def test_every_optional_protocol_is_named() -> None:
+    """The page names each small protocol that an engine can follow besides, and no other."""
+    optional = {name for name, kind in vars(engine).items() if getattr(kind, "_is_runtime_protocol", False)}
+    assert optional == PROTOCOLS
+
+
+@pytest.mark.parametrize("module", NAMES)
+def test_public_names_are_there(module: str) -> None:
+    """Each name of the table is in its module."""
+    found = importlib.import_module(module)
+    assert [name for name in NAMES[module] if not hasattr(found, name)] == []
+
+
+def imported(file: Path) -> set[tuple[str, str]]:
+    """Modules of proofroll that a file imports, each with the name that it takes from there."""
+    found = set()
+    for node in ast.walk(ast.parse(file.read_text(encoding="utf-8"))):
+        if isinstance(node, ast.ImportFrom) and (node.module or "").partition(".")[0] == "proofroll":
+            found |= {(str(node.module), alias.name) for alias in node.names}
+        elif isinstance(node, ast.Import):
+            found |= {(alias.name, "") for alias in node.names if alias.name.startswith("proofroll.")}
+    return found
+
+
+@pytest.mark.parametrize("package", PACKAGES, ids=lambda package: package.name)
+def test_packages_of_engines_use_public_names_alone(package: Path) -> None:
+    """An engine under examples/ stands on the documented names, as anybody's would."""
+    files = [file for file in package.rglob("*.py") if "build" not in file.parts]
+    assert files
+    public = {(module, name) for module, names in NAMES.items() for name in names}
+    public |= {("proofroll.core.engine", name) for name in PROTOCOLS}
+    private = {f"{file.name}: {use}" for file in files for use in imported(file) - public}
+    assert private == set()
+    assert (package / "README.md").is_file()
+    assert list((package / "tests").glob("test_conformance.py"))
