@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import dataclasses
 from typing import Any
 
 import numpy as np
@@ -9,15 +10,16 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from proofroll.core.errors import ProofrollError
+from proofroll.core.errors import InputError, ProofrollError
 from proofroll.core.events import events_of
 from proofroll.core.gravity import Gravity
 from proofroll.core.scene import Scene
+from proofroll.elements.ball_on_surface.closed_form import closed_form
 from proofroll.elements.ball_on_surface.element import BallOnSurface
 from proofroll.elements.ball_on_surface.mechanics import newton_euler
 from proofroll.elements.ball_on_surface.model import Ball, Contact, InitialMotion, RollingBall
 from proofroll.elements.ball_on_surface.rolling_equations import reduced_rates, start
-from proofroll.elements.ball_on_surface.surfaces import Bowl, Cone, Torus
+from proofroll.elements.ball_on_surface.surfaces import Bowl, Cone, Plane, Torus
 from proofroll.files.scene_file import load_scene
 from proofroll.truth.truth import truth
 
@@ -83,6 +85,45 @@ def test_steady_circles_on_a_ring(ring: float, wire: float, slope: float, k: flo
     rho = ring - (wire + a) * np.sin(slope)
     W = steady_rate(k, a, rho, slope, spin)
     held_circle(rolling(Torus("wall", ring, wire), k, (0.3, -slope), (W * rho, 0.0), spin), W)
+
+
+@settings(max_examples=30, deadline=None)
+@given(W=st.floats(0.1, 20.0), k=ratios, x=st.floats(-2, 2), vx=st.floats(-2, 2), vy=st.floats(-2, 2), spin=spins)
+def test_circles_on_a_turntable(W: float, k: float, x: float, vx: float, vy: float, spin: float) -> None:
+    """About p0 + ẑ × v0/W' with the radius v0/W' at W' = k/(1 + k) W, whatever the spin; so both routes begin too."""
+    body = rolling(Plane("wall", turning=W), k, (x, 0.0), (vx, vy), spin)
+    rate = k / (1 + k) * W
+    up = np.array([0.0, 0.0, 1.0])
+    expected = np.cross(up, body.v0) * rate
+    close = 1e-12 * (1 + W) ** 2 * 40
+    assert newton_euler(body, body.p0, body.v0, body.w0)[0] == pytest.approx(expected, abs=close)
+    assert reduced_rates(body, start(body))[2] / body.ball.mass + body.gravity == pytest.approx(expected, abs=close)
+    t = np.linspace(0, 3 * np.pi / rate, 7)
+    motion = closed_form(body, t)
+    assert motion is not None
+    centre = body.p0 + np.cross(up, body.v0) / rate
+    away = np.linalg.norm(motion.p_WB - centre, axis=1)
+    assert away == pytest.approx(np.linalg.norm(body.v0) / rate, rel=1e-12, abs=1e-12)
+    wall = np.cross([0, 0, W], motion.p_WB - 0.025 * up)
+    assert motion.v_WB - 0.025 * np.cross(motion.w_WB, up) == pytest.approx(wall, abs=1e-11 * (1 + W))
+
+
+def test_circles_on_a_tilted_turntable_drift_across() -> None:
+    """With g sin α / (k W) across the slope, not down it; both routes of the truth agree."""
+    tilt, W, k = 0.1, 3.0, 0.4
+    scene = Scene("t", "", (element(Plane("wall", tilt, turning=W), k, (0.3, 0.0), (0.1, 0.2), 0.0),))
+    period = 2 * np.pi * (1 + k) / (k * W)
+    found = truth(scene, np.linspace(0, period, 8))
+    moved = found["p_WB"].to_numpy()[-1] - found["p_WB"].to_numpy()[0]
+    assert moved == pytest.approx([0.0, G * np.sin(tilt) / (k * W) * period, 0.0], abs=1e-12)
+    assert found["across"].attrs["error_bar"] < 1e-12
+
+
+def test_on_a_wall_that_moves_a_ball_only_rolls() -> None:
+    """Where nothing is known of slip or resistance, one line says so."""
+    slippery = Contact("ball", "wall", 0.0, 0.3, 0.3)
+    with pytest.raises(InputError, match="only rolls"):
+        dataclasses.replace(element(Plane("wall", turning=1.0), 0.4, (0, 0), (0, 0), 0.0), contact=slippery)
 
 
 def test_a_ball_on_the_rim_leaves_it_in_both_routes() -> None:

@@ -5,7 +5,9 @@ of the wall only the direction of its normal and how that turns are used; of a d
 derivatives of its distance, which heyoka takes of the formula itself. Differentiating e1·v = 0 and
 v + a ω × e1 = 0 leaves, with Newton's m (v̇ - g) = F and Euler's κ m a² ω̇ = a e1 × F,
 
-    e1·v̇ = -ė1·v,      (1 + κ) v̇ = g - κ a ω × ė1 along the wall,      κ a ω̇ = e1 × (v̇ - g).
+    e1·v̇ = -ė1·v,      (1 + κ) v̇ = g - κ a ω × ė1 along the wall,      κ a ω̇ = e1 × (v̇ - g),
+
+and on a wall that turns along itself, where v + a ω × e1 is the wall's velocity w, the second has κ ẇ more.
 
 Nothing holds the state on the constraints, so that errors show.
 """
@@ -46,7 +48,8 @@ def unreduced(body: RollingBall, times: FloatArray) -> Motion:
     if not hasattr(_local, "integrators"):
         _local.integrators = cache(_compiled)  # an integrator holds a state and must not be shared between threads
     # Cylinders and planes of all sizes share an integrator each.
-    series = copy.copy(_local.integrators(surface if isinstance(surface, Declared) else type(surface)))
+    moves = body.wall_rate is not None
+    series = copy.copy(_local.integrators(surface if isinstance(surface, Declared) else type(surface), moves))
     e1 = surface.normal(body.p0)
     values = [body.ball.radius, body.ball.inertia_ratio, *body.gravity]
     if isinstance(surface, Cylinder):
@@ -54,7 +57,7 @@ def unreduced(body: RollingBall, times: FloatArray) -> Motion:
         values += [*axis, np.sign(e1 @ (body.p0 - (body.p0 @ axis) * axis))]
     elif isinstance(surface, Plane):
         values += e1.tolist()
-    series.pars[:] = values
+    series.pars[:] = [*values, *(body.wall_rate if body.wall_rate is not None else ())]
     series.time, series.state[:] = float(times[0]), np.concatenate([body.p0, body.v0, body.w0])
     states = series.propagate_grid(np.asarray(times, dtype=np.float64))[-1] if len(times) > 1 else series.state[None, :]
     if len(states) < len(times) or not np.all(np.isfinite(states)):
@@ -64,8 +67,8 @@ def unreduced(body: RollingBall, times: FloatArray) -> Motion:
     return Motion(p, v, w, force, "unreduced Newton-Euler, Taylor series")
 
 
-def _compiled(surface: Declared | type[Surface]) -> Any:
-    """The integrator on a declared surface, or on any cylinder or plane."""
+def _compiled(surface: Declared | type[Surface], moves: bool) -> Any:
+    """The integrator on a declared surface, or on any cylinder or plane; ``moves`` if the wall turns along itself."""
     import heyoka as hy
 
     p, v, w = (hy.make_vars(*(f"{name}{axis}" for axis in "xyz")) for name in "pvw")
@@ -94,7 +97,12 @@ def _compiled(surface: Declared | type[Surface]) -> Any:
     else:
         e1, e1_rate = k, [0.0, 0.0, 0.0]
     turning = cross(w, e1_rate)
-    along_wall = across([(gi - kappa * a * ti) / (1 + kappa) for gi, ti in zip(g, turning, strict=True)], e1)
+    driven = [-a * ti for ti in turning]
+    if moves:  # the wall's velocity W × (p + a e1) grows at this rate
+        first = {Cylinder: 9, Plane: 8}.get(surface, 5) if isinstance(surface, type) else 5
+        gained = cross([hy.par[first + i] for i in range(3)], [x + a * y for x, y in zip(v, e1_rate, strict=True)])
+        driven = [x + y for x, y in zip(driven, gained, strict=True)]
+    along_wall = across([(gi + kappa * di) / (1 + kappa) for gi, di in zip(g, driven, strict=True)], e1)
     normal = -dot(e1_rate, v)
     v_rate = [x + normal * e for x, e in zip(along_wall, e1, strict=True)]
     w_rate = [x / (kappa * a) for x in cross(e1, [x - gi for x, gi in zip(v_rate, g, strict=True)])]

@@ -16,6 +16,7 @@ from proofroll.elements.ball_on_surface.mechanics import (
     initial_response,
     natural_acceleration,
     slip_velocity,
+    wall_velocity,
 )
 from proofroll.elements.ball_on_surface.model import RollingBall
 from proofroll.elements.ball_on_surface.resting import stands
@@ -98,7 +99,8 @@ def certify(body: RollingBall, built: Built, sample: Sample) -> list[Line]:
     compare("gap in the engine", "m", 0.0, built.gap, body.ball.radius)
     compare("velocity", "m/s", body.v0, sample.v_WB, speed)
     compare("spin", "rad/s", body.w0, sample.w_WB, spin)
-    slip = slip_velocity(body.ball.radius, body.surface.normal(sample.p_WB), sample.v_WB, sample.w_WB)
+    e1 = body.surface.normal(sample.p_WB)
+    slip = slip_velocity(body.ball.radius, e1, sample.v_WB, sample.w_WB) - wall_velocity(body, sample.p_WB, e1)
     compare("slip", "m/s", body.slip0, slip, speed)
     compare("acceleration", "m/s^2", acceleration, built.acceleration, natural)
     compare("angular acceleration", "rad/s^2", turning, built.angular_acceleration, natural / body.ball.radius)

@@ -5,6 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from proofroll.core.arrays import FloatArray
+from proofroll.elements.ball_on_surface.mechanics import wall_velocity
 from proofroll.elements.ball_on_surface.model import RollingBall
 from proofroll.elements.ball_on_surface.motion import Motion
 from proofroll.elements.ball_on_surface.surfaces import Cylinder, Plane
@@ -22,15 +23,30 @@ def closed_form(body: RollingBall, times: FloatArray) -> Motion | None:
 
 
 def _plane(body: RollingBall, t: FloatArray) -> Motion:
-    """Uniform acceleration g_t / (1 + J/ma²): (5/7) g sin α for a homogeneous ball."""
+    """Uniform acceleration g_t / (1 + κ), κ = J/ma²: (5/7) g sin α for a homogeneous ball.
+
+    On a turntable of the rate W, v̇ = g_t / (1 + κ) + W' n × v with W' = κ/(1 + κ) W (2/7 W) and the normal n: circles
+    at the rate W', which drift where the table is tilted (Milne, Vectorial Mechanics, 1948).
+    """
     frame = body.surface.frame(body.u0)
     e1, tangents = frame[:, 0], frame[:, 1:]
     acceleration = tangents @ (tangents.T @ body.gravity) / (1 + body.ball.inertia_ratio)
-    v = body.v0 + t[:, None] * acceleration
-    p = body.p0 + t[:, None] * body.v0 + 0.5 * t[:, None] ** 2 * acceleration
-    w = (body.w0 @ e1) * e1 - np.cross(e1, v) / body.ball.radius
-    force = np.broadcast_to(body.ball.mass * (acceleration - body.gravity), p.shape).copy()
-    return Motion(p, v, w, force, "closed form (uniform acceleration)")
+    if body.wall_rate is None:
+        v = body.v0 + t[:, None] * acceleration
+        p = body.p0 + t[:, None] * body.v0 + 0.5 * t[:, None] ** 2 * acceleration
+        rates, route = np.broadcast_to(acceleration, p.shape), "closed form (uniform acceleration)"
+    else:
+        turning = body.ball.inertia_ratio / (1 + body.ball.inertia_ratio) * body.wall_rate
+        drift = np.cross(turning, acceleration) / (turning @ turning)
+        angle, circling = t[:, None] * float(turning @ -e1), body.v0 - drift
+        sideways = np.cross(-e1, circling)
+        v = drift + np.cos(angle) * circling + np.sin(angle) * sideways
+        way = np.sin(angle) * circling + 2 * np.sin(angle / 2) ** 2 * sideways
+        p = body.p0 + t[:, None] * drift + way / float(turning @ -e1)
+        rates, route = acceleration + np.cross(turning, v), "closed form (circles of a turntable)"
+    carried = wall_velocity(body, p, np.broadcast_to(e1, p.shape))
+    w = (body.w0 @ e1) * e1 - np.cross(e1, v - carried) / body.ball.radius
+    return Motion(p, v, w, body.ball.mass * (rates - body.gravity), route)
 
 
 def _vertical_cylinder(body: RollingBall, surface: Cylinder, t: FloatArray) -> Motion:

@@ -9,7 +9,7 @@ import numpy as np
 
 from proofroll.core.arrays import FloatArray
 from proofroll.core.engine import Sample
-from proofroll.elements.ball_on_surface.mechanics import energy, slip_velocity
+from proofroll.elements.ball_on_surface.mechanics import energy, slip_velocity, wall_velocity
 from proofroll.elements.ball_on_surface.model import RollingBall
 from proofroll.elements.ball_on_surface.surfaces import Surface
 
@@ -82,7 +82,8 @@ def variables(
     frame = surface.frame(u)
     e1 = surface.normal(p_WB)
     spin = np.einsum("tij,ti->tj", frame, w_WB)
-    slip = np.einsum("tij,ti->tj", frame, slip_velocity(body.ball.radius, e1, v_WB, w_WB))
+    sliding = slip_velocity(body.ball.radius, e1, v_WB, w_WB) - wall_velocity(body, p_WB, e1)
+    slip = np.einsum("tij,ti->tj", frame, sliding)
 
     found: dict[str, tuple[tuple[str, ...], FloatArray, dict[str, str]]] = {}
 

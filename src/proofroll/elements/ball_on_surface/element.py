@@ -59,11 +59,16 @@ class BallOnSurface:
     gravity: Gravity
 
     def __post_init__(self) -> None:
-        """Refuses a slip that nothing could ever brake.
+        """Refuses a slip that nothing could ever brake, and what is not known on a wall that moves.
 
         Raises:
-            InputError: the ball starts slipping, and friction without bound would stop it at once.
+            InputError: the ball starts slipping, and friction without bound would stop it at once; or the wall moves,
+                and the ball does not only roll.
         """
+        for name, only in (("mu_static", math.inf), ("rolling_resistance", 0.0)):
+            if any(self.surface.wall_rate) and getattr(self.contact, name) != only:
+                advice = f"on a wall that moves a ball only rolls; leave {name} out, or the wall's turning"
+                raise InputError(name, getattr(self.contact, name), advice)
         if math.isinf(self.contact.mu_static) and np.any(self.rolling.slip0):
             advice = "a ball that starts slipping needs a number for mu_static, or leave its tangential_spin out"
             raise InputError("tangential_spin", self.start.tangential_spin, advice)
@@ -91,6 +96,8 @@ class BallOnSurface:
             needs.add(BallCapability.CURVED_SURFACE)
         if np.any(self.rolling.slip0):
             needs.add(BallCapability.SLIPPING_START)
+        if self.rolling.wall_rate is not None:
+            needs.add(BallCapability.MOVING_WALL)
         return frozenset(needs)
 
     optional: ClassVar[frozenset[str]] = frozenset(
@@ -113,7 +120,8 @@ class BallOnSurface:
         u0 = np.asarray(self.start.coordinates, dtype=np.float64)
         frame = surface.frame(u0)
         v0 = frame[:, 1:] @ np.asarray(self.start.velocity)
-        w0 = self.start.spin * frame[:, 0] - np.cross(frame[:, 0], v0) / self.ball.radius
+        carried = np.cross(self.surface.wall_rate, surface.position(u0) + self.ball.radius * frame[:, 0])
+        w0 = self.start.spin * frame[:, 0] - np.cross(frame[:, 0], v0 - carried) / self.ball.radius
         slip0 = np.zeros(3)
         if self.start.tangential_spin is not None:
             given = frame @ (self.start.spin, *self.start.tangential_spin)

@@ -20,6 +20,13 @@ def slip_velocity(radius: float, e1: FloatArray, v_WB: FloatArray, w_WB: FloatAr
     return np.asarray(v_WB + radius * np.cross(w_WB, e1))
 
 
+def wall_velocity(body: RollingBall, p_WB: FloatArray, e1: FloatArray) -> FloatArray:
+    """Velocity of the wall where the ball touches it [m/s], shape (..., 3): W × (p + a e1)."""
+    if body.wall_rate is None:
+        return np.zeros_like(p_WB)
+    return np.asarray(np.cross(body.wall_rate, p_WB + body.ball.radius * e1))
+
+
 def resistance_moment(f: float, N: npt.ArrayLike, e1: FloatArray, v_WB: FloatArray) -> FloatArray:
     """Moment of the rolling resistance about the centre [N m], shape (..., 3).
 
@@ -145,5 +152,7 @@ def newton_euler(
     matrix[6:, :3] = np.eye(3)
     matrix[6:, 3:6] = -a * cross_e1
     right = np.concatenate([m * body.gravity, np.zeros(3), -a * np.cross(w_WB, e1_rate)])
+    if body.wall_rate is not None:  # v + a ω × e1 is the wall's velocity W × (p + a e1), whose rate this is
+        right[6:] += np.cross(body.wall_rate, v_WB + a * e1_rate)
     solution = np.linalg.solve(matrix, right)
     return solution[:3], solution[3:6], solution[6:]

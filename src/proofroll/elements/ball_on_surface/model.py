@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 from dataclasses import dataclass, field
 from enum import StrEnum
+from functools import cached_property
 from typing import Literal
 
 import numpy as np
@@ -23,12 +24,13 @@ class BallCapability(StrEnum):
     BOUNDED_FRICTION = "bounded friction (slip)"
     ORIENTATION = "the ball's orientation"
     SLIPPING_START = "a start that slips"
+    MOVING_WALL = "a wall that moves"
 
 
 ROLLS: frozenset[str] = frozenset(
     {BallCapability.ROLLING, BallCapability.CURVED_SURFACE, BallCapability.ROLLING_RESISTANCE}
 )
-ALL_OF_A_BALL: frozenset[str] = frozenset(BallCapability)
+ALL_OF_A_BALL: frozenset[str] = frozenset(BallCapability) - {BallCapability.MOVING_WALL}
 
 
 @dataclass(frozen=True)
@@ -152,6 +154,11 @@ class RollingBall:
     v0: FloatArray
     w0: FloatArray
     slip0: FloatArray = field(default_factory=lambda: np.zeros(3))
+
+    @cached_property
+    def wall_rate(self) -> FloatArray | None:
+        """W: angular velocity of the wall about the world's origin [rad/s], shape (3,); None: it stands."""
+        return np.array(self.wall.wall_rate) if any(self.wall.wall_rate) else None
 
     @property
     def udot0(self) -> FloatArray:

@@ -24,11 +24,12 @@ def natural_time(body: RollingBall) -> float:
 
     Where the path turns at the rate Ω, a ball with r = J/(m a²) oscillates across it at √(r/(1+r)) Ω (√(2/7) Ω for a
     homogeneous ball, Blajer 2006, section 3). Where it does not turn, there is no oscillation: one turn of the ball, or
-    the time 2π √(a/g) in which it would begin to roll, whichever is longer.
+    the time 2π √(a/g) in which it would begin to roll, whichever is longer. On a turntable it is one circle.
     """
-    turning = turning_rate(body)
+    turning, ratio = turning_rate(body), body.ball.inertia_ratio
+    if body.wall_rate is not None:
+        return 2 * math.pi * (1 + ratio) / (ratio * float(np.linalg.norm(body.wall_rate)))
     if turning > 0:
-        ratio = body.ball.inertia_ratio
         return 2 * math.pi / (math.sqrt(ratio / (1 + ratio)) * turning)
     speed, gravity, a = float(np.linalg.norm(body.v0)), float(np.linalg.norm(body.gravity)), body.ball.radius
     times = [a / speed] if speed else []

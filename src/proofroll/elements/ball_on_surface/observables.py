@@ -15,7 +15,7 @@ import numpy as np
 from proofroll.core.arrays import FloatArray
 from proofroll.core.events import events_of
 from proofroll.core.observable import Observable, Role
-from proofroll.elements.ball_on_surface.mechanics import natural_acceleration, resistance_moment
+from proofroll.elements.ball_on_surface.mechanics import natural_acceleration, resistance_moment, wall_velocity
 from proofroll.elements.ball_on_surface.model import RollingBall
 
 if TYPE_CHECKING:
@@ -104,7 +104,7 @@ def observe(body: RollingBall, dataset: xr.Dataset) -> dict[str, FloatArray]:
     curves["gap"] = dataset["gap"].to_numpy()
     curves["slip"] = dataset["slip"].to_numpy()
     if dataset.sizes["time"] > 2 * (_DEGREE + 1) + 2 * _ENDS:
-        if "N" in dataset or not body.contact.rolling_resistance:
+        if "N" in dataset or not (body.contact.rolling_resistance or body.wall_rate is not None):
             curves["energy_balance"] = energy_balance(body, dataset)
         if "N" in dataset:
             audited = force_audit(body, dataset)
@@ -146,9 +146,9 @@ def scales(body: RollingBall, truth: xr.Dataset) -> dict[str, float]:
 def energy_balance(body: RollingBall, dataset: xr.Dataset) -> FloatArray:
     """Energy now plus what resistance and friction took, minus the energy at the start [J], shape (time,).
 
-    Rolling resistance takes -M · ω from the ball per second (N f V / a while it rolls), friction -F · u; N, F, ω, V
-    and the slip u are the engine's own. Where there is no force at time 0, work counts from the first sample that has
-    one; shape (time - 1,) then.
+    Rolling resistance takes -M · ω from the ball per second (N f V / a while it rolls), friction -F · u, and a wall
+    that moves at the velocity w gives F · w; N, F, ω, V and the slip u are the engine's own. Where there is no force at
+    time 0, work counts from the first sample that has one; shape (time - 1,) then.
     """
     dataset = _with_forces(dataset)
     balance = dataset["energy"].to_numpy() - float(dataset["energy"][0])
@@ -160,6 +160,11 @@ def energy_balance(body: RollingBall, dataset: xr.Dataset) -> FloatArray:
         rests = not np.all(np.any(dataset["v_WB"].to_numpy(), axis=-1))
         moment = resistance_moment(f, dataset["N"].to_numpy(), e1, dataset["v_WB"].to_numpy())
         power -= np.einsum("ti,ti->t", moment, dataset["w_WB"].to_numpy())
+    if body.wall_rate is not None:
+        p_WB = dataset["p_WB"].to_numpy()
+        frame = body.surface.frame(body.surface.locate(p_WB))
+        carried = np.einsum("tij,ti->tj", frame, wall_velocity(body, p_WB, frame[..., 0]))
+        power -= sum(dataset[f"F{i}"].to_numpy() * carried[:, i - 1] for i in (2, 3))
     if bounded:
         power -= sum(dataset[f"F{i}"].to_numpy() * dataset[f"slip{i}"].to_numpy() for i in (2, 3))
     if np.any(power):

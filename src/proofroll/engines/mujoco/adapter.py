@@ -72,7 +72,7 @@ class Mujoco:
     name: ClassVar[str] = "mujoco"
     provides: ClassVar[Mapping[str, frozenset[str]]] = {
         "chart": ALL_OF_A_BALL,
-        "free": ALL_OF_A_BALL,
+        "free": ALL_OF_A_BALL | {BallCapability.MOVING_WALL},
         "facets": ALL_OF_A_BALL - {BallCapability.BOUNDED_FRICTION, BallCapability.SLIPPING_START},
         "joints": mechanism.PROVIDES,
     }

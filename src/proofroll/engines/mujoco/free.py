@@ -36,6 +36,9 @@ class Free:
         self._edits = settings.curvature or corrects(body.contact, settings)
         self._surface = body.surface
         self._radius = body.ball.radius
+        self._wall_rate, self._geom = body.wall_rate, model.geom("ball").id
+        if body.wall_rate is not None and not settings.curvature:
+            raise Refused("for MuJoCo a mocap plane has no velocity, so the wall's is added with curvature=true alone")
         self.resistance = Resistance.of(body, settings.dt)
         self._ball = model.body("ball").id
         self._wall = model.geom("wall").id
@@ -153,7 +156,16 @@ class Free:
         rows = contact.frame.reshape(3, 3) @ np.array(cross(w.tolist(), e1_rate.tolist())) * -self._radius
         v = rates[:3] + self._lead * trend[:3]
         rows[0] = v @ gradient @ v
-        data.efc_aref[contact.efc_address : contact.efc_address + contact.dim] += self._share * rows[: contact.dim]
+        first = contact.efc_address
+        if self._wall_rate is not None:
+            # Damping and rate are meant for the velocity relative to the wall's, W × (p + a e1).
+            e1 = -contact.frame[:3] if contact.geom[1] == self._geom else contact.frame[:3]
+            velocity = np.cross(self._wall_rate, data.qpos[:3] + self._radius * e1)
+            gained = np.cross(self._wall_rate, rates[:3] + self._radius * e1_rate)
+            tangents = contact.frame.reshape(3, 3)[1:]
+            rows[1:] += tangents @ gained
+            data.efc_aref[first + 1 : first + 3] += data.efc_KBIP[first + 1, 1] * (tangents @ velocity)
+        data.efc_aref[first : first + contact.dim] += self._share * rows[: contact.dim]
 
 
 class Facets:

@@ -28,7 +28,8 @@ class Pinocchio:
 
     name: ClassVar[str] = "pinocchio"
     provides: ClassVar[Mapping[str, frozenset[str]]] = {
-        **dict.fromkeys(("composite", "free_flyer", "contact"), ALL_OF_A_BALL),
+        "composite": ALL_OF_A_BALL,
+        **dict.fromkeys(("free_flyer", "contact"), ALL_OF_A_BALL | {BallCapability.MOVING_WALL}),
         "null_space": NullSpace.provides,
         "constraint_dynamics": ConstraintDynamics.provides,
     }

@@ -78,6 +78,7 @@ class ContactSteps:
         rolls = 1 + body.ball.inertia_ratio
         # Of a ball that rolls: moment per rate of its speed [N s²], and acceleration by gravity [m/s²].
         self._stopping, self._pull = rolls * body.ball.mass * body.ball.radius, (body.gravity / rolls).tolist()
+        self._wall_rate, self._radius = body.wall_rate, body.ball.radius
         self.dt, self.leapfrog = float(settings.dt or 0.0), settings.integrator == "leapfrog"
         self.solver, self.tolerance = settings.solver or "pgs", float(settings.solver_tolerance or 0.0)
         self.contact = PlaneContact(body, self.solver, self.tolerance)
@@ -150,6 +151,12 @@ class ContactSteps:
             shift2 = self._lever * (x2 * tx + y2 * ty + z2 * tz)
             shift3 = -self._lever * (x3 * tx + y3 * ty + z3 * tz)
             shift1 -= 0.5 * self.dt * (rx * vx + ry * vy + rz * vz)
+        if self._wall_rate is not None:  # where the ball will be in the middle of the step that the velocity is for
+            x1, y1, z1, x2, y2, z2, x3, y3, z3 = triad
+            there = np.array(place) + 0.5 * self.dt * np.array(along) + self._radius * np.array((x1, y1, z1))
+            carried = np.cross(self._wall_rate, there)
+            shift2 -= float(carried @ (x2, y2, z2))
+            shift3 += float(carried @ (x3, y3, z3))
         shift = np.array((shift2, shift3, shift1))
 
         torque, normal_force, centred = self._no_torque, self._normal_force, self.leapfrog and self.started

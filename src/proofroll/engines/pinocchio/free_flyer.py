@@ -25,7 +25,7 @@ class FreeFlyer(Mechanism):
     def __init__(self, body: RollingBall, orientation: bool) -> None:
         """See :class:`~proofroll.engines.pinocchio.mechanism.Mechanism`."""
         super().__init__(body)
-        self._surface = body.surface
+        self._surface, self._wall_rate = body.surface, body.wall_rate
         self._orientation = orientation
         self._matrix = np.zeros((9, 9))
         self._directions = np.zeros((3, 6))
@@ -55,7 +55,25 @@ class FreeFlyer(Mechanism):
         rows[0], rows[1:] = e1.dot(terms.jacobian[:3]), slip_rows
         bend = e1_rate[0] * v_WB[0] + e1_rate[1] * v_WB[1] + e1_rate[2] * v_WB[2]
         drift[0], drift[1:] = e1.dot(terms.bias[:3]) + bend, slip_drift
+        if self._wall_rate is not None:
+            drift[1:] -= frame.T[1:] @ self._carrying(self._wall_rate, v_WB, e1_rate)
         return terms, frame, rows, drift
+
+    def _carrying(self, W: FloatArray, v: Sequence[float], e1_rate: Sequence[float]) -> FloatArray:
+        """Rate of the wall's velocity W × (p + a e1) at the contact, which goes along with the ball [m/s²]."""
+        return np.cross(W, np.asarray(v) + self._radius * np.asarray(e1_rate))
+
+    def project(self, data: Any, q: FloatArray, v: FloatArray) -> tuple[FloatArray, FloatArray]:
+        """See :class:`~proofroll.engines.pinocchio.mechanism.Mechanism`.
+
+        A ball that the wall carried along as if it were part of it would not slip: what is projected is the rest.
+        """
+        if self._wall_rate is None:
+            return super().project(data, q, v)
+        turned = pin.Quaternion(q[3:]).toRotationMatrix().T if self._orientation else np.eye(3)
+        carried = np.concatenate([turned @ np.cross(self._wall_rate, q[:3]), turned @ self._wall_rate])
+        q, rest = super().project(data, q, v - carried)
+        return q, rest + carried
 
     def _aimed(self, moving: Sequence[float]) -> FloatArray:
         """Velocity along e1, and of slip along e2 and e3, from (v, ω) in the world, shape (3, 6).
@@ -88,6 +106,10 @@ class FreeFlyer(Mechanism):
         drift[0] = along1 + (x * vx + y * vy + z * vz)
         drift[1] = along2 + (x2 * tx + y2 * ty + z2 * tz)
         drift[2] = along3 + (x3 * tx + y3 * ty + z3 * tz)
+        if self._wall_rate is not None:
+            gain = self._carrying(self._wall_rate, (vx, vy, vz), (x, y, z))
+            drift[1] -= gain @ (x2, y2, z2)
+            drift[2] -= gain @ (x3, y3, z3)
         lever = self._rest
         if self._f:
             speed = math.sqrt(vx * vx + vy * vy + vz * vz)

@@ -40,8 +40,8 @@ class Projection:
 
     name: ClassVar[str] = "projection"
     provides: ClassVar[Mapping[str, frozenset[str]]] = {
-        "euler": ALL_OF_A_BALL,
-        "rotating_frame": ALL_OF_A_BALL,
+        "euler": ALL_OF_A_BALL | {BallCapability.MOVING_WALL},
+        "rotating_frame": ALL_OF_A_BALL | {BallCapability.MOVING_WALL},
         "dependent": mechanism.PROVIDES,
     }
     lacking: ClassVar[Mapping[str, Mapping[str, str]]] = {"dependent": mechanism.LACKING}

@@ -25,6 +25,8 @@ from proofroll.engines.projection.orientation import EulerAngles, Orientation, R
 from proofroll.engines.projection.uniform import AlongAxes, Closed
 from proofroll.engines.projection.uniform_euler import Euler
 
+_STANDS = np.zeros((2, 3))
+
 
 class Kinematics(NamedTuple):
     """How the velocities s move the ball: v = D s and v̇ = D ṡ + Ḋ s.
@@ -35,6 +37,8 @@ class Kinematics(NamedTuple):
         D: shape (6, 5), with C_h D = 0 whatever s is.
         drift: Ḋ s, shape (6,).
         v: D s, shape (6,).
+        carried: velocity of the wall where the ball touches it, along the local axes, and its rate as seen along
+            them, shape (2, 3); zero where the wall stands.
     """
 
     local: Local
@@ -42,6 +46,7 @@ class Kinematics(NamedTuple):
     D: FloatArray
     drift: FloatArray
     v: FloatArray
+    carried: FloatArray
 
 
 class Response(NamedTuple):
@@ -86,6 +91,8 @@ class ProjectedBall:
         self._geometry = geometry
         self._orientation = orientation
         self._coordinates = 2 + orientation.size
+        self._surface, self._wall_rate, self._radius = body.surface, body.wall_rate, body.ball.radius
+        written_out = written_out and self._wall_rate is None
         self._closed = _closed(body, geometry, orientation) if written_out else None
         self._tangents = geometry.at(body.u0).tangents[1:] if isinstance(geometry, Uniform) else None
 
@@ -97,7 +104,18 @@ class ProjectedBall:
         D, drift = np.zeros((6, 5)), np.empty(6)
         D[:3, :2], drift[:3] = local.tangents, local.second @ s[:2] @ s[:2]
         D[3:, 2:], drift[3:] = self._orientation.kinematics(q[2:], s[2:], local.frame, turning)
-        return Kinematics(local, turning, D, drift, D @ s)
+        v = D @ s
+        W = self._wall_rate
+        carried = _STANDS if W is None else self._carried(W @ local.frame, q, local.frame, turning, v)
+        return Kinematics(local, turning, D, drift, v, carried)
+
+    def _carried(
+        self, W: FloatArray, q: FloatArray, frame: FloatArray, turning: FloatArray, v: FloatArray
+    ) -> FloatArray:
+        """Of a wall that turns at W: W × (p + a e1) and its rate W × (ṗ + a ė1), less what the turning axes make."""
+        contact = self._surface.position(q[:2]) @ frame + [self._radius, 0.0, 0.0]
+        velocity = np.cross(W, contact)
+        return np.stack([velocity, np.cross(W, v[:3] + self._radius * turning[:, 0]) - turning @ velocity])
 
     def speed(self, x: FloatArray) -> float:
         """Of the centre [m/s]."""
@@ -163,7 +181,8 @@ class ProjectedBall:
         The rows C are constant along the local axes. So the slip changes by C times the rate of v as seen from the
         turning frame, which is Ḋs less FᵀḞ v, for the translation and the rotation alike.
         """
-        return self.rows @ (kin.drift - (kin.v.reshape(2, 3) @ kin.turning.T).ravel())
+        own = self.rows @ (kin.drift - (kin.v.reshape(2, 3) @ kin.turning.T).ravel())
+        return np.asarray(own - self.rows[:, :3] @ kin.carried[1])
 
     def contact_force(self, response: Response) -> FloatArray:
         """Force of the wall on the ball along the local axes, -C_hᵀ N - Cᵀ λ_nh = (-N, F2, F3) [N], shape (3,)."""
@@ -191,7 +210,10 @@ class ProjectedBall:
 
     def slip(self, x: FloatArray) -> FloatArray:
         """C v: violation of the active rows [m/s]."""
-        return self.rows @ self.kinematics(x).v
+        return self._violation(self.kinematics(x))
+
+    def _violation(self, kin: Kinematics) -> FloatArray:
+        return np.asarray(self.rows @ kin.v - self.rows[:, :3] @ kin.carried[0])
 
     def eliminated(self, x: FloatArray, slip: FloatArray | None = None) -> FloatArray:
         """The state with the violation of C v = 0 removed from s (Blajer 2002).
@@ -206,7 +228,7 @@ class ProjectedBall:
         if self._closed is not None and slip is None:
             return self._closed.eliminated(x)
         kin = self.kinematics(x)
-        violation = self.rows @ kin.v if slip is None else self.rows @ kin.v - slip
+        violation = self._violation(kin) if slip is None else self._violation(kin) - slip
         result = x.copy()
         result[self._coordinates :] -= self._solve(kin, np.zeros(5), violation)[:5]
         return result

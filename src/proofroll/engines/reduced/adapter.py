@@ -27,8 +27,8 @@ class Reduced:
 
     name: ClassVar[str] = "reduced"
     provides: ClassVar[Mapping[str, frozenset[str]]] = {
-        "equations": ROLLS,
-        "closed_form": ROLLS - {BallCapability.ROLLING_RESISTANCE},
+        "equations": ROLLS | {BallCapability.MOVING_WALL},
+        "closed_form": (ROLLS | {BallCapability.MOVING_WALL}) - {BallCapability.ROLLING_RESISTANCE},
     }
     lacking: ClassVar[Mapping[str, Mapping[str, str]]] = {
         "closed_form": {
@@ -101,6 +101,9 @@ class Reduced:
         if spin_rate is None:
             return None
         e1 = surface.normal(p)
-        e1_rate = surface.normal_gradient(p) @ v
+        e1_rate, v0 = surface.normal_gradient(p) @ v, v
+        if (W := self._body.wall_rate) is not None:  # the ball rolls on what the wall does not carry along
+            v = v - np.cross(W, p + self._body.ball.radius * e1)
+            acceleration = acceleration - np.cross(W, v0 + self._body.ball.radius * e1_rate)
         swung = np.cross(e1_rate, v) + np.cross(e1, acceleration)
         return np.asarray(spin_rate * e1 + (w @ e1) * e1_rate - swung / self._body.ball.radius)

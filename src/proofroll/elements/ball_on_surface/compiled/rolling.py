@@ -149,8 +149,8 @@ def reduced(resistance: bool, uniform: bool, tolerance: float) -> Reduced:
 
 
 def supports(body: RollingBall) -> bool:
-    """Whether the expressions hold on the scene's surface."""
-    return isinstance(body.surface, (Cylinder, Plane))
+    """Whether the expressions hold on the scene's surface, and on a wall that stands."""
+    return isinstance(body.surface, (Cylinder, Plane)) and body.wall_rate is None
 
 
 def is_uniform(body: RollingBall) -> bool:

@@ -36,6 +36,7 @@ class Cylinder:
     coordinates = ("gamma", "z")
     units = ("rad", "m")
     periods = (2 * np.pi, None)
+    wall_rate = (0.0, 0.0, 0.0)
 
     def __post_init__(self) -> None:
         """Refuses what is no cylinder.

@@ -40,6 +40,7 @@ class Declared:
     units: tuple[str, str]
     periods: tuple[float | None, float | None] = (None, None)
     generators: tuple[Generator, Generator] | None = None
+    wall_rate: tuple[float, float, float] = (0.0, 0.0, 0.0)
 
     @property
     def domain(self) -> tuple[tuple[float, float], tuple[float, float]]:

@@ -24,11 +24,13 @@ class Plane:
         kind: which surface it is.
         tilt: rotation from the horizontal about the world's y axis [rad]; positive descends along +x.
         height: distance of the ball's centre above the wall's surface [m]; 0 for the wall itself.
+        turning: rate of a turntable, about the normal through the world's origin, upwards [rad/s].
     """
 
     name: str
     tilt: float = field(default=0.0, metadata={"unit": "rad"})
     height: float = field(default=0.0, metadata={"unit": "m"})
+    turning: float = field(default=0.0, metadata={"unit": "rad/s"})
     kind: Literal["plane"] = "plane"
 
     coordinates = ("down", "across")
@@ -44,6 +46,12 @@ class Plane:
         """
         bounded("tilt", self.tilt)
         bounded("height", self.height)
+        bounded("turning", self.turning)
+
+    @property
+    def wall_rate(self) -> tuple[float, float, float]:
+        """See :class:`Surface`."""
+        return components(-self.turning * self._axes[:, 0])
 
     @property
     def generators(self) -> tuple[Generator, Generator]:
@@ -97,7 +105,7 @@ class Plane:
 
     def offset(self, ball_radius: float) -> Plane:
         """See :class:`Surface`."""
-        return Plane(self.name, self.tilt, self.height + ball_radius)
+        return Plane(self.name, self.tilt, self.height + ball_radius, self.turning)
 
     def position(self, u: npt.ArrayLike) -> FloatArray:
         """See :class:`Surface`."""

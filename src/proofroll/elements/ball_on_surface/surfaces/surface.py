@@ -65,6 +65,10 @@ class Surface(Protocol):
     def generators(self) -> tuple[Generator, Generator] | None:
         """Motions G1, G2 with p(u) = G1(u1) G2(u2) p(0) and frame(u) alike; None if not homogeneous."""
 
+    @property
+    def wall_rate(self) -> tuple[float, float, float]:
+        """W: angular velocity with which the wall turns along itself, about the world's origin [rad/s]."""
+
     def offset(self, ball_radius: float) -> Surface:
         """The surface on which the centre of a touching ball of this radius [m] moves."""
 
