@@ -17,6 +17,7 @@ from proofroll.truth.assemble import classic_step
 from proofroll.truth.collocation import Step, System, next_length, nodes, take
 from proofroll.truth.contact import Contact
 from proofroll.truth.crossing import first_rise
+from proofroll.truth.impact import by_equations
 from proofroll.truth.switching import End, Leg
 
 _TOLERANCE = 1e-13  # of a step, relative to the scale of each variable
@@ -47,6 +48,18 @@ class Implicit:
     def start(self) -> FloatArray:
         """See :class:`Route`."""
         return np.concatenate([self._body.p0, self._body.w0, np.zeros(3)])
+
+    def at(self, p_WB: FloatArray, v_WB: FloatArray, w_WB: FloatArray) -> FloatArray:
+        """See :class:`Route`."""
+        gap, e1 = float(self._body.surface.gap(p_WB)), self._body.surface.normal(p_WB)
+        slip = v_WB + self._body.ball.radius * np.cross(w_WB, e1)
+        return np.concatenate([p_WB + gap * e1, w_WB, slip - (slip @ e1) * e1])
+
+    def impact(
+        self, p_WB: FloatArray, v_WB: FloatArray, w_WB: FloatArray, e: float, e_t: float
+    ) -> tuple[FloatArray, FloatArray]:
+        """See :class:`Route`."""
+        return by_equations(self._body, p_WB, v_WB, w_WB, e, e_t)
 
     def excess(self, state: FloatArray) -> float:
         """See :class:`Route`."""

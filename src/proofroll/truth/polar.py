@@ -19,6 +19,7 @@ from proofroll.elements.ball_on_surface.motion import Motion, world_motion
 from proofroll.elements.ball_on_surface.rolling_equations import reduced_rates
 from proofroll.truth.assemble import classic_step, joined
 from proofroll.truth.explicit import Piece, Rates, at_clock, read, steps, stop
+from proofroll.truth.impact import by_coefficients
 from proofroll.truth.switching import End, Leg
 
 _FLOOR = 1e-4  # |u| at which the rest of a slip is extrapolated, relative to where it began
@@ -62,6 +63,18 @@ class Polar:
         """See :class:`Route`."""
         body = self._body
         return np.concatenate([body.u0, body.udot0, [body.w0 @ body.surface.normal(body.p0)]])
+
+    def at(self, p_WB: FloatArray, v_WB: FloatArray, w_WB: FloatArray) -> FloatArray:
+        """See :class:`Route`."""
+        u = self._body.surface.locate(p_WB)
+        udot = np.linalg.pinv(self._body.surface.tangents(u)) @ v_WB
+        return np.concatenate([u, udot, [w_WB @ self._body.surface.normal(p_WB)]])
+
+    def impact(
+        self, p_WB: FloatArray, v_WB: FloatArray, w_WB: FloatArray, e: float, e_t: float
+    ) -> tuple[FloatArray, FloatArray]:
+        """See :class:`Route`."""
+        return by_coefficients(self._body, p_WB, v_WB, w_WB, e, e_t)
 
     def excess(self, state: FloatArray) -> float:
         """See :class:`Route`."""

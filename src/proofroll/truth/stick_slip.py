@@ -64,7 +64,7 @@ def stick_slip(scene: Scene, times: FloatArray) -> tuple[xr.Dataset, list[Event]
     if paths[0].lands is not None:
         raise Refused(
             f"the ball leaves the wall at t = {paths[0].events[-1][1]:.9g} s and lands at t = {paths[0].lands:.9g} s; "
-            "a restitution law would be needed, so end the run before it lands"
+            "a restitution law would be needed (restitution of the contact), so end the run before it lands"
         )
     events, common = _events(paths, until)
     result, check = (

@@ -31,6 +31,9 @@ _LEFT = 1e-3
 # Part of the natural speed at which a ball that goes back and forth ever less is taken to be at rest: it has some 1e-9
 # of the natural time to go, and 1e-18 of the way. Reversals much smaller than that drown in the round-off of the time.
 _AT_REST = 1e-9
+# Parts of the speed of a fall by the radius: bounces slower than the first are over, and only those faster than the
+# second, a hundredth of the radius high, are told as events; slower than the third a contact point stands still.
+_LOW, _SEEN, _STANDS = 1e-6, 0.14, 1e-12
 # As many slips in a row, each shorter than the one before, are followed on the way there; each costs both routes the
 # search for the place where the direction of the resistance jumps.
 _REVERSALS = 10
@@ -77,6 +80,14 @@ class Route(Protocol[State]):
 
     def start(self) -> State:
         """State at time 0; that the ball slips there is not part of it."""
+
+    def at(self, p_WB: FloatArray, v_WB: FloatArray, w_WB: FloatArray) -> State:
+        """State of a ball that touches the wall, with these place [m], velocity [m/s] and spin [rad/s]."""
+
+    def impact(
+        self, p_WB: FloatArray, v_WB: FloatArray, w_WB: FloatArray, e: float, e_t: float
+    ) -> tuple[FloatArray, FloatArray]:
+        """Velocity [m/s] and spin [rad/s] after an impact with these coefficients of restitution."""
 
     def excess(self, state: State) -> float:
         """(needed - available) / (needed + available) with the friction needed to stick and μs N [-]."""
@@ -127,7 +138,7 @@ class Path(Generic[State]):
         return Motion(**columns, route=route), sticking
 
 
-def follow(body: RollingBall, route: Route[State], until: float) -> Path[State]:  # noqa: PLR0912 -- one per end of a leg
+def follow(body: RollingBall, route: Route[State], until: float) -> Path[State]:  # noqa: PLR0912, PLR0915 -- one per end
     """Everything from time 0 to ``until`` [s].
 
     Raises:
@@ -138,13 +149,19 @@ def follow(body: RollingBall, route: Route[State], until: float) -> Path[State]:
     reversals = 0
     events: list[tuple[EventKind, float]] = []
     time, state = 0.0, route.start()
-    if stands(body, route.world(state)[1]):
+    if not body.gap0 and stands(body, route.world(state)[1]):
         if stays(body, route.world(state)[0]):
             return Path([_rest(body, route, state, time, until)], events)
         state = route.nudged(state, setting_off(body, route.world(state)[0]))
-    if _pressed(body, *route.world(state)[:2]) < -_OFF_WALL * natural_acceleration(body):
-        return _flight(body, route, state, time, until, legs, [("lift_off", time)])
     slip = body.slip0 if np.any(body.slip0) else None
+    falls = _pressed(body, *route.world(state)[:2]) < -_OFF_WALL * natural_acceleration(body)
+    if falls:
+        events.append(("lift_off", time))
+    if falls or body.gap0 > 0:
+        came = _airborne(body, route, (body.p0, body.v0, body.w0), time, until, legs, events)
+        if not isinstance(came, Landed):
+            return Path(legs, events, came)
+        time, slip, state = came.time, came.slip, _touching(route, came)
     sticking = slip is None and not _must_slip(body, route, state)
     if not sticking:
         events.append(("slip", time))
@@ -159,7 +176,15 @@ def follow(body: RollingBall, route: Route[State], until: float) -> Path[State]:
             return Path(legs, events)
         if leg.why is End.LIFTOFF:
             events.append(("lift_off", time))
-            return _flight(body, route, state, time, until, legs, events)
+            last = leg.motion(np.array([time]))  # with the slip that a state does not tell
+            came = _airborne(body, route, (last.p_WB[0], last.v_WB[0], last.w_WB[0]), time, until, legs, events)
+            if not isinstance(came, Landed):
+                return Path(legs, events, came)
+            time, slip, state = came.time, came.slip, _touching(route, came)
+            sticking = slip is None and not _must_slip(body, route, state)
+            if not sticking:
+                events.append(("slip", time))
+            continue
         if _comes_to_rest(body, route, leg):
             if not sticking:
                 events.append(("stick", time))
@@ -225,17 +250,79 @@ def _pressed(body: RollingBall, p_WB: FloatArray, v_WB: FloatArray) -> float:
     return float(e1 @ body.gravity + v_WB @ bend @ v_WB)
 
 
-def _flight(
+@dataclass(frozen=True)
+class Landed:
+    """A ball that has come to stay on the wall.
+
+    Attributes:
+        time: since when [s].
+        world: its place [m], velocity [m/s] and spin [rad/s] then.
+        slip: velocity of its contact point [m/s], shape (3,); None: it rolls.
+    """
+
+    time: float
+    world: tuple[FloatArray, FloatArray, FloatArray]
+    slip: FloatArray | None
+
+
+def _touching(route: Route[State], landed: Landed) -> State:
+    """The state in which a ball goes on that has landed."""
+    state = route.at(*landed.world)
+    return state if landed.slip is not None else route.nudged(state, landed.world[1])
+
+
+def _airborne(
     body: RollingBall,
     route: Route[State],
-    state: State,
+    world: tuple[FloatArray, FloatArray, FloatArray],
     time: float,
     until: float,
     legs: list[Leg[State]],
     events: list[tuple[EventKind, float]],
-) -> Path[State]:
-    """The legs so far and free fall from the time at which the wall is left, with constant spin, to the wall again."""
-    p, v, w = route.world(state)
+) -> Landed | float | None:
+    """Flights and impacts from ``time`` on, added to the legs and events, until the ball stays on the wall.
+
+    A ball that leaves each impact with e times its speed bounces infinitely often in a finite time: below a speed that
+    does not matter (:data:`_LOW`) its last impact takes all of it, which gives the wall the same impulse as all the
+    others together.
+
+    Returns:
+        How it goes on; None if it flies until the end; the time [s] of a landing about which nothing is said.
+    """
+    e, e_t = body.contact.restitution, body.contact.tangential_restitution
+    natural = np.sqrt(body.ball.radius * np.linalg.norm(body.gravity))
+    while True:
+        lands, motion = _flight(body, world, time, until)
+        legs.append(Leg(time, until if lands is None else lands, False, route.start(), End.TIME, motion))
+        if lands is None or e is None:
+            return lands
+        if body.wall_rate is not None:
+            raise Refused(f"the ball lands at t = {lands:.9g} s on a wall that moves, which is not followed")
+        if not lands > time:
+            raise Diverged(f"the truth makes no progress at {time:g} s, where the ball bounces")
+        time = lands
+        at = motion(np.array([time]))
+        p, v, w = at.p_WB[0], at.v_WB[0], at.w_WB[0]
+        e1 = body.surface.normal(p)
+        approach, weight = float(v @ e1), _pressed(body, p, v - (v @ e1) * e1)
+        if e * approach > _LOW * natural or weight < 0:
+            world = (p, *route.impact(p, v, w, e, e_t))
+            if e * approach > _SEEN * natural:
+                events.append(("bounce", time))
+            continue
+        v, w = route.impact(p, v, w, 0.0, 0.0)
+        slip = v + body.ball.radius * np.cross(w, e1)
+        slip -= (slip @ e1) * e1
+        events.append(("settle", time + 2 * e * approach / ((1 - e) * weight) if e else time))
+        size = float(np.linalg.norm(slip))
+        return Landed(time, (p, v, w), slip if size > _STANDS * (natural + np.linalg.norm(v)) else None)
+
+
+def _flight(
+    body: RollingBall, world: tuple[FloatArray, FloatArray, FloatArray], time: float, until: float
+) -> tuple[float | None, Callable[[FloatArray], Motion]]:
+    """Free fall from ``time`` [s] with constant spin: when the ball is on the wall again (None: not until the end)."""
+    p, v, w = world
 
     def motion(times: FloatArray) -> Motion:
         t = (times - time)[:, None]
@@ -245,11 +332,15 @@ def _flight(
     def sunk(times: FloatArray) -> FloatArray:
         return -body.surface.gap(motion(times).p_WB)
 
-    lands = None
-    pace = body.ball.radius / (np.sqrt(body.ball.radius * np.linalg.norm(body.gravity)) + np.linalg.norm(v) or 1.0)
-    start = time + _LEFT * float(pace)
+    e1, pull = body.surface.normal(p), float(np.linalg.norm(body.gravity))
+    leaving = -float(v @ e1)
+    pace = _LEFT * body.ball.radius / (np.sqrt(body.ball.radius * pull) + np.linalg.norm(v) or 1.0)
+    if leaving > _LOW * np.sqrt(body.ball.radius * pull):
+        # It is in the air for longer than it takes to lose that speed; 0.7, lest a look end where it lands on a plane.
+        bend = float(np.linalg.norm(body.surface.normal_gradient(p), 2))
+        pace = 0.7 * leaving / (pull + bend * float(v @ v))
+    lands, start = None, time + float(pace)
     while lands is None and start < until:  # the gap is a smooth function of the time since: ever longer looks suffice
         end = min(time + 2 * (start - time), until)
         lands, start = first_rise(sunk, start, end), end
-    end = until if lands is None else lands
-    return Path([*legs, Leg(time, end, False, state, End.TIME, motion)], events, lands)
+    return lands, motion

@@ -14,6 +14,7 @@ from proofroll.elements.ball_on_surface.model import RollingBall
 from proofroll.elements.ball_on_surface.motion import Motion, world_motion
 from proofroll.elements.ball_on_surface.surfaces import Cylinder, Plane
 from proofroll.truth.assemble import classic_step, joined
+from proofroll.truth.impact import by_coefficients
 from proofroll.truth.polar import BEGUN, direction
 from proofroll.truth.switching import End, Leg
 from proofroll.truth.taylor_model import Model, model
@@ -74,6 +75,18 @@ class Taylor:
     def start(self) -> FloatArray:
         """See :class:`Route`."""
         return start(self._body)
+
+    def at(self, p_WB: FloatArray, v_WB: FloatArray, w_WB: FloatArray) -> FloatArray:
+        """See :class:`Route`."""
+        u = self._body.surface.locate(p_WB)
+        frame = self._body.surface.frame(u)
+        return np.concatenate([u * self._scales, frame[:, 1:].T @ v_WB, [w_WB @ frame[:, 0]]])
+
+    def impact(
+        self, p_WB: FloatArray, v_WB: FloatArray, w_WB: FloatArray, e: float, e_t: float
+    ) -> tuple[FloatArray, FloatArray]:
+        """See :class:`Route`."""
+        return by_coefficients(self._body, p_WB, v_WB, w_WB, e, e_t)
 
     def excess(self, state: FloatArray) -> float:
         """See :class:`Route`."""

@@ -51,7 +51,7 @@ def truth(scene: Scene, times: FloatArray) -> xr.Dataset:
     times = np.asarray(times, dtype=np.float64)
     # Between its ends a step of DOP853 is less accurate than at them, and an orientation asks between samples.
     turns = BallCapability.ORIENTATION in scene.requires and closed_form(body, times[:1]) is None
-    if bounded or turns or not (always_pressed(body) or stays_on(body, float(times[-1]))):
+    if bounded or turns or body.gap0 or not (always_pressed(body) or stays_on(body, float(times[-1]))):
         result, events = stick_slip(scene, times)
         return with_events(result if bounded else result.drop_vars("sticking"), events)
     result = _dataset(scene, times, _first, QUATERNIONS)

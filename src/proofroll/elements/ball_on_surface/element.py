@@ -98,6 +98,10 @@ class BallOnSurface:
             needs.add(BallCapability.SLIPPING_START)
         if self.rolling.wall_rate is not None:
             needs.add(BallCapability.MOVING_WALL)
+        if self.contact.restitution is not None or self.start.gap:
+            needs.add(BallCapability.IMPACTS)
+        if self.contact.tangential_restitution:
+            needs.add(BallCapability.TANGENTIAL_RESTITUTION)
         return frozenset(needs)
 
     optional: ClassVar[frozenset[str]] = frozenset(
@@ -127,7 +131,7 @@ class BallOnSurface:
             given = frame @ (self.start.spin, *self.start.tangential_spin)
             slip = self.ball.radius * np.cross(given - w0, frame[:, 0])
             if np.linalg.norm(slip) > _ROUND_OFF * np.linalg.norm(v0):
-                w0, slip0 = given, slip
+                w0, slip0 = given, np.zeros(3) if self.start.gap else slip
         return RollingBall(
             ball=self.ball,
             contact=self.contact,
@@ -135,10 +139,11 @@ class BallOnSurface:
             wall=self.surface,
             gravity=self.gravity.vector,
             u0=u0,
-            p0=surface.position(u0),
+            p0=surface.position(u0) - self.start.gap * frame[:, 0],
             v0=v0,
             w0=w0,
             slip0=slip0,
+            gap0=self.start.gap,
         )
 
     @cached_property

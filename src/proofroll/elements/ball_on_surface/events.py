@@ -18,7 +18,8 @@ from proofroll.elements.ball_on_surface.model import RollingBall
 if TYPE_CHECKING:
     import xarray as xr
 
-EventKind = Literal["slip", "stick", "lift_off"]  # slip begins; it sticks again; the normal force reached zero
+# Slip begins; it sticks again; the normal force reached zero; an impact; the last of infinitely many impacts.
+EventKind = Literal["slip", "stick", "lift_off", "bounce", "settle"]
 
 # How long a wall must not press before that is a flight [s]: soft and corrected contacts let a ball hop for less.
 _FLIGHT = 0.01

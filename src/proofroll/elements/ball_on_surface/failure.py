@@ -60,7 +60,7 @@ def signs(body: RollingBall, dataset: xr.Dataset, truth: xr.Dataset | None) -> l
         driven = np.inf if truth is None else float(np.max(truth["energy"] - truth["energy"][0]))
     with np.errstate(over="ignore", invalid="ignore"):
         shown = {
-            LEFT: gap > allowed,
+            LEFT: (gap > allowed) & (not body.flies),
             SANK: gap < -allowed,
             ENERGY_GAIN: energy - energy[0] - driven > GAIN * largest_kinetic_energy(body, truth),
         }

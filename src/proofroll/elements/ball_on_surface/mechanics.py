@@ -84,8 +84,10 @@ def initial_response(body: RollingBall) -> tuple[FloatArray, FloatArray]:
     the last three equations are the constraints differentiated, using the signed distance and its derivatives.
     Where that needs more friction than there is, the ball begins to slip against it: N is the same, for friction
     along the wall does not change it. A ball at rest stays so where rolling resistance and friction can hold it. A
-    ball that starts slipping has kinetic friction against its slip.
+    ball that starts slipping has kinetic friction against its slip, and one off the wall falls.
     """
+    if body.gap0:
+        return body.gravity, np.zeros(3)
     if np.any(body.slip0):
         force = _slipping_force(body)
         return force / body.ball.mass + body.gravity, force
@@ -104,7 +106,7 @@ def initial_response(body: RollingBall) -> tuple[FloatArray, FloatArray]:
 
 def initial_angular_acceleration(body: RollingBall) -> FloatArray:
     """ω̇ at time 0 in the world [rad/s²], shape (3,): moments of the wall's force and of the resistance, over J."""
-    if stands(body, body.v0) and stays(body, body.p0):
+    if body.gap0 or (stands(body, body.v0) and stays(body, body.p0)):
         return np.zeros(3)
     _, force = initial_response(body)
     e1 = body.surface.normal(body.p0)

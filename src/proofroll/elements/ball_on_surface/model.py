@@ -25,12 +25,19 @@ class BallCapability(StrEnum):
     ORIENTATION = "the ball's orientation"
     SLIPPING_START = "a start that slips"
     MOVING_WALL = "a wall that moves"
+    IMPACTS = "impacts on the wall (restitution)"
+    TANGENTIAL_RESTITUTION = "restitution along the wall"
 
 
 ROLLS: frozenset[str] = frozenset(
     {BallCapability.ROLLING, BallCapability.CURVED_SURFACE, BallCapability.ROLLING_RESISTANCE}
 )
-ALL_OF_A_BALL: frozenset[str] = frozenset(BallCapability) - {BallCapability.MOVING_WALL}
+# Of a ball that stays on a wall that stands; impacts and walls that move few formulations have, and say so themselves.
+ALL_OF_A_BALL: frozenset[str] = frozenset(BallCapability) - {
+    BallCapability.MOVING_WALL,
+    BallCapability.IMPACTS,
+    BallCapability.TANGENTIAL_RESTITUTION,
+}
 
 
 @dataclass(frozen=True)
@@ -75,6 +82,10 @@ class Contact:
         rolling_resistance: f, distance by which the normal force is shifted forward [m].
         mu_static: largest |F|/N while sticking [-]; inf: the ball never slips.
         mu_kinetic: |F|/N while slipping [-].
+        restitution: e: part of its normal velocity with which the ball leaves the wall after an impact [-]; left out:
+            nothing is said of impacts, and a ball that would land ends what is known.
+        tangential_restitution: e_t: the contact point leaves an impact with -e_t times its velocity along the wall, as
+            far as friction allows [-]; 0 stops it there, 1 turns it back whole.
     """
 
     body: str
@@ -82,6 +93,8 @@ class Contact:
     rolling_resistance: float = field(default=0.0, metadata={"unit": "m"})
     mu_static: float = field(default=math.inf, metadata={"unit": "1"})
     mu_kinetic: float = field(default=math.inf, metadata={"unit": "1"})
+    restitution: float | None = field(default=None, metadata={"unit": "1"})
+    tangential_restitution: float = field(default=0.0, metadata={"unit": "1"})
 
     def __post_init__(self) -> None:
         """Refuses what is no law of contact.
@@ -92,6 +105,10 @@ class Contact:
         bounded("rolling_resistance", self.rolling_resistance, at_least=0)
         bounded("mu_static", self.mu_static, at_least=0, unbounded=True)
         bounded("mu_kinetic", self.mu_kinetic, at_least=0, unbounded=True)
+        for name, least in (("restitution", 0), ("tangential_restitution", -1)):
+            value = getattr(self, name)
+            if value is not None and not least <= value <= 1:
+                raise OutOfBounds(name, value, f"the value must be between {least} and 1")
         if self.mu_kinetic > self.mu_static:
             raise OutOfBounds(
                 "mu_kinetic", self.mu_kinetic, f"the value must be at most mu_static = {self.mu_static:g}"
@@ -109,6 +126,7 @@ class InitialMotion:
         spin: ω1, about the normal e1 [rad/s].
         tangential_spin: ω2 and ω3, about e2 and e3 [rad/s]; left out: those of rolling without slip. Rolling along e2
             with the speed V has ω3 = -V/a, along e3 ω2 = V/a; with anything else the ball starts slipping.
+        gap: how far the ball is from the wall [m].
     """
 
     body: str
@@ -116,6 +134,7 @@ class InitialMotion:
     velocity: tuple[float, float] = field(default=(0.0, 0.0), metadata={"unit": "m/s"})
     spin: float = field(default=0.0, metadata={"unit": "rad/s"})
     tangential_spin: tuple[float, float] | None = field(default=None, metadata={"unit": "rad/s"})
+    gap: float = field(default=0.0, metadata={"unit": "m"})
 
     def __post_init__(self) -> None:
         """Refuses what is no number.
@@ -127,6 +146,7 @@ class InitialMotion:
             for value in getattr(self, name) or ():
                 bounded(name, value)
         bounded("spin", self.spin)
+        bounded("gap", self.gap, at_least=0)
 
 
 @dataclass(frozen=True)
@@ -141,7 +161,9 @@ class RollingBall:
         gravity: acceleration of gravity in the world [m/s²], shape (3,).
         u0: initial surface coordinates, shape (2,).
         p0, v0, w0: initial centre [m], velocity [m/s] and angular velocity [rad/s] in the world, shape (3,).
-        slip0: initial velocity of the contact point in the world [m/s], shape (3,); exactly zero where the ball rolls.
+        slip0: initial velocity of the contact point in the world [m/s], shape (3,); exactly zero where the ball rolls
+            or does not touch the wall.
+        gap0: initial distance from the wall [m].
     """
 
     ball: Ball
@@ -154,6 +176,12 @@ class RollingBall:
     v0: FloatArray
     w0: FloatArray
     slip0: FloatArray = field(default_factory=lambda: np.zeros(3))
+    gap0: float = 0.0
+
+    @property
+    def flies(self) -> bool:
+        """Whether the ball starts off the wall, or may leave it and land again."""
+        return self.gap0 > 0 or self.contact.restitution is not None
 
     @cached_property
     def wall_rate(self) -> FloatArray | None:

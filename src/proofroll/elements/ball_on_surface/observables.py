@@ -42,7 +42,7 @@ def table(body: RollingBall) -> tuple[Observable, ...]:
     weight = natural_acceleration(body)
     a, force = _LEAST * body.ball.radius, _LEAST * body.ball.mass * weight
     speed, energy = _LEAST * math.sqrt(weight * body.ball.radius), force * body.ball.radius
-    last = body.surface.coordinates[-1]
+    last, flies = body.surface.coordinates[-1], body.flies
     coordinates = tuple(
         Observable(
             name,
@@ -51,7 +51,7 @@ def table(body: RollingBall) -> tuple[Observable, ...]:
             Role.MOTION,
             floor=a / scale,
             headline=True,
-            decides=name == last,
+            decides=name == last and not flies,
         )
         for name, unit, scale in zip(
             body.surface.coordinates, body.surface.units, body.surface.length_scales, strict=True
@@ -74,13 +74,16 @@ def table(body: RollingBall) -> tuple[Observable, ...]:
         residual("energy_balance", "J", "energy that is not accounted for", energy),
         residual("force_audit", "N", "reported minus recomputed contact force", force, asked_for=False),
         residual("rate_audit", "m/s", "velocities minus the rates of position and attitude", speed, asked_for=False),
-        residual("gap", "m", "distance of the ball from the wall", a),
+        # A ball that flies is followed in its distance, too, which decides.
+        Observable("gap", "m", "distance of the ball from the wall", Role.MOTION, floor=a, headline=True, decides=True)
+        if flies
+        else residual("gap", "m", "distance of the ball from the wall", a),
         # Without a bound on friction nothing slips; with one the true ball does, and is followed.
         Observable(
             "slip",
             "m/s",
             "speed of the contact point along the wall",
-            Role.MOTION if bounded else Role.RESIDUAL,
+            Role.MOTION if bounded or flies else Role.RESIDUAL,
             floor=speed,
         ),
         residual("creep", "m", "way slipped while sticking", a),
@@ -104,7 +107,9 @@ def observe(body: RollingBall, dataset: xr.Dataset) -> dict[str, FloatArray]:
     curves["gap"] = dataset["gap"].to_numpy()
     curves["slip"] = dataset["slip"].to_numpy()
     if dataset.sizes["time"] > 2 * (_DEGREE + 1) + 2 * _ENDS:
-        if "N" in dataset or not (body.contact.rolling_resistance or body.wall_rate is not None):
+        # What impacts take of the energy nobody tells.
+        told = "N" in dataset or not (body.contact.rolling_resistance or body.wall_rate is not None)
+        if told and not body.flies:
             curves["energy_balance"] = energy_balance(body, dataset)
         if "N" in dataset:
             audited = force_audit(body, dataset)
@@ -140,7 +145,8 @@ def scales(body: RollingBall, truth: xr.Dataset) -> dict[str, float]:
     sizes |= dict.fromkeys(("N", "F2", "F3", "force_audit"), normal)
     sizes["needed_friction"] = float(np.max(friction[np.isfinite(friction)], initial=0.0))
     sizes |= dict.fromkeys(("slip", "rate_audit"), speed)
-    return sizes | {"energy_balance": kinetic, "gap": body.ball.radius, "creep": body.ball.radius}
+    height = float(np.ptp(truth["gap"].to_numpy())) if body.flies else body.ball.radius
+    return sizes | {"energy_balance": kinetic, "gap": height, "creep": body.ball.radius}
 
 
 def energy_balance(body: RollingBall, dataset: xr.Dataset) -> FloatArray:

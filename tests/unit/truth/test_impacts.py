@@ -1,0 +1,97 @@
+"""Impacts: a ball bounces infinitely often in a finite time, on any wall, and what a landing makes of its spin."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from proofroll.core.errors import InputError
+from proofroll.core.events import events_of
+from proofroll.elements.ball_on_surface.element import changed
+from proofroll.files.scene_file import load_scene
+from proofroll.truth.truth import truth
+
+G, A = 9.81, 0.025
+
+
+@settings(max_examples=5, deadline=None)
+@given(e=st.floats(0, 0.8), height=st.floats(0.01, 3))
+def test_infinitely_many_bounces(e: float, height: float) -> None:
+    """The ball rests after √(2h/g) (1 + e)/(1 - e), and is e^2n h high in the middle of each flight before."""
+    fall = math.sqrt(2 * height / G)
+    rests = fall * (1 + e) / (1 - e)
+    crests = [fall * (1 + sum(2 * e**i for i in range(1, n)) + e**n) for n in range(1, 6)] if e > 0.05 else []
+    found = truth(load_scene("bouncing_ball", height=height, restitution=e), np.array([0.0, *crests, rests * 1.5]))
+    bar = found["gap"].attrs["error_bar"] + 1e-15
+    expected = [height, *(height * e ** (2 * n) for n in range(1, len(crests) + 1)), 0.0]
+    np.testing.assert_allclose(found["gap"], expected, rtol=0, atol=bar)
+    settles = events_of(found)[-1]
+    assert settles.kind == "settle"
+    assert settles.time == pytest.approx(rests, rel=1e-10)
+
+
+@settings(max_examples=10, deadline=None)
+@given(
+    e=st.floats(0, 1),
+    e_t=st.floats(-1, 1),
+    k=st.floats(0.1, 1),
+    mu=st.floats(0, 2),
+    speed=st.floats(-3, 3),
+    rim=st.floats(-3, 3),
+)
+def test_one_impact(e: float, e_t: float, k: float, mu: float, speed: float, rim: float) -> None:
+    """Walton's law: the contact point turns to -e_t u where friction suffices, else friction is μ times the blow."""
+    down = math.sqrt(2 * G)
+    scene = load_scene(
+        "bouncing_ball",
+        speed=speed,
+        back_spin=rim / A,
+        restitution=e,
+        tangential_restitution=e_t,
+        inertia_ratio=k,
+        mu_static=mu,
+    )
+    after = down / G + 1e-4  # the first flight after it, or the slide
+    found = truth(scene, np.array([0.0, after]))
+    slip = speed + rim
+    change = -math.copysign(min(abs(slip) * (1 + e_t) * k / (1 + k), mu * (1 + e) * down), slip)
+    if e < 1e-3:
+        return  # it may already slide, or roll
+    assert float(found["down_rate"][1]) == pytest.approx(speed + change, abs=1e-10)
+    assert float(found["omega3"][1]) * A == pytest.approx(rim + change / k, abs=1e-10)
+
+
+def test_superball_loses_nothing() -> None:
+    """With e = e_t = 1 no impact changes the energy, and thrown under a table the ball comes back (Garwin 1969)."""
+    scene = load_scene("bouncing_ball", speed=2, back_spin=90, restitution=1, tangential_restitution=1)
+    found = truth(scene, np.linspace(0, 4, 41))
+    np.testing.assert_allclose(found["energy"], found["energy"][0], rtol=1e-12)
+    rates = np.unique(np.round(found["down_rate"], 9))
+    assert len(rates) == 2  # the spin and the speed come back at every second impact
+
+
+@pytest.mark.parametrize("e", [0.0, 0.6])
+def test_landing_in_a_lying_cylinder(e: float) -> None:
+    """Where the contact has a restitution, a ball that left the wall lands, and goes on to where the energy lets it."""
+    scene = load_scene("tilted_cylinder", tilt=math.pi / 2, speed=2.4, mu_static=0.5)
+    scene = changed(scene, contact=replace(scene.elements[0].contact, restitution=e))  # type: ignore[attr-defined]
+    found = truth(scene, np.linspace(0, 2.5, 26))
+    kinds = [event.kind for event in events_of(found)]
+    assert kinds[:2] == ["slip", "lift_off"]
+    assert "settle" in kinds
+    assert ("bounce" in kinds) == (e > 0)
+    assert found["gamma"].attrs["error_bar"] < 1e-9
+    assert float(found["gap"].min()) > -1e-14
+    assert np.all(np.diff(found["energy"]) < 1e-12)
+
+
+def test_coefficients_have_bounds() -> None:
+    """A coefficient beyond its bounds gives one line that names it."""
+    for name in ("restitution", "tangential_restitution"):
+        with pytest.raises(InputError, match=name):
+            load_scene("bouncing_ball", **{name: 1.1})
