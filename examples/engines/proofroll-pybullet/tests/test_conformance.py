@@ -11,7 +11,9 @@ KNOWN = {
     "moves_as_the_truth[plane-default-slow]": "damped as on the plane, and 1/240 s is long for a path that bends",
     "moves_as_the_truth[plane-default-fast]": "unless maxJointVelocity says more, PyBullet cuts spin to 100 rad/s",
     "first_steps_fit_the_scene[urdf-default-heavy_top]": "by default the spin of PyBullet's links is damped",
+    "first_steps_fit_the_scene[urdf-default-oscillators]": "by default the spin of PyBullet's links is damped",
     "moves_as_the_truth[urdf-default-heavy_top]": "by default the spin of PyBullet's links is damped",
+    "moves_as_the_truth[urdf-default-oscillators]": "by default the spin of PyBullet's links is damped",
 }
 
 

@@ -55,7 +55,7 @@ class MechanismKind:
 
     @staticmethod
     def truth_scenes() -> Mapping[str, Scene]:
-        """Those with a loop, with oblique axes, and with a spinning body."""
+        """Those with a loop, with oblique axes, with a spinning body, and with springs."""
         from proofroll.files.scene_file import load_scene
 
-        return {name: load_scene(name) for name in ("slider_crank", "heavy_top")}
+        return {name: load_scene(name) for name in ("slider_crank", "heavy_top", "oscillators")}

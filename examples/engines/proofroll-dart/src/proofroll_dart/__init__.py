@@ -1,0 +1,191 @@
+"""DART for proofroll: mechanisms by its skeletons, stepped by DART, or by scipy around DART's forward dynamics."""
+
+from __future__ import annotations
+
+import importlib.metadata
+from collections.abc import Mapping
+from dataclasses import dataclass
+from typing import Annotated, Any, ClassVar, Literal
+
+import dartpy as dart
+import numpy as np
+from annotated_types import Gt, Le
+from scipy.integrate import solve_ivp
+from scipy.spatial.transform import Rotation
+
+from proofroll.core.engine import Sample, whole_steps
+from proofroll.core.errors import Diverged, InputError
+from proofroll.core.scene import Scene
+from proofroll.elements.mechanism import WORLD, Joint, Mechanism
+from proofroll.elements.mechanism.capabilities import MechanismCapability
+from proofroll.elements.mechanism.sampling import MechanismBuilt, mechanism_of
+
+_KINDS = {"fixed": "Weld", "revolute": "Revolute", "prismatic": "Prismatic", "universal": "Universal"}
+_PROVIDES = frozenset({MechanismCapability[name.upper()] for name in _KINDS} | {MechanismCapability.JOINT_SPRINGS})
+_LACKING = {
+    MechanismCapability.SPRINGS: "DART has no springs between points",
+    MechanismCapability.FREE: "this adapter integrates coordinates whose rates are the velocities",
+    MechanismCapability.SPHERICAL: "this adapter integrates coordinates whose rates are the velocities",
+}
+
+
+@dataclass(frozen=True)
+class DartSettings:
+    """Settings of DART.
+
+    Attributes:
+        formulation: ``world``, DART's own steps; ``forward_dynamics``, DART's accelerations, integrated by scipy.
+        preset: ``default`` of the first, ``matched`` of the second.
+        dt: step of a world [s].
+        rtol: tolerance of scipy's DOP853.
+    """
+
+    formulation: Literal["world", "forward_dynamics"] = "world"
+    preset: Literal["default", "matched"] = "default"
+    dt: Annotated[float, Gt(0)] | None = None
+    rtol: Annotated[float, Gt(0), Le(1)] | None = None
+
+    def __post_init__(self) -> None:
+        """Refuses a step without a world, and a tolerance with one.
+
+        Raises:
+            InputError: one of them.
+        """
+        wanted, other = ("dt", "rtol") if self.formulation == "world" else ("rtol", "dt")
+        if getattr(self, wanted) is None or getattr(self, other) is not None:
+            value = getattr(self, wanted)
+            raise InputError(f"dart: {wanted}", value, f"{self.formulation} needs it, and has no {other}")
+
+    @property
+    def resolution(self) -> str:
+        """What trades speed for accuracy."""
+        return "dt" if self.formulation == "world" else "rtol"
+
+    @property
+    def order(self) -> int | None:
+        """Of semi-implicit Euler."""
+        return 1 if self.formulation == "world" else None
+
+
+class Dart:
+    """DART through dartpy. See :class:`proofroll.core.engine.Engine`."""
+
+    name: ClassVar[str] = "dart"
+    provides: ClassVar[Mapping[str, frozenset[str]]] = {"world": _PROVIDES, "forward_dynamics": _PROVIDES}
+    lacking: ClassVar[Mapping[str, Mapping[str, str]]] = {"world": _LACKING, "forward_dynamics": _LACKING}
+    settings: ClassVar[type[DartSettings]] = DartSettings
+    presets: ClassVar[Mapping[str, Mapping[str, DartSettings]]] = {
+        "world": {"default": DartSettings("world", "default", 1e-3)},
+        "forward_dynamics": {"matched": DartSettings("forward_dynamics", "matched", rtol=1e-10)},
+    }
+
+    @staticmethod
+    def version() -> str:
+        """Of the package."""
+        return importlib.metadata.version("dartpy")
+
+    @staticmethod
+    def caveat(settings: DartSettings) -> str:
+        """What is not DART's own."""
+        return "integrated by scipy around DART's accelerations" if settings.formulation == "forward_dynamics" else ""
+
+    @classmethod
+    def build(cls, scene: Scene, settings: DartSettings) -> Dart:
+        """The mechanism as a skeleton in a world of its own."""
+        return cls(mechanism_of(scene), settings)
+
+    def __init__(self, mechanism: Mechanism, settings: DartSettings) -> None:
+        self._mechanism, self._settings, self._steps, self._t = mechanism, settings, 0, 0.0
+        self._skeleton = dart.dynamics.Skeleton()
+        self._bodies: dict[str, Any] = {WORLD: None}
+        for joint in mechanism.joints:
+            self._add(joint)
+        self._world = dart.simulation.World()
+        self._world.setGravity(list(mechanism.gravity))
+        self._world.setTimeStep(settings.dt or 1e-3)
+        self._world.addSkeleton(self._skeleton)
+        self._put(*mechanism.start())
+        laws = [
+            (joint.torque, joint.stiffness, joint.rest, joint.damping)
+            for joint in mechanism.joints
+            for _ in range(joint.nv)
+        ]
+        self._drive, self._stiffness, self._rest, self._damping = np.array(laws).T
+
+    def _add(self, joint: Joint) -> None:
+        create = getattr(self._skeleton, f"create{_KINDS[joint.kind]}JointAndBodyNodePair")
+        parent = self._bodies[joint.parent]
+        built, body = create(parent) if parent is not None else create()
+        given = self._mechanism.bodies[self._mechanism.body_index[joint.child]]
+        body.setInertia(dart.dynamics.Inertia(given.mass, given.com, np.array(given.inertia)))
+        built.setTransformFromParentBodyNode(_pose(joint.parent_frame, joint.position))
+        built.setTransformFromChildBodyNode(_pose(joint.child_frame, joint.child_position))
+        if joint.kind == "universal":
+            built.setAxis1([0.0, 0.0, 1.0])
+            built.setAxis2([1.0, 0.0, 0.0])
+        elif joint.nv:
+            built.setAxis([0.0, 0.0, 1.0])
+        # DART's springs are implicit: even an acceleration at an instant has what they will do in a step
+        for index in range(joint.nv if self._settings.dt else 0):
+            built.setSpringStiffness(index, joint.stiffness)
+            built.setRestPosition(index, joint.rest)
+            built.setDampingCoefficient(index, joint.damping)
+        self._bodies[joint.child] = body
+
+    def _put(self, q: Any, v: Any) -> None:
+        self._skeleton.setPositions(q)
+        self._skeleton.setVelocities(v)
+
+    def _rates(self, _: float, x: Any) -> Any:
+        """Velocities, and DART's accelerations."""
+        q, v = np.split(x, 2)
+        self._put(q, v)
+        self._skeleton.setForces(self._drive - self._stiffness * (q - self._rest) - self._damping * v)
+        self._skeleton.computeForwardDynamics()
+        return np.concatenate([v, self._skeleton.getAccelerations()])
+
+    def advance(self, t: float) -> None:
+        """See :class:`proofroll.core.engine.Engine`."""
+        dt = self._settings.dt
+        if dt is not None:
+            for _ in range(whole_steps(self._steps * dt, t, dt)):
+                self._skeleton.setForces(self._drive)
+                self._world.step()
+                self._steps += 1
+        elif t > self._t:
+            x = np.concatenate([self._skeleton.getPositions(), self._skeleton.getVelocities()])
+            rtol = self._settings.rtol
+            found = solve_ivp(self._rates, (self._t, t), x, method="DOP853", rtol=max(rtol, 3e-14), atol=rtol)
+            if not found.success:
+                raise Diverged(f"{found.message} (t = {found.t[-1]:g} s)")
+            self._put(*np.split(found.y[:, -1], 2))
+        self._t = t
+
+    def sample(self) -> Sample:
+        """See :class:`proofroll.core.engine.Engine`."""
+        bodies = [self._bodies[body.name] for body in self._mechanism.bodies]
+        poses = [body.getWorldTransform() for body in bodies]
+        return Sample(
+            np.array([pose.translation() for pose in poses]),
+            np.array([body.getLinearVelocity() for body in bodies]),
+            np.array([body.getAngularVelocity() for body in bodies]),
+            np.array([Rotation.from_matrix(pose.rotation()).as_quat(scalar_first=True) for pose in poses]),
+        )
+
+    def built(self) -> MechanismBuilt:
+        """See :class:`proofroll.core.engine.Engine`."""
+        inertias = [self._bodies[body.name].getInertia() for body in self._mechanism.bodies]
+        return MechanismBuilt(
+            mass=np.array([inertia.getMass() for inertia in inertias]),
+            com=np.array([inertia.getLocalCOM() for inertia in inertias]),
+            inertia=np.array([inertia.getMoment() for inertia in inertias]),
+            gravity=np.array(self._world.getGravity()),
+            mobility=int(self._skeleton.getNumDofs()),
+        )
+
+
+def _pose(R: Any, p: Any) -> Any:
+    pose = dart.math.Isometry3()
+    pose.set_rotation(R)
+    pose.set_translation(p)
+    return pose
