@@ -12,7 +12,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from importlib.metadata import version
-from typing import ClassVar, Self
+from typing import Any, ClassVar, Self
 
 from proofroll.core.engine import Built, Level, Sample, Term
 from proofroll.core.errors import Refused
@@ -45,6 +45,7 @@ class Exudyn:
     """Exudyn's implicit integration of multibody systems with constraints, or with its penalty contact."""
 
     name: ClassVar[str] = "exudyn"
+    oldest: ClassVar[str] = "1.13"  # before, settings and items have other names
     provides: ClassVar[Mapping[str, frozenset[str]]] = {
         "generic": ALL_OF_A_BALL - {BallCapability.ORIENTATION},
         "carrier": ROLLS | {BallCapability.ORIENTATION},
@@ -105,6 +106,23 @@ class Exudyn:
     def version() -> str:
         """Version of the installed package; the extension module names another one on some platforms."""
         return version("exudyn")
+
+    @staticmethod
+    def defaults() -> Mapping[str, Any]:
+        """See :class:`proofroll.core.engine.TellsDefaults`: the settings of a simulation."""
+        import exudyn
+
+        found: dict[str, Any] = {}
+
+        def flatten(where: str, values: Mapping[str, Any]) -> None:
+            for name, value in values.items():
+                if isinstance(value, Mapping):
+                    flatten(f"{where}{name}.", value)
+                else:
+                    found[where + name] = value.tolist() if hasattr(value, "tolist") else str(value)
+
+        flatten("", exudyn.SimulationSettings().GetDictionary())
+        return found
 
     @classmethod
     def build(cls, scene: Scene, settings: ExudynSettings) -> Self:

@@ -70,6 +70,7 @@ class Mujoco:
     """
 
     name: ClassVar[str] = "mujoco"
+    oldest: ClassVar[str] = "3.5"  # before, mj_copyData is not there, on which every sample rests
     provides: ClassVar[Mapping[str, frozenset[str]]] = {
         "chart": ALL_OF_A_BALL,
         "free": ALL_OF_A_BALL | {BallCapability.MOVING_WALL},
@@ -122,6 +123,15 @@ class Mujoco:
     def version() -> str:
         """Of MuJoCo."""
         return str(mujoco.__version__)
+
+    @staticmethod
+    def defaults() -> Mapping[str, Any]:
+        """See :class:`proofroll.core.engine.TellsDefaults`: options, and what a bare geom has."""
+        model = mujoco.MjModel.from_xml_string("<mujoco><worldbody><geom size='1'/></worldbody></mujoco>")
+        options = {name: getattr(model.opt, name) for name in dir(model.opt) if not name.startswith("_")}
+        found = {f"option {key}": np.asarray(value).tolist() for key, value in options.items() if not callable(value)}
+        geom = ("solref", "solimp", "friction", "condim", "margin", "gap", "priority")
+        return found | {f"geom {name}": np.asarray(getattr(model, f"geom_{name}")[0]).tolist() for name in geom}
 
     @classmethod
     def build(cls, scene: Scene, settings: MujocoSettings) -> Self | MujocoMechanism:

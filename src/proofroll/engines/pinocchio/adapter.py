@@ -11,6 +11,7 @@ import pinocchio as pin
 from proofroll.core.engine import Built, Level, Sample, Term
 from proofroll.core.errors import Refused
 from proofroll.core.events import Event
+from proofroll.core.plugins import release
 from proofroll.core.scene import Scene
 from proofroll.elements.ball_on_surface.element import rolling_ball
 from proofroll.elements.ball_on_surface.model import ALL_OF_A_BALL, BallCapability
@@ -27,6 +28,7 @@ class Pinocchio:
     """Pinocchio's equations of motion with rows of rolling put to them, or its own solver of contact with friction."""
 
     name: ClassVar[str] = "pinocchio"
+    oldest: ClassVar[str] = "3.9"  # the oldest that was tried
     provides: ClassVar[Mapping[str, frozenset[str]]] = {
         "composite": ALL_OF_A_BALL,
         **dict.fromkeys(("free_flyer", "contact"), ALL_OF_A_BALL | {BallCapability.MOVING_WALL}),
@@ -88,11 +90,21 @@ class Pinocchio:
         """See :class:`proofroll.core.engine.Engine`."""
         return str(pin.__version__)
 
+    @staticmethod
+    def defaults() -> Mapping[str, Any]:
+        """See :class:`proofroll.core.engine.TellsDefaults`: gravity, and the settings of the proximal solver."""
+        solver = pin.ProximalSettings()
+        found = {f"proximal {name}": getattr(solver, name) for name in ("absolute_accuracy", "relative_accuracy", "mu")}
+        found |= {"proximal max_iter": solver.max_iter}
+        return found | {"gravity": pin.Model().gravity.linear.tolist()}
+
     @classmethod
     def build(cls, scene: Scene, settings: PinocchioSettings) -> Self:
         """See :class:`proofroll.core.engine.Engine`."""
         if settings.formulation in OF_MECHANISMS:
             return cls(MechanismRun.build(scene, settings))
+        if settings.formulation == "contact" and release(cls.version()) < (4,):
+            raise Refused(f"contact needs the constraints of pinocchio 4.0, and this is {cls.version()}")
         settings = _decided(scene, settings)
         return cls((ContactRun if settings.formulation == "contact" else RowsRun)(rolling_ball(scene), settings))
 
