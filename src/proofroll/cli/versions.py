@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import contextlib
 import os
 import re
 from collections.abc import Callable
@@ -111,10 +112,12 @@ def _place(engine: str, text: str) -> str:
 
     if os.sep in text or text.startswith(("~", ".")) or environments.find(engine, text) is not None:
         return f"{engine}@{text}"
-    if engine in engine_names() and release(describe(engine)["version"]) == release(text):
-        return engine
     if not re.fullmatch(r"\d[\w.+]*", text):
         raise InputError("version", text, f"no environment of {engine} has this label; see proofroll engines")
+    if engine in engine_names():
+        with contextlib.suppress(ProofrollError):  # it is not installed here
+            if release(describe(engine)["version"]) == release(text):
+                return engine
     return _made(engine, text)
 
 

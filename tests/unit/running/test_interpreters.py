@@ -82,6 +82,7 @@ def test_a_place_is_no_part_of_a_result(old: Path, tmp_path: Path) -> None:
     assert case_in(other).key != case_in(old).key
 
 
+@pytest.mark.own_workers
 def test_an_environment_that_changed_is_a_row(old: Path, tmp_path: Path) -> None:
     """An engine upgraded, or deleted, after it was asked fails with both versions; all other rows arrive."""
     upgraded, deleted = (seeing(tmp_path / name, "1.0") for name in ("upgraded", "deleted"))

@@ -1,0 +1,121 @@
+"""``proofroll versions``: one engine in two versions, by real runs in two interpreters."""
+
+from __future__ import annotations
+
+import json
+import re
+import tomllib
+from collections.abc import Callable
+from pathlib import Path
+
+import pytest
+from other_pythons import seeing
+
+from proofroll.core.plugins import load_engine, release
+from proofroll.report.versions_content import answer, lines, page, table
+
+Proofroll = Callable[..., tuple[int, str, str]]
+ROOT = Path(__file__).resolve().parents[1]
+DOCUMENT = (ROOT / "docs" / "json.md").read_text(encoding="utf-8")
+CLAIM = """title = "Balls"
+question = "Does it agree?"
+scene = "inclined_plane"
+until = 0.4
+every = 0.08
+[tolerances.close]
+because = "Euler's rule leaves more than this at this step, and the midpoint rule does not"
+down = "1e-6 m"
+[[rows]]
+engine = "aged[formulation=midpoint,dt=0.01]"
+tolerance = "close"
+[[rows]]
+engine = "aged[formulation=walls,dt=0.01]"
+tolerance = "close"
+"""
+
+
+@pytest.fixture(scope="module")
+def pythons(tmp_path_factory: pytest.TempPathFactory) -> dict[str, Path]:
+    """An interpreter for each version of the engine."""
+    folder = tmp_path_factory.mktemp("pythons")
+    return {version: seeing(folder / version, version) for version in ("1.0", "2.0", "2.0.1")}
+
+
+@pytest.fixture
+def versions(
+    proofroll: Proofroll,
+    install_engines: Callable[[dict[str, str]], None],
+    pythons: dict[str, Path],
+    tmp_path: Path,
+    monkeypatch: pytest.MonkeyPatch,
+) -> Callable[..., tuple[int, str, str]]:
+    """Runs ``proofroll versions aged OLD NEW`` on the claim."""
+    install_engines({"aged": "aged:Aged"})  # announced here, installed there alone
+    monkeypatch.setenv("PROOFROLL_ENGINES", str(tmp_path / "engines"))
+    claim = tmp_path / "balls.toml"
+    claim.write_text(CLAIM, encoding="utf-8")
+
+    def run(old: str, new: str, *more: str) -> tuple[int, str, str]:
+        places = [str(pythons.get(item, item)) for item in (old, new)]
+        return proofroll("versions", "aged", *places, str(claim), *more, "--out", str(tmp_path / "out"))
+
+    return run
+
+
+def test_what_changed_is_shown(versions: Callable[..., tuple[int, str, str]], tmp_path: Path) -> None:
+    """Verdicts, refusals, orders, defaults, numbers and speed; a verdict that changed is exit code 1."""
+    code, out, err = versions("1.0", "2.0", "--rounds", "2", "--json")
+    assert code == 1, err
+    found = json.loads(out)
+    section = re.search(r"^## `versions --json`\n(.*?)(?=^## )", DOCUMENT, flags=re.DOTALL | re.MULTILINE)
+    assert section is not None
+    assert set(found) == set(re.findall(r"^\| `(\w+)` \|", section[1], flags=re.MULTILINE))
+    assert [found[side]["version"] for side in ("old", "new")] == ["1.0", "2.0"]
+    midpoint, walls = found["rows"]
+    assert midpoint["declared_order"] == {"old": 1, "new": 2}
+    assert midpoint["verdicts"]["new"] == {"agrees": 1} != midpoint["verdicts"]["old"]
+    assert midpoint["numbers"]["kind"] == "changed"
+    assert midpoint["speed"]["low"] <= midpoint["speed"]["value"] <= midpoint["speed"]["high"]
+    assert walls["numbers"] is None
+    assert any("refused (walls came with version 2) → agrees" in sentence for sentence in found["changed"])
+    assert {"name": "iterations", "old": 50, "new": 100} in found["defaults"]
+    kept = json.loads((tmp_path / "out" / "versions-aged-1.0-2.0.json").read_text(encoding="utf-8"))
+    assert kept == found
+    html = page(found)
+    assert (tmp_path / "out" / "versions-aged-1.0-2.0.html").read_text(encoding="utf-8") == html
+    assert answer(found).split("; ")[-1] in html
+    assert any(line.startswith("default iterations: 50 → 100") for line in lines(found))
+    assert table(found).row_count == 2
+
+
+def test_versions_that_do_the_same(versions: Callable[..., tuple[int, str, str]]) -> None:
+    """The same bits are said to be the same, within 80 columns, and nothing is exit code 0."""
+    code, out, err = versions("2.0", "2.0.1", "--rounds", "0")
+    assert code == 0, err
+    assert "2 cases: 2 with the same bits; no verdict changed." in out
+    assert max(map(len, out.splitlines()[:-1])) <= 80
+
+
+@pytest.mark.parametrize(
+    ("old", "new", "says"),
+    [
+        ("2.0", "2.0", "both are aged@"),
+        ("latest", "2.0", "no environment of aged has this label"),
+        ("9.9", "2.0", "no environment of 9.9 is remembered; proofroll engines add aged --requirement PACKAGE==9.9"),
+        ("/nowhere/python", "2.0", "there is no /nowhere/python"),
+    ],
+)
+def test_versions_that_are_none(versions: Callable[..., tuple[int, str, str]], old: str, new: str, says: str) -> None:
+    """Each wrong version gives one line that says what to do."""
+    code, out, err = versions(old, new)
+    assert (code, out) == (2, "")
+    assert says in err
+    assert err.count("\n") == 1
+
+
+def test_lower_bounds_are_those_of_the_adapters() -> None:
+    """What `pip install proofroll[ENGINE]` brings at least is no older than the adapter supports."""
+    extras = tomllib.loads((ROOT / "pyproject.toml").read_text(encoding="utf-8"))["project"]["optional-dependencies"]
+    for name in ("mujoco", "exudyn", "pinocchio"):
+        (requirement,) = extras[name]
+        assert release(requirement.partition(">=")[2]) >= release(load_engine(name).oldest)

@@ -1,0 +1,122 @@
+"""Environments of other versions: made whole or not at all, remembered, removed."""
+
+from __future__ import annotations
+
+import os
+import signal
+import subprocess
+import sys
+import time
+import zipfile
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any
+
+import pytest
+from other_pythons import PLUGINS, script, seen_line
+
+from proofroll.core.errors import InputError, ProofrollError
+from proofroll.running import environments, make_environment
+from proofroll.running.interpreters import python_at
+
+
+@pytest.fixture
+def wheels(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
+    """A folder from which pip installs the engine ``aged``, without a network and without what it depends on."""
+    folder = tmp_path / "wheels"
+    folder.mkdir()
+    for version in ("1.0", "2.0"):
+        info = f"aged-{version}.dist-info"
+        files = {
+            f"{info}/METADATA": f"Metadata-Version: 2.1\nName: aged\nVersion: {version}\n",
+            f"{info}/WHEEL": "Wheel-Version: 1.0\nGenerator: test\nRoot-Is-Purelib: true\nTag: py3-none-any\n",
+            f"{info}/entry_points.txt": "[proofroll.engines]\naged = aged:Aged\n",
+            f"{info}/RECORD": "",
+            "aged_sees.pth": f"{PLUGINS}\n{seen_line()}\n",
+        }
+        with zipfile.ZipFile(folder / f"aged-{version}-py3-none-any.whl", "w") as archive:
+            for name, text in files.items():
+                archive.writestr(name, text)
+    for name, value in {"NO_INDEX": "1", "NO_DEPS": "1", "FIND_LINKS": str(folder), "CONFIG_FILE": os.devnull}.items():
+        monkeypatch.setenv(f"PIP_{name}", value)
+    monkeypatch.setenv("PATH", "/usr/bin:/bin")  # pip is tested, not uv
+    monkeypatch.setenv(environments.VARIABLE, str(tmp_path / "engines"))
+    return folder
+
+
+@pytest.mark.own_workers
+def test_an_environment_is_made_remembered_and_removed(wheels: Path, proofroll: Callable[..., Any]) -> None:
+    """By pip, with this proofroll; its label runs the version that was asked for, and nothing is left of it at last."""
+    code, out, err = proofroll("engines", "add", "aged", "--requirement", "aged==1.0")
+    assert code == 0, err
+    assert out.startswith("aged@1.0: aged 1.0, Python ")
+    (made,) = environments.remembered()
+    assert python_at("aged@1.0") == made.python
+    assert {"aged==1.0", "proofroll==0.1.0"} <= set(made.packages)
+    code, out, err = proofroll("run", "inclined_plane", "--engine", "aged@1.0", "--until", "0.01")
+    assert (code, "aged@1.0 (formulation=midpoint" in out) == (0, True), err
+    code, _, err = proofroll("engines", "add", "aged", "--requirement", "aged==1.0")
+    assert (code, "it is there already" in err) == (2, True)
+    made.python.unlink()
+    code, _, err = proofroll("run", "inclined_plane", "--engine", "aged@1.0")
+    assert (code, "its environment is gone" in err) == (3, True)
+    assert proofroll("engines", "remove", "aged@1.0")[0] == 0
+    assert not made.folder.exists()
+    code, _, err = proofroll("engines", "remove", "aged@1.0")
+    assert (code, "there is none" in err) == (2, True)
+    assert wheels.is_dir()
+
+
+@pytest.mark.parametrize(
+    ("requirements", "options", "says"),
+    [
+        (["aged>=1.0"], {}, "say by which label"),
+        (["aged==1.0"], {"label": "../up"}, "use letters, digits"),
+        (["--index-url=x"], {"label": "x"}, "not an option of pip"),
+        (["aged==1.0"], {"python": "no-such-python"}, "there is no such program"),
+        (["aged==1.0"], {"python": "false"}, "it does not run as a Python"),
+    ],
+)
+def test_what_makes_no_environment_says_why(
+    wheels: Path, requirements: list[str], options: dict[str, str], says: str
+) -> None:
+    """Bad input is told before anything is made."""
+    with pytest.raises(InputError, match=says):
+        make_environment.add("aged", requirements, **options)
+    assert not list(wheels.parent.glob("engines/*"))
+
+
+def test_an_interrupted_environment_leaves_nothing(wheels: Path, tmp_path: Path) -> None:
+    """Ctrl-C ends what was started, exits 130, and no half is taken for a whole."""
+    pidfile = tmp_path / "pid"
+    slow = script(
+        tmp_path / "slow",
+        f'[ "$1" = -c ] && {{ echo "$0"; echo 3 12; exit 0; }}\necho $$ > {pidfile}\nmkdir -p "$3/bin"\nsleep 1000',
+    )
+    command = [sys.executable, "-m", "proofroll", "engines", "add", "aged", "--requirement", "aged==2.0"]
+    process = subprocess.Popen([*command, "--python", str(slow)], stderr=subprocess.PIPE, text=True)
+    while not pidfile.is_file() or not pidfile.read_text().strip():
+        assert process.poll() is None
+        time.sleep(0.05)
+    process.send_signal(signal.SIGINT)
+    assert process.wait(60) == 130
+    folder = environments.place("aged", "2.0")
+    assert not folder.exists()
+    assert environments.remembered() == []
+    assert not Path(f"/proc/{pidfile.read_text().strip()}/cmdline").is_file()
+    with environments.making(folder), pytest.raises(ProofrollError, match="by another process"):
+        make_environment.add("aged", ["aged==2.0"])
+    assert wheels.is_dir()
+
+
+def test_where_environments_are_kept(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> None:
+    """Below the variable, else below XDG_DATA_HOME if it is absolute, else below the home folder."""
+    monkeypatch.setenv("HOME", str(tmp_path))
+    monkeypatch.delenv(environments.VARIABLE, raising=False)
+    monkeypatch.setenv("XDG_DATA_HOME", "relative")
+    assert environments.root() == tmp_path / ".local" / "share" / "proofroll" / "engines"
+    monkeypatch.setenv("XDG_DATA_HOME", str(tmp_path / "data"))
+    assert environments.root() == tmp_path / "data" / "proofroll" / "engines"
+    monkeypatch.setenv(environments.VARIABLE, str(tmp_path / "own"))
+    assert environments.root() == tmp_path / "own"
+    assert environments.remembered() == []
