@@ -120,6 +120,23 @@ def test_compare(proofroll: Proofroll, trough: Path) -> None:
     assert {run["status"] for run in content["runs"]} == {"done"}
 
 
+def test_mujoco_reads_what_is_exported(proofroll: Proofroll, trough: Path) -> None:
+    """The model of a scene without a file goes out as one, with the scene's start as its keyframe; elsewhere not."""
+    import mujoco
+
+    file = trough.parent / "trough.xml"
+    code, _, err = proofroll("export", str(trough), str(file), "--engine", "mujoco[formulation=free]")
+    assert code == 0, err
+    model = mujoco.MjModel.from_xml_path(str(file))
+    body = rolling_ball(load_scene(str(trough)))
+    assert model.body("ball").mass == pytest.approx(body.ball.mass)
+    assert model.key_qpos[0, :3] == pytest.approx(body.p0, abs=1e-5)
+    assert model.key_qvel[0, :3] == pytest.approx(body.v0, abs=1e-5)
+    code, _, err = proofroll("export", str(trough), str(file), "--engine", "projection")
+    assert code == 3
+    assert "writes no file" in err
+
+
 @pytest.mark.usefixtures("proofroll")
 def test_it_is_drawn_and_replayed(trough: Path) -> None:
     """The drawing has the coordinates' names, and the replay's wall lies on the trough, within its ends."""

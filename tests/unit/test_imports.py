@@ -8,6 +8,8 @@ from pathlib import Path
 import pytest
 
 import proofroll
+from proofroll.elements.ball_on_surface.surfaces.catalogue import surface_kinds
+from proofroll.files.scene_file import scene_names
 
 ROOT = Path(proofroll.__file__).parent
 # What may import what. The harness knows neither a kind of element nor an engine nor a truth; these are plug-ins.
@@ -65,4 +67,21 @@ def test_imports_lead_one_way(folder: str) -> None:
             allowed = MAY[folder] | (HARNESS | {"truth"} if folder == "elements" and parts & PLUGIN_PARTS else set())
             if target not in allowed:
                 wrong.append(f"{file.relative_to(ROOT)}:{line} imports {module}")
+    assert not wrong, "\n".join(wrong)
+
+
+def test_engines_know_no_scene_and_no_surface_by_name() -> None:
+    """An adapter that did would be fair on that one alone: it asks what any surface can say."""
+    surfaces = {kind.__name__ for kind in surface_kinds()}
+    scenes = {name for name in scene_names() if "_" in name}  # of one word are also words of mechanics: a friction cone
+    wrong = []
+    for file in (ROOT / "engines").rglob("*.py"):
+        where = file.relative_to(ROOT)
+        for node in ast.walk(ast.parse(file.read_text(encoding="utf-8"))):
+            if isinstance(node, ast.ImportFrom):
+                wrong += [f"{where} imports {alias.name}" for alias in node.names if alias.name in surfaces]
+            if isinstance(node, ast.Constant) and isinstance(node.value, str):
+                wrong += [f"{where}:{node.lineno} names {name}" for name in scenes if name in node.value]
+            if isinstance(node, ast.Compare) and ast.unparse(node.left).endswith("surface.kind"):
+                wrong.append(f"{where}:{node.lineno} asks for a kind of surface")
     assert not wrong, "\n".join(wrong)

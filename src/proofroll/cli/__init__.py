@@ -14,6 +14,7 @@ import typer
 import proofroll
 from proofroll.cli.comparing import compare
 from proofroll.cli.engines import engines
+from proofroll.cli.export import export
 from proofroll.cli.judge import judge
 from proofroll.cli.ladder import ladder
 from proofroll.cli.lists import scenes
@@ -35,7 +36,7 @@ app = typer.Typer(
     rich_markup_mode=None,
 )
 _STUDIES = (compare, report, tradeoff, recommend, ladder, stability, versions)
-for _command in (scenes, run, judge, plot, *_STUDIES):
+for _command in (scenes, run, judge, plot, export, *_STUDIES):
     app.command()(_command)
 app.add_typer(new, name="new")
 app.add_typer(engines, name="engines")

@@ -248,6 +248,19 @@ class SupportsFrom(Protocol):
 
 
 @runtime_checkable
+class WritesModels(Protocol):
+    """What an engine has besides, if its own tools read a file of the model that it builds."""
+
+    @classmethod
+    def model_file(cls, scene: Scene, settings: Any) -> str:
+        """The text of that file.
+
+        Raises:
+            Refused: there is none for this scene or formulation.
+        """
+
+
+@runtime_checkable
 class Reproduces(Protocol):
     """What an engine has besides, if it can write a program that shows its behaviour without proofroll."""
 

@@ -33,8 +33,10 @@ def wall_source(body: RollingBall) -> str:
     rotation the frame turns along.
 
     Raises:
-        Refused: the wall has no such motions, or two rotations.
+        Refused: the wall has no such motions, or two rotations, or it moves.
     """
+    if body.wall_rate is not None:
+        raise Refused("programs are written only for walls that stand")
     generators = body.surface.generators
     if generators is None or all(generator.kind == "rotation" for generator in generators):
         raise Refused("programs are written only for walls that a translation slides along themselves")

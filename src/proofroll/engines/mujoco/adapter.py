@@ -154,6 +154,23 @@ class Mujoco:
         return cls(compiled(spec), body, settings)
 
     @classmethod
+    def model_file(cls, scene: Scene, settings: MujocoSettings) -> str:
+        """See :class:`proofroll.core.engine.WritesModels`: MJCF, whose keyframe ``start`` is the state at time 0."""
+        if settings.formulation == "joints":
+            raise Refused("the model of a mechanism is not written yet")
+        engine, body = cls._build_ball(scene, settings), rolling_ball(scene)
+        spec = read_spec(scene, body, settings.formulation)
+        write_physics(spec, body, settings)
+        _FORMULATIONS[settings.formulation].write(spec, body)
+        for key in list(spec.keys):
+            spec.delete(key)
+        data = engine._data
+        pose = {"mpos": data.mocap_pos.ravel(), "mquat": data.mocap_quat.ravel()} if len(data.mocap_pos) else {}
+        spec.add_key(name="start", qpos=data.qpos, qvel=data.qvel, **pose)
+        compiled(spec)
+        return str(spec.to_xml())
+
+    @classmethod
     def reproducer(cls, scene: Scene, settings: MujocoSettings) -> str:
         """See :class:`proofroll.core.engine.Reproduces`."""
         from proofroll.engines.mujoco.reproducer import source

@@ -1,0 +1,42 @@
+"""The file of a model that an engine's own tools read, written in the engine's own process."""
+
+from __future__ import annotations
+
+import dataclasses
+from typing import Any
+
+from proofroll.core.engine import WritesModels
+from proofroll.core.errors import Refused
+from proofroll.running.case import Case
+from proofroll.running.loading import loaded, scene_of
+from proofroll.running.worker_pool import Workers
+
+_SECONDS = 300.0
+
+
+def model_file(case: Case) -> str:
+    """The text of the file.
+
+    Raises:
+        Refused: the engine writes none, or none of this scene.
+    """
+    workers = Workers()
+    try:
+        with workers.lend(case.engine.name) as worker:
+            arguments = {"case": dataclasses.asdict(case)}
+            request = {"do": "call", "function": f"{__name__}:written", "arguments": arguments}
+            answer = worker.request(request, _SECONDS)
+    finally:
+        workers.close()
+    if "text" not in answer:
+        raise Refused(f"{case.engine.name}: {answer['message']}")
+    return str(answer["text"])
+
+
+def written(case: dict[str, Any]) -> dict[str, Any]:
+    """The same, in this process; ``text``."""
+    wanted = Case.from_dict(case)
+    kind, settings = loaded(wanted)
+    if not isinstance(kind, WritesModels):
+        raise Refused("it writes no file of its model")
+    return {"text": kind.model_file(scene_of(wanted), settings)}
