@@ -17,7 +17,7 @@ from proofroll.running.runner import resolve
 
 ROOT = Path(__file__).resolve().parents[1]
 # Extras without which nothing is simulated otherwise.
-_NO_NUMBERS = {"report", "robots", "all", "dev"}
+_NO_NUMBERS = {"report", "robots", "all", "dev", "cluster", "docs"}
 # Of a comparison these are for a person, or for a report of everything.
 _WORDS = ("title", "question", "order", "brief")
 

@@ -16,6 +16,7 @@ from proofroll.cli.options import (
     Jobs,
     Json,
     Out,
+    Scheduler,
     Set,
     assignments,
     complain,
@@ -40,6 +41,7 @@ def compare(
     out: Out = Path("out"),
     fresh: Fresh = False,
     jobs: Jobs = None,
+    scheduler: Scheduler = None,
     as_json: Json = False,
 ) -> None:
     """Hold the engines of a comparison file against the truth; exit 1 if a verdict contradicts the file.
@@ -50,7 +52,7 @@ def compare(
     from proofroll.report.comparison_content import outcome_content
 
     loaded = _asked(comparison, assignments(settings or []))
-    outcomes = outcomes_of([loaded], engine or [], new_runner(out, fresh, jobs))
+    outcomes = outcomes_of([loaded], engine or [], new_runner(out, fresh, jobs, scheduler))
     content = outcome_content(outcomes[0])
     if as_json:
         write_json(content)

@@ -16,6 +16,7 @@ from proofroll.cli.options import (
     Json,
     Out,
     SceneName,
+    Scheduler,
     Set,
     assignments,
     new_runner,
@@ -35,6 +36,7 @@ def ladder(
     out: Out = Path("out"),
     fresh: Fresh = False,
     jobs: Jobs = None,
+    scheduler: Scheduler = None,
     as_json: Json = False,
 ) -> None:
     """Run one quantity up the ladder of models, and switch each optional term on and off."""
@@ -44,7 +46,7 @@ def ladder(
     study = Ladder(
         scene,
         dict(assignments(settings or [])),
-        new_runner(out, fresh, jobs),
+        new_runner(out, fresh, jobs, scheduler),
         quantity=quantity,
         until=until,
         tolerance=tolerance,

@@ -19,6 +19,7 @@ from proofroll.core.errors import InputError
 if TYPE_CHECKING:
     from rich.console import Console
 
+    from proofroll.running.cluster import Cluster
     from proofroll.running.runner import Runner
 
 _SAID_EVERY = 10.0  # seconds between lines of progress where no bar can be shown
@@ -28,17 +29,31 @@ Json = Annotated[bool, typer.Option("--json", help="Print one JSON document on s
 Out = Annotated[Path, typer.Option("--out", help="Folder for results; what is there is reused.")]
 Fresh = Annotated[bool, typer.Option("--fresh", help="Run every case again, whatever is stored.")]
 Jobs = Annotated[int | None, typer.Option("--jobs", min=1, help="Workers at once; by default one per core.")]
+Scheduler = Annotated[
+    str | None,
+    typer.Option("--scheduler", help="Run the cases on a Dask cluster: tcp://…, or local:4 for 4 workers here."),
+]
 Engines = Annotated[list[str] | None, typer.Option("--engine", help="Restrict to an engine; may be repeated.")]
 SceneName = Annotated[str, typer.Argument(help="A scene: its name, a folder with a scene.toml, or a robot file.")]
 Set = Annotated[list[str] | None, typer.Option("--set", help="parameter=value in SI units; repeat.")]
 
 
-def new_runner(out: Path, fresh: bool, jobs: int | None) -> Runner:
-    """Runs cases in worker processes and keeps their results under ``out``."""
+def new_runner(out: Path, fresh: bool, jobs: int | None, scheduler: str | None = None) -> Runner:
+    """Runs cases in worker processes, here or on a cluster, and keeps their results under ``out``."""
     from proofroll.running.runner import Runner
     from proofroll.running.store import Store
 
-    return Runner(Store(out / "cases"), jobs=jobs, fresh=fresh)
+    store = Store(out / "cases")  # a folder that cannot be written is told before a cluster is started
+    return Runner(store, jobs=jobs, fresh=fresh, cluster=new_cluster(scheduler))
+
+
+def new_cluster(scheduler: str | None) -> Cluster | None:
+    """The Dask cluster of ``--scheduler``; None where the option is not given."""
+    if scheduler is None:
+        return None
+    from proofroll.running.cluster import Cluster
+
+    return Cluster(scheduler)
 
 
 @contextmanager

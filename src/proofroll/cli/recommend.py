@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
-from proofroll.cli.options import CONTRADICTED, OK, Jobs, Json, Out, Set, write_json
+from proofroll.cli.options import CONTRADICTED, OK, Jobs, Json, Out, Set, new_runner, write_json
 from proofroll.cli.tradeoff import Over, SceneOrFile, Until, measure, question_of, ranges_of, require_observables
 from proofroll.core.errors import InputError
 
@@ -137,4 +137,4 @@ def _stored_study(
         advice = f"{why}; add --measure, which takes some minutes, or run proofroll tradeoff first"
         raise InputError("stored curves", "none that hold here", advice)
     over = ranges if ranges is not None else (claims.over if claims else {})
-    return measure(question, engines, over, claims, out, fresh=False, jobs=jobs)[0]
+    return measure(question, engines, over, claims, new_runner(out, False, jobs), out)[0]

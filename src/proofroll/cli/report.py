@@ -18,6 +18,7 @@ from proofroll.cli.options import (
     Jobs,
     Json,
     Out,
+    Scheduler,
     complain,
     new_runner,
     progress_bar,
@@ -39,6 +40,7 @@ def report(
     out: Out = Path("out"),
     fresh: Fresh = False,
     jobs: Jobs = None,
+    scheduler: Scheduler = None,
     as_json: Json = False,
 ) -> None:
     """Run the comparisons and the further studies, and write report.html and report.json.
@@ -55,7 +57,7 @@ def report(
     loaded = [load_comparison(name) for name in names]
     if not studies:
         loaded = [item.briefly() for item in loaded]
-    runner = new_runner(out, fresh, jobs)
+    runner = new_runner(out, fresh, jobs, scheduler)
     keys = list(dict.fromkeys(part.key for part in parts))
     stages = _Stages(len(keys) + bool(loaded))
     command = _command(studies or [], engine or [], out)

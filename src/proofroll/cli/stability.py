@@ -16,6 +16,7 @@ from proofroll.cli.options import (
     Jobs,
     Json,
     Out,
+    Scheduler,
     complain,
     new_runner,
     progress_bar,
@@ -35,6 +36,7 @@ def stability(
     out: Out = Path("out"),
     fresh: Fresh = False,
     jobs: Jobs = None,
+    scheduler: Scheduler = None,
     as_json: Json = False,
 ) -> None:
     """Map up to which step or tolerance each engine is stable, and right, along axes of extremes."""
@@ -47,7 +49,7 @@ def stability(
     asked = file_for(scene)
     axes = chosen(asked.axes, axis or [])
     effort = QUICK if quick else Effort()
-    runner = new_runner(out, fresh, jobs)
+    runner = new_runner(out, fresh, jobs, scheduler)
     with progress_bar("stability", None) as advance:
         study, path = make_stability(asked, axes, runner, out, engines=engine or [], effort=effort, progress=advance)
     contradictions = study["claims"]["contradictions"]

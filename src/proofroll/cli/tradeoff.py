@@ -14,6 +14,7 @@ from proofroll.cli.options import (
     Jobs,
     Json,
     Out,
+    Scheduler,
     Set,
     assignments,
     new_runner,
@@ -23,6 +24,7 @@ from proofroll.cli.options import (
 from proofroll.core.errors import InputError
 
 if TYPE_CHECKING:
+    from proofroll.running.runner import Runner
     from proofroll.studies.claims import TradeoffClaims
     from proofroll.studies.sweep import Question
 
@@ -51,6 +53,7 @@ def tradeoff(
     out: Out = Path("out"),
     fresh: Fresh = False,
     jobs: Jobs = None,
+    scheduler: Scheduler = None,
     as_json: Json = False,
 ) -> None:
     """Measure error against cost for every engine, formulation and setting, from coarse to fine."""
@@ -67,7 +70,7 @@ def tradeoff(
     claims, question = question_of(scene, settings, quantity, until)
     require_observables(question, quantity or [])
     ranges = ranges_of(question, over) if over is not None else (claims.over if claims else {})
-    study, path = measure(question, engine or [], ranges, claims, out, fresh=fresh, jobs=jobs)
+    study, path = measure(question, engine or [], ranges, claims, new_runner(out, fresh, jobs, scheduler), out)
     contradictions = study["claims"]["contradictions"]
     shown = [name for name in quantity or [] if name in study["quantities"]] or default_quantities(study)
     draw(study, shown, path.with_suffix(".svg"))
@@ -154,14 +157,11 @@ def measure(
     engines: list[str],
     over: dict[str, list[float]],
     claims: TradeoffClaims | None,
+    runner: Runner,
     out: Path,
-    *,
-    fresh: bool,
-    jobs: int | None,
 ) -> tuple[dict[str, Any], Path]:
     """Measures and keeps the curves that a recommendation can be made from, with a progress bar."""
     from proofroll.studies.study_store import make_tradeoff
 
-    runner = new_runner(out, fresh, jobs)
     with progress_bar("runs and timings") as advance:
         return make_tradeoff(question, runner, out, engines=engines, over=over, claims=claims, progress=advance)

@@ -14,6 +14,7 @@ from proofroll.files.scene_file import load_scene
 from proofroll.running.case import Status
 from proofroll.running.timing import machine
 from proofroll.studies.compare import Outcome, Run
+from proofroll.studies.hosts import hosts
 from proofroll.studies.planning import point_name
 
 
@@ -50,6 +51,7 @@ def outcome_content(outcome: Outcome) -> dict[str, Any]:
         },
         "rows": [_row(runs) for runs in by_row(outcome).values()],
         "runs": [{"row": numbers[id(run.row)], **_run(run)} for run in outcome.runs],
+        "hosts": hosts(run.result for run in outcome.runs),
     }
     return dict(plain(content))
 
@@ -205,4 +207,5 @@ def _run(run: Run) -> dict[str, Any]:
         "timings": run.result.timings,
         "versions": run.result.versions,
         "trajectory": run.result.trajectory,
+        "host": run.result.host,
     }

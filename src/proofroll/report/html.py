@@ -20,6 +20,7 @@ from proofroll.report.kinds import ReportKind, kind_of, report_kinds
 from proofroll.report.study_parts import Part, further, part_kinds
 from proofroll.report.styles import OUTLINES, styles
 from proofroll.report.tradeoff_tables import name_of
+from proofroll.studies.hosts import said_of
 
 if TYPE_CHECKING:
     import jinja2
@@ -123,6 +124,7 @@ def _templates() -> jinja2.Environment:
         "outlines": OUTLINES,
         "again": _again,
         "further": further,
+        "said_of": said_of,
         "part_kinds": part_kinds(),
         "kind_of": _kind,
     }

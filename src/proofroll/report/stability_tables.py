@@ -10,6 +10,7 @@ from rich.table import Table
 from rich.text import Text
 
 from proofroll.report.labels import number, with_caveat
+from proofroll.studies.hosts import said_of
 from proofroll.studies.stability_content import silent_ranking
 
 
@@ -24,7 +25,7 @@ def headline(study: Mapping[str, Any]) -> str:
         said += f" {study['refused']} points were refused before the run."
     if study["never_accurate"]:
         said += f" At {study['never_accurate']} points no step or tolerance that was affordable holds 1 %."
-    return said
+    return " ".join([said, *said_of(study.get("hosts", {}))])
 
 
 def boundary_table(study: Mapping[str, Any]) -> Table:

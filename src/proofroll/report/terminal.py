@@ -12,6 +12,7 @@ from proofroll.core.verdict import Verdict
 from proofroll.report.labels import SYMBOLS, caveat_lines, headlines, names, verdict_text
 from proofroll.report.screen import Screen
 from proofroll.report.study_parts import further, part_kinds
+from proofroll.studies.hosts import said_of
 
 WIDTH = 100
 _WORD, _NUMBER = 14, 7  # characters of the longest word and of a number
@@ -109,7 +110,7 @@ def closing_lines(content: dict[str, Any]) -> list[str]:
         lines += [f"  {sentence}" for sentence in content["contradictions"][:5]]
     elif any(len(row["expected"]) < len(Verdict) for row in rows):  # else nothing is claimed
         lines.append("Every verdict is as the comparison file expects.")
-    return [*lines, *caveat_lines(content["rows"])]
+    return [*lines, *caveat_lines(content["rows"]), *said_of(content.get("hosts", {}))]
 
 
 def part_lines(content: dict[str, Any]) -> list[str]:

@@ -8,7 +8,17 @@ from typing import Annotated
 import typer
 
 from proofroll.cli.checking import check_text, is_text_check
-from proofroll.cli.options import CONTRADICTED, ENGINE, OK, Engines, Json, progress_bar, write_json
+from proofroll.cli.options import (
+    CONTRADICTED,
+    ENGINE,
+    OK,
+    Engines,
+    Json,
+    Scheduler,
+    new_cluster,
+    progress_bar,
+    write_json,
+)
 
 
 def check(
@@ -63,13 +73,14 @@ def check(
 def robots(
     name: Annotated[list[str] | None, typer.Argument(help="Robots of the gallery; by default all.")] = None,
     engine: Engines = None,
+    scheduler: Scheduler = None,
     as_json: Json = False,
 ) -> None:
     """Check the robots of comparisons/robots.toml; exit 1 if an engine does otherwise than the file expects."""
     from proofroll.robots.gallery import gallery
 
     with progress_bar("robots") as advance:
-        content = gallery(name or (), engine or (), progress=advance)
+        content = gallery(name or (), engine or (), progress=advance, cluster=new_cluster(scheduler))
     if as_json:
         write_json(content)
     else:

@@ -4,9 +4,10 @@ from __future__ import annotations
 
 import dataclasses
 from collections.abc import Callable, Sequence
+from functools import partial
 from importlib.metadata import PackageNotFoundError, files
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 from proofroll.core.errors import InputError
 from proofroll.core.plugins import parse_engine
@@ -15,6 +16,9 @@ from proofroll.files.toml import read_toml
 from proofroll.robots import reading
 from proofroll.robots.check import check
 from proofroll.robots.hypotheses import hypotheses
+
+if TYPE_CHECKING:
+    from proofroll.running.cluster import Cluster
 
 # What an engine may be expected to do besides the causes by which it differs.
 REFUSES, CRASHED, OPEN = "refuses", "crashed", "open"
@@ -72,7 +76,10 @@ def locate(entry: Entry) -> Path | None:
 
 
 def gallery(
-    names: Sequence[str] = (), engines: Sequence[str] = (), progress: Callable[[str], None] | None = None
+    names: Sequence[str] = (),
+    engines: Sequence[str] = (),
+    progress: Callable[[str], None] | None = None,
+    cluster: Cluster | None = None,
 ) -> dict[str, Any]:
     """Checks robots, each with every engine that its entry expects something of and that is installed.
 
@@ -80,6 +87,7 @@ def gallery(
         names: of robots; by default all.
         engines: to which it is restricted.
         progress: called with the name of each robot.
+        cluster: where the robots are checked; None: here.
 
     Returns:
         plain data: for every robot its file, what each engine does, and what of that was not expected.
@@ -93,15 +101,15 @@ def gallery(
     for name in engines:
         reading.load_reader(parse_engine(name).name)
     rows = []
-    for entry in entries:
-        if not names or entry.name in names:
-            rows.append(_row(entry, engines))
-            if progress is not None:
-                progress(entry.name)
+    wanted, row = [entry for entry in entries if not names or entry.name in names], partial(_row, tuple(engines))
+    for host, found in cluster.map(row, wanted) if cluster else (("", row(entry)) for entry in wanted):
+        rows.append(found | {"ran_on": host})
+        if progress is not None:
+            progress(found["name"])
     return {"robots": rows}
 
 
-def _row(entry: Entry, engines: Sequence[str]) -> dict[str, Any]:
+def _row(engines: Sequence[str], entry: Entry) -> dict[str, Any]:
     path = locate(entry)
     row: dict[str, Any] = {
         "name": entry.name,

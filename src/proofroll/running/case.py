@@ -114,6 +114,7 @@ class Result:
             Empty in records from before it was measured.
         processor: the same in seconds of the worker's processor, which others on the machine do not lengthen [s].
         interpreter: path of the Python that ran it.
+        host: name of the machine of a cluster on which it ran, where no speed is measured; empty: it ran at home.
     """
 
     status: Status
@@ -128,6 +129,7 @@ class Result:
     spent: dict[str, float] = field(default_factory=dict)
     processor: dict[str, float] = field(default_factory=dict)
     interpreter: str = ""
+    host: str = ""
 
     @classmethod
     def from_dict(cls, content: dict[str, Any]) -> Result:

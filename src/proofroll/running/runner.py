@@ -7,11 +7,12 @@ import dataclasses
 import os
 import queue
 import threading
-from collections import deque
+from collections import Counter, deque
 from collections.abc import Callable, Collection, Iterable, Iterator, Mapping, Sequence
 from concurrent.futures import ThreadPoolExecutor
+from functools import partial
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 from proofroll.core.errors import InputError, Missing, ProofrollError
 from proofroll.core.plugins import plain_name
@@ -20,7 +21,10 @@ from proofroll.running.process import Worker, WorkerDied
 from proofroll.running.store import Store
 from proofroll.running.worker_pool import Workers
 
-__all__ = ["Runner", "Worker", "WorkerDied", "describe", "programs", "resolve", "run_one"]
+if TYPE_CHECKING:
+    from proofroll.running.cluster import Cluster
+
+__all__ = ["Runner", "Worker", "WorkerDied", "describe", "programs", "refusal", "resolve", "run_one"]
 
 _START_UP_SECONDS = 60.0
 
@@ -146,6 +150,9 @@ class _Waiting:
             return None
 
 
+_Arrived = queue.SimpleQueue[tuple[Case, Result] | Exception]
+
+
 class Runner:
     """Runs cases side by side, reuses stored results, and always returns one result per case.
 
@@ -154,10 +161,19 @@ class Runner:
         jobs: how many workers run at once.
         fresh: run every case again, once, whatever is stored.
         memory: how much each worker may have [GB]; by default :func:`proofroll.running.memory.memory_limit`.
+        cluster: where the cases run; None: here. Engines are asked here, and speeds measured here, all the same.
     """
 
-    def __init__(self, store: Store, jobs: int | None = None, fresh: bool = False, memory: float | None = None) -> None:
+    def __init__(
+        self,
+        store: Store,
+        jobs: int | None = None,
+        fresh: bool = False,
+        memory: float | None = None,
+        cluster: Cluster | None = None,
+    ) -> None:
         self.store = store
+        self.cluster = cluster
         self.workers = Workers(memory)
         """Idle workers, for whoever asks engines something on behalf of the same study."""
         self.jobs = jobs or os.cpu_count() or 1
@@ -165,6 +181,8 @@ class Runner:
         self.reused = 0
         self.damaged: set[str] = set()
         """Keys of the cases that were run again because what was stored is not what had been put there."""
+        self.hosts: Counter[str] = Counter()
+        """How many of the results come from which machine, those of before included; an empty name is this one."""
         self._run_here: set[str] = set()
         self._busy: set[Worker] = set()
         self._stopping = threading.Event()
@@ -188,7 +206,7 @@ class Runner:
         """
         results: dict[str, Result] = {}
         asked: set[str] = set()
-        arrived: queue.SimpleQueue[tuple[Case, Result] | Exception] = queue.SimpleQueue()
+        arrived: _Arrived = queue.SimpleQueue()
         shared = _Waiting()
         running = 0
         ready: deque[tuple[Case, Result]] = deque()
@@ -200,8 +218,8 @@ class Runner:
             asked.add(case.key)
             wanted = not self.fresh or case.key in self._run_here
             stored = self.store.get(case) if wanted else None
-            if stored is None:
-                if wanted and self.store.has(case):
+            if stored is None or self._lacks_speed(case, stored):
+                if wanted and stored is None and self.store.has(case):
                     self.damaged.add(case.key)
                 shared.add(case)
                 return 1
@@ -216,8 +234,7 @@ class Runner:
             while ready or running:
                 if running and not serving:
                     serving = True
-                    for _ in range(self.jobs):
-                        pool.submit(self._serve, shared, arrived)
+                    self._begin(pool, shared, arrived)
                 if ready:
                     case, result = ready.popleft()
                 else:
@@ -230,11 +247,11 @@ class Runner:
                     if case.key in self.damaged:
                         result = dataclasses.replace(result, message=f"{result.message}; what was stored was damaged")
                 results[case.key] = result
+                self.hosts[result.host] += 1
                 running += sum([ask(further) for further in then(case, result)])
         except BaseException:
-            self._stopping.set()
-            for worker in list(self._busy):
-                worker.kill()
+            shared.close()
+            self._stop()
             raise
         finally:
             shared.close()
@@ -242,7 +259,23 @@ class Runner:
             self._stopping.clear()
         return results
 
-    def _serve(self, waiting: _Waiting, arrived: queue.SimpleQueue[tuple[Case, Result] | Exception]) -> None:
+    def _begin(self, pool: ThreadPoolExecutor, waiting: _Waiting, arrived: _Arrived) -> None:
+        """Begins to serve what waits: on the cluster, or in so many workers here."""
+        if self.cluster is not None:
+            pool.submit(self.cluster.serve, waiting.take, partial(self._arrive, arrived), arrived.put)
+            return
+        for _ in range(self.jobs):
+            pool.submit(self._serve, waiting, arrived)
+
+    def _stop(self) -> None:
+        """Ends what runs, here and on the cluster."""
+        self._stopping.set()
+        for worker in list(self._busy):
+            worker.kill()
+        if self.cluster is not None:
+            self.cluster.stop()
+
+    def _serve(self, waiting: _Waiting, arrived: _Arrived) -> None:
         """Serves cases one after another, in a new worker for another engine and after each crash."""
         worker: Worker | None = None
         engine: str | None = None
@@ -263,17 +296,9 @@ class Runner:
                     self._busy.add(worker)
                     if self._stopping.is_set():  # whoever stops us may not have seen this worker
                         break
-                try:
-                    result = self._result(worker, case)
-                except WorkerDied as error:
-                    result = _lost(case, error)
+                if not self._arrive(arrived, case, partial(_ask, worker, case)):
                     self._drop(worker)
                     worker = None
-                    if self._stopping.is_set():
-                        break
-                except ProofrollError as error:  # a full disk, say, which costs this case alone
-                    result = _lost(case, WorkerDied(Status.CRASHED, str(error)))
-                arrived.put((case, result))
         except Exception as error:
             arrived.put(error)
             self._stopping.set()
@@ -285,15 +310,30 @@ class Runner:
             self._busy.discard(worker)
             self.workers.keep(engine, worker)
 
-    def _result(self, worker: Worker, case: Case) -> Result:
-        """The result of a case, stored."""
+    def _lacks_speed(self, case: Case, stored: Result) -> bool:
+        """Whether a stored result has no speed only because it comes from another machine: then it is run here."""
+        return bool(case.timed and stored.host and stored.status == Status.DONE and self.cluster is None)
+
+    def _arrive(self, arrived: _Arrived, case: Case, make: Callable[[Path], Result]) -> bool:
+        """Takes in what came of a case, whatever it is; whether the process that made it lives on."""
+        try:
+            result, lives = self._result(case, make), True
+        except WorkerDied as error:
+            if self._stopping.is_set():
+                return False
+            result, lives = _lost(case, error), False
+        except ProofrollError as error:  # a full disk, say, which costs this case alone
+            result, lives = _lost(case, WorkerDied(Status.CRASHED, str(error))), True
+        arrived.put((case, result))
+        return lives
+
+    def _result(self, case: Case, make: Callable[[Path], Result]) -> Result:
+        """The result of a case, stored; ``make`` writes its trajectory to a file."""
         with self.store.incoming(case) as written:
             try:
-                result = _ask(worker, case, written)
+                result = make(written)
             except InputError as error:  # a step that does not divide the grid, say: this case's own affair
-                result = Result(
-                    Status.REFUSED, str(error), versions={plain_name(case.engine.name): case.engine.version}
-                )
+                result = refusal(case, error)
             except WorkerDied as error:  # where the disk is full the name for a while means nothing to a person
                 said = str(error).replace(str(written.absolute()), str(self.store.trajectory(case)))
                 raise WorkerDied(error.status, said) from None
@@ -316,6 +356,11 @@ def _ask(worker: Worker, case: Case, out: Path) -> Result:
         return dataclasses.replace(found, spent=found.spent | {"process start": waited})
     except Missing as error:
         return Result(Status.MISSING, str(error))
+
+
+def refusal(case: Case, error: InputError) -> Result:
+    """What comes of a case whose own settings make no sense."""
+    return Result(Status.REFUSED, str(error), versions={plain_name(case.engine.name): case.engine.version})
 
 
 def _lost(case: Case, error: WorkerDied) -> Result:

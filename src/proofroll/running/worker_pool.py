@@ -11,7 +11,7 @@ from proofroll.running.interpreters import start
 from proofroll.running.process import Worker
 
 # Idle workers that are kept, some hundred MB each; of more, the one that has waited longest is ended.
-_MOST = 8
+MOST = 8
 
 
 class Workers:
@@ -19,12 +19,14 @@ class Workers:
 
     Args:
         memory: how much each may have [GB]; by default :func:`proofroll.running.memory.memory_limit`.
+        most: how many are kept while they are idle.
     """
 
-    def __init__(self, memory: float | None = None) -> None:
-        self._memory = memory
+    def __init__(self, memory: float | None = None, most: int = MOST) -> None:
+        self._memory, self._most = memory, most
         self._lock = threading.Lock()
         self._idle: list[tuple[str, Worker]] = []
+        self._made: weakref.WeakSet[Worker] = weakref.WeakSet()
         self._end = weakref.finalize(self, _close, self._idle)
 
     def take(self, engine: str) -> Worker:
@@ -37,13 +39,16 @@ class Workers:
             for index, (name, _) in enumerate(self._idle):
                 if name == engine:
                     return self._idle.pop(index)[1]
-        return start(engine, self._memory)
+        worker = start(engine, self._memory)
+        with self._lock:
+            self._made.add(worker)
+        return worker
 
     def keep(self, engine: str, worker: Worker) -> None:
         """Takes back a worker that has answered all that it was asked."""
         with self._lock:
             self._idle.append((engine, worker))
-            surplus = [self._idle.pop(0)[1]] if len(self._idle) > _MOST else []
+            surplus = [self._idle.pop(0)[1]] if len(self._idle) > self._most else []
         for old in surplus:
             old.close()
 
@@ -62,6 +67,14 @@ class Workers:
         """Ends the idle workers."""
         with self._lock:
             _close(self._idle)
+
+    def kill(self) -> None:
+        """Ends all workers that were made here, also those that are lent: whoever waits for one hears that it died."""
+        with self._lock:
+            made = list(self._made)
+        for worker in made:
+            worker.kill()
+        self.close()
 
 
 def _close(idle: list[tuple[str, Worker]]) -> None:

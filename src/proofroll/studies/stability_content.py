@@ -9,6 +9,7 @@ from typing import Any
 
 from proofroll.files.scene_file import load_scene
 from proofroll.studies.failure import ACCURATE, REFUSED, Outcome, meanings
+from proofroll.studies.hosts import hosts
 from proofroll.studies.stability import MapPoint, StabilityMap, failure_beyond
 from proofroll.studies.step_numbers import explanation, step_numbers, values
 
@@ -49,6 +50,7 @@ def content(found: StabilityMap) -> dict[str, Any]:
             for place in found.places
         ],
         "absent": found.absent,
+        "hosts": hosts(result for point in found.points for result in point.results.values()),
     }
 
 

@@ -15,6 +15,7 @@ from proofroll.running.case import Status
 from proofroll.running.timing import Timing
 from proofroll.studies import study_identity as installed
 from proofroll.studies.budget import Budget, budget, sentence
+from proofroll.studies.hosts import hosts, said_of
 from proofroll.studies.pareto import envelope, front
 from proofroll.studies.recommend import by_hand
 from proofroll.studies.sweep import BROKEN, Curve, Point
@@ -111,6 +112,7 @@ def _point(curve: Curve, point: Point, number: int, held: dict[str, float], foun
         "caveat": facts.caveat,
         "status": point.result.status,
         "message": point.result.message,
+        "host": point.result.host,
         "error": point.errors,
         "envelope": {name: value for name, value in held.items() if name in point.errors},
         "sparse": None
@@ -154,7 +156,7 @@ def _budget(curve: Curve, found: Budget, unit: str) -> dict[str, Any]:
 
 def findings(found: Tradeoff, made: Sequence[tuple[Curve, Budget]]) -> list[str]:
     """What stands out, as sentences."""
-    said = []
+    said = said_of(hosts(point.result for point in found.points))
     quantity = found.question.quantity
     scale, unit = found.reference.scale(quantity) or 1.0, found.reference.scene.observables[quantity].unit
     judged = judged_quantities(found)

@@ -18,8 +18,10 @@ from proofroll.cli.options import (
     Json,
     Out,
     SceneName,
+    Scheduler,
     Set,
     assignments,
+    new_cluster,
     new_runner,
     progress_bar,
     write_json,
@@ -35,6 +37,7 @@ def onset(
     out: Out = Path("out"),
     fresh: Fresh = False,
     jobs: Jobs = None,
+    scheduler: Scheduler = None,
     as_json: Json = False,
 ) -> None:
     """Say when the ball first slips, in every engine, and how well that is posed."""
@@ -46,7 +49,7 @@ def onset(
         study = onset_study(
             scene,
             dict(assignments(settings or [])),
-            new_runner(out, fresh, jobs),
+            new_runner(out, fresh, jobs, scheduler),
             engines=engine or (),
             until=until,
             uncertainty=uncertainty,
@@ -72,6 +75,7 @@ def regimes(
     study: Annotated[str, typer.Argument(help='A file with study = "regimes", its name, or its scene.')] = "regimes",
     out: Out = Path("out"),
     jobs: Jobs = None,
+    scheduler: Scheduler = None,
     as_json: Json = False,
 ) -> None:
     """Draw the map over speed and friction: never slips, slips and recovers, falls."""
@@ -83,7 +87,8 @@ def regimes(
     Store(out)  # fails before the work rather than after it
     words = "runs of the truth"
     with progress_bar(words, total=loaded.runs) as advance:
-        maps = regime_maps(loaded, jobs or os.cpu_count() or 1, lambda count: advance(words, count))
+        workers, cluster = jobs or os.cpu_count() or 1, new_cluster(scheduler)
+        maps = regime_maps(loaded, workers, lambda count: advance(words, count), cluster)
     content = regime_content(maps)
     draw(maps, out / "regimes.svg")
     write_text(out / "regimes.json", json.dumps(content, indent=1))

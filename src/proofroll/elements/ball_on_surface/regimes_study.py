@@ -26,6 +26,8 @@ from proofroll.truth.variants import at_speed, with_contact
 if TYPE_CHECKING:
     import xarray as xr
 
+    from proofroll.running.cluster import Cluster
+
 STUDY = "regimes"
 # Maps of this process by what they are made from: a report and its figures show the same ones.
 _MADE: dict[tuple[RegimesStudy, str], list[xr.Dataset]] = {}
@@ -101,20 +103,27 @@ def load_regimes(name: str) -> RegimesStudy:
     return found
 
 
-def regime_maps(study: RegimesStudy, workers: int, progress: Callable[[int], None] | None = None) -> list[xr.Dataset]:
+def regime_maps(
+    study: RegimesStudy,
+    workers: int,
+    progress: Callable[[int], None] | None = None,
+    cluster: Cluster | None = None,
+) -> list[xr.Dataset]:
     """One map per value of the rolling resistance, each from runs of the truth.
 
     Args:
         study: the axes.
         workers: processes at once.
         progress: called with the number of runs just finished.
+        cluster: where the runs are made; None: here.
     """
     scenes = [load_scene(study.scene, rolling_resistance=f) for f in study.rolling_resistance]
     key = study, "".join(scene.digest for scene in scenes)
     if key not in _MADE:
         axes = study.speed.values, study.mu_static.values
         _MADE[key] = [
-            regime_map(scene, *axes, until=study.until, workers=workers, progress=progress) for scene in scenes
+            regime_map(scene, *axes, until=study.until, workers=workers, progress=progress, cluster=cluster)
+            for scene in scenes
         ]
     return _MADE[key]
 
@@ -127,6 +136,7 @@ def regime_map(
     until: float = 4.0,
     workers: int = 1,
     progress: Callable[[int], None] | None = None,
+    cluster: Cluster | None = None,
 ) -> xr.Dataset:
     """The map over initial speed × static friction; the ratio μk/μs is the scene's (1 where it has no bound).
 
@@ -137,6 +147,7 @@ def regime_map(
         until: length of each run [s].
         workers: number of processes; 1 runs in this one.
         progress: called with the number of runs just finished.
+        cluster: where the runs are made; None: here.
 
     Returns:
         Dataset with dims ``speed``, ``mu_static``: ``regime`` (:class:`Regime`), ``slips`` (count), ``first_slip``
@@ -147,8 +158,13 @@ def regime_map(
     body = rolling_ball(scene)
     mus = np.asarray(frictions, dtype=np.float64)
     rows = []
-    for values in in_processes(partial(_row, body, mus, until), [float(speed) for speed in speeds], workers):
+    hosts = set()
+    row, places = partial(_row, body, mus, until), [float(speed) for speed in speeds]
+    for host, values in (
+        cluster.map(row, places) if cluster else (("", row) for row in in_processes(row, places, workers))
+    ):
         rows.append(values)
+        hosts.add(host)
         if progress is not None:
             progress(len(mus))
     regime, slips, first = np.moveaxis(np.array(rows).reshape(len(rows), len(mus), 3), -1, 0)
@@ -164,7 +180,8 @@ def regime_map(
             "speed": ("speed", np.asarray(speeds, dtype=np.float64), {"units": "m/s"}),
             "mu_static": ("mu_static", mus, {"units": "1"}),
         },
-        attrs={"scene": scene.name, "until": until, "rolling_resistance": body.contact.rolling_resistance},
+        attrs={"scene": scene.name, "until": until, "rolling_resistance": body.contact.rolling_resistance}
+        | {"ran_on": ", ".join(sorted(hosts))},
     )
     bounds = analytic_boundaries(body, result["speed"].to_numpy())
     if bounds is not None:

@@ -36,6 +36,7 @@ def regime_content(maps: Sequence[xr.Dataset]) -> dict[str, Any]:
                 "rolling_resistance": item.attrs["rolling_resistance"],
                 "until": item.attrs["until"],
                 "runs": int(item["regime"].size),
+                "ran_on": item.attrs.get("ran_on", ""),
                 "counts": {word: int((item["regime"] == regime.value).sum()) for regime, word in _WORDS.items()},
                 "outside_boundaries": _outside(item),
                 "speed": item["speed"].to_numpy().tolist(),

@@ -1,0 +1,261 @@
+"""Cases on other machines, through a Dask cluster: what runs there, and how it comes back.
+
+The runner stays the only planner. It asks a cluster instead of its own threads; the cluster never holds more cases than
+keep its workers busy, and gives back each result as the runner's own worker process would have.
+"""
+
+from __future__ import annotations
+
+import contextlib
+import dataclasses
+import logging
+import os
+import re
+import signal
+import threading
+import time
+import uuid
+import weakref
+from collections.abc import Callable, Iterator, Sequence
+from concurrent.futures import CancelledError
+from functools import partial
+from multiprocessing import resource_tracker
+from pathlib import Path
+from typing import Any, TypeVar
+
+from proofroll.core.errors import InputError, Missing, ProofrollError
+from proofroll.files.data_folders import data_folder
+from proofroll.files.scene_file import scene_folder
+from proofroll.running import cluster_task
+from proofroll.running.case import Case, Result, Status
+from proofroll.running.memory import VARIABLE, memory_limit
+from proofroll.running.process import WorkerDied
+
+# Cases that are sent ahead: one waits at each thread while another runs, and a few more, so that a cluster that grows
+# with its work sees some. No more than these are ever known to the scheduler.
+_AHEAD, _AT_LEAST = 2, 64
+# How often the threads of a cluster are counted, for workers come and go [s].
+_COUNTED = 2.0
+# How long a scheduler may take to answer [s].
+_PATIENCE = 10.0
+
+Item = TypeVar("Item")
+Found = TypeVar("Found")
+Make = Callable[[Path], Result]
+
+
+class Cluster:
+    """A Dask cluster on which cases run.
+
+    Args:
+        address: of a scheduler, ``tcp://…`` or ``tls://…``; or ``local``, ``local:4``: so many workers on this machine.
+        task: what a worker does for a case; another only to measure what all around it costs.
+
+    Raises:
+        InputError: the address is none, or nothing answers there.
+        Missing: Dask is not installed.
+    """
+
+    def __init__(self, address: str, task: Callable[..., Any] = cluster_task.run_case) -> None:
+        self.address = address
+        memory = memory_limit() if VARIABLE in os.environ else None
+        self._asked = cluster_task.Asked(uuid.uuid4().hex[:12], cluster_task.installed(), memory)
+        self._task = task
+        self._client, own = _connected(address)
+        self._close = weakref.finalize(self, _end, self._client, own, self._asked.command)
+        self._room = threading.Condition()
+        self._sent: set[Any] = set()
+        self._threads, self._counted = 0, -_COUNTED
+        self._stopped = False
+
+    def serve(
+        self,
+        take: Callable[[str | None], Case | None],
+        arrived: Callable[[Case, Make], object],
+        failed: Callable[[Exception], None],
+    ) -> None:
+        """Runs cases until there are none, for a runner.
+
+        Args:
+            take: the next case, if possible of the engine that is named; None: there are no more.
+            arrived: called, in a thread of Dask's, with a case and what writes its trajectory and gives its result.
+            failed: called with what ends the whole run.
+        """
+        self._stopped = False
+        engine = None
+        try:
+            while self._has_room() and (case := take(engine)) is not None:
+                engine = case.engine.name
+                self._send(
+                    (dataclasses.asdict(case) | {"timed": False}, _files(case)),
+                    partial(self._come, case, arrived, failed),
+                    case.key,
+                )
+        except Exception as error:
+            failed(self._gone(error))
+
+    def map(self, function: Callable[[Item], Found], items: Sequence[Item]) -> Iterator[tuple[str, Found]]:
+        """The machine's name and what a function gives for each item, in order, each computed in a watched process.
+
+        Args:
+            function: can be pickled, and its results too.
+            items: its arguments.
+
+        Raises:
+            ProofrollError: a process or the scheduler ended, or the function said so.
+        """
+        waiting: list[Any] = []
+        rest = iter(items)
+        self._stopped = False
+        try:
+            while True:
+                for item in rest:
+                    waiting.append(self._submit(cluster_task.call, (function, item), str(len(waiting))))
+                    if len(waiting) >= self._most():
+                        break
+                if not waiting:
+                    return
+                try:
+                    yield waiting.pop(0).result()
+                except ProofrollError:
+                    raise
+                except Exception as error:
+                    raise self._gone(error) from None
+        finally:
+            self.stop(waiting)
+
+    def stop(self, futures: Sequence[Any] = ()) -> None:
+        """Ends what runs and waits there for this command."""
+        with self._room:
+            self._stopped = True
+            futures = [*futures, *self._sent]
+            self._sent.clear()
+            self._room.notify_all()
+        if futures and self._client.status == "running":
+            with contextlib.suppress(Exception):  # it may be gone, and then nothing of it is left to be ended
+                self._client.cancel(futures)
+                self._client.run(cluster_task.end, self._asked.command, on_error="ignore")
+
+    def _submit(self, task: Callable[..., Any], arguments: tuple[Any, ...], name: str) -> Any:
+        key = f"proofroll-{self._asked.command}-{uuid.uuid4().hex[:8]}-{name}"
+        if self._client.status != "running":
+            raise self._gone(None)
+        return self._client.submit(task, self._asked, *arguments, key=key, pure=False)
+
+    def _send(self, arguments: tuple[Any, ...], come: Callable[[Any], None], name: str) -> None:
+        future = self._submit(self._task, arguments, name)
+        with self._room:
+            self._sent.add(future)
+        future.add_done_callback(come)
+
+    def _has_room(self) -> bool:
+        """Waits until another case may be sent; False: nothing more is to be."""
+        most = self._most()
+        with self._room:
+            while not self._stopped and len(self._sent) >= most:
+                self._room.wait(_COUNTED)
+            return not self._stopped
+
+    def _most(self) -> int:
+        """How many cases the cluster may hold."""
+        if time.monotonic() - self._counted > _COUNTED:
+            self._threads, self._counted = sum(self._client.nthreads().values()), time.monotonic()
+        return _AHEAD * self._threads + _AT_LEAST
+
+    def _come(
+        self, case: Case, arrived: Callable[[Case, Make], object], failed: Callable[[Exception], None], future: Any
+    ) -> None:
+        """Takes back what a worker sent."""
+        with self._room:
+            known = future in self._sent
+            self._sent.discard(future)
+            self._room.notify()
+        if not known:
+            return
+        try:
+            content, data = future.result()
+        except Exception as error:
+            from distributed.scheduler import KilledWorker
+
+            if not isinstance(error, KilledWorker):
+                failed(self._gone(error))
+                return
+            said = f"each of {error.allowed_failures + 1} workers of the cluster that ran it was lost"
+            arrived(case, lambda _: _raise(WorkerDied(Status.CRASHED, said)))
+            return
+
+        def made(path: Path) -> Result:
+            if data is not None:
+                path.write_bytes(data)
+            found = Result.from_dict(content)
+            return dataclasses.replace(found, trajectory=found.trajectory and path.name)
+
+        arrived(case, made)
+
+    def _gone(self, error: Exception | None) -> ProofrollError:
+        """What ends a run, in one line."""
+        if isinstance(error, ProofrollError):
+            return error
+        if error is None or isinstance(error, (CancelledError, OSError)):
+            said = f"the Dask scheduler at {self.address} is gone"
+            return ProofrollError(f"{said}; what was finished is kept, and the same command goes on from there")
+        text = " ".join(str(error).split())[:200]
+        return ProofrollError(f"the workers of {self.address} cannot run a case ({type(error).__name__}: {text})")
+
+
+def _raise(error: Exception) -> Result:
+    raise error
+
+
+def _files(case: Case) -> dict[str, bytes]:
+    """What is in the folder of a scene of the user's own, which no other machine need have."""
+    folder = scene_folder(case.scene) if case.scene else Path()
+    if folder.parent == data_folder("models"):
+        return {}
+    return {file.name: file.read_bytes() for file in sorted(folder.iterdir()) if file.is_file()}
+
+
+def _connected(address: str) -> tuple[Any, Any]:
+    """A client of the scheduler, and the cluster that was started for it, if any."""
+    local = re.fullmatch(r"local(?::(\d+))?", address)
+    if not local and not re.match(r"\w+://.", address):
+        raise InputError("--scheduler", address, "give the address of a Dask scheduler, tcp://…, or local, local:4")
+    try:
+        from distributed import Client, LocalCluster
+    except ModuleNotFoundError as error:
+        raise Missing(f"--scheduler needs Dask ({error.name} is missing): pip install 'proofroll[cluster]'") from None
+    for name in [name for name in logging.root.manager.loggerDict if name.partition(".")[0] == "distributed"]:
+        logging.getLogger(name).disabled = True  # what matters of it is said in our own line
+    # Threads and processes that begin here inherit it: Ctrl-C is this command's affair, which then ends them. The
+    # tracker of multiprocessing unblocks it where it begins, so it must be there already.
+    resource_tracker.ensure_running()
+    signal.pthread_sigmask(signal.SIG_BLOCK, {signal.SIGINT})
+    try:
+        own = None
+        if local:
+            count = int(local[1] or os.cpu_count() or 1)
+            if not count:
+                raise InputError("--scheduler", address, "give at least one worker: local:1")
+            own = LocalCluster(
+                n_workers=count,
+                threads_per_worker=1,
+                dashboard_address=None,
+                memory_limit=None,
+                silence_logs=logging.CRITICAL + 1,
+            )
+        return Client(own or address, timeout=_PATIENCE, set_as_default=False), own
+    except (OSError, ValueError) as error:
+        text = " ".join(str(error).split())[:120]
+        raise InputError("--scheduler", address, f"no Dask scheduler answers there ({text})") from None
+    finally:
+        signal.pthread_sigmask(signal.SIG_UNBLOCK, {signal.SIGINT})
+
+
+def _end(client: Any, own: Any, command: str) -> None:
+    """Leaves a cluster, and ends it where it was started here."""
+    with contextlib.suppress(Exception):
+        if client.status == "running" and own is None:
+            client.run(cluster_task.end, command, on_error="ignore")
+        client.close(timeout=_PATIENCE)
+        if own is not None:
+            own.close(timeout=_PATIENCE)
