@@ -112,3 +112,30 @@ def reference(
             out.print()
     if not all(item["met"] for item in (*content["ratios"].values(), content["onsets_per_second"])):
         raise typer.Exit(CONTRADICTED)
+
+
+@bench.command()
+def cluster(
+    scheduler: Annotated[str, typer.Option(help="As of other commands: tcp://…, or local:2.")] = "local:2",
+    cases: Annotated[int, typer.Option(min=1, help="How many cases that compute nothing.")] = 1000,
+    seconds: Annotated[float, typer.Option(min=0.0, help="How long each of them waits [s].")] = 0.0,
+    as_json: Json = False,
+) -> None:
+    """Say what a cluster costs besides its cases: time, memory and store of the command that plans them."""
+    from proofroll_benchmarks.cluster import bench_cluster
+
+    with progress_bar("cases", total=cases) as advance:
+        found = bench_cluster(scheduler, cases, seconds, progress=advance)
+    if as_json:
+        write_json(found)
+        return
+    from proofroll.report.terminal import console
+
+    each = 1e3 * found["processor"] / cases
+    console().print(
+        f"{cases} cases on {found['threads']} threads: {found['wall']:.1f} s, of which {found['processor']:.1f} s of "
+        f"this process ({each:.2g} ms a case), {found['memory']:.0f} MB more than it began with, "
+        f"{found['stored'] / cases:.0f} bytes stored a case."
+    )
+    if found["efficiency"] is not None:
+        console().print(f"Efficiency for cases of {seconds:g} s: {found['efficiency']:.2f} a thread.")

@@ -68,6 +68,12 @@ class Cluster:
         self._threads, self._counted = 0, -_COUNTED
         self._stopped = False
 
+    @property
+    def threads(self) -> int:
+        """How many cases it runs at once, as counted a moment ago."""
+        self._most()
+        return self._threads
+
     def serve(
         self,
         take: Callable[[str | None], Case | None],

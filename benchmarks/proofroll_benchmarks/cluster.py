@@ -1,0 +1,76 @@
+"""What a cluster costs besides its cases: many that compute nothing, planned, sent and stored as any others."""
+
+from __future__ import annotations
+
+import dataclasses
+import resource
+import socket
+import tempfile
+import time
+from collections.abc import Callable, Iterator, Mapping
+from pathlib import Path
+from typing import Any
+
+from proofroll.running.case import Case, EngineFacts, Result, Status
+from proofroll.running.cluster import Cluster
+from proofroll.running.cluster_task import Asked
+from proofroll.running.runner import Runner
+from proofroll.running.store import Store
+
+MB = 1e6
+
+
+def idle(_: Asked, content: dict[str, Any], __: Mapping[str, bytes]) -> tuple[dict[str, Any], None]:
+    """What a worker does for a case here: it waits, and has no processor to share."""
+    time.sleep(content["engine"]["settings"]["seconds"])
+    result = Result(Status.REFUSED, "it computes nothing", versions={"idle": "1"}, host=socket.gethostname())
+    return dataclasses.asdict(result), None
+
+
+def bench_cluster(
+    scheduler: str, cases: int, seconds: float, progress: Callable[[str], None] | None = None
+) -> dict[str, Any]:
+    """Runs cases that only wait, through the runner and into a store.
+
+    Args:
+        scheduler: as of ``--scheduler``.
+        cases: how many.
+        seconds: that each of them waits [s].
+        progress: called after each of them.
+
+    Returns:
+        ``cases``, ``threads`` of the cluster, ``seconds`` of each, ``wall`` and ``processor`` seconds of this process,
+        ``memory`` that it had at most beyond what it began with [MB], ``stored`` bytes, and ``efficiency``: the part of
+        the threads' wall time in which they waited for a case rather than for the next one; None without waiting.
+    """
+    cluster = Cluster(scheduler, idle)
+    with tempfile.TemporaryDirectory() as name:
+        store = Store(Path(name))
+        runner = Runner(store, cluster=cluster)
+        warm = runner.run(_cases(4 * cluster.threads, 0.0, first=-4 * cluster.threads))
+        assert all(result.status is Status.REFUSED for result in warm.values())
+        before, wall, processor = _peak(), time.perf_counter(), time.process_time()
+        runner.run(_cases(cases, seconds), lambda *_: progress("cases") if progress else None)
+        wall, processor = time.perf_counter() - wall, time.process_time() - processor
+        stored = sum(path.stat().st_size for path in Path(name).iterdir())
+    return {
+        "cases": cases,
+        "threads": cluster.threads,
+        "seconds": seconds,
+        "wall": wall,
+        "processor": processor,
+        "memory": _peak() - before,
+        "stored": stored,
+        "efficiency": cases * seconds / (wall * cluster.threads) if seconds else None,
+    }
+
+
+def _cases(count: int, seconds: float, first: int = 0) -> Iterator[Case]:
+    facts = EngineFacts("idle", "1", "none", {"seconds": seconds}, None, None)
+    for number in range(first, first + count):
+        yield Case("sphere_in_cylinder", {"speed": float(number)}, "none", facts, 1.0, 0.1)
+
+
+def _peak() -> float:
+    """Largest memory of this process so far [MB]."""
+    return resource.getrusage(resource.RUSAGE_SELF).ru_maxrss * 1024 / MB
