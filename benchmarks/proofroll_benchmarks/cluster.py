@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import contextlib
 import dataclasses
 import resource
 import socket
@@ -33,7 +34,7 @@ def bench_cluster(
     """Runs cases that only wait, through the runner and into a store.
 
     Args:
-        scheduler: as of ``--scheduler``.
+        scheduler: as of ``--scheduler``; or ``threads``: one in this process, with two threads for workers.
         cases: how many.
         seconds: that each of them waits [s].
         progress: called after each of them.
@@ -43,11 +44,20 @@ def bench_cluster(
         ``memory`` that it had at most beyond what it began with [MB], ``stored`` bytes, and ``efficiency``: the part of
         the threads' wall time in which they waited for a case rather than for the next one; None without waiting.
     """
-    cluster = Cluster(scheduler, idle)
-    with tempfile.TemporaryDirectory() as name:
+    with contextlib.ExitStack() as stack:
+        if scheduler == "threads":
+            from distributed import LocalCluster
+
+            own = stack.enter_context(
+                LocalCluster(n_workers=1, threads_per_worker=2, processes=False, dashboard_address="127.0.0.1:0")
+            )
+            scheduler = own.scheduler_address
+        cluster = Cluster(scheduler, idle)
+        threads = cluster.threads
+        name = stack.enter_context(tempfile.TemporaryDirectory())
         store = Store(Path(name))
         runner = Runner(store, cluster=cluster)
-        warm = runner.run(_cases(4 * cluster.threads, 0.0, first=-4 * cluster.threads))
+        warm = runner.run(_cases(4 * threads, 0.0, first=-4 * threads))
         assert all(result.status is Status.REFUSED for result in warm.values())
         before, wall, processor = _peak(), time.perf_counter(), time.process_time()
         runner.run(_cases(cases, seconds), lambda *_: progress("cases") if progress else None)
@@ -55,13 +65,13 @@ def bench_cluster(
         stored = sum(path.stat().st_size for path in Path(name).iterdir())
     return {
         "cases": cases,
-        "threads": cluster.threads,
+        "threads": threads,
         "seconds": seconds,
         "wall": wall,
         "processor": processor,
         "memory": _peak() - before,
         "stored": stored,
-        "efficiency": cases * seconds / (wall * cluster.threads) if seconds else None,
+        "efficiency": cases * seconds / (wall * threads) if seconds else None,
     }
 
 

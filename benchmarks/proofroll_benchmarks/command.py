@@ -116,7 +116,7 @@ def reference(
 
 @bench.command()
 def cluster(
-    scheduler: Annotated[str, typer.Option(help="As of other commands: tcp://…, or local:2.")] = "local:2",
+    scheduler: Annotated[str, typer.Option(help="As elsewhere: tcp://…, local:2; or threads.")] = "local:2",
     cases: Annotated[int, typer.Option(min=1, help="How many cases that compute nothing.")] = 1000,
     seconds: Annotated[float, typer.Option(min=0.0, help="How long each of them waits [s].")] = 0.0,
     as_json: Json = False,

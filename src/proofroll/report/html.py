@@ -48,7 +48,7 @@ def page(
         "points": [_marked(*pair) for pair in zip(content["comparisons"], curves, strict=True)],
     }
     text = (
-        _templates()
+        templates()
         .get_template("page.html")
         .render(
             content=content,
@@ -91,7 +91,7 @@ def _drawn_rows(comparison: dict[str, Any]) -> list[dict[str, Any]]:
     return [{"name": name, **style} for name, style in zip(labels.names(rows), styles(rows), strict=True)]
 
 
-def _templates() -> jinja2.Environment:
+def templates() -> jinja2.Environment:
     """The templates; everything that is put into them is escaped, save what they mark as ours."""
     import jinja2
 

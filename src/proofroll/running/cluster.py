@@ -34,6 +34,8 @@ from proofroll.running.process import WorkerDied
 # Cases that are sent ahead: one waits at each thread while another runs, and a few more, so that a cluster that grows
 # with its work sees some. No more than these are ever known to the scheduler.
 _AHEAD, _AT_LEAST = 2, 64
+# Results that are fetched together.
+_TOGETHER = 64
 # How often the threads of a cluster are counted, for workers come and go [s].
 _COUNTED = 2.0
 # How long a scheduler may take to answer [s].
@@ -64,7 +66,7 @@ class Cluster:
         self._client, own = _connected(address)
         self._close = weakref.finalize(self, _end, self._client, own, self._asked.command)
         self._room = threading.Condition()
-        self._sent: set[Any] = set()
+        self._sent: dict[Any, Case] = {}
         self._threads, self._counted = 0, -_COUNTED
         self._stopped = False
 
@@ -92,11 +94,11 @@ class Cluster:
         try:
             while self._has_room() and (case := take(engine)) is not None:
                 engine = case.engine.name
-                self._send(
-                    (dataclasses.asdict(case) | {"timed": False}, _files(case)),
-                    partial(self._come, case, arrived, failed),
-                    case.key,
-                )
+                content = dataclasses.asdict(case) | {"timed": False}
+                future = self._submit(self._task, (content, _files(case)), case.key)
+                with self._room:
+                    self._sent[future] = case
+                future.add_done_callback(partial(self._come, arrived, failed))
         except Exception as error:
             failed(self._gone(error))
 
@@ -148,12 +150,6 @@ class Cluster:
             raise self._gone(None)
         return self._client.submit(task, self._asked, *arguments, key=key, pure=False)
 
-    def _send(self, arguments: tuple[Any, ...], come: Callable[[Any], None], name: str) -> None:
-        future = self._submit(self._task, arguments, name)
-        with self._room:
-            self._sent.add(future)
-        future.add_done_callback(come)
-
     def _has_room(self) -> bool:
         """Waits until another case may be sent; False: nothing more is to be."""
         most = self._most()
@@ -168,18 +164,15 @@ class Cluster:
             self._threads, self._counted = sum(self._client.nthreads().values()), time.monotonic()
         return _AHEAD * self._threads + _AT_LEAST
 
-    def _come(
-        self, case: Case, arrived: Callable[[Case, Make], object], failed: Callable[[Exception], None], future: Any
-    ) -> None:
-        """Takes back what a worker sent."""
+    def _come(self, arrived: Callable[[Case, Make], object], failed: Callable[[Exception], None], future: Any) -> None:
+        """Takes back what a worker sent, with whatever else has come by now: to fetch one costs as much as many."""
         with self._room:
-            known = future in self._sent
-            self._sent.discard(future)
+            done = [item for item in self._sent if item.status == "finished"][:_TOGETHER]
+            done = done if future in done or future not in self._sent else [future]
+            cases = [self._sent.pop(item) for item in done]
             self._room.notify()
-        if not known:
-            return
         try:
-            content, data = future.result()
+            found = self._client.gather(done)
         except Exception as error:
             from distributed.scheduler import KilledWorker
 
@@ -187,16 +180,10 @@ class Cluster:
                 failed(self._gone(error))
                 return
             said = f"each of {error.allowed_failures + 1} workers of the cluster that ran it was lost"
-            arrived(case, lambda _: _raise(WorkerDied(Status.CRASHED, said)))
+            arrived(cases[0], lambda _: _raise(WorkerDied(Status.CRASHED, said)))
             return
-
-        def made(path: Path) -> Result:
-            if data is not None:
-                path.write_bytes(data)
-            found = Result.from_dict(content)
-            return dataclasses.replace(found, trajectory=found.trajectory and path.name)
-
-        arrived(case, made)
+        for case, (content, data) in zip(cases, found, strict=True):
+            arrived(case, partial(_made, content, data))
 
     def _gone(self, error: Exception | None) -> ProofrollError:
         """What ends a run, in one line."""
@@ -211,6 +198,14 @@ class Cluster:
 
 def _raise(error: Exception) -> Result:
     raise error
+
+
+def _made(content: dict[str, Any], data: bytes | None, path: Path) -> Result:
+    """Writes the trajectory that a worker sent; the result that came with it."""
+    if data is not None:
+        path.write_bytes(data)
+    found = Result.from_dict(content)
+    return dataclasses.replace(found, trajectory=found.trajectory and path.name)
 
 
 def _files(case: Case) -> dict[str, bytes]:
@@ -245,7 +240,7 @@ def _connected(address: str) -> tuple[Any, Any]:
             own = LocalCluster(
                 n_workers=count,
                 threads_per_worker=1,
-                dashboard_address=None,
+                dashboard_address="127.0.0.1:0",
                 memory_limit=None,
                 silence_logs=logging.CRITICAL + 1,
             )
