@@ -57,7 +57,9 @@ class JointCoordinates:
     def __init__(self, mechanism: Mechanism, rank: int | None = None) -> None:
         for joint in mechanism.joints:
             if joint.friction:
-                raise Refused(f"dry friction in joint {joint.name} switches; no route of the truth follows it")
+                raise Refused(
+                    f"dry friction in joint {joint.name} switches; no route of the truth follows it (a robot file has friction=0)"
+                )
         self.mechanism, self.tree = mechanism, Tree(mechanism)
         self.rank = analysed(mechanism).rank if rank is None else rank
         self._mass = np.array([body.mass for body in mechanism.bodies])

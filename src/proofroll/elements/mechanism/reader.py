@@ -11,29 +11,15 @@ from collections.abc import Mapping
 from dataclasses import MISSING, fields
 from typing import Any
 
-import numpy as np
-
 from proofroll.core.errors import InputError
 from proofroll.elements.mechanism import checks
 from proofroll.elements.mechanism.assembly import assembled, check_start
 from proofroll.elements.mechanism.expressions import substituted
 from proofroll.elements.mechanism.model import Body, Joint, Loop, Mechanism, Point, Spring
-from proofroll.elements.mechanism.parameters import parameter_values
 
 KINDS: dict[str, type[Any]] = {"bodies": Body, "joints": Joint, "loops": Loop, "springs": Spring, "points": Point}
 _TEXTS = ("name", "kind", "parent", "child", "body", "body_a", "body_b")
 _MOST = 10_000  # repetitions: beyond it, a slip of the pen
-
-
-def read_mechanism(content: Mapping[str, Any], /, **given: float) -> Mechanism:
-    """The mechanism of a whole scene file's content, see :func:`made_mechanism`.
-
-    Args:
-        content: the file's tables: parameters, gravity and those of a mechanism; others are left alone.
-        **given: parameters that the user sets.
-    """
-    values = parameter_values(_table(content, "parameters"), given)
-    return made_mechanism(content, _gravity(content, values), values)
 
 
 def made_mechanism(content: Mapping[str, Any], gravity: checks.Vector, values: Mapping[str, float]) -> Mechanism:
@@ -111,26 +97,6 @@ def _flag(field: str, table: Any, key: str) -> bool:
     if not isinstance(value, bool):
         raise InputError(f"{field}.{key}", value, "give true or false")
     return value
-
-
-def _gravity(content: Mapping[str, Any], values: Mapping[str, float]) -> checks.Vector:
-    table = substituted("gravity", dict(_table(content, "gravity")), values)
-    for key in table:
-        if key not in {"magnitude", "direction"}:
-            raise InputError(f"gravity.{key}", table[key], "there is no such key here; remove it")
-    if "magnitude" not in table:
-        raise InputError("gravity.magnitude", "nothing", "this key is required; add it (0 for no gravity)")
-    magnitude = checks.number("gravity.magnitude", table["magnitude"], at_least=0)
-    direction = checks.axis("gravity.direction", table.get("direction", (0.0, 0.0, -1.0)))
-    x, y, z = (float(component) for component in magnitude * np.array(direction))
-    return x, y, z
-
-
-def _table(content: Mapping[str, Any], key: str) -> Mapping[str, Any]:
-    table = content.get(key, {})
-    if not isinstance(table, Mapping):
-        raise InputError(key, table, f"give a table, [{key}]")
-    return table
 
 
 def _tables(content: Mapping[str, Any], key: str) -> list[Any]:

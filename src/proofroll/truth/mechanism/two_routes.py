@@ -18,6 +18,7 @@ from proofroll.elements.mechanism.joint_coordinates import JointCoordinates
 from proofroll.elements.mechanism.model import Mechanism
 from proofroll.elements.mechanism.record import Record, gathered
 from proofroll.elements.mechanism.rotations import Array
+from proofroll.elements.mechanism.singular_poses import singular_poses
 from proofroll.truth.mechanism.closed_forms import ClosedForm, closed_form
 from proofroll.truth.mechanism.maximal_coordinates import MaximalCoordinates
 
@@ -52,7 +53,7 @@ class Truth:
     checked_by: tuple[str, float] | None
 
 
-def find_truth(mechanism: Mechanism, times: Array, tolerance: float = 1e-14) -> Truth:
+def find_truth(mechanism: Mechanism, times: Array, tolerance: float = 1e-15) -> Truth:
     """The truth at the given times.
 
     Args:
@@ -81,7 +82,8 @@ def find_truth(mechanism: Mechanism, times: Array, tolerance: float = 1e-14) -> 
         best = precise if exact is None else _matched(mechanism, one, exact)
     except Diverged as stopped:
         if exact is None:
-            raise Refused(f"no truth to the end: {stopped}; end before it") from None
+            poses = _singular(mechanism, float(times[-1]))
+            raise Refused(f"no truth to the end: {stopped}; end before it{poses}") from None
         one = two = precise = _matched(mechanism, exact, first.run_rk4(times))
         best, routes = exact, ("joint coordinates, RK4",)
     if exact is not None and form is not None:
@@ -103,6 +105,16 @@ def find_truth(mechanism: Mechanism, times: Array, tolerance: float = 1e-14) -> 
     if form is not None and form.motion is None:
         checked = (form.title, float(_largest(form.part(times) - form.same(best)).max()))
     return Truth(masked, bars, differences, horizon, found.determinate, routes, checked)
+
+
+def _singular(mechanism: Mechanism, until: float) -> str:
+    """Where singular poses lie on the way, as a clause; nothing where none is found."""
+    try:
+        found = singular_poses(mechanism, until, min(5e-3, until / 200))
+    except np.linalg.LinAlgError:  # steps of that size do not follow the motion
+        found = []
+    where = ", ".join(f"{time:.4g}" for time in found[:3]) + (", …" if len(found) > 3 else "")
+    return f" (singular poses near t = {where} s)" if found else ""
 
 
 def _apart(one: Record, two: Record) -> Array:

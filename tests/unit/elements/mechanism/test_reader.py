@@ -1,20 +1,25 @@
-import tomllib
+from pathlib import Path
 
 import numpy as np
 import pytest
 
 from proofroll.core.errors import InputError
 from proofroll.elements.mechanism.analysis import analysed
-from proofroll.elements.mechanism.reader import read_mechanism
+from proofroll.files.scene_file import load_scene
 
-SLIDER_CRANK = """
+LENGTH = 'unit = "m"\nsource = "this test"'
+SLIDER_CRANK = f"""
 [parameters.crank]
 value = 0.15
+meaning = "crank"
 above = 0
-below = "$rod"
+below = "rod"
+{LENGTH}
 [parameters.rod]
 value = 0.4
+meaning = "rod"
 above = 0
+{LENGTH}
 [gravity]
 magnitude = 9.81
 direction = [0, -1, 0]
@@ -64,15 +69,21 @@ body_b = "slider"
 """
 
 
-def content(text=SLIDER_CRANK):
-    """The tables of a file."""
-    return tomllib.loads(text)
+@pytest.fixture
+def read(tmp_path: Path):
+    """Reads the mechanism of a scene's file as every command does."""
+
+    def mechanism(text=SLIDER_CRANK, **given):
+        (tmp_path / "scene.toml").write_text(f'title = "a mechanism"\nsource = "this test"\n{text}')
+        return load_scene(str(tmp_path), **given).elements[0].mechanism
+
+    return mechanism
 
 
-def test_dependent_joints_follow_from_the_loops():
+def test_dependent_joints_follow_from_the_loops(read):
     """The slider stands and moves where plane geometry puts it, for any lengths."""
     for crank, rod in ((0.15, 0.4), (0.1, 0.3)):
-        joints = {joint.name: joint for joint in read_mechanism(content(), crank=crank, rod=rod).joints}
+        joints = {joint.name: joint for joint in read(crank=crank, rod=rod).joints}
         angle = np.pi / 4
         tilt = np.arcsin(-crank * np.sin(angle) / rod)
         turning = -crank * np.cos(angle) * 10 / (rod * np.cos(tilt))
@@ -81,23 +92,26 @@ def test_dependent_joints_follow_from_the_loops():
         assert joints["guide"].v0[0] == pytest.approx(speed, abs=1e-13)
 
 
-def test_joints_are_sorted_depth_first():
+def test_joints_are_sorted_depth_first(read):
     """Each joint comes after its parent's and before any other branch, whatever the file's order."""
-    assert [joint.name for joint in read_mechanism(content()).joints] == ["guide", "shaft", "pin"]
+    assert [joint.name for joint in read().joints] == ["guide", "shaft", "pin"]
 
 
-def test_analysis_of_a_planar_loop_closed_by_a_revolute():
+def test_analysis_of_a_planar_loop_closed_by_a_revolute(read):
     """It has one degree of freedom, three redundant rows, and only Fx, Fy, Mz are determinate."""
-    found = analysed(read_mechanism(content()))
+    found = analysed(read())
     assert (found.rows, found.rank, found.redundant, found.mobility, found.singular_start) == (5, 2, 3, 1, False)
     assert (found.determinate == [True, True, False, False, False, True]).all()
 
 
-def test_repeat_writes_tables_with_an_index():
+def test_repeat_writes_tables_with_an_index(read):
     """A chain of n links has n bodies, each joint naming the one before it."""
     text = """
     [parameters.n]
     value = 3
+    unit = "1"
+    meaning = "number of links"
+    source = "this test"
     [gravity]
     magnitude = 1
     [[repeat]]
@@ -115,7 +129,7 @@ def test_repeat_writes_tables_with_an_index():
     parent = "world"
     child = "link0"
     """
-    mechanism = read_mechanism(content(text), n=4)
+    mechanism = read(text, n=4)
     assert [body.name for body in mechanism.bodies] == ["link0", "link1", "link2", "link3", "link4"]
     assert [joint.parent for joint in mechanism.joints] == ["world", "link0", "link1", "link2", "link3"]
     assert mechanism.bodies[3].mass == 3
@@ -196,7 +210,10 @@ BAD = {
     "unknown parameter": (SLIDER_CRANK.replace("$crank", "$lenght"), "no such parameter; choose from crank, rod"),
     "unknown kind": (SLIDER_CRANK.replace('"prismatic"', '"slider"'), "joints.guide.kind.*choose one of fixed"),
     "name used twice": (SLIDER_CRANK.replace('"wrist"', '"pin"'), "used twice"),
-    "out of bounds": (SLIDER_CRANK.replace("value = 0.15", "value = 0.5"), "crank = 0.5: crank must be below 0.4"),
+    "out of bounds": (
+        SLIDER_CRANK.replace("value = 0.15", "value = 0.5"),
+        "crank = 0.5: crank must be below rod = 0.4 m",
+    ),
     "no gravity": (SLIDER_CRANK.replace("[gravity]\nmagnitude = 9.81", "[gravity]"), "gravity.magnitude.*required"),
     "axis where there is none": (
         SLIDER_CRANK + ROD + joint("world", "extra", "spherical", "axis = [1, 0, 0]"),
@@ -210,23 +227,20 @@ BAD = {
 
 
 @pytest.mark.parametrize("name", BAD)
-def test_bad_input_is_one_clear_line(name):
+def test_bad_input_is_one_clear_line(read, name):
     """Each mistake is an InputError of one line that names the field."""
     text, message = BAD[name]
     with pytest.raises(InputError, match=message) as raised:
-        read_mechanism(content(text))
+        read(text)
     assert "\n" not in str(raised.value)
 
 
-def test_inconsistent_velocities_are_refused():
+def test_inconsistent_velocities_are_refused(read):
     """Speeds that would open a loop are refused with the speed at which it opens."""
-    whole = read_mechanism(content())
+    whole = read()
     start = {joint.name: joint.q0[0] for joint in whole.joints}
     text = SLIDER_CRANK.replace("dependent = true", "").replace("q0 = 0.5", f"q0 = {start['guide']!r}")
     text = text.replace("q0 = -1", f"q0 = {start['pin']!r}")
     with pytest.raises(InputError, match=r"loops.wrist = .*v0 opens the loop at 4\.\d+ m/s"):
-        read_mechanism(content(text))
-    assert (
-        read_mechanism(content(text.replace("v0 = 10", "v0 = 0"))).joints
-        == read_mechanism(content(SLIDER_CRANK.replace("v0 = 10", "v0 = 0"))).joints
-    )
+        read(text)
+    assert read(text.replace("v0 = 10", "v0 = 0")).joints == read(SLIDER_CRANK.replace("v0 = 10", "v0 = 0")).joints
