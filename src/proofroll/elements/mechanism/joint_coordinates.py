@@ -58,7 +58,7 @@ class JointCoordinates:
         for joint in mechanism.joints:
             if joint.friction:
                 raise Refused(
-                    f"dry friction in joint {joint.name} switches; no route of the truth follows it (a robot file has friction=0)"
+                    f"dry friction in joint {joint.name} switches; no route follows it (of robots: friction=0)"
                 )
         self.mechanism, self.tree = mechanism, Tree(mechanism)
         self.rank = analysed(mechanism).rank if rank is None else rank
