@@ -56,6 +56,7 @@ class Exudyn:
     }
     lacking: ClassVar[Mapping[str, Mapping[str, str]]] = {
         "generic": {BallCapability.ORIENTATION: "the spin of generic is a quasi-velocity, the rate of no orientation"},
+        "contact": {BallCapability.IMPACTS: "its hollow sphere follows a ball that touches the wall"},
         "carrier": {BallCapability.BOUNDED_FRICTION: "its joint rolls without slip; use generic or contact"},
         "rolling_disc": {BallCapability.BOUNDED_FRICTION: "its joint rolls without slip; use generic or contact"},
         "redundant": redundant.LACKING,

@@ -24,7 +24,7 @@ from proofroll.engines.mujoco.friction import BoundedFriction, check_coefficient
 from proofroll.engines.mujoco.mechanism import MujocoMechanism
 from proofroll.engines.mujoco.model import read_spec, write_physics
 from proofroll.engines.mujoco.running import compiled, forget_callbacks, raise_if_fatal, silent
-from proofroll.engines.mujoco.settings import PRESETS, ROLLS, MujocoSettings, check, velocity_lag
+from proofroll.engines.mujoco.settings import PRESETS, ROLLS, MujocoSettings, check, check_restitution, velocity_lag
 from proofroll.engines.mujoco.softness import softness
 from proofroll.engines.mujoco.start import EVALUATIONS, accelerations, start
 from proofroll.engines.mujoco.terms import TERMS
@@ -73,7 +73,7 @@ class Mujoco:
     oldest: ClassVar[str] = "3.5"  # before, mj_copyData is not there, on which every sample rests
     provides: ClassVar[Mapping[str, frozenset[str]]] = {
         "chart": ALL_OF_A_BALL,
-        "free": ALL_OF_A_BALL | {BallCapability.MOVING_WALL},
+        "free": frozenset(BallCapability),
         "facets": ALL_OF_A_BALL - {BallCapability.BOUNDED_FRICTION, BallCapability.SLIPPING_START},
         "joints": mechanism.PROVIDES,
     }
@@ -82,6 +82,7 @@ class Mujoco:
             BallCapability.BOUNDED_FRICTION: "each edge between two boxes throws the ball off the wall, so facets "
             "cannot tell when it slips"
         },
+        "chart": {BallCapability.IMPACTS: "an impact is one step of damping, which RK4 spreads over stages; use free"},
         "joints": mechanism.LACKING,
     }
     settings: ClassVar[type[Any]] = MujocoSettings
@@ -147,6 +148,8 @@ class Mujoco:
         check(settings, bounded=bounded)
         if bounded:
             check_coefficients(body.contact, settings)
+        if body.flies:
+            check_restitution(settings)
         forget_callbacks()
         spec = read_spec(scene, body, settings.formulation)
         write_physics(spec, body, settings)

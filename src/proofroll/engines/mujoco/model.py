@@ -67,17 +67,30 @@ def write_physics(spec: Any, body: RollingBall, settings: MujocoSettings) -> Non
         geom.solref = [time_constant(settings), 1.0]
         geom.solimp = [*impedance(settings), 0.001, 0.5, 2.0]
     if settings.friction_damping is not None:
-        _write_pair(spec, settings, mu)
+        _write_pair(spec, settings, mu, settings.friction_damping)
+    if body.contact.restitution is not None:
+        _write_restitution(spec, body, settings, mu)
 
 
-def _write_pair(spec: Any, settings: MujocoSettings, mu: float) -> None:
+def _write_restitution(spec: Any, body: RollingBall, settings: MujocoSettings, mu: float) -> None:
+    """An impact as one step of damping in solref's direct format: (1 + e)/dt takes 1 + e times the velocity.
+
+    The stiffness, which the format asks for, is too small to matter.
+    """
+    for geom in spec.geoms:
+        geom.solref = [-1.0, -(1 + (body.contact.restitution or 0.0)) / settings.dt]
+    if settings.cone == "elliptic":
+        _write_pair(spec, settings, mu, 1 + body.contact.tangential_restitution)
+
+
+def _write_pair(spec: Any, settings: MujocoSettings, mu: float, damping: float) -> None:
     """The contact as a pair, in place of the one that MuJoCo finds itself: only a pair has ``solreffriction``."""
     pair = spec.add_pair(geomname1="wall", geomname2="ball", condim=condim(mu, settings))
     sliding, turning, rolling = friction_coefficients(mu, settings)
     pair.friction = [sliding, sliding, turning, rolling, rolling]
     pair.solref, pair.solimp = spec.geom("ball").solref, spec.geom("ball").solimp
     # Stiffness and damping with the sign that marks the direct format; a slip has no position to be stiff about.
-    pair.solreffriction = [-1.0, -(settings.friction_damping or 0.0) / settings.dt]
+    pair.solreffriction = [-1.0, -damping / settings.dt]
 
 
 def pose(element: Any, position: FloatArray, quaternion: FloatArray) -> None:

@@ -9,7 +9,7 @@ from typing import Annotated, Literal
 from annotated_types import Ge, Gt, Le, Lt
 from pydantic import BeforeValidator
 
-from proofroll.core.errors import InputError
+from proofroll.core.errors import InputError, Refused
 
 # What a MuJoCo model has whose author writes nothing: step, friction, solref [s], solimp (dmin, dmax).
 DEFAULT_STEP = 2e-3
@@ -180,6 +180,19 @@ def check(settings: MujocoSettings, *, bounded: bool) -> None:
         # MuJoCo's damping would supply all of J̇v or more of it: nothing is left to add.
         advice = f"curvature=true needs impedance times time_constant above 1, not {1 / share:.4g}"
         raise InputError("mujoco: impedance", impedance(settings)[1], advice)
+
+
+def check_restitution(settings: MujocoSettings) -> None:
+    """Rejects what would make of an impact something else than restitution.
+
+    Raises:
+        Refused: the integrator has stages, or the contact is edited.
+    """
+    if settings.integrator != "Euler" or settings.curvature or settings.cone_correction:
+        raise Refused(
+            "an impact is one step of damping in MuJoCo, which needs integrator=Euler and a contact as MuJoCo has it "
+            "(curvature=false, cone_correction=false)"
+        )
 
 
 def _check_condim(settings: MujocoSettings, bounded: bool) -> None:

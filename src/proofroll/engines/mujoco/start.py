@@ -88,8 +88,8 @@ def start(
                 # plain.
                 data.qacc[:] = (data.qacc - share * before) / (1 - share)
 
-    depth = _TOUCHING * body.ball.radius
-    if settings.start == "settled":
+    depth = 0.0 if body.gap0 else _TOUCHING * body.ball.radius
+    if settings.start == "settled" and not body.flies:
         settled = _settled_depth(model, data, body, evaluate_at)
         # Bounded friction may lift the ball more than the load presses it: then it starts at the surface.
         depth = settled if math.isinf(body.contact.mu_static) else max(settled, depth)

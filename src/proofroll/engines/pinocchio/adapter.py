@@ -31,11 +31,15 @@ class Pinocchio:
     oldest: ClassVar[str] = "3.9"  # the oldest that was tried
     provides: ClassVar[Mapping[str, frozenset[str]]] = {
         "composite": ALL_OF_A_BALL,
-        **dict.fromkeys(("free_flyer", "contact"), ALL_OF_A_BALL | {BallCapability.MOVING_WALL}),
+        "free_flyer": ALL_OF_A_BALL | {BallCapability.MOVING_WALL},
+        "contact": ALL_OF_A_BALL | {BallCapability.MOVING_WALL, BallCapability.IMPACTS},
         "null_space": NullSpace.provides,
         "constraint_dynamics": ConstraintDynamics.provides,
     }
     lacking: ClassVar[Mapping[str, Mapping[str, str]]] = {
+        "composite": {BallCapability.IMPACTS: "its rows hold the ball on the wall; use contact"},
+        "free_flyer": {BallCapability.IMPACTS: "its rows hold the ball on the wall; use contact"},
+        "contact": {BallCapability.TANGENTIAL_RESTITUTION: "Pinocchio's solver has no restitution to be asked for"},
         "null_space": NullSpace.lacking,
         "constraint_dynamics": ConstraintDynamics.lacking,
     }

@@ -28,6 +28,8 @@ UNBOUNDED_FRICTION = {"pgs": 1e6, "admm": 1e2}
 _ON_CONE = 1 - 1e-9
 # A normal impulse smaller than this part of gravity's is round-off of the gap: the wall does not press.
 _FAINT = 1e-9
+# A rebound of less than so many steps of gravity is none: the ball stays on the wall.
+_SOFT = 5.0
 # The moment of rolling resistance follows the normal force, and is found by repetition.
 _REPEATS, _SETTLED = 10, 1e-13
 
@@ -79,6 +81,7 @@ class ContactSteps:
         # Of a ball that rolls: moment per rate of its speed [N s²], and acceleration by gravity [m/s²].
         self._stopping, self._pull = rolls * body.ball.mass * body.ball.radius, (body.gravity / rolls).tolist()
         self._wall_rate, self._radius = body.wall_rate, body.ball.radius
+        self._restitution, self._gravity = body.contact.restitution, body.gravity.tolist()
         self.dt, self.leapfrog = float(settings.dt or 0.0), settings.integrator == "leapfrog"
         self.solver, self.tolerance = settings.solver or "pgs", float(settings.solver_tolerance or 0.0)
         self.contact = PlaneContact(body, self.solver, self.tolerance)
@@ -141,7 +144,7 @@ class ContactSteps:
         to_joints = contact.inverse.dot(jacobian.T)
         delassus = pin.DelassusOperatorDense(jacobian.dot(to_joints))
         # What is added to the velocity of the contact point along e2, -e3 and -e1: that the gap closes within the step.
-        shift2, shift3, shift1 = 0.0, 0.0, gap / self.dt
+        shift2, shift3, shift1 = 0.0, 0.0, self._closing(gap, triad, along)
         if self.leapfrog:
             # What the turning of the normal adds in half a step: a ω × ė1, and the bend of the path.
             _, _, _, x2, y2, z2, x3, y3, z3 = triad
@@ -175,6 +178,21 @@ class ContactSteps:
             if centred:
                 along = (0.5 * (v + after)[:3]).tolist()
         return Kick(after, impulse, found, status)
+
+    def _closing(self, gap: float, triad: Sequence[float], v: Sequence[float]) -> float:
+        """Speed [m/s] with which the ball may come to the wall, at most: that the gap closes within the step.
+
+        Pinocchio's solver has no restitution. Where the ball would reach the wall within the step, it is asked for
+        the velocity after an impact instead; an approach of a few steps of gravity is no impact any more.
+        """
+        x, y, z, *_ = triad
+        vx, vy, vz = v
+        gx, gy, gz = self._gravity
+        approach, pull = x * vx + y * vy + z * vz, x * gx + y * gy + z * gz
+        e = self._restitution
+        if e is None or e * approach <= _SOFT * abs(pull) * self.dt or gap > self.dt * (approach + self.dt * pull):
+            return gap / self.dt
+        return -e * approach
 
     def resistance(
         self, triad: Sequence[float], v: Sequence[float], normal_force: float, span: float = 0.0

@@ -44,7 +44,11 @@ class Projection:
         "rotating_frame": ALL_OF_A_BALL | {BallCapability.MOVING_WALL},
         "dependent": mechanism.PROVIDES,
     }
-    lacking: ClassVar[Mapping[str, Mapping[str, str]]] = {"dependent": mechanism.LACKING}
+    lacking: ClassVar[Mapping[str, Mapping[str, str]]] = {
+        "euler": {BallCapability.IMPACTS: "its constraint holds the ball on the wall"},
+        "rotating_frame": {BallCapability.IMPACTS: "its constraint holds the ball on the wall"},
+        "dependent": mechanism.LACKING,
+    }
     settings: ClassVar[type[ProjectionSettings]] = ProjectionSettings
     presets: ClassVar[Mapping[str, Mapping[str, ProjectionSettings]]] = PRESETS
     levels: ClassVar[Mapping[str, Level]] = {

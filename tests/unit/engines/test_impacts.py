@@ -1,0 +1,45 @@
+"""Restitution in the engines that can be asked for it."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from proofroll.core.errors import Refused
+from proofroll.files.scene_file import load_scene
+from proofroll.running.simulation import simulate
+
+
+@pytest.mark.parametrize("e", [0.5, 0.8])
+@pytest.mark.parametrize(
+    ("engine", "off"),
+    [
+        ("pinocchio[formulation=contact]", 1e-2),
+        ("pinocchio[formulation=contact,preset=default]", 1e-2),
+        ("mujoco[formulation=free]", 1e-2),
+        ("mujoco[formulation=free,dt=1e-4]", 1e-3),
+    ],
+)
+def test_height_after_each_impact(engine: str, off: float, e: float) -> None:
+    """The ball is where the truth says in the first flights, to what a step leaves, and rests in the end."""
+    scene = load_scene("bouncing_ball", restitution=e, height=0.3)
+    until = 2.6
+    true, found = (simulate(scene, name, until=until, every=0.02) for name in ("truth", engine))
+    np.testing.assert_allclose(found["gap"], true["gap"], rtol=0, atol=off)
+    assert float(np.max(np.abs(found["v_WB"][-5:]))) < 1e-3
+
+
+@pytest.mark.parametrize(
+    ("engine", "said"),
+    [
+        ("projection", "impacts on the wall"),
+        ("exudyn[formulation=contact]", "follows a ball that touches the wall"),
+        ("mujoco[formulation=chart]", "use free"),
+        ("mujoco[formulation=free,preset=tuned]", "integrator=Euler"),
+        ("pinocchio[formulation=free_flyer]", "use contact"),
+    ],
+)
+def test_who_cannot_let_a_ball_land_says_so(engine: str, said: str) -> None:
+    """A formulation without restitution refuses, and says what to take or why."""
+    with pytest.raises(Refused, match=said):
+        simulate(load_scene("bouncing_ball"), engine, until=0.1, every=0.05)
