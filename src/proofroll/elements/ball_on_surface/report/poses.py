@@ -30,7 +30,7 @@ NEEDED = (
 _SUBSTEPS = 4
 
 SLIPS, STICKS, AWAY = 0, 1, 2
-_AFTER = {"slip": SLIPS, "stick": STICKS, "lift_off": AWAY}
+_AFTER = {"slip": SLIPS, "stick": STICKS, "lift_off": AWAY, "bounce": AWAY, "settle": STICKS}
 
 
 @dataclass(frozen=True)
