@@ -49,7 +49,7 @@ def versions(
 
     Environments that are missing are made, as by `proofroll engines add`. Speed never decides the exit code.
     """
-    from proofroll.report.versions_content import lines, page, robot_table, table
+    from proofroll.report.versions_content import heading, lines, page, robot_table, table
 
     readers = {point.name: point for point in entry_points(group=SUBJECTS)}
     robot = readers.get(Path(subject).suffix.removeprefix("."))
@@ -77,6 +77,7 @@ def versions(
 
         terminal = console()
         terminal.width = min(terminal.width, 80)
+        terminal.print(heading(content), markup=False)
         terminal.print(table(content) if robot is None else robot_table(content))
         for line in lines(content):
             terminal.print(line, markup=False)

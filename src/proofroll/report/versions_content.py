@@ -70,7 +70,7 @@ def speed_text(row: Mapping[str, Any]) -> str:
 
 def table(content: Mapping[str, Any]) -> Table:
     """One line for each setting of each comparison."""
-    made = Table(title=Text(heading(content)), title_justify="left", box=None, padding=(0, 1, 0, 0))
+    made = Table(box=None, padding=(0, 1, 0, 0))
     made.add_column("setting", overflow="fold", min_width=16)
     made.add_column("verdicts")
     made.add_column("numbers", justify="right")
@@ -90,7 +90,7 @@ def table(content: Mapping[str, Any]) -> Table:
 
 def robot_table(content: Mapping[str, Any]) -> Table:
     """One line for each layer of a robot's check."""
-    made = Table(title=Text(heading(content)), title_justify="left", box=None, padding=(0, 1, 0, 0))
+    made = Table(box=None, padding=(0, 1, 0, 0))
     for column in ("layer", content["old"]["version"], content["new"]["version"]):
         made.add_column(str(column))
     for layer in content["robot"]["layers"]:

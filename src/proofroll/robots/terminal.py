@@ -42,7 +42,9 @@ def table(content: dict[str, Any]) -> Table:
         made.add_column(SHORT[layer], justify="right", no_wrap=True)
     for row in content["engines"]:
         style = _COLOURS.get(row["status"], "bold red")
-        label = Text(one_line(f"{row['engine']} {row['version'] or ''}"), overflow="ellipsis")
+        # A path would fill the column, and the version says which it is.
+        name = row["engine"].partition("@")[0] if "/" in row["engine"] else row["engine"]
+        label = Text(one_line(f"{name} {row['version'] or ''}"), overflow="ellipsis")
         cells = (_cell(row["layers"].get(layer)) for layer in content["layers"])
         made.add_row(label, Text(_MARKS.get(row["status"], "!"), style=style), *cells)
     return made
