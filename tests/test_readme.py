@@ -57,7 +57,7 @@ def commands(program: str) -> list[str]:
 
 
 # Makes what a command does take less long: a shorter run, or one of the engines that tests/agreement runs all.
-SHORTER = {"recommend": ["--until", "0.2"], "ladder": ["--until", "0.2"], "compare": ["--engine", "projection"]}
+SHORTER = {"recommend": ["--until", "0.2"], "ladder": ["--until", "0.05"], "compare": ["--engine", "projection"]}
 
 
 @pytest.mark.slow

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import time
 from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import Annotated, Any, ClassVar, Literal, Self
@@ -89,3 +90,14 @@ class Tiny:
             acceleration=initial_response(self.body)[0],
             terms=frozenset({BallCapability.ROLLING_RESISTANCE} if self.resists else ()),
         )
+
+
+class Sleepy(Tiny):
+    """Takes as long for a simulated second as a second lasts."""
+
+    name: ClassVar[str] = "sleepy"
+
+    def advance(self, t: float) -> None:
+        """See :class:`proofroll.core.engine.Engine`."""
+        time.sleep(max(t - self.t, 0.0))
+        super().advance(t)

@@ -15,6 +15,7 @@ from proofroll.studies.stability_claims import STUDY, Claim, StabilityFile, file
 if TYPE_CHECKING:
     from proofroll.report.study_parts import Tell
     from proofroll.running.runner import Runner
+    from proofroll.studies.axes import Axis
 
 
 @dataclass
@@ -61,12 +62,12 @@ class StabilityPart:
         }  # fmt: skip
 
     def keeps(self, out: Path) -> bool:
-        """The whole map, or else a quick one."""
+        """The whole map, or else a quick one, of all axes if there is."""
         from proofroll.studies.stability_places import QUICK, Effort
         from proofroll.studies.study_store import kept, stability_path
 
-        for effort in (Effort(), QUICK):
-            path = stability_path(out, self.asked, self.asked.axes, self.engines, effort)
+        for effort, axes in ((Effort(), self.asked.axes), (QUICK, self.asked.axes), (QUICK, self._quick_axes)):
+            path = stability_path(out, self.asked, axes, self.engines, effort)
             self.study, _ = kept(path)
             if self.study is not None:
                 self.folder = _programs(path)
@@ -79,9 +80,14 @@ class StabilityPart:
         from proofroll.studies.study_store import make_stability
 
         self.study, path = make_stability(
-            self.asked, self.asked.axes, runner, out, engines=self.engines, effort=QUICK, progress=tell
+            self.asked, self._quick_axes, runner, out, engines=self.engines, effort=QUICK, progress=tell
         )
         self.folder = _programs(path)
+
+    @property
+    def _quick_axes(self) -> list[Axis]:
+        """Those on which something should happen."""
+        return [axis for axis in self.asked.axes if not axis.scale_free]
 
     def content(self) -> dict[str, Any]:
         """The map, the worst of what nobody is told, and what was claimed."""
@@ -89,6 +95,7 @@ class StabilityPart:
 
         study = self.study
         assert study is not None  # it was made
+        mapped = {axis["name"] for axis in study["axes"]}
         claims, contradictions = [], []
         for claim in () if self.engines else self.asked.claims:
             against = claim.contradictions(study["points"])
@@ -111,6 +118,7 @@ class StabilityPart:
             "study": {**study, "points": points},
             "silent": list(silent_lines(study)),
             "claims": claims,
+            "left_out": [axis.name for axis in self.asked.axes if axis.name not in mapped],
             "contradictions": contradictions,
             "lost": [] if study["points"] else [f"{name}: {reason}" for name, reason in study["absent"].items()],
         }

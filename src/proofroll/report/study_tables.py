@@ -82,7 +82,7 @@ def effort(study: Mapping[str, Any]) -> str:
     said = ""
     if study.get("brief"):
         said = (
-            "Speeds were measured briefly, three times at most and those of long runs once, and the finest steps were "
+            "Speeds were measured briefly, twice at most and those of long runs once, and the finest steps were "
             "left out: they contradict no claim. "
         )
     over = ", ".join(f"{name} {min(values):g} to {max(values):g}" for name, values in study["over"].items())

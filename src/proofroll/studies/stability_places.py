@@ -54,7 +54,7 @@ class Effort:
 
 
 # Most of a map's time is spent on the longest runs and on engines that no affordable step makes accurate.
-QUICK = Effort(values=3, steps=10_000, limit=3.0, longest=10.0, matched=True)
+QUICK = Effort(values=3, steps=2_500, limit=3.0, longest=10.0, matched=True)
 
 
 @dataclass

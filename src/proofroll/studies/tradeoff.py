@@ -25,10 +25,10 @@ from proofroll.studies.pareto import envelope, front
 from proofroll.studies.reference import Reference
 from proofroll.studies.sweep import FINER, Curve, Point, Question, case_of, cases_of, curves_of, judged, sweep
 
-# What makes up most of a study's time is the repetition of measurements. A brief one repeats less: in three rounds an
-# outlier does not decide the median; a run longer than this [s] warms itself up, and is measured once.
+# What makes up most of a study's time is the repetition of measurements. A brief one repeats less: two rounds
+# show how far a cost can be trusted; a run longer than this [s] warms itself up, and is measured once.
 # A shorter measurement scatters more, which the interval of the rounds shows.
-BRIEF_ROUNDS, BRIEF_ONCE, BRIEF_SECONDS = 3, 0.5, 0.02
+BRIEF_ROUNDS, BRIEF_ONCE, BRIEF_SECONDS = 2, 0.1, 0.02
 # The finest steps take as long as all others together, and tell little of a choice: at most this part of an interval.
 BRIEF_FINER = tuple(part for part in FINER if part >= 1e-3)
 

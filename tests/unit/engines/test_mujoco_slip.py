@@ -55,16 +55,12 @@ def assert_events(case: str, engine: str, within: float) -> None:
 @pytest.mark.parametrize(
     ("case", "engine", "bound"),
     [
-        ("blajer", "formulation=chart,preset=tuned", 4e-4),
         ("blajer", "formulation=free,preset=tuned", 2e-4),
-        ("blajer", "formulation=chart,preset=tuned,dt=2.5e-4", 2e-4),
         ("blajer", "formulation=free,preset=tuned,dt=2.5e-4", 3e-4),
-        ("kinetic", "formulation=chart,preset=tuned", 1e-3),
         ("kinetic", "formulation=free,preset=tuned", 1e-2),
         ("slow", "formulation=chart,preset=tuned", 5e-5),
         ("slow, resisted", "formulation=free,preset=tuned", 1e-4),
         ("falls", "formulation=chart,preset=tuned", 1e-3),
-        ("falls", "formulation=free,preset=tuned", 7e-3),
     ],
 )
 def test_events_and_fall_with_the_correction(case: str, engine: str, bound: float) -> None:

@@ -20,8 +20,6 @@ from proofroll.running.runner import Runner, WorkerDied, describe, resolve, run_
 from proofroll.running.store import Store
 from proofroll.studies.run_once import single_case
 
-pytestmark = pytest.mark.own_workers
-
 MakeCase = Callable[..., Case]
 
 
@@ -285,6 +283,7 @@ def test_resolve_gives_each_answer_in_its_place() -> None:
     assert found[0].resolution == "dt"
 
 
+@pytest.mark.own_workers
 def test_code_hash_follows_the_adapter(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     """A change in the adapter's file changes the hash, so that no stored result outlives it."""
     text = Path(__file__).parents[2].joinpath("plugins", "hostile.py").read_text(encoding="utf-8")

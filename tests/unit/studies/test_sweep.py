@@ -13,7 +13,7 @@ from proofroll.running.runner import Runner
 from proofroll.running.store import Store
 from proofroll.studies.sweep import BROKEN, Curve, Point, Question, _further, curves_of, sweep
 
-QUESTION = Question("sphere_in_cylinder", {"speed": 3.0}, 0.4, "z")
+QUESTION = Question("sphere_in_cylinder", {"speed": 3.0}, 0.2, "z")
 
 
 @pytest.fixture(scope="module")

@@ -119,14 +119,14 @@ def test_rate_audit_sees_an_orientation_of_its_own() -> None:
     """An orientation that turns by 1 % less than ω says shows as 1 % of the radius times ω, several turns a second."""
     scene = load_scene("sphere_in_cylinder")
     motion = reduced(rolling_ball(scene), TIMES)
-    fine = np.linspace(0, TIMES[-1], 64 * (len(TIMES) - 1) + 1)
+    fine = np.linspace(0, TIMES[-1], 40 * (len(TIMES) - 1) + 1)
     spin = reduced(rolling_ball(scene), np.linspace(0, TIMES[-1], 2 * len(fine) - 1)).w_WB[1::2]  # at the middles
 
     def audited(factor: float) -> float:
         attitude, found = Rotation.identity(), [Rotation.identity()]
         for index, (h, w) in enumerate(zip(np.diff(fine), spin, strict=True), 1):
             attitude = Rotation.from_rotvec(factor * h * w) * attitude
-            if index % 64 == 0:
+            if index % 40 == 0:
                 found.append(attitude)
         q = np.array([one.as_quat(scalar_first=True) for one in found])
         return largest(
