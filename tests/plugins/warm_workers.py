@@ -56,9 +56,13 @@ class WarmWorkers:
             yield
 
     def _take(self, place: _Place) -> Worker | None:
-        with self._lock:
-            index = next((index for index, (where, _) in enumerate(self._idle) if where == place), None)
-            return None if index is None else self._idle.pop(index)[1]
+        while True:
+            with self._lock:
+                index = next((index for index, (where, _) in enumerate(self._idle) if where == place), None)
+                worker = None if index is None else self._idle.pop(index)[1]
+            if worker is None or not worker._ended():
+                return worker
+            worker.close()  # a test of what an interrupt does ended all workers of this process, these among them
 
     def _keep(self, engine: str, worker: Worker) -> None:
         place = self._began.get(worker)

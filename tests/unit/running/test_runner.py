@@ -2,6 +2,7 @@ from __future__ import annotations
 
 import dataclasses
 import json
+import os
 import shutil
 import statistics
 import subprocess
@@ -287,7 +288,7 @@ def test_resolve_gives_each_answer_in_its_place() -> None:
 def test_code_hash_follows_the_adapter(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     """A change in the adapter's file changes the hash, so that no stored result outlives it."""
     text = Path(__file__).parents[2].joinpath("plugins", "hostile.py").read_text(encoding="utf-8")
-    monkeypatch.setenv("PYTHONPATH", f"{tmp_path}:{tmp_path / 'site'}")
+    monkeypatch.setenv("PYTHONPATH", f"{tmp_path}{os.pathsep}{os.environ['PYTHONPATH']}")
     hashes = []
     for content in (text, text + "\n# changed\n"):
         (tmp_path / "hostile.py").write_text(content, encoding="utf-8")
