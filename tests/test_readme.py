@@ -15,6 +15,7 @@ from pathlib import Path
 
 import pytest
 from PIL import Image
+from robot_templates import urdf
 
 from proofroll.core.plugins import parse_engine
 from proofroll.files.comparison_file import load_comparison
@@ -69,6 +70,7 @@ def test_a_command_of_the_readme_works(
     words = shlex.split(line)[1:]
     words = [str(ROOT / word) if word.startswith("comparisons/") else word for word in words]
     monkeypatch.chdir(tmp_path)
+    (tmp_path / "ROBOT.urdf").write_text(urdf(), encoding="utf-8")
     code, out, err = proofroll(*words, *SHORTER.get(words[0], []))
     assert code == 0, err
     assert out
