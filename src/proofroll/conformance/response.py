@@ -9,6 +9,7 @@ from unittest import SkipTest
 
 import numpy as np
 
+from proofroll.conformance.explaining import explained
 from proofroll.conformance.subject import Subject, require
 from proofroll.core.arrays import FloatArray
 from proofroll.core.certificate import first_difference
@@ -48,7 +49,7 @@ def first_steps_fit_the_scene(subject: Subject) -> None:
     if not lines:
         raise SkipTest("its contact is so soft that its springs move first; the run against the truth judges it")
     difference = first_difference([dataclasses.replace(line, tolerance=min(line.tolerance, MOST)) for line in lines])
-    require(difference is None, str(difference))
+    require(difference is None, explained(subject, str(difference)) if difference else "")
 
 
 def moves_as_the_truth(subject: Subject) -> None:
@@ -69,10 +70,8 @@ def moves_as_the_truth(subject: Subject) -> None:
         # The speed may be many times what gravity adds to it; a tolerance is relative to it.
         rough = max(_ROUND_OFF, 10 * subject.closeness)
         allowed = min(_MOST, _MARGIN * change + soft + rough)
-        require(
-            error <= allowed,
-            f"{name} is off by {error:.2g} of what gravity makes of it in {times[-1]:.2g} s, allowed {allowed:.2g}",
-        )
+        off = f"{name} is off by {error:.2g} of what gravity makes of it in {times[-1]:.2g} s, allowed {allowed:.2g}"
+        require(error <= allowed, off if error <= allowed else explained(subject, off))
 
 
 def _moved(subject: Subject, times: FloatArray, true: xr.Dataset) -> dict[str, FloatArray]:

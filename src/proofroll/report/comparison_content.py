@@ -95,6 +95,7 @@ def _row(runs: list[Run]) -> dict[str, Any]:
         "shared": next((run.shared for run in runs if run.shared), ""),
         "missing": sorted({name for run in runs for name in run.missing}),
         "remarks": _remarks(runs),
+        "diagnosis": _diagnosis(runs),
         "expected": first.row.expect,
         "expected_for": first.row.expect_for,
         "because": first.row.because,
@@ -135,6 +136,16 @@ def _remarks(runs: list[Run]) -> list[str]:
         where = f" at {point_name(run.parameters)}" if run.parameters else ""
         found += [f"{item.observable}{where}: {remark}" for remark in item.remarks]
     return found
+
+
+def _diagnosis(runs: list[Run]) -> list[dict[str, Any]]:
+    """The causes that were proven at some point of the parameters, each told once, with the points."""
+    found: dict[str, dict[str, Any]] = {}
+    for run in runs:
+        for item in run.diagnosis:
+            told = found.setdefault(item.cause.id, {**item.as_dict(), "points": []})
+            told["points"].append(point_name(run.parameters))
+    return list(found.values())
 
 
 def _furthest(judged: list[tuple[Run, Judgement | None]]) -> tuple[Run, Judgement | None]:
@@ -201,6 +212,7 @@ def _run(run: Run) -> dict[str, Any]:
         "contradictions": run.contradictions,
         "missing": run.missing,
         "shared": run.shared,
+        "diagnosis": [item.as_dict() for item in run.diagnosis],
         "judgements": [dataclasses.asdict(judgement) for judgement in run.judgements],
         "certificate": run.result.certificate,
         "seconds_per_second": run.result.seconds_per_second,

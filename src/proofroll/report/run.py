@@ -7,8 +7,10 @@ from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
 
+from proofroll.core.diagnosis.of_scene import diagnosed
 from proofroll.core.events import events_of
 from proofroll.files.netcdf import read
+from proofroll.files.scene_file import load_scene
 from proofroll.running.case import Case, Result
 
 _EVENTS = 8  # of so many the terminal tells; the JSON document has all
@@ -34,7 +36,11 @@ def run_content(case: Case, result: Result, trajectory: Path) -> dict[str, Any]:
         "wall_seconds": result.wall_seconds,
         "versions": result.versions,
         "certificate": result.certificate,
+        "diagnosis": [],
     }
+    if result.trajectory is None and result.certificate:
+        scene = load_scene(case.scene, asks=case.asks, **case.parameters)
+        content["diagnosis"] = [item.as_dict() for item in diagnosed(scene, result.certificate)]
     if result.trajectory is None:
         return content
     dataset = read(trajectory)
@@ -65,6 +71,7 @@ def run_lines(content: dict[str, Any]) -> list[Any]:
     settings = ", ".join(f"{key}={value}" for key, value in content["settings"].items())
     lines: list[Any] = [Text(f"{content['scene']} in {content['engine']}" + (f" ({settings})" if settings else ""))]
     lines.append(Text(f"{content['status']}: {content['message']}"))
+    lines += [Text(f"  {cause['sentence']}") for cause in content["diagnosis"]]
     if not content["final"]:
         return lines
     bars = content.get("error_bars", {})

@@ -203,6 +203,12 @@ def _head(row: dict[str, Any]) -> dict[str, Any]:
     return {"engine": row["engine"], "name": row["name"], "setting": setting(row), "step": step(row)}
 
 
+def causes(content: dict[str, Any]) -> list[tuple[str, str, str]]:
+    """Name of each row with a proven cause of its difference, the cause, and what to do."""
+    shown = zip(names(content["rows"]), content["rows"], strict=True)
+    return [(name, cause["sentence"], cause["remedy"]) for name, row in shown for cause in row["diagnosis"]]
+
+
 def remarks(content: dict[str, Any]) -> list[tuple[str, str]]:
     """What was remarked of each row, with its name."""
     shown = names(content["rows"])

@@ -101,7 +101,9 @@ def closing_lines(content: dict[str, Any]) -> list[str]:
     said = ", ".join(f"{count} {verdict}" for verdict, count in counts.items() if count)
     lines = [f"{len(rows)} engine settings, {len(content['runs'])} runs in all: {said}."]
     shown = list(zip(names(rows), rows, strict=True))
-    lines += [f"{SYMBOLS[row['verdict']]} {name}: {row['reason']}" for name, row in shown if row["reason"]]
+    for name, row in shown:
+        lines += [f"{SYMBOLS[row['verdict']]} {name}: {row['reason']}"] if row["reason"] else []
+        lines += [f"  {cause['sentence']}" for cause in row["diagnosis"]]
     lines += [f"* {name}: {remark}" for name, row in shown for remark in row["remarks"]]
     if content["contradictions"]:
         lines.append(

@@ -32,6 +32,7 @@ ASIDE = frozenset(
         "regimes_study",
         "commands",
         "failure_program",
+        "diagnosis",
     }
 )
 

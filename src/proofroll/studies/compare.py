@@ -11,6 +11,7 @@ import numpy as np
 from proofroll.core.arrays import FloatArray
 from proofroll.core.comparison import Band, Comparison, Row
 from proofroll.core.convergence import Limit, richardson, tightest
+from proofroll.core.diagnosis.of_scene import Diagnosis, diagnosed
 from proofroll.core.errors import Missing, ProofrollError
 from proofroll.core.verdict import Judgement, Verdict, judge
 from proofroll.files.netcdf import read
@@ -50,6 +51,7 @@ class Run:
         case: the run's case, or None.
         missing: observables that the claim's tolerances judge and the run does not give.
         shared: which route of the truth rests on the same equations, as a clause; empty if none does.
+        diagnosis: causes of a difference that are proven.
     """
 
     row: Row
@@ -61,6 +63,7 @@ class Run:
     case: Case | None = None
     missing: list[str] = field(default_factory=list)
     shared: str = ""
+    diagnosis: list[Diagnosis] = field(default_factory=list)
 
     @property
     def verdict(self) -> Verdict:
@@ -132,9 +135,18 @@ def evaluate(planned: Plan, results: dict[str, Result], runner: Runner) -> Outco
         missing = sorted({*band.bounds, *run.row.bound} - {judgement.observable for judgement in judgements})
         contradictions = _contradictions(comparison, run, judgements, missing)
         shared = references[name].shared(run.facts.shares)
-        judged.append(
-            Run(run.row, run.parameters, run.facts, result, judgements, contradictions, main, missing, shared)
-        )
+        found = Run(run.row, run.parameters, run.facts, result, judgements, contradictions, main, missing, shared)
+        if found.verdict == Verdict.DIFFERS:
+            causes = diagnosed(
+                references[name].scene,
+                result.certificate,
+                trajectories[1.0],
+                references[name].dataset,
+                _step(run.facts),
+                judgements,
+            )
+            found = replace(found, diagnosis=causes)
+        judged.append(found)
     return Outcome(comparison, judged, planned.truths)
 
 
@@ -163,7 +175,10 @@ def _absent(run: Planned) -> Run:
 def _failed(run: Planned, facts: EngineFacts, result: Result) -> Run:
     expected = Verdict.FAILED in run.row.expected(run.parameters)
     sentence = f"{run.row.engine} at {point_name(run.parameters)} {result.status}: {result.message}"
-    return Run(run.row, run.parameters, facts, result, [], [] if expected else [sentence], run.ladder[1.0])
+    scene = load_scene(run.ladder[1.0].scene, **run.parameters)
+    causes = diagnosed(scene, result.certificate, step=_step(facts))
+    said = [] if expected else [sentence]
+    return Run(run.row, run.parameters, facts, result, [], said, run.ladder[1.0], diagnosis=causes)
 
 
 def _without_truth(run: Planned, facts: EngineFacts, result: Result, truth: Result) -> Run:
@@ -235,6 +250,11 @@ def _lost(run: Planned, results: dict[str, Result]) -> str:
         if result.status != Status.DONE and name is not None:
             return f"{name} {case.engine.settings[name]:g} {result.status}: {result.message}"
     return ""
+
+
+def _step(facts: EngineFacts) -> float | None:
+    """The step of an engine with a fixed one [s], or None."""
+    return float(facts.settings["dt"]) if facts.resolution == "dt" else None
 
 
 def _has_ladder(run: Planned, curve: FloatArray) -> bool:

@@ -40,3 +40,26 @@ def faults(as_json: Json = False) -> None:
         sys.stdout.flush()
         os._exit(CONTRADICTED)
     raise typer.Exit(OK if contained == len(rows) else CONTRADICTED)
+
+
+@drill.command()
+def mutants(as_json: Json = False) -> None:
+    """Run engines with one planted fault each; exit 1 unless all are detected and nine of ten named."""
+    import dataclasses
+
+    from proofroll_drill.mutants.drilling import ENOUGH, mutant_drill
+    from proofroll_drill.mutants.drilling import mutants as all_mutants
+
+    with progress_bar("mutants", total=len(all_mutants())) as advance:
+        rows = list(mutant_drill(advance))
+    detected, named = sum(row.detected for row in rows), sum(row.named for row in rows)
+    if as_json:
+        content = [dataclasses.asdict(row) for row in rows]
+        write_json({"tried": len(rows), "detected": detected, "named": named, "mutants": content})
+    else:
+        from proofroll.report.terminal import console
+        from proofroll_drill.table import mutant_table
+
+        console().print(mutant_table(rows))
+        console().print(f"{len(rows)} mutants tried, {detected} detected, {named} named.")
+    raise typer.Exit(OK if detected == len(rows) and named >= ENOUGH * len(rows) else CONTRADICTED)

@@ -7,6 +7,7 @@ from collections.abc import Sequence
 from rich.table import Table
 from rich.text import Text
 
+from proofroll_drill.mutants.drilling import Mutated
 from proofroll_drill.row import Drilled
 
 
@@ -27,4 +28,19 @@ def drill_table(rows: Sequence[Drilled]) -> Table:
             f"{row.recomputed}/{row.missing}",
             Text(row.said if row.contained else f"{row.said} ({row.problem})", overflow="fold"),
         )
+    return table
+
+
+def mutant_table(rows: Sequence[Mutated]) -> Table:
+    """One line per mutant: whether it was detected, whether its fault was named, and what the diagnosis says."""
+    table = Table(box=None, padding=(0, 1, 0, 0))
+    table.add_column("planted")
+    table.add_column("detected", no_wrap=True)
+    table.add_column("named", no_wrap=True)
+    table.add_column("diagnosis")
+    for row in rows:
+        marks = [
+            Text("yes", style="green") if yes else Text("NO", style="bold red") for yes in (row.detected, row.named)
+        ]
+        table.add_row(row.fault, *marks, Text(row.said or f"nothing proven; {row.by}", overflow="fold"))
     return table

@@ -20,6 +20,8 @@ from proofroll.elements.ball_on_surface.surfaces.catalogue import surface_kinds
 from proofroll.files.validation import strict, units_of, validated
 
 if TYPE_CHECKING:
+    from proofroll.core.diagnosis import Hypothesis
+
     AnySurface = Surface
 else:
     AnySurface = Union[surface_kinds()]  # noqa: UP007 -- of a tuple
@@ -102,6 +104,13 @@ class BallOnSurfaceKind:
             "slow": _turned(scenes["cylinder-resisting"], -1.0, 0.05, velocity=(1.2, 0.2), spin=5.0),
             "fast": _turned(scenes["cylinder"], 2.0, -0.2, velocity=(4.5, -0.7)),
         }
+
+    @staticmethod
+    def hypotheses() -> Sequence[Hypothesis]:
+        """See :class:`proofroll.core.diagnosis.ExplainsRuns`."""
+        from proofroll.elements.ball_on_surface.diagnosis import HYPOTHESES
+
+        return HYPOTHESES
 
 
 def _turned(scene: Scene, gamma: float, tilt: float, **motion: Any) -> Scene:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from typing import Any, ClassVar
+from typing import TYPE_CHECKING, Any, ClassVar
 
 from proofroll.core.errors import InputError
 from proofroll.core.gravity import Gravity
@@ -11,6 +11,9 @@ from proofroll.core.numbers import Numbers
 from proofroll.core.scene import Scene
 from proofroll.elements.mechanism.element import MechanismElement
 from proofroll.elements.mechanism.reader import made_mechanism
+
+if TYPE_CHECKING:
+    from proofroll.core.diagnosis import Hypothesis
 
 
 class MechanismKind:
@@ -59,3 +62,10 @@ class MechanismKind:
         from proofroll.files.scene_file import load_scene
 
         return {name: load_scene(name) for name in ("slider_crank", "heavy_top", "oscillators")}
+
+    @staticmethod
+    def hypotheses() -> Sequence[Hypothesis]:
+        """See :class:`proofroll.core.diagnosis.ExplainsRuns`."""
+        from proofroll.elements.mechanism.diagnosis import HYPOTHESES
+
+        return HYPOTHESES

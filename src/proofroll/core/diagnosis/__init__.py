@@ -1,0 +1,161 @@
+"""Why a run is not the scene's motion: hypotheses, each proven by what it leaves of the difference.
+
+A kind of element brings its hypotheses (:class:`ExplainsRuns`). Each looks at a run, its truth and its certificate, and
+says what the difference would be if the engine did one thing otherwise. It is named only where that closes the
+difference; what nobody can prove is not said.
+"""
+
+from __future__ import annotations
+
+import dataclasses
+from collections.abc import Iterable, Mapping, Sequence
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, Any, Protocol, runtime_checkable
+
+import numpy as np
+
+from proofroll.core.element import Element
+
+if TYPE_CHECKING:
+    import xarray as xr
+
+# A hypothesis has to leave no more than this part of a difference. One number that is fitted to a curve of many samples
+# takes away the part of it that is alike by chance: to leave a twentieth, 99.75 % of the squares have to be alike.
+CLOSES = 1 / 20
+# A difference below this part of the quantity's size says nothing about causes: the truth's samples, between which a
+# spline is laid, know themselves no better.
+_LEAST = 1e-7
+# At time 0 both sides are exact numbers: what is left of a difference is round-off.
+CLOSES_EXACTLY = 1e-6
+_AS_GOOD = 3.0
+_ALTERNATIVES = 2
+
+
+@dataclass(frozen=True)
+class Evidence:
+    """What there is to explain.
+
+    Attributes:
+        element: what was to be simulated.
+        lines: of the certificate (:meth:`proofroll.core.certificate.Line.as_dict`).
+        run, truth: the element's variables, at the same times; None: the engine was not run.
+        step: of the engine [s], or None.
+    """
+
+    element: Any
+    lines: Sequence[Mapping[str, Any]]
+    run: xr.Dataset | None = None
+    truth: xr.Dataset | None = None
+    step: float | None = None
+
+
+@dataclass(frozen=True)
+class Cause:
+    """A cause with its proof.
+
+    Attributes:
+        id: of the hypothesis.
+        says: what the engine does, as a clause.
+        quantity, unit: of the difference that it closes.
+        before, after: difference without and with the hypothesis, in ``unit``.
+        remedy: what an author looks at.
+        fitted: how many numbers were chosen so that it closes.
+        covers: further quantities that it explains, of which no other cause is looked for.
+        closes: largest part of the difference that it may leave.
+        alternative: whether it explains what another cause explains as well: from outside the two look the same.
+    """
+
+    id: str
+    says: str
+    quantity: str
+    unit: str
+    before: float
+    after: float
+    remedy: str
+    fitted: int = 0
+    covers: tuple[str, ...] = ()
+    closes: float = CLOSES
+    alternative: bool = False
+
+    @property
+    def proven(self) -> bool:
+        """Whether it closes the difference."""
+        return bool(self.before > 0 and self.after <= self.closes * self.before)
+
+    @property
+    def left(self) -> float:
+        """Part of the difference that it leaves, as far as that says anything."""
+        return max(self.after / self.before, _LEAST)
+
+    @property
+    def sentence(self) -> str:
+        """What it does, and the proof."""
+        unit = "" if self.unit == "1" else f" {self.unit}"
+        return f"{self.says} ({self.quantity} off by {self.before:.2g}{unit}, by {self.after:.1g}{unit} with that)"
+
+
+class Hypothesis(Protocol):
+    """A cause that can be tested. A new one is one small class in the element's tuple.
+
+    Attributes:
+        id: unique within the kind of element.
+        grounds: what it tests, and on what grounds that proves it.
+    """
+
+    @property
+    def id(self) -> str: ...  # noqa: D102 -- see the class
+
+    @property
+    def grounds(self) -> str: ...  # noqa: D102 -- see the class
+
+    def test(self, evidence: Evidence) -> Iterable[Cause]:
+        """Causes worth looking at; those that do not close the difference are dropped by :func:`diagnose`."""
+
+
+@runtime_checkable
+class ExplainsRuns(Protocol):
+    """What a kind of element (:class:`proofroll.core.element.ElementKind`) has besides, if it can explain its runs."""
+
+    @staticmethod
+    def hypotheses() -> Sequence[Any]:
+        """Its hypotheses, each a class as :class:`Hypothesis`; those that concern what an engine says come first."""
+
+
+def diagnose(evidence: Evidence, hypotheses: Sequence[Any]) -> list[Cause]:
+    """The proven causes, the best first: with the fewest fitted numbers, then with the smallest part left.
+
+    Of those that explain the same quantity few more are kept, if they do so as well: as alternatives.
+    """
+    proven = [cause for item in hypotheses for cause in item.test(evidence) if cause.proven]
+    proven.sort(key=lambda cause: (cause.fitted, cause.left))
+    found: list[Cause] = []
+    for cause in proven:
+        rivals = [other for other in found if {cause.quantity, *cause.covers} & {other.quantity, *other.covers}]
+        if not rivals:
+            found.append(cause)
+        elif all(_rivals(cause, rival) for rival in rivals) and len(rivals) <= _ALTERNATIVES:
+            found.append(dataclasses.replace(cause, alternative=True))
+    return sorted(found, key=lambda cause: cause.alternative)
+
+
+def _rivals(cause: Cause, first: Cause) -> bool:
+    """Whether a cause explains as much as the first one and as well, and is not only a part of it."""
+    as_good = cause.fitted == first.fitted and cause.left <= _AS_GOOD * first.left
+    whole = cause.quantity == first.quantity or first.quantity in cause.covers
+    return as_good and whole and cause.id != first.id
+
+
+def hypotheses_of(element: Element) -> Sequence[Any]:
+    """Those of the element's kind: the one in whose package it is defined."""
+    from proofroll.core.plugins import load_element_kinds
+
+    package = type(element).__module__.rpartition(".")[0]
+    for kind in load_element_kinds():
+        if kind.__module__.rpartition(".")[0] == package and isinstance(kind, ExplainsRuns):
+            return kind.hypotheses()
+    return ()
+
+
+def worth(difference: float, size: float) -> bool:
+    """Whether a difference is large enough to have a cause other than round-off."""
+    return bool(np.isfinite(difference) and difference > _LEAST * max(size, 1e-300))

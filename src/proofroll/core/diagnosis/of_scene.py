@@ -1,0 +1,106 @@
+"""Why a run of a scene does not agree: what its elements' hypotheses prove, for everybody who shows a run."""
+
+from __future__ import annotations
+
+import dataclasses
+from collections.abc import Iterable, Mapping, Sequence
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, Any
+
+from proofroll.core.dataset import part
+from proofroll.core.diagnosis import Cause, Evidence, diagnose, hypotheses_of
+from proofroll.core.element import WatchesRuns
+from proofroll.core.observable import Role
+from proofroll.core.scene import Scene
+from proofroll.core.verdict import Judgement, Verdict
+
+if TYPE_CHECKING:
+    import xarray as xr
+
+# So many causes are told; where more close something, the first ones do it best.
+_MOST = 3
+
+
+@dataclass(frozen=True)
+class Diagnosis:
+    """A cause of one element.
+
+    Attributes:
+        element: its name.
+        cause: with its proof.
+        seen: what of the run is right and what is not, as the beginning of the sentence; may be empty.
+    """
+
+    element: str
+    cause: Cause
+    seen: str = ""
+
+    @property
+    def sentence(self) -> str:
+        """For a person."""
+        if self.cause.alternative:
+            return f"or, which looks the same from outside: {self.cause.sentence}"
+        return f"{self.seen}: {self.cause.sentence}" if self.seen else self.cause.sentence
+
+    def as_dict(self) -> dict[str, Any]:
+        """For JSON: the cause with its numbers, and the sentence."""
+        return {"element": self.element, "sentence": self.sentence, **dataclasses.asdict(self.cause)}
+
+
+def diagnosed(
+    scene: Scene,
+    lines: Sequence[Mapping[str, Any]],
+    run: xr.Dataset | None = None,
+    truth: xr.Dataset | None = None,
+    step: float | None = None,
+    judgements: Iterable[Judgement] = (),
+) -> list[Diagnosis]:
+    """The proven causes of all elements of a scene.
+
+    Args:
+        scene: what was to be simulated.
+        lines: of the stored certificate; empty if there is none.
+        run: the engine's trajectory, or None.
+        truth: at the same times, or None.
+        step: of the engine [s], or None.
+        judgements: of the run's observables, for what is right in it.
+    """
+    if run is None and all(line["holds"] for line in lines):
+        return []
+    found, seen = [], what_is_right(scene, judgements)
+    for element in scene.elements:
+        ending = f".{element.name}" if len(scene.elements) > 1 else ""
+        own = [
+            {**line, "quantity": line["quantity"].removesuffix(ending)}
+            for line in lines
+            if str(line["quantity"]).endswith(ending)
+        ]
+        ran = None if run is None else part(scene, element, run)
+        true = None if truth is None else part(scene, element, truth)
+        if ran is not None and true is not None and isinstance(element, WatchesRuns):
+            true, shorter = element.common_span(true, {0: ran})
+            ran = shorter[0]
+        evidence = Evidence(element, own, ran, true, step)
+        found += [Diagnosis(element.name, cause, seen) for cause in diagnose(evidence, hypotheses_of(element))[:_MOST]]
+    return found
+
+
+def what_is_right(scene: Scene, judgements: Iterable[Judgement]) -> str:
+    """Which of the observables that a person asks for first agree and which do not: ``the path is right and N is not``.
+
+    Empty unless some are right and some are not.
+    """
+    right, wrong = [], []
+    for item in judgements:
+        known = scene.observables.get(item.observable)
+        if known is None or (known.role == Role.RESIDUAL and known.name != "slip"):
+            continue
+        if item.verdict in {Verdict.AGREES, Verdict.UNCONFIRMED}:
+            right.append(known)
+        elif item.verdict in {Verdict.DIFFERS, Verdict.CONVERGES}:
+            wrong.append(known)
+    decided = [item for item in right if item.decides]
+    if not decided or not wrong:
+        return ""
+    shown = [item.shown for item in wrong[:3]]
+    return f"the path is right and {' and '.join(shown)} {'is' if len(shown) == 1 else 'are'} not"

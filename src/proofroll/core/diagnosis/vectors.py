@@ -1,0 +1,207 @@
+"""What can happen to a vector on its way from an engine into a sample: sign, unit, axes, frame, time, precision.
+
+Every test takes the true vectors, does to them what the engine may have done, and holds the result against what the
+engine said. So it needs no equations, and is proof by itself.
+"""
+
+from __future__ import annotations
+
+import itertools
+from collections.abc import Iterator, Mapping
+from dataclasses import dataclass, field
+
+import numpy as np
+
+from proofroll.core.arrays import FloatArray
+from proofroll.core.diagnosis import Cause, worth
+from proofroll.core.diagnosis.fitting import said_factor
+
+WORLD = "world"
+_SPLINE = 5
+_SHIFTS = 6
+# A rotation is fitted with three numbers, a scale or a shift with one, a limit with one.
+_PERMUTATIONS = [
+    (order, signs)
+    for order in itertools.permutations(range(3))
+    for signs in itertools.product((1.0, -1.0), repeat=3)
+    if order != (0, 1, 2) or len(set(signs)) > 1
+]
+_SIGN = "an engine may give what acts on the other body: look at whose vector it is"
+
+
+@dataclass(frozen=True)
+class Reported:
+    """A vector that an engine gives at each time.
+
+    Attributes:
+        name: of the variable, e.g. ``w_WB``.
+        what: in words, e.g. ``the angular velocity``.
+        unit: its unit.
+        said, true: values, shape (time, …, 3).
+        time: [s], shape (time,).
+        frames: name -> rotations whose columns are the frame's axes in the world, shape (time, …, 3, 3).
+        least: size below which the quantity stands still, in its unit.
+    """
+
+    name: str
+    what: str
+    unit: str
+    said: FloatArray
+    true: FloatArray
+    time: FloatArray
+    frames: Mapping[str, FloatArray] = field(default_factory=dict)
+    least: float = 0.0
+
+    @classmethod
+    def after_start(
+        cls,
+        name: str,
+        what: str,
+        unit: str,
+        said: FloatArray,
+        true: FloatArray,
+        time: FloatArray,
+        frames: Mapping[str, FloatArray],
+        least: float = 0.0,
+    ) -> Reported:
+        """Without time 0 where that is right: an engine may give there what it was given."""
+        if (
+            len(said) > 1
+            and said.shape == true.shape
+            and not worth(apart(said[0], true[0]), max(float(np.max(np.abs(true))), least))
+        ):
+            said, true, time = said[1:], true[1:], time[1:]
+            frames = {key: frame[1:] for key, frame in frames.items()}
+        return cls(name, what, unit, said, true, time, frames, least)
+
+    @property
+    def before(self) -> float:
+        """Largest difference."""
+        return apart(self.said, self.true)
+
+    def cause(self, kind: str, says: str, explained: FloatArray, remedy: str, number: int = 0) -> Cause:
+        """That the engine said ``explained`` instead of the truth."""
+        after = apart(self.said, explained)
+        return Cause(f"{kind}.{self.name}", says, self.name, self.unit, self.before, after, remedy, number)
+
+    def causes(self, step: float | None) -> Iterator[Cause]:
+        """All of this module, as far as there is a difference."""
+        size = float(np.max(np.abs(self.true), initial=self.least))
+        if self.said.shape != self.true.shape or not worth(self.before, size):
+            return
+        sign = self.cause("sign", f"{self.name} has the wrong sign: it is minus {self.what}", -self.true, _SIGN)
+        for causes in (
+            iter([sign]),
+            self._scaled(step),
+            self._frames(),
+            self._clamped(),
+            self._late(step),
+            self._axes(),
+        ):
+            tried = list(causes)
+            yield from tried
+            if any(cause.proven for cause in tried):
+                return  # what is simple goes first, and is enough
+
+    def _frames(self) -> Iterator[Cause]:
+        remedy = f"give {self.name} along the axes of the world"
+        for name, frame in self.frames.items():
+            local = into(frame, self.true)
+            yield self.cause("frame", f"{self.name} looks like {self.what} in {name}", local, remedy)
+            yield self.cause("frame", f"{self.name} looks like minus {self.what} in {name}", -local, remedy)
+            turned = np.einsum("...ij,...j->...i", frame, self.true)
+            yield self.cause("frame", f"{self.name} looks turned by {name} once too often", turned, remedy)
+
+    def _axes(self) -> Iterator[Cause]:
+        for name, frame in {WORLD: None, **self.frames}.items():
+            local = self.true if frame is None else into(frame, self.true)
+            said = self.said if frame is None else into(frame, self.said)
+            for order, signs in _PERMUTATIONS:
+                changed = local[..., order] * signs
+                if apart(said, changed) * 4 > self.before:
+                    continue
+                where = "" if frame is None else f" in {name}"
+                shown = ", ".join("-" * (s < 0) + "xyz"[k] for k, s in zip(order, signs, strict=True))
+                says = f"{self.name} has other axes or signs{where}: its x, y, z are the true {shown}"
+                explained = changed if frame is None else np.einsum("...ij,...j->...i", frame, changed)
+                yield self.cause("axes", says, explained, f"look at the signs and the order of axes of {self.name}")
+
+    def _scaled(self, step: float | None) -> Iterator[Cause]:
+        square = float(np.sum(self.true**2))
+        if square:
+            factor = float(np.sum(self.said * self.true)) / square
+            times = (
+                "times the step, as an impulse" if step and abs(factor - step) < 1e-3 * step else said_factor(factor)
+            )
+            says = f"{self.name} is {self.what} {times}"
+            yield self.cause("scaled", says, factor * self.true, f"look at the unit of {self.name}", 1)
+
+    def _clamped(self) -> Iterator[Cause]:
+        limit = float(np.max(np.abs(self.said)))
+        remedy = f"find what limits {self.name} to {limit:.6g} {self.unit}"
+        says = f"{self.name} is clamped at {limit:.6g} {self.unit}"
+        yield self.cause("clamped", f"each component of {says}", np.clip(self.true, -limit, limit), remedy, 1)
+        sizes = np.linalg.norm(self.true, axis=-1, keepdims=True)
+        longest = float(np.max(np.linalg.norm(self.said, axis=-1)))
+        shorter = self.true * np.minimum(1.0, longest / np.where(sizes > 0, sizes, 1.0))
+        says = f"{self.name} is clamped at a length of {longest:.6g} {self.unit}"
+        yield self.cause("clamped", says, shorter, f"find what limits {self.name} to {longest:.6g} {self.unit}", 1)
+
+    def _late(self, step: float | None) -> Iterator[Cause]:
+        shift = late(self.time, self.said, self.true)
+        if shift is None:
+            return
+        delay, before, after = shift
+        says = f"{self.name} is {said_delay(delay, step)}"
+        remedy = f"sample {self.name} at the time that was asked for"
+        yield Cause(f"late.{self.name}", says, self.name, self.unit, before, after, remedy, 1)
+
+
+def apart(one: FloatArray, other: FloatArray) -> float:
+    """Largest difference; infinite where something is not finite in one of them alone."""
+    difference = np.abs(np.asarray(one) - np.asarray(other))
+    known = difference[~(np.isnan(one) & np.isnan(other))] if difference.size else difference
+    found = float(np.max(known, initial=0.0))
+    return found if np.isfinite(found) else float("inf")
+
+
+def into(frame: FloatArray, vectors: FloatArray) -> FloatArray:
+    """Components along the axes of frames."""
+    return np.asarray(np.einsum("...ji,...j->...i", frame, vectors))
+
+
+def late(time: FloatArray, said: FloatArray, true: FloatArray) -> tuple[float, float, float] | None:
+    """By how much what is said is late [s], and the differences without and with that; None: too few samples.
+
+    The true curve is laid through its samples; the first and last few, beyond which a shift would lead, are left out.
+    """
+    from scipy.interpolate import make_interp_spline
+
+    if len(time) < 3 * (_SPLINE + 1):
+        return None
+    flat, held = said.reshape(len(time), -1), true.reshape(len(time), -1)
+    known = np.isfinite(flat).all(0) & np.isfinite(held).all(0)
+    if not known.any():
+        return None
+    inner = slice(_SPLINE, -_SPLINE)
+    flat, curve = flat[inner][:, known], make_interp_spline(time, held[:, known], k=_SPLINE)
+    rate, delay, reach = curve.derivative(), 0.0, time[_SPLINE] - time[0]
+    for _ in range(_SHIFTS):
+        slope = rate(time[inner] - delay)
+        square = float(np.sum(slope**2))
+        if not square:
+            return None
+        delay -= float(np.sum((flat - curve(time[inner] - delay)) * slope)) / square
+        delay = float(np.clip(delay, -reach, reach))
+    return delay, apart(flat, held[inner][:, known]), apart(flat, curve(time[inner] - delay))
+
+
+def said_delay(delay: float, step: float | None) -> str:
+    """A shift in time, in steps where it is some."""
+    word = "late" if delay > 0 else "early"
+    if step:
+        steps = abs(delay) / step
+        for number, words in ((0.5, "half a step"), (1.0, "one step"), (2.0, "two steps")):
+            if abs(steps - number) <= 0.05 * number:
+                return f"{words} ({abs(delay):.3g} s) {word}"
+    return f"{abs(delay):.3g} s {word}"

@@ -1,0 +1,148 @@
+"""A ball's run held against the equations at its own states: what is left of them under another law.
+
+Accelerations are derived from the run, forces are those that it reports. So a law is tested at each sample by itself,
+however far the path has gone from the true one.
+"""
+
+from __future__ import annotations
+
+import dataclasses
+import itertools
+from collections.abc import Callable
+from dataclasses import dataclass
+from typing import TYPE_CHECKING
+
+import numpy as np
+from scipy.interpolate import make_interp_spline
+
+from proofroll.core.arrays import FloatArray
+from proofroll.core.events import events_of
+from proofroll.elements.ball_on_surface.mechanics import resistance_moment, slip_velocity
+from proofroll.elements.ball_on_surface.model import RollingBall
+
+if TYPE_CHECKING:
+    import xarray as xr
+
+_DEGREE, _ENDS, _SAMPLES = 7, 5, 24
+
+
+@dataclass(frozen=True)
+class States:
+    """A run at some of its samples, away from events.
+
+    Attributes:
+        p, v, w: centre, velocity and angular velocity in the world, shape (samples, 3).
+        a, alpha: their rates, from the run itself.
+        force: that the engine reports; None if it does not.
+        sticks: whether the ball sticks.
+    """
+
+    p: FloatArray
+    v: FloatArray
+    w: FloatArray
+    a: FloatArray
+    alpha: FloatArray
+    force: FloatArray | None
+    sticks: FloatArray
+
+
+@dataclass(frozen=True)
+class Law:
+    """How a ball is taken to move.
+
+    Attributes:
+        body: with what the law takes its numbers to be.
+        force, moment: applied besides [N, N m], of velocity and angular velocity.
+        resisting: moment of the rolling resistance [N m] for N and the angular velocity; None: that of the scene.
+        slipping: friction [N] for N and the centre's velocity; None: Coulomb's.
+        lever: distance of the friction from the centre [m]; None: the radius.
+    """
+
+    body: RollingBall
+    force: Callable[[FloatArray], FloatArray] | None = None
+    moment: Callable[[FloatArray], FloatArray] | None = None
+    resisting: Callable[[RollingBall, float, FloatArray], FloatArray] | None = None
+    slipping: Callable[[RollingBall, float, FloatArray], FloatArray] | None = None
+    lever: float | None = None
+
+
+def states(body: RollingBall, dataset: xr.Dataset) -> States | None:
+    """The run at its samples; None: too few of them lie between events."""
+    t = dataset["time"].to_numpy()
+    cuts = [0, *np.searchsorted(t, [event.time for event in events_of(dataset)]).tolist(), len(t)]
+    parts = [dataset.isel(time=slice(a, b)) for a, b in itertools.pairwise(cuts)]
+    found = [_states(body, part) for part in parts if part.sizes["time"] > _DEGREE + 2 * _ENDS]
+    if not found:
+        return None
+    columns = zip(*(dataclasses.astuple(part) for part in found), strict=True)
+    whole = [None if column[0] is None else np.concatenate(column) for column in columns]
+    pick = np.unique(np.linspace(0, len(whole[0]) - 1, _SAMPLES).astype(int))  # type: ignore[arg-type]  # positions are there
+    return States(*(None if part is None else part[pick] for part in whole))  # type: ignore[arg-type]  # only a force is None
+
+
+def _states(body: RollingBall, part: xr.Dataset) -> States:
+    surface, t, inner = body.surface, part["time"].to_numpy(), slice(_ENDS, -_ENDS)
+    u = np.stack([part[name].to_numpy() for name in surface.coordinates], axis=-1)
+    rates = np.stack([part[f"{name}_rate"].to_numpy() for name in surface.coordinates], axis=-1)
+    second = make_interp_spline(t, rates, k=_DEGREE).derivative()(t)
+    a = np.einsum("tij,tj->ti", surface.tangents(u), second)
+    a += np.einsum("tijk,tj,tk->ti", surface.second(u), rates, rates)
+    w = part["w_WB"].to_numpy()
+    alpha = make_interp_spline(t, w, k=_DEGREE).derivative()(t)
+    force = None
+    if "N" in part:
+        local = np.stack([-part["N"].to_numpy(), part["F2"].to_numpy(), part["F3"].to_numpy()], axis=-1)
+        force = np.einsum("tij,tj->ti", surface.frame(u), local)
+        force = force[inner] if np.all(np.isfinite(force[inner])) else None
+    sticks = part["sticking"].to_numpy() if "sticking" in part else np.ones(len(t))
+    p, v = part["p_WB"].to_numpy(), part["v_WB"].to_numpy()
+    return States(p[inner], v[inner], w[inner], a[inner], alpha[inner], force, sticks[inner])
+
+
+def residuals(body: RollingBall, seen: States, law: Law) -> FloatArray:
+    """What the law leaves of accelerations, turning times the radius, and force over mass [m/s²]."""
+    left = []
+    for i in range(len(seen.p)):
+        a, alpha, force = response(law, seen.p[i], seen.v[i], seen.w[i], bool(seen.sticks[i]))
+        left += [seen.a[i] - a, body.ball.radius * (seen.alpha[i] - alpha)]
+        if seen.force is not None:
+            left.append((seen.force[i] - force) / body.ball.mass)
+    return np.concatenate(left)
+
+
+def response(
+    law: Law, p: FloatArray, v: FloatArray, w: FloatArray, sticks: bool
+) -> tuple[FloatArray, FloatArray, FloatArray]:
+    """Accelerations and the wall's force at a state: Newton-Euler as in the mechanics, with the law's loads."""
+    body = law.body
+    m, J, f = body.ball.mass, body.ball.inertia, body.contact.rolling_resistance
+    a = body.ball.radius if law.lever is None else law.lever
+    e1 = body.surface.normal(p)
+    bend = body.surface.normal_gradient(p) @ v
+    applied = m * body.gravity + (law.force(v) if law.force else 0.0)
+    turning = law.moment(w) if law.moment else np.zeros(3)
+
+    def resisting(N: float) -> FloatArray:
+        if law.resisting is not None:
+            return law.resisting(body, N, w)
+        return resistance_moment(f, N, e1, v)
+
+    if not sticks:
+        N = float(m * bend @ v + applied @ e1)
+        slip = slip_velocity(body.ball.radius, e1, v, w)
+        slip = slip - (slip @ e1) * e1
+        size = float(np.linalg.norm(slip))
+        if law.slipping is not None:
+            friction = law.slipping(body, N, v)
+        else:
+            friction = -body.contact.mu_kinetic * N * slip / size if size else np.zeros(3)
+        force = friction - N * e1
+        return (force + applied) / m, (a * np.cross(e1, force) + resisting(N) + turning) / J, force
+    cross_e1 = np.array([[0, -e1[2], e1[1]], [e1[2], 0, -e1[0]], [-e1[1], e1[0], 0]])
+    matrix, right = np.zeros((9, 9)), np.zeros(9)
+    matrix[:3, :3], matrix[:3, 6:] = m * np.eye(3), -np.eye(3)
+    matrix[3:6, 3:6], matrix[3:6, 6:] = J * np.eye(3), -a * cross_e1 + np.outer(resisting(1.0), e1)
+    matrix[6:, :3], matrix[6:, 3:6] = np.eye(3), -a * cross_e1
+    right[:3], right[3:6], right[6:] = applied, turning, -a * np.cross(w, bend)
+    found = np.asarray(np.linalg.solve(matrix, right), dtype=np.float64)
+    return found[:3], found[3:6], found[6:]

@@ -1,0 +1,240 @@
+"""A mechanism's run held against the equations of motion at its own states, without solving them.
+
+The accelerations are derived from the run, or are those of the certificate. Put into d'Alembert's principle, what the
+bodies need and what acts on them must balance along every motion that joints and loops allow. That is linear in masses,
+inertias, stiffnesses, damping and gravity, and needs no reaction.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from functools import cached_property
+from typing import Any
+
+import numpy as np
+from scipy.interpolate import make_interp_spline
+from scipy.spatial.transform import Rotation
+
+from proofroll.core.arrays import FloatArray
+from proofroll.core.diagnosis import Evidence
+from proofroll.elements.mechanism.kinematics import Motion, Tree
+from proofroll.elements.mechanism.model import Mechanism
+from proofroll.elements.mechanism.placed import Placed
+from proofroll.elements.mechanism.rotations import skews
+
+_DEGREE, _ENDS, _SAMPLES = 7, 5, 16
+_DEPENDENT = 1e-7
+_CONSISTENT = 1e-3
+
+
+@dataclass(frozen=True)
+class State:
+    """Everything that the equations need at one instant of a run.
+
+    Attributes:
+        q, v: coordinates and velocities of the tree.
+        motion: kinematics there.
+        acceleration: of the origin of each body's frame, and turning, shape (bodies, 6).
+    """
+
+    q: FloatArray
+    v: FloatArray
+    motion: Motion
+    acceleration: FloatArray
+
+
+class States:
+    """A run, or the moment of its certificate, as states of a tree.
+
+    Attributes:
+        each: the states.
+        consistent: whether the bodies' velocities are such as the tree allows in their poses; where they are not,
+            what is said of the motion is wrong, and equations would be blamed for it.
+    """
+
+    def __init__(self, mechanism: Mechanism, placed: Placed, acceleration: FloatArray, which: FloatArray) -> None:
+        self.mechanism, self.tree = mechanism, Tree(mechanism)
+        coordinates = placed.coordinates()
+        self.each: list[State] = []
+        self.consistent = True
+        for i in which.tolist():
+            q = np.concatenate([_coordinate(placed, coordinates, joint, i) for joint in mechanism.joints])
+            still = self.tree.at(q, np.zeros(mechanism.nv))
+            twists = np.concatenate([placed.v_WB[i], placed.w_WB[i]], axis=-1)
+            v = np.linalg.lstsq(still.J[:-1].reshape(-1, mechanism.nv), twists.ravel(), rcond=None)[0]
+            off = np.abs(still.J[:-1].reshape(-1, mechanism.nv) @ v - twists.ravel())
+            self.consistent &= bool(np.max(off) <= _CONSISTENT * max(float(np.max(np.abs(twists))), 1e-300))
+            self.each.append(State(q, v, self.tree.at(q, v), acceleration[i]))
+
+    @cached_property
+    def allowed(self) -> list[FloatArray]:
+        """Directions of the tree's velocities that the loops allow, (nv, directions), at each state."""
+        return [self.free(state, ()) for state in self.each]
+
+    def free(self, state: State, without: tuple[int, ...]) -> FloatArray:
+        """The same at one state, without some rows of the loops."""
+        rows = self.tree.loop_rows(state.motion)
+        C = np.delete(rows.C, without, axis=0)
+        if not len(C):
+            return np.eye(self.mechanism.nv)
+        _, S, Vt = np.linalg.svd(C)
+        return Vt[int(np.sum(_DEPENDENT * S[0] < S)) :].T
+
+    @cached_property
+    def v_rates(self) -> list[FloatArray]:
+        """Accelerations of the tree's velocities, at each state."""
+        found: list[FloatArray] = []
+        for state in self.each:
+            J = state.motion.J[:-1].reshape(-1, self.mechanism.nv)
+            off = (state.acceleration - state.motion.bias[:-1]).ravel()
+            found.append(np.asarray(np.linalg.lstsq(J, off, rcond=None)[0], dtype=np.float64))
+        return found
+
+    @cached_property
+    def scale(self) -> FloatArray:
+        """What each balance is relative to: the largest that inertia or loads make of it."""
+        sizes = self.parts(Change(self.mechanism)).reshape(-1, self.mechanism.nv)
+        largest = np.max(np.abs(sizes), axis=0, initial=0.0)
+        return np.where(largest > 1e-9 * np.max(largest), largest, np.max(largest) or 1.0)
+
+    def parts(self, change: Change) -> FloatArray:
+        """Inertia and loads of a mechanism at each state along each velocity of the tree, (states, 2, nv)."""
+        return np.array([change.balance(self, i) for i in range(len(self.each))])
+
+    def left(self, change: Change, without: tuple[int, ...] = ()) -> FloatArray:
+        """What does not balance, relative, along the motions that are allowed."""
+        found = []
+        for i, both in enumerate(self.parts(change)):
+            directions = self.free(self.each[i], without) if without else self.allowed[i]
+            found.append(directions.T @ (both[0] - both[1]) / (np.abs(directions.T) @ self.scale))
+        return np.concatenate(found)
+
+
+@dataclass(frozen=True)
+class Change:
+    """Numbers with which an engine may move a mechanism, where they are not its own.
+
+    Attributes:
+        mechanism: what moves.
+        mass, com, inertia: of the bodies; None: the mechanism's.
+        gravity: [m/s²].
+        damping, stiffness, torque, armature: factors on those of the joints, or, ``added``, further ones by velocity.
+        springs: factor on the springs.
+        added: further damping by velocity of the tree, and further armature.
+        gyroscopic: factor on ω × I ω.
+        coupling: pairs of velocities that lose their term of the mass matrix.
+    """
+
+    mechanism: Mechanism
+    mass: FloatArray | None = None
+    com: FloatArray | None = None
+    inertia: FloatArray | None = None
+    gravity: FloatArray | None = None
+    damping: float = 1.0
+    stiffness: float = 1.0
+    torque: float = 1.0
+    armature: float = 1.0
+    springs: float = 1.0
+    added_damping: FloatArray | float = 0.0
+    added_armature: FloatArray | float = 0.0
+    gyroscopic: float = 1.0
+    coupling: FloatArray | None = None
+
+    def balance(self, states: States, i: int) -> tuple[FloatArray, FloatArray]:
+        """What inertia needs and what acts, along each velocity of the tree."""
+        m, state, mechanism = states.mechanism, states.each[i], self.mechanism
+        motion, n = state.motion, len(m.bodies)
+        mass = np.array([b.mass for b in mechanism.bodies]) if self.mass is None else self.mass
+        com = np.array([b.com for b in mechanism.bodies]) if self.com is None else self.com
+        own = np.array([b.inertia for b in mechanism.bodies]) if self.inertia is None else self.inertia
+        g = np.array(mechanism.gravity) if self.gravity is None else self.gravity
+        R, w = motion.R_WB[:n], motion.w_WB[:n]
+        arm = np.einsum("nij,nj->ni", R, com)
+        inertia = R @ own @ R.transpose(0, 2, 1)
+        J = motion.J[:n].copy()
+        J[:, :3] -= skews(arm) @ J[:, 3:]
+        alpha = state.acceleration[:, 3:]
+        at_com = state.acceleration[:, :3] + np.cross(alpha, arm) + np.cross(w, np.cross(w, arm))
+        spin = np.cross(w, np.einsum("nij,nj->ni", inertia, w)) * self.gyroscopic
+        moment = np.einsum("nij,nj->ni", inertia, alpha) + spin
+        needed = np.einsum("nij,ni->j", J[:, :3], mass[:, None] * at_com) + np.einsum("nij,ni->j", J[:, 3:], moment)
+        acts = np.einsum("nij,ni->j", J[:, :3], mass[:, None] * g)
+        by_v = [joint for joint in mechanism.joints for _ in range(joint.nv)]
+        rate = states.v_rates[i]
+        needed = needed + (self.armature * np.array([j.armature for j in by_v]) + self.added_armature) * rate
+        if self.coupling is not None:
+            weighted = np.concatenate([mass[:, None, None] * J[:, :3], inertia @ J[:, 3:]], axis=1)
+            M = J.reshape(-1, m.nv).T @ weighted.reshape(-1, m.nv)
+            needed = needed - (M * self.coupling) @ rate
+        acts = acts + self.torque * np.array([j.torque for j in by_v])
+        acts = acts - (self.damping * np.array([j.damping for j in by_v]) + self.added_damping) * state.v
+        for joint, at_q, at_v in zip(mechanism.joints, m.q_slices, m.v_slices, strict=True):
+            if joint.stiffness:
+                acts[at_v] -= self.stiffness * joint.stiffness * (state.q[at_q] - joint.rest)
+        return needed, acts + self.springs * _spring_loads(states, state, mechanism)
+
+
+def _spring_loads(states: States, state: State, mechanism: Mechanism) -> FloatArray:
+    found = np.zeros(mechanism.nv)
+    for spring in mechanism.springs:
+        (p_a, v_a, J_a, _), (p_b, v_b, J_b, _) = (
+            states.tree.point(state.motion, body, np.array(position))
+            for body, position in ((spring.body_a, spring.position_a), (spring.body_b, spring.position_b))
+        )
+        length = float(np.linalg.norm(p_b - p_a))
+        along = (p_b - p_a) / length
+        pull = spring.stiffness * (length - spring.length) + spring.damping * (along @ (v_b - v_a))
+        found += pull * along @ (J_a - J_b)
+    return found
+
+
+def placed_of(mechanism: Mechanism, dataset: Any) -> Placed:
+    """The bodies of a run."""
+    parts = (dataset[name].to_numpy() for name in ("p_WB", "v_WB", "w_WB", "q_WB"))
+    return Placed(mechanism, dataset["time"].to_numpy(), *parts)
+
+
+def of_run(mechanism: Mechanism, dataset: Any) -> States | None:
+    """The states of a run away from its ends; None: too few samples for its accelerations, or not all are numbers."""
+    placed = placed_of(mechanism, dataset)
+    if len(placed.time) <= _DEGREE + 2 * _ENDS or not np.all(np.isfinite(placed.q_WB)):
+        return None
+    if np.any(np.linalg.norm(placed.q_WB, axis=-1) < 0.1):
+        return None
+    twists = np.concatenate([placed.v_WB, placed.w_WB], axis=-1)
+    acceleration = make_interp_spline(placed.time, twists, k=_DEGREE).derivative()(placed.time)
+    which = np.unique(np.linspace(_ENDS, len(placed.time) - 1 - _ENDS, _SAMPLES).astype(int))
+    return States(mechanism, placed, acceleration, which)
+
+
+def of_start(evidence: Evidence) -> States | None:
+    """The start with the accelerations of the certificate; None: it does not say them."""
+    element = evidence.element
+    lines = {line["quantity"]: line for line in evidence.lines}
+    rows = []
+    for name in ("acceleration", "angular acceleration"):
+        line = lines.get(name)
+        if line is None or not line["found"] or not np.all(np.isfinite(line["found"])):
+            line = lines.get(f"{name} of the first steps")
+        if line is None or not line["found"]:
+            return None
+        rows.append(np.reshape(line["found"], (len(element.bodies), 3)))
+    return States(element.mechanism, element.start, np.concatenate(rows, axis=-1)[None], np.zeros(1, dtype=int))
+
+
+def _coordinate(placed: Placed, known: dict[str, tuple[FloatArray, FloatArray]], joint: Any, i: int) -> FloatArray:
+    """Coordinates of a joint at a sample."""
+    if joint.name in known:
+        return known[joint.name][0][i : i + 1]
+    index = placed.mechanism.body_index
+    A = placed.R_WB[i, index[joint.parent]] @ joint.parent_frame
+    S = A.T @ placed.R_WB[i, index[joint.child]] @ joint.child_frame
+    apart = placed.point(joint.child, joint.child_position)[i] - placed.point(joint.parent, joint.position)[i]
+    if joint.kind == "universal":
+        return np.array([np.arctan2(S[1, 0], S[0, 0]), np.arctan2(S[2, 1], S[2, 2])])
+    if joint.kind == "planar":
+        return np.array([*(A.T @ apart)[:2], np.arctan2(S[1, 0], S[0, 0])])
+    quaternion = Rotation.from_matrix(S).as_quat(scalar_first=True)
+    if joint.kind == "free":
+        return np.concatenate([A.T @ apart, quaternion])
+    return np.asarray(quaternion) if joint.kind == "spherical" else np.zeros(joint.nq)

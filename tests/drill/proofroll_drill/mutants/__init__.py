@@ -1,0 +1,1 @@
+"""Engines with planted faults, and whether they are detected and their faults named."""

@@ -1,0 +1,245 @@
+"""Balls that move rightly and are told wrongly."""
+
+from __future__ import annotations
+
+import dataclasses
+from typing import Any
+
+import numpy as np
+from scipy.spatial.transform import Rotation
+
+from proofroll.core.arrays import FloatArray
+from proofroll.core.engine import Sample
+from proofroll.core.scene import Scene
+from proofroll.elements.ball_on_surface.element import rolling_ball
+from proofroll_drill.mutants.base import STEP, Mutant
+
+
+class _Told(Mutant):
+    """What a ball's samples are made wrong with."""
+
+    asks = ("orientation",)
+
+    def __init__(self, scene: Scene, settings: Any) -> None:
+        super().__init__(scene, settings)
+        self.body = rolling_ball(scene)
+
+    def local(self, p: FloatArray) -> FloatArray:
+        """The surface's axes at a point."""
+        return np.asarray(self.body.surface.frame(self.body.surface.locate(p[None]))[0])
+
+
+class BodySpin(_Told):
+    """ω along the body's axes."""
+
+    fault = "body spin for world spin"
+    named = ("angular velocity in body axes",)
+
+    def misreport(self, sample: Sample) -> Sample:
+        """Turned back."""
+        assert sample.q_WB is not None  # it is asked for
+        turn = Rotation.from_quat(sample.q_WB, scalar_first=True)
+        return dataclasses.replace(sample, w_WB=turn.inv().apply(sample.w_WB))
+
+
+class LocalSpin(_Told):
+    """ω along e1, e2, e3."""
+
+    fault = "spin along the surface's axes"
+    named = ("angular velocity in the surface's axes",)
+
+    def misreport(self, sample: Sample) -> Sample:
+        """Its components."""
+        return dataclasses.replace(sample, w_WB=self.local(sample.p_WB).T @ sample.w_WB)
+
+
+class NegativeForce(_Told):
+    """The force on the wall."""
+
+    fault = "force of the ball on the wall"
+    named = ("wrong sign",)
+
+    def misreport(self, sample: Sample) -> Sample:
+        """Minus."""
+        assert sample.force is not None
+        return dataclasses.replace(sample, force=-sample.force)
+
+
+class LocalForce(_Told):
+    """The force along e1, e2, e3."""
+
+    fault = "force in the surface's axes"
+    named = ("ball in the surface's axes",)
+
+    def misreport(self, sample: Sample) -> Sample:
+        """Its components, but at time 0."""
+        assert sample.force is not None
+        return dataclasses.replace(sample, force=self.local(sample.p_WB).T @ sample.force)
+
+
+class BodyForce(_Told):
+    """The force along the body's axes."""
+
+    fault = "force in body axes"
+    named = ("ball in body axes",)
+
+    def misreport(self, sample: Sample) -> Sample:
+        """Turned back."""
+        assert sample.force is not None
+        assert sample.q_WB is not None
+        turn = Rotation.from_quat(sample.q_WB, scalar_first=True)
+        return dataclasses.replace(sample, force=turn.inv().apply(sample.force))
+
+
+class FrictionSign(_Told):
+    """N is right, the friction points the other way."""
+
+    fault = "friction with the wrong sign"
+    named = ("friction has the wrong sign",)
+
+    def misreport(self, sample: Sample) -> Sample:
+        """Mirrored at the normal."""
+        assert sample.force is not None
+        e1 = self.local(sample.p_WB)[:, 0]
+        return dataclasses.replace(sample, force=2 * (sample.force @ e1) * e1 - sample.force)
+
+
+class StaleNormal(_Told):
+    """The force is put along the axes of the step before."""
+
+    fault = "stale normal: the force along the axes of a step before"
+    named = ("normal of",)
+
+    def misreport(self, sample: Sample) -> Sample:
+        """Turned by what the normal turns in a step."""
+        assert sample.force is not None
+        before = sample.p_WB - (STEP if self.t else 0.0) * sample.v_WB
+        return dataclasses.replace(sample, force=self.local(before) @ self.local(sample.p_WB).T @ sample.force)
+
+
+class Impulse(_Told):
+    """The solver's impulse over the wrong step."""
+
+    fault = "impulse instead of force"
+    named = ("force is the wall's force on the ball",)
+
+    def misreport(self, sample: Sample) -> Sample:
+        """Times a step."""
+        assert sample.force is not None
+        return dataclasses.replace(sample, force=sample.force * STEP)
+
+
+class Clamped(_Told):
+    """No component of the spin is beyond 100 rad/s."""
+
+    fault = "spin clamped at 100 rad/s"
+    named = ("clamped",)
+
+    def misreport(self, sample: Sample) -> Sample:
+        """After the first step."""
+        return dataclasses.replace(sample, w_WB=np.clip(sample.w_WB, -100, 100) if self.t else sample.w_WB)
+
+
+class Single(_Told):
+    """All numbers are cut to 24 bits."""
+
+    fault = "float32"
+    named = ("single-precision",)
+
+    def misreport(self, sample: Sample) -> Sample:
+        """Rounded."""
+        cut = {name: np.float64(np.float32(getattr(sample, name))) for name in ("p_WB", "v_WB", "w_WB", "force")}
+        return dataclasses.replace(sample, **cut)  # type: ignore[arg-type]  # vectors by name
+
+
+class Late(_Told):
+    """A state of a step before."""
+
+    fault = "one step of lag"
+    named = ("one step (0.002 s) late",)
+
+    def clock(self, t: float) -> float:
+        """Behind."""
+        return t - STEP
+
+
+class OneTooMany(_Told):
+    """A step more than asked for at the first call."""
+
+    fault = "one step too many"
+    named = ("one step (0.002 s) early",)
+
+    def clock(self, t: float) -> float:
+        """Ahead."""
+        return t + STEP
+
+
+class Shifted(_Told):
+    """Its clock begins at 4 ms."""
+
+    fault = "time grid shifted by 4 ms"
+    named = ("two steps (0.004 s) early",)
+
+    def __init__(self, scene: Scene, settings: Any) -> None:
+        super().__init__(scene, settings)
+        self.inner.advance(0.004)
+
+    def clock(self, t: float) -> float:
+        """Ahead."""
+        return t + 0.004
+
+
+class LateForce(_Told):
+    """The state is of now, the force of the step before."""
+
+    fault = "force of the step before"
+    named = ("force is one step (0.002 s) late",)
+
+    def __init__(self, scene: Scene, settings: Any) -> None:
+        super().__init__(scene, settings)
+        self.behind: Any = type(self.inner).build(scene, settings)
+
+    def advance(self, t: float) -> None:
+        """Both."""
+        super().advance(t)
+        self.behind.advance(t - STEP)
+
+    def misreport(self, sample: Sample) -> Sample:
+        """The other's force."""
+        return dataclasses.replace(sample, force=self.behind.sample().force)
+
+
+class ContactPoint(_Told):
+    """The contact point's place."""
+
+    fault = "position of the contact point"
+    named = ("contact point",)
+
+    def misreport(self, sample: Sample) -> Sample:
+        """One radius out, from the first step on."""
+        out = self.body.ball.radius * self.local(sample.p_WB)[:, 0] if self.t else 0.0
+        return dataclasses.replace(sample, p_WB=sample.p_WB + out)
+
+
+class ScalarLast(_Told):
+    """Another convention for quaternions."""
+
+    fault = "quaternion with its scalar last"
+    named = ("scalar last",)
+
+    def misreport(self, sample: Sample) -> Sample:
+        """x, y, z, w."""
+        assert sample.q_WB is not None
+        return dataclasses.replace(sample, q_WB=np.roll(sample.q_WB, -1))
+
+
+class Inverse(_Told):
+    """The world in the body."""
+
+    fault = "quaternion of the inverse rotation"
+    named = ("inverse rotation",)
+
+    def misreport(self, sample: Sample) -> Sample:
+        """Conjugated."""
+        assert sample.q_WB is not None
+        return dataclasses.replace(sample, q_WB=sample.q_WB * [1, -1, -1, -1])

@@ -1,0 +1,97 @@
+"""Engines with one fault each: the projection method behind the public protocol, and what goes wrong in between.
+
+A mutant does not tell on itself: it says that it built what the scene says, as an author believes who made the mistake.
+"""
+
+from __future__ import annotations
+
+import dataclasses
+from collections.abc import Mapping
+from typing import Any, ClassVar, Self
+
+from proofroll.core.engine import Built, Sample
+from proofroll.core.events import Event
+from proofroll.core.scene import Scene
+from proofroll.engines.projection import Projection
+from proofroll.engines.projection.settings import ProjectionSettings
+
+STEP = 2e-3
+
+
+class Mutant:
+    """The scene in the projection method, as the mutant misreads it.
+
+    Attributes:
+        fault: what is planted, in a few words.
+        scene: on which it is tried, with its parameters.
+        named: words of which the diagnosis must have one: the cause in plain words.
+        until, every: length of the run and interval of its samples [s].
+        asks: what is wanted besides the motion.
+    """
+
+    name: ClassVar[str] = "mutant"
+    formulation: ClassVar[str] = "rotating_frame"
+    provides: ClassVar[Mapping[str, frozenset[str]]] = Projection.provides
+    settings: ClassVar[type[Any]] = ProjectionSettings
+    presets: ClassVar[Mapping[str, Mapping[str, Any]]] = Projection.presets
+    fault: ClassVar[str] = ""
+    scene: ClassVar[tuple[str, Mapping[str, float]]] = ("sphere_in_cylinder", {})
+    named: ClassVar[tuple[str, ...]] = ()
+    until: ClassVar[float] = 0.3
+    every: ClassVar[float] = 0.01
+    asks: ClassVar[tuple[str, ...]] = ()
+
+    @staticmethod
+    def version() -> str:
+        """See :class:`proofroll.core.engine.Engine`."""
+        return "1.0"
+
+    @classmethod
+    def build(cls, scene: Scene, settings: Any) -> Self:
+        """See :class:`proofroll.core.engine.Engine`."""
+        return cls(scene, settings)
+
+    def __init__(self, scene: Scene, settings: Any) -> None:
+        self.element: Any = scene.elements[0]
+        self.claimed = Projection.build(scene, settings)
+        self.inner: Any = Projection.build(self.misread(scene), settings)
+        self.t = 0.0
+
+    def misread(self, scene: Scene) -> Scene:
+        """The scene that it builds."""
+        return scene
+
+    def misreport(self, sample: Sample) -> Sample:
+        """What it says of its state."""
+        return sample
+
+    def clock(self, t: float) -> float:
+        """Time of its model when ``t`` is asked for [s]."""
+        return t
+
+    def advance(self, t: float) -> None:
+        """See :class:`proofroll.core.engine.Engine`."""
+        self.t = t
+        self.inner.advance(max(self.clock(t), 0.0))
+
+    def sample(self) -> Sample:
+        """See :class:`proofroll.core.engine.Engine`; at time 0 as the scene says, which is what it was given."""
+        return self.misreport(self.inner.sample())
+
+    def events(self) -> list[Event]:
+        """See :class:`proofroll.core.engine.LocatesEvents`."""
+        return list(self.inner.events())
+
+    def built(self) -> Built | Any:
+        """What it was given, as the scene says; how it sets off it reads back."""
+        found = self.inner.built()
+        moves = {name: getattr(found, name) for name in ("acceleration", "angular_acceleration")}
+        return dataclasses.replace(self.claimed.built(), **moves)
+
+
+class Honest(Mutant):
+    """It tells what it really built, so that its certificate shows the fault."""
+
+    def built(self) -> Built | Any:
+        """Read back."""
+        return self.inner.built()

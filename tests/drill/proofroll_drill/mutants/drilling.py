@@ -1,0 +1,125 @@
+"""Runs every mutant as a comparison would, and asks the diagnosis what is wrong with it."""
+
+from __future__ import annotations
+
+import dataclasses
+import functools
+import inspect
+from collections.abc import Callable, Iterator
+from dataclasses import dataclass
+from types import ModuleType
+from typing import Any
+
+import numpy as np
+
+from proofroll.core.certificate import certify, first_difference
+from proofroll.core.diagnosis.of_scene import diagnosed
+from proofroll.core.errors import Diverged
+from proofroll.core.scene import Scene
+from proofroll.core.time_grid import time_grid
+from proofroll.core.truth import truth
+from proofroll.core.verdict import Judgement, Verdict, judge
+from proofroll.files.scene_file import load_scene
+from proofroll.running.recording import record
+from proofroll.studies.reference import Reference
+from proofroll_drill.mutants import ball_models, ball_samples, mechanism_models, mechanism_samples
+from proofroll_drill.mutants.base import STEP, Mutant
+
+MODULES: tuple[ModuleType, ...] = (ball_models, ball_samples, mechanism_models, mechanism_samples)
+# Tolerance of every observable, relative to its size: the projection method at this step is right to 1e-8.
+_TOLERANCE = 1e-6
+# Part of the mutants whose fault has to be named.
+ENOUGH = 0.9
+
+
+@dataclass(frozen=True)
+class Mutated:
+    """What became of one mutant.
+
+    Attributes:
+        fault: what was planted.
+        mutant: its class.
+        scene: on which it ran.
+        detected: whether certificate or verdicts show that something is wrong.
+        by: what showed it.
+        named: whether the diagnosis says the cause.
+        said: what the diagnosis says; empty if nothing.
+    """
+
+    fault: str
+    mutant: str
+    scene: str
+    detected: bool
+    by: str
+    named: bool
+    said: str
+
+
+def mutants() -> list[type[Mutant]]:
+    """All, in the order of their modules."""
+    found = [kind for module in MODULES for _, kind in inspect.getmembers(module, inspect.isclass)]
+    return [kind for kind in found if issubclass(kind, Mutant) and kind.fault and kind.__module__ in _names()]
+
+
+def _names() -> set[str]:
+    return {module.__name__ for module in MODULES}
+
+
+def mutant_drill(progress: Callable[[str], None] = lambda _: None) -> Iterator[Mutated]:
+    """Tries every mutant."""
+    for kind in mutants():
+        yield tried(kind)
+        progress(kind.fault)
+
+
+def tried(kind: type[Mutant]) -> Mutated:
+    """One mutant: certificate, run, verdicts, diagnosis."""
+    scene, reference = _reference(kind)
+    settings = dataclasses.replace(kind.presets[kind.formulation]["default"], dt=STEP)
+    engine = kind.build(scene, settings)
+    certificate = certify(engine, scene)
+    lines = [line.as_dict() for line in certificate]
+    by = first_difference(certificate) or ""
+    if by:
+        causes = diagnosed(scene, lines, step=STEP)
+    else:
+        try:
+            recording = record(engine, scene, reference.dataset["time"].to_numpy())
+        except Diverged as error:
+            return Mutated(kind.fault, kind.__name__, scene.name, True, str(error), False, "")
+        wrong = [item for item in judged(reference, recording.dataset) if item.verdict == Verdict.DIFFERS]
+        by = recording.failure or "; ".join(f"{item.observable} {item.reason.partition(';')[0]}" for item in wrong[:2])
+        judgements = judged(reference, recording.dataset)
+        causes = diagnosed(scene, lines, recording.dataset, reference.dataset, STEP, judgements) if by else []
+    said = "; ".join(item.sentence for item in causes)
+    # The first cause, and what looks the same from outside, are the answer; what is said after it does not count.
+    answer = " ".join(item.sentence for item in causes[:1] + [item for item in causes[1:] if item.cause.alternative])
+    return Mutated(
+        kind.fault, kind.__name__, scene.name, bool(by), by, any(word in answer for word in kind.named), said
+    )
+
+
+def judged(reference: Reference, dataset: Any) -> list[Judgement]:
+    """Verdicts of all observables that a run has."""
+    found = []
+    for name, values in reference.observed(dataset).items():
+        true, bar = reference.true(name, values)
+        size = reference.sizes.get(name, 1.0)
+        unit = reference.scene.observables[name].unit
+        allowed = max(_TOLERANCE * size, 4 * bar)
+        found.append(judge(name, unit, values, true, truth_error_bar=bar, tolerance=allowed, scale=size, limit=None))
+    return found
+
+
+def _reference(kind: type[Mutant]) -> tuple[Scene, Reference]:
+    name, parameters = kind.scene
+    return _truth(name, tuple(sorted(parameters.items())), kind.asks, kind.until, kind.every)
+
+
+@functools.cache
+def _truth(
+    name: str, parameters: tuple[tuple[str, float], ...], asks: tuple[str, ...], until: float, every: float
+) -> tuple[Scene, Reference]:
+    """Shared by all mutants of a scene."""
+    scene = load_scene(name, asks=asks, **dict(parameters))
+    return scene, Reference.of(scene, truth(scene, np.asarray(time_grid(until, every))))

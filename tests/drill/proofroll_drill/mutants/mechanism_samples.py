@@ -1,0 +1,180 @@
+"""Mechanisms that move rightly and are told wrongly."""
+
+from __future__ import annotations
+
+import dataclasses
+from typing import Any, ClassVar
+
+import numpy as np
+from scipy.spatial.transform import Rotation
+
+from proofroll.core.engine import Sample
+from proofroll.core.scene import Scene
+from proofroll_drill.mutants.base import STEP, Mutant
+from proofroll_drill.mutants.mechanism_models import CRANK, PENDULUM, TOP
+
+
+class _Told(Mutant):
+    """Samples that are made wrong."""
+
+    formulation: ClassVar[str] = "dependent"
+    scene: ClassVar[Any] = PENDULUM
+    until: ClassVar[float] = 0.3
+
+    def __init__(self, scene: Scene, settings: Any) -> None:
+        super().__init__(scene, settings)
+        self.com = np.array([body.com for body in self.element.mechanism.bodies])
+
+    def events(self) -> list[Any]:
+        """None."""
+        return []
+
+
+def _turns(sample: Sample) -> Rotation:
+    assert sample.q_WB is not None
+    return Rotation.from_quat(sample.q_WB, scalar_first=True)
+
+
+class BodyRates(_Told):
+    """ω along each body's own axes."""
+
+    fault = "body spin for world spin of a top"
+    scene = TOP
+    named = ("angular velocity in body axes",)
+
+    def misreport(self, sample: Sample) -> Sample:
+        """Turned back, from the first step on."""
+        return dataclasses.replace(sample, w_WB=_turns(sample).inv().apply(sample.w_WB)) if self.t else sample
+
+
+class CentrePosition(_Told):
+    """Positions of the centres of mass."""
+
+    fault = "positions of the centres of mass"
+    named = ("p_WB is the position of the centres of mass",)
+
+    def misreport(self, sample: Sample) -> Sample:
+        """Shifted, from the first step on."""
+        return dataclasses.replace(sample, p_WB=sample.p_WB + _turns(sample).apply(self.com)) if self.t else sample
+
+
+class CentreVelocity(_Told):
+    """Velocities of the centres of mass."""
+
+    fault = "velocities of the centres of mass"
+    named = ("v_WB is the velocity of the centres of mass",)
+
+    def misreport(self, sample: Sample) -> Sample:
+        """Shifted, from the first step on."""
+        arm = _turns(sample).apply(self.com)
+        return dataclasses.replace(sample, v_WB=sample.v_WB + np.cross(sample.w_WB, arm)) if self.t else sample
+
+
+class OnParent(_Told):
+    """The wrench on the parent."""
+
+    fault = "reaction on the wrong body"
+    named = ("force has the wrong sign",)
+
+    def misreport(self, sample: Sample) -> Sample:
+        """Minus."""
+        assert sample.joint_force is not None
+        assert sample.joint_torque is not None
+        return dataclasses.replace(sample, joint_force=-sample.joint_force, joint_torque=-sample.joint_torque)
+
+
+class BodyReaction(_Told):
+    """The wrench along the child's axes."""
+
+    fault = "reaction in body axes"
+    named = ("joint in body axes",)
+
+    def misreport(self, sample: Sample) -> Sample:
+        """Turned back."""
+        assert sample.joint_force is not None
+        return dataclasses.replace(sample, joint_force=_turns(sample).inv().apply(sample.joint_force))
+
+
+class Swapped(_Told):
+    """The joints' reactions in another order."""
+
+    fault = "reactions in another order of joints"
+    named = ("of another joint",)
+
+    def misreport(self, sample: Sample) -> Sample:
+        """Reversed."""
+        assert sample.joint_force is not None
+        assert sample.joint_torque is not None
+        return dataclasses.replace(sample, joint_force=sample.joint_force[::-1], joint_torque=sample.joint_torque[::-1])
+
+
+class AboutCentre(_Told):
+    """Moments about the centre of mass."""
+
+    fault = "moment about the centre of mass"
+    named = ("moment about the centre of mass",)
+
+    def misreport(self, sample: Sample) -> Sample:
+        """Of each child."""
+        assert sample.joint_force is not None
+        assert sample.joint_torque is not None
+        arm = _turns(sample).apply(self.com)
+        return dataclasses.replace(sample, joint_torque=sample.joint_torque - np.cross(arm, sample.joint_force))
+
+
+class Unnormalised(_Told):
+    """The quaternion grows, and its matrix is taken as if it did not."""
+
+    fault = "quaternion not normalised"
+    scene = TOP
+    named = ("not of unit length",)
+
+    def misreport(self, sample: Sample) -> Sample:
+        """By a twentieth per second."""
+        assert sample.q_WB is not None
+        return dataclasses.replace(sample, q_WB=sample.q_WB * (1 + 0.05 * self.t))
+
+
+class ScalarLast(_Told):
+    """Another convention for quaternions."""
+
+    fault = "quaternions of bodies with their scalar last"
+    scene = CRANK
+    named = ("scalar last",)
+
+    def misreport(self, sample: Sample) -> Sample:
+        """x, y, z, w, from the first step on."""
+        assert sample.q_WB is not None
+        return dataclasses.replace(sample, q_WB=np.roll(sample.q_WB, -1, axis=-1)) if self.t else sample
+
+
+class LateReaction(_Told):
+    """The reactions of the step before."""
+
+    fault = "reactions of the step before"
+    named = ("force is one step (0.002 s) late",)
+
+    def __init__(self, scene: Scene, settings: Any) -> None:
+        super().__init__(scene, settings)
+        self.behind: Any = type(self.inner).build(scene, settings)
+
+    def advance(self, t: float) -> None:
+        """Both."""
+        super().advance(t)
+        self.behind.advance(t - STEP)
+
+    def misreport(self, sample: Sample) -> Sample:
+        """The other's."""
+        old = self.behind.sample()
+        return dataclasses.replace(sample, joint_force=old.joint_force, joint_torque=old.joint_torque)
+
+
+class LateMechanism(_Told):
+    """A state of a step before."""
+
+    fault = "a mechanism one step late"
+    named = ("one step (0.002 s) late",)
+
+    def clock(self, t: float) -> float:
+        """Behind."""
+        return t - STEP

@@ -1,0 +1,75 @@
+"""The drill of mutants: every planted fault is detected, nearly every one named, and honest engines are not accused."""
+
+from __future__ import annotations
+
+import functools
+import json
+
+import numpy as np
+import pytest
+from typer.testing import CliRunner
+
+from proofroll.cli import app
+from proofroll.core.diagnosis import CLOSES, Cause, Evidence, diagnose, hypotheses_of
+from proofroll.core.plugins import load_element_kinds
+from proofroll.core.truth import truth
+from proofroll.files.scene_file import load_scene
+from proofroll_drill.mutants.drilling import ENOUGH
+
+
+@functools.cache
+def _drilled() -> dict[str, object]:
+    done = CliRunner().invoke(app, ["drill", "mutants", "--json"])
+    assert done.exit_code == 0, done.output
+    return dict(json.loads(done.stdout))
+
+
+@pytest.mark.slow
+@pytest.mark.timeout(900)  # 20 s of processor time, on a machine that may have much else to do
+def test_every_mutant_is_detected_and_most_are_named() -> None:
+    """At least thirty engines with one fault each: all are detected, nine of ten are told their cause."""
+    found = _drilled()
+    rows = found["mutants"]
+    assert isinstance(rows, list)
+    assert found["tried"] == len(rows) >= 30
+    assert [row["mutant"] for row in rows if not row["detected"]] == []
+    assert sum(row["named"] for row in rows) == found["named"] >= ENOUGH * len(rows)
+    assert all(row["said"] for row in rows if row["named"])
+
+
+@pytest.mark.parametrize(
+    ("scene", "parameters", "until"),
+    [
+        ("sphere_in_cylinder", {}, 0.3),
+        ("sphere_in_cylinder", {"mu_static": 0.2, "mu_kinetic": 0.15}, 0.4),
+        ("double_pendulum", {}, 0.3),
+        ("slider_crank", {}, 0.3),
+    ],
+)
+def test_small_errors_of_an_honest_engine_have_no_cause(scene: str, parameters: dict[str, float], until: float) -> None:
+    """A run that scatters about the truth, as an engine's own tolerance makes it, is accused of nothing."""
+    loaded = load_scene(scene, **parameters)
+    true = truth(loaded, np.arange(0, until, 0.008))
+    noisy, random = true.copy(deep=True), np.random.default_rng(7)
+    for name in ("p_WB", "v_WB", "w_WB"):
+        noisy[name] += 1e-5 * random.standard_normal(noisy[name].shape) * float(abs(noisy[name]).max())
+    for element in loaded.elements:
+        for run in (true, noisy):
+            assert diagnose(Evidence(element, [], run, true, 1e-3), hypotheses_of(element)) == []
+
+
+def test_every_hypothesis_says_its_grounds() -> None:
+    """Each hypothesis of each kind of element has a name of its own and says what it tests and why that is proof."""
+    kinds = [kind for kind in load_element_kinds() if hasattr(kind, "hypotheses")]
+    assert {kind.name for kind in kinds} >= {"ball_on_surface", "mechanism"}
+    for kind in kinds:
+        names = [item.id for item in kind.hypotheses()]
+        assert all(len(item.grounds) > 20 for item in kind.hypotheses())
+        assert len(names) - len(set(names)) <= 2  # three loads are one hypothesis
+
+
+def test_a_cause_that_leaves_too_much_is_not_told() -> None:
+    """A hypothesis that leaves more of a difference than it may proves nothing, and one that leaves little does."""
+    base = {"id": "x", "says": "it does x", "quantity": "N", "unit": "N", "before": 1.0, "remedy": "do y"}
+    assert not Cause(**base, after=1.1 * CLOSES).proven
+    assert Cause(**base, after=0.049).sentence == "it does x (N off by 1 N, by 0.05 N with that)"
