@@ -15,6 +15,7 @@ import proofroll
 from proofroll.cli.comparing import compare
 from proofroll.cli.engines import engines
 from proofroll.cli.export import export
+from proofroll.cli.findings import findings
 from proofroll.cli.judge import judge
 from proofroll.cli.ladder import ladder
 from proofroll.cli.lists import scenes
@@ -36,7 +37,7 @@ app = typer.Typer(
     rich_markup_mode=None,
 )
 _STUDIES = (compare, report, tradeoff, recommend, ladder, stability, versions)
-for _command in (scenes, run, judge, plot, export, *_STUDIES):
+for _command in (scenes, run, judge, plot, export, findings, *_STUDIES):
     app.command()(_command)
 app.add_typer(new, name="new")
 app.add_typer(engines, name="engines")

@@ -13,7 +13,7 @@ _PACKAGE = Path(__file__).resolve().parents[1]
 
 
 def data_folder(kind: str) -> Path:
-    """The folder ``models`` or ``comparisons``.
+    """The folder ``models``, ``comparisons`` or ``findings``.
 
     Raises:
         ProofrollError: neither the installed package nor a repository around it holds the folder.

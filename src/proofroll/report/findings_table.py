@@ -1,0 +1,33 @@
+"""Findings about engines as tables on the terminal."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+from rich.table import Table
+from rich.text import Text
+
+from proofroll.studies.findings import Finding, Shown, State
+
+_STYLES = {State.SHOWS: "red", State.GONE: "green", State.NOT_INSTALLED: "dim", State.BROKEN: "yellow"}
+
+
+def findings_table(rows: Sequence[Shown]) -> Table:
+    """One line per finding: what it is, whether it shows in what is installed, and what its program says."""
+    table = Table(box=None, padding=(0, 1, 0, 0))
+    for name in ("finding", "state", "installed", "said"):
+        table.add_column(name, overflow="fold", no_wrap=name == "state")
+    for row in rows:
+        version = f"{row.finding.package} {row.version}".strip() if row.version else ""
+        table.add_row(Text(row.finding.title), Text(row.state, style=_STYLES[row.state]), Text(version), Text(row.said))
+    return table
+
+
+def findings_list(findings: Sequence[Finding]) -> Table:
+    """One line per finding: what it is, in which versions it was seen, and where it is discussed."""
+    table = Table(box=None, padding=(0, 1, 0, 0))
+    for name in ("finding", "seen in", "gone in", "issue"):
+        table.add_column(name, overflow="fold")
+    for item in findings:
+        table.add_row(*(Text(text) for text in (item.title, item.seen, item.gone, item.issue)))
+    return table

@@ -1,0 +1,159 @@
+"""What was found out about engines: a file each under ``findings/``, with a program with the engine alone."""
+
+from __future__ import annotations
+
+import json
+import re
+import subprocess
+import sys
+import tempfile
+import tomllib
+from collections.abc import Iterable, Iterator, Sequence
+from dataclasses import dataclass
+from enum import StrEnum
+from pathlib import Path
+
+from proofroll.core.errors import InputError, Missing, choices
+from proofroll.files.data_folders import data_folder
+
+# Exit code of a program whose finding still shows; 0 says that it is gone, everything else that it could not tell.
+SHOWS = 10
+_FRONT = re.compile(r"\+\+\+\n(.*?)\n\+\+\+\n(.*)", re.DOTALL)
+_PROGRAM = re.compile(r"```python\n(.*?)```", re.DOTALL)
+# Tells which of the packages that are named in the command line are installed, with their versions.
+_LOOK = """
+import importlib.metadata, json, sys
+known = {str(item.metadata["Name"]).lower(): item.version for item in importlib.metadata.distributions()}
+print(json.dumps({name: known[name] for name in sys.argv[1:] if name in known}))
+"""
+
+
+@dataclass(frozen=True)
+class Finding:
+    """One file of ``findings/``.
+
+    Attributes:
+        name: of the file.
+        title: what the engine does, in one line.
+        engine: whose.
+        package: distribution that has to be installed.
+        seen: versions in which it was seen, for a person.
+        gone: versions in which it was seen to be gone; may be empty.
+        issue: address of the public thread about it; may be empty.
+        text: what the documentation says, what happens, why it matters, what to do.
+        program: source; exit code 10 if it shows.
+    """
+
+    name: str
+    title: str
+    engine: str
+    package: str
+    seen: str
+    gone: str
+    issue: str
+    text: str
+    program: str
+
+
+class State(StrEnum):
+    """What a program says of what is installed."""
+
+    SHOWS = "still shows"
+    GONE = "gone"
+    NOT_INSTALLED = "not installed"
+    BROKEN = "could not tell"
+
+
+@dataclass(frozen=True)
+class Shown:
+    """A finding against what is installed.
+
+    Attributes:
+        finding: which.
+        state: whether it shows.
+        version: of the package that is installed; empty if none is.
+        said: the last line of the program.
+    """
+
+    finding: Finding
+    state: State
+    version: str
+    said: str
+
+
+def load_findings(engines: Iterable[str] = ()) -> list[Finding]:
+    """All findings, by name; of some engines alone, if any are named.
+
+    Raises:
+        InputError: a file that is none, or an engine of which there is no finding.
+    """
+    found = [read_finding(path) for path in sorted(data_folder("findings").glob("*.md"))]
+    wanted = list(engines)
+    known = sorted({item.engine for item in found})
+    for name in wanted:
+        if name not in known:
+            raise InputError("engine", name, f"there is no finding about it; choose {choices(known)}")
+    return [item for item in found if not wanted or item.engine in wanted]
+
+
+def read_finding(path: Path) -> Finding:
+    """One file: TOML between lines of +++, then text with one Python program.
+
+    Raises:
+        InputError: what is missing.
+    """
+    parts = _FRONT.match(path.read_text(encoding="utf-8"))
+    if parts is None:
+        raise InputError(str(path), path.name, "it has to begin with TOML between two lines of +++")
+    try:
+        front = tomllib.loads(parts[1])
+    except tomllib.TOMLDecodeError as error:
+        raise InputError(str(path), path.name, f"its TOML cannot be read: {error}") from None
+    programs = _PROGRAM.findall(parts[2])
+    if len(programs) != 1:
+        raise InputError(str(path), len(programs), "it has to hold one program, between ```python and ```")
+    names = ("title", "engine", "package", "seen", "gone", "issue")
+    for name in names:
+        if not isinstance(front.get(name), str):
+            raise InputError(f"{path}: {name}", front.get(name), "give a text; it may be empty")
+    told = {name: front[name] for name in names}
+    return Finding(name=path.stem, **told, text=_PROGRAM.sub("", parts[2]).strip(), program=programs[0])
+
+
+def shown(findings: Sequence[Finding], python: str = "", time_limit: float = 300.0) -> Iterator[Shown]:
+    """Runs each program in a process of its own.
+
+    Args:
+        findings: from :func:`load_findings`.
+        python: interpreter that has the engines; this one if empty.
+        time_limit: for each program [s].
+
+    Raises:
+        Missing: there is no such interpreter.
+    """
+    interpreter = python or sys.executable
+    try:
+        versions = json.loads(_run([interpreter, "-c", _LOOK, *{item.package for item in findings}], time_limit)[1])
+    except (OSError, ValueError):
+        raise Missing(f"{interpreter} is no Python interpreter; give the path of one") from None
+    for item in findings:
+        if item.package not in versions:
+            yield Shown(item, State.NOT_INSTALLED, "", f"{item.package} is not installed")
+            continue
+        with tempfile.TemporaryDirectory() as folder:
+            file = Path(folder) / f"{item.name}.py"
+            file.write_text(item.program, encoding="utf-8")
+            code, said = _run([interpreter, "-P", str(file)], time_limit)
+        state = {SHOWS: State.SHOWS, 0: State.GONE}.get(code, State.BROKEN)
+        yield Shown(item, state, versions[item.package], (said.strip().splitlines() or [""])[-1])
+
+
+def _run(command: list[str], time_limit: float) -> tuple[int, str]:
+    """Exit code and output; what was written to standard error where there is nothing else."""
+    try:
+        done = subprocess.run(
+            command, capture_output=True, text=True, errors="replace", timeout=time_limit, check=False
+        )
+    except subprocess.TimeoutExpired:
+        return -1, f"it did not end within {time_limit:g} s"
+    return done.returncode, done.stdout.strip() or done.stderr

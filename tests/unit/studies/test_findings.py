@@ -1,0 +1,81 @@
+"""Findings about engines: files that are sound, programs whose exit codes are read rightly."""
+
+from __future__ import annotations
+
+import json
+import sys
+from pathlib import Path
+
+import pytest
+from typer.testing import CliRunner
+
+from proofroll.cli import app
+from proofroll.core.errors import InputError, Missing
+from proofroll.studies.findings import Finding, State, load_findings, read_finding, shown
+
+
+def made(program: str, package: str = "numpy") -> Finding:
+    """A finding with this program."""
+    return Finding("made", "it does", "numpy", package, "1", "", "", "text", program)
+
+
+def test_every_file_is_sound() -> None:
+    """Each file names engine, versions and remedy, its issue is an address, and its program can say both."""
+    found = load_findings()
+    assert len(found) >= 15
+    for item in found:
+        assert item.title
+        assert item.seen
+        assert item.issue == "" or item.issue.startswith("https://github.com/")
+        assert "## What happens" in item.text
+        assert "## What to do" in item.text
+        compile(item.program, item.name, "exec")
+        assert "SystemExit(10 if" in item.program
+
+
+@pytest.mark.parametrize(
+    ("program", "state"),
+    [
+        ("print('here')\nraise SystemExit(10)", State.SHOWS),
+        ("print('here')", State.GONE),
+        ("raise ValueError('here')", State.BROKEN),
+        ("print('here'); import os; os.abort()", State.BROKEN),
+    ],
+)
+def test_exit_codes_are_read(program: str, state: State) -> None:
+    """Exit code 10 shows, 0 is gone, and a program that fails could not tell; the last line is what it says."""
+    (row,) = shown([made(program)])
+    assert row.state == state
+    assert state == State.BROKEN or row.said == "here"
+    assert row.version
+
+
+def test_what_cannot_be_run_is_said() -> None:
+    """An engine that is not installed is no verdict; an interpreter that does not exist is named; a hang is ended."""
+    (row,) = shown([made("", "no-such-engine")])
+    assert row.state == State.NOT_INSTALLED
+    with pytest.raises(Missing, match="/no/such/python is no Python interpreter"):
+        list(shown([made("")], "/no/such/python"))
+
+
+@pytest.mark.parametrize(
+    ("text", "problem"),
+    [("no front", "begin with TOML"), ("+++\ntitle = \n+++\n", "cannot be read"), ("+++\n+++\n", "begin with TOML")],
+)
+def test_broken_files_give_one_line(tmp_path: Path, text: str, problem: str) -> None:
+    """A file that is no finding is named with what is wrong."""
+    file = tmp_path / "broken.md"
+    file.write_text(text)
+    with pytest.raises(InputError, match=problem):
+        read_finding(file)
+
+
+def test_the_command_tells_states_and_versions() -> None:
+    """The command runs the findings of one engine in an interpreter and tells each with its state and version."""
+    options = ["findings", "--engine", "pinocchio", "--python", sys.executable, "--json"]
+    done = CliRunner().invoke(app, options)
+    assert done.exit_code == 0, done.output
+    content = json.loads(done.stdout)
+    states = {row["name"]: row["state"] for row in content["findings"]}
+    assert states["pinocchio_crba_order"] in {"still shows", "gone"}
+    assert sum(content["counts"].values()) == len(states) >= 4
