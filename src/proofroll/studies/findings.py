@@ -143,16 +143,16 @@ def shown(findings: Sequence[Finding], python: str = "", time_limit: float = 300
         with tempfile.TemporaryDirectory() as folder:
             file = Path(folder) / f"{item.name}.py"
             file.write_text(item.program, encoding="utf-8")
-            code, said = _run([interpreter, "-P", str(file)], time_limit)
+            code, said = _run([interpreter, "-P", str(file)], time_limit, folder)
         state = {SHOWS: State.SHOWS, 0: State.GONE}.get(code, State.BROKEN)
         yield Shown(item, state, versions[item.package], (said.strip().splitlines() or [""])[-1])
 
 
-def _run(command: list[str], time_limit: float) -> tuple[int, str]:
-    """Exit code and output; what was written to standard error where there is nothing else."""
+def _run(command: list[str], time_limit: float, folder: str | None = None) -> tuple[int, str]:
+    """Exit code and output, that of standard error where there is nothing else; engines may write into ``folder``."""
     try:
         done = subprocess.run(
-            command, capture_output=True, text=True, errors="replace", timeout=time_limit, check=False
+            command, capture_output=True, text=True, errors="replace", timeout=time_limit, check=False, cwd=folder
         )
     except subprocess.TimeoutExpired:
         return -1, f"it did not end within {time_limit:g} s"
