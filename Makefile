@@ -3,7 +3,7 @@ PYTHON ?= python3
 BIN := .venv/bin
 OUT ?= out
 
-.PHONY: install report tradeoff test check format readme clean
+.PHONY: install report tradeoff test check format readme docs gallery clean
 
 install: .venv/.installed
 
@@ -34,6 +34,14 @@ format: install
 # The pictures and the tables of README.md, from real runs; some minutes, on a machine that does nothing else.
 readme: install
 	$(BIN)/python docs/update_readme.py
+
+# The documentation, from docs/ and the docstrings; a warning is an error.
+docs: install
+	$(BIN)/python -m sphinx --quiet --fail-on-warning --keep-going --builder html docs $(OUT)/docs
+
+# The pictures and verdicts of docs/gallery.md, from real runs; some minutes.
+gallery: install
+	$(BIN)/python docs/gallery.py
 
 clean:
 	rm -rf $(OUT) dist build .pytest_cache .mypy_cache .ruff_cache .hypothesis

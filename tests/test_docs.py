@@ -1,44 +1,70 @@
-"""Pages under docs/: their Python runs, and their links lead somewhere."""
+"""The pages of docs/: what they tell a person to type works, in the order of the page, in one folder."""
 
 from __future__ import annotations
 
-import inspect
 import re
+import shlex
+import subprocess
 import sys
-import types
-from collections.abc import Callable
 from pathlib import Path
-from typing import Any
 
 import pytest
+import yaml
 
-DOCS = Path(__file__).resolve().parents[1] / "docs"
-PAGES = {page.name: page.read_text(encoding="utf-8") for page in sorted(DOCS.glob("*.md"))}
-
-
-def snippets(text: str) -> list[tuple[int, str]]:
-    """Each Python block of a page, with its line."""
-    found = re.finditer(r"^```python\n(.*?)^```$", text, flags=re.DOTALL | re.MULTILINE)
-    return [(text[: block.start(1)].count("\n"), block[1]) for block in found]
-
-
-@pytest.mark.parametrize("name", [name for name, text in PAGES.items() if snippets(text)])
-def test_the_python_of_a_page_runs(
-    name: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, assert_agrees: Callable[..., Any]
-) -> None:
-    """The snippets of a page run one after another, as a reader would type them, and so do the tests among them."""
-    module = types.ModuleType(f"page_{Path(name).stem}")
-    monkeypatch.setitem(sys.modules, module.__name__, module)
-    monkeypatch.chdir(tmp_path)
-    for line, source in snippets(PAGES[name]):
-        exec(compile("\n" * line + source, str(DOCS / name), "exec"), vars(module))
-    for function in [item for key, item in vars(module).items() if key.startswith("test_")]:
-        wanted = inspect.signature(function).parameters
-        function(**{"assert_agrees": assert_agrees} if "assert_agrees" in wanted else {})
+ROOT = Path(__file__).resolve().parents[1]
+PROOFROLL = str(Path(sys.executable).with_name("proofroll"))
+# README.md and the pages whose snippets have tests of their own.
+ELSEWHERE = {"agreement_in_your_tests", "vocabulary", "write_an_engine", "write_an_element", "worker_protocol"}
+PAGES = sorted(path.stem for path in (ROOT / "docs").glob("*.md") if path.stem not in ELSEWHERE)
+BLOCK = re.compile(r"^```([^\n]*)\n(.*?)^```$", flags=re.DOTALL | re.MULTILINE)
+# A file's first line names it, as a comment.
+NAMED = re.compile(r"(?:#|<!--) ([\w./]+\.(?:toml|urdf))")
 
 
-@pytest.mark.parametrize("name", PAGES)
-def test_links_of_a_page_lead_somewhere(name: str) -> None:
-    """Every relative link leads to a file of the repository."""
-    targets = [target for target in re.findall(r"\]\(([^)#]+)\)", PAGES[name]) if "://" not in target]
-    assert [target for target in targets if not (DOCS / target).exists()] == []
+def blocks(page: str) -> list[tuple[str, str]]:
+    """Language and text of each fenced block; a block of commands has none."""
+    found = BLOCK.findall((ROOT / "docs" / f"{page}.md").read_text(encoding="utf-8"))
+    return [(language, text) for language, text in found if not language.startswith("{")]  # Sphinx's own
+
+
+def commands(text: str) -> list[tuple[list[str], int]]:
+    """The words of each command, and the exit code that its comment tells."""
+    found = []
+    for line in text.splitlines():
+        command, _, comment = line.partition("  #")
+        code = re.search(r"exits (\d)", comment)
+        found.append((shlex.split(command), int(code[1]) if code else 0))
+    return found
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("page", [page for page in PAGES if blocks(page)])
+def test_a_page_can_be_followed(page: str, tmp_path: Path) -> None:
+    """Every file, command and snippet of a page works, one after the other; scripts for other systems parse."""
+    for language, text in blocks(page):
+        if language in {"toml", "xml"}:
+            named = NAMED.match(text)
+            assert named, text
+            (tmp_path / named[1]).parent.mkdir(exist_ok=True)
+            (tmp_path / named[1]).write_text(text.partition("\n")[2], encoding="utf-8")
+        elif language == "sh":
+            subprocess.run(["bash", "-n", "-c", text], check=True)
+        elif language == "yaml":
+            assert yaml.safe_load(text)
+        elif language == "python":
+            subprocess.run([sys.executable, "-c", text], cwd=tmp_path, check=True, capture_output=True)
+        else:
+            assert language == "", f"nothing executes {language}"
+            for words, code in commands(text):
+                assert words[0] == "proofroll"
+                command = [PROOFROLL, *words[1:]]
+                done = subprocess.run(command, cwd=tmp_path, capture_output=True, text=True, check=False)
+                assert done.returncode == code, (words, done.stderr, done.stdout)
+
+
+def test_every_page_is_in_the_contents() -> None:
+    """No page is left out of the table of contents, and none is named there that is not."""
+    index = (ROOT / "docs" / "index.md").read_text(encoding="utf-8")
+    trees = re.findall(r"```\{toctree\}\n(.*?)```", index, flags=re.DOTALL)
+    named = [line for tree in trees for line in tree.splitlines() if line and not line.startswith(":")]
+    assert sorted([*named, "index"]) == sorted(path.stem for path in (ROOT / "docs").glob("*.md"))

@@ -1,0 +1,39 @@
+"""How the documentation is built: ``make docs``."""
+
+from __future__ import annotations
+
+import re
+from typing import Any
+
+import proofroll
+
+project = "proofroll"
+author = "the proofroll authors"
+copyright = author  # noqa: A001 -- the name is Sphinx's
+release = proofroll.__version__
+extensions = ["myst_parser", "sphinx.ext.autodoc", "sphinx.ext.napoleon", "sphinx.ext.mathjax", "sphinx.ext.viewcode"]
+myst_enable_extensions = ["dollarmath", "amsmath", "colon_fence"]
+myst_heading_anchors = 3
+exclude_patterns = ["_build", "examples/*.md"]
+suppress_warnings = ["myst.header"]
+html_theme = "furo"
+html_title = "proofroll"
+html_static_path = ["_static"]
+html_css_files = ["proofroll.css"]
+html_show_sourcelink = False
+autodoc_member_order = "bysource"
+autodoc_typehints = "description"
+autodoc_class_signature = "separated"
+napoleon_google_docstring = True
+napoleon_numpy_docstring = False
+nitpicky = False
+
+
+def _links(_: Any, __: str, source: list[str]) -> None:
+    """Files outside ``docs`` are named, not linked: an installed documentation has them not beside it."""
+    source[0] = re.sub(r"\[([^]]+)\]\(\.\./[^)]*\)", r"\1", source[0])
+
+
+def setup(app: Any) -> None:
+    """Called by Sphinx."""
+    app.connect("source-read", _links)

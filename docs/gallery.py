@@ -1,0 +1,114 @@
+"""Writes docs/gallery.md: every scene with picture, claim, truth and verdicts, from real runs: ``make gallery``."""
+
+from __future__ import annotations
+
+import sys
+from pathlib import Path
+
+from proofroll.core.comparison import Comparison
+from proofroll.files.comparison_file import load_comparison
+from proofroll.files.data_folders import data_folder
+from proofroll.files.netcdf import read
+from proofroll.files.scene_file import load_scene, read_scene_file, scene_names
+from proofroll.files.toml import study_of
+from proofroll.report.comparison_content import outcome_content
+from proofroll.report.html import templates
+from proofroll.report.labels import number
+from proofroll.report.markdown import caveat_list, verdict_table
+from proofroll.report.scene_sheet import scene_sheet
+from proofroll.running.runner import Runner
+from proofroll.running.store import Store
+from proofroll.studies.compare import Outcome, compare
+
+DOCS = Path(__file__).resolve().parent
+PICTURES = DOCS / "gallery"
+# A picture stands alone on white; in a report the page's own style sheet says the same.
+STYLE = """<style>path,circle{fill:none;stroke:#1b1f24;stroke-width:1.2;stroke-linejoin:round;stroke-linecap:round}
+.faint{stroke:#5b6570;stroke-width:.7;stroke-dasharray:2 3}.hidden{stroke:#5b6570;stroke-width:.9;stroke-dasharray:4 3}
+.axis{stroke:#5b6570;stroke-width:.9;stroke-dasharray:9 3 2 3}.wall{fill:#eceef1}.ball{fill:#d5dae0}
+.motion{stroke:#1a6f5f;stroke-width:1.6}.force{stroke:#9c3a1e;stroke-width:1.8}[class$=head]{stroke:none;fill:#1b1f24}
+.motion-head,.motion-letter{fill:#1a6f5f}.force-head,.force-letter{fill:#9c3a1e}
+text{font:italic 15px Georgia,serif;fill:#1b1f24}.sub{font-size:10.5px;font-style:normal}</style>"""
+HEAD = """# Gallery of scenes
+
+Scenes with what they ask, what is true of them, and what each engine makes of them. Written by `make gallery`
+from real runs of the comparisons, with the values that a brief report has; do not edit it. Errors are the largest over
+all points of the parameters; what the words mean: [read a verdict](read_a_verdict.md). What each costs says the
+[trade-off](tradeoff.md).
+"""
+
+
+def comparisons() -> dict[str, Comparison]:
+    """The first comparison of each scene that has one."""
+    found: dict[str, Comparison] = {}
+    for path in sorted(data_folder("comparisons").rglob("*.toml")):
+        if study_of(path) is None:
+            comparison = load_comparison(str(path)).briefly()
+            found.setdefault(comparison.scene, comparison)
+    return found
+
+
+def picture(scene: str) -> str:
+    """Draws the scene into a file; its line of Markdown, empty where there is no drawing."""
+    drawings = scene_sheet(scene, [])["drawings"]
+    if not drawings:
+        return ""
+    markup = str(templates().get_template("scene.html").module.picture(drawings[0], scene))  # type: ignore[attr-defined]
+    width, height = drawings[0]["box"][2:]
+    head = f'<svg xmlns="http://www.w3.org/2000/svg" width="{width:g}" height="{height:g}"'
+    lines = [line for line in markup.splitlines() if line.strip()]
+    text = "\n".join(lines).replace("<svg", head, 1).replace(">", f">\n{STYLE}", 1)
+    (PICTURES / f"{scene}.svg").write_text(text + "\n", encoding="utf-8")
+    return f"```{{image}} gallery/{scene}.svg\n:alt: {scene}, {drawings[0]['label']}\n```\n"
+
+
+def truth(outcome: Outcome, runner: Runner) -> str:
+    """By which routes the truth was found, and how well it is known at the first point."""
+    case = next(iter(outcome.truths.values()))
+    result = runner.store.get(case)
+    if result is None or result.trajectory is None:
+        return f"There is none: {result.message if result else 'it was not made'}."
+    dataset = read(runner.store.trajectory(case))
+    name = load_scene(case.scene, **case.parameters).deciding
+    said = f"{result.message}."
+    if name in dataset and "error_bar" in dataset[name].attrs:
+        bar, unit = dataset[name].attrs["error_bar"], dataset[name].attrs["units"]
+        said += f" Error bar of {name}: {number(float(bar))} {unit}."
+    return said
+
+
+def section(scene: str, comparison: Comparison | None, runner: Runner) -> str:
+    """One scene."""
+    file = read_scene_file(scene)
+    parts = [f"## {scene}\n\n{file.title}. *{file.source}.*\n", picture(scene)]
+    if comparison is None:
+        parts.append("No comparison of it comes with proofroll.\n")
+        return "\n".join(parts)
+    outcome = compare(comparison, runner)
+    content = outcome_content(outcome)
+    path = f"comparisons: {comparison.name}"
+    parts += [f"**Asked** ({path}): {comparison.question}\n", f"**True**: {truth(outcome, runner)}\n"]
+    # Without costs, which are measured in turns where that is asked.
+    table = "".join(line.rstrip("\n").rsplit("|", 2)[0] + "|\n" for line in verdict_table(content).splitlines())
+    parts += [table, caveat_list(content)]
+    return "\n".join(part for part in parts if part)
+
+
+def main(names: list[str]) -> None:
+    """Writes all sections; those of the scenes that are named, or all, are made anew."""
+    PICTURES.mkdir(exist_ok=True)
+    runner = Runner(Store(DOCS.parent / "out" / "cases"))
+    target, known = DOCS / "gallery.md", comparisons()
+    before = target.read_text(encoding="utf-8") if target.exists() else ""
+    kept = {part.partition("\n")[0]: f"## {part}".rstrip() + "\n" for part in before.split("\n## ")[1:]}
+    for scene in scene_names():
+        if names and scene not in names:
+            continue
+        kept[scene] = section(scene, known.get(scene), runner)
+        text = "\n".join([HEAD, *(kept[name] for name in scene_names() if name in kept)])
+        target.write_text(text, encoding="utf-8")
+        sys.stderr.write(f"{scene}\n")
+
+
+if __name__ == "__main__":
+    main(sys.argv[1:])
