@@ -59,7 +59,7 @@ def write(mechanism: Mechanism, settings: MujocoSettings) -> Any:
         for end, body, position in (("a", spring.body_a, spring.position_a), ("b", spring.body_b, spring.position_b)):
             bodies[body].add_site(name=f"spring{number}{end}", pos=position)
             tendon.wrap_site(f"spring{number}{end}")
-        tendon.stiffness[0], tendon.damping[0] = spring.stiffness, spring.damping
+        _set_law(tendon, spring.stiffness, spring.damping)
         tendon.springlength = [spring.length, spring.length]
     return spec
 
@@ -78,7 +78,8 @@ def _add_body(spec: Any, parent: Any, number: int, joint: Joint, body: Body) -> 
         made = added.add_joint(
             name=f"{number}.{part}", type=kind, pos=joint.child_position, axis=joint.child_frame[:, column]
         )
-        made.stiffness[0], made.damping[0], made.springref = joint.stiffness, joint.damping, joint.rest
+        _set_law(made, joint.stiffness, joint.damping)
+        made.springref = joint.rest
         made.frictionloss, made.armature = joint.friction, joint.armature
     added.add_site(name=f"{number}", pos=joint.child_position)
     for kind in ("FORCE", "TORQUE"):
@@ -89,6 +90,15 @@ def _add_body(spec: Any, parent: Any, number: int, joint: Joint, body: Body) -> 
             objname=f"{number}",
         )
     return added
+
+
+def _set_law(item: Any, stiffness: float, damping: float) -> None:
+    """Linear stiffness and damping: in MuJoCo of today the first of several coefficients, in 3.5 the only one."""
+    for name, value in (("stiffness", stiffness), ("damping", damping)):
+        if np.ndim(getattr(item, name)):
+            getattr(item, name)[0] = value
+        else:
+            setattr(item, name, value)
 
 
 def _add_loop(

@@ -27,6 +27,8 @@ _ABOVE = 20.0
 _ANGLES = 90
 _FEWEST = 5
 # Along one direction every cone has its edge or its face: the slip has to turn by this much to tell [rad].
+# A face that is fitted comes near any short arc of slip: an elliptic cone that lags left a fiftieth.
+_PYRAMID = 1 / 100
 _TURNS = 0.4
 # What an engine is given, and may say to hold though it does not.
 GIVEN = ("mass", "inertia", "gravity", "ball radius", "rolling resistance", "static friction", "kinetic friction")
@@ -327,7 +329,8 @@ class PyramidalCone:
                 after = min(after, apart(said, -most * (np.sign(along) * kind) @ turn.T))
         says = "the friction cone is a pyramid: the friction depends on the direction of the slip"
         remedy = "choose an elliptic (quadratic) cone"
-        yield Cause(self.id, says, "friction while slipping", "N", before, after, remedy, 1, ("motion", *COVERED))
+        covered = ("motion", *COVERED)
+        yield Cause(self.id, says, "friction while slipping", "N", before, after, remedy, 1, covered, closes=_PYRAMID)
 
 
 def _has_resistance(body: RollingBall) -> bool:
