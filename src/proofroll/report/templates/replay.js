@@ -244,11 +244,9 @@
   const SIGNS = { arrow: "M1 5H19M14 1L20 5L14 9", line: "M1 5H21" };
   function key() {
     const drawn = (path) => {
-      const sign = document.createElementNS("http://www.w3.org/2000/svg", "svg"), stroke = document.createElementNS("http://www.w3.org/2000/svg", "path");
-      for (const [name, value] of Object.entries({ width: 22, height: 10, "aria-hidden": "true" })) sign.setAttribute(name, value);
-      for (const [name, value] of Object.entries({ d: path, fill: "none", stroke: "currentColor", "stroke-width": 2 })) stroke.setAttribute(name, value);
-      sign.append(stroke);
-      return sign;
+      const holder = make("span");
+      holder.innerHTML = `<svg width="22" height="10" aria-hidden="true"><path d="${path}" fill="none" stroke="currentColor" stroke-width="2"/></svg>`;  // a sign of ours
+      return holder.firstChild;
     };
     const forces = stage.perNewton ? Number((0.01 / stage.perNewton).toPrecision(2)) : "";
     ui.key.replaceChildren(...kind.key(forces).map(({ sign, text, tone }) => {

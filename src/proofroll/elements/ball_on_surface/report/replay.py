@@ -65,7 +65,7 @@ def drawn(replayed: Replayed) -> tuple[dict[str, Any], list[int], Numbers]:
         "until": float(times[-1]),
         "frames": times.size,
         "speed": _SPEED,
-        "from": _FROM,
+        "from": list(_FROM),
         "tail": 0.4,
         "least": 0.1,
         "off": "distance of its centre from the true ball's",
