@@ -32,6 +32,7 @@ made_from = importlib.util.module_from_spec(_SPEC)
 _SPEC.loader.exec_module(made_from)
 # Where the files of the project lie; beside them are those of tools.
 TOPS = (
+    "findings",
     "src",
     "models",
     "comparisons",

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import dataclasses
 from collections.abc import Callable, Mapping
 from pathlib import Path
 
@@ -30,6 +31,7 @@ def test_a_case_says_where_its_time_went(
     """Every result of a run names its causes, none negative, and the time inside the engine is the stopwatch's."""
     install_engines({"tiny": "tiny:Tiny"})
     case = make_case("tiny", timed=True)
+    case = dataclasses.replace(case, engine=dataclasses.replace(case.engine, version="1.0"))
     store = Store(tmp_path)
     result = Runner(store, jobs=1).run([case])[case.key]
     assert result.status is Status.DONE

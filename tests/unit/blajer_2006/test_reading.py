@@ -56,7 +56,7 @@ def written(tmp_path: Path, text: str) -> str:
     [
         ('study = "figures"', 'study = "tradeoff"', 'only a file with study = "figures"'),
         ('title = "Some figures"', "title = Some figures", "the file is broken"),
-        ('scene = "sphere_in_cylinder"', 'scene = "cone"', "there is no such scene"),
+        ('scene = "sphere_in_cylinder"', 'scene = "nowhere"', "there is no such scene"),
         ("speed = 4", "haste = 4", "runs.free.haste"),
         ("speed = 4", "speed = 0", "nothing to roll on"),
         ("until = 0.5", "until = -1", "not negative"),

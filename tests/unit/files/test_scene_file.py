@@ -153,7 +153,7 @@ def test_a_scene_outside_models(edited: Callable[[str, str], str]) -> None:
         ("[gravity]", "[gravity", ["broken", "line"]),
         ("[gravity]", "[gravity]\nmagnitud = 3", ["magnitud", "no such key"]),
         ("[gravity]", "[gravitation]", ["gravity", "required"]),
-        ('kind = "cylinder"', 'kind = "cone"', ["surfaces", "cylinder", "plane"]),
+        ('kind = "cylinder"', 'kind = "nowhere"', ["surfaces", "cylinder", "plane"]),
         ('kind = "cylinder"', "", ["surfaces.0.kind", "'nothing'"]),
         ('radius = "$radius"', 'radius = "wide"', ["balls.0.radius", "'wide'", "number"]),
         ('radius = "$radius"', "", ["balls.0.radius", "required"]),

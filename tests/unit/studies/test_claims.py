@@ -158,7 +158,7 @@ def test_steps_and_orders_are_judged_exactly_in_a_brief_study_too(tmp_path: Path
         ("speed = [3, 5]", "speed = [0, 5]", "speed"),
         ("speed = [3, 5]", "haste = [3, 5]", "haste"),
         ("until = 1.0", "until = 1.0\nwheels = 4", "wheels"),
-        ('scene = "sphere_in_cylinder"', 'scene = "cone"', "there is no such scene"),
+        ('scene = "sphere_in_cylinder"', 'scene = "nowhere"', "there is no such scene"),
         (TEXT[TEXT.index("[[cheapest]]") :], "", "claims nothing"),
         ('title = "A claim"', "title = A claim", "the file is broken"),
     ],
