@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import os
+import signal
 import sys
 from collections.abc import Callable, Iterator, Mapping
 from functools import cache
@@ -33,6 +34,10 @@ settings.register_profile(
     suppress_health_check=[HealthCheck.too_slow, HealthCheck.function_scoped_fixture],
 )
 settings.load_profile("repeatable")
+
+# Tests of Ctrl-C mean nothing where whoever began pytest has SIGINT ignored (nohup, a shell's "&"), which children inherit.
+if signal.getsignal(signal.SIGINT) is signal.SIG_IGN:
+    signal.signal(signal.SIGINT, signal.default_int_handler)
 
 # Nothing about this motion is zero or symmetric, so a lost sign or a swapped axis shows.
 GENERAL = {"speed": 3.3, "axial_speed": 0.7, "radial_spin": 12.0}

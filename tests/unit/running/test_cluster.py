@@ -36,6 +36,8 @@ HOST = socket.gethostname()
 ASKED = Workers()
 PLUGINS = Path(__file__).parents[2] / "plugins"
 
+pytestmark = pytest.mark.xdist_group("cluster")  # one process starts the cluster, which costs more than its tests
+
 
 def case(engine: str, speed: float = 4.0, scene: str = "sphere_in_cylinder") -> Case:
     """A short case with the engine's own facts."""
@@ -79,6 +81,17 @@ class DaskCluster:
         process = subprocess.Popen(command, env=os.environ | environment, stdout=self._log, stderr=self._log)
         self.processes.append(process)
         return process
+
+    def one_worker(self) -> None:
+        """At least one worker, whichever tests ran before."""
+        if all(process.poll() is not None for process in self.processes[1:]):
+            self.worker()
+
+    def no_workers(self) -> None:
+        """None at all."""
+        for process in self.processes[1:]:
+            process.kill()
+            process.wait()
 
     def close(self) -> None:
         """Ends all of it."""
@@ -129,14 +142,15 @@ def test_a_worker_with_other_engines(dask: DaskCluster, tmp_path: Path) -> None:
     shutil.copytree(dask.folder / "site" / "throwaway-1.0.dist-info", other / "throwaway-2.0.dist-info")
     text = (other / "throwaway-2.0.dist-info" / "METADATA").read_text()
     (other / "throwaway-2.0.dist-info" / "METADATA").write_text(text.replace("Version: 1.0", "Version: 2.0"))
+    dask.no_workers()
     dask.worker(PYTHONPATH=os.pathsep.join([str(other), os.environ["PYTHONPATH"]]))
     runner = Runner(Store(tmp_path / "store"), cluster=Cluster(dask.address))
     with pytest.raises(ProofrollError, match=r"other versions: here throwaway 1\.0; there throwaway 2\.0;"):
         runner.run([case("oracle")])
     # The same packages, another code of the adapter: the case would have another key there.
     asked = dataclasses.replace(case("oracle"), engine=dataclasses.replace(case("oracle").engine, code="other"))
-    dask.processes[-1].kill()
-    dask.worker()
+    dask.no_workers()
+    dask.one_worker()
     with pytest.raises(ProofrollError, match=r"here oracle 1 \(code other\); there oracle 1 \(code \w+\)"):
         Runner(Store(tmp_path / "store"), cluster=Cluster(dask.address)).run([asked])
     asked = dataclasses.replace(case("oracle"), scene_digest="other")
@@ -152,6 +166,7 @@ def test_results_are_those_of_home(dask: DaskCluster, tmp_path: Path, room: Path
     waiting = [case("waiting", speed) for speed in (3.0, 3.5)]
     home, away = Store(tmp_path / "home"), Store(tmp_path / "away")
 
+    dask.one_worker()
     cluster = Cluster(dask.address)
     first = Runner(away, cluster=cluster).run(some)
     lost = dask.worker()
@@ -191,6 +206,7 @@ def test_results_are_those_of_home(dask: DaskCluster, tmp_path: Path, room: Path
 
 def test_a_scheduler_that_ends(dask: DaskCluster, tmp_path: Path, room: Path) -> None:
     """One line says so; what was finished is stored, and the next run makes the rest alone."""
+    dask.one_worker()
     store = Store(tmp_path / "store")
     done, rest = case("oracle"), case("waiting")
     runner = Runner(store, cluster=Cluster(dask.address))

@@ -72,7 +72,7 @@ def test_an_environment_is_made_remembered_and_removed(wheels: Path, proofroll: 
     [
         (["aged>=1.0"], {}, "say by which label"),
         (["aged==1.0"], {"label": "../up"}, "use letters, digits"),
-        (["--index-url=x"], {"label": "x"}, "not an option of pip"),
+        (["--upgrade"], {"label": "x"}, "not an option of pip"),
         (["aged==1.0"], {"python": "no-such-python"}, "there is no such program"),
         (["aged==1.0"], {"python": "false"}, "it does not run as a Python"),
     ],
