@@ -35,7 +35,7 @@ settings.register_profile(
 )
 settings.load_profile("repeatable")
 
-# Tests of Ctrl-C mean nothing where whoever began pytest has SIGINT ignored (nohup, a shell's "&"), which children inherit.
+# Tests of Ctrl-C mean nothing where SIGINT was ignored when pytest began (nohup, a shell's "&"); children inherit that.
 if signal.getsignal(signal.SIGINT) is signal.SIG_IGN:
     signal.signal(signal.SIGINT, signal.default_int_handler)
 
