@@ -78,7 +78,7 @@ CHAPTERS: dict[str, tuple[Table, ...]] = {
     'A stability map: `study = "stability"`': (
         Table("", stability_claims.StabilityFile, (*_OF_FILE, "axes", "claims")),
         Table("[[axes]]", axes.Axis, ("parameters",)),
-        Table("[axes.parameters.NAME]", axes.Term),
+        Table("[axes.parameters.NAME]", axes.AxisTerm),
         Table("[[claims]]", stability_claims.Claim),
     ),
     'A regime map: `study = "regimes"`': (

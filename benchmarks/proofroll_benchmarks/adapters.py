@@ -32,7 +32,7 @@ _LIMIT = 300.0
 
 
 @dataclasses.dataclass(frozen=True)
-class Row:
+class AdapterRow:
     """One engine with one model.
 
     Attributes:
@@ -135,13 +135,13 @@ def bench_adapters(
     rounds: int = ROUNDS,
     seconds: float = LEAST_SECONDS,
     progress: Callable[[str], None] | None = None,
-) -> list[Row]:
+) -> list[AdapterRow]:
     """All formulations of some engines, each with every variant, one worker process per engine."""
     from proofroll.files.scene_file import load_scene
     from proofroll.running.runner import Worker, WorkerDied
     from proofroll_benchmarks.loops import announced
 
-    rows: list[Row] = []
+    rows: list[AdapterRow] = []
     needed = load_scene(SCENE).requires
     for engine in engines:
         worker = Worker()
@@ -154,15 +154,15 @@ def bench_adapters(
                     if needed <= set(described["provides"][name])
                 ]
             except ProofrollError as error:
-                rows.append(Row(engine, "", preset, "", None, str(error)))
+                rows.append(AdapterRow(engine, "", preset, "", None, str(error)))
                 continue
             if preset not in {found for _, found in formulations}:
-                rows.append(Row(engine, "", preset, "", None, f"no formulation has the preset {preset}"))
+                rows.append(AdapterRow(engine, "", preset, "", None, f"no formulation has the preset {preset}"))
                 continue
             try:
                 announced(engine)
             except Refused as error:
-                rows.append(Row(engine, "", preset, "", None, str(error)))  # once, not for every variant
+                rows.append(AdapterRow(engine, "", preset, "", None, str(error)))  # once, not for every variant
                 continue
             for formulation, found in formulations:
                 for variant, parameters in VARIANTS.items():
@@ -184,7 +184,7 @@ def bench_adapters(
                         worker = Worker()
                     except ProofrollError as error:
                         row = {"ratio": None, "message": str(error)}
-                    rows.append(Row(engine, formulation, found, variant, **row))
+                    rows.append(AdapterRow(engine, formulation, found, variant, **row))
         finally:
             worker.close()
     return rows
@@ -208,7 +208,7 @@ def _row(answer: dict[str, Any]) -> dict[str, Any]:
     }
 
 
-def content(rows: Sequence[Row]) -> dict[str, Any]:
+def content(rows: Sequence[AdapterRow]) -> dict[str, Any]:
     """The rows as plain data: per engine the worst ratio, and all of its rows."""
     from proofroll.running.timing import machine
 

@@ -27,7 +27,7 @@ from proofroll.running.timing import Interval, Timing, interleaved, machine, rat
 from proofroll.truth.onset import first_slip as true_first_slip
 from proofroll.truth.rolling import unreduced
 from proofroll_benchmarks.compiled import Onsets, Timed, compiled, numeric
-from proofroll_benchmarks.search import SAMPLES, Found, search
+from proofroll_benchmarks.search import SAMPLES, Configuration, search
 
 _SCENE = "sphere_in_cylinder"
 _PARAMETERS = {"speed": 4.0, "rolling_resistance": 5e-4}
@@ -79,7 +79,7 @@ def reference(rounds: int, progress: Callable[[str], None]) -> dict[str, Any]:
     finalists = {item.name: item for item in found}
     with Stopwatch() as stopwatch:
 
-        def timed(item: Found) -> Callable[[], float | None]:
+        def timed(item: Configuration) -> Callable[[], float | None]:
             def task() -> float | None:
                 rate = stopwatch(item.case)
                 return None if rate is None else rate * slip
@@ -106,7 +106,7 @@ def _models(scene: Any, free: Any, times: FloatArray, true_p: FloatArray) -> dic
 def _content(
     slip: float,
     models: Mapping[str, Timed],
-    finalists: Mapping[str, Found],
+    finalists: Mapping[str, Configuration],
     timings: Mapping[str, Timing],
     onsets: Onsets,
     own_slip: float | None,

@@ -30,7 +30,7 @@ _LIMIT = 5.0
 
 
 @dataclasses.dataclass(frozen=True)
-class Found:
+class Configuration:
     """A configuration that holds the bound.
 
     Attributes:
@@ -61,7 +61,7 @@ def search(
     runner: Runner,
     finalists: int,
     progress: Callable[[str], None],
-) -> list[Found]:
+) -> list[Configuration]:
     """The fastest configurations of all installed engines that hold the bound, and the fastest contact models.
 
     Compiled models are left out: they are what the engines are compared with.
@@ -77,7 +77,7 @@ def search(
     """
     progress("asking the engines")
     kinds = list(_kinds())
-    best: dict[int, Found] = {}
+    best: dict[int, Configuration] = {}
 
     def attempt(wanted: list[tuple[int, float]], what: str) -> None:
         cases = [(index, _case(scene, _with(kinds[index][0], value), until)) for index, value in wanted]
@@ -99,7 +99,7 @@ def search(
     return sorted((best[index] for index in chosen), key=lambda found: found.seconds)
 
 
-def _coarser(one: Found, other: Found) -> bool:
+def _coarser(one: Configuration, other: Configuration) -> bool:
     """Whether the one of two that hold the bound does so with less work; the wall seconds of a run are too noisy."""
     return _resolution(one.case.engine) > _resolution(other.case.engine)
 
@@ -108,7 +108,7 @@ def _resolution(facts: EngineFacts) -> float:
     return float(facts.settings[str(facts.resolution)])
 
 
-def _between(found: Found, every: float) -> list[float]:
+def _between(found: Configuration, every: float) -> list[float]:
     """Coarser resolutions than the one that holds the bound, finer than the next that did not."""
     facts = found.case.engine
     if facts.resolution == "rtol":
@@ -173,8 +173,8 @@ def _case(scene: Scene, facts: EngineFacts, until: float) -> Case:
     )
 
 
-def _judged(case: Case, result: Result, true_z: FloatArray, contact: bool, runner: Runner) -> Found | None:
+def _judged(case: Case, result: Result, true_z: FloatArray, contact: bool, runner: Runner) -> Configuration | None:
     if result.status is not Status.DONE:
         return None
     z = read(runner.store.trajectory(case))["z"].to_numpy()
-    return Found(case, float(np.max(np.abs(z - true_z))), result.wall_seconds, contact)
+    return Configuration(case, float(np.max(np.abs(z - true_z))), result.wall_seconds, contact)

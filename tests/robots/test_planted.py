@@ -17,7 +17,7 @@ from proofroll.core.plugins import parse_engine
 from proofroll.robots import reading
 from proofroll.robots.body_recursion import body_recursion
 from proofroll.robots.judging import judged
-from proofroll.robots.layers import Truth
+from proofroll.robots.layers import RobotTruth
 from proofroll.robots.model import Robot
 from proofroll.robots.protocol import Reading, Request
 from proofroll.robots.robot_file import RobotFile, open_robot
@@ -92,7 +92,7 @@ def _examined(path: Path, base: str) -> tuple[RobotFile, Robot | None]:
     return file, read_urdf(file) if file.kind == "urdf" else None
 
 
-def _request(written: Path, file: RobotFile, truth: Truth, options: dict[str, bool]) -> Request:
+def _request(written: Path, file: RobotFile, truth: RobotTruth, options: dict[str, bool]) -> Request:
     robot = truth.robot
     children = {joint.name: joint.child for joint in robot.moving}
     what = (written, file.kind, file.base, BASE_JOINT, options, children)
@@ -123,7 +123,7 @@ def test_real_engines(
     written = reading.write(file, place)
     if robot is None:
         robot, _ = reading.compiled(robot_workers("mujoco"), file, written, 60)
-    truth = Truth.of(robot, random_states(robot, 5, 1))
+    truth = RobotTruth.of(robot, random_states(robot, 5, 1))
     request = _request(written, file, truth, reading.options_of(spec.options, spec.name))
     answer = reading.ask(robot_workers(spec.name), spec.name, request, place, 60)
     row = judged(file, truth, 1e-14, spec, answer, truth.torques())
@@ -215,7 +215,7 @@ UNKNOWN: list[tuple[str, Callable[[str], str], str]] = [
 ]
 
 
-def _held(robot: Robot, truth: Truth) -> Reading:
+def _held(robot: Robot, truth: RobotTruth) -> Reading:
     """What an engine would say that holds this robot and evaluates it by the second formulation."""
     states = truth.states
     d, placed = body_recursion(robot, states), poses(robot, states)
@@ -246,8 +246,8 @@ def _row(text: str, change: Callable[[str], str], base: str, folder: Path) -> di
         path.write_text(content)
         files.append(open_robot(path, base))
     robot, held = (read_urdf(file) for file in files)
-    truth = Truth.of(robot, random_states(robot, 5, 1))
-    answer = reading.Answer("1", "", {}, _held(held, truth), "")
+    truth = RobotTruth.of(robot, random_states(robot, 5, 1))
+    answer = reading.ReaderAnswer("1", "", {}, _held(held, truth), "")
     return judged(files[0], truth, 1e-14, parse_engine("planted"), answer, truth.torques())
 
 
@@ -318,8 +318,8 @@ def test_planted_causes_in_mjcf(
         (tmp_path / f"{name}-given").mkdir()
         written = reading.write(files[-1], tmp_path / f"{name}-given")
         robots.append(reading.compiled(robot_workers("mujoco"), files[-1], written, 60)[0])
-    truth = Truth.of(robots[0], random_states(robots[0], 5, 1))
-    answer = reading.Answer("1", "", {}, _held(robots[1], truth), "")
+    truth = RobotTruth.of(robots[0], random_states(robots[0], 5, 1))
+    answer = reading.ReaderAnswer("1", "", {}, _held(robots[1], truth), "")
     row = judged(files[0], truth, 1e-14, parse_engine("planted"), answer, truth.torques())
     assert [found["id"] for found in row["causes"]] == [cause]
     assert row["status"] == "explained"
@@ -331,8 +331,8 @@ def test_free_base_that_was_fixed(tmp_path: Path) -> None:
     path.write_text(urdf().replace(inertial(mass="4"), ""))
     free, fixed = open_robot(path, "free"), open_robot(path, "fixed")
     robot, held = read_urdf(free), read_urdf(fixed)
-    truth = Truth.of(robot, random_states(robot, 5, 1))
-    answer = reading.Answer("1", "", {}, dataclasses.replace(_held(held, truth)), "")
+    truth = RobotTruth.of(robot, random_states(robot, 5, 1))
+    answer = reading.ReaderAnswer("1", "", {}, dataclasses.replace(_held(held, truth)), "")
     row = judged(free, truth, 1e-14, parse_engine("planted"), answer, truth.torques())
     assert [cause["id"] for cause in row["causes"]] == ["free_base_is_fixed"]
     assert row["status"] == "explained"

@@ -11,8 +11,8 @@ from robot_templates import urdf
 from scipy.spatial.transform import Rotation
 
 from proofroll.robots.body_recursion import body_recursion
-from proofroll.robots.layers import Truth
-from proofroll.robots.model import WORLD, Body, Joint, Robot
+from proofroll.robots.layers import RobotTruth
+from proofroll.robots.model import WORLD, Robot, RobotBody, RobotJoint
 from proofroll.robots.plain_data import mechanism_tables, plain, robot_from, states_from
 from proofroll.robots.robot_file import open_robot
 from proofroll.robots.states import random_states
@@ -29,13 +29,13 @@ def _tree(base: str, seed: int, kinds: list[str] = KINDS) -> Robot:
     for index, kind in enumerate([base, *kinds]):
         name, free = f"b{index}", kind == "free"
         A = random.normal(size=(3, 3))
-        bodies[name] = Body(name, random.uniform(0.5, 2), random.normal(size=3), A @ A.T + 0.1 * np.eye(3))
+        bodies[name] = RobotBody(name, random.uniform(0.5, 2), random.normal(size=3), A @ A.T + 0.1 * np.eye(3))
         axis = random.normal(size=3)
         parent = f"b{random.integers(index)}" if index else WORLD
         place, at = (np.zeros(3), np.zeros(3)) if free else random.normal(size=(2, 3))
         turn = np.eye(3) if free else np.asarray(Rotation.random(rng=random).as_matrix())
         axis /= np.linalg.norm(axis)
-        joints.append(Joint(f"j{index}", kind, parent, name, place, turn, axis, at, armature=0.1 * index))
+        joints.append(RobotJoint(f"j{index}", kind, parent, name, place, turn, axis, at, armature=0.1 * index))
     return Robot("tree", bodies, tuple(joints))
 
 
@@ -54,9 +54,9 @@ def test_formulations_agree(base: str, seed: int) -> None:
 def test_pendulum() -> None:
     """A pendulum with armature has the mass matrix and torques of the textbook."""
     mass, length, moment, armature, q = 1.3, 0.7, 0.05, 0.2, 0.4
-    rod = Body("rod", mass, np.array([0.0, 0.0, -length]), np.diag([moment, moment, 0.001]))
+    rod = RobotBody("rod", mass, np.array([0.0, 0.0, -length]), np.diag([moment, moment, 0.001]))
     axis = np.array([0.0, 1.0, 0.0])
-    hinge = Joint("hinge", "revolute", WORLD, "rod", np.zeros(3), np.eye(3), axis, armature=armature)
+    hinge = RobotJoint("hinge", "revolute", WORLD, "rod", np.zeros(3), np.eye(3), axis, armature=armature)
     robot = Robot("pendulum", {"rod": rod}, (hinge,))
     states = random_states(robot, 1, 0)
     states = dataclasses.replace(states, angle={"hinge": np.array([q])})
@@ -138,8 +138,8 @@ def test_tables_of_a_mechanism(tmp_path: Path) -> None:
 def test_singular_mass_matrix() -> None:
     """A joint that moves no mass makes the mass matrix singular, and an ordinary robot's is not."""
     robot = _tree("fixed", 2)
-    assert not Truth.of(robot, random_states(robot, 2, 0)).singular
-    empty = Body("end", 0.0, np.zeros(3), np.zeros((3, 3)))
-    joint = Joint("last", "revolute", "b0", "end", np.zeros(3), np.eye(3), np.array([0.0, 0.0, 1.0]))
+    assert not RobotTruth.of(robot, random_states(robot, 2, 0)).singular
+    empty = RobotBody("end", 0.0, np.zeros(3), np.zeros((3, 3)))
+    joint = RobotJoint("last", "revolute", "b0", "end", np.zeros(3), np.eye(3), np.array([0.0, 0.0, 1.0]))
     robot = robot.change(bodies={**robot.bodies, "end": empty}, joints=(*robot.joints, joint))
-    assert Truth.of(robot, random_states(robot, 2, 0)).singular
+    assert RobotTruth.of(robot, random_states(robot, 2, 0)).singular

@@ -18,7 +18,7 @@ from proofroll.core.errors import Diverged
 from proofroll.core.scene import Scene
 from proofroll.elements.ball_on_surface.model import RollingBall
 from proofroll.engines.exudyn.carrier import Carrier
-from proofroll.engines.exudyn.contact import Contact
+from proofroll.engines.exudyn.contact import PenaltyContact
 from proofroll.engines.exudyn.integration import new_system, simulation_settings
 from proofroll.engines.exudyn.native import Output, exu, items
 from proofroll.engines.exudyn.rolling_disc import RollingDisc
@@ -147,12 +147,12 @@ def _generic(body: RollingBall, settings: Any) -> Callable[[FloatArray], FloatAr
 
 
 def _rigid(
-    model: Carrier | RollingDisc | Contact, body: RollingBall, settings: Any, forces: list[tuple[Any, Any]]
+    model: Carrier | RollingDisc | PenaltyContact, body: RollingBall, settings: Any, forces: list[tuple[Any, Any]]
 ) -> Callable[[FloatArray], FloatArray]:
     """A run of a model with a rigid ball, from the start that its builder found."""
     system, ball, stopped = model.system, model.ball, list[str]()
     data = system.systemData
-    consistent = not isinstance(model, Contact)
+    consistent = not isinstance(model, PenaltyContact)
     start = (data.GetODE2Coordinates_tt(exu.ConfigurationType.Initial), data.GetAECoordinates()) if consistent else None
     if ball.resistance is not None:
         system.SetLoadParameter(ball.resistance, "loadVectorUserFunction", _resistance(body, ball.node))
@@ -162,7 +162,7 @@ def _rigid(
         forces,
         [Output.Position, Output.CoordinatesTotal, Output.Velocity, Output.AngularVelocity],
     )
-    if isinstance(model, Contact):
+    if isinstance(model, PenaltyContact):
         system.SetPostStepUserFunction(_watch(model, body, stopped))
     system.Assemble()
 
@@ -212,7 +212,7 @@ def _rolling_disc(body: RollingBall, settings: Any) -> Callable[[FloatArray], Fl
 
 
 def _contact(body: RollingBall, settings: Any) -> Callable[[FloatArray], FloatArray]:
-    model = Contact(body, settings)
+    model = PenaltyContact(body, settings)
     node, follower, position = model.ball.node, model.follower, Output.Position
 
     def follow(system: Any, t: float, newton_iteration: int, discontinuous_iteration: int) -> None:  # noqa: ARG001 -- Exudyn's signature
@@ -223,7 +223,7 @@ def _contact(body: RollingBall, settings: Any) -> Callable[[FloatArray], FloatAr
     return _rigid(model, body, settings, [(model.contact, Output.Force)])
 
 
-def _watch(model: Contact, body: RollingBall, stopped: list[str]) -> Callable[[Any, float], bool]:
+def _watch(model: PenaltyContact, body: RollingBall, stopped: list[str]) -> Callable[[Any, float], bool]:
     """After each step: whether the contact is lost, or holds or slips otherwise than before."""
     data, coordinates = model.data, Output.Coordinates
     zone, bounded = model.zone, math.isfinite(body.contact.mu_static)

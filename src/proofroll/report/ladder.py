@@ -16,7 +16,7 @@ from proofroll.report.terminal import number, step
 from proofroll.running.case import Status
 from proofroll.running.timing import Interval, machine, ratio
 from proofroll.studies.ladder import Ladder, absence, distance, key_of
-from proofroll.studies.ladder_models import Model, Rung, Switch
+from proofroll.studies.ladder_models import LadderModel, Rung, Switch
 from proofroll.studies.term_worth import Side, Worth, worth
 
 _SHORT = {Worth.NOT_NEEDED: "not needed"}
@@ -76,7 +76,7 @@ def _rung(study: Ladder, rung: Rung) -> dict[str, Any]:
     return content | {"resolution": resolution, "resolution_value": value}
 
 
-def _said(study: Ladder, model: Model, point: dict[str, float]) -> dict[str, Any]:
+def _said(study: Ladder, model: LadderModel, point: dict[str, float]) -> dict[str, Any]:
     answer = study.answers[key_of(model)]
     message = answer.result.message
     if answer.result.status == Status.DONE and answer.values is None:

@@ -84,7 +84,7 @@ class Replayed:
 
 
 @dataclass
-class Numbers:
+class PackedNumbers:
     """What the page unpacks: names and shapes of arrays, and their numbers one after the other.
 
     Attributes:
@@ -111,7 +111,7 @@ class Numbers:
 
 
 # What a kind of scene makes of a truth: its part of the case, how many frames each ghost has, and the numbers.
-Drawer = Callable[[Replayed], tuple[dict[str, Any], list[int], Numbers]]
+Drawer = Callable[[Replayed], tuple[dict[str, Any], list[int], PackedNumbers]]
 
 
 def replay_content(

@@ -7,7 +7,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from proofroll.robots.model import WORLD, Array, Body, Joint, Robot
+from proofroll.robots.model import WORLD, Array, Robot, RobotBody, RobotJoint
 from proofroll.robots.states import States
 from proofroll.robots.two_formulations import Dynamics, armature, skew, within
 
@@ -59,7 +59,7 @@ def newton_euler(robot: Robot, states: States, v: Array, a: Array, gravity: Arra
     return torque
 
 
-def _subspace(joint: Joint, R: Array) -> Array:
+def _subspace(joint: RobotJoint, R: Array) -> Array:
     """Which spatial velocities (rotation first) the joint gives its child, shape (states, 6, velocities)."""
     zero = np.zeros((3, 3))
     if joint.kind == "free":
@@ -73,7 +73,7 @@ def _subspace(joint: Joint, R: Array) -> Array:
     return np.broadcast_to(found, (len(R), *found.shape))
 
 
-def _spatial(body: Body) -> Array:
+def _spatial(body: RobotBody) -> Array:
     """Spatial inertia at the origin of the body's frame, shape (6, 6)."""
     C = skew(body.com)
     moment = body.mass * C

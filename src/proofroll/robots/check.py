@@ -17,7 +17,7 @@ from proofroll.core.plugins import EngineSpec, parse_engine, place_of
 from proofroll.robots import reading
 from proofroll.robots.body_recursion import body_recursion
 from proofroll.robots.judging import TIME_LIMIT, judged, meaning, unread
-from proofroll.robots.layers import LAYERS, Truth
+from proofroll.robots.layers import LAYERS, RobotTruth
 from proofroll.robots.lint import lint
 from proofroll.robots.protocol import Request
 from proofroll.robots.robot_file import RobotFile, open_robot
@@ -70,7 +70,7 @@ def check(
         if not robot.moving:
             raise InputError("file", str(path), "nothing in it moves" + _fixed_hint(file))
         sampled = random_states(robot, states, seed)
-        truth = Truth.of(robot, sampled)
+        truth = RobotTruth.of(robot, sampled)
         bar = _bar(truth)
         torques = truth.torques()
         children = {joint.name: joint.child for joint in robot.moving}
@@ -117,7 +117,7 @@ def _fixed_hint(file: RobotFile) -> str:
     return "; try --base free" if file.kind == "urdf" and file.base == "fixed" else ""
 
 
-def _bar(truth: Truth) -> float:
+def _bar(truth: RobotTruth) -> float:
     """The largest relative difference of the two formulations."""
     one, other = truth.dynamics, body_recursion(truth.robot, truth.states)
     pairs = ((one.M, other.M), (one.g, other.g), (one.h, other.h))
@@ -126,7 +126,7 @@ def _bar(truth: Truth) -> float:
 
 def _row(
     file: RobotFile,
-    truth: Truth,
+    truth: RobotTruth,
     bar: float,
     request: Request,
     spec: EngineSpec,
@@ -147,7 +147,7 @@ def _row(
     return judged(file, truth, bar, spec, answer, dict(request.torques))
 
 
-def _skeleton(truth: Truth) -> dict[str, Any]:
+def _skeleton(truth: RobotTruth) -> dict[str, Any]:
     """Where every body is at rest coordinates, for a drawing."""
     robot = truth.robot
     zero = {joint.name: np.zeros(1) for joint in robot.moving}

@@ -7,7 +7,7 @@ from collections.abc import Callable, Mapping
 from xml.etree.ElementTree import Element
 
 from proofroll.robots.hypotheses import Evidence, Hypothesis, hypotheses
-from proofroll.robots.layers import LAYERS, Truth, differences, first_failing
+from proofroll.robots.layers import LAYERS, RobotTruth, differences, first_failing
 from proofroll.robots.model import Array, Robot
 from proofroll.robots.protocol import Reading
 from proofroll.robots.robot_file import RobotFile
@@ -44,14 +44,14 @@ class Cause:
 class _Step:
     """A truth under the causes found so far."""
 
-    truth: Truth
+    truth: RobotTruth
     found: dict[str, float]
     causes: tuple[Cause, ...] = ()
 
 
 def explain(
     file: RobotFile,
-    truth: Truth,
+    truth: RobotTruth,
     torques: dict[str, Array],
     reading: Reading,
     engine: str,
@@ -92,7 +92,7 @@ class _Trial:
         robot = hypothesis.change(Evidence(self.file, step.truth.robot, self.reading, self.recompiled))
         if robot is None or robot is step.truth.robot or not robot.moving:
             return None
-        truth = Truth.of(robot, step.truth.states, like=step.truth)
+        truth = RobotTruth.of(robot, step.truth.states, like=step.truth)
         found = differences(truth, self.torques, self.reading)
         if layer not in found:
             return None

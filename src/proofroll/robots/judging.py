@@ -15,7 +15,7 @@ from proofroll.core.errors import InputError
 from proofroll.core.plugins import EngineSpec, plain_name
 from proofroll.robots import reading
 from proofroll.robots.explain import explain
-from proofroll.robots.layers import LAYERS, TOLERANCE, Truth, differences
+from proofroll.robots.layers import LAYERS, TOLERANCE, RobotTruth, differences
 from proofroll.robots.model import Array, Robot
 from proofroll.robots.robot_file import RobotFile
 from proofroll.robots.urdf import read_urdf
@@ -34,7 +34,12 @@ def unread(spec: EngineSpec, status: str, why: str) -> dict[str, Any]:
 
 
 def judged(
-    file: RobotFile, truth: Truth, bar: float, spec: EngineSpec, answer: reading.Answer, torques: dict[str, Array]
+    file: RobotFile,
+    truth: RobotTruth,
+    bar: float,
+    spec: EngineSpec,
+    answer: reading.ReaderAnswer,
+    torques: dict[str, Array],
 ) -> dict[str, Any]:
     """The row of an engine that answered.
 
@@ -90,7 +95,7 @@ class _Recompiler:
         return None
 
 
-def _offending(truth: Truth, held: Any) -> list[str]:
+def _offending(truth: RobotTruth, held: Any) -> list[str]:
     """Joints whose carried body an engine holds with another mass, centre of mass or inertia, or lacks."""
     groups = truth.robot.groups
     found = [name for name in groups if name not in held.joints]

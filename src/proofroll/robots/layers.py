@@ -8,7 +8,7 @@ from functools import cached_property
 
 import numpy as np
 
-from proofroll.robots.model import Array, Body, Robot
+from proofroll.robots.model import Array, Robot, RobotBody
 from proofroll.robots.protocol import Reading
 from proofroll.robots.states import States
 from proofroll.robots.two_formulations import Dynamics, passive, poses, world_jacobians
@@ -34,17 +34,17 @@ _FLOOR = 1e-3
 
 
 @dataclasses.dataclass(frozen=True)
-class Truth:
+class RobotTruth:
     """A robot with what it does at some states."""
 
     robot: Robot
     states: States
     dynamics: Dynamics
     passive: Array
-    like: Truth | None = None
+    like: RobotTruth | None = None
 
     @classmethod
-    def of(cls, robot: Robot, states: States, like: Truth | None = None) -> Truth:
+    def of(cls, robot: Robot, states: States, like: RobotTruth | None = None) -> RobotTruth:
         """Evaluated by the first formulation.
 
         Args:
@@ -98,7 +98,7 @@ class Truth:
         return {name: found[:, columns] for name, columns in self.robot.columns.items()}
 
 
-def differences(truth: Truth, torques: dict[str, Array], reading: Reading) -> dict[str, float]:
+def differences(truth: RobotTruth, torques: dict[str, Array], reading: Reading) -> dict[str, float]:
     """How far an engine is off, by layer; a layer that the engine does not offer is left out.
 
     Args:
@@ -168,7 +168,7 @@ def _columns(reading: Reading, joints: list[str]) -> list[int]:
     return [int(starts[name]) + index for name in joints for index in range(dofs[name])]
 
 
-def _kinematics(truth: Truth, reading: Reading, joints: list[str]) -> float:
+def _kinematics(truth: RobotTruth, reading: Reading, joints: list[str]) -> float:
     children = {joint.name: joint.child for joint in truth.robot.moving}
     true = poses(truth.robot, truth.states)
     off = []
@@ -179,7 +179,7 @@ def _kinematics(truth: Truth, reading: Reading, joints: list[str]) -> float:
     return _largest(off)
 
 
-def _apart(com: Array, mass: float, group: Body, whole: float) -> float:
+def _apart(com: Array, mass: float, group: RobotBody, whole: float) -> float:
     """Difference of two first moments of mass over the whole mass: without mass there is no centre to compare [m]."""
     return float(np.abs(mass * com - group.mass * group.com).max()) / whole
 

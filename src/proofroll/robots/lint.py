@@ -8,7 +8,7 @@ from xml.etree.ElementTree import Element
 import numpy as np
 
 from proofroll.robots.inertia import breaks_triangle, moments, not_positive
-from proofroll.robots.model import Joint, Robot
+from proofroll.robots.model import Robot, RobotJoint
 from proofroll.robots.robot_file import Finding, RobotFile
 from proofroll.robots.safe_xml import numbers
 
@@ -56,7 +56,7 @@ def _bodies(file: RobotFile, robot: Robot) -> Iterator[Finding]:
             yield Finding("error", f"joint {joint.name}", "it moves no mass: the mass matrix is singular")
 
 
-def _carried(robot: Robot, joint: Joint) -> list[str]:
+def _carried(robot: Robot, joint: RobotJoint) -> list[str]:
     return [name for name, (home, _, _) in robot.welded.items() if home == joint.name]
 
 

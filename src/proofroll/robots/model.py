@@ -18,7 +18,7 @@ DOFS = {"fixed": 0, "revolute": 1, "prismatic": 1, "spherical": 3, "free": 6}
 
 
 @dataclasses.dataclass(frozen=True)
-class Body:
+class RobotBody:
     """A rigid body.
 
     Attributes:
@@ -35,7 +35,7 @@ class Body:
 
 
 @dataclasses.dataclass(frozen=True)
-class Joint:
+class RobotJoint:
     """A joint, which carries its child.
 
     Attributes:
@@ -103,14 +103,14 @@ class Robot:
     """
 
     name: str
-    bodies: Mapping[str, Body]
-    joints: tuple[Joint, ...]
+    bodies: Mapping[str, RobotBody]
+    joints: tuple[RobotJoint, ...]
     mimics: tuple[Mimic, ...] = ()
     gravity: Array = dataclasses.field(default_factory=lambda: np.array([0.0, 0.0, -9.81]))
     sources: Mapping[str, Any] = dataclasses.field(default_factory=dict)
 
     @cached_property
-    def moving(self) -> tuple[Joint, ...]:
+    def moving(self) -> tuple[RobotJoint, ...]:
         """The joints that have velocities."""
         return tuple(joint for joint in self.joints if joint.dofs)
 
@@ -145,9 +145,9 @@ class Robot:
         return found
 
     @cached_property
-    def groups(self) -> dict[str, Body]:
+    def groups(self) -> dict[str, RobotBody]:
         """What each moving joint carries rigidly, as one body in the frame of the joint's child; by joint."""
-        parts: dict[str, list[tuple[Body, Array, Array]]] = {joint.name: [] for joint in self.moving}
+        parts: dict[str, list[tuple[RobotBody, Array, Array]]] = {joint.name: [] for joint in self.moving}
         for name, (home, p, R) in self.welded.items():
             if home != WORLD:
                 parts[home].append((self.bodies[name], p, R))
@@ -157,7 +157,7 @@ class Robot:
         """The robot with some attributes replaced."""
         return dataclasses.replace(self, **changes)
 
-    def with_bodies(self, bodies: Iterable[Body]) -> Robot:
+    def with_bodies(self, bodies: Iterable[RobotBody]) -> Robot:
         """The robot with some bodies replaced by others of the same name."""
         return self.change(bodies={**self.bodies, **{body.name: body for body in bodies}})
 
@@ -166,7 +166,7 @@ class Robot:
         return self.change(joints=tuple(dataclasses.replace(joint, **values) for joint in self.joints))  # type: ignore[arg-type]
 
 
-def composed(name: str, parts: Iterable[tuple[Body, Array, Array]]) -> Body:
+def composed(name: str, parts: Iterable[tuple[RobotBody, Array, Array]]) -> RobotBody:
     """Several bodies as one, each given with its position and rotation in the frame of the whole."""
     parts = list(parts)
     mass = sum(body.mass for body, _, _ in parts)
@@ -176,4 +176,4 @@ def composed(name: str, parts: Iterable[tuple[Body, Array, Array]]) -> Body:
     for body, p, R in parts:
         r = p + R @ body.com - com
         inertia += R @ body.inertia @ R.T + body.mass * (r @ r * np.eye(3) - np.outer(r, r))
-    return Body(name, mass, com, inertia)
+    return RobotBody(name, mass, com, inertia)

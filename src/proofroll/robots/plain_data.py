@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 from scipy.spatial.transform import Rotation
 
-from proofroll.robots.model import WORLD, Body, Joint, Mimic, Robot
+from proofroll.robots.model import WORLD, Mimic, Robot, RobotBody, RobotJoint
 from proofroll.robots.states import States
 
 
@@ -28,8 +28,8 @@ def robot_from(data: Mapping[str, Any]) -> Robot:
     """The robot of which :func:`plain` made this; its ``sources`` stay plain."""
     return Robot(
         data["name"],
-        {name: Body(**_arrays(body)) for name, body in data["bodies"].items()},
-        tuple(Joint(**_arrays(joint)) for joint in data["joints"]),
+        {name: RobotBody(**_arrays(body)) for name, body in data["bodies"].items()},
+        tuple(RobotJoint(**_arrays(joint)) for joint in data["joints"]),
         tuple(Mimic(**mimic) for mimic in data["mimics"]),
         np.array(data["gravity"]),
         data["sources"],
@@ -68,7 +68,7 @@ def mechanism_tables(robot: Robot) -> dict[str, Any]:
     }
 
 
-def _joint_table(joint: Joint, names: Mapping[str, str]) -> dict[str, Any]:
+def _joint_table(joint: RobotJoint, names: Mapping[str, str]) -> dict[str, Any]:
     table: dict[str, Any] = {"name": joint.name, "kind": joint.kind}
     table |= {"parent": names[joint.parent], "child": names[joint.child]}
     table["orientation"] = Rotation.from_matrix(joint.rotation).as_euler("xyz").tolist()

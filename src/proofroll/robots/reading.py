@@ -49,7 +49,7 @@ def load_reader(name: str) -> Any:
 
 
 @dataclasses.dataclass(frozen=True)
-class Answer:
+class ReaderAnswer:
     """What a reader answered.
 
     Attributes:
@@ -67,7 +67,7 @@ class Answer:
     refused: str
 
 
-def ask(worker: Worker, engine: str, request: Request, folder: Path, time_limit: float) -> Answer:
+def ask(worker: Worker, engine: str, request: Request, folder: Path, time_limit: float) -> ReaderAnswer:
     """Has a file read and evaluated in the worker.
 
     Raises:
@@ -85,7 +85,7 @@ def ask(worker: Worker, engine: str, request: Request, folder: Path, time_limit:
                 values[name] = dict(zip(told[name], found[name], strict=True))
         values |= {name: tuple(told[name]) for name in ("joints", "dofs", "coupled", "remarks")}
         reading = Reading(**values)
-    return Answer(told["version"], told["says"], told["tolerances"], reading, told["refused"])
+    return ReaderAnswer(told["version"], told["says"], told["tolerances"], reading, told["refused"])
 
 
 def read_robot(engine: str, asked: str, arrays: str) -> dict[str, Any]:

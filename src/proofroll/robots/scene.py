@@ -19,7 +19,7 @@ from scipy.spatial.transform import Rotation
 from proofroll.core.errors import InputError
 from proofroll.elements.mechanism.rotations import to_rpy
 from proofroll.robots.judging import TIME_LIMIT, meaning
-from proofroll.robots.model import WORLD, Array, Joint, Robot
+from proofroll.robots.model import WORLD, Array, Robot, RobotJoint
 from proofroll.robots.reading import write
 from proofroll.robots.robot_file import BASES, RobotFile, open_robot
 from proofroll.robots.states import States, random_states
@@ -132,7 +132,7 @@ def _names(robot: Robot) -> dict[str, str]:
 
 
 def _joint(
-    robot: Robot, joint: Joint, names: Mapping[str, str], start: States, values: Mapping[str, float]
+    robot: Robot, joint: RobotJoint, names: Mapping[str, str], start: States, values: Mapping[str, float]
 ) -> dict[str, Any]:
     """A joint between what its parent and its child are welded to."""
     home, p, R = robot.welded[joint.parent]

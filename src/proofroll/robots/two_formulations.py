@@ -11,7 +11,7 @@ import dataclasses
 import numpy as np
 from scipy.spatial.transform import Rotation
 
-from proofroll.robots.model import WORLD, Array, Joint, Robot
+from proofroll.robots.model import WORLD, Array, Robot, RobotJoint
 from proofroll.robots.states import States
 
 
@@ -42,7 +42,7 @@ def passive(robot: Robot, states: States) -> Array:
     return found
 
 
-def within(joint: Joint, states: States) -> tuple[Array, Array]:
+def within(joint: RobotJoint, states: States) -> tuple[Array, Array]:
     """Position and rotation of the child in its parent's frame, shapes (states, 3) and (states, 3, 3)."""
     count = states.count
     slid = np.zeros((count, 3))
@@ -121,7 +121,9 @@ def armature(robot: Robot) -> Array:
     return np.concatenate([np.zeros(0), *(np.full(joint.dofs, joint.armature) for joint in robot.moving)])
 
 
-def _carried(robot: Robot, joint: Joint, parent: _Motion, frames: dict[str, tuple[Array, Array]], v: Array) -> _Motion:
+def _carried(
+    robot: Robot, joint: RobotJoint, parent: _Motion, frames: dict[str, tuple[Array, Array]], v: Array
+) -> _Motion:
     (p_parent, R_parent), (p, R) = frames[joint.parent], frames[joint.child]
     r = p - p_parent
     Jv, Jw = parent.Jv - skew(r) @ parent.Jw, parent.Jw.copy()

@@ -11,7 +11,7 @@ import numpy as np
 from scipy.spatial.transform import Rotation
 
 from proofroll.core.errors import InputError
-from proofroll.robots.model import WORLD, Array, Body, Joint, Mimic, Robot
+from proofroll.robots.model import WORLD, Array, Mimic, Robot, RobotBody, RobotJoint
 from proofroll.robots.robot_file import Finding, RobotFile
 from proofroll.robots.safe_xml import numbers
 
@@ -97,7 +97,7 @@ def _origin(element: Element) -> tuple[Array, Array]:
     return np.array(numbers(origin, "xyz", "0 0 0", 3)), np.asarray(Rotation.from_euler("xyz", angles).as_matrix())
 
 
-def _body(name: str, link: Element) -> tuple[Body, dict[str, Any]]:
+def _body(name: str, link: Element) -> tuple[RobotBody, dict[str, Any]]:
     shapes = []
     for collision in link.findall("collision"):
         geometry = collision.find("geometry")
@@ -106,7 +106,7 @@ def _body(name: str, link: Element) -> tuple[Body, dict[str, Any]]:
     inertial = link.find("inertial")
     source: dict[str, Any] = {"inertial": inertial is not None, "shapes": shapes}
     if inertial is None:
-        return Body(name, 0.0, np.zeros(3), np.zeros((3, 3))), source
+        return RobotBody(name, 0.0, np.zeros(3), np.zeros((3, 3))), source
     com, R = _origin(inertial)
     mass = inertial.find("mass")
     m = 0.0 if mass is None else numbers(mass, "value", None, 1)[0]
@@ -118,10 +118,10 @@ def _body(name: str, link: Element) -> tuple[Body, dict[str, Any]]:
         )
         written = np.array([[xx, xy, xz], [xy, yy, yz], [xz, yz, zz]])
     source |= {"written": written, "frame": R}
-    return Body(name, m, com, R @ written @ R.T), source
+    return RobotBody(name, m, com, R @ written @ R.T), source
 
 
-def _joint(name: str, element: Element, links: dict[str, Element]) -> Joint:
+def _joint(name: str, element: Element, links: dict[str, Element]) -> RobotJoint:
     kind = _KINDS.get(element.get("type", ""))
     if kind is None:
         known = ", ".join(_KINDS)
@@ -142,7 +142,7 @@ def _joint(name: str, element: Element, links: dict[str, Element]) -> Joint:
     dynamics = element.find("dynamics")
     limit = element.find("limit")
     bounded = limit is not None and element.get("type") in {"revolute", "prismatic"}
-    return Joint(
+    return RobotJoint(
         name, kind, ends["parent"], ends["child"], position, rotation, axis / length,
         damping=0.0 if dynamics is None or kind == "fixed" else numbers(dynamics, "damping", "0", 1)[0],
         friction=0.0 if dynamics is None or kind == "fixed" else numbers(dynamics, "friction", "0", 1)[0],
@@ -151,7 +151,7 @@ def _joint(name: str, element: Element, links: dict[str, Element]) -> Joint:
     )  # fmt: skip
 
 
-def _ordered(joints: list[Joint], links: dict[str, Element], base: str) -> tuple[Joint, ...]:
+def _ordered(joints: list[RobotJoint], links: dict[str, Element], base: str) -> tuple[RobotJoint, ...]:
     """The joints, parents first, with the one that carries the root."""
     carried = Counter(joint.child for joint in joints)
     for name, times in carried.items():
@@ -163,11 +163,11 @@ def _ordered(joints: list[Joint], links: dict[str, Element], base: str) -> tuple
             "its links form a loop" if not roots else f"it has {len(roots)} roots, {roots[0]} and {roots[1]} among them"
         )
         raise InputError("<robot>", roots[0] if roots else "", f"{said}; a URDF is a tree with one root")
-    below: dict[str, list[Joint]] = {}
+    below: dict[str, list[RobotJoint]] = {}
     for joint in joints:
         below.setdefault(joint.parent, []).append(joint)
     kind = "free" if base == "free" else "fixed"
-    found = [Joint(BASE_JOINT, kind, WORLD, roots[0], np.zeros(3), np.eye(3), np.array([0.0, 0.0, 1.0]))]
+    found = [RobotJoint(BASE_JOINT, kind, WORLD, roots[0], np.zeros(3), np.eye(3), np.array([0.0, 0.0, 1.0]))]
     waiting = list(reversed(below.get(roots[0], [])))
     while waiting:
         found.append(waiting.pop())

@@ -10,7 +10,7 @@ from proofroll.core.scene import Scene
 
 
 @dataclass(frozen=True)
-class Term:
+class AxisTerm:
     """A parameter as a function of the axis's value x: ``times`` · x^``power``.
 
     Attributes:
@@ -40,7 +40,7 @@ class Axis:
     unit: str
     meaning: str
     values: list[float]
-    parameters: dict[str, Term] = field(default_factory=dict)
+    parameters: dict[str, AxisTerm] = field(default_factory=dict)
     horizon: bool = False
     scale_free: bool = False
 

@@ -7,7 +7,7 @@ from dataclasses import dataclass, field
 from typing import Generic, Protocol, TypeVar
 
 
-class Verdict(Protocol):
+class RungVerdict(Protocol):
     """What a run on a rung gave."""
 
     @property
@@ -19,11 +19,11 @@ class Verdict(Protocol):
         """Whether it was right as well; never without being stable."""
 
 
-V = TypeVar("V", bound=Verdict)
+V = TypeVar("V", bound=RungVerdict)
 
 
 @dataclass
-class Found(Generic[V]):
+class SearchResult(Generic[V]):
     """What a search found; rungs are numbered from the coarsest.
 
     Attributes:
@@ -44,7 +44,7 @@ class Found(Generic[V]):
         return min(holding, default=None), failing
 
 
-def search(size: int, stride: int) -> Generator[int, V | None, Found[V]]:
+def search(size: int, stride: int) -> Generator[int, V | None, SearchResult[V]]:
     """Asks for rungs and is sent what a run on each gave; returns what it found.
 
     It goes down by ``stride`` until a run is accurate and one half a stride below it too: the finest run costs most.
@@ -52,7 +52,7 @@ def search(size: int, stride: int) -> Generator[int, V | None, Found[V]]:
     boundary a pass may be luck. What is known is never asked again. A rung for which None is sent, and all finer ones,
     are left out as too long.
     """
-    found: Found[V] = Found(limit=size)
+    found: SearchResult[V] = SearchResult(limit=size)
     seen = found.seen
     rung, in_a_row = 0, 0
     while rung < found.limit:
@@ -83,15 +83,15 @@ def search(size: int, stride: int) -> Generator[int, V | None, Found[V]]:
     return found
 
 
-def _stable(verdict: Verdict) -> bool:
+def _stable(verdict: RungVerdict) -> bool:
     return verdict.stable
 
 
-def _accurate(verdict: Verdict) -> bool:
+def _accurate(verdict: RungVerdict) -> bool:
     return verdict.accurate
 
 
-def _next(found: Found[V], passes: Callable[[V], bool]) -> int | None:
+def _next(found: SearchResult[V], passes: Callable[[V], bool]) -> int | None:
     """The rung to be looked at next for a boundary, or None if it is found."""
     holding, failing = found.boundary(passes)
     if holding is None:

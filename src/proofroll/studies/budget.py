@@ -16,7 +16,7 @@ import numpy as np
 
 from proofroll.core.arrays import FloatArray
 from proofroll.core.convergence import Limit, observed_order, richardson, size, tightest
-from proofroll.studies.sweep import Curve, Point
+from proofroll.studies.sweep import Curve, CurvePoint
 
 # Neighbouring local orders this near to each other belong to one power law.
 _SAME_ORDER = 0.3
@@ -197,11 +197,11 @@ def _stretch(local: Sequence[float]) -> tuple[int, int]:
     return best
 
 
-def _bar(points: Sequence[Point], quantity: str) -> float:
+def _bar(points: Sequence[CurvePoint], quantity: str) -> float:
     return max((point.bars.get(quantity, 0.0) for point in points), default=0.0)
 
 
-def _coarse_end(curve: Curve, quantity: str, every: float, limit: Limit) -> tuple[Point, FloatArray] | None:
+def _coarse_end(curve: Curve, quantity: str, every: float, limit: Limit) -> tuple[CurvePoint, FloatArray] | None:
     """The coarsest run that reached the end, and how far it is from the limit; None if it cannot be compared.
 
     With a step longer than the sampling interval it has only some of the limit's samples.

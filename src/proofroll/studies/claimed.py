@@ -19,7 +19,7 @@ from proofroll.studies.recommend import Wish, fits, holding
 _Study = Mapping[str, Any]
 
 
-class Judgement(NamedTuple):
+class ClaimJudgement(NamedTuple):
     """What a study says of a claim.
 
     Attributes:
@@ -51,17 +51,17 @@ class Holds:
     step: float
     because: str
 
-    def judged(self, study: _Study, quantity: str) -> Judgement:
+    def judged(self, study: _Study, quantity: str) -> ClaimJudgement:
         """Exactly, in a brief study too."""
         said = f"{self.engine} holds {_to(quantity, self.tolerance)} up to a step of {self.step:g}"
         if unknown := _unknown(study, [self.engine]):
-            return Judgement(said, self.because, None, unknown)
+            return ClaimJudgement(said, self.because, None, unknown)
         held = holding(study, Wish(quantity, self.tolerance, engines=(self.engine,)), here=True)
         steps = [point["step"] for point in held if point["step"] is not None]
         if not steps:
-            return Judgement(said, self.because, False, "no step of the sweep does")
+            return ClaimJudgement(said, self.because, False, "no step of the sweep does")
         found = f"the coarsest that does is {max(steps):g}"
-        return Judgement(said, self.because, math.isclose(max(steps), self.step), found)
+        return ClaimJudgement(said, self.because, math.isclose(max(steps), self.step), found)
 
 
 @dataclass(frozen=True)
@@ -78,20 +78,20 @@ class Converges:
     order: tuple[float, float]
     because: str
 
-    def judged(self, study: _Study, quantity: str) -> Judgement:
+    def judged(self, study: _Study, quantity: str) -> ClaimJudgement:
         """Exactly, in a brief study too."""
         lowest, highest = self.order
         said = f"{self.engine} converges in {quantity} with order {lowest:g} to {highest:g}"
         if unknown := _unknown(study, [self.engine]):
-            return Judgement(said, self.because, None, unknown)
+            return ClaimJudgement(said, self.because, None, unknown)
         curves = {point["curve"] for point in study["points"] if fits(point, self.engine)}
         found = [b for b in study["budgets"] if b["curve"] in curves and b["quantity"] == quantity and b["order"]]
         orders = [(b["order_low"] or b["order"], b["order_high"] or b["order"]) for b in found]
         if not orders:
-            return Judgement(said, self.because, False, "no order shows")
+            return ClaimJudgement(said, self.because, False, "no order shows")
         shown = "what shows is " + ", ".join(f"{low:.3g} to {high:.3g}" for low, high in orders)
         holds = all(low <= highest and high >= lowest for low, high in orders)
-        return Judgement(said, self.because, holds, shown)
+        return ClaimJudgement(said, self.because, holds, shown)
 
 
 @dataclass(frozen=True)
@@ -110,7 +110,7 @@ class Cheapest:
     because: str
     levels: list[Level] = field(default_factory=list)
 
-    def judged(self, study: _Study, quantity: str) -> Judgement:
+    def judged(self, study: _Study, quantity: str) -> ClaimJudgement:
         """By the ratio of its cost to that of the cheapest other that holds the tolerance.
 
         It holds where the whole interval of the ratio is at most 1, and is contradicted where all of it exceeds
@@ -119,7 +119,7 @@ class Cheapest:
         """
         among = f" among {', '.join(self.levels)}" if self.levels else ""
         said = f"the cheapest that holds {_to(quantity, self.tolerance)}{among} is {' or '.join(self.engine)}"
-        return Judgement(
+        return ClaimJudgement(
             said, self.because, *self._found(study, Wish(quantity, self.tolerance, levels=tuple(self.levels)))
         )
 

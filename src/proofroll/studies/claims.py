@@ -14,7 +14,7 @@ from proofroll.core.errors import InputError
 from proofroll.files.scene_file import load_scene
 from proofroll.files.toml import read_toml, study_files
 from proofroll.files.validation import first_problem
-from proofroll.studies.claimed import Cheapest, Converges, Holds, Judgement
+from proofroll.studies.claimed import Cheapest, ClaimJudgement, Converges, Holds
 from proofroll.studies.sweep import Question
 
 STUDY = "tradeoff"
@@ -49,7 +49,7 @@ class TradeoffClaims:
         """What is to be swept."""
         return Question(self.scene, self.parameters, self.until, self.quantity)
 
-    def judged(self, study: Mapping[str, Any]) -> list[Judgement]:
+    def judged(self, study: Mapping[str, Any]) -> list[ClaimJudgement]:
         """What a study says of each claim."""
         claims: list[Holds | Converges | Cheapest] = [*self.holds, *self.converges, *self.cheapest]
         return [claim.judged(study, self.quantity) for claim in claims]

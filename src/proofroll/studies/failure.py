@@ -48,7 +48,7 @@ def meanings(scene: Scene) -> Mapping[str, str]:
 
 
 @dataclass(frozen=True)
-class Outcome:
+class RunOutcome:
     """What a run gave.
 
     Attributes:
@@ -98,7 +98,7 @@ class Yardstick:
         return cls(scene, truth, name, true, float(np.max(np.ptp(true, axis=0))) or 1.0)
 
 
-def judge(result: Result, dataset: xr.Dataset | None, yardstick: Yardstick) -> Outcome:
+def judge(result: Result, dataset: xr.Dataset | None, yardstick: Yardstick) -> RunOutcome:
     """What a run gave, held against the yardstick.
 
     Args:
@@ -125,9 +125,9 @@ def judge(result: Result, dataset: xr.Dataset | None, yardstick: Yardstick) -> O
         # Its model ended the run where it is no longer that of the scene.
         return _failed(_by_event(dataset, yardstick.scene) or GAVE_UP, result, error, float(dataset["time"][-1]))
     if errors is None or error is None or error <= ACCURATE:
-        return Outcome(True, True, None, False, error, None, result.message)
+        return RunOutcome(True, True, None, False, error, None, result.message)
     index = int(np.argmax(errors > ACCURATE))
-    return Outcome(True, False, _wrong(dataset, yardstick, errors, index), True, error, None, result.message)
+    return RunOutcome(True, False, _wrong(dataset, yardstick, errors, index), True, error, None, result.message)
 
 
 def _by_event(dataset: xr.Dataset, scene: Scene) -> str | None:
@@ -141,8 +141,8 @@ def _by_event(dataset: xr.Dataset, scene: Scene) -> str | None:
 
 def _failed(
     failure: str | None, result: Result, error: float | None, time: float | None, *, silent: bool = False
-) -> Outcome:
-    return Outcome(False, False, failure, silent, error, time, result.message)
+) -> RunOutcome:
+    return RunOutcome(False, False, failure, silent, error, time, result.message)
 
 
 def _errors(dataset: xr.Dataset, yardstick: Yardstick) -> FloatArray | None:

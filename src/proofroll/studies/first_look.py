@@ -12,7 +12,7 @@ from proofroll.core.plugins import engine_names
 from proofroll.core.scene import Scene
 from proofroll.core.verdict import Verdict
 from proofroll.files.scene_file import load_scene, read_scene_file
-from proofroll.studies.axes import Axis, Term
+from proofroll.studies.axes import Axis, AxisTerm
 
 _UNTIL, _SAMPLES = 1.0, 50
 _CLOSE = "close"
@@ -82,7 +82,7 @@ def axes_of(name: str) -> list[Axis]:
             continue
         allowed = [part for part in _PARTS if _loads(name, key, part * values[key])]
         if len(allowed) > 1:
-            found.append(Axis(key, "1", f"{item.meaning}, in parts of the default", allowed, {key: Term(key)}))
+            found.append(Axis(key, "1", f"{item.meaning}, in parts of the default", allowed, {key: AxisTerm(key)}))
     return [*found, Axis("horizon", "swings", "length of the run in natural times", [1.0, 3.0], horizon=True)]
 
 

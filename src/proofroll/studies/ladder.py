@@ -22,7 +22,7 @@ from proofroll.running.case import Case, EngineFacts, Result, Status
 from proofroll.running.runner import Runner, WorkerDied, resolve
 from proofroll.running.stopwatch import Stopwatch
 from proofroll.running.timing import ROUNDS, Timing, interleaved
-from proofroll.studies.ladder_models import Model, Rung, Switch, described, rungs, switches
+from proofroll.studies.ladder_models import LadderModel, Rung, Switch, described, rungs, switches
 from proofroll.studies.reference import Reference
 
 if TYPE_CHECKING:
@@ -34,7 +34,7 @@ _TIME_LIMIT = 60.0  # wall seconds for one case
 
 
 @dataclass(frozen=True)
-class Answer:
+class ModelAnswer:
     """What one model gave.
 
     Attributes:
@@ -51,7 +51,7 @@ class Answer:
 
 
 @dataclass(frozen=True)
-class Truth:
+class LadderTruth:
     """The truth at one point of the parameters: the whole, the quantity of it, and that one's error bar."""
 
     dataset: xr.Dataset
@@ -118,8 +118,8 @@ class Ladder:
         if not isinstance(truth, EngineFacts):
             raise truth
         self._truth_facts = truth
-        self.truths: dict[str, Truth] = {}
-        self.answers: dict[str, Answer] = {}
+        self.truths: dict[str, LadderTruth] = {}
+        self.answers: dict[str, ModelAnswer] = {}
         self.ladder: list[Rung] = rungs(self.engines, self.scene.requires)
         self.switches: list[Switch] = []
 
@@ -136,13 +136,13 @@ class Ladder:
             if isinstance(found, EngineFacts):
                 cases[key] = self._case(found, model)
             else:
-                self.answers[key] = Answer(None, absence(found))
+                self.answers[key] = ModelAnswer(None, absence(found))
         results = self._runner.run(cases.values(), lambda case, _: progress(case.engine.name))
         for key, case in cases.items():
             self.answers[key] = self._answer(models[key], case, results[case.key])
         self._time(progress)
 
-    def _case(self, facts: EngineFacts, model: Model) -> Case:
+    def _case(self, facts: EngineFacts, model: LadderModel) -> Case:
         parameters = self._given | dict(model.parameters)
         scene = load_scene(self._name, asks=model.asks, **parameters)
         return Case(
@@ -158,7 +158,7 @@ class Ladder:
 
     def _run_truths(self, wanted: Sequence[dict[str, float]], progress: Callable[[str], None]) -> None:
         wanted = [point for point in wanted if str(point) not in self.truths]
-        cases = {str(point): self._case(self._truth_facts, Model("truth", {}, point)) for point in wanted}
+        cases = {str(point): self._case(self._truth_facts, LadderModel("truth", {}, point)) for point in wanted}
         results = self._runner.run(cases.values(), lambda *_: progress("truth"))
         for point in wanted:
             case = cases[str(point)]
@@ -167,12 +167,12 @@ class Ladder:
                 raise Refused(f"there is no truth of this scene: {result.message}")
             self.truths[str(point)] = self._truth(read(self._runner.store.trajectory(case)), point)
 
-    def _truth(self, dataset: xr.Dataset, point: dict[str, float]) -> Truth:
+    def _truth(self, dataset: xr.Dataset, point: dict[str, float]) -> LadderTruth:
         reference = Reference.of(self._scene_at(point), dataset)
         if self.quantity not in reference.curves:
             raise Refused(f"the truth of this scene has no {self.quantity}")
         values, bar = reference.true(self.quantity, reference.curves[self.quantity])
-        return Truth(dataset, values, bar)
+        return LadderTruth(dataset, values, bar)
 
     def _scene_at(self, point: Mapping[str, float]) -> Scene:
         return load_scene(self._name, **(self._given | dict(point)))
@@ -181,12 +181,12 @@ class Ladder:
         """The quantity of a run of the scene with these parameters."""
         return observe(self._scene_at(point), dataset).get(self.quantity)
 
-    def _answer(self, model: Model, case: Case, result: Result) -> Answer:
+    def _answer(self, model: LadderModel, case: Case, result: Result) -> ModelAnswer:
         if result.status != Status.DONE:
-            return Answer(case, result)
-        return Answer(case, result, self._curve(model.parameters, read(self._runner.store.trajectory(case))))
+            return ModelAnswer(case, result)
+        return ModelAnswer(case, result, self._curve(model.parameters, read(self._runner.store.trajectory(case))))
 
-    def error(self, model: Model, point: dict[str, float]) -> float | None:
+    def error(self, model: LadderModel, point: dict[str, float]) -> float | None:
         """Largest distance from the truth of the scene with these parameters; None: no answer."""
         values = self.answers[key_of(model)].values
         return None if values is None else distance(values, self.truths[str(point)].values)
@@ -203,7 +203,7 @@ class Ladder:
             self.answers[key] = dataclasses.replace(self.answers[key], timing=timing)
 
 
-def key_of(model: Model) -> str:
+def key_of(model: LadderModel) -> str:
     """Distinguishes models."""
     return repr((model.engine, sorted(model.options.items()), sorted(model.parameters.items()), model.asks))
 

@@ -18,7 +18,7 @@ if TYPE_CHECKING:
 
 
 @dataclass(frozen=True)
-class Model:
+class LadderModel:
     """An engine with options, on the scene with some parameters.
 
     Attributes:
@@ -51,7 +51,7 @@ class Rung:
     """
 
     level: Level
-    model: Model | None
+    model: LadderModel | None
     variant: str = ""
     message: str = ""
 
@@ -70,9 +70,9 @@ class Switch:
 
     term: str
     kind: str
-    model: Model
-    on: Model | None
-    off: Model | None
+    model: LadderModel
+    on: LadderModel | None
+    off: LadderModel | None
     because: str
 
 
@@ -98,7 +98,7 @@ def rungs(engines: Mapping[str, dict[str, Any] | ProofrollError], requires: froz
             for formulation, presets in told["presets"].items():
                 if told["levels"].get(formulation) != level or not requires & set(told["provides"][formulation]):
                     continue
-                model = Model(told["name"], {"formulation": formulation, "preset": _preset(presets)})
+                model = LadderModel(told["name"], {"formulation": formulation, "preset": _preset(presets)})
                 ladder.append(Rung(level, model))
                 for term in told["terms"]:
                     if term["rung"] and formulation in term["formulations"]:
@@ -112,8 +112,8 @@ def _preset(presets: Mapping[str, Any]) -> str:
     return "matched" if "matched" in presets else next(iter(presets))
 
 
-def _with(model: Model, options: Mapping[str, Any]) -> Model:
-    return Model(model.engine, {**model.options, **options}, model.parameters, model.asks)
+def _with(model: LadderModel, options: Mapping[str, Any]) -> LadderModel:
+    return LadderModel(model.engine, {**model.options, **options}, model.parameters, model.asks)
 
 
 def _written(options: Mapping[str, Any]) -> str:
@@ -151,7 +151,7 @@ def switches(
     return found
 
 
-def _of_the_scene(model: Model, scene: Scene, truth: xr.Dataset, inherent: Mapping[str, str]) -> list[Switch]:
+def _of_the_scene(model: LadderModel, scene: Scene, truth: xr.Dataset, inherent: Mapping[str, str]) -> list[Switch]:
     """What the scene's elements can have or not."""
     found: list[Switch] = []
     for element in scene.elements:
@@ -159,7 +159,7 @@ def _of_the_scene(model: Model, scene: Scene, truth: xr.Dataset, inherent: Mappi
             if term.capability in inherent:
                 found.append(Switch(term.name, "scene", model, None, None, inherent[term.capability]))
             elif not term.asks or not scene.asks:
-                on = Model(model.engine, model.options, term.put, term.asks)
-                off = Model(model.engine, model.options, term.taken)
+                on = LadderModel(model.engine, model.options, term.put, term.asks)
+                off = LadderModel(model.engine, model.options, term.taken)
                 found.append(Switch(term.name, "scene", model, on, off, term.because))
     return found

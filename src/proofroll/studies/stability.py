@@ -15,8 +15,8 @@ from proofroll.files.scene_file import load_scene
 from proofroll.running.case import Case, EngineFacts, Result, Status
 from proofroll.running.runner import Runner
 from proofroll.studies.axes import Axis
-from proofroll.studies.bisection import Found, search
-from proofroll.studies.failure import TOO_SLOW, Outcome, judge
+from proofroll.studies.bisection import SearchResult, search
+from proofroll.studies.failure import TOO_SLOW, RunOutcome, judge
 from proofroll.studies.stability_places import PER_PERIOD, Effort, Place, case_at, measure, places_of
 from proofroll.studies.sweep import Curve, curves_of
 
@@ -44,7 +44,7 @@ class MapPoint:
     curve: Curve
     place: Place
     ladder: list[float]
-    found: Found[Outcome] = field(default_factory=Found)
+    found: SearchResult[RunOutcome] = field(default_factory=SearchResult)
     cases: dict[int, Case] = field(default_factory=dict)
     results: dict[int, Result] = field(default_factory=dict)
 
@@ -94,7 +94,7 @@ class StabilityMap:
 
 
 Progress = Callable[[str, int], None]
-Searching = Generator[int, Outcome | None, Found[Outcome]]
+Searching = Generator[int, RunOutcome | None, SearchResult[RunOutcome]]
 
 
 def stability(
@@ -200,7 +200,7 @@ def _search(name: str, points: Sequence[MapPoint], effort: Effort, runner: Runne
     runner.follow(first, arrived)
 
 
-def _send(point: MapPoint, searching: Searching, outcome: Outcome | None) -> int | None:
+def _send(point: MapPoint, searching: Searching, outcome: RunOutcome | None) -> int | None:
     """Gives an answer to a search; returns what it asks next, or None when it has ended."""
     try:
         return searching.send(outcome)
@@ -213,11 +213,11 @@ def _label(point: MapPoint) -> str:
     return f"{point.curve.facts.name}, {point.place.axis.name} = {point.place.value:g}"
 
 
-def failure_beyond(point: MapPoint, rung: int | None) -> Outcome | None:
+def failure_beyond(point: MapPoint, rung: int | None) -> RunOutcome | None:
     """The outcome on a failing rung; where no run was affordable at all, that it is too slow."""
     if rung is not None:
         return point.found.seen[rung]
     if not point.found.seen and point.found.limit == 0:
         message = "even the coarsest run takes too long"
-        return Outcome(False, False, TOO_SLOW, False, None, None, message)
+        return RunOutcome(False, False, TOO_SLOW, False, None, None, message)
     return None

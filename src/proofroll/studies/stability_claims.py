@@ -14,7 +14,7 @@ from proofroll.core.plugins import parse_engine
 from proofroll.files.scene_file import load_scene, read_scene_file
 from proofroll.files.toml import read_toml, study_files
 from proofroll.files.validation import first_problem
-from proofroll.studies.axes import Axis, Term
+from proofroll.studies.axes import Axis, AxisTerm
 from proofroll.studies.failure import meanings
 from proofroll.studies.first_look import axes_of
 from proofroll.studies.stability_content import dependence
@@ -206,5 +206,5 @@ def _check(where: str, found: StabilityFile) -> None:
                 raise InputError(f"{at}.{name}", pair, "write [low, high]")
 
 
-for _typed in (StabilityFile, Claim, Axis, Term):
+for _typed in (StabilityFile, Claim, Axis, AxisTerm):
     setattr(_typed, "__pydantic_config__", ConfigDict(extra="forbid"))  # noqa: B010 -- the name is pydantic's, not the class's

@@ -8,7 +8,7 @@ from dataclasses import asdict
 from typing import Any
 
 from proofroll.files.scene_file import load_scene
-from proofroll.studies.failure import ACCURATE, REFUSED, Outcome, meanings
+from proofroll.studies.failure import ACCURATE, REFUSED, RunOutcome, meanings
 from proofroll.studies.hosts import hosts
 from proofroll.studies.stability import MapPoint, StabilityMap, failure_beyond
 from proofroll.studies.step_numbers import explanation, step_numbers, values
@@ -16,7 +16,7 @@ from proofroll.studies.step_numbers import explanation, step_numbers, values
 BOUNDARIES = ("stable", "accurate")
 # Boundaries this factor apart count as the same: two rungs of the ladder of steps, one of that of tolerances.
 _SAME = {True: 2.3, False: 15.0}
-_PASSES: Mapping[str, Callable[[Outcome], bool]] = {
+_PASSES: Mapping[str, Callable[[RunOutcome], bool]] = {
     "stable": lambda outcome: outcome.stable,
     "accurate": lambda outcome: outcome.accurate,
 }

@@ -76,7 +76,7 @@ class Question:
 
 
 @dataclass
-class Point:
+class CurvePoint:
     """One engine with complete settings on the scene.
 
     Attributes:
@@ -94,7 +94,7 @@ class Point:
     errors: dict[str, float] = field(default_factory=dict)
     bars: dict[str, float] = field(default_factory=dict)
     dense: dict[str, float] = field(default_factory=dict)
-    sparse: Point | None = None
+    sparse: CurvePoint | None = None
 
     @property
     def step(self) -> float | None:
@@ -118,7 +118,7 @@ class Curve:
     engine: str
     facts: EngineFacts
     level: str | None
-    points: list[Point] = field(default_factory=list)
+    points: list[CurvePoint] = field(default_factory=list)
     dropped: dict[float, str] = field(default_factory=dict)
 
     @property
@@ -311,7 +311,7 @@ def _run(
             raise ProofrollError(f"there is no truth here: {results[case.key].message}")
         references[every] = Reference.read(scene, runner.store.trajectory(case))
     for index, both in cases:
-        curves[index].points.append(judged([Point(case, results[case.key]) for case in both], references, runner))
+        curves[index].points.append(judged([CurvePoint(case, results[case.key]) for case in both], references, runner))
     for curve in curves:
         curve.points.sort(key=lambda point: -(point.step or 0.0))
 
@@ -337,7 +337,7 @@ def cases_of(question: Question, scene: Scene, facts: EngineFacts, every: float)
     )
 
 
-def judged(points: Sequence[Point], references: Mapping[float, Reference], runner: Runner) -> Point:
+def judged(points: Sequence[CurvePoint], references: Mapping[float, Reference], runner: Runner) -> CurvePoint:
     """The point with its observables and their errors, if it has a trajectory that reached the end.
 
     Args:
@@ -358,7 +358,7 @@ def judged(points: Sequence[Point], references: Mapping[float, Reference], runne
     return replace(point, errors=errors, dense=point.errors, sparse=sparse)
 
 
-def _measured(point: Point, reference: Reference, runner: Runner) -> Point:
+def _measured(point: CurvePoint, reference: Reference, runner: Runner) -> CurvePoint:
     if point.result.status != Status.DONE:
         return point
     curves = reference.observed(read(runner.store.trajectory(point.case)))

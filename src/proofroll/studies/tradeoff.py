@@ -23,7 +23,7 @@ from proofroll.running.timing import ROUNDS, Timing, interleaved
 from proofroll.running.worker_pool import Workers
 from proofroll.studies.pareto import envelope, front
 from proofroll.studies.reference import Reference
-from proofroll.studies.sweep import FINER, Curve, Point, Question, case_of, cases_of, curves_of, judged, sweep
+from proofroll.studies.sweep import FINER, Curve, CurvePoint, Question, case_of, cases_of, curves_of, judged, sweep
 
 # What makes up most of a study's time is the repetition of measurements. A brief one repeats less: two rounds
 # show how far a cost can be trusted; a run longer than this [s] warms itself up, and is measured once.
@@ -82,7 +82,7 @@ class Tradeoff:
         return self.references[self.question.every]
 
     @property
-    def points(self) -> list[Point]:
+    def points(self) -> list[CurvePoint]:
         """Every point of every curve."""
         return [point for curve in self.curves for point in curve.points]
 
@@ -197,7 +197,7 @@ def _checked(found: Tradeoff, runner: Runner, told: Callable[[Case, Result], Non
         for key, both in runs.items():
             lost = next((case.every for case in both if case.every not in references), None)
             if lost is None:
-                point = judged([Point(case, results[case.key]) for case in both], references, runner)
+                point = judged([CurvePoint(case, results[case.key]) for case in both], references, runner)
                 corners[key].append(_corner(place, point, references[both[0].every]))
             else:
                 said = results[truths[lost].key].message
@@ -205,7 +205,7 @@ def _checked(found: Tradeoff, runner: Runner, told: Callable[[Case, Result], Non
     return corners
 
 
-def _corner(place: dict[str, float], point: Point, reference: Reference) -> Corner:
+def _corner(place: dict[str, float], point: CurvePoint, reference: Reference) -> Corner:
     errors = {name: error for name, error in point.errors.items() if np.isfinite(error)}
     relative = {name: error / (reference.scale(name) or 1.0) for name, error in errors.items()}
     ended = point.sparse or point
@@ -219,7 +219,7 @@ def judged_quantities(found: Tradeoff) -> list[str]:
 
 def pareto_entries(
     curves: Iterable[Curve], quantity: str, timings: Mapping[str, Timing]
-) -> list[tuple[Point, float, float]]:
+) -> list[tuple[CurvePoint, float, float]]:
     """Every timed point with its cost and the envelope of its error, of which the truth shows no more than its bar."""
     entries = []
     for curve in curves:

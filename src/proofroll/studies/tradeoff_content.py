@@ -18,7 +18,7 @@ from proofroll.studies.budget import Budget, budget, sentence
 from proofroll.studies.hosts import hosts, said_of
 from proofroll.studies.pareto import envelope, front
 from proofroll.studies.recommend import by_hand
-from proofroll.studies.sweep import BROKEN, Curve, Point
+from proofroll.studies.sweep import BROKEN, Curve, CurvePoint
 from proofroll.studies.tradeoff import Tradeoff, judged_quantities, pareto_entries
 
 
@@ -96,7 +96,7 @@ def _envelopes(curve: Curve, quantities: Iterable[str]) -> list[dict[str, float]
     return [{name: held[index] for name, held in by_name.items()} for index in range(len(curve.points))]
 
 
-def _point(curve: Curve, point: Point, number: int, held: dict[str, float], found: Tradeoff) -> dict[str, Any]:
+def _point(curve: Curve, point: CurvePoint, number: int, held: dict[str, float], found: Tradeoff) -> dict[str, Any]:
     timing = found.timings.get(point.case.key)
     corners = found.corners.get(point.case.key)
     facts = point.case.engine

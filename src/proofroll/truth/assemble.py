@@ -7,19 +7,22 @@ from collections.abc import Callable
 import numpy as np
 
 from proofroll.core.arrays import FloatArray
-from proofroll.elements.ball_on_surface.motion import Motion
+from proofroll.elements.ball_on_surface.motion import BallMotion
 
 
 def joined(
-    times: FloatArray, change: float, early: Callable[[FloatArray], Motion], late: Callable[[FloatArray], Motion]
-) -> Motion:
+    times: FloatArray,
+    change: float,
+    early: Callable[[FloatArray], BallMotion],
+    late: Callable[[FloatArray], BallMotion],
+) -> BallMotion:
     """Motion at rising times: by ``early`` before the time ``change`` [s] and by ``late`` from then on."""
     first = int(np.searchsorted(times, change))
     parts = early(times[:first]), late(times[first:])
     p, v, w, force = (
         np.concatenate([getattr(part, key) for part in parts]) for key in ("p_WB", "v_WB", "w_WB", "force")
     )
-    return Motion(p, v, w, force, parts[1].route)
+    return BallMotion(p, v, w, force, parts[1].route)
 
 
 def classic_step(rates: Callable[[FloatArray], FloatArray], state: FloatArray, span: float) -> FloatArray:

@@ -31,7 +31,7 @@ def _dot(x: AnyArray, y: AnyArray) -> AnyArray:
     return np.asarray(((x * y) @ _ONES)[..., None])
 
 
-class Contact:
+class ContactRates:
     """Rates of the state y = (p, ω, u), shape (n, 9), with the slip velocity u in place of the centre's velocity.
 
     u is a state because the difference v + a ω × e1 would lose the digits of a small slip.

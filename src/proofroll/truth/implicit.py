@@ -12,10 +12,10 @@ from proofroll.core.arrays import FloatArray
 from proofroll.core.errors import Diverged
 from proofroll.elements.ball_on_surface.mechanics import always_pressed
 from proofroll.elements.ball_on_surface.model import RollingBall
-from proofroll.elements.ball_on_surface.motion import Motion
+from proofroll.elements.ball_on_surface.motion import BallMotion
 from proofroll.truth.assemble import classic_step
 from proofroll.truth.collocation import Step, System, next_length, nodes, take
-from proofroll.truth.contact import Contact
+from proofroll.truth.contact import ContactRates
 from proofroll.truth.crossing import first_rise
 from proofroll.truth.impact import by_equations
 from proofroll.truth.switching import End, Leg
@@ -28,7 +28,7 @@ _STILL = 1e-9  # time left, relative to the pace of the motion, that is extrapol
 
 
 class Implicit:
-    """Route in the state y = (p, ω, u) of :class:`Contact`.
+    """Route in the state y = (p, ω, u) of :class:`ContactRates`.
 
     Args:
         body: the scene's ball.
@@ -39,7 +39,7 @@ class Implicit:
 
     def __init__(self, body: RollingBall, first_step: float = 0.1) -> None:
         self._body = body
-        self._contact = Contact(body)
+        self._contact = ContactRates(body)
         self._first = first_step
         self._pace = body.ball.radius / max(float(self._contact.scale[-1]), 1e-300)  # [s]
         self._mu = body.contact.mu_static
@@ -122,9 +122,9 @@ class Implicit:
                 return walk.leg(self, False, gone, walk.cut(gone), End.LIFTOFF)
         return walk.leg(self, False, until, walk.state, End.TIME)
 
-    def motion(self, y: FloatArray, sticking: bool) -> Motion:
+    def motion(self, y: FloatArray, sticking: bool) -> BallMotion:
         """Motion in states, shape (n, 9)."""
-        return Motion(y[:, :3], self._contact.velocity(y), y[:, 3:6], self._contact.force(y, sticking), self.name)
+        return BallMotion(y[:, :3], self._contact.velocity(y), y[:, 3:6], self._contact.force(y, sticking), self.name)
 
     def force_at_start(self, state: FloatArray) -> FloatArray:
         """Force of the wall at the very start of a slip [N], shape (3,), where u = 0 but has a direction."""
@@ -239,7 +239,7 @@ class _Walk:
         steps, first = self.steps, self._state
         starts = np.array([step.time for step in steps])
 
-        def motion(times: FloatArray) -> Motion:
+        def motion(times: FloatArray) -> BallMotion:
             y = np.broadcast_to(first, (len(times), 9)).copy()
             index = np.searchsorted(starts, times, side="right") - 1
             for number in np.unique(index[index >= 0]):

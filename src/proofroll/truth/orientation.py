@@ -12,7 +12,7 @@ import numpy as np
 from scipy.spatial.transform import Rotation
 
 from proofroll.core.arrays import FloatArray
-from proofroll.elements.ball_on_surface.motion import Motion
+from proofroll.elements.ball_on_surface.motion import BallMotion
 from proofroll.truth import collocation
 
 # Turn of the ball within one step [rad], so small that a step's error is that of the spin itself.
@@ -24,7 +24,7 @@ Quadrature = tuple[FloatArray, Callable[[FloatArray, FloatArray], FloatArray]]
 
 
 def orientation(
-    motion: Callable[[FloatArray], Motion], times: FloatArray, kinks: Iterable[float], quadrature: Quadrature
+    motion: Callable[[FloatArray], BallMotion], times: FloatArray, kinks: Iterable[float], quadrature: Quadrature
 ) -> FloatArray:
     """q_WB at rising times [s], scalar first, continuous, shape (n, 4).
 

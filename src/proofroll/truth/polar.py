@@ -15,7 +15,7 @@ import numpy as np
 from proofroll.core.arrays import FloatArray
 from proofroll.core.errors import Diverged
 from proofroll.elements.ball_on_surface.model import RollingBall
-from proofroll.elements.ball_on_surface.motion import Motion, world_motion
+from proofroll.elements.ball_on_surface.motion import BallMotion, world_motion
 from proofroll.elements.ball_on_surface.rolling_equations import reduced_rates
 from proofroll.truth.assemble import classic_step, joined
 from proofroll.truth.explicit import Piece, Rates, at_clock, read, steps, stop
@@ -109,7 +109,7 @@ class Polar:
         pieces: list[Piece] = []
 
         def leg(end: float, last: FloatArray, why: End) -> Leg[FloatArray]:
-            def motion(times: FloatArray) -> Motion:
+            def motion(times: FloatArray) -> BallMotion:
                 return self._motion(read(pieces, times, state), np.zeros(len(times)), None)
 
             return Leg(time, end, True, last, why, motion)
@@ -139,7 +139,7 @@ class Polar:
             why, begun, small = None, time, np.append(state, np.linalg.norm(slip))
             handover = max(handover, BEGUN * small[5])
 
-        def creeping(times: FloatArray) -> Motion:
+        def creeping(times: FloatArray) -> BallMotion:
             y = read(lead, times, np.append(state, 0.0))
             return self._motion(y[:, :5], y[:, 5], np.array([self._slaved(row)[1] for row in y]))
 
@@ -150,11 +150,11 @@ class Polar:
         floor = np.log(_FLOOR * handover)
         pieces: list[Piece] = []
 
-        def slipping(times: FloatArray) -> Motion:
+        def slipping(times: FloatArray) -> BallMotion:
             y = at_clock(pieces, times, first)
             return self._motion(y[:, :5], np.exp(y[:, 5]), y[:, 6])
 
-        def motion(times: FloatArray) -> Motion:
+        def motion(times: FloatArray) -> BallMotion:
             return joined(times, begun, creeping, slipping)
 
         def leg(y: FloatArray, end: End) -> Leg[FloatArray]:
@@ -285,7 +285,7 @@ class Polar:
         found = [(*when, end) for end, g in ends if (when := stop(self._rolling, piece, g))]
         return min(found, key=lambda item: item[0], default=None)
 
-    def _motion(self, y: FloatArray, size: FloatArray, phi: FloatArray | None) -> Motion:
+    def _motion(self, y: FloatArray, size: FloatArray, phi: FloatArray | None) -> BallMotion:
         frame = self._body.surface.frame(y[:, :2])
         v = np.einsum("nij,nj->ni", self._body.surface.tangents(y[:, :2]), y[:, 2:4])
         drives = [self._drive(row) for row in y]

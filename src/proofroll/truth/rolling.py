@@ -21,7 +21,7 @@ from proofroll.core.arrays import FloatArray
 from proofroll.core.errors import Diverged
 from proofroll.elements.ball_on_surface.mechanics import newton_euler
 from proofroll.elements.ball_on_surface.model import RollingBall
-from proofroll.elements.ball_on_surface.motion import Motion
+from proofroll.elements.ball_on_surface.motion import BallMotion
 from proofroll.elements.ball_on_surface.resting import setting_off, stands, stays
 from proofroll.elements.ball_on_surface.rolling_equations import placed, reduced_rates, start
 
@@ -51,7 +51,7 @@ class _Equations:
     moving: Callable[[FloatArray, FloatArray], FloatArray]
 
 
-def reduced(body: RollingBall, times: FloatArray) -> Motion:
+def reduced(body: RollingBall, times: FloatArray) -> BallMotion:
     """The reduced equations at tight tolerance."""
     surface = body.surface
 
@@ -70,10 +70,10 @@ def reduced(body: RollingBall, times: FloatArray) -> Motion:
     evaluated = [reduced_rates(body, x) for x in states]
     v, force = (np.array([item[i] for item in evaluated]) for i in (1, 2))
     force[rests:] = -body.ball.mass * body.gravity
-    return Motion(*placed(body, states, v), force, "reduced equations, DOP853")
+    return BallMotion(*placed(body, states, v), force, "reduced equations, DOP853")
 
 
-def unreduced(body: RollingBall, times: FloatArray) -> Motion:
+def unreduced(body: RollingBall, times: FloatArray) -> BallMotion:
     """Newton-Euler in the world with all constraint forces, at tight tolerance."""
 
     def rates(x: FloatArray) -> FloatArray:
@@ -92,7 +92,7 @@ def unreduced(body: RollingBall, times: FloatArray) -> Motion:
     p, v, w = states[:, :3], states[:, 3:6], states[:, 6:]
     force = np.array([newton_euler(body, *x)[2] for x in zip(p, v, w, strict=True)])
     force[rests:] = -body.ball.mass * body.gravity
-    return Motion(p, v, w, force, "unreduced Newton-Euler, DOP853")
+    return BallMotion(p, v, w, force, "unreduced Newton-Euler, DOP853")
 
 
 def _sizes(body: RollingBall) -> tuple[float, float, float]:

@@ -18,7 +18,7 @@ from proofroll.core.errors import Diverged, Refused
 from proofroll.elements.ball_on_surface.events import EventKind
 from proofroll.elements.ball_on_surface.mechanics import natural_acceleration
 from proofroll.elements.ball_on_surface.model import RollingBall
-from proofroll.elements.ball_on_surface.motion import Motion
+from proofroll.elements.ball_on_surface.motion import BallMotion
 from proofroll.elements.ball_on_surface.resting import setting_off, stands, stays
 from proofroll.truth.crossing import first_rise
 
@@ -68,7 +68,7 @@ class Leg(Generic[State]):
     sticking: bool
     state: State
     why: End
-    motion: Callable[[FloatArray], Motion]
+    motion: Callable[[FloatArray], BallMotion]
 
 
 class Route(Protocol[State]):
@@ -125,7 +125,7 @@ class Path(Generic[State]):
     events: list[tuple[EventKind, float]]
     lands: float | None = None
 
-    def motion(self, times: FloatArray, route: str) -> tuple[Motion, np.ndarray[tuple[int], np.dtype[np.bool_]]]:
+    def motion(self, times: FloatArray, route: str) -> tuple[BallMotion, np.ndarray[tuple[int], np.dtype[np.bool_]]]:
         """Motion at ``times`` [s] and whether the ball sticks there; a time of an event belongs to the later leg."""
         index = np.searchsorted([leg.start for leg in self.legs], times, side="right") - 1
         columns = {key: np.empty((len(times), 3)) for key in ("p_WB", "v_WB", "w_WB", "force")}
@@ -135,7 +135,7 @@ class Path(Generic[State]):
             for key, column in columns.items():
                 column[here] = getattr(part, key)
         sticking = np.array([leg.sticking for leg in self.legs])[index]
-        return Motion(**columns, route=route), sticking
+        return BallMotion(**columns, route=route), sticking
 
 
 def follow(body: RollingBall, route: Route[State], until: float) -> Path[State]:  # noqa: PLR0912, PLR0915 -- one per end
@@ -237,9 +237,9 @@ def _rest(body: RollingBall, route: Route[State], state: State, time: float, unt
     e1 = body.surface.normal(p)
     force = -body.ball.mass * body.gravity
 
-    def motion(times: FloatArray) -> Motion:
+    def motion(times: FloatArray) -> BallMotion:
         p_WB, v_WB, w_WB, held = (np.broadcast_to(x, (len(times), 3)) for x in (p, np.zeros(3), (w @ e1) * e1, force))
-        return Motion(p_WB, v_WB, w_WB, held, "at rest")
+        return BallMotion(p_WB, v_WB, w_WB, held, "at rest")
 
     return Leg(time, until, True, state, End.TIME, motion)
 
@@ -320,14 +320,14 @@ def _airborne(
 
 def _flight(
     body: RollingBall, world: tuple[FloatArray, FloatArray, FloatArray], time: float, until: float
-) -> tuple[float | None, Callable[[FloatArray], Motion]]:
+) -> tuple[float | None, Callable[[FloatArray], BallMotion]]:
     """Free fall from ``time`` [s] with constant spin: when the ball is on the wall again (None: not until the end)."""
     p, v, w = world
 
-    def motion(times: FloatArray) -> Motion:
+    def motion(times: FloatArray) -> BallMotion:
         t = (times - time)[:, None]
         p_WB, v_WB = p + t * v + 0.5 * t**2 * body.gravity, v + t * body.gravity
-        return Motion(p_WB, v_WB, np.broadcast_to(w, p_WB.shape), np.zeros_like(p_WB), "free flight")
+        return BallMotion(p_WB, v_WB, np.broadcast_to(w, p_WB.shape), np.zeros_like(p_WB), "free flight")
 
     def sunk(times: FloatArray) -> FloatArray:
         return -body.surface.gap(motion(times).p_WB)

@@ -11,13 +11,13 @@ from proofroll.core.errors import Diverged
 from proofroll.elements.ball_on_surface.compiled import library
 from proofroll.elements.ball_on_surface.compiled.rolling import is_uniform, parameters, start
 from proofroll.elements.ball_on_surface.model import RollingBall
-from proofroll.elements.ball_on_surface.motion import Motion, world_motion
+from proofroll.elements.ball_on_surface.motion import BallMotion, world_motion
 from proofroll.elements.ball_on_surface.surfaces import Cylinder, Plane
 from proofroll.truth.assemble import classic_step, joined
 from proofroll.truth.impact import by_coefficients
 from proofroll.truth.polar import BEGUN, direction
 from proofroll.truth.switching import End, Leg
-from proofroll.truth.taylor_model import Model, model
+from proofroll.truth.taylor_model import TaylorModel, model
 
 # Stop conditions of the integrators in the order of their events.
 _STICK_ENDS = (End.LIFTOFF, End.CONE)
@@ -50,7 +50,7 @@ def _vertical(body: RollingBall, surface: Cylinder) -> bool:
     return not np.any(np.cross(body.gravity, surface.generators[1].axis))
 
 
-class Taylor:
+class SlidingTaylor:
     """Route in the local frame with (ln|u|, direction) against τ, dt = |u| dτ, while slipping.
 
     Against τ the end of a slip, |u| → 0, is a smooth decay to infinity. The start of a slip is not: there the direction
@@ -70,7 +70,7 @@ class Taylor:
         self._A = (1 + body.ball.inertia_ratio) / body.ball.inertia_ratio
         self._pars = [*parameters(body), *(min(mu, _LARGEST) for mu in (contact.mu_kinetic, contact.mu_static))]
         bounded = bool(np.isfinite(contact.mu_static))
-        self._model: Model = model(contact.rolling_resistance > 0, is_uniform(body), bounded)
+        self._model: TaylorModel = model(contact.rolling_resistance > 0, is_uniform(body), bounded)
 
     def start(self) -> FloatArray:
         """See :class:`Route`."""
@@ -115,7 +115,7 @@ class Taylor:
         """See :class:`Route`."""
         run = _Run(self._model.stick, self._pars, time, state, until)
 
-        def motion(times: FloatArray) -> Motion:
+        def motion(times: FloatArray) -> BallMotion:
             return self._motion(run.at(times), np.zeros(len(times)), None)
 
         return Leg(time, run.end, True, run.last, End.TIME if run.event is None else _STICK_ENDS[run.event], motion)
@@ -132,7 +132,7 @@ class Taylor:
         begin = until if slip is None else time
         creep = _Run(self._model.creep, [*self._pars, handover], time, np.append(state, 0.0), begin)
 
-        def creeping(times: FloatArray) -> Motion:
+        def creeping(times: FloatArray) -> BallMotion:
             states = creep.at(times)
             return self._motion(states[:, :5], states[:, 5], self._model.direction(states.T, self._pars)[0])
 
@@ -148,11 +148,11 @@ class Taylor:
         first = np.array([*small[:5], np.log(small[5]), phi, creep.end])
         run = _Run(self._model.slip, [*self._pars, np.log(_FLOOR * handover), until], 0.0, first, np.inf)
 
-        def slipping(times: FloatArray) -> Motion:
+        def slipping(times: FloatArray) -> BallMotion:
             states = _at_times(run, times)
             return self._motion(states[:, :5], np.exp(states[:, 5]), states[:, 6])
 
-        def motion(times: FloatArray) -> Motion:
+        def motion(times: FloatArray) -> BallMotion:
             return joined(times, creep.end, creeping, slipping)
 
         why = _SLIP_ENDS[run.event or 0]
@@ -174,7 +174,7 @@ class Taylor:
         rates[3] += -mu * N * sin + b3 / self._A
         return float(last[7]) + left, last[:5] + left * rates
 
-    def _motion(self, states: FloatArray, size: FloatArray, phi: FloatArray | None) -> Motion:
+    def _motion(self, states: FloatArray, size: FloatArray, phi: FloatArray | None) -> BallMotion:
         """Motion in states, shape (n, 5), slipping with speed ``size`` [m/s] in direction ``phi`` (None: sticking)."""
         ball = self._body.ball
         b2, b3, _, N = self._model.drive(states.T, self._pars)

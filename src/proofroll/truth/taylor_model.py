@@ -19,7 +19,7 @@ PARAMETERS = (*SHARED, "mu_k", "mu_s", "limit", "t_end")
 
 
 @dataclass
-class Model:
+class TaylorModel:
     """Compiled integrators; each holds a state and must not be shared between threads.
 
     Attributes:
@@ -45,7 +45,7 @@ class Model:
 _local = threading.local()
 
 
-def model(resistance: bool, uniform: bool, bounded: bool) -> Model:
+def model(resistance: bool, uniform: bool, bounded: bool) -> TaylorModel:
     """The integrators, compiled once per thread.
 
     Args:
@@ -55,11 +55,11 @@ def model(resistance: bool, uniform: bool, bounded: bool) -> Model:
     """
     if not hasattr(_local, "models"):
         _local.models = cache(_compiled)
-    compiled: Model = _local.models(resistance, uniform, bounded)
+    compiled: TaylorModel = _local.models(resistance, uniform, bounded)
     return compiled
 
 
-def _compiled(resistance: bool, uniform: bool, bounded: bool) -> Model:
+def _compiled(resistance: bool, uniform: bool, bounded: bool) -> TaylorModel:
     import heyoka as hy
 
     size, y, phi, t = hy.make_vars("size", "y", "phi", "t")
@@ -96,7 +96,7 @@ def _compiled(resistance: bool, uniform: bool, bounded: bool) -> Model:
         (phi, b3 * cos - b2 * sin),
         (t, speed),
     ]
-    return Model(
+    return TaylorModel(
         stick=integrator(
             rolling,
             [hy.t_event(N, direction=down), *([hy.t_event(equations.excess(mu_s), direction=up)] if bounded else [])],

@@ -15,7 +15,7 @@ from proofroll.elements.ball_on_surface.dataset import variables
 from proofroll.elements.ball_on_surface.element import rolling_ball
 from proofroll.elements.ball_on_surface.mechanics import always_pressed
 from proofroll.elements.ball_on_surface.model import BallCapability, RollingBall
-from proofroll.elements.ball_on_surface.motion import Motion
+from proofroll.elements.ball_on_surface.motion import BallMotion
 from proofroll.truth import rolling, unreduced_taylor
 from proofroll.truth.error_bars import put_error_bars
 from proofroll.truth.orientation import MATRICES, QUATERNIONS, Quadrature, orientation
@@ -24,7 +24,7 @@ from proofroll.truth.stick_slip import stays_on, stick_slip
 if TYPE_CHECKING:
     import xarray as xr
 
-Route = Callable[[RollingBall, FloatArray], Motion]
+Route = Callable[[RollingBall, FloatArray], BallMotion]
 
 # A route's own round-off: its values carry a relative error of some machine epsilons even where the routes agree.
 _ROUND_OFF = 4 * np.finfo(float).eps
@@ -61,11 +61,11 @@ def truth(scene: Scene, times: FloatArray) -> xr.Dataset:
     return result
 
 
-def _first(body: RollingBall, times: FloatArray) -> Motion:
+def _first(body: RollingBall, times: FloatArray) -> BallMotion:
     return closed_form(body, times) or rolling.reduced(body, times)
 
 
-def _unreduced(body: RollingBall, times: FloatArray) -> Motion:
+def _unreduced(body: RollingBall, times: FloatArray) -> BallMotion:
     if unreduced_taylor.available(body):
         return unreduced_taylor.unreduced(body, times)
     return rolling.unreduced(body, times)
@@ -77,7 +77,7 @@ def _dataset(scene: Scene, times: FloatArray, route: Route, quadrature: Quadratu
     q_WB = None
     if BallCapability.ORIENTATION in scene.requires:
 
-        def from_start(at: FloatArray) -> Motion:
+        def from_start(at: FloatArray) -> BallMotion:
             return route(body, at) if at[0] == 0 else route(body, np.append(0.0, at)).at(slice(1, None))
 
         q_WB = orientation(from_start, times, (), quadrature)

@@ -26,7 +26,7 @@ from proofroll.core.errors import Diverged
 from proofroll.elements.ball_on_surface.compiled import library
 from proofroll.elements.ball_on_surface.mechanics import newton_euler
 from proofroll.elements.ball_on_surface.model import RollingBall
-from proofroll.elements.ball_on_surface.motion import Motion
+from proofroll.elements.ball_on_surface.motion import BallMotion
 from proofroll.elements.ball_on_surface.surfaces import Cylinder, Declared, Plane, Surface
 
 _local = threading.local()
@@ -38,7 +38,7 @@ def available(body: RollingBall) -> bool:
     return known and library.available()
 
 
-def unreduced(body: RollingBall, times: FloatArray) -> Motion:
+def unreduced(body: RollingBall, times: FloatArray) -> BallMotion:
     """The motion at rising times [s].
 
     Raises:
@@ -64,7 +64,7 @@ def unreduced(body: RollingBall, times: FloatArray) -> Motion:
         raise Diverged(f"the truth (Taylor series in the world) could not be integrated past {series.time:g} s")
     p, v, w = (np.array(part) for part in (states[:, :3], states[:, 3:6], states[:, 6:]))
     force = np.array([newton_euler(body, *x)[2] for x in zip(p, v, w, strict=True)])
-    return Motion(p, v, w, force, "unreduced Newton-Euler, Taylor series")
+    return BallMotion(p, v, w, force, "unreduced Newton-Euler, Taylor series")
 
 
 def _compiled(surface: Declared | type[Surface], moves: bool) -> Any:

@@ -10,7 +10,7 @@ import pytest
 
 from proofroll.running.timing import Interval
 from proofroll_benchmarks import loops
-from proofroll_benchmarks.adapters import GOAL, Row, bench_adapters, content, measure_adapter
+from proofroll_benchmarks.adapters import GOAL, AdapterRow, bench_adapters, content, measure_adapter
 from proofroll_benchmarks.bare import Bare
 
 pytestmark = pytest.mark.own_workers
@@ -76,10 +76,10 @@ def test_the_bare_loop_runs_over_the_same_times(monkeypatch: pytest.MonkeyPatch)
 def test_the_worst_row_speaks_for_an_engine() -> None:
     """An engine's ratio is that of its slowest row, and the goal holds only if it does for each."""
     rows = [
-        Row("e", "one", "matched", "f = 0", Interval(1.05, 1.0, 1.1, 0.97), ""),
-        Row("e", "two", "matched", "f > 0", Interval(1.4, 1.3, 1.5, 0.97), ""),
-        Row("e", "two", "matched", "bounded, slips", None, "refused"),
-        Row("good", "one", "matched", "f = 0", Interval(GOAL, 1.0, 1.2, 0.97), ""),
+        AdapterRow("e", "one", "matched", "f = 0", Interval(1.05, 1.0, 1.1, 0.97), ""),
+        AdapterRow("e", "two", "matched", "f > 0", Interval(1.4, 1.3, 1.5, 0.97), ""),
+        AdapterRow("e", "two", "matched", "bounded, slips", None, "refused"),
+        AdapterRow("good", "one", "matched", "f = 0", Interval(GOAL, 1.0, 1.2, 0.97), ""),
     ]
     found = content(rows)
     assert found["engines"]["e"]["ratio"] == {"value": 1.4, "low": 1.3, "high": 1.5, "confidence": 0.97}

@@ -12,7 +12,7 @@ from proofroll.elements.ball_on_surface.element import rolling_ball
 from proofroll.elements.ball_on_surface.rolling_equations import reduced_rates
 from proofroll.elements.ball_on_surface.surfaces import Cylinder, Plane
 from proofroll.engines.projection import uniform
-from proofroll.engines.projection.geometry import General, Uniform, geometry_of, local_geometry
+from proofroll.engines.projection.geometry import GeneralSurface, Uniform, geometry_of, local_geometry
 from proofroll.engines.projection.method import ProjectedBall
 from proofroll.engines.projection.orientation import EulerAngles, RotatingFrame
 
@@ -212,15 +212,15 @@ def test_uniform_geometry_is_the_general_one(surface, u):
     """On a homogeneous surface the precomputed geometry equals the one evaluated on the spot."""
     cheap = geometry_of(surface)
     assert isinstance(cheap, Uniform)
-    for found, expected in zip(cheap.at(np.array(u)), General(surface).at(np.array(u)), strict=True):
+    for found, expected in zip(cheap.at(np.array(u)), GeneralSurface(surface).at(np.array(u)), strict=True):
         close(found, expected)
 
 
 def test_other_surfaces_are_evaluated_at_each_point():
     """A surface without generators, or with some that do not commute, is not taken for uniform."""
-    assert isinstance(geometry_of(Torus()), General)
+    assert isinstance(geometry_of(Torus()), GeneralSurface)
 
     class Sphere(Torus):
         generators = tuple(replace(Cylinder("w", 1.0, tilt).generators[0]) for tilt in (0.0, 1.0))
 
-    assert isinstance(geometry_of(Sphere()), General)
+    assert isinstance(geometry_of(Sphere()), GeneralSurface)

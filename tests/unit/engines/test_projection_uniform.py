@@ -9,7 +9,7 @@ import pytest
 
 from proofroll.elements.ball_on_surface.element import rolling_ball
 from proofroll.elements.ball_on_surface.model import RollingBall
-from proofroll.engines.projection.geometry import General, Uniform, geometry_of
+from proofroll.engines.projection.geometry import GeneralSurface, Uniform, geometry_of
 from proofroll.engines.projection.method import ProjectedBall
 from proofroll.engines.projection.orientation import EulerAngles, Orientation, RotatingFrame
 from proofroll.files.scene_file import load_scene
@@ -41,7 +41,7 @@ def test_they_are_the_projected_ones(orientation: Orientation) -> None:
     for body in bodies():
         geometry = geometry_of(body.surface)
         assert isinstance(geometry, Uniform)
-        written, carried = (ProjectedBall(body, kind, orientation) for kind in (geometry, General(body.surface)))
+        written, carried = (ProjectedBall(body, kind, orientation) for kind in (geometry, GeneralSurface(body.surface)))
         for _ in range(5):
             x = state(orientation)
             expected, found = carried.response(carried.kinematics(x)), written.response_at(x)

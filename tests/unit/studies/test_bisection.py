@@ -7,7 +7,7 @@ from dataclasses import dataclass
 
 import pytest
 
-from proofroll.studies.bisection import Found, search
+from proofroll.studies.bisection import SearchResult, search
 
 
 @dataclass(frozen=True)
@@ -20,7 +20,7 @@ class Made:
 
 def found(
     stable: Callable[[int], bool], accurate: Callable[[int], bool], size: int = 35, affordable: int = 35
-) -> Found[Made]:
+) -> SearchResult[Made]:
     """What a search finds if rungs behave so."""
     searching = search(size, 4)
     rung = next(searching)
@@ -32,7 +32,7 @@ def found(
             return stop.value  # type: ignore[no-any-return]  # StopIteration has no type
 
 
-def boundaries(result: Found[Made]) -> list[tuple[int | None, int | None]]:
+def boundaries(result: SearchResult[Made]) -> list[tuple[int | None, int | None]]:
     """Coarsest that holds and the failing one beside it, for stable and for accurate."""
     return [result.boundary(lambda v: v.stable), result.boundary(lambda v: v.accurate)]
 

@@ -7,7 +7,7 @@ import pytest
 
 from proofroll.running.case import Case, EngineFacts, Result, Status
 from proofroll.studies.budget import FLOOR, MODEL_FORM, TIME_STEP, TRUTH, Budget, Order, budget, order_of, sentence
-from proofroll.studies.sweep import Curve, Point
+from proofroll.studies.sweep import Curve, CurvePoint
 
 T = np.linspace(0, 2, 41)
 TRUE = np.sin(3 * T)
@@ -28,7 +28,7 @@ def made(
         values = TRUE + step**order * np.cos(T) + model * T + floor * scatter.uniform(-1, 1, T.size)
         error = float(np.max(np.abs(values - TRUE)))
         case = Case("scene", {}, "0", own, 2.0, 0.05)
-        curve.points.append(Point(case, Result(Status.DONE, "done"), {"z": values}, {"z": error}, {"z": bar}))
+        curve.points.append(CurvePoint(case, Result(Status.DONE, "done"), {"z": values}, {"z": error}, {"z": bar}))
     return budget(curve, "z", 0.05, TRUE)
 
 
@@ -71,7 +71,7 @@ def test_the_coarse_end_is_that_of_the_whole_curve(start: int) -> None:
         own = EngineFacts("made", "1", "0", {"dt": step}, "dt", 2)
         error = float(np.max(np.abs(values - np.sin(3 * t))))
         case = Case("scene", {}, "0", own, 2.0, every)
-        curve.points.append(Point(case, Result(Status.DONE, "done"), {"z": values}, {"z": error}, {"z": 1e-13}))
+        curve.points.append(CurvePoint(case, Result(Status.DONE, "done"), {"z": values}, {"z": error}, {"z": 1e-13}))
     found = budget(curve, "z", 0.05, TRUE[start:])
     assert (found.coarse_step, found.coarse, found.fine) == (0.4, TIME_STEP, MODEL_FORM)
     curve.points[0].curves["z"] = curve.points[0].curves["z"][:-1]

@@ -19,7 +19,7 @@ from proofroll.report.stability_map import LETTERS, legend, svg
 from proofroll.report.stability_tables import boundary_table, headline, silent_lines
 from proofroll.running.runner import Runner
 from proofroll.running.store import Store
-from proofroll.studies.axes import Axis, Term, chosen, thinned
+from proofroll.studies.axes import Axis, AxisTerm, chosen, thinned
 from proofroll.studies.failure import meanings
 from proofroll.studies.stability import stability
 from proofroll.studies.stability_claims import Claim, file_for
@@ -28,7 +28,7 @@ from proofroll.studies.stability_places import Effort, places_of
 from proofroll.studies.stability_reproducers import write_reproducers
 from proofroll.studies.step_numbers import OSCILLATION, explanation, values
 
-SPEED = Axis("V0", "m/s", "initial speed", [2.0, 8.0], {"speed": Term()})
+SPEED = Axis("V0", "m/s", "initial speed", [2.0, 8.0], {"speed": AxisTerm()})
 ENGINE = "projection[formulation=rotating_frame,preset=default]"
 SHORT = Effort(periods=1.0, steps=2000)
 
@@ -82,7 +82,7 @@ def test_a_run_that_met_the_limit_of_time_contradicts_nothing() -> None:
 
 def test_a_closed_form_has_no_boundary(tmp_path: Path) -> None:
     """What has neither step nor tolerance is named with the reason, and its neighbour is mapped by its tolerance."""
-    axis = Axis("V0", "m/s", "initial speed", [4.0], {"speed": Term()})
+    axis = Axis("V0", "m/s", "initial speed", [4.0], {"speed": AxisTerm()})
     told: list[str] = []
     found = mapped(tmp_path, ["reduced[preset=matched]"], [axis], progress=lambda text, _: told.append(text))
     assert told[-1].endswith("V0 = 4: 1 of 1 points")
@@ -143,7 +143,7 @@ def programs(tmp_path_factory: pytest.TempPathFactory) -> dict[str, dict[str, An
         "exudyn[formulation=carrier,preset=default]",
         "pinocchio[formulation=contact,preset=default]",
     ]
-    axis = Axis("V0", "m/s", "initial speed", [4.0], {"speed": Term()})
+    axis = Axis("V0", "m/s", "initial speed", [4.0], {"speed": AxisTerm()})
     found = mapped(folder, engines, [axis])
     study = plain(content(found))
     write_reproducers(found, study, folder / "reproducers")
@@ -165,7 +165,7 @@ def test_a_program_shows_the_failure_without_us(programs: dict[str, dict[str, An
 
 def test_what_is_ours_is_shown_through_proofroll(tmp_path: Path) -> None:
     """Where an engine has no program of its own, the program asks proofroll, says why, and exits with 1."""
-    axis = Axis("V0", "m/s", "initial speed", [4.0], {"speed": Term()})
+    axis = Axis("V0", "m/s", "initial speed", [4.0], {"speed": AxisTerm()})
     found = mapped(tmp_path, ["projection[formulation=euler,preset=default]"], [axis])
     study = plain(content(found))
     write_reproducers(found, study, tmp_path / "reproducers")
@@ -205,7 +205,7 @@ def test_a_quick_map_leaves_out_the_longest_runs() -> None:
 
 def test_of_each_formulation_the_matched_settings(tmp_path: Path) -> None:
     """Where only matched settings are mapped, others of the same formulation are not, but where it has no matched."""
-    axis = Axis("V0", "m/s", "initial speed", [4.0], {"speed": Term()})
+    axis = Axis("V0", "m/s", "initial speed", [4.0], {"speed": AxisTerm()})
     effort = dataclasses.replace(SHORT, steps=50, matched=True)
     runner = Runner(Store(tmp_path), jobs=1)
     found = stability("sphere_in_cylinder", [axis], runner, engines=["projection"], effort=effort)
@@ -219,17 +219,17 @@ def test_of_each_formulation_the_matched_settings(tmp_path: Path) -> None:
 
 def test_axes_share_the_runs_where_they_meet() -> None:
     """A value that is the scene's default is no parameter of its own: the case is that of the other axis."""
-    axes = [Axis(name, "1", name, [1.0], {name: Term(times=name)}) for name in ("mass", "radius")]
+    axes = [Axis(name, "1", name, [1.0], {name: AxisTerm(times=name)}) for name in ("mass", "radius")]
     assert [place.parameters for place in places_of("sphere_in_cylinder", axes, SHORT)] == [{}, {}]
 
 
 def test_axes_as_data() -> None:
     """A parameter follows the value of its axis by the factor and the power that the file gives."""
     scene = load_scene("sphere_in_cylinder")
-    size = Axis("size", "1", "", [4.0], {"radius": Term("radius"), "speed": Term("speed", 0.5)})
+    size = Axis("size", "1", "", [4.0], {"radius": AxisTerm("radius"), "speed": AxisTerm("speed", 0.5)})
     assert size.at(scene, 4.0) == {"radius": 0.1, "speed": 8.0}
     with pytest.raises(InputError, match="no such parameter"):
-        Axis("x", "1", "", [1.0], {"nothing": Term()}).at(scene, 1.0)
+        Axis("x", "1", "", [1.0], {"nothing": AxisTerm()}).at(scene, 1.0)
     with pytest.raises(InputError, match="no such axis"):
         chosen([size], ["mass"])
     assert thinned([1, 2, 3, 4, 5, 6, 7], 3) == [1, 4, 7]

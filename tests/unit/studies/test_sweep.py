@@ -11,7 +11,7 @@ from proofroll.core.errors import InputError
 from proofroll.running.case import Case, Result, Status
 from proofroll.running.runner import Runner
 from proofroll.running.store import Store
-from proofroll.studies.sweep import BROKEN, Curve, Point, Question, _further, curves_of, sweep
+from proofroll.studies.sweep import BROKEN, Curve, CurvePoint, Question, _further, curves_of, sweep
 
 QUESTION = Question("sphere_in_cylinder", {"speed": 3.0}, 0.2, "z")
 
@@ -69,9 +69,9 @@ def test_round_off_does_not_make_another_run_of_the_same_one() -> None:
     """Two errors that differ in their last digits are those of one run; two that differ by a part of them are not."""
     (curve,), _ = curves_of(["projection[formulation=rotating_frame,preset=matched]"])
 
-    def point(error: float) -> Point:
+    def point(error: float) -> CurvePoint:
         result = Result(Status.DONE, "reached 1 s")
-        return Point(None, result, errors={"z": error}, bars={"z": 1e-15})  # type: ignore[arg-type]  # no case is run
+        return CurvePoint(None, result, errors={"z": error}, bars={"z": 1e-15})  # type: ignore[arg-type]  # no case is run
 
     for first, second, same in ((7.2e-16, 1.05e-15, True), (2.84893454e-7, 2.84893458e-7, True), (3e-2, 4e-3, False)):
         curve.points = [point(first), point(second)]
@@ -100,10 +100,10 @@ def test_how_far_a_curve_goes_does_not_hang_on_how_fast_the_machine_is() -> None
     """Runs that seem to have taken a thousand times as long are followed by the same finer steps."""
     (curve,), _ = curves_of(["exudyn[formulation=generic,preset=default]"])
 
-    def point(step: float, error: float, seconds: float) -> Point:
+    def point(step: float, error: float, seconds: float) -> CurvePoint:
         facts = replace(curve.facts, settings=curve.facts.settings | {"dt": step})
         case = Case("sphere_in_cylinder", {}, "", facts, QUESTION.until, QUESTION.every)
-        return Point(case, Result(Status.DONE, "reached", wall_seconds=seconds), errors={"z": error})
+        return CurvePoint(case, Result(Status.DONE, "reached", wall_seconds=seconds), errors={"z": error})
 
     reference = SimpleNamespace(scale=lambda _: 1.0)
     found = []

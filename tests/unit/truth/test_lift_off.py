@@ -18,7 +18,7 @@ from proofroll.elements.ball_on_surface.element import changed, rolling_ball
 from proofroll.truth.implicit import Implicit
 from proofroll.truth.polar import Polar
 from proofroll.truth.switching import follow
-from proofroll.truth.taylor import Taylor
+from proofroll.truth.taylor import SlidingTaylor
 
 C, G = 0.2, 9.81
 # Start at the bottom, level: what a solid ball needs to pass the top, from energy and N = 0 there.
@@ -49,7 +49,7 @@ def test_who_passes_the_top() -> None:
     assert fast.attrs["smallest_N"] == float(fast.N[1:].min()) > 0
 
 
-@pytest.mark.parametrize("route", [Taylor, Polar, Implicit])
+@pytest.mark.parametrize("route", [SlidingTaylor, Polar, Implicit])
 def test_known_digits(route: Any) -> None:
     """At 2.4 m/s the ball leaves at 0.242029573 s and lands at 0.594832033 s, in every route."""
     body = rolling_ball(lying(2.4))
@@ -79,7 +79,7 @@ def test_landing_is_refused_with_its_time() -> None:
         truth(lying(2.7), np.linspace(0, 1, 11))
 
 
-@pytest.mark.parametrize("route", [Taylor, Polar, Implicit])
+@pytest.mark.parametrize("route", [SlidingTaylor, Polar, Implicit])
 @pytest.mark.parametrize("mu", [5.0, 0.5])
 def test_with_a_bound_the_ball_slips_first(route: Any, mu: float) -> None:
     """F/N grows without limit towards N = 0, so friction of any bound slips before, once, and then the ball leaves."""

@@ -14,7 +14,7 @@ from proofroll.core.truth import truth
 from proofroll.elements.ball_on_surface.element import changed, rolling_ball
 from proofroll.truth import implicit, taylor
 from proofroll.truth import stick_slip as module
-from proofroll.truth.contact import Contact
+from proofroll.truth.contact import ContactRates
 from proofroll.truth.implicit import Implicit
 from proofroll.truth.polar import Polar
 from proofroll.truth.stick_slip import first_route, stick_slip
@@ -75,7 +75,7 @@ def test_start_of_slip_does_not_matter() -> None:
     routes: list[Any] = [Implicit(body, first_step=length) for length in (0.02, 0.2)]
     routes += [Polar(body, handover=1e-4)]
     if taylor.available():
-        routes += [taylor.Taylor(body, handover=size) for size in (1e-7, 1e-6, 1e-5, 1e-4)]
+        routes += [taylor.SlidingTaylor(body, handover=size) for size in (1e-7, 1e-6, 1e-5, 1e-4)]
     paths: list[Path[Any]] = [follow(body, route, 2.5) for route in routes]
     reference = [time for _, time in paths[0].events]
     ends = [path.motion(np.array([2.5]), "")[0].p_WB[0] for path in paths]
@@ -99,8 +99,8 @@ def test_heyoka_is_chosen_only_where_its_equations_hold() -> None:
     """Taylor series are used on the vertical cylinder, and not where the resistance changes direction by a jump."""
     if not taylor.available():
         pytest.skip("heyoka is not installed")
-    assert isinstance(first_route(rolling_ball(cylinder(**PAPER))), taylor.Taylor)
-    assert isinstance(first_route(rolling_ball(cylinder(tilt=1.2, mu_static=0.3))), taylor.Taylor)
+    assert isinstance(first_route(rolling_ball(cylinder(**PAPER))), taylor.SlidingTaylor)
+    assert isinstance(first_route(rolling_ball(cylinder(tilt=1.2, mu_static=0.3))), taylor.SlidingTaylor)
     assert isinstance(first_route(rolling_ball(cylinder(tilt=1.2, **PAPER))), Polar)
     plane = load_scene("inclined_plane", rolling_resistance=1e-3, mu_static=0.3)
     assert isinstance(first_route(rolling_ball(plane)), Polar)
@@ -270,7 +270,7 @@ def test_long_sequences(
 ) -> None:
     """A slip takes the second route some fifty steps and eighty Jacobians, which are what it costs."""
     counted = {"steps": 0, "jacobians": 0}
-    take, jacobian = implicit.take, Contact._jacobian
+    take, jacobian = implicit.take, ContactRates._jacobian
 
     def counting(*arguments: Any) -> Any:
         counted["steps"] += 1
@@ -281,7 +281,7 @@ def test_long_sequences(
         return jacobian(*arguments)
 
     monkeypatch.setattr(implicit, "take", counting)
-    monkeypatch.setattr(Contact, "_jacobian", counting_too)
+    monkeypatch.setattr(ContactRates, "_jacobian", counting_too)
     body = rolling_ball(cylinder(**parameters))
     assert len(follow(body, Implicit(body), until).events) == kinds
     assert counted["steps"] < 53 * kinds

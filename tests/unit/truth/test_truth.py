@@ -13,7 +13,7 @@ from proofroll.elements.ball_on_surface.closed_form import closed_form
 from proofroll.elements.ball_on_surface.dataset import variables
 from proofroll.elements.ball_on_surface.element import changed, rolling_ball
 from proofroll.elements.ball_on_surface.model import Ball
-from proofroll.elements.ball_on_surface.motion import Motion
+from proofroll.elements.ball_on_surface.motion import BallMotion
 from proofroll.elements.ball_on_surface.surfaces import Cylinder
 from proofroll.files.scene_file import load_scene
 from proofroll.truth import rolling, unreduced_taylor
@@ -22,7 +22,7 @@ from proofroll.truth.rolling import reduced, unreduced
 A, C, G, M = 0.025, 0.2, 9.81, 0.517
 
 
-def difference(one: Motion, other: Motion) -> dict[str, float]:
+def difference(one: BallMotion, other: BallMotion) -> dict[str, float]:
     """Largest relative difference of each quantity of two motions."""
     return {
         name: float(np.max(np.abs(getattr(one, name) - getattr(other, name))) / np.max(np.abs(getattr(one, name))))
@@ -198,7 +198,7 @@ def test_error_bar_shows_a_wrong_route(monkeypatch: pytest.MonkeyPatch) -> None:
     t = np.linspace(0, 0.5, 3)
     honest = truth(scene, t)["down"].attrs["error_bar"]
 
-    def shifted(*arguments: Any) -> Motion:
+    def shifted(*arguments: Any) -> BallMotion:
         motion = unreduced(*arguments)
         return dataclasses.replace(motion, p_WB=motion.p_WB + np.array([1e-3, 0, 0]))
 

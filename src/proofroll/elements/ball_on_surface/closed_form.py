@@ -7,11 +7,11 @@ import numpy as np
 from proofroll.core.arrays import FloatArray
 from proofroll.elements.ball_on_surface.mechanics import wall_velocity
 from proofroll.elements.ball_on_surface.model import RollingBall
-from proofroll.elements.ball_on_surface.motion import Motion
+from proofroll.elements.ball_on_surface.motion import BallMotion
 from proofroll.elements.ball_on_surface.surfaces import Cylinder, Plane
 
 
-def closed_form(body: RollingBall, times: FloatArray) -> Motion | None:
+def closed_form(body: RollingBall, times: FloatArray) -> BallMotion | None:
     """The closed form, or None where there is none (rolling resistance, a tilted cylinder)."""
     if body.contact.rolling_resistance > 0:
         return None
@@ -22,7 +22,7 @@ def closed_form(body: RollingBall, times: FloatArray) -> Motion | None:
     return None
 
 
-def _plane(body: RollingBall, t: FloatArray) -> Motion:
+def _plane(body: RollingBall, t: FloatArray) -> BallMotion:
     """Uniform acceleration g_t / (1 + κ), κ = J/ma²: (5/7) g sin α for a homogeneous ball.
 
     On a turntable of the rate W, v̇ = g_t / (1 + κ) + W' n × v with W' = κ/(1 + κ) W (2/7 W) and the normal n: circles
@@ -46,10 +46,10 @@ def _plane(body: RollingBall, t: FloatArray) -> Motion:
         rates, route = acceleration + np.cross(turning, v), "closed form (circles of a turntable)"
     carried = wall_velocity(body, p, np.broadcast_to(e1, p.shape))
     w = (body.w0 @ e1) * e1 - np.cross(e1, v - carried) / body.ball.radius
-    return Motion(p, v, w, body.ball.mass * (rates - body.gravity), route)
+    return BallMotion(p, v, w, body.ball.mass * (rates - body.gravity), route)
 
 
-def _vertical_cylinder(body: RollingBall, surface: Cylinder, t: FloatArray) -> Motion:
+def _vertical_cylinder(body: RollingBall, surface: Cylinder, t: FloatArray) -> BallMotion:
     """γ̇ = Ω; z oscillates with ν = √(κ/(1+κ)) Ω, κ = J/ma² (Blajer 2006; ν = √(2/7) Ω for a homogeneous ball).
 
     Its only error is round-off of the phases, 4 ε νt of the amplitude of z and 4 ε Ωt of the radius of the path: 1e-8
@@ -78,4 +78,4 @@ def _vertical_cylinder(body: RollingBall, surface: Cylinder, t: FloatArray) -> M
     local_w = np.stack([spin1, z_rate / a, np.full_like(t, -c * omega / a)], axis=-1)
     local_f = np.stack([np.full_like(t, -m * c * omega**2), np.zeros_like(t), m * (z_second - gravity)], axis=-1)
     v, w, force = (np.einsum("tij,tj->ti", frame, x) for x in (local_v, local_w, local_f))
-    return Motion(surface.position(u), v, w, force, "closed form (Blajer 2006)")
+    return BallMotion(surface.position(u), v, w, force, "closed form (Blajer 2006)")

@@ -11,7 +11,7 @@ from proofroll.elements.ball_on_surface.model import RollingBall
 
 
 @dataclass(frozen=True)
-class Motion:
+class BallMotion:
     """State and contact force at given times.
 
     Attributes:
@@ -26,9 +26,9 @@ class Motion:
     force: FloatArray
     route: str
 
-    def at(self, which: slice) -> Motion:
+    def at(self, which: slice) -> BallMotion:
         """The same at some of the times."""
-        return Motion(self.p_WB[which], self.v_WB[which], self.w_WB[which], self.force[which], self.route)
+        return BallMotion(self.p_WB[which], self.v_WB[which], self.w_WB[which], self.force[which], self.route)
 
 
 def world_motion(
@@ -41,7 +41,7 @@ def world_motion(
     friction: FloatArray,
     press: FloatArray,
     route: str,
-) -> Motion:
+) -> BallMotion:
     """Motion at n times.
 
     Args:
@@ -63,4 +63,4 @@ def world_motion(
     v_WB = along(velocity)
     # slip = v + a ω × e1, so the tangential part of ω is e1 × (slip - v) / a
     w_WB = spin[:, None] * e1 + np.cross(e1, along(slip) - v_WB) / body.ball.radius
-    return Motion(body.surface.position(u), v_WB, w_WB, along(friction) - press[:, None] * e1, route)
+    return BallMotion(body.surface.position(u), v_WB, w_WB, along(friction) - press[:, None] * e1, route)

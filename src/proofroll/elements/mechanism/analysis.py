@@ -7,7 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from proofroll.elements.mechanism.kinematics import Motion, Rows, Tree
+from proofroll.elements.mechanism.kinematics import BodyMotion, Rows, Tree
 from proofroll.elements.mechanism.model import Mechanism
 from proofroll.elements.mechanism.rotations import Array, cross
 
@@ -86,7 +86,7 @@ def rank_of(values: Array) -> int:
     return int((values > RANK * values.max(initial=0.0)).sum())
 
 
-def determinate(tree: Tree, motion: Motion, rows: Rows, rank: int) -> NDArray[np.bool_]:
+def determinate(tree: Tree, motion: BodyMotion, rows: Rows, rank: int) -> NDArray[np.bool_]:
     """Which components of the wrenches of joints and then loops no null vector of Cᵀ changes, (joints + loops, 6)."""
     mechanism = tree.mechanism
     mask = np.ones((len(mechanism.joints) + len(mechanism.loops), 6), dtype=bool)
@@ -98,7 +98,7 @@ def determinate(tree: Tree, motion: Motion, rows: Rows, rank: int) -> NDArray[np
     return mask
 
 
-def reactions(tree: Tree, motion: Motion, rows: Rows, multipliers: Array, loads: Array) -> tuple[Array, Array]:
+def reactions(tree: Tree, motion: BodyMotion, rows: Rows, multipliers: Array, loads: Array) -> tuple[Array, Array]:
     """Wrenches that joints and loops transmit, from what else acts on the bodies.
 
     Args:
@@ -132,7 +132,7 @@ def reactions(tree: Tree, motion: Motion, rows: Rows, multipliers: Array, loads:
     return of_joints, of_loops
 
 
-def _near(tree: Tree, q: Array, C: Array) -> Motion:
+def _near(tree: Tree, q: Array, C: Array) -> BodyMotion:
     """The mechanism at a pose near q that its loops allow and that no symmetry distinguishes."""
     nv = tree.mechanism.nv
     direction = 1.0 + np.modf(np.arange(1, nv + 1) * 0.6180339887498949)[0]  # golden ratio: no two alike

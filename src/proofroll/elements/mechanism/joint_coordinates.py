@@ -16,7 +16,7 @@ import numpy as np
 
 from proofroll.core.errors import Refused
 from proofroll.elements.mechanism.analysis import analysed, reactions
-from proofroll.elements.mechanism.kinematics import Motion, Rows, Tree
+from proofroll.elements.mechanism.kinematics import BodyMotion, Rows, Tree
 from proofroll.elements.mechanism.model import Mechanism
 from proofroll.elements.mechanism.record import Record, gathered
 from proofroll.elements.mechanism.rotations import Array, cross, crosses, skews, to_quaternion
@@ -37,7 +37,7 @@ class Solution:
 
     acceleration: Array
     multipliers: Array
-    motion: Motion
+    motion: BodyMotion
     rows: Rows
     split: tuple[Array, Array] | None
     smallest: float
@@ -166,7 +166,7 @@ class JointCoordinates:
             "residual": np.array(largest),
         }
 
-    def inertial(self, motion: Motion) -> tuple[Array, Array, Array]:
+    def inertial(self, motion: BodyMotion) -> tuple[Array, Array, Array]:
         """Jacobians at the centres of mass, mass matrix, inertial and gravity wrenches at v̇ = 0."""
         n = len(self._mass)
         R, w = motion.R_WB[:n], motion.w_WB[:n]
@@ -203,7 +203,7 @@ class JointCoordinates:
             needed[self.mechanism.body_index[end]] -= np.concatenate([force, cross(at, force)])
         return needed
 
-    def _spring_forces(self, motion: Motion) -> list[tuple[str, Array, Array]]:
+    def _spring_forces(self, motion: BodyMotion) -> list[tuple[str, Array, Array]]:
         """Body, position on it and force, world axes, of each end of each spring."""
         found = []
         for spring in self.mechanism.springs:
@@ -215,7 +215,7 @@ class JointCoordinates:
             found += [(body, position, s * pull * along) for (body, position), s in zip(ends, (1, -1), strict=True)]
         return found
 
-    def _energy(self, motion: Motion, q: Array) -> float:
+    def _energy(self, motion: BodyMotion, q: Array) -> float:
         n = len(self._mass)
         R, w = motion.R_WB[:n], motion.w_WB[:n]
         arm = np.einsum("nij,nj->ni", R, self._com)

@@ -18,7 +18,7 @@ _O = np.zeros(3)
 
 
 @dataclass(frozen=True)
-class Motion:
+class BodyMotion:
     """Motion of all bodies at one instant, world axes; the last entry of every array over bodies is the world.
 
     Attributes:
@@ -100,7 +100,7 @@ class Tree:
         """The coordinates after a small motion ``dv`` (nv), to first order, quaternions of unit length."""
         return self.normalised(q + self.rate(q, dv))
 
-    def at(self, q: Array, v: Array) -> Motion:
+    def at(self, q: Array, v: Array) -> BodyMotion:
         """Motion of all bodies for coordinates q (nq) and velocities v (nv)."""
         n, nv, nj = len(self.mechanism.bodies), self.mechanism.nv, len(self._static)
         p, R, w, vel = np.zeros((n + 1, 3)), np.zeros((n + 1, 3, 3)), np.zeros((n + 1, 3)), np.zeros((n + 1, 3))
@@ -141,9 +141,9 @@ class Tree:
                 + cross(alpha, arm)
                 + cross(w[c], cross(w[c], arm))
             )
-        return Motion(p, R, vel, w, J, bias, p_joint, R_parent, R_child)
+        return BodyMotion(p, R, vel, w, J, bias, p_joint, R_parent, R_child)
 
-    def point(self, motion: Motion, body: str, position: Array) -> tuple[Array, Array, Array, Array]:
+    def point(self, motion: BodyMotion, body: str, position: Array) -> tuple[Array, Array, Array, Array]:
         """Position, velocity, derivative of it by v (3, nv) and bias acceleration of a point of a body."""
         i = self.mechanism.body_index[body]
         arm, w = motion.R_WB[i] @ position, motion.w_WB[i]
@@ -154,7 +154,7 @@ class Tree:
             motion.bias[i, :3] + cross(motion.bias[i, 3:], arm) + cross(w, cross(w, arm)),
         )
 
-    def loop_rows(self, motion: Motion) -> Rows:
+    def loop_rows(self, motion: BodyMotion) -> Rows:
         """Residuals and rows of all loops."""
         parts = [self._rows_of(motion, loop) for loop in self.mechanism.loops]
         if not parts:
@@ -164,7 +164,7 @@ class Tree:
         residual, C, bias, force, torque = (np.concatenate(columns) for columns in zip(*parts, strict=True))
         return Rows(residual, C, bias, force, torque, loop)
 
-    def _rows_of(self, motion: Motion, loop: Loop) -> tuple[Array, Array, Array, Array, Array]:
+    def _rows_of(self, motion: BodyMotion, loop: Loop) -> tuple[Array, Array, Array, Array, Array]:
         a, b = self.mechanism.body_index[loop.body_a], self.mechanism.body_index[loop.body_b]
         p_a, v_a, J_a, bias_a = self.point(motion, loop.body_a, np.array(loop.position_a))
         p_b, v_b, J_b, bias_b = self.point(motion, loop.body_b, np.array(loop.position_b))

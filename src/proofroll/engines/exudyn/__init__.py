@@ -23,20 +23,20 @@ from proofroll.elements.ball_on_surface.model import ALL_OF_A_BALL, ROLLS, BallC
 from proofroll.elements.mechanism.sampling import MechanismBuilt
 from proofroll.engines.exudyn import redundant, tree
 from proofroll.engines.exudyn.carrier import Carrier
-from proofroll.engines.exudyn.contact import Contact
+from proofroll.engines.exudyn.contact import PenaltyContact
 from proofroll.engines.exudyn.generic import Generic
 from proofroll.engines.exudyn.redundant import Redundant
 from proofroll.engines.exudyn.rolling_disc import RollingDisc
 from proofroll.engines.exudyn.settings import PRESETS, ExudynSettings
 from proofroll.engines.exudyn.tree import KinematicTree
 
-OfBall = Generic | Carrier | RollingDisc | Contact
+OfBall = Generic | Carrier | RollingDisc | PenaltyContact
 OfMechanism = Redundant | KinematicTree
 MODELS: Mapping[str, type[OfBall]] = {
     "generic": Generic,
     "carrier": Carrier,
     "rolling_disc": RollingDisc,
-    "contact": Contact,
+    "contact": PenaltyContact,
 }
 OF_MECHANISMS: Mapping[str, type[OfMechanism]] = {"redundant": Redundant, "tree": KinematicTree}
 

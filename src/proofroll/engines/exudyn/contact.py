@@ -43,7 +43,7 @@ POSITION, COORDINATES = Output.Position, Output.Coordinates
 ROUND_OFF = 1e-12
 
 
-class Contact:
+class PenaltyContact:
     """A rigid ball and one ``ObjectContactSphereSphere`` with a hollow sphere; needs no generators of the surface."""
 
     def __init__(self, body: RollingBall, settings: ExudynSettings) -> None:

@@ -50,7 +50,7 @@ class Touch(NamedTuple):
 
 
 @dataclass
-class Sliding:
+class KineticFriction:
     """Kinetic friction as it is built, shared with the function that applies it.
 
     Attributes:

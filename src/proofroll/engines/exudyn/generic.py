@@ -18,7 +18,7 @@ from proofroll.core.engine import Built, Sample
 from proofroll.core.errors import Refused
 from proofroll.core.events import Event
 from proofroll.elements.ball_on_surface.model import BallCapability, RollingBall
-from proofroll.engines.exudyn.friction import Sliding, Touch, needed_function
+from proofroll.engines.exudyn.friction import KineticFriction, Touch, needed_function
 from proofroll.engines.exudyn.generic_forces import (
     SIZE,
     base,
@@ -31,7 +31,7 @@ from proofroll.engines.exudyn.integration import Integration, initial_matrices, 
 from proofroll.engines.exudyn.local_frame import local_geometry
 from proofroll.engines.exudyn.native import exu, items
 from proofroll.engines.exudyn.settings import ExudynSettings
-from proofroll.engines.exudyn.stick_slip import StickSlip
+from proofroll.engines.exudyn.stick_slip import SwitchedIntegration
 
 
 class Generic:
@@ -52,7 +52,7 @@ class Generic:
                 numberOfODE2Coordinates=SIZE,
             )
         )
-        self.friction = Sliding(body.contact.mu_kinetic) if math.isfinite(body.contact.mu_static) else None
+        self.friction = KineticFriction(body.contact.mu_kinetic) if math.isfinite(body.contact.mu_static) else None
         mass = np.diag([m, 0.0, 0.0, J, J, J])
         mass[1:3, 1:3] = m * self.local.tangents.T @ self.local.tangents
         self.object = self.system.AddObject(
@@ -63,7 +63,7 @@ class Generic:
         self.rolling = self._constrain(node, body.ball.radius)
         self.system.Assemble()
         self._gravity, self._resistance, self._mu_kinetic = self._probe(settings)
-        self.integration: Integration | StickSlip
+        self.integration: Integration | SwitchedIntegration
         if self.friction is None:
             self.integration = Integration(self.system, settings)
         else:
@@ -72,7 +72,7 @@ class Generic:
             self._constant_gravity = None if constant is None else tuple(constant[:3])
             self._radius = body.ball.radius
             self._tangents: tuple[float, ...] = tuple(self.local.tangents[1:].ravel().tolist())
-            self.integration = StickSlip(self, body, settings)
+            self.integration = SwitchedIntegration(self, body, settings)
 
     def _probe(self, settings: ExudynSettings) -> tuple[FloatArray, float | None, float | None]:
         """Gravity in the world [m/s²], f [m] and μk [-], from the forces that Exudyn computes without spin."""
@@ -163,7 +163,7 @@ class Generic:
 
     def events(self) -> list[Event]:
         """Stick and slip so far."""
-        return self.integration.events if isinstance(self.integration, StickSlip) else []
+        return self.integration.events if isinstance(self.integration, SwitchedIntegration) else []
 
     @property
     def place_matters(self) -> bool:
@@ -220,7 +220,7 @@ class Generic:
             gravity=self._gravity,
             ball_radius=float(np.array(self.system.GetObject(self.rolling)["scalingMarker1"])[0, 5]),
             rolling_resistance=self._resistance,
-            mu_static=self.integration.mu_static if isinstance(self.integration, StickSlip) else None,
+            mu_static=self.integration.mu_static if isinstance(self.integration, SwitchedIntegration) else None,
             mu_kinetic=self._mu_kinetic,
             gap=-float(q[0]),
             acceleration=frame @ acceleration,
@@ -232,5 +232,5 @@ class Generic:
         """What there is besides rolling; rolling resistance if Exudyn computed its moment."""
         if self._resistance:
             yield BallCapability.ROLLING_RESISTANCE
-        if isinstance(self.integration, StickSlip):
+        if isinstance(self.integration, SwitchedIntegration):
             yield BallCapability.BOUNDED_FRICTION

@@ -10,7 +10,7 @@ import numpy as np
 from proofroll.core.arrays import FloatArray
 from proofroll.core.errors import Refused
 from proofroll.elements.ball_on_surface.model import RollingBall
-from proofroll.engines.exudyn.friction import Sliding
+from proofroll.engines.exudyn.friction import KineticFriction
 from proofroll.engines.exudyn.local_frame import LocalGeometry
 from proofroll.engines.exudyn.resistance import resistance_moment, slow
 
@@ -39,7 +39,7 @@ def quadratic_terms(body: RollingBall, local: LocalGeometry) -> list[tuple[int, 
     return [(int(r), int(i), int(j), float(c[r, i, j])) for r, i, j in np.argwhere(np.abs(c) > 0)]
 
 
-def force_function(body: RollingBall, local: LocalGeometry, friction: Sliding | None) -> Any:
+def force_function(body: RollingBall, local: LocalGeometry, friction: KineticFriction | None) -> Any:
     """Right-hand side of M q̈ + Cᵀλ = Q as plain floats: Exudyn calls it for every residual."""
     f, least = body.contact.rolling_resistance, slow(body)
     tangents = local.tangents

@@ -11,7 +11,7 @@ from proofroll.core.errors import Refused
 from proofroll.elements.ball_on_surface.model import RollingBall
 from proofroll.elements.ball_on_surface.reproducer_source import assigned, ball_numbers, wall_source
 from proofroll.engines.exudyn.carrier import Carrier
-from proofroll.engines.exudyn.contact import SURELY, Contact
+from proofroll.engines.exudyn.contact import SURELY, PenaltyContact
 from proofroll.engines.exudyn.generic import Generic
 from proofroll.engines.exudyn.local_frame import curvature
 from proofroll.engines.exudyn.native import exu
@@ -269,7 +269,7 @@ def source(model: Any, body: RollingBall, settings: ExudynSettings) -> str:
         f"MULTIPLIERS = {start[1]!r}",
         *_numbers(model, body),
     ]
-    parts = {Generic: _GENERIC, Carrier: _CARRIER, RollingDisc: _ROLLING_DISC, Contact: _CONTACT}
+    parts = {Generic: _GENERIC, Carrier: _CARRIER, RollingDisc: _ROLLING_DISC, PenaltyContact: _CONTACT}
     return (
         "import exudyn as exu\nimport exudyn.itemInterface as items\nimport numpy as np\n\n"
         + assigned(**numbers)
@@ -293,7 +293,7 @@ def _start_spin(model: Any) -> Any:
 
 def _start(model: Any) -> tuple[list[float], list[float]]:
     """Accelerations and multipliers at time 0, where the adapter gives them; else nothing."""
-    if isinstance(model, (Contact, Generic)):
+    if isinstance(model, (PenaltyContact, Generic)):
         return [], []  # Exudyn finds them
     data = model.system.systemData
     initial = data.GetODE2Coordinates_tt(exu.ConfigurationType.Initial)
@@ -304,7 +304,7 @@ def _numbers(model: Any, body: RollingBall) -> list[str]:
     """Assignments that only one formulation needs."""
     if isinstance(model, (Carrier, Generic)):
         return model.numbers(body)
-    if isinstance(model, Contact):
+    if isinstance(model, PenaltyContact):
         contact = model.system.GetObject(model.contact)
         state = model.system.GetNode(model.data)["initialCoordinates"]
         radii = [float(radius) for radius in contact["spheresRadii"]]

@@ -11,7 +11,7 @@ import numpy as np
 from scipy.spatial.transform import Rotation
 
 from proofroll.core.errors import Refused
-from proofroll.robots.model import WORLD, Array, Joint, Robot
+from proofroll.robots.model import WORLD, Array, Robot, RobotJoint
 from proofroll.robots.protocol import AtState, Reading, Request, evaluate
 
 _FREE = (("prismatic", 0), ("prismatic", 1), ("prismatic", 2), ("revolute", 0), ("revolute", 1), ("revolute", 2))
@@ -62,7 +62,7 @@ class ExudynRobots:
         )  # fmt: skip
 
 
-def _turn(joint: Joint) -> Array:
+def _turn(joint: RobotJoint) -> Array:
     """Axes of the tree's link in the child's frame: z is the joint's axis; of a free joint the child's own."""
     if joint.kind == "free":
         return np.eye(3)
@@ -135,7 +135,7 @@ class _Tree:
         settings.solution.file.write = False
         self.solver.InitializeSolver(self.mbs, settings)
 
-    def _rows(self, joint: Joint) -> list[tuple[Any, ...]]:
+    def _rows(self, joint: RobotJoint) -> list[tuple[Any, ...]]:
         """Links of the tree for a joint: type, parent, rotation, offset, mass, centre of mass, inertia."""
         robot, start = self.robot, robot_columns(self.robot)[joint.name]
         group, A = robot.groups[joint.name], self.turn[joint.name]

@@ -63,7 +63,7 @@ class State(NamedTuple):
     touch: Touch
 
 
-class StickSlip:
+class SwitchedIntegration:
     """Drives a :class:`Switched` model; stands in for :class:`Integration`.
 
     Attributes:

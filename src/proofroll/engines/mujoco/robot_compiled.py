@@ -8,7 +8,7 @@ import numpy as np
 from scipy.spatial.transform import Rotation
 
 from proofroll.core.errors import Refused
-from proofroll.robots.model import WORLD, Array, Body, Joint, Mimic, Robot
+from proofroll.robots.model import WORLD, Array, Mimic, Robot, RobotBody, RobotJoint
 
 _KINDS = {0: "free", 1: "spherical", 2: "prismatic", 3: "revolute"}
 
@@ -24,23 +24,23 @@ def robot_of(model: Any) -> Robot:
     if np.any(getattr(model, "tendon_armature", np.zeros(0))):
         raise Refused("a tendon has armature, which the check does not cover")
     names = [WORLD, *(model.body(index).name for index in range(1, model.nbody))]
-    bodies: dict[str, Body] = {}
-    joints: list[Joint] = []
+    bodies: dict[str, RobotBody] = {}
+    joints: list[RobotJoint] = []
     driven = {int(model.actuator_trnid[index, 0]) for index in range(model.nu) if model.actuator_trntype[index] == 0}
     for index in range(1, model.nbody):
         name, parent = names[index], names[int(model.body_parentid[index])]
         A = _matrix(model.body_iquat[index])
         inertia = A @ np.diag(model.body_inertia[index]) @ A.T
-        bodies[name] = Body(name, float(model.body_mass[index]), np.array(model.body_ipos[index]), inertia)
+        bodies[name] = RobotBody(name, float(model.body_mass[index]), np.array(model.body_ipos[index]), inertia)
         position, rotation = np.array(model.body_pos[index]), _matrix(model.body_quat[index])
         first, count = int(model.body_jntadr[index]), int(model.body_jntnum[index])
         if not count:
-            joints.append(Joint(f"({name})", "fixed", parent, name, position, rotation, np.array([0.0, 0.0, 1.0])))
+            joints.append(RobotJoint(f"({name})", "fixed", parent, name, position, rotation, np.array([0.0, 0.0, 1.0])))
         for joint in range(first, first + count):
             last = joint == first + count - 1
             child = name if last else f"{name}/{joint - first}"
             if not last:
-                bodies[child] = Body(child, 0.0, np.zeros(3), np.zeros((3, 3)))
+                bodies[child] = RobotBody(child, 0.0, np.zeros(3), np.zeros((3, 3)))
             joints.append(_joint(model, joint, parent, child, position, rotation, joint in driven))
             parent, position, rotation = child, np.zeros(3), np.eye(3)
     return Robot("robot", bodies, tuple(joints), _mimics(model), np.array(model.opt.gravity), _sources(model, names))
@@ -63,13 +63,15 @@ def _sources(model: Any, names: list[str]) -> dict[str, dict[str, Any]]:
     return found
 
 
-def _joint(model: Any, index: int, parent: str, child: str, position: Array, rotation: Array, driven: bool) -> Joint:
+def _joint(
+    model: Any, index: int, parent: str, child: str, position: Array, rotation: Array, driven: bool
+) -> RobotJoint:
     kind = _KINDS[int(model.jnt_type[index])]
     dof, start = int(model.jnt_dofadr[index]), int(model.jnt_qposadr[index])
     anchor = np.array(model.jnt_pos[index]) * (kind != "free")
     shift = float(model.qpos0[start]) * (kind in {"revolute", "prismatic"})
     bounded = bool(model.jnt_limited[index]) and kind in {"revolute", "prismatic"}
-    return Joint(
+    return RobotJoint(
         model.joint(index).name, kind, parent, child,
         position + rotation @ anchor if kind != "free" else np.zeros(3),
         rotation if kind != "free" else np.eye(3),

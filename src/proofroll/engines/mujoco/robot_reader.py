@@ -10,7 +10,7 @@ from typing import Any, ClassVar
 import numpy as np
 from scipy.spatial.transform import Rotation
 
-from proofroll.robots.model import Array, Body, Robot, composed
+from proofroll.robots.model import Array, Robot, RobotBody, composed
 from proofroll.robots.protocol import AtState, Reading, Request, evaluate
 
 
@@ -154,7 +154,7 @@ def _at(
     return AtState(T, np.zeros(model.nv), M, g, data.qfrc_bias.copy(), inverse, forward)
 
 
-def _group(model: Any, body: int) -> Body:
+def _group(model: Any, body: int) -> RobotBody:
     """A body with what is welded to it, in its frame."""
     poses = {body: (np.zeros(3), np.eye(3))}
     parts = []
@@ -167,7 +167,9 @@ def _group(model: Any, body: int) -> Body:
             poses[index] = (p + R @ model.body_pos[index], R @ _matrix(model.body_quat[index]))
         A = _matrix(model.body_iquat[index])
         inertia = A @ np.diag(model.body_inertia[index]) @ A.T
-        parts.append((Body("", float(model.body_mass[index]), model.body_ipos[index].copy(), inertia), *poses[index]))
+        parts.append(
+            (RobotBody("", float(model.body_mass[index]), model.body_ipos[index].copy(), inertia), *poses[index])
+        )
     return composed("", parts)
 
 

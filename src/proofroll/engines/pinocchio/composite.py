@@ -12,7 +12,7 @@ from proofroll.core.arrays import FloatArray
 from proofroll.core.errors import Refused
 from proofroll.elements.ball_on_surface.model import RollingBall
 from proofroll.elements.ball_on_surface.surfaces import Generator
-from proofroll.engines.pinocchio.mechanism import Mechanism, Sliding
+from proofroll.engines.pinocchio.mechanism import BallWithRows, SlidingContact
 from proofroll.engines.pinocchio.rows import (
     BallTerms,
     ball_terms,
@@ -46,7 +46,7 @@ class _AlongAxes(NamedTuple):
     turns: tuple[Any, ...]
 
 
-class Composite(Mechanism):
+class Composite(BallWithRows):
     """Two joints along the generators carry a massless carriage; a spherical joint in it carries the ball.
 
     Coordinates are (u1, u2, orientation of the ball in the carriage), velocities (u̇1, u̇2, spin relative to the
@@ -59,7 +59,7 @@ class Composite(Mechanism):
     """
 
     def __init__(self, body: RollingBall, orientation: bool) -> None:
-        """See :class:`~proofroll.engines.pinocchio.mechanism.Mechanism`.
+        """See :class:`~proofroll.engines.pinocchio.mechanism.BallWithRows`.
 
         Raises:
             Refused: the surface has no generators.
@@ -136,7 +136,7 @@ class Composite(Mechanism):
         return -float(e1.dot(data.oMi[self.ball].rotation.dot(data.f[self.ball].linear)))
 
     def accelerate(self, data: Any, q: FloatArray, v: FloatArray) -> FloatArray:
-        """See :class:`~proofroll.engines.pinocchio.mechanism.Mechanism`; the multipliers are F2, F3."""
+        """See :class:`~proofroll.engines.pinocchio.mechanism.BallWithRows`; the multipliers are F2, F3."""
         if self._own is not None:
             return self._accelerate_along(self._own, data, q, v)
         terms, frame, rows, drift = self._rows(data, q, v)
@@ -147,7 +147,7 @@ class Composite(Mechanism):
         return pin.forwardDynamics(self.model, data, torque, rows, drift)  # type: ignore[no-any-return]  # it is an array
 
     def normal_force(self, data: Any) -> float:
-        """See :class:`~proofroll.engines.pinocchio.mechanism.Mechanism`; forwardDynamics leaves the bias pass alone."""
+        """See :class:`~proofroll.engines.pinocchio.mechanism.BallWithRows`: forwardDynamics keeps the bias."""
         if self._own is not None:
             if data is not self._read:
                 # Pinocchio's memory, looked up once: that takes as long as the dynamics.
@@ -162,8 +162,8 @@ class Composite(Mechanism):
         pin.rnea(self.model, data, q, v, acceleration)
         return acceleration, frame @ np.array([-self._transmitted(data, frame[:, 0]), *friction])
 
-    def slide(self, data: Any, q: FloatArray, v: FloatArray, direction: FloatArray) -> Sliding:
-        """See :class:`~proofroll.engines.pinocchio.mechanism.Mechanism`; the friction is put to the joints."""
+    def slide(self, data: Any, q: FloatArray, v: FloatArray, direction: FloatArray) -> SlidingContact:
+        """See :class:`~proofroll.engines.pinocchio.mechanism.BallWithRows`; the friction is put to the joints."""
         terms, frame, rows, drift = self._rows(data, q, v)
         e1, along = frame[:, 0], frame[:, 1:]
         # Friction along the wall cannot change N, no more than the joints can.
@@ -174,19 +174,19 @@ class Composite(Mechanism):
             torque += normal_force * resistance(terms, self._f, e1)
         acceleration = np.array(pin.aba(self.model, data, q, v, torque))
         slip_rate = along @ (rows @ acceleration + drift)
-        return Sliding(acceleration, normal_force, along @ (rows @ v), slip_rate, along @ friction, e1)
+        return SlidingContact(acceleration, normal_force, along @ (rows @ v), slip_rate, along @ friction, e1)
 
     def sliding_reaction(
         self, data: Any, q: FloatArray, v: FloatArray, direction: FloatArray
     ) -> tuple[FloatArray, FloatArray]:
-        """See :class:`~proofroll.engines.pinocchio.mechanism.Mechanism`; N from the joint's wrench."""
+        """See :class:`~proofroll.engines.pinocchio.mechanism.BallWithRows`; N from the joint's wrench."""
         sliding = self.slide(data, q, v, direction)
         pin.rnea(self.model, data, q, v, sliding.acceleration)
         force = sliding.friction - self._transmitted(data, sliding.e1) * sliding.e1
         return sliding.acceleration, np.asarray(force)
 
     def project_sliding(self, data: Any, q: FloatArray, v: FloatArray) -> tuple[FloatArray, FloatArray]:  # noqa: ARG002 -- the protocol's
-        """See :class:`~proofroll.engines.pinocchio.mechanism.Mechanism`: the joints hold the ball on the surface."""
+        """See :class:`~proofroll.engines.pinocchio.mechanism.BallWithRows`: the joints hold the ball on the surface."""
         return q, v
 
 

@@ -11,11 +11,11 @@ import pinocchio as pin
 
 from proofroll.core.arrays import FloatArray
 from proofroll.elements.ball_on_surface.model import RollingBall
-from proofroll.engines.pinocchio.mechanism import Mechanism, Sliding
+from proofroll.engines.pinocchio.mechanism import BallWithRows, SlidingContact
 from proofroll.engines.pinocchio.rows import BallTerms, ball_terms, own_bias, resistance, rolling_rows
 
 
-class FreeFlyer(Mechanism):
+class FreeFlyer(BallWithRows):
     """Six freedoms; the rows come from the signed distance to the surface and its derivatives.
 
     Velocities are those of the free-flyer joint, in the ball's own axes. The multipliers are the components of the
@@ -23,7 +23,7 @@ class FreeFlyer(Mechanism):
     """
 
     def __init__(self, body: RollingBall, orientation: bool) -> None:
-        """See :class:`~proofroll.engines.pinocchio.mechanism.Mechanism`."""
+        """See :class:`~proofroll.engines.pinocchio.mechanism.BallWithRows`."""
         super().__init__(body)
         self._surface, self._wall_rate = body.surface, body.wall_rate
         self._orientation = orientation
@@ -64,7 +64,7 @@ class FreeFlyer(Mechanism):
         return np.cross(W, np.asarray(v) + self._radius * np.asarray(e1_rate))
 
     def project(self, data: Any, q: FloatArray, v: FloatArray) -> tuple[FloatArray, FloatArray]:
-        """See :class:`~proofroll.engines.pinocchio.mechanism.Mechanism`.
+        """See :class:`~proofroll.engines.pinocchio.mechanism.BallWithRows`.
 
         A ball that the wall carried along as if it were part of it would not slip: what is projected is the rest.
         """
@@ -141,7 +141,7 @@ class FreeFlyer(Mechanism):
         return solution[:6]
 
     def accelerate(self, data: Any, q: FloatArray, v: FloatArray) -> FloatArray:
-        """See :class:`~proofroll.engines.pinocchio.mechanism.Mechanism`.
+        """See :class:`~proofroll.engines.pinocchio.mechanism.BallWithRows`.
 
         Without orientation the acceleration is that of world components: the joint accelerates in the ball's axes,
         which turn with ω, and axes that are held fixed do not.
@@ -158,7 +158,7 @@ class FreeFlyer(Mechanism):
         return acceleration
 
     def normal_force(self, data: Any) -> float:
-        """See :class:`~proofroll.engines.pinocchio.mechanism.Mechanism`."""
+        """See :class:`~proofroll.engines.pinocchio.mechanism.BallWithRows`."""
         return -float(data.lambda_c[0])
 
     def reaction(self, data: Any, q: FloatArray, v: FloatArray) -> tuple[FloatArray, FloatArray]:
@@ -180,7 +180,7 @@ class FreeFlyer(Mechanism):
         """Value of the row of the surface [m]."""
         return float(self._surface.gap(q[:3]))
 
-    def _slide(self, data: Any, q: FloatArray, v: FloatArray, direction: FloatArray) -> Sliding:
+    def _slide(self, data: Any, q: FloatArray, v: FloatArray, direction: FloatArray) -> SlidingContact:
         """One row, that of the surface; friction and rolling resistance are columns, for both follow N."""
         terms, frame, rows, drift = self._rows(data, q, v)
         e1, along = frame[:, 0], frame[:, 1:]
@@ -196,10 +196,10 @@ class FreeFlyer(Mechanism):
         acceleration, normal_force = solution[:6], -float(solution[6])
         slip_rate = along @ (rows[1:] @ acceleration + drift[1:])
         friction = along @ (normal_force * against)
-        return Sliding(acceleration, normal_force, along @ (rows[1:] @ v), slip_rate, friction, e1)
+        return SlidingContact(acceleration, normal_force, along @ (rows[1:] @ v), slip_rate, friction, e1)
 
-    def slide(self, data: Any, q: FloatArray, v: FloatArray, direction: FloatArray) -> Sliding:
-        """See :class:`~proofroll.engines.pinocchio.mechanism.Mechanism`."""
+    def slide(self, data: Any, q: FloatArray, v: FloatArray, direction: FloatArray) -> SlidingContact:
+        """See :class:`~proofroll.engines.pinocchio.mechanism.BallWithRows`."""
         sliding = self._slide(data, q, v, direction)
         if not self._orientation:  # as in respond
             sliding.acceleration[:3] += pin.skew(v[3:]) @ v[:3]
@@ -208,12 +208,12 @@ class FreeFlyer(Mechanism):
     def sliding_reaction(
         self, data: Any, q: FloatArray, v: FloatArray, direction: FloatArray
     ) -> tuple[FloatArray, FloatArray]:
-        """See :class:`~proofroll.engines.pinocchio.mechanism.Mechanism`; N is the multiplier."""
+        """See :class:`~proofroll.engines.pinocchio.mechanism.BallWithRows`; N is the multiplier."""
         sliding = self._slide(data, q, v, direction)
         return sliding.acceleration, np.asarray(sliding.friction - sliding.normal_force * sliding.e1)
 
     def project_sliding(self, data: Any, q: FloatArray, v: FloatArray) -> tuple[FloatArray, FloatArray]:
-        """See :class:`~proofroll.engines.pinocchio.mechanism.Mechanism`."""
+        """See :class:`~proofroll.engines.pinocchio.mechanism.BallWithRows`."""
         q = self.on_surface(q)
         rows = self._rows(data, q, v)[2]
         return q, np.array(pin.impulseDynamics(self.model, data, v, rows[:1]))

@@ -7,15 +7,15 @@ from typing import Any, Protocol, runtime_checkable
 from proofroll.core.arrays import FloatArray
 from proofroll.core.events import Event
 from proofroll.elements.ball_on_surface.model import Contact
-from proofroll.engines.pinocchio.integrators import Integrator
-from proofroll.engines.pinocchio.mechanism import Mechanism
+from proofroll.engines.pinocchio.integrators import TangentIntegrator
+from proofroll.engines.pinocchio.mechanism import BallWithRows
 from proofroll.engines.pinocchio.settings import PinocchioSettings
 from proofroll.engines.pinocchio.stick_slip import AdaptiveStickSlip
 from proofroll.engines.pinocchio.stick_slip_steps import StickSlipEuler, StickSlipRungeKutta4
 
 
 @runtime_checkable
-class StickSlip(Integrator, Protocol):
+class StickSlipIntegrator(TangentIntegrator, Protocol):
     """An integrator that knows stick from slip.
 
     Attributes:
@@ -34,7 +34,7 @@ class StickSlip(Integrator, Protocol):
         """Joint acceleration, and force of the wall on the ball in the world [N], now."""
 
 
-def stick_slip(mechanism: Mechanism, settings: PinocchioSettings, contact: Contact) -> StickSlip:
+def stick_slip(mechanism: BallWithRows, settings: PinocchioSettings, contact: Contact) -> StickSlipIntegrator:
     """The integrator that the settings ask for."""
     if settings.integrator == "dop853":
         return AdaptiveStickSlip(mechanism, settings, contact)

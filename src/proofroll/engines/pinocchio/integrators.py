@@ -11,11 +11,11 @@ from proofroll.core.arrays import FloatArray
 from proofroll.core.engine import whole_steps
 from proofroll.core.errors import Diverged
 from proofroll.core.events import Event
-from proofroll.engines.pinocchio.mechanism import Mechanism, left_the_wall
+from proofroll.engines.pinocchio.mechanism import BallWithRows, left_the_wall
 from proofroll.engines.pinocchio.settings import PinocchioSettings
 
 
-class Integrator(Protocol):
+class TangentIntegrator(Protocol):
     """Moves the state of a mechanism.
 
     Attributes:
@@ -39,16 +39,16 @@ class Integrator(Protocol):
         """
 
 
-def integrator(mechanism: Mechanism, settings: PinocchioSettings) -> Integrator:
+def integrator(mechanism: BallWithRows, settings: PinocchioSettings) -> TangentIntegrator:
     """The integrator that the settings ask for."""
     if settings.integrator == "dop853":
         return Adaptive(mechanism, settings)
     if settings.integrator == "semi_implicit_euler":
         return SemiImplicitEuler(mechanism, settings)
-    return RungeKutta4(mechanism, settings)
+    return TangentRungeKutta4(mechanism, settings)
 
 
-def _moving(mechanism: Mechanism, settings: PinocchioSettings) -> FloatArray:
+def _moving(mechanism: BallWithRows, settings: PinocchioSettings) -> FloatArray:
     """Factors on the joint velocity where it moves the configuration: 0 holds the ball's orientation, shape (nv,)."""
     factors = np.ones(mechanism.model.nv)
     if not settings.orientation:
@@ -61,7 +61,7 @@ def _moving(mechanism: Mechanism, settings: PinocchioSettings) -> FloatArray:
 class FixedStep:
     """Steps of ``dt``; subclasses say what one step is."""
 
-    def __init__(self, mechanism: Mechanism, settings: PinocchioSettings) -> None:
+    def __init__(self, mechanism: BallWithRows, settings: PinocchioSettings) -> None:
         self._mechanism, self._settings = mechanism, settings
         self._model, self._data = mechanism.model, mechanism.model.createData()
         self._moving = _moving(mechanism, settings)
@@ -72,11 +72,11 @@ class FixedStep:
 
     @property
     def turns(self) -> bool:
-        """See :class:`Integrator`."""
+        """See :class:`TangentIntegrator`."""
         return bool(np.any(self._moving[-3:]))
 
     def advance(self, start: float, end: float) -> None:
-        """See :class:`Integrator`."""
+        """See :class:`TangentIntegrator`."""
         try:
             for number in range(whole_steps(start, end, self._dt)):
                 self._advance_one(start + number * self._dt)
@@ -113,7 +113,7 @@ class SemiImplicitEuler(FixedStep):
         self.q = pin.integrate(self._model, self.q, h * self._moving * self.v)
 
 
-class RungeKutta4(FixedStep):
+class TangentRungeKutta4(FixedStep):
     """The classical scheme; displacements within a step are tangent vectors at its start.
 
     As usually written, the displacement's rate is taken to be the joint velocity. That is so only where
@@ -157,7 +157,7 @@ class Adaptive:
     output of DOP853 has a lower order.
     """
 
-    def __init__(self, mechanism: Mechanism, settings: PinocchioSettings) -> None:
+    def __init__(self, mechanism: BallWithRows, settings: PinocchioSettings) -> None:
         self._mechanism, self._settings = mechanism, settings
         self._model, self._data = mechanism.model, mechanism.model.createData()
         # In both formulations the orientation is last. Without it, see _moving, no more than the place is integrated,
@@ -177,7 +177,7 @@ class Adaptive:
 
     @property
     def turns(self) -> bool:
-        """See :class:`Integrator`."""
+        """See :class:`TangentIntegrator`."""
         return self._turns
 
     def _joined(self, q: FloatArray, v: FloatArray) -> FloatArray:
@@ -214,7 +214,7 @@ class Adaptive:
         return DOP853(rates, start, y, np.inf, rtol=self._rtol, atol=self._atol)
 
     def advance(self, start: float, end: float) -> None:
-        """See :class:`Integrator`."""
+        """See :class:`TangentIntegrator`."""
         if end <= start:
             return
         self._short_steps = 0

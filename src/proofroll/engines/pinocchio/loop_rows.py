@@ -22,7 +22,7 @@ from proofroll.engines.pinocchio.joint_tree import JointTree
 _NEARBY = 0.05  # rad or m: far enough from a singular start to see the rank that holds in general
 
 
-class Rows(NamedTuple):
+class RowsAtState(NamedTuple):
     """Φ, C with C v = Φ̇, Ċ v; and of each row its loop, and the force and moment on body_b of a unit multiplier."""
 
     residual: Array
@@ -67,7 +67,7 @@ class LoopRows:
             self.rank = independent(at_start.C)
             self.rank = max(self.rank, independent(self._nearby(data, at_start).C))
 
-    def at(self, data: Any, q: Array, v: Array) -> Rows:
+    def at(self, data: Any, q: Array, v: Array) -> RowsAtState:
         """Rows at a state; positions, velocities and drifts of all frames are in ``data`` then."""
         model = self._model
         pin.forwardKinematics(model, data, q, v, np.zeros(model.nv))
@@ -85,7 +85,7 @@ class LoopRows:
         x, y = A[j, :, self._x], B[j, :, self._y]
         t, x_rate, y_rate = crosses(y, x), crosses(w_a[j], x), crosses(w_b[j], y)
         turn = _dot(t, a[j, 3:]) + _dot(crosses(w_a[j], x_rate), y) + _dot(x, crosses(w_b[j], y_rate))
-        return Rows(
+        return RowsAtState(
             np.concatenate([_dot(n, d[i]), _dot(x, y)]),
             np.concatenate([C, _times(t, J[j, 3:])]),
             np.concatenate([drift, turn + 2 * _dot(x_rate, y_rate)]),
@@ -126,7 +126,7 @@ class LoopRows:
         v = v - split.locked @ (split.back @ (rows.C @ v))
         return pin.integrate(self._model, q, -split.locked @ (split.back @ rows.residual)), v
 
-    def _nearby(self, data: Any, rows: Rows) -> Rows:
+    def _nearby(self, data: Any, rows: RowsAtState) -> RowsAtState:
         """The rows at a pose near the start that the loops allow and that no symmetry distinguishes."""
         n = self._model.nv
         direction = 1.0 + np.modf(np.arange(1, n + 1) * 0.6180339887498949)[0]  # golden ratio: no two alike

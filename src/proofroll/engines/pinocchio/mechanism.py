@@ -21,7 +21,7 @@ _FAINT = 1e-9
 
 
 @dataclass(frozen=True, slots=True)
-class Sliding:
+class SlidingContact:
     """What happens while the contact point slides.
 
     Attributes:
@@ -46,7 +46,7 @@ def left_the_wall(when: str) -> Diverged:
     return Diverged(f"the ball leaves the wall {when}, which this formulation does not model")
 
 
-class Mechanism(ABC):
+class BallWithRows(ABC):
     """A ball on its surface as a Pinocchio model with rows on top.
 
     Every method takes the ``data`` that it may overwrite, so that sampling leaves the running data alone.
@@ -114,7 +114,7 @@ class Mechanism(ABC):
         return self.friction_force(data), self.normal_force(data)
 
     @abstractmethod
-    def slide(self, data: Any, q: FloatArray, v: FloatArray, direction: FloatArray) -> Sliding:
+    def slide(self, data: Any, q: FloatArray, v: FloatArray, direction: FloatArray) -> SlidingContact:
         """The ball on its surface with friction mu_kinetic N against ``direction``, shape (3,), in the world.
 
         The direction is a unit vector along the wall; zero leaves the friction out.

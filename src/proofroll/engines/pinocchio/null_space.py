@@ -11,7 +11,7 @@ import pinocchio as pin
 from proofroll.core.engine import Regularised
 from proofroll.elements.mechanism.rotations import Array
 from proofroll.engines.pinocchio.joint_tree import LACKING, PROVIDES, JointTree
-from proofroll.engines.pinocchio.loop_rows import LoopRows, Rows
+from proofroll.engines.pinocchio.loop_rows import LoopRows, RowsAtState
 from proofroll.engines.pinocchio.settings import PinocchioSettings
 
 
@@ -39,7 +39,7 @@ class NullSpace:
             return np.array(pin.aba(model, data, q, v, tau, tree.pulls(data)))
         return self._solved(data, q, v, tau)[0]
 
-    def _solved(self, data: Any, q: Array, v: Array, tau: Array) -> tuple[Array, Rows, Array]:
+    def _solved(self, data: Any, q: Array, v: Array, tau: Array) -> tuple[Array, RowsAtState, Array]:
         """Acceleration, rows and multipliers, the smallest in norm where rows depend on each other."""
         tree, model = self._tree, self._model
         rows = self._rows.at(data, q, v)

@@ -15,9 +15,9 @@ from proofroll.core.events import Event
 from proofroll.elements.ball_on_surface.model import BallCapability, RollingBall
 from proofroll.engines.pinocchio.composite import Composite
 from proofroll.engines.pinocchio.free_flyer import FreeFlyer
-from proofroll.engines.pinocchio.friction import StickSlip, stick_slip
-from proofroll.engines.pinocchio.integrators import Integrator, integrator
-from proofroll.engines.pinocchio.mechanism import Mechanism
+from proofroll.engines.pinocchio.friction import StickSlipIntegrator, stick_slip
+from proofroll.engines.pinocchio.integrators import TangentIntegrator, integrator
+from proofroll.engines.pinocchio.mechanism import BallWithRows
 from proofroll.engines.pinocchio.settings import PinocchioSettings
 
 
@@ -27,8 +27,8 @@ class RowsRun:
     def __init__(self, body: RollingBall, settings: PinocchioSettings) -> None:
         """At time 0; the settings say whether the orientation is integrated, no longer the scene."""
         kind = Composite if settings.formulation == "composite" else FreeFlyer
-        self.mechanism: Mechanism = kind(body, bool(settings.orientation))
-        self.motion: Integrator = (
+        self.mechanism: BallWithRows = kind(body, bool(settings.orientation))
+        self.motion: TangentIntegrator = (
             stick_slip(self.mechanism, settings, body.contact)
             if math.isfinite(body.contact.mu_static)
             else integrator(self.mechanism, settings)
@@ -51,12 +51,12 @@ class RowsRun:
             w_WB=velocity.angular.copy(),
             q_WB=np.roll(pin.Quaternion(pose.rotation).coeffs(), 1) if self.motion.turns else None,
             force=force,
-            sticking=self.motion.sticking if isinstance(self.motion, StickSlip) else None,
+            sticking=self.motion.sticking if isinstance(self.motion, StickSlipIntegrator) else None,
         )
 
     def events(self) -> tuple[Event, ...]:
         """See :class:`proofroll.core.engine.LocatesEvents`; with unbounded friction there is but leaving the wall."""
-        if isinstance(self.motion, StickSlip):
+        if isinstance(self.motion, StickSlipIntegrator):
             return tuple(self.motion.events)
         return () if self.motion.left is None else (self.motion.left,)
 
@@ -70,7 +70,7 @@ class RowsRun:
         radius = float(np.linalg.norm(mechanism.rolling_row(data, q, v)[-3:]))
         torque = mechanism.resistance(data, q, mechanism.along(data, q))
         mu_static, mu_kinetic = None, None  # without a bound nothing stands for it: the rows of rolling hold always
-        if isinstance(self.motion, StickSlip):
+        if isinstance(self.motion, StickSlipIntegrator):
             mu_static = self.motion.mu_static
             mu_kinetic = float(np.linalg.norm(mechanism.friction(1.0, np.array([1.0, 0.0]))))
         acceleration = self._reaction(data)[0]
@@ -94,13 +94,13 @@ class RowsRun:
         """What there is besides rolling, with the torque of rolling resistance as it is put to the joints."""
         if torque is not None:
             yield BallCapability.ROLLING_RESISTANCE
-        if isinstance(self.motion, StickSlip):
+        if isinstance(self.motion, StickSlipIntegrator):
             yield BallCapability.BOUNDED_FRICTION
         if self.motion.turns:
             yield BallCapability.ORIENTATION
 
     def _reaction(self, data: Any) -> tuple[FloatArray, FloatArray]:
         """Joint acceleration, and force of the wall on the ball in the world [N], now."""
-        if isinstance(self.motion, StickSlip):
+        if isinstance(self.motion, StickSlipIntegrator):
             return self.motion.reaction(data)
         return self.mechanism.reaction(data, self.motion.q, self.motion.v)

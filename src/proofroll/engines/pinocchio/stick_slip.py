@@ -23,7 +23,7 @@ from proofroll.elements.ball_on_surface.events import EventKind
 from proofroll.elements.ball_on_surface.model import Contact
 from proofroll.engines.pinocchio.crossing import located
 from proofroll.engines.pinocchio.integrators import Adaptive
-from proofroll.engines.pinocchio.mechanism import Mechanism, Sliding, left_the_wall
+from proofroll.engines.pinocchio.mechanism import BallWithRows, SlidingContact, left_the_wall
 from proofroll.engines.pinocchio.settings import PinocchioSettings
 
 # |u| at which creeping ends, relative to |b|/ω_b: what is left out of the direction goes with its square.
@@ -49,7 +49,7 @@ _NOISE = 1e-13
 _GRAZE = 1e-12
 
 
-class Mode(Enum):
+class FrictionLaw(Enum):
     """The law that holds now."""
 
     STICKING = auto()
@@ -63,7 +63,7 @@ def unit(vector: FloatArray) -> FloatArray:
     return vector / length if length > 0 else vector
 
 
-def excess(mechanism: Mechanism, data: Any, q: FloatArray, v: FloatArray, mu_static: float) -> tuple[float, float]:
+def excess(mechanism: BallWithRows, data: Any, q: FloatArray, v: FloatArray, mu_static: float) -> tuple[float, float]:
     """(needed - available) / (needed + available) friction while sticking [-], and N [N].
 
     Slip begins where the first is positive.
@@ -90,19 +90,19 @@ class AdaptiveStickSlip(Adaptive):
         sticking: whether the ball sticks now.
     """
 
-    def __init__(self, mechanism: Mechanism, settings: PinocchioSettings, contact: Contact) -> None:
+    def __init__(self, mechanism: BallWithRows, settings: PinocchioSettings, contact: Contact) -> None:
         super().__init__(mechanism, settings)
         self.mu_static = contact.mu_static
         self._span = _SPAN * self._turning_time
         self._handover = self._floor = self._least = 0.0
-        self._mode = Mode.STICKING
+        self._mode = FrictionLaw.STICKING
         self.events: list[Event] = []
         self._monitored = 0.0, 0.0, 0.0
         y = self._joined(self.q, self.v)
         if mechanism.slips0:
             self._record("slip", 0.0, 0.0)
             self._creep(y)  # sets the scales of this slip, too
-            self._mode = Mode.SLIDING
+            self._mode = FrictionLaw.SLIDING
             self._floor = max(self._floor, _BEGUN * self._speed(y)[0])
         elif self._excess(y) > 0:
             self._record("slip", 0.0, 0.0)
@@ -111,7 +111,7 @@ class AdaptiveStickSlip(Adaptive):
     @property
     def sticking(self) -> bool:
         """Whether the ball sticks now."""
-        return self._mode is Mode.STICKING
+        return self._mode is FrictionLaw.STICKING
 
     def reaction(self, data: Any) -> tuple[FloatArray, FloatArray]:
         """Joint acceleration, and force of the wall on the ball in the world [N], now."""
@@ -121,7 +121,7 @@ class AdaptiveStickSlip(Adaptive):
         return self._mechanism.sliding_reaction(data, self.q, self.v, direction)
 
     def advance(self, start: float, end: float) -> None:
-        """See :class:`~proofroll.engines.pinocchio.integrators.Integrator`."""
+        """See :class:`~proofroll.engines.pinocchio.integrators.TangentIntegrator`."""
         try:
             while start < end:
                 start = self._leg(start, end)
@@ -130,18 +130,18 @@ class AdaptiveStickSlip(Adaptive):
 
     # -- the laws ---------------------------------------------------------------------------------------------------
 
-    def _slide(self, data: Any, y: FloatArray, direction: FloatArray) -> Sliding:
+    def _slide(self, data: Any, y: FloatArray, direction: FloatArray) -> SlidingContact:
         return self._mechanism.slide(data, *self._split(y), direction)
 
     def _excess(self, y: FloatArray) -> float:
         return excess(self._mechanism, self._data, *self._split(y), self.mu_static)[0]
 
     def _normal_force(self, y: FloatArray) -> float:
-        if self._mode is Mode.STICKING:
+        if self._mode is FrictionLaw.STICKING:
             return excess(self._mechanism, self._data, *self._split(y), self.mu_static)[1]
         return self._slide(self._data, y, self._direction(self._data, y)).normal_force
 
-    def _turning(self, data: Any, y: FloatArray) -> tuple[Sliding, FloatArray]:
+    def _turning(self, data: Any, y: FloatArray) -> tuple[SlidingContact, FloatArray]:
         """The ball without friction, and the rate at which the direction of its slip_rate turns [1/s], shape (3,)."""
         free = self._slide(data, y, np.zeros(3))
         along = unit(free.slip_rate)
@@ -150,7 +150,7 @@ class AdaptiveStickSlip(Adaptive):
 
     def _direction(self, data: Any, y: FloatArray) -> FloatArray:
         """Direction against which friction acts, shape (3,)."""
-        if self._mode is Mode.SLIDING:
+        if self._mode is FrictionLaw.SLIDING:
             return unit(self._slide(data, y, np.zeros(3)).slip)
         free, turning = self._turning(data, y)
         along, strength = unit(free.slip_rate), math.sqrt(free.slip_rate @ free.slip_rate)
@@ -160,13 +160,13 @@ class AdaptiveStickSlip(Adaptive):
         tangential = turning - (turning @ free.e1) * free.e1
         return unit(along - lag * tangential)
 
-    def _sliding_rates(self, data: Any, y: FloatArray, direction: FloatArray) -> tuple[FloatArray, Sliding]:
+    def _sliding_rates(self, data: Any, y: FloatArray, direction: FloatArray) -> tuple[FloatArray, SlidingContact]:
         q, v = self._split(y)
         sliding = self._mechanism.slide(data, q, v, direction)
         return self._moved(q, v, sliding.acceleration), sliding
 
     def _law(self, t: float, y: FloatArray) -> FloatArray:
-        if self._mode is Mode.STICKING:
+        if self._mode is FrictionLaw.STICKING:
             return self._rates(t, y)
         return self._sliding_rates(self._data, y, self._direction(self._data, y))[0]
 
@@ -182,13 +182,13 @@ class AdaptiveStickSlip(Adaptive):
         """Integrates in the present mode until the mode changes or ``end``; returns that time [s]."""
         if self._solver is None:
             y = self._joined(self.q, self.v)
-            law = self._rates if self._mode is Mode.STICKING else self._law  # a solver lives as long as its mode
+            law = self._rates if self._mode is FrictionLaw.STICKING else self._law  # a solver lives as long as its mode
             self._solver, self._short_steps = self._solver_from(law, start, y), 0
             self._monitored = self._monitor(y)
         solver, monitor = self._solver, self._monitored
         solver.t_bound, solver.status = end, "running"
         while solver.status == "running":
-            if self._mode is Mode.SLIDING:
+            if self._mode is FrictionLaw.SLIDING:
                 left = monitor[0] / -monitor[1] if monitor[1] < 0 else math.inf
                 if monitor[0] <= self._floor and left < math.inf:
                     stop = solver.t + left
@@ -217,7 +217,7 @@ class AdaptiveStickSlip(Adaptive):
         """Puts the state back on the constraints, if that is wanted; what :meth:`_monitor` says then."""
         if self._settings.projection:
             self._put_back(solver)
-        if self._mode is not Mode.STICKING:
+        if self._mode is not FrictionLaw.STICKING:
             return self._speed(solver.y)
         # The rates that were found last are those at the end of the step, with projection or without.
         data, mechanism = self._data, self._mechanism
@@ -225,7 +225,7 @@ class AdaptiveStickSlip(Adaptive):
         return relative_excess(needed, normal_force, self.mu_static), 0.0, normal_force
 
     def _put_back(self, solver: Any) -> None:
-        if self._mode is Mode.STICKING:
+        if self._mode is FrictionLaw.STICKING:
             super()._put_back(solver)
             return
         q, v = self._split(solver.y)
@@ -236,7 +236,7 @@ class AdaptiveStickSlip(Adaptive):
 
     def _monitor(self, y: FloatArray) -> tuple[float, float, float]:
         """What may end the mode, the excess of needed friction when sticking, else |u| and its rate; and N [N]."""
-        if self._mode is not Mode.STICKING:
+        if self._mode is not FrictionLaw.STICKING:
             return self._speed(y)
         beyond, normal_force = excess(self._mechanism, self._data, *self._split(y), self.mu_static)
         return beyond, 0.0, normal_force
@@ -245,14 +245,14 @@ class AdaptiveStickSlip(Adaptive):
         self, solver: Any, before: tuple[float, float, float], after: tuple[float, float, float]
     ) -> tuple[float, float, FloatArray] | None:
         """Time at which the mode ended within the last step [s], half the width of its bracket [s], and state."""
-        if self._mode is Mode.STICKING:
+        if self._mode is FrictionLaw.STICKING:
             # The excess lies in [-1, 1] and its crests are many steps wide, so far below zero nothing is missed.
             if max(before[0], after[0]) < -0.1 - abs(after[0] - before[0]):
                 return None
             return located(
                 solver, lambda y: self._excess(y) - _GRAZE, before[0] - _GRAZE, after[0] - _GRAZE, self._span
             )
-        if self._mode is Mode.CREEPING:
+        if self._mode is FrictionLaw.CREEPING:
             if after[0] >= self._handover:
                 return located(
                     solver, lambda y: self._speed(y)[0] - self._handover, -self._handover, after[0], self._span
@@ -285,24 +285,24 @@ class AdaptiveStickSlip(Adaptive):
         self._solver = None
         self._keep(y)
         was = self._mode
-        if was is Mode.CREEPING and self._speed(y)[0] > 0.5 * self._handover:
-            self._mode = Mode.SLIDING
+        if was is FrictionLaw.CREEPING and self._speed(y)[0] > 0.5 * self._handover:
+            self._mode = FrictionLaw.SLIDING
             return time
         # The contact point is at rest up to round-off; the ball sticks if it can.
         self.q, self.v = self._mechanism.project(self._data, self.q, self.v)
         y = self._joined(self.q, self.v)
-        if was is Mode.STICKING:
+        if was is FrictionLaw.STICKING:
             self._record("slip", time, width)
             self._creep(y)
         elif self._excess(y) <= _NOISE:
-            self._mode = Mode.STICKING
+            self._mode = FrictionLaw.STICKING
             self._record("stick", time, width)
         else:
             self._creep(y)
         return time
 
     def _creep(self, y: FloatArray) -> None:
-        self._mode = Mode.CREEPING
+        self._mode = FrictionLaw.CREEPING
         free, turning = self._turning(self._data, y)
         rate = max(math.sqrt(turning @ turning), 1.0 / (_STEADY * self._turning_time))
         along, strength = unit(free.slip_rate), math.sqrt(free.slip_rate @ free.slip_rate)

@@ -10,8 +10,8 @@ import numpy as np
 from proofroll.core.arrays import FloatArray
 from proofroll.core.events import Event
 from proofroll.elements.ball_on_surface.model import Contact
-from proofroll.engines.pinocchio.integrators import FixedStep, RungeKutta4, SemiImplicitEuler
-from proofroll.engines.pinocchio.mechanism import Mechanism, Sliding, left_the_wall
+from proofroll.engines.pinocchio.integrators import FixedStep, SemiImplicitEuler, TangentRungeKutta4
+from proofroll.engines.pinocchio.mechanism import BallWithRows, SlidingContact, left_the_wall
 from proofroll.engines.pinocchio.settings import PinocchioSettings
 from proofroll.engines.pinocchio.stick_slip import excess, unit
 
@@ -25,7 +25,7 @@ class FixedStickSlip(FixedStep):
         sticking: whether the ball sticks now.
     """
 
-    def __init__(self, mechanism: Mechanism, settings: PinocchioSettings, contact: Contact) -> None:
+    def __init__(self, mechanism: BallWithRows, settings: PinocchioSettings, contact: Contact) -> None:
         super().__init__(mechanism, settings)
         self.mu_static = contact.mu_static
         self.events: list[Event] = []
@@ -61,7 +61,7 @@ class FixedStickSlip(FixedStep):
         self._free = self._without_friction()
         self._must_press(time + self._dt, self._free.normal_force)
 
-    def _without_friction(self) -> Sliding:
+    def _without_friction(self) -> SlidingContact:
         return self._mechanism.slide(self._data, self.q, self.v, np.zeros(3))
 
     def _must_press(self, time: float, normal_force: float) -> None:
@@ -120,5 +120,5 @@ class StickSlipEuler(FixedStickSlip, SemiImplicitEuler):
     """Stick and slip by semi-implicit Euler."""
 
 
-class StickSlipRungeKutta4(FixedStickSlip, RungeKutta4):
+class StickSlipRungeKutta4(FixedStickSlip, TangentRungeKutta4):
     """Stick and slip by the classical scheme, of order 1 over an event."""

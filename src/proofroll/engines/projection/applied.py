@@ -9,7 +9,7 @@ import numpy as np
 
 from proofroll.elements.mechanism import Joint, Mechanism
 from proofroll.elements.mechanism.rotations import Array
-from proofroll.engines.projection.connections import Bodies, Connections, Ends, cross, turned
+from proofroll.engines.projection.connections import Bodies, Ends, ProjectedConnections, cross, turned
 
 _TURN = 2 * math.pi
 
@@ -28,7 +28,7 @@ class _Law(NamedTuple):
 class Applied:
     """What acts on the bodies besides reactions."""
 
-    def __init__(self, mechanism: Mechanism, connections: Connections) -> None:
+    def __init__(self, mechanism: Mechanism, connections: ProjectedConnections) -> None:
         self._connections = connections
         index, count = mechanism.body_index, len(mechanism.bodies)
         self._mass = np.array([body.mass for body in mechanism.bodies])

@@ -42,7 +42,7 @@ class Ends(NamedTuple):
     B: Array
 
 
-class Rows(NamedTuple):
+class ConnectionRows(NamedTuple):
     """Φ (rows,), C of the dependent velocities (rows, 6 bodies), Ċ times them (rows,), n and x × y (rows, 3)."""
 
     residual: Array
@@ -65,7 +65,7 @@ def turned(R: Array, a: Array) -> Array:
     return found
 
 
-class Connections:
+class ProjectedConnections:
     """All joints, then all loops, of a mechanism.
 
     Attributes:
@@ -108,7 +108,7 @@ class Connections:
         d_rate = v[b] + cross(w[b], arm_b) - v[a] - cross(w[a], arm_a)
         return Ends(arm_a, arm_b, d, d_rate, R_a @ self._A, R_b @ self._B)
 
-    def rows(self, bodies: Bodies, ends: Ends) -> Rows:
+    def rows(self, bodies: Bodies, ends: Ends) -> ConnectionRows:
         """The rows of all connections: those of points, then those of angles."""
         w_a, w_b = bodies.w[self.a], bodies.w[self.b]
         bent = cross(w_b, cross(w_b, ends.arm_b)) - cross(w_a, cross(w_a, ends.arm_a))
@@ -133,7 +133,7 @@ class Connections:
         nothing_t, nothing_n = np.zeros((len(i), 3)), np.zeros((len(j), 3))
         force, torque = np.concatenate([n, nothing_n]), np.concatenate([nothing_t, t])
         C = self.spread(bodies, self.owner, force, np.concatenate(m_a), np.concatenate(m_b))
-        return Rows(np.concatenate(residual), C, np.concatenate(drift), force, torque)
+        return ConnectionRows(np.concatenate(residual), C, np.concatenate(drift), force, torque)
 
     def spread(self, bodies: Bodies, connection: NDArray[np.intp], n: Array, m_a: Array, m_b: Array) -> Array:
         """n·(v_b − v_a) + m_b·ω_b − m_a·ω_a on the dependent velocities of all bodies, shape (rows, 6 bodies)."""

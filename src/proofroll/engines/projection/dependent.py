@@ -21,19 +21,19 @@ from proofroll.elements.mechanism import Mechanism, Tree
 from proofroll.elements.mechanism.rotations import Array, to_quaternion
 from proofroll.elements.mechanism.sampling import independent
 from proofroll.engines.projection.applied import Applied
-from proofroll.engines.projection.connections import Bodies, Connections, Ends, Rows
+from proofroll.engines.projection.connections import Bodies, ConnectionRows, Ends, ProjectedConnections
 
 _NEARBY = 0.05  # rad or m: far enough from a singular start to see the rank that holds in general
 
 
-class Answer(NamedTuple):
+class SolvedState(NamedTuple):
     """Accelerations u̇ and multipliers, with what they were found from."""
 
     acceleration: Array
     multipliers: Array
     bodies: Bodies
     ends: Ends
-    rows: Rows
+    rows: ConnectionRows
 
 
 class DependentCoordinates:
@@ -51,7 +51,7 @@ class DependentCoordinates:
         self.inertia = np.array([body.inertia for body in mechanism.bodies])
         self.com = np.array([body.com for body in mechanism.bodies])
         self._count = n = len(self.mass)
-        self.connections = Connections(mechanism)
+        self.connections = ProjectedConnections(mechanism)
         self.applied = Applied(mechanism, self.connections)
         # M^(-1/2), block by block: it is constant, since ω is along the bodies' own axes
         self._root = np.zeros((6 * n, 6 * n))
@@ -94,7 +94,7 @@ class DependentCoordinates:
         padded[2, :n] = np.matmul(R[:n], w[:, :, None])[:, :, 0]
         return Bodies(padded[0], R, padded[1], padded[2])
 
-    def solve(self, x: Array, rank: int | None = None) -> Answer:
+    def solve(self, x: Array, rank: int | None = None) -> SolvedState:
         """Projections of the equations of motion at a state."""
         bodies = self.bodies(x)
         ends = self.connections.ends(bodies)
@@ -102,10 +102,10 @@ class DependentCoordinates:
         free = self._root.T @ self.applied(bodies, self.parts(x)[3], ends)
         r = self.rank if rank is None else rank
         if not r:
-            return Answer(self._root @ free, np.zeros(len(rows.C)), bodies, ends, rows)
+            return SolvedState(self._root @ free, np.zeros(len(rows.C)), bodies, ends, rows)
         locked, back = self._split(rows.C, r)
         normal = -back @ rows.drift - locked @ free  # what the constraints change in their own subspace
-        return Answer(self._root @ (free + locked.T @ normal), back.T @ normal, bodies, ends, rows)
+        return SolvedState(self._root @ (free + locked.T @ normal), back.T @ normal, bodies, ends, rows)
 
     def _split(self, C: Array, rank: int) -> tuple[Array, Array]:
         """Unit vectors of the constrained subspace, (rank, 6 bodies), and what takes values of rows to them."""

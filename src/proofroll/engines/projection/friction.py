@@ -22,7 +22,7 @@ from proofroll.engines.projection.method import Kinematics, ProjectedBall, Respo
 _ON_CONE = 1e-12
 
 
-class Sliding(NamedTuple):
+class SlidingForces(NamedTuple):
     """What the equations give at one state of slip.
 
     Attributes:
@@ -80,15 +80,15 @@ class Friction:
         """Rate b of the slip without friction [m/s²], shape (2,)."""
         return self._slip_rate(kin, self.sliding.response(kin))
 
-    def slide(self, kin: Kinematics, direction: FloatArray) -> Sliding:
+    def slide(self, kin: Kinematics, direction: FloatArray) -> SlidingForces:
         """The ball slipping along ``direction``, shape (2,)."""
         response = self.sliding.response(kin, -self.mu_kinetic * (direction @ self._rows))
         rate = self._slip_rate(kin, response)
         growth, across = direction @ rate, direction[0] * rate[1] - direction[1] * rate[0]
         drive = rate + self._mobility * self.mu_kinetic * response.N * direction
-        return Sliding(response, direction, drive, float(growth), float(across))
+        return SlidingForces(response, direction, drive, float(growth), float(across))
 
-    def force(self, sliding: Sliding) -> FloatArray:
+    def force(self, sliding: SlidingForces) -> FloatArray:
         """Force of the wall on the slipping ball along the local axes [N], shape (3,)."""
         friction = -self.mu_kinetic * sliding.response.N * (sliding.direction @ self._rows)
         return self.sliding.contact_force(sliding.response) + friction[:3]

@@ -53,7 +53,7 @@ def local_geometry(surface: Surface, u: FloatArray) -> Local:
 
 
 @dataclass(frozen=True)
-class General:
+class GeneralSurface:
     """Any surface, evaluated anew at each point."""
 
     surface: Surface
@@ -109,9 +109,9 @@ def geometry_of(surface: Surface) -> Geometry:
     """The cheapest description that is exact for this surface."""
     generators = surface.generators
     if generators is None:
-        return General(surface)
+        return GeneralSurface(surface)
     first, second = generators
     rotations = (first.kind, second.kind).count("rotation")
     parallel = not np.any(np.abs(np.cross(first.axis, second.axis)) > 4 * np.finfo(float).eps)
     commute = rotations == 0 or (rotations == 1 and parallel)
-    return Uniform(surface, generators) if commute else General(surface)
+    return Uniform(surface, generators) if commute else GeneralSurface(surface)

@@ -68,7 +68,7 @@ class Pace(NamedTuple):
         return _SETTLED * self.speed
 
 
-class Mode(Protocol):
+class ContactMode(Protocol):
     """One mode of contact."""
 
     @property

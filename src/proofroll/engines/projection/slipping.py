@@ -21,7 +21,7 @@ import math
 import numpy as np
 
 from proofroll.core.arrays import FloatArray
-from proofroll.engines.projection.friction import Friction, Sliding, along
+from proofroll.engines.projection.friction import Friction, SlidingForces, along
 from proofroll.engines.projection.method import Kinematics
 from proofroll.engines.projection.modes import DIFFERENCE, Exit, Pace, Survey
 
@@ -41,7 +41,7 @@ class SlavedSlip:
     def __init__(self, friction: Friction, pace: Pace) -> None:
         self._friction, self._ball, self._pace = friction, friction.sliding, pace
 
-    def look(self, y: FloatArray) -> Sliding:
+    def look(self, y: FloatArray) -> SlidingForces:
         """The slip at y."""
         x, rho = y[:-1], float(y[-1])
         kin = self._ball.kinematics(x)
@@ -56,7 +56,7 @@ class SlavedSlip:
         lag = rho * turned / span / (sliding.strength + sliding.growth)
         return self._friction.slide(kin, along(psi - lag))
 
-    def _span(self, kin: Kinematics, sliding: Sliding) -> float:
+    def _span(self, kin: Kinematics, sliding: SlidingForces) -> float:
         """Time [s] over which to difference the drive, in which the resistance jumps where the centre stands still."""
         span = DIFFERENCE * self._pace.time
         if not self._ball.rolling_resistance:
@@ -104,7 +104,7 @@ class FreeSlip:
         self._friction, self._ball, self._pace = friction, friction.sliding, pace
         self._slaved = SlavedSlip(friction, pace)
 
-    def look(self, y: FloatArray) -> Sliding:
+    def look(self, y: FloatArray) -> SlidingForces:
         """The slip at y."""
         return self._friction.slide(self._ball.kinematics(y[:-2]), along(float(y[-1])))
 

@@ -13,7 +13,7 @@ from proofroll.core.errors import Diverged
 from proofroll.core.events import Event
 from proofroll.elements.ball_on_surface.events import EventKind
 from proofroll.engines.projection.friction import Friction
-from proofroll.engines.projection.modes import Exit, Mode, Pace, Survey
+from proofroll.engines.projection.modes import ContactMode, Exit, Pace, Survey
 from proofroll.engines.projection.slipping import FreeSlip, SlavedSlip
 from proofroll.engines.projection.stepping import Stepper
 from proofroll.engines.projection.sticking import Rest, Stick
@@ -76,7 +76,7 @@ class Switching:
         self._slaved, self._free = SlavedSlip(friction, pace), FreeSlip(friction, pace)
         self._idle = 0
         self._lost: str | None = None
-        self.mode: Mode = self._stick
+        self.mode: ContactMode = self._stick
         self._survey = Survey(())
         if slip is None:
             self._settle(0.0, 0.0, x, was_sticking=True)
@@ -135,7 +135,7 @@ class Switching:
             return self._stick.glance(stepper.y, self._survey, stepper.t - stepper.t_before)
         return self.mode.survey(stepper.y)
 
-    def _enter(self, mode: Mode, t: float, y: FloatArray) -> None:
+    def _enter(self, mode: ContactMode, t: float, y: FloatArray) -> None:
         def accept(at: float, state: FloatArray) -> FloatArray:
             self._hooks.check(at, mode.x(state))
             return mode.eliminated(state) if self._eliminate else state
@@ -223,7 +223,7 @@ class Switching:
         if high > 0:
             x = ball.eliminated(x)
         speed = self._friction.rolling.speed(x) if self._stick.halts else np.inf
-        mode: Mode
+        mode: ContactMode
         if speed <= self._pace.settled and self._rest.holds(x):
             mode, x = self._rest, self._rest.eliminated(x)
         else:

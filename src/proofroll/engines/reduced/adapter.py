@@ -14,7 +14,7 @@ from proofroll.core.scene import Scene
 from proofroll.elements.ball_on_surface.compiled.library import with_heyoka
 from proofroll.elements.ball_on_surface.element import rolling_ball
 from proofroll.elements.ball_on_surface.model import ROLLS, BallCapability, RollingBall
-from proofroll.engines.reduced.models import ClosedForm, Compiled, Integrated, Model
+from proofroll.engines.reduced.models import ClosedFormModel, Compiled, Integrated, ReducedModel
 from proofroll.engines.reduced.settings import PRESETS, ReducedSettings
 
 
@@ -57,9 +57,9 @@ class Reduced:
 
     def __init__(self, body: RollingBall, settings: ReducedSettings) -> None:
         self._body = body
-        self._model: Model
+        self._model: ReducedModel
         if settings.rtol is None:
-            self._model = ClosedForm(body)
+            self._model = ClosedFormModel(body)
         elif settings.integrator == "taylor":
             self._model = Compiled(body, settings.rtol)
         else:

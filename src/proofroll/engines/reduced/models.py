@@ -18,14 +18,14 @@ from proofroll.elements.ball_on_surface.compiled.rolling import is_uniform, para
 from proofroll.elements.ball_on_surface.compiled.rolling import start as start_along_arc
 from proofroll.elements.ball_on_surface.compiled.series import Series, still_moving
 from proofroll.elements.ball_on_surface.model import RollingBall
-from proofroll.elements.ball_on_surface.motion import Motion, world_motion
+from proofroll.elements.ball_on_surface.motion import BallMotion, world_motion
 from proofroll.elements.ball_on_surface.rolling_equations import placed, reduced_rates, start
 
 # A step shorter than this part of the way to the next sample leads nowhere.
 _STUCK = 1e-12
 
 
-class Model(Protocol):
+class ReducedModel(Protocol):
     """Moves the ball in time."""
 
     def advance(self, t: float) -> None:
@@ -35,14 +35,14 @@ class Model(Protocol):
             Diverged: it gave up.
         """
 
-    def motion(self) -> Motion:
+    def motion(self) -> BallMotion:
         """State and force now, each shape (1, 3)."""
 
     def spin_rate(self) -> float | None:
         """ω̇1 now [rad/s²]; None: the model has no equation for it."""
 
 
-class ClosedForm:
+class ClosedFormModel:
     """The closed form."""
 
     def __init__(self, body: RollingBall) -> None:
@@ -57,21 +57,21 @@ class ClosedForm:
             )
         self._motion = found
 
-    def _at(self, t: float) -> Motion | None:
+    def _at(self, t: float) -> BallMotion | None:
         return closed_form(self._body, np.array([t]))
 
     def advance(self, t: float) -> None:
-        """See :class:`Model`."""
+        """See :class:`ReducedModel`."""
         found = self._at(t)
         assert found is not None  # whether there is one does not depend on time
         self._motion = found
 
-    def motion(self) -> Motion:
-        """See :class:`Model`."""
+    def motion(self) -> BallMotion:
+        """See :class:`ReducedModel`."""
         return self._motion
 
     def spin_rate(self) -> float | None:
-        """See :class:`Model`."""
+        """See :class:`ReducedModel`."""
         return None
 
 
@@ -91,7 +91,7 @@ class Integrated:
         )
 
     def advance(self, t: float) -> None:
-        """See :class:`Model`."""
+        """See :class:`ReducedModel`."""
         solver, span = self._solver, t - self._solver.t
         if span <= 0:
             return
@@ -111,13 +111,13 @@ class Integrated:
         """Velocity of the centre along the coordinates [m/s], shape (2,)."""
         return np.asarray(x[2:4] * self._scales)
 
-    def motion(self) -> Motion:
-        """See :class:`Model`."""
+    def motion(self) -> BallMotion:
+        """See :class:`ReducedModel`."""
         _, v, force = reduced_rates(self._body, self._solver.y)
-        return Motion(*placed(self._body, self._solver.y[None, :], v[None, :]), force[None, :], "reduced equations")
+        return BallMotion(*placed(self._body, self._solver.y[None, :], v[None, :]), force[None, :], "reduced equations")
 
     def spin_rate(self) -> float:
-        """See :class:`Model`."""
+        """See :class:`ReducedModel`."""
         return float(reduced_rates(self._body, self._solver.y)[0][4])
 
 
@@ -140,11 +140,11 @@ class Compiled:
             still_moving(before[2:4], t, x[2:4])
 
     def advance(self, t: float) -> None:
-        """See :class:`Model`."""
+        """See :class:`ReducedModel`."""
         self._series.advance(t)
 
-    def motion(self) -> Motion:
-        """See :class:`Model`."""
+    def motion(self) -> BallMotion:
+        """See :class:`ReducedModel`."""
         x, ball = self._series.x, self._body.ball
         held2, held3, N = self._evaluate(x, self._pars)[5:]
         return world_motion(
@@ -159,7 +159,7 @@ class Compiled:
         )
 
     def spin_rate(self) -> float:
-        """See :class:`Model`."""
+        """See :class:`ReducedModel`."""
         return float(self._evaluate(self._series.x, self._pars)[4])
 
 

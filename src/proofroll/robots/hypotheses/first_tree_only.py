@@ -3,12 +3,12 @@
 from __future__ import annotations
 
 from proofroll.robots.hypotheses import Evidence, Hypothesis
-from proofroll.robots.model import WORLD, Joint, Robot
+from proofroll.robots.model import WORLD, Robot, RobotJoint
 
 
 def _change(evidence: Evidence) -> Robot | None:
     robot, kept = evidence.robot, {WORLD}
-    joints: list[Joint] = []
+    joints: list[RobotJoint] = []
     for joint in robot.joints:
         if joint.parent in kept and not (joint.parent == WORLD and joints):
             kept.add(joint.child)

@@ -7,10 +7,10 @@ import dataclasses
 import numpy as np
 
 from proofroll.robots.hypotheses import Evidence, Hypothesis
-from proofroll.robots.model import Joint, Robot
+from proofroll.robots.model import Robot, RobotJoint
 
 
-def _offset(joint: Joint, robot: Robot) -> Joint:
+def _offset(joint: RobotJoint, robot: Robot) -> RobotJoint:
     source = robot.sources.get(joint.child, {})
     if joint.kind != "free" or "rotation" not in source:
         return joint

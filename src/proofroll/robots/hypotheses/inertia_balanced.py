@@ -8,10 +8,10 @@ import numpy as np
 
 from proofroll.robots.hypotheses import Evidence, Hypothesis
 from proofroll.robots.inertia import replaced
-from proofroll.robots.model import Body, Robot
+from proofroll.robots.model import Robot, RobotBody
 
 
-def _sphere(body: Body) -> Body:
+def _sphere(body: RobotBody) -> RobotBody:
     return dataclasses.replace(body, inertia=np.trace(body.inertia) / 3 * np.eye(3))
 
 

@@ -7,13 +7,13 @@ import dataclasses
 import numpy as np
 
 from proofroll.robots.hypotheses import Evidence, Hypothesis
-from proofroll.robots.model import Array, Body, Robot
+from proofroll.robots.model import Array, Robot, RobotBody
 
 # As URDF importers of MuJoCo are commonly asked for, and as our option asks [kg], [kg m²].
 _MASS, _MOMENT = 1e-6, 1e-8
 
 
-def _raised(body: Body, com: Array) -> Body:
+def _raised(body: RobotBody, com: Array) -> RobotBody:
     values, axes = np.linalg.eigh(body.inertia)
     bounded = axes @ np.diag(np.maximum(values, _MOMENT)) @ axes.T
     return dataclasses.replace(body, mass=max(body.mass, _MASS), com=com, inertia=bounded)

@@ -8,7 +8,7 @@ import numpy as np
 from scipy.optimize import linear_sum_assignment
 
 from proofroll.robots.hypotheses import Evidence, Hypothesis
-from proofroll.robots.model import Array, Body, Robot
+from proofroll.robots.model import Array, Robot, RobotBody
 
 
 def _moments(inertia: Array) -> Array:
@@ -20,7 +20,7 @@ def _moments(inertia: Array) -> Array:
 
 def _change(evidence: Evidence) -> Robot | None:
     robot = evidence.robot
-    bodies: list[Body] = []
+    bodies: list[RobotBody] = []
     for home in robot.columns:
         members = [(name, p, R) for name, (carrier, p, R) in robot.welded.items() if carrier == home]
         if len(members) == 1:

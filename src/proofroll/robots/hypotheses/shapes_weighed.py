@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 
 from proofroll.robots.hypotheses import Evidence, Hypothesis
-from proofroll.robots.model import Array, Body, Robot, composed
+from proofroll.robots.model import Array, Robot, RobotBody, composed
 
 _DENSITY = 1000.0
 
@@ -32,14 +32,14 @@ def _solid(kind: str, sizes: Mapping[str, str]) -> tuple[float, Array] | None:
     return None
 
 
-def _weighed(name: str, shapes: list[Any]) -> Body | None:
+def _weighed(name: str, shapes: list[Any]) -> RobotBody | None:
     parts = []
     for kind, sizes, position, rotation in shapes:
         solid = _solid(kind, sizes)
         if solid is None:
             return None
         mass, moments = solid
-        parts.append((Body("", mass, np.zeros(3), np.diag(moments)), np.array(position), np.array(rotation)))
+        parts.append((RobotBody("", mass, np.zeros(3), np.diag(moments)), np.array(position), np.array(rotation)))
     return composed(name, parts) if parts else None
 
 

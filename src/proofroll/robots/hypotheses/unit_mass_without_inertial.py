@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from proofroll.robots.hypotheses import Evidence, Hypothesis
-from proofroll.robots.model import Body, Robot
+from proofroll.robots.model import Robot, RobotBody
 
 
 def _change(evidence: Evidence) -> Robot | None:
@@ -13,7 +13,7 @@ def _change(evidence: Evidence) -> Robot | None:
     bare = [name for name, source in robot.sources.items() if name in robot.bodies and not source.get("inertial", True)]
     if not bare:
         return None
-    return robot.with_bodies(Body(name, 1.0, np.zeros(3), np.eye(3)) for name in bare)
+    return robot.with_bodies(RobotBody(name, 1.0, np.zeros(3), np.eye(3)) for name in bare)
 
 
 HYPOTHESIS = Hypothesis(

@@ -8,13 +8,13 @@ import numpy as np
 
 from proofroll.robots.hypotheses import Evidence, Hypothesis
 from proofroll.robots.inertia import replaced
-from proofroll.robots.model import Body, Robot
+from proofroll.robots.model import Robot, RobotBody
 
 # Density of water [kg/m³].
 _WATER = 1000.0
 
 
-def _sphere(body: Body) -> Body:
+def _sphere(body: RobotBody) -> RobotBody:
     mass = body.mass or 1.0
     radius = (3 * mass / (4 * np.pi * _WATER)) ** (1 / 3)
     return dataclasses.replace(body, mass=mass, inertia=0.4 * mass * radius**2 * np.eye(3))

@@ -22,7 +22,7 @@ _PARALLEL = 1e-12  # how far axes of a plane mechanism may be from parallel: rou
 
 
 @dataclass(frozen=True)
-class Placed:
+class BodyStart:
     """Start of one body: origin and velocity of its frame, rotation, angular velocity, world axes."""
 
     p: Array
@@ -32,7 +32,7 @@ class Placed:
 
 
 @dataclass(frozen=True)
-class View:
+class BodyInScalars:
     """A body at one instant, of scalars: centre of mass, rotation by rows, velocity, angular velocity, world axes."""
 
     r: Sequence[Scalar]
@@ -42,10 +42,10 @@ class View:
 
 
 _UNIT = ((1.0, 0.0, 0.0), (0.0, 1.0, 0.0), (0.0, 0.0, 1.0))
-GROUND = View((0.0,) * 3, _UNIT, (0.0,) * 3, (0.0,) * 3)
+GROUND = BodyInScalars((0.0,) * 3, _UNIT, (0.0,) * 3, (0.0,) * 3)
 
 
-class General:
+class GeneralBody:
     """A body that can move anyhow: r, quaternion | v, ω in body axes."""
 
     nx, nu = 7, 6
@@ -56,14 +56,14 @@ class General:
         self.inverse[:3, :3] = np.eye(3) / mass
         self.inverse[3:, 3:] = np.linalg.inv(inertia)
 
-    def start(self, placed: Placed, com: Array) -> tuple[list[float], list[float]]:
+    def start(self, placed: BodyStart, com: Array) -> tuple[list[float], list[float]]:
         """Coordinates and velocities of a placed body."""
         arm = placed.R.apply(com)
         attitude = placed.R.as_quat(scalar_first=True)
         velocity = placed.v + np.cross(placed.w, arm)
         return [*(placed.p + arm), *attitude], [*velocity, *placed.R.inv().apply(placed.w)]
 
-    def view(self, x: Sequence[Scalar], u: Sequence[Scalar], _: Mapping[str, Any]) -> View:
+    def view(self, x: Sequence[Scalar], u: Sequence[Scalar], _: Mapping[str, Any]) -> BodyInScalars:
         """The body for coordinates x, of a unit quaternion, and velocities u."""
         a, b, c, d = x[3:]
         R = (
@@ -71,9 +71,9 @@ class General:
             (2.0 * (b * c + a * d), 1.0 - 2.0 * (b * b + d * d), 2.0 * (c * d - a * b)),
             (2.0 * (b * d - a * c), 2.0 * (c * d + a * b), 1.0 - 2.0 * (b * b + c * c)),
         )
-        return View(x[:3], R, u[:3], turned(R, u[3:]))
+        return BodyInScalars(x[:3], R, u[:3], turned(R, u[3:]))
 
-    def projected(self, view: View, force: Sequence[Scalar], moment: Sequence[Scalar]) -> list[Scalar]:
+    def projected(self, view: BodyInScalars, force: Sequence[Scalar], moment: Sequence[Scalar]) -> list[Scalar]:
         """What a force and a moment about the centre of mass, world axes, do along the velocities u."""
         return [*force, *turned_back(view.R, moment)]
 
@@ -119,7 +119,7 @@ class Planar:
             [_clean(row) for row in part] for part in (matrix - along @ matrix, around @ matrix, along @ matrix)
         ]
 
-    def start(self, placed: Placed, com: Array) -> tuple[list[float], list[float]]:
+    def start(self, placed: BodyStart, com: Array) -> tuple[list[float], list[float]]:
         """Coordinates and velocities of a placed body."""
         arm = placed.R.apply(com)
         angle = float((placed.R * self.zero.inv()).as_rotvec() @ self.plane[:, 2])
@@ -127,7 +127,7 @@ class Planar:
         e1, e2, normal = self.plane.T
         return [(placed.p + arm) @ e1, (placed.p + arm) @ e2, angle], [velocity @ e1, velocity @ e2, placed.w @ normal]
 
-    def view(self, x: Sequence[Scalar], u: Sequence[Scalar], functions: Mapping[str, Any]) -> View:
+    def view(self, x: Sequence[Scalar], u: Sequence[Scalar], functions: Mapping[str, Any]) -> BodyInScalars:
         """The body for coordinates x and velocities u."""
         c, s = functions["cos"](x[2]), functions["sin"](x[2])
         R = [
@@ -136,9 +136,9 @@ class Planar:
         ]
         e1, e2, normal = self._columns
         r = plus(scaled(x[0], e1), scaled(x[1], e2), self._height)
-        return View(r, R, plus(scaled(u[0], e1), scaled(u[1], e2)), scaled(u[2], normal))
+        return BodyInScalars(r, R, plus(scaled(u[0], e1), scaled(u[1], e2)), scaled(u[2], normal))
 
-    def projected(self, _: View, force: Sequence[Scalar], moment: Sequence[Scalar]) -> list[Scalar]:
+    def projected(self, _: BodyInScalars, force: Sequence[Scalar], moment: Sequence[Scalar]) -> list[Scalar]:
         """What a force and a moment about the centre of mass, world axes, do along the velocities u."""
         e1, e2, normal = self._columns
         return [dot(force, e1), dot(force, e2), dot(moment, normal)]
@@ -152,9 +152,9 @@ class Planar:
         return list(u)
 
 
-def placed_bodies(mechanism: Mechanism, at_zero: bool = False) -> dict[str, Placed]:
+def placed_bodies(mechanism: Mechanism, at_zero: bool = False) -> dict[str, BodyStart]:
     """Where all bodies are at the start, from the joints' own definition; at_zero: at q = 0, v = 0 instead."""
-    found = {WORLD: Placed(np.zeros(3), Rotation.identity(), np.zeros(3), np.zeros(3))}
+    found = {WORLD: BodyStart(np.zeros(3), Rotation.identity(), np.zeros(3), np.zeros(3))}
     for joint in mechanism.joints:
         parent = found[joint.parent]
         frame = parent.R * Rotation.from_euler("xyz", joint.orientation)
@@ -166,7 +166,7 @@ def placed_bodies(mechanism: Mechanism, at_zero: bool = False) -> dict[str, Plac
         w = parent.w + frame.apply(spin)
         arm = -R.apply(joint.child_position)
         v_joint = parent.v + np.cross(parent.w, at) + frame.apply(slide)
-        found[joint.child] = Placed(parent.p + at + arm, R, v_joint + np.cross(w, arm), w)
+        found[joint.child] = BodyStart(parent.p + at + arm, R, v_joint + np.cross(w, arm), w)
     return found
 
 
@@ -190,11 +190,11 @@ def _moved(joint: Joint, q: Array, v: Array) -> tuple[Array, Rotation, Array, Ar
     return shift, turn, slide, turn.apply(v[-3:])
 
 
-def made_bodies(mechanism: Mechanism, allow_planar: bool) -> list[General | Planar]:
+def made_bodies(mechanism: Mechanism, allow_planar: bool) -> list[GeneralBody | Planar]:
     """The bodies, plane ones with three coordinates where that is allowed."""
     plane = _plane(mechanism) if allow_planar else None
     if plane is None:
-        return [General(body.mass, np.array(body.inertia)) for body in mechanism.bodies]
+        return [GeneralBody(body.mass, np.array(body.inertia)) for body in mechanism.bodies]
     placed = placed_bodies(mechanism, at_zero=True)
     return [
         Planar(

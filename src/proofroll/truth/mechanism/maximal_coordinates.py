@@ -22,9 +22,14 @@ from proofroll.elements.mechanism.record import Record, gathered
 from proofroll.elements.mechanism.rotations import Array
 from proofroll.elements.mechanism.stepping import integrated
 from proofroll.truth.mechanism.borrowed_mass import lent_wrenches, with_borrowed_mass
-from proofroll.truth.mechanism.maximal_bodies import View
-from proofroll.truth.mechanism.maximal_equations import Connection, Equations, MaximalEquations, Row
-from proofroll.truth.mechanism.maximal_taylor import Taylor
+from proofroll.truth.mechanism.maximal_bodies import BodyInScalars
+from proofroll.truth.mechanism.maximal_equations import (
+    Connection,
+    ConstrainedEquations,
+    ConstraintRow,
+    MaximalEquations,
+)
+from proofroll.truth.mechanism.maximal_taylor import MaximalTaylor
 
 RANK = 1e-8  # see analysis.RANK; this route finds its own rank
 
@@ -33,7 +38,7 @@ RANK = 1e-8  # see analysis.RANK; this route finds its own rank
 class Solved:
     """Accelerations u̇ and multipliers at one state, with what eliminates violations."""
 
-    equations: Equations
+    equations: ConstrainedEquations
     acceleration: Array
     multipliers: Array
     C: Array
@@ -42,7 +47,7 @@ class Solved:
     back: Array
 
 
-class Numbers:
+class NumericEquations:
     """The equations of :class:`MaximalEquations` in numbers, solved by projection with a fixed rank."""
 
     def __init__(self, equations: MaximalEquations) -> None:
@@ -113,7 +118,7 @@ class Numbers:
         u -= found.into @ (found.back @ (found.C @ u))
         return self.normalised(state)
 
-    def _matrix(self, rows: Sequence[Row]) -> Array:
+    def _matrix(self, rows: Sequence[ConstraintRow]) -> Array:
         C = np.zeros((len(rows), self.equations.nu))
         for number, row in enumerate(rows):
             for place, value in row.coefficients.items():
@@ -131,19 +136,19 @@ class MaximalCoordinates:
     def __init__(self, mechanism: Mechanism) -> None:
         mechanism, self._loans = with_borrowed_mass(mechanism)
         self.mechanism = mechanism
-        self.lean = Numbers(MaximalEquations(mechanism, allow_planar=True))
-        self._whole = Numbers(MaximalEquations(mechanism, allow_planar=False))
+        self.lean = NumericEquations(MaximalEquations(mechanism, allow_planar=True))
+        self._whole = NumericEquations(MaximalEquations(mechanism, allow_planar=False))
         self._armature = np.array([joint.armature for joint in mechanism.joints for _ in range(joint.nv)])
-        self._compiled: dict[bool, Taylor] = {}
+        self._compiled: dict[bool, MaximalTaylor] = {}
 
-    def taylor(self, long_double: bool = False) -> Taylor:
+    def taylor(self, long_double: bool = False) -> MaximalTaylor:
         """The compiled integrator; the first call compiles, seconds.
 
         Raises:
             Missing: heyoka is not installed.
         """
         if long_double not in self._compiled:
-            self._compiled[long_double] = Taylor(self.lean.equations, self.lean.independent_rows(), long_double)
+            self._compiled[long_double] = MaximalTaylor(self.lean.equations, self.lean.independent_rows(), long_double)
         return self._compiled[long_double]
 
     def run_taylor(self, times: Array, long_double: bool = False) -> Record:
@@ -191,7 +196,7 @@ class MaximalCoordinates:
             "residual": np.array([np.abs(found.residual).max(initial=0.0), np.abs(found.C @ u).max(initial=0.0)]),
         }
 
-    def _complete(self, views: list[View], angles: Array) -> Array:
+    def _complete(self, views: list[BodyInScalars], angles: Array) -> Array:
         """The state of bodies with all their coordinates."""
         x: list[float] = []
         u: list[float] = []
@@ -201,7 +206,7 @@ class MaximalCoordinates:
             u += [*view.v, *R.inv().apply(np.array(view.w, dtype=float))]
         return np.array([*x, *u, *angles])
 
-    def _wrenches(self, found: Solved, views: list[View]) -> Array:
+    def _wrenches(self, found: Solved, views: list[BodyInScalars]) -> Array:
         wrenches = np.zeros((len(self._whole.equations.connections), 6))
         for row, multiplier in zip(found.equations.rows, found.multipliers, strict=True):
             wrenches[row.connection] += multiplier * np.array([*row.force, *row.torque])
@@ -219,7 +224,7 @@ class MaximalCoordinates:
             wrenches[: len(joints)] -= lent
         return wrenches
 
-    def _needed(self, name: str, found: Solved, views: list[View]) -> Array:
+    def _needed(self, name: str, found: Solved, views: list[BodyInScalars]) -> Array:
         """Force, and moment about the world's origin, that move what a body borrowed as the body moves."""
         i, loan = self.mechanism.body_index[name], self._loans[name]
         R, w = np.array(views[i].R, dtype=float), np.array(views[i].w, dtype=float)
@@ -232,13 +237,13 @@ class MaximalCoordinates:
         moment = inertia @ alpha + np.cross(w, inertia @ w) + np.cross(np.array(views[i].r, dtype=float) + arm, force)
         return np.concatenate([force, moment])
 
-    def _point(self, views: list[View], body: str, position: Any) -> Array:
+    def _point(self, views: list[BodyInScalars], body: str, position: Any) -> Array:
         i = self.mechanism.body_index[body]
         com = np.zeros(3) if body == WORLD else np.array(self.mechanism.bodies[i].com)
         point: Array = np.array(views[i].r) + np.array(views[i].R) @ (np.array(position) - com)
         return point
 
-    def _energy(self, views: list[View], angles: Array) -> float:
+    def _energy(self, views: list[BodyInScalars], angles: Array) -> float:
         energy = 0.0
         for view, body in zip(views, self.mechanism.bodies, strict=False):
             v, spin = np.array(view.v, dtype=float), np.array(view.R).T @ np.array(view.w, dtype=float)
@@ -261,7 +266,7 @@ class MaximalCoordinates:
                 energy += 0.5 * joint.stiffness * float(A[:, 2] @ d - joint.rest) ** 2
         return energy
 
-    def _relative(self, views: list[View]) -> tuple[Array, Array]:
+    def _relative(self, views: list[BodyInScalars]) -> tuple[Array, Array]:
         """Coordinates (angles within half a turn) and velocities of the tree's joints, from the bodies' own."""
         q: list[float] = []
         v: list[float] = []
@@ -274,7 +279,7 @@ class MaximalCoordinates:
         return np.array(q), np.array(v)
 
 
-def _between(c: Connection, views: list[View]) -> tuple[Array, Array, Array, Array]:
+def _between(c: Connection, views: list[BodyInScalars]) -> tuple[Array, Array, Array, Array]:
     """Distance of a connection's points, its rate as seen from a, and its frames, world axes."""
     a, b = views[c.a], views[c.b]
     R_a, R_b = np.array(a.R, dtype=float), np.array(b.R, dtype=float)

@@ -18,7 +18,7 @@ from proofroll.elements.mechanism.checks import WORLD
 from proofroll.elements.mechanism.joint import FACTS
 from proofroll.elements.mechanism.model import Mechanism
 from proofroll.elements.mechanism.rotations import Array
-from proofroll.truth.mechanism.maximal_bodies import GROUND, View, made_bodies, placed_bodies
+from proofroll.truth.mechanism.maximal_bodies import GROUND, BodyInScalars, made_bodies, placed_bodies
 from proofroll.truth.mechanism.scalars import (
     Scalar,
     add,
@@ -54,7 +54,7 @@ class Connection:
 
 
 @dataclass
-class Row:
+class ConstraintRow:
     """One constraint: Φ = 0, Σ coefficient·u = 0, Σ coefficient·u̇ + bias = 0, and what it applies to body b."""
 
     residual: Scalar
@@ -68,23 +68,23 @@ class Row:
 class Drive(NamedTuple):
     """The armature of a joint whose rate is Σ coefficient·u of the row: λ = −inertia·(Σ coefficient·u̇ + bias)."""
 
-    row: Row
+    row: ConstraintRow
     inertia: float
 
 
 @dataclass(frozen=True)
-class Equations:
+class ConstrainedEquations:
     """M u̇ = force + Cᵀλ, C u̇ + bias = 0, and the rates of coordinates and of angles that springs remember.
 
     ``drives``: the armature of joints. ``laws``: force and moment of each joint's own spring, damper and drive on its
     child, at the joint, world axes.
     """
 
-    rows: list[Row]
+    rows: list[ConstraintRow]
     force: list[Scalar]
     rate: list[Scalar]
     angle_rate: list[Scalar]
-    views: list[View]
+    views: list[BodyInScalars]
     laws: list[tuple[list[Scalar], list[Scalar]]]
     drives: list[Drive]
 
@@ -145,7 +145,7 @@ class MaximalEquations:
         angles = [self.mechanism.joints[k].q0[n] for k, n in self.angles]
         return np.array([s for x, _ in starts for s in x] + [s for _, u in starts for s in u] + angles)
 
-    def at(self, state: Sequence[Scalar], functions: Mapping[str, Any] = FUNCTIONS) -> Equations:
+    def at(self, state: Sequence[Scalar], functions: Mapping[str, Any] = FUNCTIONS) -> ConstrainedEquations:
         """The equations for a state as :meth:`start` gives it, of any scalars; quaternions of unit length."""
         x, u, angles = state[: self.nx], state[self.nx : self.nx + self.nu], state[self.nx + self.nu :]
         views = [
@@ -159,7 +159,7 @@ class MaximalEquations:
             weight = [float(body.mass * g) for g in self.mechanism.gravity]
             force += plus(body.gyroscopic(u[at_u]), body.projected(view, weight, _NONE))
             rate += body.rate(x[at_x], u[at_u])
-        rows: list[Row] = []
+        rows: list[ConstraintRow] = []
         laws, angle_rate = [], []
         for number, connection in enumerate(self.connections):
             rows += self._rows_of(number, connection, views)
@@ -183,7 +183,7 @@ class MaximalEquations:
             for number, joint in enumerate(self.mechanism.joints)
             if joint.armature
         ]
-        return Equations(rows, force, rate, angle_rate, views, laws, drives)
+        return ConstrainedEquations(rows, force, rate, angle_rate, views, laws, drives)
 
     def _connection(
         self, kind: str, a: str, b: str, at_a: Sequence[float], at_b: Sequence[float], frame_a: Array, frame_b: Array
@@ -198,7 +198,7 @@ class MaximalEquations:
     def _apply(
         self,
         force: list[Scalar],
-        views: list[View],
+        views: list[BodyInScalars],
         body: int,
         push: Sequence[Scalar],
         arm: Sequence[Scalar],
@@ -211,7 +211,7 @@ class MaximalEquations:
         for place, entry in enumerate(entries, self.u_slices[body].start):
             force[place] = add(force[place], entry)
 
-    def _rows_of(self, number: int, c: Connection, views: list[View]) -> list[Row]:
+    def _rows_of(self, number: int, c: Connection, views: list[BodyInScalars]) -> list[ConstraintRow]:
         a, b = views[c.a], views[c.b]
         A, B = _columns(product(a.R, c.frame_a)), _columns(product(b.R, c.frame_b))
         arm_a, arm_b = turned(a.R, c.place_a), turned(b.R, c.place_b)
@@ -236,7 +236,7 @@ class MaximalEquations:
             rows.append(self._row(number, views, dot(x, y), bias, (_NONE, t), (_NONE, back), (_NONE, t)))
         return rows
 
-    def _rate_row(self, number: int, kind: str, views: list[View]) -> Row:
+    def _rate_row(self, number: int, kind: str, views: list[BodyInScalars]) -> ConstraintRow:
         """The rate of a revolute or prismatic joint's coordinate as a row; its wrench acts along the coordinate."""
         c = self.connections[number]
         a, b = views[c.a], views[c.b]
@@ -247,7 +247,7 @@ class MaximalEquations:
             return self._row(number, views, 0.0, bias, (_NONE, axis), (_NONE, back), (_NONE, axis))
         return self._sliding(number, views, axis)
 
-    def _sliding(self, number: int, views: list[View], n: Sequence[Scalar]) -> Row:
+    def _sliding(self, number: int, views: list[BodyInScalars], n: Sequence[Scalar]) -> ConstraintRow:
         """How far two points are apart along an axis that turns with body a, as a row."""
         c = self.connections[number]
         a, b = views[c.a], views[c.b]
@@ -263,13 +263,13 @@ class MaximalEquations:
     def _row(
         self,
         number: int,
-        views: list[View],
+        views: list[BodyInScalars],
         residual: Scalar,
         bias: Scalar,
         on_b: _Wrench,
         on_a: _Wrench,
         given: _Wrench,
-    ) -> Row:
+    ) -> ConstraintRow:
         """A row from what its unit multiplier applies to each body, and what that is at the joint on b."""
         c = self.connections[number]
         coefficients: dict[int, Scalar] = {}
@@ -279,10 +279,10 @@ class MaximalEquations:
                 for place, entry in enumerate(entries, self.u_slices[body].start):
                     if not is_zero(entry):
                         coefficients[place] = entry
-        return Row(residual, coefficients, bias, number, *given)
+        return ConstraintRow(residual, coefficients, bias, number, *given)
 
     def _law(
-        self, number: int, c: Connection, views: list[View], angles: list[Scalar], force: list[Scalar]
+        self, number: int, c: Connection, views: list[BodyInScalars], angles: list[Scalar], force: list[Scalar]
     ) -> tuple[tuple[list[Scalar], list[Scalar]], list[Scalar]]:
         """Force and moment of a joint's own spring, damper and drive on its child, added to the forces; angle rates."""
         joint, a, b = self.mechanism.joints[number], views[c.a], views[c.b]
@@ -319,7 +319,7 @@ def _along(joint: Any, q: Scalar, speed: Scalar) -> Scalar:
     return add(float(joint.torque), spring, mul(-joint.damping, speed) if joint.damping else 0.0)
 
 
-def _speed(view: View, arm: Sequence[Scalar]) -> list[Scalar]:
+def _speed(view: BodyInScalars, arm: Sequence[Scalar]) -> list[Scalar]:
     return plus(view.v, cross(view.w, arm))
 
 

@@ -13,7 +13,7 @@ import numpy as np
 
 from proofroll.core.errors import Diverged, Missing
 from proofroll.elements.mechanism.rotations import Array
-from proofroll.truth.mechanism.maximal_equations import Equations, MaximalEquations, Row
+from proofroll.truth.mechanism.maximal_equations import ConstrainedEquations, ConstraintRow, MaximalEquations
 from proofroll.truth.mechanism.scalars import Scalar, add, is_zero, mul, sub
 
 try:
@@ -27,7 +27,7 @@ except ImportError:  # no wheel for this platform
 _SMALL = 60
 
 
-class Taylor:
+class MaximalTaylor:
     """A compiled integrator of a mechanism; it starts anew on every run.
 
     Args:
@@ -75,7 +75,9 @@ class Taylor:
         return np.asarray(states)
 
 
-def accelerations(equations: MaximalEquations, found: Equations, rows: Sequence[Row]) -> list[Scalar]:
+def accelerations(
+    equations: MaximalEquations, found: ConstrainedEquations, rows: Sequence[ConstraintRow]
+) -> list[Scalar]:
     """u̇ = M⁻¹(force + Cᵀλ), λ from (C M⁻¹ Cᵀ) λ = −bias − C M⁻¹ force, solved sparsely in the scalars themselves.
 
     A drive is one row more, which yields by λ/inertia.

@@ -30,7 +30,7 @@ JUDGED = ("p_WB", "v_WB", "q_WB", "w_WB", "q", "v", "wrench", "points", "energy"
 
 
 @dataclass(frozen=True)
-class Truth:
+class TwoRouteMotion:
     """The motion that is taken to be true, and how well it is known.
 
     Attributes:
@@ -53,7 +53,7 @@ class Truth:
     checked_by: tuple[str, float] | None
 
 
-def find_truth(mechanism: Mechanism, times: Array, tolerance: float = 1e-15) -> Truth:
+def find_truth(mechanism: Mechanism, times: Array, tolerance: float = 1e-15) -> TwoRouteMotion:
     """The truth at the given times.
 
     Args:
@@ -104,7 +104,7 @@ def find_truth(mechanism: Mechanism, times: Array, tolerance: float = 1e-15) -> 
     checked = None
     if form is not None and form.motion is None:
         checked = (form.title, float(_largest(form.part(times) - form.same(best)).max()))
-    return Truth(masked, bars, differences, horizon, found.determinate, routes, checked)
+    return TwoRouteMotion(masked, bars, differences, horizon, found.determinate, routes, checked)
 
 
 def _singular(mechanism: Mechanism, until: float) -> str:

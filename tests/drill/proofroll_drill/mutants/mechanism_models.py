@@ -12,7 +12,7 @@ from proofroll.core.scene import Scene
 from proofroll.elements.mechanism import Mechanism
 from proofroll.elements.mechanism.element import MechanismElement
 from proofroll.elements.mechanism.joint_coordinates import JointCoordinates
-from proofroll.elements.mechanism.kinematics import Motion, Rows
+from proofroll.elements.mechanism.kinematics import BodyMotion, Rows
 from proofroll.elements.mechanism.rotations import Array
 from proofroll_drill.mutants.base import STEP, Mutant
 
@@ -226,7 +226,7 @@ class MissingRow(_Joints):
         found = JointCoordinates(mechanism, rank=1)
         whole = found.tree.loop_rows
 
-        def rows(motion: Motion) -> Rows:
+        def rows(motion: BodyMotion) -> Rows:
             return Rows(*(np.delete(part, 1, axis=0) for part in whole(motion)))  # type: ignore[arg-type]  # one row less of each
 
         found.tree.loop_rows = rows  # type: ignore[method-assign]  # that is the fault
@@ -244,7 +244,7 @@ class OutOfOrder(_Joints):
         found = JointCoordinates(mechanism)
         whole = found.inertial
 
-        def inertial(motion: Motion) -> tuple[Array, Array, Array]:
+        def inertial(motion: BodyMotion) -> tuple[Array, Array, Array]:
             J, M, loads = whole(motion)
             return J, np.diag(np.diag(M)), loads
 

@@ -12,7 +12,7 @@ from proofroll.core.engine import Sample
 from proofroll.core.scene import Scene
 from proofroll.elements.ball_on_surface.dataset import variables, with_samples_between
 from proofroll.elements.ball_on_surface.element import rolling_ball
-from proofroll.elements.ball_on_surface.motion import Motion
+from proofroll.elements.ball_on_surface.motion import BallMotion
 from proofroll.elements.ball_on_surface.observables import energy_balance, force_audit, rate_audit
 from proofroll.files.scene_file import load_scene
 from proofroll.running.recording import off_grid
@@ -159,7 +159,7 @@ def test_absent_forces_at_time_0_are_left_out(case: tuple[Scene, xr.Dataset]) ->
     assert "N" not in from_samples(scene, TIMES, samples), "only time 0 may lack a force"
 
 
-def vars_of(motion: Motion) -> tuple[np.ndarray, ...]:
+def vars_of(motion: BallMotion) -> tuple[np.ndarray, ...]:
     """Positions, velocities, spins and forces."""
     assert motion.force is not None
     return motion.p_WB, motion.v_WB, motion.w_WB, motion.force

@@ -9,7 +9,7 @@ from typing import Any, ClassVar
 import numpy as np
 from scipy.spatial.transform import Rotation
 
-from proofroll.robots.model import Array, Body, composed
+from proofroll.robots.model import Array, RobotBody, composed
 from proofroll.robots.protocol import AtState, Reading, Request, evaluate
 
 # One step of semi-implicit Euler shows the acceleration at its start exactly, whatever its length [s].
@@ -193,10 +193,10 @@ class _Loaded:
         R = _matrix(turned) @ A.T
         return np.array(place) - R @ c, R
 
-    def groups(self) -> dict[str, Body]:
+    def groups(self) -> dict[str, RobotBody]:
         """What each moving joint carries rigidly."""
         homes = {index: (index, np.zeros(3), np.eye(3)) for index in (-1, *self.indices)}
-        parts: dict[int, list[tuple[Body, Array, Array]]] = {index: [] for index in homes}
+        parts: dict[int, list[tuple[RobotBody, Array, Array]]] = {index: [] for index in homes}
         for index in range(-1, len(self.parents)):
             if index not in homes:
                 parent, position, rotation = self.parents[index]
@@ -205,5 +205,5 @@ class _Loaded:
                 homes[index] = (home, p + R @ (c + A @ position), R @ A @ rotation.T @ self.inertial(index)[3].T)
             home, p, R = homes[index]
             mass, moments, c, A = self.inertial(index)
-            parts[home].append((Body("", mass, c, A @ np.diag(moments) @ A.T), p, R))
+            parts[home].append((RobotBody("", mass, c, A @ np.diag(moments) @ A.T), p, R))
         return {name: composed(name, parts[index]) for name, index in self.link.items()}

@@ -95,7 +95,7 @@ def start(body: RollingBall, formulation: Formulation) -> FloatArray:
 
 
 @dataclass(frozen=True)
-class Equations:
+class ProjectionEquations:
     """In symbols.
 
     Attributes:
@@ -119,7 +119,7 @@ class Equations:
         return first**2 + second**2 - (mu * self.N) ** 2
 
 
-def equations(form: Structure) -> Equations:
+def equations(form: Structure) -> ProjectionEquations:
     """The equations of motion, derived in symbols from the projection method's matrices."""
     import heyoka as hy
 
@@ -163,7 +163,7 @@ def equations(form: Structure) -> Equations:
     acceleration = mobility @ (D.T @ (force - M * drift - rows.T @ multipliers))
     rates = [s[0], s[1], *(s[2:] if angles else []), *acceleration]
     system = [(variable, hy.expression(0.0) + rate) for variable, rate in zip([*u, *angles, *s], rates, strict=True)]
-    return Equations(system, N, (multipliers[0], multipliers[1]))
+    return ProjectionEquations(system, N, (multipliers[0], multipliers[1]))
 
 
 def _euler_angles(theta: Any, psi: Any, r: _Symbols) -> tuple[_Symbols, _Symbols, _Symbols]:

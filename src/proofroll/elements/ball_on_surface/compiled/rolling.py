@@ -122,7 +122,7 @@ class Function:
 
 
 @dataclass(frozen=True)
-class Reduced:
+class CompiledRolling:
     """Rolling without slip, compiled.
 
     Attributes:
@@ -135,14 +135,14 @@ class Reduced:
 
 
 @lru_cache(maxsize=16)
-def reduced(resistance: bool, uniform: bool, tolerance: float) -> Reduced:
+def reduced(resistance: bool, uniform: bool, tolerance: float) -> CompiledRolling:
     """The equations compiled for a tolerance of each step, relative to the state [-]; it also decides the order."""
     import heyoka as hy
 
     found = expressions(resistance, uniform)
     system = found.rolling()
     outputs = [*(rate for _, rate in system), found.per_A * found.b2, found.per_A * found.b3, found.N]
-    return Reduced(
+    return CompiledRolling(
         integrator=hy.taylor_adaptive(system, [1.0] * len(system), tol=tolerance),
         evaluate=Function(outputs, found.state),
     )

@@ -15,7 +15,7 @@ from proofroll.elements.ball_on_surface.report.wall import middle, wall
 from proofroll.files.json_data import plain
 from proofroll.files.netcdf import read_some
 from proofroll.report.labels import symbol, unit
-from proofroll.report.replay import Numbers, Replayed, frame_times
+from proofroll.report.replay import PackedNumbers, Replayed, frame_times
 
 # What the numbers of the picture are rounded to, powers of two: 8e-6 m, 6e-5 of a quaternion, 1e-3 N. None is seen.
 LENGTH, TURN, FORCE = 2.0**-17, 2.0**-14, 2.0**-10
@@ -34,7 +34,7 @@ def seen(scene: Scene) -> float:
     return _SEEN * rolling_ball(scene).ball.radius
 
 
-def drawn(replayed: Replayed) -> tuple[dict[str, Any], list[int], Numbers]:
+def drawn(replayed: Replayed) -> tuple[dict[str, Any], list[int], PackedNumbers]:
     """What the replay draws of a ball: see :data:`proofroll.report.replay.Drawer`."""
     body = rolling_ball(replayed.scene)
     coordinates = body.surface.coordinates
@@ -46,7 +46,7 @@ def drawn(replayed: Replayed) -> tuple[dict[str, Any], list[int], Numbers]:
     ]
     u = np.stack([np.interp(times, sampled["time"], sampled[name]) for name in coordinates], axis=1)
     built = wall(body, u)
-    numbers = Numbers()
+    numbers = PackedNumbers()
     numbers.put("points", -1, built.points.reshape(-1, 3), LENGTH)
     numbers.put("outward", -1, built.normals.reshape(-1, 3), TURN)
     numbers.put("middle", -1, middle(body, u), LENGTH)

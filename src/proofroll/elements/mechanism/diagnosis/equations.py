@@ -17,7 +17,7 @@ from scipy.spatial.transform import Rotation
 
 from proofroll.core.arrays import FloatArray
 from proofroll.core.diagnosis import Evidence
-from proofroll.elements.mechanism.kinematics import Motion, Tree
+from proofroll.elements.mechanism.kinematics import BodyMotion, Tree
 from proofroll.elements.mechanism.model import Mechanism
 from proofroll.elements.mechanism.placed import Placed
 from proofroll.elements.mechanism.rotations import skews
@@ -39,7 +39,7 @@ class State:
 
     q: FloatArray
     v: FloatArray
-    motion: Motion
+    motion: BodyMotion
     acceleration: FloatArray
 
 

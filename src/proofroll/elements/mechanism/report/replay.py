@@ -21,7 +21,7 @@ from proofroll.elements.mechanism.report.drawing import direction
 from proofroll.files.json_data import plain
 from proofroll.files.netcdf import read_some
 from proofroll.report.labels import symbol, unit
-from proofroll.report.replay import SPEEDS, Numbers, Replayed, frame_times
+from proofroll.report.replay import SPEEDS, PackedNumbers, Replayed, frame_times
 
 # Thickness of what is drawn, and what looks right, as parts of the mechanism's length.
 _SCALE, _SEEN = 0.035, 1e-3
@@ -42,7 +42,7 @@ def seen(scene: Scene) -> float:
     return _SEEN * _element(scene).length
 
 
-def drawn(replayed: Replayed) -> tuple[dict[str, Any], list[int], Numbers]:
+def drawn(replayed: Replayed) -> tuple[dict[str, Any], list[int], PackedNumbers]:
     """What the replay draws of a mechanism: see :data:`proofroll.report.replay.Drawer`."""
     element = _element(replayed.scene)
     mechanism, length = element.mechanism, element.length
@@ -60,7 +60,7 @@ def drawn(replayed: Replayed) -> tuple[dict[str, Any], list[int], Numbers]:
         for ghost in replayed.ghosts
     ]
     least = 2.0 ** math.floor(math.log2(length * _ROUNDED))
-    numbers = Numbers()
+    numbers = PackedNumbers()
     coms = {body.name: body.com for body in mechanism.bodies}
     com = np.stack([placed.point(*place) for place in coms.items()], axis=1)
     ends = [placed.point(body, at) for body, places in skeleton.items() for at in places]

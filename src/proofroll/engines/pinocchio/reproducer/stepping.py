@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from proofroll.elements.ball_on_surface.reproducer_source import assigned
 from proofroll.engines.pinocchio.integrators import PATIENCE, SHORT
-from proofroll.engines.pinocchio.mechanism import Mechanism
+from proofroll.engines.pinocchio.mechanism import BallWithRows
 from proofroll.engines.pinocchio.settings import PinocchioSettings
 
 _FIXED = '''
@@ -119,7 +119,7 @@ def source(settings: PinocchioSettings) -> str:
     return (_ADAPTIVE if settings.integrator == "dop853" else _FIXED) + _RUN
 
 
-def numbers(mechanism: Mechanism, settings: PinocchioSettings) -> str:
+def numbers(mechanism: BallWithRows, settings: PinocchioSettings) -> str:
     """Assignments: the start, and how it is integrated."""
     values = {"START_Q": mechanism.q0, "START_V": mechanism.v0, "FAINT": mechanism.faint}
     lines = f"ORIENTATION = {bool(settings.orientation)}\nPROJECTION = {settings.projection}\n"
