@@ -13,7 +13,8 @@ from proofroll.core.errors import Diverged
 from proofroll.elements.ball_on_surface.mechanics import always_pressed
 from proofroll.elements.ball_on_surface.model import RollingBall
 from proofroll.elements.ball_on_surface.motion import BallMotion
-from proofroll.truth.assemble import classic_step
+from proofroll.truth import unreduced_taylor
+from proofroll.truth.assemble import classic_step, joined
 from proofroll.truth.collocation import Step, System, next_length, nodes, take
 from proofroll.truth.contact import ContactRates
 from proofroll.truth.crossing import first_rise
@@ -24,6 +25,7 @@ _TOLERANCE = 1e-13  # of a step, relative to the scale of each variable
 _APPROACH = 0.5  # part of the time left until something stands still that one step may take, while it is far,
 _CLOSE = 0.99  # and when it is near, where the time left is well known
 _FURTHER = 1.2  # a polynomial is continued over this part of the length of its own step
+_MANY = 300  # steps of a leg that rolls: the rest of a longer one is left to a compiled series
 _STILL = 1e-9  # time left, relative to the pace of the motion, that is extrapolated
 
 
@@ -85,7 +87,10 @@ class Implicit:
         walk = _Walk(self._contact.system(sticking=True), time, state, until)
         resisted = self._body.contact.rolling_resistance > 0
         length = self._pace
+        compiled = self._held and self._body.wall_rate is None and unreduced_taylor.available(self._body)
         while walk.time < until:
+            if compiled and len(walk.steps) == _MANY:
+                return self._rolls_on(walk, until)
             left = self._until_still(walk.state, True) if resisted else np.inf
             if left < _STILL * self._pace:
                 halted = walk.state + left * self._contact.rates(walk.state[None, :], True)[0]
@@ -98,6 +103,21 @@ class Implicit:
                 when, why = min(ended, key=lambda item: item[0])
                 return walk.leg(self, True, when, walk.cut(when), why)
         return walk.leg(self, True, until, walk.state, End.TIME)
+
+    def _rolls_on(self, walk: _Walk, until: float) -> Leg[FloatArray]:
+        """The rest of a long leg by Taylor series of the same equations, which take a fraction of the time."""
+        y, begun = walk.state, walk.time
+        end, slips, states = unreduced_taylor.until_slip(self._body, begun, y[:6], until)
+
+        def at(times: FloatArray) -> FloatArray:
+            return np.concatenate([states(times), np.zeros((len(times), 3))], axis=1)
+
+        early = walk.leg(self, True, begun, y, End.TIME).motion
+
+        def motion(times: FloatArray) -> BallMotion:
+            return joined(times, begun, early, lambda late: self.motion(at(late), True))
+
+        return Leg(walk.start, end, True, at(np.array([end]))[0], End.CONE if slips else End.TIME, motion)
 
     def slip(self, time: float, state: FloatArray, until: float, slip: FloatArray | None = None) -> Leg[FloatArray]:
         """See :class:`Route`."""
@@ -186,14 +206,14 @@ class _Walk:
     """Steps of one leg, each controlled by its error."""
 
     def __init__(self, system: System, time: float, state: FloatArray, until: float) -> None:
-        self._system, self._start, self._state, self._until = system, time, state, until
+        self._system, self.start, self._state, self._until = system, time, state, until
         self.steps: list[Step] = []
 
     @property
     def time(self) -> float:
         """Reached so far [s]; exactly ``until`` at the end."""
         if not self.steps:
-            return self._start
+            return self.start
         end = self.steps[-1].time + self.steps[-1].length
         return self._until if self._until - end <= 4 * np.spacing(self._until) else end
 
@@ -251,4 +271,4 @@ class _Walk:
                     result.force[row] = route.force_at_start(y[row])
             return result
 
-        return Leg(self._start, end, sticking, state, why, motion)
+        return Leg(self.start, end, sticking, state, why, motion)

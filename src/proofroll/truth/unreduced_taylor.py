@@ -16,6 +16,7 @@ from __future__ import annotations
 
 import copy
 import threading
+from collections.abc import Callable
 from functools import cache
 from typing import Any
 
@@ -44,12 +45,56 @@ def unreduced(body: RollingBall, times: FloatArray) -> BallMotion:
     Raises:
         Diverged: the series could not be continued.
     """
+    series = _integrator(body, bounded=False)
+    series.time, series.state[:] = float(times[0]), np.concatenate([body.p0, body.v0, body.w0])
+    states = series.propagate_grid(np.asarray(times, dtype=np.float64))[-1] if len(times) > 1 else series.state[None, :]
+    if len(states) < len(times) or not np.all(np.isfinite(states)):
+        raise _stopped(series)
+    p, v, w = (np.array(part) for part in (states[:, :3], states[:, 3:6], states[:, 6:]))
+    force = np.array([newton_euler(body, *x)[2] for x in zip(p, v, w, strict=True)])
+    return BallMotion(p, v, w, force, "unreduced Newton-Euler, Taylor series")
+
+
+def until_slip(
+    body: RollingBall, time: float, state: FloatArray, until: float
+) -> tuple[float, bool, Callable[[FloatArray], FloatArray]]:
+    """Rolling under bounded friction, to where more is needed than there is.
+
+    Args:
+        body: the ball, always pressed against its wall, which is at rest.
+        time: at the start [s].
+        state: p and ω then, shape (6,).
+        until: the last time [s].
+
+    Returns:
+        The time of the end [s], whether the friction was used up there, and the states at times in between.
+
+    Raises:
+        Diverged: the series could not be continued.
+    """
+    series = _integrator(body, bounded=True)
+    series.time, series.state[:] = time, state
+    series.reset_cooldowns()
+    code, *_, dense, _ = series.propagate_until(until, c_output=True)
+    slips = int(code) == -1  # terminal events are numbered -1, -2, …
+    if not (slips or series.time == until) or not np.all(np.isfinite(series.state)):
+        raise _stopped(series)
+    return float(series.time), slips, lambda times: np.array(dense(times))
+
+
+def _stopped(series: Any) -> Diverged:
+    return Diverged(f"the truth (Taylor series in the world) could not be integrated past {series.time:g} s")
+
+
+def _integrator(body: RollingBall, bounded: bool) -> Any:
+    """The integrator with the body's numbers; one that is bounded ends where the friction is used up."""
     surface = body.surface
     if not hasattr(_local, "integrators"):
         _local.integrators = cache(_compiled)  # an integrator holds a state and must not be shared between threads
     # Cylinders and planes of all sizes share an integrator each.
     moves = body.wall_rate is not None
-    series = copy.copy(_local.integrators(surface if isinstance(surface, Declared) else type(surface), moves))
+    kind = surface if isinstance(surface, Declared) else type(surface)
+    series = copy.copy(_local.integrators(kind, moves, bounded))
     e1 = surface.normal(body.p0)
     values = [body.ball.radius, body.ball.inertia_ratio, *body.gravity]
     if isinstance(surface, Cylinder):
@@ -57,21 +102,23 @@ def unreduced(body: RollingBall, times: FloatArray) -> BallMotion:
         values += [*axis, np.sign(e1 @ (body.p0 - (body.p0 @ axis) * axis))]
     elif isinstance(surface, Plane):
         values += e1.tolist()
-    series.pars[:] = [*values, *(body.wall_rate if body.wall_rate is not None else ())]
-    series.time, series.state[:] = float(times[0]), np.concatenate([body.p0, body.v0, body.w0])
-    states = series.propagate_grid(np.asarray(times, dtype=np.float64))[-1] if len(times) > 1 else series.state[None, :]
-    if len(states) < len(times) or not np.all(np.isfinite(states)):
-        raise Diverged(f"the truth (Taylor series in the world) could not be integrated past {series.time:g} s")
-    p, v, w = (np.array(part) for part in (states[:, :3], states[:, 3:6], states[:, 6:]))
-    force = np.array([newton_euler(body, *x)[2] for x in zip(p, v, w, strict=True)])
-    return BallMotion(p, v, w, force, "unreduced Newton-Euler, Taylor series")
+    values += body.wall_rate.tolist() if body.wall_rate is not None else []
+    series.pars[:] = [*values, *([body.contact.mu_static] if bounded else [])]
+    return series
 
 
-def _compiled(surface: Declared | type[Surface], moves: bool) -> Any:
-    """The integrator on a declared surface, or on any cylinder or plane; ``moves`` if the wall turns along itself."""
+def _compiled(surface: Declared | type[Surface], moves: bool, bounded: bool) -> Any:
+    """The integrator on a declared surface, or on any cylinder or plane.
+
+    Args:
+        surface: the wall.
+        moves: whether it turns along itself.
+        bounded: to the end of the friction, in p and ω alone, for rolling on a wall at rest v = a e1 × ω; what then is
+            not a state cannot drift.
+    """
     import heyoka as hy
 
-    p, v, w = (hy.make_vars(*(f"{name}{axis}" for axis in "xyz")) for name in "pvw")
+    p, free, w = (hy.make_vars(*(f"{name}{axis}" for axis in "xyz")) for name in "pvw")
     a, kappa = hy.par[0], hy.par[1]
     g, k, outward = [hy.par[i] for i in (2, 3, 4)], [hy.par[i] for i in (5, 6, 7)], hy.par[8]
 
@@ -88,23 +135,36 @@ def _compiled(surface: Declared | type[Surface], moves: bool) -> Any:
     if isinstance(surface, Declared):
         away = surface.distance(*p)
         e1 = [-hy.diff(away, x) for x in p]
-        e1_rate = [dot([hy.diff(component, x) for x in p], v) for component in e1]
     elif surface is Cylinder:
         radial = across(p, k)
         distance = hy.sqrt(dot(radial, radial))
         e1 = [outward * x / distance for x in radial]
+    else:
+        e1 = k
+    v = [a * x for x in cross(e1, w)] if bounded else free
+    if isinstance(surface, Declared):
+        e1_rate = [dot([hy.diff(component, x) for x in p], v) for component in e1]
+    elif surface is Cylinder:
         e1_rate = [outward * x / distance for x in across(across(v, k), e1)]
     else:
-        e1, e1_rate = k, [0.0, 0.0, 0.0]
+        e1_rate = [0.0, 0.0, 0.0]
     turning = cross(w, e1_rate)
     driven = [-a * ti for ti in turning]
+    first = (
+        {Cylinder: 9, Plane: 8}.get(surface, 5) if isinstance(surface, type) else 5
+    )  # parameter that is not taken yet
     if moves:  # the wall's velocity W × (p + a e1) grows at this rate
-        first = {Cylinder: 9, Plane: 8}.get(surface, 5) if isinstance(surface, type) else 5
         gained = cross([hy.par[first + i] for i in range(3)], [x + a * y for x, y in zip(v, e1_rate, strict=True)])
         driven = [x + y for x, y in zip(driven, gained, strict=True)]
     along_wall = across([(gi + kappa * di) / (1 + kappa) for gi, di in zip(g, driven, strict=True)], e1)
     normal = -dot(e1_rate, v)
     v_rate = [x + normal * e for x, e in zip(along_wall, e1, strict=True)]
     w_rate = [x / (kappa * a) for x in cross(e1, [x - gi for x, gi in zip(v_rate, g, strict=True)])]
-    system = list(zip([*p, *v, *w], [*v, *v_rate, *w_rate], strict=True))
-    return hy.taylor_adaptive(system, [1.0] * 9)
+    if not bounded:
+        return hy.taylor_adaptive(list(zip([*p, *v, *w], [*v, *v_rate, *w_rate], strict=True)), [1.0] * 9)
+    mu = hy.par[first]
+    force = [x - gi for x, gi in zip(v_rate, g, strict=True)]  # of the wall, of a unit of mass
+    pressed = -dot(force, e1)
+    friction = [x + pressed * e for x, e in zip(force, e1, strict=True)]
+    used_up = hy.t_event(dot(friction, friction) - (mu * pressed) ** 2, direction=hy.event_direction.positive)
+    return hy.taylor_adaptive(list(zip([*p, *w], [*v, *w_rate], strict=True)), [1.0] * 6, t_events=[used_up])

@@ -286,3 +286,30 @@ def test_long_sequences(
     assert len(follow(body, Implicit(body), until).events) == kinds
     assert counted["steps"] < 53 * kinds
     assert counted["jacobians"] < 81 * kinds
+
+
+def test_a_long_leg_is_handed_to_a_compiled_series(monkeypatch: pytest.MonkeyPatch) -> None:
+    """However long the ball rolls, collocation makes a bounded number of steps, and events and path stay the same."""
+    if not taylor.available():
+        pytest.skip("heyoka is not installed")
+    body, times = rolling_ball(cylinder(speed=10.0, mu_static=0.03)), np.linspace(0.0, 2.0, 7)
+    steps, take = [0], implicit.take
+
+    def counting(*arguments: Any) -> Any:
+        steps[-1] += 1
+        return take(*arguments)
+
+    monkeypatch.setattr(implicit, "take", counting)
+    paths = []
+    for many in (10**9, 3):
+        monkeypatch.setattr(implicit, "_MANY", many)
+        paths.append(follow(body, Implicit(body), 2.0))
+        steps.append(0)
+    (kinds, found), (others, again) = (zip(*path.events, strict=True) for path in paths)
+    assert kinds == others
+    assert len(kinds) > 1
+    assert again == pytest.approx(found, abs=1e-11, rel=0)
+    assert steps[1] < steps[0] - 20
+    whole, handed = (path.motion(times, "")[0] for path in paths)
+    for name in ("p_WB", "v_WB", "w_WB", "force"):
+        np.testing.assert_allclose(getattr(handed, name), getattr(whole, name), rtol=1e-10, atol=1e-10)
