@@ -9,7 +9,7 @@ from pathlib import Path
 
 import pytest
 
-from proofroll.core import engine
+from proofroll.core import engine_abilities
 
 ROOT = Path(__file__).resolve().parents[1]
 PAGE = (ROOT / "docs" / "write_an_engine.md").read_text(encoding="utf-8")
@@ -29,7 +29,7 @@ NAMES = table("Names to build on")
 
 def test_every_optional_protocol_is_named() -> None:
     """The page names each small protocol that an engine can follow besides, and no other."""
-    optional = {name for name, kind in vars(engine).items() if getattr(kind, "_is_runtime_protocol", False)}
+    optional = {name for name, kind in vars(engine_abilities).items() if getattr(kind, "_is_runtime_protocol", False)}
     assert optional == PROTOCOLS
 
 
@@ -57,7 +57,7 @@ def test_packages_of_engines_use_public_names_alone(package: Path) -> None:
     files = [file for file in package.rglob("*.py") if "build" not in file.parts]
     assert files
     public = {(module, name) for module, names in NAMES.items() for name in names}
-    public |= {("proofroll.core.engine", name) for name in PROTOCOLS}
+    public |= {("proofroll.core.engine_abilities", name) for name in PROTOCOLS}
     private = {f"{file.name}: {use}" for file in files for use in imported(file) - public}
     assert private == set()
     assert (package / "README.md").is_file()

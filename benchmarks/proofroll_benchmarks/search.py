@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 
 from proofroll.core.arrays import FloatArray
-from proofroll.core.engine import Level
+from proofroll.core.engine_abilities import Level
 from proofroll.core.errors import ProofrollError
 from proofroll.core.plugins import engine_names
 from proofroll.core.scene import Scene

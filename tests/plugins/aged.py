@@ -54,7 +54,7 @@ class Aged(Tiny):
 
     @staticmethod
     def defaults() -> dict[str, Any]:
-        """See :class:`proofroll.core.engine.TellsDefaults`."""
+        """See :class:`proofroll.core.engine_abilities.TellsDefaults`."""
         return {"iterations": 100 if age() >= (2,) else 50, "gravity": -9.81}
 
     @classmethod

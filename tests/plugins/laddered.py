@@ -8,7 +8,8 @@ from typing import Any, ClassVar, Literal, Self
 
 from tiny import Tiny, TinySettings
 
-from proofroll.core.engine import Level, Term, whole_steps
+from proofroll.core.engine import whole_steps
+from proofroll.core.engine_abilities import Level, Term
 from proofroll.core.errors import Refused
 from proofroll.core.scene import Scene
 from proofroll.elements.ball_on_surface.model import ROLLS, BallCapability

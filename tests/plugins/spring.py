@@ -15,7 +15,8 @@ from tiny import TinySettings
 from proofroll.core.arrays import FloatArray
 from proofroll.core.certificate import Line
 from proofroll.core.element import Element, FirstMotion, OptionalTerm, Sign, StepNumber
-from proofroll.core.engine import Level, Sample, Term, whole_steps
+from proofroll.core.engine import Sample, whole_steps
+from proofroll.core.engine_abilities import Level, Term
 from proofroll.core.gravity import Gravity
 from proofroll.core.numbers import Numbers
 from proofroll.core.observable import Observable, Role

@@ -6,7 +6,7 @@ import pytest
 from invented import stability_study, tradeoff_study
 
 from proofroll.core.comparison import Tolerance
-from proofroll.core.engine import TellsCaveats
+from proofroll.core.engine_abilities import TellsCaveats
 from proofroll.core.plugins import engine_names, load_engine
 from proofroll.report.labels import caveat_lines, with_caveat
 from proofroll.report.stability_tables import silent_lines

@@ -11,8 +11,9 @@ import numpy as np
 
 from proofroll.conformance.subject import Subject, bits, lacking, require, scenes
 from proofroll.core.certificate import certify, first_difference
-from proofroll.core.element import HasOptionalCapabilities
-from proofroll.core.engine import Sample, require_provided
+from proofroll.core.element_abilities import HasOptionalCapabilities
+from proofroll.core.engine import Sample
+from proofroll.core.engine_abilities import require_provided
 from proofroll.core.errors import Refused
 from proofroll.core.scene import Scene
 
@@ -71,7 +72,7 @@ def builds_only_what_is_required(subject: Subject) -> None:
     """What the scene requires is in the model; what it does not is not, unless a setting or the engine says why.
 
     The setting is one named as what can be asked for, ``orientation=true``; the engine's reasons are
-    :class:`proofroll.core.engine.CannotLeaveOut`.
+    :class:`proofroll.core.engine_abilities.CannotLeaveOut`.
     """
     engine = subject.build()
     terms = getattr(engine.built(), "terms", None)

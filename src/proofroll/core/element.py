@@ -9,13 +9,12 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
-from typing import TYPE_CHECKING, Any, ClassVar, Protocol, runtime_checkable
+from typing import TYPE_CHECKING, Any, ClassVar, Protocol
 
 import numpy as np
 import numpy.typing as npt
 
 from proofroll.core.arrays import FloatArray
-from proofroll.core.events import Event
 from proofroll.core.gravity import Gravity
 from proofroll.core.numbers import Numbers
 from proofroll.core.observable import Observable
@@ -86,7 +85,7 @@ class OptionalTerm:
         because: what it is for, or with which numbers it is tried.
         put, taken: parameters of the scene with it and without.
         asks: what is asked for with it, besides the motion.
-        capability: of an engine that cannot leave it out (:class:`proofroll.core.engine.CannotLeaveOut`).
+        capability: of an engine that cannot leave it out (:class:`proofroll.core.engine_abilities.CannotLeaveOut`).
     """
 
     name: str
@@ -179,156 +178,6 @@ class Element(Protocol):
 
     def optional_terms(self, parameters: Mapping[str, float], truth: xr.Dataset) -> list[OptionalTerm]:
         """Parts of the model that the scene's parameters put in or take out."""
-
-
-@dataclass(frozen=True)
-class SeenInRun:
-    """What a watch saw.
-
-    Attributes:
-        samples: how many of the samples are of the scene.
-        events: in order; None: it has nothing to say of events.
-        ended: why the run ends where it does though nothing failed, or None.
-    """
-
-    samples: int
-    events: Sequence[Event] | None
-    ended: str | None = None
-
-
-class RunWatch(Protocol):
-    """Follows one run."""
-
-    def over(self, sample: Sample) -> bool:
-        """Whether the model is no longer that of the scene, so that the run ends here."""
-
-    def conclude(self, times: FloatArray, samples: Sequence[Sample], located: Sequence[Event] | None) -> SeenInRun:
-        """What was seen.
-
-        Args:
-            times: of the samples [s]; there may be fewer samples.
-            samples: of the element.
-            located: the engine's own events (:class:`proofroll.core.engine.LocatesEvents`), or None.
-        """
-
-
-@runtime_checkable
-class WatchesRuns(Protocol):
-    """What an element has besides, if it has events, or if a run can leave the scene."""
-
-    def watch(self, asks: Sequence[str]) -> RunWatch:
-        """A watch over a run that is about to begin."""
-
-    def common_span(
-        self, truth: xr.Dataset, runs: Mapping[Any, xr.Dataset]
-    ) -> tuple[xr.Dataset, dict[Any, xr.Dataset]]:
-        """The truth and runs of it as far as they are comparable."""
-
-
-@runtime_checkable
-class HasOptionalCapabilities(Protocol):
-    """What an element has besides, if scenes of its kind may do without some of what a formulation can provide."""
-
-    @property
-    def optional(self) -> frozenset[str]:
-        """Capabilities that are in an engine's model only where :attr:`Element.requires` or a question names them."""
-
-
-@runtime_checkable
-class KnowsAnotherScene(Protocol):
-    """What an element has besides, if a model of it can be of another kind though each of its numbers is allowed."""
-
-    def another_scene(self, lines: Sequence[Mapping[str, Any]], truth: xr.Dataset) -> str | None:
-        """Why the model is of another kind, as one clause; None: it is of the same.
-
-        Args:
-            lines: of a stored certificate (:meth:`proofroll.core.certificate.Line.as_dict`).
-            truth: the true run.
-        """
-
-
-@runtime_checkable
-class ExplainsErrors(Protocol):
-    """What an element has besides, if it can say why a bounded path is wrong."""
-
-    def cause(self, dataset: xr.Dataset, error: float) -> str | None:
-        """What an ``error`` of the deciding observable, in its unit, comes from at the end of a run.
-
-        A name that ``meanings`` has; None: nothing that the element knows of.
-        """
-
-
-@dataclass(frozen=True)
-class FailedRun:
-    """A run beyond a boundary of a stability map, for a program that shows its failure.
-
-    Attributes:
-        scene, parameters, engine, version, settings, resolution, until, every: the case.
-        where: the point of the map, for a person.
-        boundary: ``stable`` or ``accurate``.
-        failure: its name.
-        silent: whether the engine does not say so.
-        truth: the true run, or None.
-        scale, allowed: range of the deciding observable, and part of it that its error may be.
-        note: why the program asks proofroll, or nothing.
-    """
-
-    scene: str
-    parameters: Mapping[str, float]
-    engine: str
-    version: str
-    settings: Mapping[str, Any]
-    resolution: str
-    until: float
-    every: float
-    where: str
-    boundary: str
-    failure: str
-    silent: bool
-    truth: xr.Dataset | None
-    scale: float
-    allowed: float
-    note: str
-
-    def lines(self, what: str, head: str) -> list[str]:
-        """The first words of the program: what fails where, and what it needs.
-
-        Args:
-            what: happens, in a few words.
-            head: the program's lines of imports.
-        """
-        numbers = ", ".join(f"{name} = {value:g}" for name, value in self.parameters.items()) or "default parameters"
-        settings = ", ".join(f"{key}={value}" for key, value in self.settings.items())
-        needs = " and ".join(imported(head))
-        return [
-            f"{self.engine} {self.version}: {self.failure} ({self.where}).",
-            "",
-            f"{what} ({self.scene}, {numbers}).",
-            f"Beyond the largest {self.resolution} that is {self.boundary}. "
-            + ("The engine does not say so." if self.silent else "The engine says so."),
-            f"Settings: {settings}.",
-            *([f"Why proofroll: {self.note}."] if self.note else []),
-            f"Needs {needs} alone. Exit code 1: the failure shows.",
-        ]
-
-
-def imported(head: str) -> list[str]:
-    """Packages that lines of imports name."""
-    lines = [line.split() for line in head.splitlines() if line.startswith(("import ", "from "))]
-    return list(dict.fromkeys(words[1].partition(".")[0] for words in lines))
-
-
-@runtime_checkable
-class WritesPrograms(Protocol):
-    """What an element has besides, if it can write a program that shows the failure of a run."""
-
-    def failure_program(self, failed: FailedRun, engine: str | None) -> str:
-        """Source of the program, which exits with 1 if the failure shows.
-
-        Args:
-            failed: the run.
-            engine: the engine's own part (:class:`proofroll.core.engine.Reproduces`); None: it asks proofroll.
-        """
 
 
 class ElementKind(Protocol):

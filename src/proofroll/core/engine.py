@@ -7,14 +7,12 @@ NaN, timeouts and files. An adapter knows surfaces and contact laws, never a sce
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping, Sequence
+from collections.abc import Mapping
 from dataclasses import dataclass, field
-from enum import StrEnum
-from typing import Any, ClassVar, Protocol, Self, runtime_checkable
+from typing import Any, ClassVar, Protocol, Self
 
 from proofroll.core.arrays import FloatArray
-from proofroll.core.errors import InputError, Refused
-from proofroll.core.events import Event
+from proofroll.core.errors import InputError
 from proofroll.core.scene import Scene
 
 
@@ -155,152 +153,6 @@ class Engine(Protocol):
         """What was built, read back from the engine. Called at time 0; changes nothing."""
 
 
-@runtime_checkable
-class LocatesEvents(Protocol):
-    """What an engine has besides, if it locates stick-slip events more closely than its samples tell."""
-
-    def events(self) -> Sequence[Event]:
-        """The events so far, in order, each with its bracket (one step wide for a fixed step)."""
-
-
-@runtime_checkable
-class TellsRemarks(Protocol):
-    """What an engine has besides, if there is something about a run that a person should know though it went well."""
-
-    def remarks(self) -> Sequence[str]:
-        """One clause each, without a full stop; none if there is nothing to say."""
-
-
-class Level(StrEnum):
-    """How much of the scene a formulation models, from the least to the most: the rungs of the ladder."""
-
-    CLOSED_FORM = "closed form"
-    REDUCED = "reduced equations"
-    PROJECTION = "projection DAE"
-    CONSTRAINT = "engine constraint"
-    CONTACT = "engine contact"
-    FACETS = "faceted wall"
-
-
-@dataclass(frozen=True)
-class Term:
-    """A part of a model that can be switched on and off by a setting.
-
-    Attributes:
-        name: for a person, e.g. ``elimination of violations``.
-        formulations: those that have it.
-        on, off: settings with and without it, put over a preset.
-        because: what it is for.
-        rung: whether a model with it is a rung of the ladder by itself, as a contact of more dimensions is.
-    """
-
-    name: str
-    formulations: tuple[str, ...]
-    on: Mapping[str, Any]
-    off: Mapping[str, Any]
-    because: str
-    rung: bool = False
-
-
-@runtime_checkable
-class TellsLevels(Protocol):
-    """What an engine has besides, to be put on the ladder of models.
-
-    Attributes:
-        levels: formulation -> its rung.
-        terms: what can be switched on and off.
-    """
-
-    levels: ClassVar[Mapping[str, Level]]
-    terms: ClassVar[Sequence[Term]]
-
-
-@runtime_checkable
-class TellsCaveats(Protocol):
-    """What an engine has besides, if some of its settings are not what the engine alone would do.
-
-    An integrator of proofroll's around an engine's terms, say: whoever reads a verdict must not blame the engine.
-    """
-
-    @staticmethod
-    def caveat(settings: Any) -> str:
-        """What is not the engine's own with these settings: one clause without a full stop; empty: nothing."""
-
-
-@runtime_checkable
-class TellsDefaults(Protocol):
-    """What an engine has besides, if it can say what it takes where nobody chooses: for comparing its versions."""
-
-    @staticmethod
-    def defaults() -> Mapping[str, Any]:
-        """Read from the engine itself: name -> number, text or list of numbers."""
-
-
-@runtime_checkable
-class SupportsFrom(Protocol):
-    """What an engine has besides, if its adapter does not run on every version of it.
-
-    Attributes:
-        oldest: version of the engine from which on it does; an older one is refused with both versions.
-    """
-
-    oldest: ClassVar[str]
-
-
-@runtime_checkable
-class WritesModels(Protocol):
-    """What an engine has besides, if its own tools read a file of the model that it builds."""
-
-    @classmethod
-    def model_file(cls, scene: Scene, settings: Any) -> str:
-        """The text of that file.
-
-        Raises:
-            Refused: there is none for this scene or formulation.
-        """
-
-
-@runtime_checkable
-class Reproduces(Protocol):
-    """What an engine has besides, if it can write a program that shows its behaviour without proofroll."""
-
-    @classmethod
-    def reproducer(cls, scene: Scene, settings: Any) -> str:
-        """Source of a program with numpy and the engine's own interface alone.
-
-        It assigns RADIUS [m], MASS [kg], INERTIA [kg m²], GRAVITY [m/s²] and the start, and defines ``frame(p)``,
-        ``gap(p)`` (:func:`reproducer_source.wall_source`) and ``run(times)``, a generator of the ball's centre,
-        velocity and angular velocity in the world at each of the times [s]; where the engine says that it has failed,
-        ``run`` raises RuntimeError with its words.
-
-        Raises:
-            Refused: there is no program for this; the text says why.
-        """
-
-
-@runtime_checkable
-class CannotLeaveOut(Protocol):
-    """What an engine has besides, if some of its models hold what no scene asked for and no setting takes away.
-
-    Attributes:
-        inherent: formulation -> what is always in its model -> why.
-    """
-
-    inherent: ClassVar[Mapping[str, Mapping[str, str]]]
-
-
-@runtime_checkable
-class SharesEquations(Protocol):
-    """What an engine has besides, if some of its formulations rest on the equations of a route of the truth.
-
-    Attributes:
-        shares: formulation -> routes (the part of a route's name before the comma or bracket). Where the truth takes
-            such a route, agreement with it is news only as far as the other route agrees too, and is marked.
-    """
-
-    shares: ClassVar[Mapping[str, Sequence[str]]]
-
-
 def fixed_step(settings: Settings) -> float | None:
     """The step of settings with a fixed one [s], or None."""
     step: float | None = getattr(settings, settings.resolution) if settings.resolution == "dt" else None
@@ -323,28 +175,3 @@ def whole_steps(start: float, end: float, dt: float) -> int:
             f"sample every {near:.6g} s (`every`) or choose a step that divides the interval, as {less:.6g} s",
         )  # fmt: skip
     return steps
-
-
-@runtime_checkable
-class SaysWhyNot(Protocol):
-    """What an engine has besides, if it can say why a formulation does not provide something.
-
-    Attributes:
-        lacking: formulation -> what it does not provide -> why, as the end of a sentence.
-    """
-
-    lacking: ClassVar[Mapping[str, Mapping[str, str]]]
-
-
-def require_provided(engine: Any, formulation: str, scene: Scene) -> None:
-    """Compares what a scene requires with what a formulation provides.
-
-    Raises:
-        Refused: it lacks something; the text says what, and why if the engine says it.
-    """
-    reasons = engine.lacking.get(formulation, {}) if isinstance(engine, SaysWhyNot) else {}
-    missing = sorted(scene.requires - engine.provides[formulation])
-    if missing:
-        raise Refused(
-            "needs " + ", ".join(f"{name}, and {reasons[name]}" if name in reasons else name for name in missing)
-        )

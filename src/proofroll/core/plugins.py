@@ -12,7 +12,7 @@ from importlib.util import find_spec
 from typing import Any
 
 from proofroll.core.element import ElementKind
-from proofroll.core.engine import SupportsFrom
+from proofroll.core.engine_abilities import SupportsFrom
 from proofroll.core.errors import InputError, Missing, ProofrollError, place
 
 GROUP = "proofroll.engines"

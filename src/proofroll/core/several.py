@@ -7,7 +7,8 @@ from collections.abc import Mapping, Sequence
 from typing import Any
 
 from proofroll.core.element import Element
-from proofroll.core.engine import LocatesEvents, Sample, TellsRemarks, require_provided
+from proofroll.core.engine import Sample
+from proofroll.core.engine_abilities import LocatesEvents, TellsRemarks, require_provided
 from proofroll.core.events import Event
 from proofroll.core.scene import Scene
 
@@ -64,6 +65,6 @@ def sample_of(scene: Scene, element: Element, sample: AnySample) -> Sample:
 
 
 def events_of_engine(engine: Any, element: Element) -> Sequence[Event] | None:
-    """What the engine itself located for an element (:class:`proofroll.core.engine.LocatesEvents`); None: nothing."""
+    """What the engine located for an element (:class:`proofroll.core.engine_abilities.LocatesEvents`), or None."""
     part = engine.parts[element.name] if isinstance(engine, EachAlone) else engine
     return list(part.events()) if isinstance(part, LocatesEvents) else None

@@ -6,7 +6,7 @@ from collections.abc import Mapping, Sequence
 from typing import Any
 
 from proofroll.core.comparison import Tolerance
-from proofroll.core.engine import Level
+from proofroll.core.engine_abilities import Level
 from proofroll.report.labels import SYMBOLS, caveat_lines, verdict_text
 from proofroll.report.labels import number as short
 from proofroll.report.terminal import columns, number, step

@@ -39,7 +39,7 @@ class EngineFacts:
         settings: complete settings, by name.
         resolution: name of the setting that trades speed for accuracy, ``dt`` or ``rtol``.
         order: declared order of convergence, or None.
-        shares: routes of the truth whose equations it rests on, see :class:`proofroll.core.engine.SharesEquations`.
+        shares: routes of the truth that it shares, see :class:`proofroll.core.engine_abilities.SharesEquations`.
         caveat: what of these settings is not the engine's own, to be said wherever it is judged; empty: nothing.
         libraries: versions of Python, numpy and scipy, on which the last digits hang; in another interpreter also a
             hash of all its packages.

@@ -39,7 +39,7 @@ ASIDE = frozenset(
 
 def describe(engine: str) -> dict[str, Any]:
     """What an engine is and provides, and where its formulations stand on the ladder of models."""
-    from proofroll.core.engine import CannotLeaveOut, TellsDefaults, TellsLevels
+    from proofroll.core.engine_abilities import CannotLeaveOut, TellsDefaults, TellsLevels
     from proofroll.running.loading import load
 
     kind = load(engine)
@@ -70,7 +70,7 @@ def resolve(engine: str, options: dict[str, Any], requires: Sequence[str] = ()) 
             raise InputError("truth", ", ".join(options), "the truth has no settings; leave them out")
         code = digest([Path(inspect.getfile(truth)).parent for truth in load_truths()])
         return dataclasses.asdict(EngineFacts("truth", truth_version(), code, {}))
-    from proofroll.core.engine import SharesEquations, TellsCaveats
+    from proofroll.core.engine_abilities import SharesEquations, TellsCaveats
     from proofroll.core.plugins import resolve_settings
     from proofroll.running.handshake import libraries
     from proofroll.running.loading import load

@@ -5,7 +5,7 @@ from __future__ import annotations
 import dataclasses
 from typing import Any
 
-from proofroll.core.engine import WritesModels
+from proofroll.core.engine_abilities import WritesModels
 from proofroll.core.errors import Refused
 from proofroll.running.case import Case
 from proofroll.running.loading import loaded, scene_of

@@ -12,8 +12,10 @@ import numpy as np
 
 from proofroll.core.arrays import FloatArray
 from proofroll.core.dataset import add_events, from_samples
-from proofroll.core.element import Element, WatchesRuns
-from proofroll.core.engine import Sample, TellsRemarks
+from proofroll.core.element import Element
+from proofroll.core.element_abilities import WatchesRuns
+from proofroll.core.engine import Sample
+from proofroll.core.engine_abilities import TellsRemarks
 from proofroll.core.errors import Diverged, lack_behind
 from proofroll.core.events import Event
 from proofroll.core.scene import Scene
@@ -65,7 +67,7 @@ class Recording:
         wall_seconds: spent inside ``advance`` [s].
         advancing, sampling: spent inside ``advance``, and inside ``sample`` and around it: wall and processor seconds
             [s].
-        remarks: what the engine says about a run that went well (:class:`proofroll.core.engine.TellsRemarks`).
+        remarks: of the engine about a run that went well (:class:`proofroll.core.engine_abilities.TellsRemarks`).
     """
 
     dataset: xr.Dataset

@@ -83,7 +83,7 @@ def resolve(
 
 
 def programs(cases: Sequence[Case], workers: Workers | None = None) -> list[tuple[str | None, str]]:
-    """The engines' own programs for cases (:class:`proofroll.core.engine.Reproduces`), each or None and why not."""
+    """Engines' programs for cases (:class:`proofroll.core.engine_abilities.Reproduces`), each or None and why not."""
     found: list[tuple[str | None, str]] = []
     with _lent(workers) as lent:
         for case in cases:

@@ -70,7 +70,7 @@ def _answer(request: dict[str, Any]) -> dict[str, Any]:
 
 def reproduce(case: dict[str, Any]) -> dict[str, Any]:
     """The engine's own program for a case, or why there is none."""
-    from proofroll.core.engine import Reproduces
+    from proofroll.core.engine_abilities import Reproduces
     from proofroll.running.loading import loaded, scene_of
 
     wanted = Case.from_dict(case)

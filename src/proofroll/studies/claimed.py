@@ -12,7 +12,7 @@ from dataclasses import dataclass, field
 from typing import Any, NamedTuple
 
 from proofroll.core.comparison import Tolerance
-from proofroll.core.engine import Level
+from proofroll.core.engine_abilities import Level
 from proofroll.running.timing import FACTOR, Timing, named, ratio
 from proofroll.studies.recommend import Wish, fits, holding
 

@@ -7,7 +7,7 @@ from collections.abc import Hashable, Mapping
 from typing import TYPE_CHECKING, TypeVar
 
 from proofroll.core.dataset import observe
-from proofroll.core.element import WatchesRuns
+from proofroll.core.element_abilities import WatchesRuns
 from proofroll.studies.reference import Reference
 
 if TYPE_CHECKING:

@@ -13,7 +13,7 @@ import numpy as np
 
 from proofroll.core.arrays import FloatArray
 from proofroll.core.dataset import part
-from proofroll.core.element import ExplainsErrors
+from proofroll.core.element_abilities import ExplainsErrors
 from proofroll.core.events import events_of
 from proofroll.core.scene import Scene
 from proofroll.running.case import Result, Status

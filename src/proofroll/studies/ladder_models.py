@@ -7,7 +7,7 @@ from dataclasses import dataclass, field
 from typing import TYPE_CHECKING, Any
 
 from proofroll.core.dataset import part
-from proofroll.core.engine import Level
+from proofroll.core.engine_abilities import Level
 from proofroll.core.errors import ProofrollError
 from proofroll.core.plugins import engine_names
 from proofroll.core.scene import Scene

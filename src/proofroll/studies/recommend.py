@@ -7,7 +7,7 @@ from dataclasses import dataclass
 from typing import Any
 
 from proofroll.core.comparison import Tolerance
-from proofroll.core.engine import Level
+from proofroll.core.engine_abilities import Level
 from proofroll.core.errors import InputError
 from proofroll.core.plugins import parse_engine
 from proofroll.studies.pareto import tied

@@ -13,7 +13,7 @@ import numpy as np
 
 from proofroll.core.arrays import FloatArray
 from proofroll.core.dataset import observe, part, scales
-from proofroll.core.element import KnowsAnotherScene
+from proofroll.core.element_abilities import KnowsAnotherScene
 from proofroll.core.events import Event, events_of
 from proofroll.core.observable import Role
 from proofroll.core.scene import Scene

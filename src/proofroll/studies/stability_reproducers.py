@@ -6,7 +6,8 @@ import re
 from pathlib import Path
 from typing import Any
 
-from proofroll.core.element import FailedRun, WritesPrograms, imported
+from proofroll.core.element_abilities import WritesPrograms
+from proofroll.core.failed_run import FailedRun, imported
 from proofroll.running.case import Case
 from proofroll.running.runner import programs
 from proofroll.running.store import write_text

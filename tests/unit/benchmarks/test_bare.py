@@ -7,7 +7,7 @@ from collections.abc import Mapping
 import numpy as np
 import pytest
 
-from proofroll.core.engine import require_provided
+from proofroll.core.engine_abilities import require_provided
 from proofroll.core.errors import Diverged, Refused
 from proofroll.core.plugins import load_engine, resolve_settings
 from proofroll.files.scene_file import load_scene

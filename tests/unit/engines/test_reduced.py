@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from proofroll.core.engine import Level, TellsLevels
+from proofroll.core.engine_abilities import Level, TellsLevels
 from proofroll.core.errors import Diverged, InputError, Refused
 from proofroll.core.gravity import Gravity
 from proofroll.core.plugins import resolve_settings

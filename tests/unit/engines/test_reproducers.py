@@ -7,7 +7,7 @@ from typing import Any
 import numpy as np
 import pytest
 
-from proofroll.core.engine import Reproduces
+from proofroll.core.engine_abilities import Reproduces
 from proofroll.core.errors import Refused
 from proofroll.core.plugins import load_engine, resolve_settings
 from proofroll.elements.ball_on_surface.element import rolling_ball

@@ -9,7 +9,7 @@ from typing import Any
 
 import pytest
 
-from proofroll.core.engine import Level
+from proofroll.core.engine_abilities import Level
 from proofroll.core.errors import InputError
 from proofroll.files.scene_file import load_scene
 from proofroll.report.comparison_content import plain

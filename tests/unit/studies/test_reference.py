@@ -6,7 +6,7 @@ from typing import Any
 
 import numpy as np
 
-from proofroll.core.engine import SharesEquations
+from proofroll.core.engine_abilities import SharesEquations
 from proofroll.core.truth import truth
 from proofroll.engines.reduced import Reduced
 from proofroll.files.scene_file import load_scene

@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Any
 
 from proofroll.core.dataset import part
 from proofroll.core.diagnosis import Cause, Evidence, diagnose, hypotheses_of
-from proofroll.core.element import WatchesRuns
+from proofroll.core.element_abilities import WatchesRuns
 from proofroll.core.observable import Role
 from proofroll.core.scene import Scene
 from proofroll.core.verdict import Judgement, Verdict

@@ -12,9 +12,11 @@ from typing import TYPE_CHECKING, Any, ClassVar
 import numpy as np
 
 from proofroll.core.arrays import FloatArray
-from proofroll.core.element import FailedRun, FirstMotion, OptionalTerm, RunWatch, Sign, StepNumber
+from proofroll.core.element import FirstMotion, OptionalTerm, Sign, StepNumber
+from proofroll.core.element_abilities import RunWatch
 from proofroll.core.engine import Sample
 from proofroll.core.errors import InputError, Refused
+from proofroll.core.failed_run import FailedRun
 from proofroll.core.gravity import Gravity
 from proofroll.core.observable import Observable
 from proofroll.core.scene import Scene
@@ -201,7 +203,7 @@ class BallOnSurface:
         return frozenset(name for name in CAPS if not name.startswith("1 / "))
 
     def another_scene(self, lines: Sequence[Mapping[str, Any]], truth: xr.Dataset) -> str | None:
-        """See :class:`proofroll.core.element.KnowsAnotherScene`."""
+        """See :class:`proofroll.core.element_abilities.KnowsAnotherScene`."""
         from proofroll.elements.ball_on_surface.certificate import another_scene
 
         friction = truth["needed_friction"].to_numpy()
@@ -214,7 +216,7 @@ class BallOnSurface:
         return from_samples(self.rolling, times, samples, between)
 
     def watch(self, asks: Sequence[str]) -> RunWatch:  # noqa: ARG002 -- the protocol's
-        """See :class:`proofroll.core.element.WatchesRuns`."""
+        """See :class:`proofroll.core.element_abilities.WatchesRuns`."""
         from proofroll.elements.ball_on_surface.events import Watch
 
         return Watch(self.rolling)
@@ -222,7 +224,7 @@ class BallOnSurface:
     def common_span(
         self, truth: xr.Dataset, runs: Mapping[Any, xr.Dataset]
     ) -> tuple[xr.Dataset, dict[Any, xr.Dataset]]:
-        """See :class:`proofroll.core.element.WatchesRuns`."""
+        """See :class:`proofroll.core.element_abilities.WatchesRuns`."""
         from proofroll.elements.ball_on_surface.events import common_span
 
         return common_span(truth, runs)
@@ -274,13 +276,13 @@ class BallOnSurface:
         return signs(self.rolling, dataset, truth)
 
     def cause(self, dataset: xr.Dataset, error: float) -> str | None:
-        """See :class:`proofroll.core.element.ExplainsErrors`."""
+        """See :class:`proofroll.core.element_abilities.ExplainsErrors`."""
         from proofroll.elements.ball_on_surface.failure import cause
 
         return cause(self.rolling, dataset, error)
 
     def failure_program(self, failed: FailedRun, engine: str | None) -> str:
-        """See :class:`proofroll.core.element.WritesPrograms`."""
+        """See :class:`proofroll.core.element_abilities.WritesPrograms`."""
         from proofroll.elements.ball_on_surface.failure_program import program
 
         return program(self.rolling, failed, engine)

@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Literal, TypeVar
 import numpy as np
 
 from proofroll.core.arrays import FloatArray
-from proofroll.core.element import SeenInRun
+from proofroll.core.element_abilities import SeenInRun
 from proofroll.core.engine import Sample
 from proofroll.core.events import Event, events_of
 from proofroll.elements.ball_on_surface.mechanics import always_pressed, natural_acceleration, normal_force
@@ -34,7 +34,7 @@ Key = TypeVar("Key", bound=Hashable)
 class Watch:
     """Looks for slip and for lift-off, after which a model that holds the ball is another one than the scene.
 
-    See :class:`proofroll.core.element.RunWatch`.
+    See :class:`proofroll.core.element_abilities.RunWatch`.
     """
 
     def __init__(self, body: RollingBall) -> None:

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from proofroll.core.element import FailedRun
+from proofroll.core.failed_run import FailedRun
 from proofroll.elements.ball_on_surface.failure import (
     BACKWARDS,
     GAIN,
@@ -104,7 +104,7 @@ def through_proofroll(body: RollingBall, failed: FailedRun) -> str:
 
 
 def program(body: RollingBall, failed: FailedRun, engine: str | None) -> str:
-    """The whole file; see :class:`proofroll.core.element.WritesPrograms`."""
+    """The whole file; see :class:`proofroll.core.element_abilities.WritesPrograms`."""
     truth, part = failed.truth, engine if engine is not None else through_proofroll(body, failed)
     generators = body.surface.generators
     along = None if generators is None else generators[-1]

@@ -1,6 +1,6 @@
 """Source text that programs of several engines share: numbers, and the wall as plain functions.
 
-An engine may offer :meth:`proofroll.core.engine.Reproduces.reproducer`; what it writes runs without proofroll.
+They are for :meth:`proofroll.core.engine_abilities.Reproduces.reproducer`; what that writes runs without proofroll.
 """
 
 from __future__ import annotations

@@ -14,7 +14,8 @@ from collections.abc import Mapping, Sequence
 from importlib.metadata import version
 from typing import Any, ClassVar, Self
 
-from proofroll.core.engine import Built, Level, Sample, Term
+from proofroll.core.engine import Built, Sample
+from proofroll.core.engine_abilities import Level, Term
 from proofroll.core.errors import Refused
 from proofroll.core.events import Event
 from proofroll.core.scene import Scene
@@ -110,7 +111,7 @@ class Exudyn:
 
     @staticmethod
     def defaults() -> Mapping[str, Any]:
-        """See :class:`proofroll.core.engine.TellsDefaults`: the settings of a simulation."""
+        """See :class:`proofroll.core.engine_abilities.TellsDefaults`: the settings of a simulation."""
         import exudyn
 
         found: dict[str, Any] = {}
@@ -134,7 +135,7 @@ class Exudyn:
 
     @classmethod
     def reproducer(cls, scene: Scene, settings: ExudynSettings) -> str:
-        """See :class:`proofroll.core.engine.Reproduces`."""
+        """See :class:`proofroll.core.engine_abilities.Reproduces`."""
         from proofroll.engines.exudyn.reproducer import source
 
         if settings.formulation in OF_MECHANISMS:
@@ -151,7 +152,7 @@ class Exudyn:
         return self._model.sample()
 
     def events(self) -> Sequence[Event]:
-        """See :class:`proofroll.core.engine.LocatesEvents`."""
+        """See :class:`proofroll.core.engine_abilities.LocatesEvents`."""
         return self._model.events()
 
     def built(self) -> Built | MechanismBuilt:

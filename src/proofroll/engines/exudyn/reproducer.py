@@ -242,7 +242,7 @@ def state_of_ball():
 
 
 def source(model: Any, body: RollingBall, settings: ExudynSettings) -> str:
-    """See :class:`proofroll.core.engine.Reproduces`.
+    """See :class:`proofroll.core.engine_abilities.Reproduces`.
 
     Args:
         model: of the formulation, at time 0.

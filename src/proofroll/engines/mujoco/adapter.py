@@ -9,7 +9,8 @@ from typing import Any, ClassVar, Protocol, Self
 import mujoco
 import numpy as np
 
-from proofroll.core.engine import Built, Level, Sample, Term, whole_steps
+from proofroll.core.engine import Built, Sample, whole_steps
+from proofroll.core.engine_abilities import Level, Term
 from proofroll.core.errors import Refused
 from proofroll.core.events import Event
 from proofroll.core.scene import Scene
@@ -127,7 +128,7 @@ class Mujoco:
 
     @staticmethod
     def defaults() -> Mapping[str, Any]:
-        """See :class:`proofroll.core.engine.TellsDefaults`: options, and what a bare geom has."""
+        """See :class:`proofroll.core.engine_abilities.TellsDefaults`: options, and what a bare geom has."""
         model = mujoco.MjModel.from_xml_string("<mujoco><worldbody><geom size='1'/></worldbody></mujoco>")
         options = {name: getattr(model.opt, name) for name in dir(model.opt) if not name.startswith("_")}
         found = {f"option {key}": np.asarray(value).tolist() for key, value in options.items() if not callable(value)}
@@ -158,7 +159,7 @@ class Mujoco:
 
     @classmethod
     def model_file(cls, scene: Scene, settings: MujocoSettings) -> str:
-        """See :class:`proofroll.core.engine.WritesModels`: MJCF, whose keyframe ``start`` is the state at time 0."""
+        """MJCF, whose keyframe ``start`` is time 0; see :class:`proofroll.core.engine_abilities.WritesModels`."""
         if settings.formulation == "joints":
             raise Refused("the model of a mechanism is not written yet")
         engine, body = cls._build_ball(scene, settings), rolling_ball(scene)
@@ -175,7 +176,7 @@ class Mujoco:
 
     @classmethod
     def reproducer(cls, scene: Scene, settings: MujocoSettings) -> str:
-        """See :class:`proofroll.core.engine.Reproduces`."""
+        """See :class:`proofroll.core.engine_abilities.Reproduces`."""
         from proofroll.engines.mujoco.reproducer import source
 
         if settings.formulation == "joints":
@@ -224,7 +225,7 @@ class Mujoco:
         )
 
     def events(self) -> Sequence[Event]:
-        """See :class:`proofroll.core.engine.LocatesEvents`."""
+        """See :class:`proofroll.core.engine_abilities.LocatesEvents`."""
         return [] if self._friction is None else self._friction.events(self._evaluated())
 
     def built(self) -> Built:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from proofroll.core.engine import Term
+from proofroll.core.engine_abilities import Term
 from proofroll.engines.mujoco.settings import ROLLS, SLIDES, TURNS
 
 TERMS = (

@@ -8,7 +8,8 @@ from typing import Any, ClassVar, Self
 
 import pinocchio as pin
 
-from proofroll.core.engine import Built, Level, Sample, Term
+from proofroll.core.engine import Built, Sample
+from proofroll.core.engine_abilities import Level, Term
 from proofroll.core.errors import Refused
 from proofroll.core.events import Event
 from proofroll.core.plugins import release
@@ -85,7 +86,7 @@ class Pinocchio:
 
     @staticmethod
     def caveat(settings: PinocchioSettings) -> str:
-        """See :class:`proofroll.core.engine.TellsCaveats`. Pinocchio computes terms and impulses; it has no steps."""
+        """See :class:`proofroll.core.engine_abilities.TellsCaveats`: Pinocchio computes terms, and has no steps."""
         terms = "contact solver" if settings.formulation == "contact" else "terms"
         return f"proofroll's own integrator on Pinocchio's {terms}, for Pinocchio brings none"
 
@@ -96,7 +97,7 @@ class Pinocchio:
 
     @staticmethod
     def defaults() -> Mapping[str, Any]:
-        """See :class:`proofroll.core.engine.TellsDefaults`: gravity, and the settings of the proximal solver."""
+        """See :class:`proofroll.core.engine_abilities.TellsDefaults`: gravity, and settings of the proximal solver."""
         solver = pin.ProximalSettings()
         found = {f"proximal {name}": getattr(solver, name) for name in ("absolute_accuracy", "relative_accuracy", "mu")}
         found |= {"proximal max_iter": solver.max_iter}
@@ -114,7 +115,7 @@ class Pinocchio:
 
     @classmethod
     def reproducer(cls, scene: Scene, settings: PinocchioSettings) -> str:
-        """See :class:`proofroll.core.engine.Reproduces`."""
+        """See :class:`proofroll.core.engine_abilities.Reproduces`."""
         from proofroll.engines.pinocchio.reproducer import source
 
         if settings.formulation in OF_MECHANISMS:
@@ -131,7 +132,7 @@ class Pinocchio:
         return self._run.sample()
 
     def events(self) -> Sequence[Event]:
-        """See :class:`proofroll.core.engine.LocatesEvents`."""
+        """See :class:`proofroll.core.engine_abilities.LocatesEvents`."""
         return self._run.events()
 
     def built(self) -> Built | MechanismBuilt:

@@ -101,5 +101,5 @@ class ContactRun:
             yield BallCapability.ORIENTATION
 
     def events(self) -> tuple[Event, ...]:
-        """See :class:`proofroll.core.engine.LocatesEvents`; none with unbounded friction."""
+        """See :class:`proofroll.core.engine_abilities.LocatesEvents`; none with unbounded friction."""
         return tuple(self.steps.events) if self.steps.bounded else ()

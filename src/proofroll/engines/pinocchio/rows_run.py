@@ -55,7 +55,7 @@ class RowsRun:
         )
 
     def events(self) -> tuple[Event, ...]:
-        """See :class:`proofroll.core.engine.LocatesEvents`; with unbounded friction there is but leaving the wall."""
+        """See :class:`proofroll.core.engine_abilities.LocatesEvents`; unbounded friction has but leaving the wall."""
         if isinstance(self.motion, StickSlipIntegrator):
             return tuple(self.motion.events)
         return () if self.motion.left is None else (self.motion.left,)

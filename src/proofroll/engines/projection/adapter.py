@@ -10,7 +10,8 @@ import numpy as np
 
 import proofroll
 from proofroll.core.arrays import FloatArray
-from proofroll.core.engine import Built, Level, Sample, Term
+from proofroll.core.engine import Built, Sample
+from proofroll.core.engine_abilities import Level, Term
 from proofroll.core.errors import Diverged, Refused
 from proofroll.core.events import Event
 from proofroll.core.integrators import INTEGRATORS, Integrator
@@ -174,11 +175,11 @@ class Projection:
             raise Diverged(f"{error}, between t = {start:.6g} s and {t:.6g} s") from None
 
     def events(self) -> Sequence[Event]:
-        """See :class:`proofroll.core.engine.LocatesEvents`."""
+        """See :class:`proofroll.core.engine_abilities.LocatesEvents`."""
         return tuple(self._motion.events) if isinstance(self._motion, Switching) else ()
 
     def remarks(self) -> Sequence[str]:
-        """See :class:`proofroll.core.engine.TellsRemarks`."""
+        """See :class:`proofroll.core.engine_abilities.TellsRemarks`."""
         times = self._orientation.renewals if isinstance(self._orientation, EulerAngles) else []
         if not times:
             return ()

@@ -9,7 +9,8 @@ import numpy as np
 
 import proofroll
 from proofroll.core.arrays import FloatArray
-from proofroll.core.engine import Built, Level, Sample, Term
+from proofroll.core.engine import Built, Sample
+from proofroll.core.engine_abilities import Level, Term
 from proofroll.core.scene import Scene
 from proofroll.elements.ball_on_surface.compiled.library import with_heyoka
 from proofroll.elements.ball_on_surface.element import rolling_ball

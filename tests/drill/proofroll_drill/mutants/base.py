@@ -79,7 +79,7 @@ class Mutant:
         return self.misreport(self.inner.sample())
 
     def events(self) -> list[Event]:
-        """See :class:`proofroll.core.engine.LocatesEvents`."""
+        """See :class:`proofroll.core.engine_abilities.LocatesEvents`."""
         return list(self.inner.events())
 
     def built(self) -> Built | Any:

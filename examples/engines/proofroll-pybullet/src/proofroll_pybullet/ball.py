@@ -201,7 +201,7 @@ class PybulletBall:
         return turning * fastest / natural_acceleration(body)
 
     def events(self) -> tuple[Event, ...]:
-        """See :class:`proofroll.core.engine.LocatesEvents`; none with unbounded friction."""
+        """See :class:`proofroll.core.engine_abilities.LocatesEvents`; none with unbounded friction."""
         return tuple(self._events)
 
 

@@ -20,7 +20,7 @@ from proofroll.engines.mujoco.start import EVALUATIONS
 
 
 def source(xml: str, model: Any, data: Any, body: RollingBall, settings: MujocoSettings) -> str:
-    """See :class:`proofroll.core.engine.Reproduces`.
+    """See :class:`proofroll.core.engine_abilities.Reproduces`.
 
     Args:
         xml: the model as MuJoCo writes it.

@@ -17,7 +17,7 @@ from proofroll.engines.pinocchio.settings import PinocchioSettings
 
 
 def source(body: RollingBall, settings: PinocchioSettings) -> str:
-    """See :class:`proofroll.core.engine.Reproduces`.
+    """See :class:`proofroll.core.engine_abilities.Reproduces`.
 
     Args:
         body: the scene's.

@@ -1,0 +1,106 @@
+"""What an element may have besides: each of these protocols is optional."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, Any, Protocol, runtime_checkable
+
+from proofroll.core.arrays import FloatArray
+from proofroll.core.events import Event
+from proofroll.core.failed_run import FailedRun
+
+if TYPE_CHECKING:
+    import xarray as xr
+
+    from proofroll.core.engine import Sample
+
+
+@dataclass(frozen=True)
+class SeenInRun:
+    """What a watch saw.
+
+    Attributes:
+        samples: how many of the samples are of the scene.
+        events: in order; None: it has nothing to say of events.
+        ended: why the run ends where it does though nothing failed, or None.
+    """
+
+    samples: int
+    events: Sequence[Event] | None
+    ended: str | None = None
+
+
+class RunWatch(Protocol):
+    """Follows one run."""
+
+    def over(self, sample: Sample) -> bool:
+        """Whether the model is no longer that of the scene, so that the run ends here."""
+
+    def conclude(self, times: FloatArray, samples: Sequence[Sample], located: Sequence[Event] | None) -> SeenInRun:
+        """What was seen.
+
+        Args:
+            times: of the samples [s]; there may be fewer samples.
+            samples: of the element.
+            located: the engine's own events (:class:`proofroll.core.engine_abilities.LocatesEvents`), or None.
+        """
+
+
+@runtime_checkable
+class WatchesRuns(Protocol):
+    """What an element has besides, if it has events, or if a run can leave the scene."""
+
+    def watch(self, asks: Sequence[str]) -> RunWatch:
+        """A watch over a run that is about to begin."""
+
+    def common_span(
+        self, truth: xr.Dataset, runs: Mapping[Any, xr.Dataset]
+    ) -> tuple[xr.Dataset, dict[Any, xr.Dataset]]:
+        """The truth and runs of it as far as they are comparable."""
+
+
+@runtime_checkable
+class HasOptionalCapabilities(Protocol):
+    """What an element has besides, if scenes of its kind may do without some of what a formulation can provide."""
+
+    @property
+    def optional(self) -> frozenset[str]:
+        """Capabilities that are in an engine's model only where :attr:`Element.requires` or a question names them."""
+
+
+@runtime_checkable
+class KnowsAnotherScene(Protocol):
+    """What an element has besides, if a model of it can be of another kind though each of its numbers is allowed."""
+
+    def another_scene(self, lines: Sequence[Mapping[str, Any]], truth: xr.Dataset) -> str | None:
+        """Why the model is of another kind, as one clause; None: it is of the same.
+
+        Args:
+            lines: of a stored certificate (:meth:`proofroll.core.certificate.Line.as_dict`).
+            truth: the true run.
+        """
+
+
+@runtime_checkable
+class ExplainsErrors(Protocol):
+    """What an element has besides, if it can say why a bounded path is wrong."""
+
+    def cause(self, dataset: xr.Dataset, error: float) -> str | None:
+        """What an ``error`` of the deciding observable, in its unit, comes from at the end of a run.
+
+        A name that ``meanings`` has; None: nothing that the element knows of.
+        """
+
+
+@runtime_checkable
+class WritesPrograms(Protocol):
+    """What an element has besides, if it can write a program that shows the failure of a run."""
+
+    def failure_program(self, failed: FailedRun, engine: str | None) -> str:
+        """Source of the program, which exits with 1 if the failure shows.
+
+        Args:
+            failed: the run.
+            engine: its part (:class:`proofroll.core.engine_abilities.Reproduces`); None: the program asks proofroll.
+        """
