@@ -10,11 +10,14 @@ import numpy as np
 from proofroll.core.errors import InputError
 from proofroll.elements.mechanism.analysis import analysed, least
 from proofroll.elements.mechanism.joint import FACTS
+from proofroll.elements.mechanism.joint_coordinates import JointCoordinates
 from proofroll.elements.mechanism.kinematics import Tree
 from proofroll.elements.mechanism.model import Mechanism
+from proofroll.elements.mechanism.rotations import Array
 
 CLOSED = 1e-12  # m, 1, m/s, 1/s: what round-off leaves of a loop that closes
 _ROUNDS = 50  # Newton's steps; from a fair guess it needs five
+_STILL = 1e-12  # least eigenvalue of a mass matrix with ones on its diagonal: below it, round-off decides
 _LARGEST = 0.5  # rad or m in one step: beyond it, the linearisation says nothing
 ADVICE = "correct q0, or give the joints that follow from the loops dependent = true and q0 as a guess"
 
@@ -50,6 +53,24 @@ def assembled(mechanism: Mechanism, dependent: Collection[str]) -> Mechanism:
     return replace(mechanism, joints=joints)
 
 
+def _check_inertia(mechanism: Mechanism, M: Array) -> None:
+    """Every velocity moves something that has inertia.
+
+    Raises:
+        InputError: one does not, so that forces do not tell how it changes.
+    """
+    size = np.sqrt(np.where(np.diag(M) > 0, np.diag(M), 1.0))
+    values, vectors = np.linalg.eigh(M / np.outer(size, size))
+    if len(values) and values[0] < _STILL:
+        joint = next(
+            joint
+            for joint, at in zip(mechanism.joints, mechanism.v_slices, strict=True)
+            if np.abs(vectors[at, 0]).max(initial=0.0) == np.abs(vectors[:, 0]).max()
+        )
+        advice = "nothing with inertia moves along a coordinate of it, alone or with others; give it some, or fix it"
+        raise InputError(f"joints.{joint.name}.child", joint.child, advice)
+
+
 def check_start(mechanism: Mechanism) -> None:
     """The loops close at the start, the velocities keep them closed, and the mechanism can move.
 
@@ -80,5 +101,6 @@ def check_start(mechanism: Mechanism) -> None:
         if rate > CLOSED * max(1.0, float(np.abs(v).max(initial=0.0))):
             advice = f"v0 opens the loop at {rate:.3g} m/s (or rad/s); {ADVICE.replace('q0', 'v0', 1)}"
             raise InputError(field, between, advice)
+    _check_inertia(mechanism, JointCoordinates(mechanism, 0).inertial(motion)[1])
     if analysed(mechanism).mobility == 0:
         raise InputError("mechanism", f"{len(mechanism.joints)} joints", "it cannot move; free a joint or a loop")

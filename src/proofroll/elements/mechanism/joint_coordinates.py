@@ -14,7 +14,7 @@ from typing import Any
 
 import numpy as np
 
-from proofroll.core.errors import Refused
+from proofroll.core.errors import Diverged, Refused
 from proofroll.elements.mechanism.analysis import analysed, reactions
 from proofroll.elements.mechanism.kinematics import BodyMotion, Rows, Tree
 from proofroll.elements.mechanism.model import Mechanism
@@ -47,19 +47,12 @@ class JointCoordinates:
     """Equations of motion of a mechanism in the coordinates of its tree.
 
     Args:
-        mechanism: any without dry friction.
+        mechanism: any.
         rank: of the loops' rows; None: that of a general pose.
-
-    Raises:
-        Refused: the mechanism has dry friction, whose switching this route does not follow.
     """
 
     def __init__(self, mechanism: Mechanism, rank: int | None = None) -> None:
-        for joint in mechanism.joints:
-            if joint.friction:
-                raise Refused(
-                    f"dry friction in joint {joint.name} switches; no route follows it (of robots: friction=0)"
-                )
+        self._dry = next((joint.name for joint in mechanism.joints if joint.friction), None)
         self.mechanism, self.tree = mechanism, Tree(mechanism)
         self.rank = analysed(mechanism).rank if rank is None else rank
         self._mass = np.array([body.mass for body in mechanism.bodies])
@@ -74,7 +67,14 @@ class JointCoordinates:
         self._springs = [(joint.stiffness, joint.rest, at_q, at_v) for joint, at_q, at_v in laws if joint.stiffness]
 
     def solve(self, q: Array, v: Array) -> Solution:
-        """Accelerations and multipliers for coordinates (nq) and velocities (nv)."""
+        """Accelerations and multipliers for coordinates (nq) and velocities (nv).
+
+        Raises:
+            Refused: the mechanism has dry friction, whose switching this route does not follow.
+            Diverged: a velocity moves nothing with inertia in this pose.
+        """
+        if self._dry is not None:
+            raise Refused(f"dry friction in joint {self._dry} switches; no route follows it (of robots: friction=0)")
         motion = self.tree.at(q, v)
         J, M, loads = self.inertial(motion)
         b = self._torque - self._damping * v - np.einsum("nij,ni->j", J, loads)
@@ -83,7 +83,10 @@ class JointCoordinates:
         for end, position, force in self._spring_forces(motion):
             b += force @ self.tree.point(motion, end, position)[2]
         rows = self.tree.loop_rows(motion)
-        into = np.linalg.inv(np.linalg.cholesky(M)).T  # M⁻¹ = into intoᵀ
+        try:
+            into = np.linalg.inv(np.linalg.cholesky(M)).T  # M⁻¹ = into intoᵀ
+        except np.linalg.LinAlgError:
+            raise Diverged("the mass matrix is singular, as where joints of massless bodies line up") from None
         free = into.T @ b
         if not self.rank:
             return Solution(into @ free, np.zeros(0), motion, rows, None, 1.0)

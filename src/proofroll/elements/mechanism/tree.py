@@ -4,8 +4,6 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 
-import numpy as np
-
 from proofroll.core.errors import InputError
 from proofroll.elements.mechanism.checks import WORLD
 from proofroll.elements.mechanism.joint import Joint
@@ -57,19 +55,15 @@ def clusters(joints: Sequence[Joint]) -> dict[str, list[str]]:
 
 
 def check_masses(bodies: Sequence[Body], joints: Sequence[Joint]) -> None:
-    """Whatever can move has a mass and moments of inertia.
+    """Whatever a joint moves has a mass, if not in the body itself, then in one that it carries.
 
     Raises:
-        InputError: a moving body, with all that is fixed to it, has none.
+        InputError: a body that moves carries no mass, and its joint has no armature.
     """
-    by_name = {body.name: body for body in bodies}
-    for leader, members in clusters(joints).items():
-        if leader == WORLD:
-            continue
-        heavy = [by_name[name] for name in members if by_name[name].mass > 0]
-        if not heavy:
-            raise InputError(f"bodies.{leader}.mass", 0.0, "a body without mass can move here; give it one or fix it")
-        moments = [np.linalg.eigvalsh(body.inertia) for body in heavy]
-        if not any(low > 0 for low, *_ in moments):
-            advice = "a moving body needs positive moments of inertia about all axes; give small ones"
-            raise InputError(f"bodies.{heavy[0].name}.inertia", heavy[0].inertia, advice)
+    carried = {body.name: body.mass for body in bodies} | {WORLD: 0.0}
+    for joint in reversed(joints):  # sorted: the children come last
+        carried[joint.parent] += carried[joint.child]
+        if not carried[joint.child] and joint.nv and not joint.armature:
+            raise InputError(
+                f"bodies.{joint.child}.mass", 0.0, "a body without mass can move here; give it one or fix it"
+            )

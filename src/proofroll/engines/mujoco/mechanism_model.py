@@ -73,7 +73,10 @@ def _add_body(spec: Any, parent: Any, number: int, joint: Joint, body: Body) -> 
     axes[:, 2] *= np.sign(np.linalg.det(axes))
     if np.count_nonzero(body.inertia) == np.count_nonzero(np.diag(body.inertia)):
         moments, axes = np.diag(body.inertia), np.eye(3)
-    added.mass, added.ipos, added.inertia, added.iquat = body.mass, body.com, moments, to_quaternion(axes)
+    # MuJoCo refuses moving bodies below this, also where others give the joint its inertia; it is lost in their digits
+    least = mujoco.mjMINVAL if joint.nv else 0.0
+    added.mass, added.inertia = max(body.mass, least), np.maximum(moments, least)
+    added.ipos, added.iquat = body.com, to_quaternion(axes)
     for part, (kind, column) in enumerate(parts_of(joint)):
         made = added.add_joint(
             name=f"{number}.{part}", type=kind, pos=joint.child_position, axis=joint.child_frame[:, column]

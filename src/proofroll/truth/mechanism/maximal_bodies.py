@@ -10,6 +10,7 @@ from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
+from scipy.linalg import block_diag
 from scipy.spatial.transform import Rotation
 
 from proofroll.elements.mechanism.checks import WORLD
@@ -19,6 +20,7 @@ from proofroll.elements.mechanism.rotations import Array, frame_of_axis
 from proofroll.truth.mechanism.scalars import Scalar, add, cross, dot, mul, plus, scaled, turned, turned_back
 
 _PARALLEL = 1e-12  # how far axes of a plane mechanism may be from parallel: round-off
+_LIGHT = 1e-9  # of the largest moment of a body: a smaller one is a rod's or a point's, written with a file's digits
 
 
 @dataclass(frozen=True)
@@ -46,15 +48,20 @@ GROUND = BodyInScalars((0.0,) * 3, _UNIT, (0.0,) * 3, (0.0,) * 3)
 
 
 class GeneralBody:
-    """A body that can move anyhow: r, quaternion | v, ω in body axes."""
+    """A body that can move anyhow: r, quaternion | v, ω in body axes.
+
+    Attributes:
+        mass_matrix: along its velocities.
+        heavy: whether that has an inverse: no body without mass, no point, no rod.
+    """
 
     nx, nu = 7, 6
 
     def __init__(self, mass: float, inertia: Array) -> None:
         self.mass, self.inertia = mass, [[float(x) for x in row] for row in inertia]
-        self.inverse = np.zeros((6, 6))
-        self.inverse[:3, :3] = np.eye(3) / mass
-        self.inverse[3:, 3:] = np.linalg.inv(inertia)
+        low, _, high = np.linalg.eigvalsh(inertia)
+        self.heavy = bool(mass > 0 and low > _LIGHT * high)
+        self.mass_matrix = block_diag(mass * np.eye(3), inertia)
 
     def start(self, placed: BodyStart, com: Array) -> tuple[list[float], list[float]]:
         """Coordinates and velocities of a placed body."""
@@ -109,7 +116,8 @@ class Planar:
         self.mass, self.zero = mass, R
         normal = plane[:, 2]
         moment = R.inv().apply(normal) @ inertia @ R.inv().apply(normal)
-        self.inverse = np.diag([1 / mass, 1 / mass, 1 / moment])
+        self.heavy = bool(mass > 0 and moment > _LIGHT * np.abs(inertia).max())
+        self.mass_matrix = np.diag([mass, mass, moment])
         self.plane = plane
         self._columns = [_clean(column) for column in plane.T]
         self._height = _clean(normal * (normal @ com))

@@ -21,7 +21,6 @@ from proofroll.elements.mechanism.model import Mechanism
 from proofroll.elements.mechanism.record import Record, gathered
 from proofroll.elements.mechanism.rotations import Array
 from proofroll.elements.mechanism.stepping import integrated
-from proofroll.truth.mechanism.borrowed_mass import lent_wrenches, with_borrowed_mass
 from proofroll.truth.mechanism.maximal_bodies import BodyInScalars
 from proofroll.truth.mechanism.maximal_equations import (
     Connection,
@@ -52,8 +51,9 @@ class NumericEquations:
 
     def __init__(self, equations: MaximalEquations) -> None:
         self.equations = equations
-        self._mass = np.linalg.inv(equations.inverse_mass)
-        self._inverse_root = np.linalg.cholesky(equations.inverse_mass)
+        mass = equations.mass_matrix.copy()
+        mass[equations.light, equations.light] += max(equations.usual)  # only the scale of rows hangs on it
+        self._inverse_root = np.linalg.inv(np.linalg.cholesky(mass)).T
         start = self.equations.start()
         C = self._matrix(self.equations.at(start.tolist()).rows)
         values = np.linalg.svd(C @ self._inverse_root, compute_uv=False) if C.size else np.zeros(0)
@@ -70,11 +70,11 @@ class NumericEquations:
         """Accelerations and multipliers, the smallest where rows depend on each other."""
         found = self.equations.at(state.tolist())
         C, half, force = self._matrix(found.rows), self._inverse_root, np.array(found.force, dtype=float)
-        if found.drives:
-            G = self._matrix([drive.row for drive in found.drives])
-            inertia = np.array([drive.inertia for drive in found.drives])
-            half = np.linalg.inv(np.linalg.cholesky(self._mass + (G.T * inertia) @ G)).T
-            force = force - G.T @ (inertia * np.array([drive.row.bias for drive in found.drives], dtype=float))
+        if added := [*found.drives, *found.holders]:
+            G = self._matrix([drive.row for drive in added])
+            inertia = np.array([drive.inertia for drive in added])
+            half = np.linalg.inv(np.linalg.cholesky(self.equations.mass_matrix + (G.T * inertia) @ G)).T
+            force = force - G.T @ (inertia * np.array([drive.row.bias for drive in added], dtype=float))
         free = half.T @ force
         residual = np.array([row.residual for row in found.rows], dtype=float)
         if not self.rank:
@@ -134,7 +134,6 @@ class MaximalCoordinates:
     """
 
     def __init__(self, mechanism: Mechanism) -> None:
-        mechanism, self._loans = with_borrowed_mass(mechanism)
         self.mechanism = mechanism
         self.lean = NumericEquations(MaximalEquations(mechanism, allow_planar=True))
         self._whole = NumericEquations(MaximalEquations(mechanism, allow_planar=False))
@@ -190,7 +189,7 @@ class MaximalCoordinates:
             "w_WB": np.array([views[i].w for i in range(n)], dtype=float),
             "q": q,
             "v": v,
-            "wrench": self._wrenches(found, views),
+            "wrench": self._wrenches(found),
             "points": np.array([self._point(views, p.body, p.position) for p in self.mechanism.points]).reshape(-1, 3),
             "energy": self._energy(views, state[lean.nx + lean.nu :]) + float(0.5 * self._armature @ v**2),
             "residual": np.array([np.abs(found.residual).max(initial=0.0), np.abs(found.C @ u).max(initial=0.0)]),
@@ -206,7 +205,7 @@ class MaximalCoordinates:
             u += [*view.v, *R.inv().apply(np.array(view.w, dtype=float))]
         return np.array([*x, *u, *angles])
 
-    def _wrenches(self, found: Solved, views: list[BodyInScalars]) -> Array:
+    def _wrenches(self, found: Solved) -> Array:
         wrenches = np.zeros((len(self._whole.equations.connections), 6))
         for row, multiplier in zip(found.equations.rows, found.multipliers, strict=True):
             wrenches[row.connection] += multiplier * np.array([*row.force, *row.torque])
@@ -215,27 +214,7 @@ class MaximalCoordinates:
             wrenches[row.connection] -= inertia * rate * np.array([*row.force, *row.torque])
         for number, (force, moment) in enumerate(found.equations.laws):
             wrenches[number] += np.array([*force, *moment])
-        if self._loans:
-            joints = self.mechanism.joints
-            needed = {name: self._needed(name, found, views) for name in self._loans}
-            lent = lent_wrenches(self.mechanism, self._loans, needed)
-            places = [self._point(views, joint.child, joint.child_position) for joint in joints]
-            lent[:, 3:] -= np.cross(places, lent[:, :3])
-            wrenches[: len(joints)] -= lent
         return wrenches
-
-    def _needed(self, name: str, found: Solved, views: list[BodyInScalars]) -> Array:
-        """Force, and moment about the world's origin, that move what a body borrowed as the body moves."""
-        i, loan = self.mechanism.body_index[name], self._loans[name]
-        R, w = np.array(views[i].R, dtype=float), np.array(views[i].w, dtype=float)
-        at = self._whole.equations.u_slices[i]
-        alpha = R @ found.acceleration[at][3:]
-        arm = R @ (loan.com - self.mechanism.bodies[i].com)
-        acceleration = found.acceleration[at][:3] + np.cross(alpha, arm) + np.cross(w, np.cross(w, arm))
-        force = loan.mass * (acceleration - self.mechanism.gravity)
-        inertia = R @ loan.inertia @ R.T
-        moment = inertia @ alpha + np.cross(w, inertia @ w) + np.cross(np.array(views[i].r, dtype=float) + arm, force)
-        return np.concatenate([force, moment])
 
     def _point(self, views: list[BodyInScalars], body: str, position: Any) -> Array:
         i = self.mechanism.body_index[body]
@@ -249,8 +228,6 @@ class MaximalCoordinates:
             v, spin = np.array(view.v, dtype=float), np.array(view.R).T @ np.array(view.w, dtype=float)
             energy += float(0.5 * body.mass * (v @ v) + 0.5 * spin @ np.array(body.inertia) @ spin)
             energy -= body.mass * float(np.dot(self.mechanism.gravity, view.r))
-        for name, loan in self._loans.items():
-            energy += loan.mass * float(np.dot(self.mechanism.gravity, self._point(views, name, loan.com)))
         for spring in self.mechanism.springs:
             a, b = (
                 self._point(views, name, at)

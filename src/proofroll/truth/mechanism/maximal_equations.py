@@ -12,6 +12,7 @@ from itertools import pairwise
 from typing import Any, NamedTuple
 
 import numpy as np
+from scipy.linalg import block_diag
 
 from proofroll.core.errors import Refused
 from proofroll.elements.mechanism.checks import WORLD
@@ -76,8 +77,9 @@ class Drive(NamedTuple):
 class ConstrainedEquations:
     """M u̇ = force + Cᵀλ, C u̇ + bias = 0, and the rates of coordinates and of angles that springs remember.
 
-    ``drives``: the armature of joints. ``laws``: force and moment of each joint's own spring, damper and drive on its
-    child, at the joint, world axes.
+    ``drives``: the armature of joints. ``holders``: rows that hold a body without inertia, each as a drive; rows are
+    obeyed, so that it changes nothing but M, which alone has no inverse. ``laws``: force and moment of each joint's own
+    spring, damper and drive on its child, at the joint, world axes.
     """
 
     rows: list[ConstraintRow]
@@ -87,13 +89,14 @@ class ConstrainedEquations:
     views: list[BodyInScalars]
     laws: list[tuple[list[Scalar], list[Scalar]]]
     drives: list[Drive]
+    holders: list[Drive]
 
 
 class MaximalEquations:
     """The mechanism as bodies, connections and springs.
 
     Args:
-        mechanism: any without dry friction and bodies without mass.
+        mechanism: any without dry friction.
         allow_planar: give bodies of plane mechanisms three coordinates; their rows are those within the plane.
 
     Raises:
@@ -104,16 +107,19 @@ class MaximalEquations:
         for joint in mechanism.joints:
             if joint.friction:
                 raise Refused(f"joint {joint.name} has dry friction; no route of the truth follows its switching")
-        for body in mechanism.bodies:
-            if np.linalg.eigvalsh(body.inertia)[0] <= 0:
-                raise Refused(f"body {body.name} has a moment of inertia of zero; maximal coordinates divide by it")
         self.mechanism, self.bodies = mechanism, made_bodies(mechanism, allow_planar)
         self.x_slices = _slices([body.nx for body in self.bodies])
         self.u_slices = _slices([body.nu for body in self.bodies])
         self.nx, self.nu = self.x_slices[-1].stop, self.u_slices[-1].stop
-        self.inverse_mass = np.zeros((self.nu, self.nu))
-        for own, at in zip(self.bodies, self.u_slices, strict=True):
-            self.inverse_mass[at, at] = own.inverse
+        self.mass_matrix = block_diag(*(body.mass_matrix for body in self.bodies))
+        self._light = {number for number, body in enumerate(self.bodies) if not body.heavy}
+        self.light = [k for number in sorted(self._light) for k in range(self.nu)[self.u_slices[number]]]
+        heavy = [body for number, body in enumerate(mechanism.bodies) if number not in self._light]
+        # kg and kg m² of the holders: any will do, those of the mechanism cost the fewest digits
+        self.usual = (
+            float(np.median([body.mass for body in heavy] or [1.0])),
+            float(np.median([np.trace(body.inertia) / 3 for body in heavy] or [1.0])),
+        )
         index = mechanism.body_index
         self._com = {WORLD: np.zeros(3)} | {body.name: np.array(body.com) for body in mechanism.bodies}
         self.connections = [
@@ -183,7 +189,12 @@ class MaximalEquations:
             for number, joint in enumerate(self.mechanism.joints)
             if joint.armature
         ]
-        return ConstrainedEquations(rows, force, rate, angle_rate, views, laws, drives)
+        holders = [
+            Drive(row, self.usual[0 if any(not is_zero(part) for part in row.force) else 1])
+            for row in rows
+            if self._light & {self.connections[row.connection].a, self.connections[row.connection].b}
+        ]
+        return ConstrainedEquations(rows, force, rate, angle_rate, views, laws, drives, holders)
 
     def _connection(
         self, kind: str, a: str, b: str, at_a: Sequence[float], at_b: Sequence[float], frame_a: Array, frame_b: Array

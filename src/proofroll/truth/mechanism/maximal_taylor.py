@@ -6,7 +6,7 @@ rows that do not depend on each other; they are chosen once, at the start.
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from typing import Any
 
 import numpy as np
@@ -80,11 +80,12 @@ def accelerations(
 ) -> list[Scalar]:
     """u̇ = M⁻¹(force + Cᵀλ), λ from (C M⁻¹ Cᵀ) λ = −bias − C M⁻¹ force, solved sparsely in the scalars themselves.
 
-    A drive is one row more, which yields by λ/inertia.
+    A drive is one row more, which yields by λ/inertia. Accelerations of bodies without inertia, whose M has no inverse,
+    are unknowns beside λ: C₀ᵀλ − M₀u̇₀ = −force₀.
     """
-    rows = [*rows, *(drive.row for drive in found.drives)]
-    inverse = equations.inverse_mass
-    blocks = [[(k, float(inverse[i, k])) for k in np.flatnonzero(inverse[i]).tolist()] for i in range(equations.nu)]
+    held, drives = len(rows), [*found.drives, *found.holders]
+    rows = [*rows, *(drive.row for drive in drives)]
+    blocks = _inverse_blocks(equations)
     free = [add(*(mul(value, found.force[k]) for k, value in block)) for block in blocks]
     weighted = [_times(row.coefficients, blocks) for row in rows]  # rows of C M⁻¹
     m = len(rows)
@@ -95,17 +96,52 @@ def accelerations(
             shared = touching[i] & rows[j].coefficients.keys()
             if shared:
                 A[i, j] = add(*(mul(weighted[i][k], rows[j].coefficients[k]) for k in sorted(shared)))
-    for i, drive in enumerate(found.drives, m - len(found.drives)):
-        A[i, i] = add(A[i, i], 1.0 / drive.inertia)
+    for i, drive in enumerate(drives, held):
+        A[i, i] = add(A.get((i, i), 0.0), 1.0 / drive.inertia)
+    after = _of_light_bodies(A, equations, rows, held)
     right = [
         sub(sub(0.0, row.bias), add(*(mul(value, free[k]) for k, value in row.coefficients.items()))) for row in rows
     ]
-    multipliers = _solved(A, right)
+    right += [sub(0.0, found.force[k]) for k in equations.light]
+    unknowns = _solved(A, right, after)
     result = list(free)
-    for weight, multiplier in zip(weighted, multipliers, strict=True):
+    for weight, multiplier in zip(weighted, unknowns, strict=False):
         for k, value in weight.items():
             result[k] = add(result[k], mul(value, multiplier))
+    for k, value in zip(equations.light, unknowns[m:], strict=True):
+        result[k] = value
     return result
+
+
+def _of_light_bodies(
+    A: dict[tuple[int, int], Scalar], equations: MaximalEquations, rows: Sequence[ConstraintRow], held: int
+) -> dict[int, set[int]]:
+    """Adds the columns of u̇₀ to A; which unknown comes after which others, for no pivot to be zero.
+
+    Drives go before the accelerations that they hold, and these before the multipliers of the first ``held`` rows: M
+    plus the drives is positive definite.
+    """
+    after: dict[int, set[int]] = {}
+    for p, k in enumerate(equations.light, len(rows)):
+        for i, row in enumerate(rows):
+            if k in row.coefficients:
+                A[p, i] = row.coefficients[k]
+                later, earlier = (i, p) if i < held else (p, i)
+                after.setdefault(later, set()).add(earlier)
+        for other, place in enumerate(equations.light[: p - len(rows) + 1], len(rows)):
+            A[p, other] = -float(equations.mass_matrix[k, place])
+    return after
+
+
+def _inverse_blocks(equations: MaximalEquations) -> list[list[tuple[int, float]]]:
+    """Rows of M⁻¹ by what is not zero; of bodies without inertia they are empty."""
+    blocks: list[list[tuple[int, float]]] = [[] for _ in range(equations.nu)]
+    for body, at in zip(equations.bodies, equations.u_slices, strict=True):
+        if body.heavy:
+            inverse = np.linalg.inv(body.mass_matrix)
+            for i, row in enumerate(inverse):
+                blocks[at.start + i] = [(at.start + k, float(row[k])) for k in np.flatnonzero(row).tolist()]
+    return blocks
 
 
 def _times(coefficients: dict[int, Scalar], blocks: list[list[tuple[int, float]]]) -> dict[int, Scalar]:
@@ -116,8 +152,11 @@ def _times(coefficients: dict[int, Scalar], blocks: list[list[tuple[int, float]]
     return {k: value for k, value in product.items() if not is_zero(value)}
 
 
-def _solved(A: dict[tuple[int, int], Scalar], right: list[Scalar]) -> list[Scalar]:
-    """X of the symmetric A x = right; A holds its lower triangle. Pivots are those with the fewest neighbours."""
+def _solved(A: dict[tuple[int, int], Scalar], right: list[Scalar], after: Mapping[int, set[int]]) -> list[Scalar]:
+    """X of the symmetric A x = right; A holds its lower triangle.
+
+    Pivots are those with the fewest neighbours; each of ``after`` comes after all that it names.
+    """
     entries = {frozenset(pair): value for pair, value in A.items() if not is_zero(value)}
     neighbours: dict[int, set[int]] = {i: set() for i in range(len(right))}
     for pair in entries:
@@ -127,7 +166,8 @@ def _solved(A: dict[tuple[int, int], Scalar], right: list[Scalar]) -> list[Scala
             neighbours[j].add(i)
     b, order, factors = list(right), [], []
     while neighbours:
-        pivot = min(neighbours, key=lambda i: (len(neighbours[i]), i))
+        ready = neighbours if not after else [i for i in neighbours if after.get(i, set()).isdisjoint(neighbours)]
+        pivot = min(ready, key=lambda i: (len(neighbours[i]), i))
         others = sorted(neighbours.pop(pivot))
         diagonal = entries[frozenset([pivot])]
         factor = {i: entries[frozenset([pivot, i])] / diagonal for i in others}

@@ -177,9 +177,9 @@ BAD = {
         SLIDER_CRANK.replace("mass = 0.6\ninertia = [1e-3, 1e-3, 1e-3]", "mass = 0"),
         "bodies.slider.mass = 0.0: a body without mass can move",
     ),
-    "moving body without inertia": (
-        SLIDER_CRANK.replace("inertia = [1e-3, 1e-3, 1e-3]", ""),
-        "positive moments of inertia",
+    "point that spins": (
+        SLIDER_CRANK + '\n[[bodies]]\nname = "extra"\nmass = 1\n' + joint("world", "extra", "spherical"),
+        "joints.extra.child.*nothing with inertia moves",
     ),
     "negative mass": (SLIDER_CRANK.replace("mass = 0.6", "mass = -0.6"), "bodies.slider.mass.*at least 0"),
     "axis of zero": (SLIDER_CRANK.replace("axis = [1, 0, 0]", "axis = [0, 0, 0]"), "joints.guide.axis.*no direction"),

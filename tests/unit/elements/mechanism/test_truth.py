@@ -166,6 +166,29 @@ def test_bodies_without_inertia_are_carried_by_others():
     assert np.abs(still).max() < 1e-12  # nothing pulls at a tool without mass
 
 
+def test_moving_bodies_without_inertia_are_moved_by_what_they_carry():
+    """Massless bodies and points between joints: both routes agree on the motion and on every wrench."""
+    pytest.importorskip("heyoka")
+    bodies = (
+        Body("hub", 0.0),
+        Body("ring", 0.0),
+        Body("hand", 0.7, (0, 0.1, 0.05), INERTIA),
+        Body("point", 0.5, (0, 0.3, 0.1)),
+        Body("wheel", 0.0),
+    )
+    joints = (
+        Joint("shaft", "revolute", "world", "hub", axis=(1, 2, 0), q0=(0.4,), v0=(1.0,)),
+        Joint("gimbal", "revolute", "hub", "ring", (0.3, 0, 0), axis=(0, 1, 0.2), q0=(0.3,), damping=0.1),
+        Joint("slide", "prismatic", "ring", "hand", axis=(0, 0, 1), q0=(0.1,), v0=(0.5,)),
+        Joint("thread", "revolute", "hub", "point", (-0.1, 0, 0), axis=(1, 0, 0), v0=(2.0,)),
+        Joint("axle", "revolute", "point", "wheel", (0, 0.3, 0), axis=(0, 0, 1), armature=0.02, v0=(3.0,)),
+    )
+    found = find_truth(Mechanism(bodies, joints), np.array([0.0, 0.2]))
+    assert found.differences["p_WB"] < 1e-13
+    assert found.differences["wrench"] < 1e-11
+    assert found.differences["energy"] < 1e-12
+
+
 def test_routes_of_a_spinning_body_agree(scene):
     """Ten seconds about the intermediate axis: attitudes and points within 1e-11, though errors grow 500 times."""
     pytest.importorskip("heyoka")
