@@ -18,7 +18,8 @@ from proofroll.report.markdown import caveat_list, verdict_table
 from proofroll.report.scene_sheet import scene_sheet
 from proofroll.running.runner import Runner
 from proofroll.running.store import Store
-from proofroll.studies.compare import Outcome, compare
+from proofroll.studies.compare import compare
+from proofroll.studies.outcome import Outcome
 
 DOCS = Path(__file__).resolve().parent
 PICTURES = DOCS / "gallery"

@@ -26,7 +26,8 @@ from proofroll.report.work_precision import draw as draw_work_precision
 from proofroll.running.runner import Runner
 from proofroll.running.store import Store
 from proofroll.studies.claims import claims_for
-from proofroll.studies.compare import Outcome, compare
+from proofroll.studies.compare import compare
+from proofroll.studies.outcome import Outcome
 from proofroll.studies.planning import point_name
 from proofroll.studies.tradeoff import tradeoff
 from proofroll.studies.tradeoff_content import content

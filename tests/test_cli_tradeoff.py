@@ -16,8 +16,8 @@ from proofroll.report import labels
 from proofroll.report.tradeoff_tables import corner_table
 from proofroll.report.work_precision import svg
 from proofroll.studies import study_identity as installed
+from proofroll.studies.curve import Question
 from proofroll.studies.study_store import keep
-from proofroll.studies.sweep import Question
 from proofroll.studies.tradeoff import stored
 
 pytestmark = pytest.mark.xdist_group("tradeoff")  # one process makes the study that most of them read

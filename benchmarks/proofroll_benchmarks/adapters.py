@@ -138,7 +138,7 @@ def bench_adapters(
 ) -> list[AdapterRow]:
     """All formulations of some engines, each with every variant, one worker process per engine."""
     from proofroll.files.scene_file import load_scene
-    from proofroll.running.runner import Worker, WorkerDied
+    from proofroll.running.process import Worker, WorkerDied
     from proofroll_benchmarks.loops import announced
 
     rows: list[AdapterRow] = []

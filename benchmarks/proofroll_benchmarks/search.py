@@ -14,8 +14,9 @@ from proofroll.core.errors import ProofrollError
 from proofroll.core.plugins import engine_names
 from proofroll.core.scene import Scene
 from proofroll.files.netcdf import read
+from proofroll.running.asking import describe, resolve
 from proofroll.running.case import Case, EngineFacts, Result, Status
-from proofroll.running.runner import Runner, describe, resolve
+from proofroll.running.runner import Runner
 
 # Samples per run: enough that the largest error of an oscillation of about 0.6 s is seen. Every run stops at them, the
 # timed ones too; that costs a fixed step nothing, and an adaptive one of high order at most a factor of about two.

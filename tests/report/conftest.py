@@ -27,7 +27,7 @@ from proofroll.report.growing_report import begun, write_report
 from proofroll.report.html import page
 from proofroll.running.case import Case, EngineFacts, Result, Status
 from proofroll.running.store import Store
-from proofroll.studies.compare import Outcome, Run
+from proofroll.studies.outcome import Outcome, Run
 from proofroll.studies.planning import point_name
 
 

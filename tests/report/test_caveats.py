@@ -11,9 +11,10 @@ from proofroll.core.plugins import engine_names, load_engine
 from proofroll.report.labels import caveat_lines, with_caveat
 from proofroll.report.stability_tables import silent_lines
 from proofroll.report.tradeoff_tables import answer_lines
+from proofroll.running.asking import resolve
 from proofroll.running.case import EngineFacts
-from proofroll.running.runner import resolve
-from proofroll.studies.recommend import Wish, recommend
+from proofroll.studies.recommend import recommend
+from proofroll.studies.wish import Wish
 
 OURS = "proofroll's own integrator"
 

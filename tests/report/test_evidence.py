@@ -25,7 +25,7 @@ from proofroll.report.report_content import report_content
 from proofroll.report.styles import OUTLINES, styles
 from proofroll.report.tables import cost_title, costs, expectations
 from proofroll.running.store import Store
-from proofroll.studies.compare import Outcome
+from proofroll.studies.outcome import Outcome
 
 
 def test_rough_curves_keep_extrema_ends_and_gaps() -> None:

@@ -24,7 +24,7 @@ from proofroll.report.plots import kept, point_curves
 from proofroll.report.report_content import report_content
 from proofroll.report.scores import Score, recommendation
 from proofroll.running.store import Store
-from proofroll.studies.compare import Outcome
+from proofroll.studies.outcome import Outcome
 
 COMMAND = "proofroll report invented"
 

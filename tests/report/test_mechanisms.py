@@ -20,7 +20,8 @@ from proofroll.report.growing_report import write_report
 from proofroll.report.plots import point_curves
 from proofroll.running.runner import Runner
 from proofroll.running.store import Store
-from proofroll.studies.compare import Outcome, compare
+from proofroll.studies.compare import compare
+from proofroll.studies.outcome import Outcome
 
 
 @pytest.fixture(scope="module")

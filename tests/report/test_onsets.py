@@ -30,7 +30,7 @@ from proofroll.report.scores import scores
 from proofroll.report.terminal import closing_lines, console, verdict_table
 from proofroll.running.case import Case, EngineFacts, Result, Status
 from proofroll.running.store import Store
-from proofroll.studies.compare import Outcome, Run
+from proofroll.studies.outcome import Outcome, Run
 from proofroll.studies.planning import point_name
 from proofroll.truth.onset import onset
 

@@ -15,7 +15,7 @@ from proofroll.files.scene_file import load_scene
 from proofroll.report.growing_report import begun
 from proofroll.report.terminal import part_lines
 from proofroll.running.store import Store
-from proofroll.studies.compare import Outcome
+from proofroll.studies.outcome import Outcome
 
 
 @pytest.fixture(scope="module")

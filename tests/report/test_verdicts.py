@@ -25,7 +25,7 @@ from proofroll.report.tables import counted, overview
 from proofroll.report.terminal import closing_lines, verdict_table
 from proofroll.running.case import Result, Status
 from proofroll.running.store import Store
-from proofroll.studies.compare import Outcome, Run
+from proofroll.studies.outcome import Outcome, Run
 
 TRUE = np.sin(np.linspace(0, 2, 21))
 OTHER = Limit(TRUE + 0.05, 2e-4, 1.0)

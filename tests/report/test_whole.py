@@ -17,7 +17,7 @@ from proofroll.report.stability_part import StabilityPart
 from proofroll.report.study_parts import absent, all_parts, attempt, entry, part_kinds, parts_of
 from proofroll.report.summary import three_sentences
 from proofroll.running.store import Store
-from proofroll.studies.compare import Outcome
+from proofroll.studies.outcome import Outcome
 from proofroll.studies.stability_places import QUICK, Effort
 from proofroll.studies.study_store import keep, stability_path
 from proofroll.studies.tradeoff import stored

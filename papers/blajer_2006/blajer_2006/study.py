@@ -15,8 +15,9 @@ from proofroll.elements.ball_on_surface.element import ASKED, rolling_ball
 from proofroll.elements.ball_on_surface.model import RollingBall
 from proofroll.files.netcdf import read
 from proofroll.files.scene_file import load_scene
+from proofroll.running.asking import describe, resolve
 from proofroll.running.case import Case, EngineFacts, Result, Status
-from proofroll.running.runner import Runner, describe, resolve
+from proofroll.running.runner import Runner
 
 if TYPE_CHECKING:
     import xarray as xr

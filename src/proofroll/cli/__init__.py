@@ -97,7 +97,7 @@ def main() -> None:
         code = USAGE
     except ProofrollError as error:
         from proofroll.core.errors import Refused
-        from proofroll.running.runner import WorkerDied
+        from proofroll.running.process import WorkerDied
 
         complain(str(error))
         code = ENGINE if isinstance(error, (Missing, WorkerDied, Refused)) else USAGE

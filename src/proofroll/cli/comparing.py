@@ -28,7 +28,7 @@ from proofroll.cli.options import (
 if TYPE_CHECKING:
     from proofroll.core.comparison import Comparison
     from proofroll.running.runner import Runner
-    from proofroll.studies.compare import Outcome
+    from proofroll.studies.outcome import Outcome
 
 
 def compare(

@@ -83,7 +83,7 @@ def remove(
 
 
 def _described(name: str) -> dict[str, Any]:
-    from proofroll.running.runner import describe
+    from proofroll.running.asking import describe
 
     try:
         return {"status": "installed", **describe(name)}

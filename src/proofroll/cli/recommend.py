@@ -15,7 +15,7 @@ from proofroll.core.errors import InputError
 
 if TYPE_CHECKING:
     from proofroll.studies.claims import TradeoffClaims
-    from proofroll.studies.sweep import Question
+    from proofroll.studies.curve import Question
 
 # Of SI, before the unit of a tolerance; the second µ is the Greek letter.
 _PREFIXES = {"k": 1e3, "m": 1e-3, "µ": 1e-6, "\u03bc": 1e-6, "u": 1e-6, "n": 1e-9}
@@ -46,8 +46,8 @@ def recommend(
     """
     from proofroll.core.plugins import engine_names, parse_engine, require_engine
     from proofroll.report.tradeoff_tables import answer_lines
-    from proofroll.studies.recommend import Wish
     from proofroll.studies.recommend import recommend as answered
+    from proofroll.studies.wish import Wish
 
     claims, question = question_of(scene, settings, [quantity] if quantity else None, until)
     require_observables(question, [question.quantity])  # before minutes are spent on measuring

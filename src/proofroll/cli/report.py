@@ -29,7 +29,7 @@ if TYPE_CHECKING:
     from proofroll.report.growing_report import Report
     from proofroll.report.study_parts import Part
     from proofroll.running.runner import Runner
-    from proofroll.studies.compare import Outcome
+    from proofroll.studies.outcome import Outcome
 
 
 def report(

@@ -26,7 +26,7 @@ from proofroll.core.errors import InputError
 if TYPE_CHECKING:
     from proofroll.running.runner import Runner
     from proofroll.studies.claims import TradeoffClaims
-    from proofroll.studies.sweep import Question
+    from proofroll.studies.curve import Question
 
 SceneOrFile = Annotated[
     str, typer.Argument(help="A scene, or a comparison file for it, e.g. comparisons/tradeoff.toml.")
@@ -109,7 +109,7 @@ def question_of(
     from proofroll.core.time_grid import time_grid
     from proofroll.files.scene_file import load_scene
     from proofroll.studies.claims import claims_for, load_claims
-    from proofroll.studies.sweep import Question
+    from proofroll.studies.curve import Question
 
     path = Path(scene)
     claims = load_claims(path) if path.suffix == ".toml" else claims_for(scene)

@@ -54,7 +54,7 @@ def versions(
     readers = {point.name: point for point in entry_points(group=SUBJECTS)}
     robot = readers.get(Path(subject).suffix.removeprefix("."))
     if robot is None:
-        from proofroll.studies.versions import comparisons_about
+        from proofroll.studies.version_subjects import comparisons_about
 
         comparisons = comparisons_about(subject, engine)  # before minutes are spent on environments
     sides = _place(engine, old), _place(engine, new)
@@ -109,7 +109,7 @@ def _place(engine: str, text: str) -> str:
     """The engine ``NAME`` or ``NAME@PLACE`` that a person means by a version, a label or a path; made if need be."""
     from proofroll.core.plugins import engine_names, release
     from proofroll.running import environments
-    from proofroll.running.runner import describe
+    from proofroll.running.asking import describe
 
     if os.sep in text or text.startswith(("~", ".")) or environments.find(engine, text) is not None:
         return f"{engine}@{text}"

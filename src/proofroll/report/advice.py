@@ -7,7 +7,8 @@ from typing import TYPE_CHECKING, Any
 
 from proofroll.core.comparison import Tolerance
 from proofroll.report.tradeoff_tables import default_quantities
-from proofroll.studies.recommend import Wish, recommend
+from proofroll.studies.recommend import recommend
+from proofroll.studies.wish import Wish
 
 if TYPE_CHECKING:
     from proofroll.studies.claims import TradeoffClaims

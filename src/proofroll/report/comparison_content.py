@@ -13,8 +13,8 @@ from proofroll.files.json_data import plain
 from proofroll.files.scene_file import load_scene
 from proofroll.running.case import Status
 from proofroll.running.timing import machine
-from proofroll.studies.compare import Outcome, Run
 from proofroll.studies.hosts import hosts
+from proofroll.studies.outcome import Outcome, Run
 from proofroll.studies.planning import point_name
 
 

@@ -13,7 +13,7 @@ if TYPE_CHECKING:
     from collections.abc import Sequence
 
     from proofroll.core.comparison import Row, Tolerance
-    from proofroll.studies.compare import Outcome
+    from proofroll.studies.outcome import Outcome
 
 
 def add_evidence(content: dict[str, Any], outcome: Outcome) -> None:

@@ -24,7 +24,7 @@ from proofroll.running.store import Store, write_text
 if TYPE_CHECKING:
     from collections.abc import Callable
 
-    from proofroll.studies.compare import Outcome
+    from proofroll.studies.outcome import Outcome
 
 
 @dataclass

@@ -11,7 +11,8 @@ from proofroll.report.labels import SYMBOLS, caveat_lines, verdict_text
 from proofroll.report.labels import number as short
 from proofroll.report.terminal import columns, number, step
 from proofroll.report.tradeoff_tables import name_of, step_of
-from proofroll.studies.recommend import Wish, recommend
+from proofroll.studies.recommend import recommend
+from proofroll.studies.wish import Wish
 
 
 def verdict_table(content: dict[str, Any]) -> str:

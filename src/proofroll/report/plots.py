@@ -15,7 +15,7 @@ from proofroll.files.netcdf import read, read_some
 from proofroll.files.scene_file import load_scene
 from proofroll.report.kinds import kind_of
 from proofroll.report.labels import symbol, unit
-from proofroll.studies.compare import Outcome, Run
+from proofroll.studies.outcome import Outcome, Run
 from proofroll.studies.planning import point_name
 
 if TYPE_CHECKING:

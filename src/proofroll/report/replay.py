@@ -20,7 +20,7 @@ from proofroll.report.replay_library import packed, thinned, three
 from proofroll.report.styles import styles
 from proofroll.running.case import Case, Status
 from proofroll.running.store import Store
-from proofroll.studies.compare import Outcome, Run
+from proofroll.studies.outcome import Outcome, Run
 from proofroll.studies.planning import point_name
 
 # How fast a person can let it run, over real time.

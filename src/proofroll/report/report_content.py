@@ -18,7 +18,7 @@ from proofroll.report.summary import three_sentences
 
 if TYPE_CHECKING:
     from proofroll.running.store import Store
-    from proofroll.studies.compare import Outcome
+    from proofroll.studies.outcome import Outcome
 
 
 def report_content(outcomes: list[Outcome], store: Store, command: str) -> dict[str, Any]:

@@ -8,7 +8,7 @@ from typing import Any
 from proofroll.core.plugins import plain_name
 from proofroll.robots.check import check
 from proofroll.robots.terminal import amount
-from proofroll.running.runner import describe
+from proofroll.running.asking import describe
 
 
 def between(file: str, old: str, new: str) -> dict[str, Any]:

@@ -20,10 +20,11 @@ import proofroll
 from proofroll.core.errors import InputError, ProofrollError
 from proofroll.core.plugins import GROUP
 from proofroll.files.scene_file import load_scene
+from proofroll.running.asking import resolve
 from proofroll.running.case import Case, EngineFacts
 from proofroll.running.identity import digest
 from proofroll.running.process import WorkerDied
-from proofroll.running.runner import refusal, resolve, run_one
+from proofroll.running.runner import refusal, run_one
 from proofroll.running.worker_pool import Workers
 
 # Processes are kept between the cases of a command, in each Dask worker for so many engines and commands.

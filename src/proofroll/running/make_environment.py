@@ -21,10 +21,10 @@ from pathlib import Path
 from proofroll.core.errors import InputError, ProofrollError
 from proofroll.core.plugins import GROUP, release
 from proofroll.running import environments
+from proofroll.running.asking import describe
 from proofroll.running.environments import Environment
 from proofroll.running.interpreters import OLDEST
 from proofroll.running.process import environment_of_another
-from proofroll.running.runner import describe
 
 _PACKAGES = """
 import json, platform

@@ -2,152 +2,28 @@
 
 from __future__ import annotations
 
-import contextlib
 import dataclasses
 import os
 import queue
 import threading
 from collections import Counter, deque
-from collections.abc import Callable, Collection, Iterable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterable
 from concurrent.futures import ThreadPoolExecutor
 from functools import partial
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 from proofroll.core.errors import InputError, Missing, ProofrollError
 from proofroll.core.plugins import plain_name
-from proofroll.running.case import Case, EngineFacts, Result, Status
+from proofroll.running.asking import lent_workers
+from proofroll.running.case import Case, Result, Status
 from proofroll.running.process import Worker, WorkerDied
 from proofroll.running.store import Store
+from proofroll.running.waiting_cases import WaitingCases
 from proofroll.running.worker_pool import Workers
 
 if TYPE_CHECKING:
     from proofroll.running.cluster import Cluster
-
-__all__ = ["Runner", "Worker", "WorkerDied", "describe", "programs", "refusal", "resolve", "run_one"]
-
-_START_UP_SECONDS = 60.0
-
-
-def describe(engine: str, workers: Workers | None = None) -> dict[str, Any]:
-    """What an engine is, provides and has as presets; asked in a process of its own.
-
-    Raises:
-        InputError, Missing, WorkerDied: it cannot be asked.
-    """
-    with _lent(workers) as lent, lent.lend(engine) as worker:
-        return worker.request({"do": "describe", "engine": engine}, _START_UP_SECONDS)
-
-
-def resolve(
-    engines: Sequence[tuple[str, Mapping[str, Any]]],
-    workers: Workers | None = None,
-    requires: Collection[str] = (),
-) -> list[EngineFacts | ProofrollError]:
-    """Complete settings for engines with options, each or the reason why not, in the order given.
-
-    Args:
-        engines: names and options.
-        workers: processes in which they are asked.
-        requires: by the scene, which decides the formulation where none is given.
-    """
-    found: list[EngineFacts | ProofrollError] = [ProofrollError("not asked")] * len(engines)
-
-    def ask(name: str, lent: Workers) -> None:
-        for index, (other, options) in enumerate(engines):
-            if other != name:
-                continue
-            request = {"do": "resolve", "engine": name, "options": dict(options), "requires": sorted(requires)}
-            try:
-                worker = lent.take(name)
-            except ProofrollError as error:  # another interpreter that does not serve
-                found[index] = error
-                continue
-            try:
-                found[index] = EngineFacts(**worker.request(request, _START_UP_SECONDS))
-            except WorkerDied as error:
-                found[index] = error
-                worker.close()
-                continue
-            except ProofrollError as error:
-                found[index] = error
-            except BaseException:
-                worker.close()
-                raise
-            lent.keep(name, worker)
-
-    # Most of it is the start of the processes and the import of the engines.
-    with _lent(workers) as lent, ThreadPoolExecutor(os.cpu_count() or 1) as pool:
-        list(pool.map(lambda name: ask(name, lent), dict.fromkeys(name for name, _ in engines)))
-    return found
-
-
-def programs(cases: Sequence[Case], workers: Workers | None = None) -> list[tuple[str | None, str]]:
-    """Engines' programs for cases (:class:`proofroll.core.engine_abilities.Reproduces`), each or None and why not."""
-    found: list[tuple[str | None, str]] = []
-    with _lent(workers) as lent:
-        for case in cases:
-            try:
-                with lent.lend(case.engine.name) as worker:
-                    request = {"do": "reproduce", "case": dataclasses.asdict(case)}
-                    answer = worker.request(request, _START_UP_SECONDS)
-                found.append((answer["program"], answer["message"]))
-            except ProofrollError as error:
-                found.append((None, str(error)))
-    return found
-
-
-@contextlib.contextmanager
-def _lent(workers: Workers | None) -> Iterator[Workers]:
-    """The workers that are given, or some that end with the block."""
-    if workers is not None:
-        yield workers
-        return
-    own = Workers()
-    try:
-        yield own
-    finally:
-        own.close()
-
-
-class _Waiting:
-    """Cases that wait. A worker goes on with its engine while it can: starting another costs more than many a case."""
-
-    def __init__(self) -> None:
-        self._changed = threading.Condition()
-        self._by_engine: dict[str, deque[Case]] = {}
-        self._begun: set[str] = set()
-        self._closed = False
-
-    def add(self, case: Case) -> None:
-        """Puts a case at the end."""
-        with self._changed:
-            self._by_engine.setdefault(case.engine.name, deque()).append(case)
-            self._changed.notify()
-
-    def close(self) -> None:
-        """Nothing more will come, and what waits is not to be begun."""
-        with self._changed:
-            self._closed = True
-            self._changed.notify_all()
-
-    def take(self, engine: str | None) -> Case | None:
-        """The next case, of this engine if there is one, else of one that nobody has begun; None: it is closed.
-
-        Where all are begun, the one with the most cases left is shared. Where there is none, it waits for one.
-        """
-        with self._changed:
-            while not self._closed:
-                group = self._by_engine.get(engine or "")
-                if not group:
-                    fresh = [cases for name, cases in self._by_engine.items() if cases and name not in self._begun]
-                    group = max(fresh or self._by_engine.values(), key=len, default=None)
-                if group:
-                    case = group.popleft()
-                    self._begun.add(case.engine.name)
-                    return case
-                self._changed.wait()
-            return None
 
 
 _Arrived = queue.SimpleQueue[tuple[Case, Result] | Exception]
@@ -207,7 +83,7 @@ class Runner:
         results: dict[str, Result] = {}
         asked: set[str] = set()
         arrived: _Arrived = queue.SimpleQueue()
-        shared = _Waiting()
+        shared = WaitingCases()
         running = 0
         ready: deque[tuple[Case, Result]] = deque()
 
@@ -259,7 +135,7 @@ class Runner:
             self._stopping.clear()
         return results
 
-    def _begin(self, pool: ThreadPoolExecutor, waiting: _Waiting, arrived: _Arrived) -> None:
+    def _begin(self, pool: ThreadPoolExecutor, waiting: WaitingCases, arrived: _Arrived) -> None:
         """Begins to serve what waits: on the cluster, or in so many workers here."""
         if self.cluster is not None:
             pool.submit(self.cluster.serve, waiting.take, partial(self._arrive, arrived), arrived.put)
@@ -275,7 +151,7 @@ class Runner:
         if self.cluster is not None:
             self.cluster.stop()
 
-    def _serve(self, waiting: _Waiting, arrived: _Arrived) -> None:
+    def _serve(self, waiting: WaitingCases, arrived: _Arrived) -> None:
         """Serves cases one after another, in a new worker for another engine and after each crash."""
         worker: Worker | None = None
         engine: str | None = None
@@ -370,7 +246,7 @@ def _lost(case: Case, error: WorkerDied) -> Result:
 def run_one(case: Case, out: Path, workers: Workers | None = None) -> Result:
     """Runs a single case, its trajectory going to ``out``, with nothing stored or reused."""
     try:
-        with _lent(workers) as lent, lent.lend(case.engine.name) as worker:
+        with lent_workers(workers) as lent, lent.lend(case.engine.name) as worker:
             return _ask(worker, case, out)
     except WorkerDied as error:
         return _lost(case, error)

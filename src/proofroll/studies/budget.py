@@ -16,7 +16,7 @@ import numpy as np
 
 from proofroll.core.arrays import FloatArray
 from proofroll.core.convergence import Limit, observed_order, richardson, size, tightest
-from proofroll.studies.sweep import Curve, CurvePoint
+from proofroll.studies.curve import Curve, CurvePoint
 
 # Neighbouring local orders this near to each other belong to one power law.
 _SAME_ORDER = 0.3

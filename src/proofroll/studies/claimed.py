@@ -14,7 +14,8 @@ from typing import Any, NamedTuple
 from proofroll.core.comparison import Tolerance
 from proofroll.core.engine_abilities import Level
 from proofroll.running.timing import FACTOR, Timing, named, ratio
-from proofroll.studies.recommend import Wish, fits, holding
+from proofroll.studies.recommend import fits, holding
+from proofroll.studies.wish import Wish
 
 _Study = Mapping[str, Any]
 

@@ -15,7 +15,7 @@ from proofroll.files.scene_file import load_scene
 from proofroll.files.toml import read_toml, study_files
 from proofroll.files.validation import first_problem
 from proofroll.studies.claimed import Cheapest, ClaimJudgement, Converges, Holds
-from proofroll.studies.sweep import Question
+from proofroll.studies.curve import Question
 
 STUDY = "tradeoff"
 

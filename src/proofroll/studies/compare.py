@@ -2,101 +2,31 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Collection, Iterable, Sequence
-from dataclasses import dataclass, field, replace
+from collections.abc import Callable, Iterable
+from dataclasses import replace
 from typing import TYPE_CHECKING
 
 import numpy as np
 
 from proofroll.core.arrays import FloatArray
-from proofroll.core.comparison import Band, Comparison, Row
+from proofroll.core.comparison import Band, Comparison
 from proofroll.core.convergence import Limit, richardson, tightest
-from proofroll.core.diagnosis.of_scene import Diagnosis, diagnosed
+from proofroll.core.diagnosis.of_scene import diagnosed
 from proofroll.core.errors import Missing, ProofrollError
 from proofroll.core.verdict import Judgement, Verdict, judge
 from proofroll.files.netcdf import read
 from proofroll.files.scene_file import load_scene
 from proofroll.running.case import LASTING, Case, EngineFacts, Result, Status
-from proofroll.running.runner import Runner, WorkerDied
+from proofroll.running.process import WorkerDied
+from proofroll.running.runner import Runner
 from proofroll.studies.common_span import common_span
+from proofroll.studies.expectations import contradictions_of
+from proofroll.studies.outcome import Outcome, Run
 from proofroll.studies.planning import Plan, Planned, plan, point_name
 from proofroll.studies.reference import Reference
 
 if TYPE_CHECKING:
     import xarray as xr
-
-
-_ORDER = list(Verdict)
-# What a run is called that came to its end and cannot be judged; any other without a judgement failed.
-_UNJUDGED = {Status.ANOTHER_SCENE: Verdict.ANOTHER_SCENE, Status.NO_TRUTH: Verdict.NOT_JUDGED}
-
-
-def worst(judgements: Sequence[Judgement], missing: Collection[str] = ()) -> Verdict:
-    """The worst verdict of any observable, those that are missing included; failed if there is no judgement."""
-    found = [judgement.verdict for judgement in judgements]
-    return max([*found, *([Verdict.INCOMPLETE] if found and missing else [])], key=_ORDER.index, default=Verdict.FAILED)
-
-
-@dataclass(frozen=True)
-class Run:
-    """One row of the comparison at one point of its parameters.
-
-    Attributes:
-        row: the claim.
-        parameters: the point.
-        facts: the engine with complete settings, or None if it could not be asked.
-        result: how the run itself ended.
-        judgements: one per observable; empty if there is no trajectory.
-        contradictions: sentences about what the claim did not expect.
-        case: the run's case, or None.
-        missing: observables that the claim's tolerances judge and the run does not give.
-        shared: which route of the truth rests on the same equations, as a clause; empty if none does.
-        diagnosis: causes of a difference that are proven.
-    """
-
-    row: Row
-    parameters: dict[str, float]
-    facts: EngineFacts | None
-    result: Result
-    judgements: list[Judgement] = field(default_factory=list)
-    contradictions: list[str] = field(default_factory=list)
-    case: Case | None = None
-    missing: list[str] = field(default_factory=list)
-    shared: str = ""
-    diagnosis: list[Diagnosis] = field(default_factory=list)
-
-    @property
-    def verdict(self) -> Verdict:
-        """The worst verdict of any observable; incomplete if all that is reported agrees but something is missing."""
-        if self.result.status != Status.DONE:
-            return _UNJUDGED.get(self.result.status, Verdict.FAILED)
-        return worst(self.judgements, self.missing)
-
-
-@dataclass(frozen=True)
-class Outcome:
-    """All that a comparison found."""
-
-    comparison: Comparison
-    runs: list[Run]
-    truths: dict[str, Case]
-    """The truth's case by :func:`point_name`."""
-
-    @property
-    def contradictions(self) -> list[str]:
-        """What the comparison did not expect, as sentences."""
-        return [sentence for run in self.runs for sentence in run.contradictions]
-
-    @property
-    def lost(self) -> list[Run]:
-        """Runs whose engine is missing, crashed or hung, though the comparison does not expect a failure."""
-        broken = {Status.MISSING, Status.CRASHED, Status.TIMEOUT}
-        lost = [run for run in self.runs if run.result.status in broken]
-        return [run for run in lost if Verdict.FAILED not in run.row.expected(run.parameters)]
-
-
-# Where nobody can be judged; that contradicts no claim, and is expected of every engine.
-NOBODY = frozenset({Verdict.ILL_POSED, Verdict.NOT_JUDGED, Verdict.ANOTHER_SCENE})
 
 
 def evaluate(planned: Plan, results: dict[str, Result], runner: Runner) -> Outcome:
@@ -133,7 +63,7 @@ def evaluate(planned: Plan, results: dict[str, Result], runner: Runner) -> Outco
         band = comparison.bands[run.row.tolerance]
         judgements = _judgements(run, band, references[name], trajectories, _lost(run, results))
         missing = sorted({*band.bounds, *run.row.bound} - {judgement.observable for judgement in judgements})
-        contradictions = _contradictions(comparison, run, judgements, missing)
+        contradictions = contradictions_of(comparison, run, judgements, missing)
         shared = references[name].shared(run.facts.shares)
         found = Run(run.row, run.parameters, run.facts, result, judgements, contradictions, main, missing, shared)
         if found.verdict == Verdict.DIFFERS:
@@ -261,47 +191,3 @@ def _has_ladder(run: Planned, curve: FloatArray) -> bool:
     """Whether small steps could confirm the curve: several were asked for, and there is something to converge."""
     resolved = isinstance(run.facts, EngineFacts) and run.facts.resolution is not None
     return resolved and len(run.row.ladder) > 1 and curve.size > 0
-
-
-def _contradictions(
-    comparison: Comparison, run: Planned, judgements: list[Judgement], missing: Collection[str]
-) -> list[str]:
-    """What the claim did not expect, as sentences."""
-    where = f"{run.row.engine} at {point_name(run.parameters)}"
-    found = []
-    row, expected = run.row, run.row.expected(run.parameters)
-    known = [judgement for judgement in judgements if judgement.verdict not in NOBODY]
-    overall = worst(known, missing)
-    # Where something cannot be judged, the rest contradicts only by being worse than expected.
-    whole = len(known) == len(judgements)
-    worse = bool(known) and _ORDER.index(overall) > max(map(_ORDER.index, expected))
-    # What is missing is said below, name by name.
-    if overall not in {*expected, Verdict.INCOMPLETE} and (whole or worse):
-        # Which observables make it so; where it is better than expected, all of them do.
-        guilty = [judgement for judgement in known if judgement.verdict == overall]
-        guilty.sort(key=lambda item: item.error / item.tolerance, reverse=True)
-        said = "; ".join(f"{item.observable} {item.verdict}" for item in guilty)
-        said = f"{said}; {guilty[0].observable}: {guilty[0].reason}" if guilty else "nothing is judged"
-        found.append(f"{where} {overall}, expected: {' or '.join(expected)} ({said})")
-    for judgement in judgements:
-        name, verdict = judgement.observable, judgement.verdict
-        alone = row.expect_for.get(name)
-        if alone is not None and verdict not in {*alone, *NOBODY}:
-            found.append(f"{where}: {name} {verdict}, expected: {' or '.join(alone)} ({judgement.reason})")
-        if name in row.order and not _within(judgement.order, row.order[name]):
-            low, high = row.order[name]
-            found.append(f"{where}: order of {name} is {judgement.order}, expected {low:g} to {high:g}")
-        if name in row.limit:
-            allowed = row.limit[name].absolute(judgement.scale)
-            if judgement.limit_error is None or judgement.limit_error > allowed:
-                found.append(f"{where}: limit of {name} is off by {judgement.limit_error}, expected {allowed:.3g}")
-    claimed = {*row.bound, *row.expect_for, *row.order, *row.limit}
-    if Verdict.INCOMPLETE not in expected:
-        claimed |= {*missing}
-    for name in sorted(claimed - {judgement.observable for judgement in judgements}):
-        found.append(f"{where}: {name} is not reported, though {comparison.name} makes a claim about it")
-    return found
-
-
-def _within(value: float | None, bounds: tuple[float, float]) -> bool:
-    return value is not None and bounds[0] <= value <= bounds[1]

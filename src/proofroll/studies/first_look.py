@@ -59,7 +59,7 @@ def bounds(scene: Scene) -> dict[str, Tolerance]:
 
 def able(scene: Scene, *, first: bool = False) -> list[str]:
     """Formulations of installed engines that can represent the scene, as files write them; ``first``: one of each."""
-    from proofroll.running.runner import describe
+    from proofroll.running.asking import describe
 
     found = []
     for engine in engine_names():

@@ -18,8 +18,10 @@ from proofroll.core.scene import Scene
 from proofroll.core.time_grid import time_grid
 from proofroll.files.netcdf import read
 from proofroll.files.scene_file import load_scene
+from proofroll.running.asking import resolve
 from proofroll.running.case import Case, EngineFacts, Result, Status
-from proofroll.running.runner import Runner, WorkerDied, resolve
+from proofroll.running.process import WorkerDied
+from proofroll.running.runner import Runner
 from proofroll.running.stopwatch import Stopwatch
 from proofroll.running.timing import ROUNDS, Timing, interleaved
 from proofroll.studies.ladder_models import LadderModel, Rung, Switch, described, rungs, switches

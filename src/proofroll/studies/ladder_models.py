@@ -11,7 +11,7 @@ from proofroll.core.engine_abilities import Level
 from proofroll.core.errors import ProofrollError
 from proofroll.core.plugins import engine_names
 from proofroll.core.scene import Scene
-from proofroll.running.runner import describe
+from proofroll.running.asking import describe
 
 if TYPE_CHECKING:
     import xarray as xr

@@ -12,8 +12,8 @@ from proofroll.core.errors import InputError, ProofrollError
 from proofroll.core.plugins import parse_engine, place_of, plain_name
 from proofroll.core.scene import Scene
 from proofroll.files.scene_file import load_scene
+from proofroll.running.asking import resolve
 from proofroll.running.case import Case, EngineFacts
-from proofroll.running.runner import resolve
 from proofroll.running.worker_pool import Workers
 from proofroll.studies.comparison_points import settled
 

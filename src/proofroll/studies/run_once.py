@@ -9,8 +9,8 @@ from proofroll.core.errors import InputError, ProofrollError
 from proofroll.core.plugins import parse_engine
 from proofroll.core.time_grid import sampling_interval
 from proofroll.files.scene_file import load_scene
+from proofroll.running.asking import resolve
 from proofroll.running.case import Case
-from proofroll.running.runner import resolve
 from proofroll.running.worker_pool import Workers
 
 

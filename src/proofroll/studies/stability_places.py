@@ -10,11 +10,13 @@ from proofroll.core.errors import ProofrollError
 from proofroll.core.scene import Scene
 from proofroll.files.netcdf import read
 from proofroll.files.scene_file import load_scene
+from proofroll.running.asking import resolve
 from proofroll.running.case import Case, EngineFacts, Status
-from proofroll.running.runner import Runner, resolve
+from proofroll.running.runner import Runner
 from proofroll.studies.axes import Axis, thinned
+from proofroll.studies.curve import Question
+from proofroll.studies.curve_points import case_of
 from proofroll.studies.failure import Yardstick
-from proofroll.studies.sweep import Question, case_of
 
 # Sampling intervals per natural time; the coarsest step is one of them, the finer ones divide it.
 PER_PERIOD = 8

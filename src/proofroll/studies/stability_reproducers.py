@@ -8,8 +8,8 @@ from typing import Any
 
 from proofroll.core.element_abilities import WritesPrograms
 from proofroll.core.failed_run import FailedRun, imported
+from proofroll.running.asking import programs
 from proofroll.running.case import Case
-from proofroll.running.runner import programs
 from proofroll.running.store import write_text
 from proofroll.running.worker_pool import Workers
 from proofroll.studies.failure import ACCURATE, REFUSED, TOO_SLOW, WRONG

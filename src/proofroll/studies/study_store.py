@@ -18,9 +18,9 @@ if TYPE_CHECKING:
     from proofroll.running.runner import Runner
     from proofroll.studies.axes import Axis
     from proofroll.studies.claims import TradeoffClaims
+    from proofroll.studies.curve import Question
     from proofroll.studies.stability_claims import StabilityFile
     from proofroll.studies.stability_places import Effort
-    from proofroll.studies.sweep import Question
 
 
 def kept(path: Path) -> tuple[dict[str, Any] | None, list[str]]:

@@ -21,9 +21,12 @@ from proofroll.running.runner import Runner
 from proofroll.running.stopwatch import SECONDS, Stopwatch
 from proofroll.running.timing import ROUNDS, Timing, interleaved
 from proofroll.running.worker_pool import Workers
+from proofroll.studies.curve import Curve, CurvePoint, Question
+from proofroll.studies.curve_points import case_of, cases_of, judged
+from proofroll.studies.curves_asked import curves_of
 from proofroll.studies.pareto import envelope, front
 from proofroll.studies.reference import Reference
-from proofroll.studies.sweep import FINER, Curve, CurvePoint, Question, case_of, cases_of, curves_of, judged, sweep
+from proofroll.studies.sweep import FINER, sweep
 
 # What makes up most of a study's time is the repetition of measurements. A brief one repeats less: two rounds
 # show how far a cost can be trusted; a run longer than this [s] warms itself up, and is measured once.
@@ -140,8 +143,8 @@ def tradeoff(
 
 
 def _truth_case(question: Question, references: Mapping[float, Reference], runner: Runner) -> Case:
+    from proofroll.running.asking import resolve
     from proofroll.running.case import EngineFacts
-    from proofroll.running.runner import resolve
 
     (facts,) = resolve([("truth", {})], runner.workers)
     assert isinstance(facts, EngineFacts)  # the sweep has run with it

@@ -15,10 +15,11 @@ from proofroll.running.case import Status
 from proofroll.running.timing import Timing
 from proofroll.studies import study_identity as installed
 from proofroll.studies.budget import Budget, budget, sentence
+from proofroll.studies.curve import Curve, CurvePoint
 from proofroll.studies.hosts import hosts, said_of
 from proofroll.studies.pareto import envelope, front
 from proofroll.studies.recommend import by_hand
-from proofroll.studies.sweep import BROKEN, Curve, CurvePoint
+from proofroll.studies.sweep import BROKEN
 from proofroll.studies.tradeoff import Tradeoff, judged_quantities, pareto_entries
 
 

@@ -9,22 +9,20 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from proofroll.core.comparison import Band, Comparison, Row, Tolerance
+from proofroll.core.comparison import Comparison
 from proofroll.core.dataset import observe, scales
-from proofroll.core.errors import InputError
 from proofroll.core.observable import Role
 from proofroll.core.plugins import parse_engine
 from proofroll.core.scene import Scene
-from proofroll.files.comparison_file import comparison_names, load_comparison
-from proofroll.files.data_folders import study_folders
 from proofroll.files.netcdf import read
-from proofroll.files.scene_file import load_scene, read_scene_file, scene_folder
-from proofroll.files.toml import study_of
+from proofroll.files.scene_file import load_scene
+from proofroll.running.asking import describe
 from proofroll.running.case import Result, Status
-from proofroll.running.runner import Runner, describe
+from proofroll.running.runner import Runner
 from proofroll.running.stopwatch import Stopwatch
 from proofroll.running.timing import interleaved, ratio
-from proofroll.studies.compare import Run, evaluate
+from proofroll.studies.compare import evaluate
+from proofroll.studies.outcome import Run
 from proofroll.studies.planning import Plan, plan, point_name
 
 if TYPE_CHECKING:
@@ -37,71 +35,8 @@ ROUND_OFF = 1e-9
 _ANOTHER_ORDER = 0.5
 # Rounds of timing: with twelve one estimate moved by 5 % between series, with twenty the interval is some 4 % wide.
 ROUNDS = 20
-# Of a scene about which no comparison is written.
-_UNTIL, _EVERY = 2.0, 0.01
-_BECAUSE = (
-    "a thousandth of its size is what a measurement or a picture would show; no comparison says more about this scene"
-)
 
 Progress = Callable[[str], None]
-
-
-def comparisons_about(subject: str, engine: str) -> list[Comparison]:
-    """What is run: a comparison, or those about a scene, or all that have rows of the engine.
-
-    Args:
-        subject: name or path of a comparison, or of a scene; empty: all comparisons, briefly.
-        engine: plain name; of a scene without comparisons, each of its formulations and presets is run.
-
-    Raises:
-        InputError: there is no such thing, or it has nothing of this engine.
-    """
-    if not subject:
-        found = [load_comparison(name).briefly() for name in comparison_names()]
-        found = [item for item in found if _rows_of(item, engine)]
-        if not found:
-            raise InputError("engine", engine, "no comparison has rows of it; name a scene or a comparison")
-        return found
-    try:
-        scene_folder(subject)
-    except InputError:
-        loaded = load_comparison(subject)
-        if not _rows_of(loaded, engine):
-            raise InputError("engine", engine, f"{loaded.name} has no rows of it") from None
-        return [loaded]
-    files = [path for folder in study_folders() for path in sorted(folder.rglob("*.toml")) if study_of(path) is None]
-    about = [item for path in files if (item := load_comparison(str(path))).scene == subject and _rows_of(item, engine)]
-    return about or [_of_scene(subject, engine)]
-
-
-def _rows_of(comparison: Comparison, engine: str) -> list[Row]:
-    return [row for row in comparison.rows if parse_engine(row.engine).name == engine]
-
-
-def _of_scene(name: str, engine: str) -> Comparison:
-    """Every formulation and preset of an engine on a scene, held to a thousandth of what decides there."""
-    scene = load_scene(name)
-    told = describe(engine) if named_engine(engine) else None
-    if told is None:
-        raise InputError("engine", engine, f"no comparison about {name} has rows of it, and it is not installed here")
-    rows = [
-        Row(f"{engine}[formulation={formulation},preset={preset}]", "thousandth")
-        for formulation, presets in told["presets"].items()
-        if set(scene.requires) & set(told["provides"][formulation])
-        for preset in presets
-    ]
-    if not rows:
-        raise InputError("engine", engine, f"none of its formulations is for scenes like {name}")
-    bands = {"thousandth": Band(_BECAUSE, {scene.deciding: Tolerance(1e-3, True)})}
-    title = read_scene_file(name).title
-    return Comparison(name, title, title, name, _UNTIL, _EVERY, bands=bands, rows=rows, timed=False)
-
-
-def named_engine(name: str) -> bool:
-    """Whether an installed package announces this engine."""
-    from proofroll.core.plugins import engine_names
-
-    return name in engine_names()
 
 
 def compared(

@@ -18,7 +18,7 @@ from proofroll.elements.ball_on_surface.model import RollingBall
 from proofroll.truth import taylor
 from proofroll.truth.crossing import first_rise
 from proofroll.truth.polar import Polar
-from proofroll.truth.switching import Route
+from proofroll.truth.route import Route
 from proofroll.truth.variants import with_contact
 
 _UNREACHABLE = 1e6  # a static friction that stands for rolling without slip, and still can be squared

@@ -19,7 +19,7 @@ from proofroll.truth.collocation import Step, System, next_length, nodes, take
 from proofroll.truth.contact import ContactRates
 from proofroll.truth.crossing import first_rise
 from proofroll.truth.impact import by_equations
-from proofroll.truth.switching import End, Leg
+from proofroll.truth.route import End, Leg
 
 _TOLERANCE = 1e-13  # of a step, relative to the scale of each variable
 _APPROACH = 0.5  # part of the time left until something stands still that one step may take, while it is far,

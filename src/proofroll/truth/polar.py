@@ -20,7 +20,7 @@ from proofroll.elements.ball_on_surface.rolling_equations import reduced_rates
 from proofroll.truth.assemble import classic_step, joined
 from proofroll.truth.explicit import Piece, Rates, at_clock, read, steps, stop
 from proofroll.truth.impact import by_coefficients
-from proofroll.truth.switching import End, Leg
+from proofroll.truth.route import End, Leg
 
 _FLOOR = 1e-4  # |u| at which the rest of a slip is extrapolated, relative to where it began
 _APPROACH = 0.6  # part of the time left until the centre stands still that one step may take

@@ -9,8 +9,9 @@ import numpy as np
 from proofroll.core.arrays import FloatArray
 from proofroll.elements.ball_on_surface.model import RollingBall
 from proofroll.elements.ball_on_surface.surfaces import Cylinder
+from proofroll.truth.route import End
 from proofroll.truth.stick_slip import first_route
-from proofroll.truth.switching import End, follow
+from proofroll.truth.switching import follow
 
 
 class Regime(IntEnum):

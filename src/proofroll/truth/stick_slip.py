@@ -19,7 +19,8 @@ from proofroll.truth.error_bars import SAFETY, put_error_bars
 from proofroll.truth.implicit import Implicit
 from proofroll.truth.orientation import MATRICES, QUATERNIONS, Quadrature, orientation
 from proofroll.truth.polar import Polar
-from proofroll.truth.switching import Path, Route, follow
+from proofroll.truth.route import Path, Route
+from proofroll.truth.switching import follow
 
 if TYPE_CHECKING:
     import xarray as xr

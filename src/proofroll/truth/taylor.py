@@ -16,7 +16,7 @@ from proofroll.elements.ball_on_surface.surfaces import Cylinder, Plane
 from proofroll.truth.assemble import classic_step, joined
 from proofroll.truth.impact import by_coefficients
 from proofroll.truth.polar import BEGUN, direction
-from proofroll.truth.switching import End, Leg
+from proofroll.truth.route import End, Leg
 from proofroll.truth.taylor_model import TaylorModel, model
 
 # Stop conditions of the integrators in the order of their events.

@@ -17,8 +17,9 @@ from pathlib import Path
 from proofroll.files.atomic import content
 from proofroll.files.comparison_file import load_comparison
 from proofroll.files.scene_file import load_scene
+from proofroll.running.asking import resolve
 from proofroll.running.case import Case, EngineFacts
-from proofroll.running.runner import Runner, resolve
+from proofroll.running.runner import Runner
 from proofroll.running.store import Store
 from proofroll.running.worker_pool import Workers
 from proofroll.studies.compare import compare

@@ -16,10 +16,11 @@ from proofroll.core.errors import InputError, Missing, ProofrollError
 from proofroll.core.plugins import load_engine, release
 from proofroll.files.scene_file import load_scene
 from proofroll.running import interpreters
+from proofroll.running.asking import describe, resolve
 from proofroll.running.case import Case, EngineFacts, Status
 from proofroll.running.handshake import mismatch, own
 from proofroll.running.process import WorkerDied
-from proofroll.running.runner import Runner, describe, resolve, run_one
+from proofroll.running.runner import Runner, run_one
 from proofroll.running.simulation import simulate
 from proofroll.running.store import Store
 from proofroll.running.worker_pool import Workers

@@ -16,8 +16,10 @@ from hostile import ENTRY_POINTS
 
 from proofroll.core.errors import InputError, Missing
 from proofroll.files.netcdf import read
+from proofroll.running.asking import describe, resolve
 from proofroll.running.case import Case, EngineFacts, Result, Status
-from proofroll.running.runner import Runner, WorkerDied, describe, resolve, run_one
+from proofroll.running.process import WorkerDied
+from proofroll.running.runner import Runner, run_one
 from proofroll.running.store import Store
 from proofroll.studies.run_once import single_case
 

@@ -26,7 +26,7 @@ pytestmark = pytest.mark.own_workers
 
 PARENT = """
 import json, sys
-from proofroll.running.runner import Worker
+from proofroll.running.process import Worker
 
 with Worker() as worker:
     worker.ask({"do": "run", "case": json.loads(sys.argv[1]), "out": sys.argv[2]}, 600)

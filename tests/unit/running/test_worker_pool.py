@@ -6,8 +6,9 @@ from pathlib import Path
 
 import pytest
 
+from proofroll.running.asking import resolve
 from proofroll.running.process import Worker
-from proofroll.running.runner import Runner, resolve
+from proofroll.running.runner import Runner
 from proofroll.running.store import Store
 from proofroll.running.worker_pool import Workers
 from proofroll.studies.run_once import single_case

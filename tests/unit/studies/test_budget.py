@@ -7,7 +7,7 @@ import pytest
 
 from proofroll.running.case import Case, EngineFacts, Result, Status
 from proofroll.studies.budget import FLOOR, MODEL_FORM, TIME_STEP, TRUTH, Budget, Order, budget, order_of, sentence
-from proofroll.studies.sweep import Curve, CurvePoint
+from proofroll.studies.curve import Curve, CurvePoint
 
 T = np.linspace(0, 2, 41)
 TRUE = np.sin(3 * T)

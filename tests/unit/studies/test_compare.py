@@ -25,7 +25,8 @@ from proofroll.running.case import Case, EngineFacts, Result, Status
 from proofroll.running.runner import Runner
 from proofroll.running.simulation import simulate
 from proofroll.running.store import Store
-from proofroll.studies.compare import Outcome, compare, evaluate
+from proofroll.studies.compare import compare, evaluate
+from proofroll.studies.outcome import Outcome
 from proofroll.studies.planning import Plan, Planned, point_name
 from proofroll.truth.onset import onset
 

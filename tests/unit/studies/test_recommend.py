@@ -9,7 +9,8 @@ import pytest
 from proofroll.core.comparison import Tolerance
 from proofroll.core.errors import InputError
 from proofroll.report.tradeoff_tables import answer_lines, front_tables
-from proofroll.studies.recommend import Wish, covers, recommend
+from proofroll.studies.recommend import covers, recommend
+from proofroll.studies.wish import Wish
 
 
 def point(  # noqa: D103 -- one measured point

@@ -11,7 +11,9 @@ from proofroll.core.errors import InputError
 from proofroll.running.case import Case, Result, Status
 from proofroll.running.runner import Runner
 from proofroll.running.store import Store
-from proofroll.studies.sweep import BROKEN, Curve, CurvePoint, Question, _further, curves_of, sweep
+from proofroll.studies.curve import Curve, CurvePoint, Question
+from proofroll.studies.curves_asked import curves_of
+from proofroll.studies.sweep import BROKEN, _further, sweep
 
 QUESTION = Question("sphere_in_cylinder", {"speed": 3.0}, 0.2, "z")
 

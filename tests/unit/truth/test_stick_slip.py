@@ -17,8 +17,9 @@ from proofroll.truth import stick_slip as module
 from proofroll.truth.contact import ContactRates
 from proofroll.truth.implicit import Implicit
 from proofroll.truth.polar import Polar
+from proofroll.truth.route import Path
 from proofroll.truth.stick_slip import first_route, stick_slip
-from proofroll.truth.switching import Path, follow
+from proofroll.truth.switching import follow
 
 PAPER: dict[str, float] = {"rolling_resistance": 5e-4, "mu_static": 0.35}
 

@@ -15,8 +15,10 @@ from proofroll.core.scene import Scene
 from proofroll.elements.ball_on_surface.model import BallCapability
 from proofroll.files.netcdf import read
 from proofroll.files.scene_file import load_scene
+from proofroll.running.asking import describe, resolve
 from proofroll.running.case import Case, EngineFacts, Result, Status
-from proofroll.running.runner import Runner, WorkerDied, describe, resolve
+from proofroll.running.process import WorkerDied
+from proofroll.running.runner import Runner
 from proofroll.running.worker_pool import Workers
 
 if TYPE_CHECKING:

@@ -10,7 +10,6 @@ the rate that friction takes from |u|, that is the direction of b, lagging by |u
 from __future__ import annotations
 
 import math
-import sys
 from enum import Enum, auto
 from typing import Any
 
@@ -25,6 +24,7 @@ from proofroll.engines.pinocchio.crossing import located
 from proofroll.engines.pinocchio.integrators import Adaptive
 from proofroll.engines.pinocchio.mechanism import BallWithRows, SlidingContact, left_the_wall
 from proofroll.engines.pinocchio.settings import PinocchioSettings
+from proofroll.engines.pinocchio.slip_excess import NOISE, excess, relative_excess, unit
 
 # |u| at which creeping ends, relative to |b|/ω_b: what is left out of the direction goes with its square.
 _HANDOVER = 1e-4
@@ -42,8 +42,6 @@ _SPAN = 1e-4
 # A steady b counts as turning by a radian in so many of these times.
 _STEADY = 100.0
 
-# Friction relative to the normal force, and excess of it, that is round-off.
-_NOISE = 1e-13
 # Excess at which slip begins. Above round-off, so that a crest which only touches the cone cannot begin a slip that
 # ends at the same instant and begins again; where the excess rises through it, it costs about as many seconds.
 _GRAZE = 1e-12
@@ -55,30 +53,6 @@ class FrictionLaw(Enum):
     STICKING = auto()
     CREEPING = auto()
     SLIDING = auto()
-
-
-def unit(vector: FloatArray) -> FloatArray:
-    """The vector made a unit vector; zero stays zero."""
-    length = math.sqrt(vector @ vector)
-    return vector / length if length > 0 else vector
-
-
-def excess(mechanism: BallWithRows, data: Any, q: FloatArray, v: FloatArray, mu_static: float) -> tuple[float, float]:
-    """(needed - available) / (needed + available) friction while sticking [-], and N [N].
-
-    Slip begins where the first is positive.
-    """
-    needed, normal_force = mechanism.needed(data, q, v)
-    return relative_excess(needed, normal_force, mu_static), normal_force
-
-
-def relative_excess(needed: float, normal_force: float, mu_static: float) -> float:
-    """(needed - available) / (needed + available) [-] for a needed friction and a normal force [N]."""
-    available = mu_static * normal_force
-    # A friction of round-off is needed even where none is: it must not count as more than none (mu_static = 0).
-    noise = _NOISE * abs(normal_force)
-    size = max(needed + abs(available) + noise, sys.float_info.min)
-    return (needed - available - noise) / size
 
 
 class AdaptiveStickSlip(Adaptive):
@@ -294,7 +268,7 @@ class AdaptiveStickSlip(Adaptive):
         if was is FrictionLaw.STICKING:
             self._record("slip", time, width)
             self._creep(y)
-        elif self._excess(y) <= _NOISE:
+        elif self._excess(y) <= NOISE:
             self._mode = FrictionLaw.STICKING
             self._record("stick", time, width)
         else:

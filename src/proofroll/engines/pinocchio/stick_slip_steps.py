@@ -13,7 +13,7 @@ from proofroll.elements.ball_on_surface.model import Contact
 from proofroll.engines.pinocchio.integrators import FixedStep, SemiImplicitEuler, TangentRungeKutta4
 from proofroll.engines.pinocchio.mechanism import BallWithRows, SlidingContact, left_the_wall
 from proofroll.engines.pinocchio.settings import PinocchioSettings
-from proofroll.engines.pinocchio.stick_slip import excess, unit
+from proofroll.engines.pinocchio.slip_excess import excess, unit
 
 
 class FixedStickSlip(FixedStep):

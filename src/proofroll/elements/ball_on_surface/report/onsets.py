@@ -20,7 +20,7 @@ if TYPE_CHECKING:
 
     from proofroll.core.scene import Scene
     from proofroll.running.store import Store
-    from proofroll.studies.compare import Run
+    from proofroll.studies.outcome import Run
 
 # The curve on which onsets are marked.
 CURVE = "needed_friction"

@@ -13,7 +13,7 @@ if TYPE_CHECKING:
 
     from proofroll.core.observable import Observable
     from proofroll.running.store import Store
-    from proofroll.studies.compare import Outcome, Run
+    from proofroll.studies.outcome import Outcome, Run
 
 
 class MechanismReport:

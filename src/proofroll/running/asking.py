@@ -1,0 +1,98 @@
+"""What engines say of themselves and of cases, each asked in a worker process."""
+
+from __future__ import annotations
+
+import contextlib
+import dataclasses
+import os
+from collections.abc import Collection, Iterator, Mapping, Sequence
+from concurrent.futures import ThreadPoolExecutor
+from typing import Any
+
+from proofroll.core.errors import ProofrollError
+from proofroll.running.case import Case, EngineFacts
+from proofroll.running.process import WorkerDied
+from proofroll.running.worker_pool import Workers
+
+_START_UP_SECONDS = 60.0
+
+
+def describe(engine: str, workers: Workers | None = None) -> dict[str, Any]:
+    """What an engine is, provides and has as presets; asked in a process of its own.
+
+    Raises:
+        InputError, Missing, WorkerDied: it cannot be asked.
+    """
+    with lent_workers(workers) as lent, lent.lend(engine) as worker:
+        return worker.request({"do": "describe", "engine": engine}, _START_UP_SECONDS)
+
+
+def resolve(
+    engines: Sequence[tuple[str, Mapping[str, Any]]],
+    workers: Workers | None = None,
+    requires: Collection[str] = (),
+) -> list[EngineFacts | ProofrollError]:
+    """Complete settings for engines with options, each or the reason why not, in the order given.
+
+    Args:
+        engines: names and options.
+        workers: processes in which they are asked.
+        requires: by the scene, which decides the formulation where none is given.
+    """
+    found: list[EngineFacts | ProofrollError] = [ProofrollError("not asked")] * len(engines)
+
+    def ask(name: str, lent: Workers) -> None:
+        for index, (other, options) in enumerate(engines):
+            if other != name:
+                continue
+            request = {"do": "resolve", "engine": name, "options": dict(options), "requires": sorted(requires)}
+            try:
+                worker = lent.take(name)
+            except ProofrollError as error:  # another interpreter that does not serve
+                found[index] = error
+                continue
+            try:
+                found[index] = EngineFacts(**worker.request(request, _START_UP_SECONDS))
+            except WorkerDied as error:
+                found[index] = error
+                worker.close()
+                continue
+            except ProofrollError as error:
+                found[index] = error
+            except BaseException:
+                worker.close()
+                raise
+            lent.keep(name, worker)
+
+    # Most of it is the start of the processes and the import of the engines.
+    with lent_workers(workers) as lent, ThreadPoolExecutor(os.cpu_count() or 1) as pool:
+        list(pool.map(lambda name: ask(name, lent), dict.fromkeys(name for name, _ in engines)))
+    return found
+
+
+def programs(cases: Sequence[Case], workers: Workers | None = None) -> list[tuple[str | None, str]]:
+    """Engines' programs for cases (:class:`proofroll.core.engine_abilities.Reproduces`), each or None and why not."""
+    found: list[tuple[str | None, str]] = []
+    with lent_workers(workers) as lent:
+        for case in cases:
+            try:
+                with lent.lend(case.engine.name) as worker:
+                    request = {"do": "reproduce", "case": dataclasses.asdict(case)}
+                    answer = worker.request(request, _START_UP_SECONDS)
+                found.append((answer["program"], answer["message"]))
+            except ProofrollError as error:
+                found.append((None, str(error)))
+    return found
+
+
+@contextlib.contextmanager
+def lent_workers(workers: Workers | None) -> Iterator[Workers]:
+    """The workers that are given, or some that end with the block."""
+    if workers is not None:
+        yield workers
+        return
+    own = Workers()
+    try:
+        yield own
+    finally:
+        own.close()

@@ -1,0 +1,48 @@
+"""Cases that wait for a worker, by engine."""
+
+from __future__ import annotations
+
+import threading
+from collections import deque
+
+from proofroll.running.case import Case
+
+
+class WaitingCases:
+    """Cases that wait. A worker goes on with its engine while it can: starting another costs more than many a case."""
+
+    def __init__(self) -> None:
+        self._changed = threading.Condition()
+        self._by_engine: dict[str, deque[Case]] = {}
+        self._begun: set[str] = set()
+        self._closed = False
+
+    def add(self, case: Case) -> None:
+        """Puts a case at the end."""
+        with self._changed:
+            self._by_engine.setdefault(case.engine.name, deque()).append(case)
+            self._changed.notify()
+
+    def close(self) -> None:
+        """Nothing more will come, and what waits is not to be begun."""
+        with self._changed:
+            self._closed = True
+            self._changed.notify_all()
+
+    def take(self, engine: str | None) -> Case | None:
+        """The next case, of this engine if there is one, else of one that nobody has begun; None: it is closed.
+
+        Where all are begun, the one with the most cases left is shared. Where there is none, it waits for one.
+        """
+        with self._changed:
+            while not self._closed:
+                group = self._by_engine.get(engine or "")
+                if not group:
+                    fresh = [cases for name, cases in self._by_engine.items() if cases and name not in self._begun]
+                    group = max(fresh or self._by_engine.values(), key=len, default=None)
+                if group:
+                    case = group.popleft()
+                    self._begun.add(case.engine.name)
+                    return case
+                self._changed.wait()
+            return None

@@ -1,0 +1,122 @@
+"""Points and curves of a sweep, and the question that they answer."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+
+import numpy as np
+
+from proofroll.core.arrays import FloatArray
+from proofroll.core.scene import Scene
+from proofroll.files.scene_file import load_scene
+from proofroll.running.case import Case, EngineFacts, Result
+
+# Samples per run. An oscillation of the founding scene's z has a dozen of them.
+SAMPLES = 40
+
+
+# An adaptive step ends at each sample, so that with many of them no tolerance may be too loose. A run with so few is
+# made besides, and the larger of both errors counts.
+SPARSE = 2
+
+
+# Errors of runs that are the same but for round-off differ by less than this part.
+_SAME = 1e-6
+
+
+@dataclass(frozen=True)
+class Question:
+    """What is swept.
+
+    Attributes:
+        scene: name of the scene.
+        parameters: its parameters that differ from the defaults.
+        until: length of every run [s].
+        quantity: the observable that decides how far the sweep goes.
+    """
+
+    scene: str
+    parameters: dict[str, float]
+    until: float
+    quantity: str
+
+    @property
+    def every(self) -> float:
+        """Sampling interval [s]."""
+        return float(f"{self.until / SAMPLES:.12g}")
+
+    @property
+    def sparse(self) -> float:
+        """Sampling interval of the second run of an adaptive step [s]."""
+        return float(f"{self.until / SPARSE:.12g}")
+
+    def step(self, factor: float) -> float:
+        """So many sampling intervals [s], without the digits that multiplying leaves (0.005000000000000001)."""
+        return float(f"{self.every * factor:.12g}")
+
+    def loaded(self) -> Scene:
+        """The scene with these parameters."""
+        return load_scene(self.scene, **self.parameters)
+
+
+@dataclass
+class CurvePoint:
+    """One engine with complete settings on the scene.
+
+    Attributes:
+        case, result: the run.
+        curves: observables of its trajectory; empty if there is none.
+        errors: largest distance of each from the truth; with an adaptive step also over few samples.
+        bars: error bars of the truth, by observable.
+        dense: ``errors`` over the many samples alone.
+        sparse: the run over few samples, with its errors; None with a fixed step, which samples do not change.
+    """
+
+    case: Case
+    result: Result
+    curves: dict[str, FloatArray] = field(default_factory=dict)
+    errors: dict[str, float] = field(default_factory=dict)
+    bars: dict[str, float] = field(default_factory=dict)
+    dense: dict[str, float] = field(default_factory=dict)
+    sparse: CurvePoint | None = None
+
+    @property
+    def step(self) -> float | None:
+        """Value of the setting that trades speed for accuracy; None if there is none."""
+        facts = self.case.engine
+        return None if facts.resolution is None else float(facts.settings[facts.resolution])
+
+
+@dataclass
+class Curve:
+    """One engine, formulation and preset over its range.
+
+    Attributes:
+        engine: ``name[formulation=…,preset=…]``.
+        facts: with the preset's own step or tolerance.
+        level: its rung on the ladder of models, or None if the engine does not tell.
+        points: coarse first.
+        dropped: step -> why there is no run with it.
+    """
+
+    engine: str
+    facts: EngineFacts
+    level: str | None
+    points: list[CurvePoint] = field(default_factory=list)
+    dropped: dict[float, str] = field(default_factory=dict)
+
+    @property
+    def fixed_step(self) -> bool:
+        """Whether it is swept over steps rather than over tolerances."""
+        return self.facts.resolution == "dt"
+
+    def saturated(self, quantity: str) -> bool:
+        """Whether the two loosest tolerances give the same run: something else than they limits its steps.
+
+        Where an array happens to lie in memory may change the round-off of a run, so equal is equal up to that.
+        """
+        if self.fixed_step or len(self.points) < 2:
+            return False
+        loosest, other = (point.errors.get(quantity, np.inf) for point in self.points[:2])
+        bar = self.points[0].bars.get(quantity, 0.0)
+        return bool(np.isfinite(loosest) and abs(loosest - other) <= max(bar, _SAME * loosest))

@@ -1,0 +1,70 @@
+"""The cases of a point, and its errors against the truth."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import replace
+
+import numpy as np
+
+from proofroll.core.scene import Scene
+from proofroll.files.netcdf import read
+from proofroll.running.case import Case, EngineFacts, Status
+from proofroll.running.runner import Runner
+from proofroll.studies.curve import CurvePoint, Question
+from proofroll.studies.reference import Reference
+
+
+def case_of(question: Question, scene: Scene, facts: EngineFacts, every: float) -> Case:
+    """One run of the question."""
+    return Case(
+        scene=question.scene,
+        parameters={name: scene.parameters[name] for name in question.parameters},
+        scene_digest=scene.digest,
+        engine=facts,
+        until=question.until,
+        every=every,
+        time_limit=60.0,
+    )
+
+
+def cases_of(question: Question, scene: Scene, facts: EngineFacts, every: float) -> tuple[Case, ...]:
+    """The run of the question, and with an adaptive step the one over few samples."""
+    adaptive = facts.resolution not in {None, "dt"}
+    return tuple(
+        case_of(question, scene, facts, interval) for interval in ((every, question.sparse) if adaptive else (every,))
+    )
+
+
+def judged(points: Sequence[CurvePoint], references: Mapping[float, Reference], runner: Runner) -> CurvePoint:
+    """The point with its observables and their errors, if it has a trajectory that reached the end.
+
+    Args:
+        points: the run, and the one over few samples if there is one.
+        references: the truth by sampling interval.
+        runner: where the trajectories are.
+    """
+    point, *others = (_measured(point, references[point.case.every], runner) for point in points)
+    if not others:
+        return point
+    (sparse,) = others
+    reference = references[sparse.case.every]
+    # What is derived from neighbouring samples, as an audit, is not compared where there are few.
+    errors = {
+        name: max(error, sparse.errors.get(name, np.inf)) if name in reference.dataset else error
+        for name, error in point.errors.items()
+    }
+    return replace(point, errors=errors, dense=point.errors, sparse=sparse)
+
+
+def _measured(point: CurvePoint, reference: Reference, runner: Runner) -> CurvePoint:
+    if point.result.status != Status.DONE:
+        return point
+    curves = reference.observed(read(runner.store.trajectory(point.case)))
+    errors, bars = {}, {}
+    for name, curve in curves.items():
+        true, bar = reference.true(name, curve)
+        same = curve.shape == true.shape
+        error = float(np.max(np.abs(curve - true), initial=0.0)) if same else np.inf
+        errors[name], bars[name] = error if np.isfinite(error) else np.inf, bar
+    return replace(point, curves=curves, errors=errors, bars=bars)

@@ -1,0 +1,76 @@
+"""Which formulations and presets of which engines are swept."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Mapping
+from typing import Any
+
+from proofroll.core.errors import InputError, ProofrollError
+from proofroll.core.plugins import EngineSpec, engine_names, parse_engine
+from proofroll.running.asking import describe, resolve
+from proofroll.running.case import EngineFacts
+from proofroll.running.worker_pool import Workers
+from proofroll.studies.curve import Curve
+
+
+def curves_of(
+    engines: Iterable[str], workers: Workers | None = None, requires: frozenset[str] = frozenset()
+) -> tuple[list[Curve], dict[str, str]]:
+    """A curve without points for every formulation and preset of the engines, and why some engine has none.
+
+    Args:
+        engines: names, or ``name[key=value,…]`` for one formulation or setting; all that are installed if empty.
+        workers: processes in which they are asked.
+        requires: by the scene; formulations that provide nothing of it are for other kinds of scenes, and left out.
+    """
+    wanted: list[tuple[str, str | None]] = []
+    absent: dict[str, str] = {}
+    for text in list(engines) or engine_names():
+        spec = parse_engine(text)
+        try:
+            described = describe(spec.name, workers)
+        except InputError:
+            raise
+        except ProofrollError as error:
+            absent[spec.name] = str(error)
+            continue
+        chosen, foreign = _chosen(spec, described, requires)
+        if foreign:
+            absent.setdefault(spec.name, "none of its formulations is for scenes of this kind")
+        wanted += chosen
+        if any(parse_engine(name).name == spec.name for name, _ in wanted):
+            absent.pop(spec.name, None)
+        elif spec.name not in absent:
+            raise InputError("engine", text, f"{spec.name} has {', '.join(described['presets'])}")
+    specs = [parse_engine(name) for name, _ in wanted]
+    curves = []
+    resolved = resolve([(spec.name, spec.options) for spec in specs], workers)
+    for (name, level), facts in zip(wanted, resolved, strict=True):
+        if isinstance(facts, InputError):
+            raise facts
+        if isinstance(facts, EngineFacts):
+            curves.append(Curve(name, facts, level))
+        else:
+            absent[name] = str(facts)
+    return curves, absent
+
+
+def _chosen(
+    spec: EngineSpec, described: Mapping[str, Any], requires: frozenset[str]
+) -> tuple[list[tuple[str, str | None]], bool]:
+    """Formulations and presets that a specification means, each with its level; whether some are for other scenes."""
+    levels: Mapping[str, str] = described.get("levels", {})
+    chosen: list[tuple[str, str | None]] = []
+    foreign = False
+    for formulation, presets in described["presets"].items():
+        if spec.options.get("formulation", formulation) != formulation:
+            continue
+        if requires and not requires & set(described["provides"][formulation]):
+            foreign = True
+            continue
+        for preset in presets:
+            if spec.options.get("preset", preset) == preset:
+                options = {"formulation": formulation, "preset": preset, **spec.options}
+                inner = ",".join(f"{key}={value}" for key, value in options.items())
+                chosen.append((f"{spec.name}[{inner}]", levels.get(formulation)))
+    return chosen, foreign

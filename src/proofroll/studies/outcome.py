@@ -1,0 +1,83 @@
+"""What a comparison found: runs with their judgements."""
+
+from __future__ import annotations
+
+from collections.abc import Collection, Sequence
+from dataclasses import dataclass, field
+
+from proofroll.core.comparison import Comparison, Row
+from proofroll.core.diagnosis.of_scene import Diagnosis
+from proofroll.core.verdict import Judgement, Verdict
+from proofroll.running.case import Case, EngineFacts, Result, Status
+
+SEVERITY = list(Verdict)
+
+
+# What a run is called that came to its end and cannot be judged; any other without a judgement failed.
+_UNJUDGED = {Status.ANOTHER_SCENE: Verdict.ANOTHER_SCENE, Status.NO_TRUTH: Verdict.NOT_JUDGED}
+
+
+def worst(judgements: Sequence[Judgement], missing: Collection[str] = ()) -> Verdict:
+    """The worst verdict of any observable, those that are missing included; failed if there is no judgement."""
+    found = [judgement.verdict for judgement in judgements]
+    return max(
+        [*found, *([Verdict.INCOMPLETE] if found and missing else [])], key=SEVERITY.index, default=Verdict.FAILED
+    )
+
+
+@dataclass(frozen=True)
+class Run:
+    """One row of the comparison at one point of its parameters.
+
+    Attributes:
+        row: the claim.
+        parameters: the point.
+        facts: the engine with complete settings, or None if it could not be asked.
+        result: how the run itself ended.
+        judgements: one per observable; empty if there is no trajectory.
+        contradictions: sentences about what the claim did not expect.
+        case: the run's case, or None.
+        missing: observables that the claim's tolerances judge and the run does not give.
+        shared: which route of the truth rests on the same equations, as a clause; empty if none does.
+        diagnosis: causes of a difference that are proven.
+    """
+
+    row: Row
+    parameters: dict[str, float]
+    facts: EngineFacts | None
+    result: Result
+    judgements: list[Judgement] = field(default_factory=list)
+    contradictions: list[str] = field(default_factory=list)
+    case: Case | None = None
+    missing: list[str] = field(default_factory=list)
+    shared: str = ""
+    diagnosis: list[Diagnosis] = field(default_factory=list)
+
+    @property
+    def verdict(self) -> Verdict:
+        """The worst verdict of any observable; incomplete if all that is reported agrees but something is missing."""
+        if self.result.status != Status.DONE:
+            return _UNJUDGED.get(self.result.status, Verdict.FAILED)
+        return worst(self.judgements, self.missing)
+
+
+@dataclass(frozen=True)
+class Outcome:
+    """All that a comparison found."""
+
+    comparison: Comparison
+    runs: list[Run]
+    truths: dict[str, Case]
+    """The truth's case by :func:`point_name`."""
+
+    @property
+    def contradictions(self) -> list[str]:
+        """What the comparison did not expect, as sentences."""
+        return [sentence for run in self.runs for sentence in run.contradictions]
+
+    @property
+    def lost(self) -> list[Run]:
+        """Runs whose engine is missing, crashed or hung, though the comparison does not expect a failure."""
+        broken = {Status.MISSING, Status.CRASHED, Status.TIMEOUT}
+        lost = [run for run in self.runs if run.result.status in broken]
+        return [run for run in lost if Verdict.FAILED not in run.row.expected(run.parameters)]
