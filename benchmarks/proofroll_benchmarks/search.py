@@ -17,6 +17,7 @@ from proofroll.files.netcdf import read
 from proofroll.running.asking import describe, resolve
 from proofroll.running.case import Case, EngineFacts, Result, Status
 from proofroll.running.runner import Runner
+from proofroll.studies.cases import case_of
 
 # Samples per run: enough that the largest error of an oscillation of about 0.6 s is seen. Every run stops at them, the
 # timed ones too; that costs a fixed step nothing, and an adaptive one of high order at most a factor of about two.
@@ -163,15 +164,7 @@ def _with(facts: EngineFacts, value: float) -> EngineFacts:
 
 
 def _case(scene: Scene, facts: EngineFacts, until: float) -> Case:
-    return Case(
-        scene=scene.name,
-        parameters=dict(scene.parameters),
-        scene_digest=scene.digest,
-        engine=facts,
-        until=until,
-        every=until / SAMPLES,
-        time_limit=_LIMIT,
-    )
+    return case_of(scene.name, scene, scene.parameters, facts, until, until / SAMPLES, time_limit=_LIMIT)
 
 
 def _judged(case: Case, result: Result, true_z: FloatArray, contact: bool, runner: Runner) -> Configuration | None:

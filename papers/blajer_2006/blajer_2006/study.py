@@ -18,6 +18,7 @@ from proofroll.files.scene_file import load_scene
 from proofroll.running.asking import describe, resolve
 from proofroll.running.case import Case, EngineFacts, Result, Status
 from proofroll.running.runner import Runner
+from proofroll.studies.cases import case_of
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -138,16 +139,9 @@ def _turned(parameters: dict[str, float]) -> tuple[str, ...]:
 
 
 def _case(figures: Figures, parameters: dict[str, float], facts: EngineFacts, asks: tuple[str, ...]) -> Case:
-    return Case(
-        scene=figures.scene,
-        parameters=parameters,
-        scene_digest=load_scene(figures.scene, asks=asks, **parameters).digest,
-        engine=facts,
-        until=figures.until,
-        every=figures.every,
-        time_limit=figures.time_limit,
-        asks=asks,
-    )
+    scene = load_scene(figures.scene, asks=asks, **parameters)
+    limits = {"time_limit": figures.time_limit, "asks": asks}
+    return case_of(figures.scene, scene, parameters, facts, figures.until, figures.every, **limits)
 
 
 def _made(figures: Figures, case: Case, result: Result, runner: Runner) -> FigureRun:

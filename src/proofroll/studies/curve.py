@@ -10,6 +10,7 @@ from proofroll.core.arrays import FloatArray
 from proofroll.core.scene import Scene
 from proofroll.files.scene_file import load_scene
 from proofroll.running.case import Case, EngineFacts, Result
+from proofroll.studies.cases import case_of
 
 # Samples per run. An oscillation of the founding scene's z has a dozen of them.
 SAMPLES = 40
@@ -57,6 +58,15 @@ class Question:
     def loaded(self) -> Scene:
         """The scene with these parameters."""
         return load_scene(self.scene, **self.parameters)
+
+    def case(self, scene: Scene, facts: EngineFacts, every: float, time_limit: float = 60.0) -> Case:
+        """One run, on the loaded scene."""
+        return case_of(self.scene, scene, self.parameters, facts, self.until, every, time_limit=time_limit)
+
+    def cases(self, scene: Scene, facts: EngineFacts, every: float) -> tuple[Case, ...]:
+        """The run, and with an adaptive step the one over few samples."""
+        adaptive = facts.resolution not in {None, "dt"}
+        return tuple(self.case(scene, facts, each) for each in ((every, self.sparse) if adaptive else (every,)))
 
 
 @dataclass

@@ -1,4 +1,4 @@
-"""The cases of a point, and its errors against the truth."""
+"""A point of a curve with its errors against the truth."""
 
 from __future__ import annotations
 
@@ -7,33 +7,11 @@ from dataclasses import replace
 
 import numpy as np
 
-from proofroll.core.scene import Scene
 from proofroll.files.netcdf import read
-from proofroll.running.case import Case, EngineFacts, Status
+from proofroll.running.case import Status
 from proofroll.running.runner import Runner
-from proofroll.studies.curve import CurvePoint, Question
+from proofroll.studies.curve import CurvePoint
 from proofroll.studies.reference import Reference
-
-
-def case_of(question: Question, scene: Scene, facts: EngineFacts, every: float) -> Case:
-    """One run of the question."""
-    return Case(
-        scene=question.scene,
-        parameters={name: scene.parameters[name] for name in question.parameters},
-        scene_digest=scene.digest,
-        engine=facts,
-        until=question.until,
-        every=every,
-        time_limit=60.0,
-    )
-
-
-def cases_of(question: Question, scene: Scene, facts: EngineFacts, every: float) -> tuple[Case, ...]:
-    """The run of the question, and with an adaptive step the one over few samples."""
-    adaptive = facts.resolution not in {None, "dt"}
-    return tuple(
-        case_of(question, scene, facts, interval) for interval in ((every, question.sparse) if adaptive else (every,))
-    )
 
 
 def judged(points: Sequence[CurvePoint], references: Mapping[float, Reference], runner: Runner) -> CurvePoint:

@@ -24,6 +24,7 @@ from proofroll.running.process import WorkerDied
 from proofroll.running.runner import Runner
 from proofroll.running.stopwatch import Stopwatch
 from proofroll.running.timing import ROUNDS, Timing, interleaved
+from proofroll.studies.cases import case_of
 from proofroll.studies.ladder_models import LadderModel, Rung, Switch, described, rungs, switches
 from proofroll.studies.reference import Reference
 
@@ -147,16 +148,8 @@ class Ladder:
     def _case(self, facts: EngineFacts, model: LadderModel) -> Case:
         parameters = self._given | dict(model.parameters)
         scene = load_scene(self._name, asks=model.asks, **parameters)
-        return Case(
-            scene=self._name,
-            parameters=parameters,
-            scene_digest=scene.digest,
-            engine=facts,
-            until=self.until,
-            every=_EVERY,
-            time_limit=_TIME_LIMIT,
-            asks=model.asks,
-        )
+        limits = {"time_limit": _TIME_LIMIT, "asks": model.asks}
+        return case_of(self._name, scene, parameters, facts, self.until, _EVERY, **limits)
 
     def _run_truths(self, wanted: Sequence[dict[str, float]], progress: Callable[[str], None]) -> None:
         wanted = [point for point in wanted if str(point) not in self.truths]

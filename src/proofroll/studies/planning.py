@@ -15,6 +15,7 @@ from proofroll.files.scene_file import load_scene
 from proofroll.running.asking import resolve
 from proofroll.running.case import Case, EngineFacts
 from proofroll.running.worker_pool import Workers
+from proofroll.studies.cases import case_of
 from proofroll.studies.comparison_points import settled
 
 
@@ -150,13 +151,5 @@ def _scaled(facts: EngineFacts, factor: float) -> float:
 def _case(
     comparison: Comparison, scene: Scene, point: dict[str, float], facts: EngineFacts, timed: bool = False
 ) -> Case:
-    return Case(
-        scene=comparison.scene,
-        parameters=point,
-        scene_digest=scene.digest,
-        engine=facts,
-        until=comparison.until,
-        every=comparison.every,
-        timed=timed,
-        time_limit=comparison.time_limit,
-    )
+    limits = {"timed": timed, "time_limit": comparison.time_limit}
+    return case_of(comparison.scene, scene, point, facts, comparison.until, comparison.every, **limits)

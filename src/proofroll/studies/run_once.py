@@ -12,6 +12,7 @@ from proofroll.files.scene_file import load_scene
 from proofroll.running.asking import resolve
 from proofroll.running.case import Case
 from proofroll.running.worker_pool import Workers
+from proofroll.studies.cases import case_of
 
 
 def single_case(
@@ -44,13 +45,4 @@ def single_case(
         raise facts
     if every is None:
         every = sampling_interval(facts.settings["dt"] if facts.resolution == "dt" else None)
-    return Case(
-        scene=scene,
-        parameters={name: loaded.parameters[name] for name in parameters},
-        scene_digest=loaded.digest,
-        engine=facts,
-        until=until,
-        every=every,
-        time_limit=time_limit,
-        asks=tuple(asks),
-    )
+    return case_of(scene, loaded, parameters, facts, until, every, time_limit=time_limit, asks=tuple(asks))

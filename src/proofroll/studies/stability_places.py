@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import dataclasses
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 
@@ -15,7 +14,6 @@ from proofroll.running.case import Case, EngineFacts, Status
 from proofroll.running.runner import Runner
 from proofroll.studies.axes import Axis, thinned
 from proofroll.studies.curve import Question
-from proofroll.studies.curve_points import case_of
 from proofroll.studies.failure import Yardstick
 
 # Sampling intervals per natural time; the coarsest step is one of them, the finer ones divide it.
@@ -131,4 +129,4 @@ def case_at(name: str, place: Place, facts: EngineFacts, limit: float) -> Case:
     """A run at a place with a limit of time [s]."""
     assert place.scene is not None  # the caller looked
     question = Question(name, place.parameters, place.until, place.scene.deciding)
-    return dataclasses.replace(case_of(question, place.scene, facts, place.every), time_limit=limit)
+    return question.case(place.scene, facts, place.every, limit)

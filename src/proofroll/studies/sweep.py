@@ -13,7 +13,7 @@ from proofroll.running.asking import resolve
 from proofroll.running.case import Case, EngineFacts, Result, Status
 from proofroll.running.runner import Runner
 from proofroll.studies.curve import Curve, CurvePoint, Question
-from proofroll.studies.curve_points import case_of, cases_of, judged
+from proofroll.studies.curve_points import judged
 from proofroll.studies.reference import Reference
 
 # Steps in sampling intervals: those that every curve starts with, and those by which it may be extended.
@@ -130,9 +130,9 @@ def _run(
         except InputError as error:
             curves[index].dropped[value] = str(error)
             continue
-        cases.append((index, cases_of(question, scene, facts, every)))
+        cases.append((index, question.cases(scene, facts, every)))
     intervals = {question.every, *(case.every for _, both in cases for case in both)} - references.keys()
-    truths = {every: case_of(question, scene, truth_facts, every) for every in intervals}
+    truths = {every: question.case(scene, truth_facts, every) for every in intervals}
     results = runner.run([*truths.values(), *(case for _, both in cases for case in both)], progress)
     for every, case in truths.items():
         if results[case.key].status != Status.DONE:

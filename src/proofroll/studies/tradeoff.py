@@ -22,7 +22,7 @@ from proofroll.running.stopwatch import SECONDS, Stopwatch
 from proofroll.running.timing import ROUNDS, Timing, interleaved
 from proofroll.running.worker_pool import Workers
 from proofroll.studies.curve import Curve, CurvePoint, Question
-from proofroll.studies.curve_points import case_of, cases_of, judged
+from proofroll.studies.curve_points import judged
 from proofroll.studies.curves_asked import curves_of
 from proofroll.studies.pareto import envelope, front
 from proofroll.studies.reference import Reference
@@ -148,7 +148,7 @@ def _truth_case(question: Question, references: Mapping[float, Reference], runne
 
     (facts,) = resolve([("truth", {})], runner.workers)
     assert isinstance(facts, EngineFacts)  # the sweep has run with it
-    return case_of(question, references[question.every].scene, facts, question.every)
+    return question.case(references[question.every].scene, facts, question.every)
 
 
 def _timed(found: Tradeoff, truth: Case, workers: Workers, rounds: int, progress: Progress | None) -> dict[str, Timing]:
@@ -184,9 +184,9 @@ def _checked(found: Tradeoff, runner: Runner, told: Callable[[Case, Result], Non
     for place in places:
         question = dataclasses.replace(base, parameters={**base.parameters, **place})
         scene = question.loaded()
-        runs = {key: cases_of(question, scene, point.case.engine, point.case.every) for key, point in chosen.items()}
+        runs = {key: question.cases(scene, point.case.engine, point.case.every) for key, point in chosen.items()}
         intervals = {case.every for both in runs.values() for case in both}
-        truths = {every: case_of(question, scene, truth_facts, every) for every in intervals}
+        truths = {every: question.case(scene, truth_facts, every) for every in intervals}
         asked.append((place, scene, truths, runs))
     cases = [case for _, _, truths, runs in asked for case in (*truths.values(), *itertools.chain(*runs.values()))]
     results = runner.run(cases, told)

@@ -20,6 +20,7 @@ from proofroll.running.case import Case, EngineFacts, Result, Status
 from proofroll.running.process import WorkerDied
 from proofroll.running.runner import Runner
 from proofroll.running.worker_pool import Workers
+from proofroll.studies.cases import case_of
 
 if TYPE_CHECKING:
     from proofroll.truth.onset import Onset
@@ -132,11 +133,10 @@ def onset_study(
     for found in facts:
         if isinstance(found, InputError):
             raise found
-    given = {name: loaded.parameters[name] for name in parameters}
     asked = [found for found in facts if isinstance(found, EngineFacts)]
 
     def run(engines: Sequence[EngineFacts], end: float) -> list[tuple[Result, Event | None]]:
-        cases = [Case(scene, given, loaded.digest, found, end, _EVERY) for found in engines]
+        cases = [case_of(scene, loaded, parameters, found, end, _EVERY) for found in engines]
         results = runner.run(cases, progress)
         return [(results[case.key], _first_slip(runner, case, results[case.key])) for case in cases]
 
