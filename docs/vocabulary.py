@@ -17,7 +17,8 @@ from proofroll.elements.ball_on_surface import model as balls
 from proofroll.elements.ball_on_surface import regimes_study
 from proofroll.elements.ball_on_surface.surfaces.catalogue import surface_kinds
 from proofroll.elements.mechanism import model as mechanisms
-from proofroll.files.scene_file import Parameter, SceneFile
+from proofroll.files.scene_file import SceneFile
+from proofroll.files.scene_parameters import Parameter
 from proofroll.studies import axes, claimed, claims, stability_claims
 
 ROOT = Path(__file__).resolve().parents[1]

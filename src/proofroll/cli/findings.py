@@ -21,7 +21,7 @@ def findings(
 
     from proofroll.report.findings_table import findings_list, findings_table
     from proofroll.report.terminal import console
-    from proofroll.studies.findings import State, load_findings, shown
+    from proofroll.studies.findings import FindingState, load_findings, shown
 
     wanted = load_findings(engine or [])
     if listed:
@@ -35,7 +35,7 @@ def findings(
         for row in shown(wanted, python, time_limit):
             rows.append(row)
             advance(row.finding.name)
-    counts = {state.value: sum(row.state == state for row in rows) for state in State}
+    counts = {state.value: sum(row.state == state for row in rows) for state in FindingState}
     if as_json:
         told = [
             {**dataclasses.asdict(row.finding), "state": row.state.value, "version": row.version, "said": row.said}

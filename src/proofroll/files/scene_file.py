@@ -6,54 +6,23 @@ A file of another format that somebody reads (:mod:`proofroll.files.scene_source
 from __future__ import annotations
 
 import dataclasses
-import math
-import operator
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from functools import cache
 from pathlib import Path
 from typing import Any
 
 from proofroll.core.element import Element
-from proofroll.core.errors import InputError, choices
+from proofroll.core.errors import InputError
 from proofroll.core.gravity import Gravity
 from proofroll.core.numbers import Numbers
 from proofroll.core.plugins import load_element_kinds
 from proofroll.core.scene import Scene
 from proofroll.files.data_folders import data_folder
+from proofroll.files.scene_parameters import Parameter, check_parameters, values_of
 from proofroll.files.scene_sources import source_of
 from proofroll.files.toml import read_toml
 from proofroll.files.validation import strict, units_of, validated
-
-
-@dataclass(frozen=True)
-class Parameter:
-    """A number that a user may set by name.
-
-    Attributes:
-        value: default, or the name of the parameter whose value is the default.
-        unit: of the value; nothing is converted.
-        symbol: as equations write it.
-        meaning: what it is, in one line; messages say it.
-        source: where the number comes from.
-        above, at_least, below, at_most: bounds, as numbers or names of other parameters.
-        nonzero: why the value must not be zero.
-        unbounded: whether inf is allowed.
-        integer: whether it counts something.
-    """
-
-    value: float | str
-    unit: str
-    meaning: str
-    source: str
-    symbol: str = ""
-    above: float | str | None = None
-    at_least: float | str | None = None
-    below: float | str | None = None
-    at_most: float | str | None = None
-    nonzero: str | None = None
-    unbounded: bool = False
-    integer: bool = False
 
 
 @dataclass(frozen=True)
@@ -124,10 +93,10 @@ def _read(name: str, given: Mapping[str, object]) -> tuple[SceneFile, dict[str, 
     if other is None:
         path = scene_folder(name) / "scene.toml"
         file = _parse(path)
-        return file, _values(file, given), path
+        return file, values_of(file.parameters, given), path
     source, path = other
     file = _checked({"gravity": {}, **source.content(path)}, path)
-    values = _values(file, given)
+    values = values_of(file.parameters, given)
     tables = dict(source.tables(path, values))
     return dataclasses.replace(file, gravity=tables.pop("gravity"), tables=tables), values, path
 
@@ -221,90 +190,5 @@ def _checked(content: Mapping[str, Any], path: Path) -> SceneFile:
     own = {key: value for key, value in content.items() if key in _OWN}
     tables = {key: value for key, value in content.items() if key not in _OWN}
     file = validated(SceneFile, own | {"tables": tables}, str(path))
-    known_units = dict.fromkeys([*_units().values(), "s", "N"])
-    for name, parameter in file.parameters.items():
-        where = f"{path}: parameters.{name}"
-        if parameter.unit not in known_units:
-            advice = f"this unit is not known, and nothing is converted; write the value in {choices(known_units)}"
-            raise InputError(f"{where}.unit", parameter.unit, advice)
-        for key in ("value", "above", "at_least", "below", "at_most"):
-            other = getattr(parameter, key)
-            if not isinstance(other, str):
-                continue
-            if other == name or other not in file.parameters:
-                known = choices(item for item in file.parameters if item != name)
-                advice = f"there is no such parameter to refer to; choose from {known}"
-                raise InputError(f"{where}.{key}", other, advice)
-            if file.parameters[other].unit != parameter.unit:
-                advice = f"its unit is {file.parameters[other].unit}, that of {name} is {parameter.unit}"
-                raise InputError(f"{where}.{key}", other, advice)
-        _check_end(file, name, f"{where}.value")
+    check_parameters(file.parameters, [*_units().values(), "s", "N"], path)
     return file
-
-
-def _check_end(file: SceneFile, name: str, where: str) -> None:
-    """The defaults that follow one another end at a number.
-
-    Raises:
-        InputError: they go round in a circle.
-    """
-    passed = [name]
-    while isinstance(following := file.parameters[passed[-1]].value, str) and following in file.parameters:
-        if following in passed:
-            raise InputError(where, " -> ".join([*passed, following]), "this goes round in a circle; give a number")
-        passed.append(following)
-
-
-def _values(file: SceneFile, given: Mapping[str, object]) -> dict[str, float]:
-    """Every parameter's number: given, or default, or that of the parameter it follows."""
-    for name, value in given.items():
-        if name not in file.parameters:
-            raise InputError(name, value, f"there is no such parameter; choose from {choices(file.parameters)}")
-    values: dict[str, float] = {}
-    for name, parameter in file.parameters.items():
-        source = name
-        while source not in given and isinstance(following := file.parameters[source].value, str):
-            source = following
-        values[name] = _number(name, given.get(source, file.parameters[source].value), parameter)
-    # Numbers first, then other parameters: a parameter is never blamed for the bad value of another.
-    for kind in (float, str):
-        for name, parameter in file.parameters.items():
-            _check_bounds(name, parameter, values, kind)
-    return values
-
-
-def _number(name: str, value: object, parameter: Parameter) -> float:
-    if isinstance(value, bool) or not isinstance(value, (int, float, str)):
-        raise InputError(name, value, f"this is not a number; give one in {parameter.unit}")
-    try:
-        number = float(value)
-    except (ValueError, OverflowError):
-        raise InputError(name, value, f"this is not a number; give one in {parameter.unit}") from None
-    if math.isnan(number) or (math.isinf(number) and not (parameter.unbounded and number > 0)):
-        raise InputError(name, value, f"the value must be finite; give a number in {parameter.unit}")
-    if parameter.integer and number != round(number):
-        raise InputError(name, value, f"{parameter.meaning} must be a whole number")
-    if parameter.nonzero is not None and number == 0:
-        raise InputError(name, value, f"{parameter.nonzero}; give a value other than 0 {parameter.unit}")
-    return number
-
-
-_Bound = tuple[str, float | str | None, Callable[[float, float], bool]]
-
-
-def _check_bounds(name: str, parameter: Parameter, values: Mapping[str, float], kind: type) -> None:
-    value = values[name]
-    bounds: tuple[_Bound, ...] = (
-        ("above", parameter.above, operator.gt),
-        ("at least", parameter.at_least, operator.ge),
-        ("below", parameter.below, operator.lt),
-        ("at most", parameter.at_most, operator.le),
-    )
-    for words, bound, holds in bounds:
-        if bound is None or not isinstance(bound, kind):
-            continue
-        limit = values[bound] if isinstance(bound, str) else bound
-        if not holds(value, limit):
-            shown = f"{bound} = {limit:g}" if isinstance(bound, str) else f"{limit:g}"
-            unit = "" if parameter.unit == "1" else f" {parameter.unit}"
-            raise InputError(name, value, f"{parameter.meaning} must be {words} {shown}{unit}")

@@ -7,9 +7,14 @@ from collections.abc import Sequence
 from rich.table import Table
 from rich.text import Text
 
-from proofroll.studies.findings import Finding, Shown, State
+from proofroll.studies.findings import Finding, FindingState, Shown
 
-_STYLES = {State.SHOWS: "red", State.GONE: "green", State.NOT_INSTALLED: "dim", State.BROKEN: "yellow"}
+_STYLES = {
+    FindingState.SHOWS: "red",
+    FindingState.GONE: "green",
+    FindingState.NOT_INSTALLED: "dim",
+    FindingState.BROKEN: "yellow",
+}
 
 
 def findings_table(rows: Sequence[Shown]) -> Table:

@@ -55,7 +55,7 @@ class Finding:
     program: str
 
 
-class State(StrEnum):
+class FindingState(StrEnum):
     """What a program says of what is installed."""
 
     SHOWS = "still shows"
@@ -76,7 +76,7 @@ class Shown:
     """
 
     finding: Finding
-    state: State
+    state: FindingState
     version: str
     said: str
 
@@ -138,13 +138,13 @@ def shown(findings: Sequence[Finding], python: str = "", time_limit: float = 300
         raise Missing(f"{interpreter} is no Python interpreter; give the path of one") from None
     for item in findings:
         if item.package not in versions:
-            yield Shown(item, State.NOT_INSTALLED, "", f"{item.package} is not installed")
+            yield Shown(item, FindingState.NOT_INSTALLED, "", f"{item.package} is not installed")
             continue
         with tempfile.TemporaryDirectory() as folder:
             file = Path(folder) / f"{item.name}.py"
             file.write_text(item.program, encoding="utf-8")
             code, said = _run([interpreter, "-P", str(file)], time_limit, folder)
-        state = {SHOWS: State.SHOWS, 0: State.GONE}.get(code, State.BROKEN)
+        state = {SHOWS: FindingState.SHOWS, 0: FindingState.GONE}.get(code, FindingState.BROKEN)
         yield Shown(item, state, versions[item.package], (said.strip().splitlines() or [""])[-1])
 
 

@@ -11,7 +11,7 @@ from typer.testing import CliRunner
 
 from proofroll.cli import app
 from proofroll.core.errors import InputError, Missing
-from proofroll.studies.findings import Finding, State, load_findings, read_finding, shown
+from proofroll.studies.findings import Finding, FindingState, load_findings, read_finding, shown
 
 
 def made(program: str, package: str = "numpy") -> Finding:
@@ -36,24 +36,24 @@ def test_every_file_is_sound() -> None:
 @pytest.mark.parametrize(
     ("program", "state"),
     [
-        ("print('here')\nraise SystemExit(10)", State.SHOWS),
-        ("print('here')", State.GONE),
-        ("raise ValueError('here')", State.BROKEN),
-        ("print('here'); import os; os.abort()", State.BROKEN),
+        ("print('here')\nraise SystemExit(10)", FindingState.SHOWS),
+        ("print('here')", FindingState.GONE),
+        ("raise ValueError('here')", FindingState.BROKEN),
+        ("print('here'); import os; os.abort()", FindingState.BROKEN),
     ],
 )
-def test_exit_codes_are_read(program: str, state: State) -> None:
+def test_exit_codes_are_read(program: str, state: FindingState) -> None:
     """Exit code 10 shows, 0 is gone, and a program that fails could not tell; the last line is what it says."""
     (row,) = shown([made(program)])
     assert row.state == state
-    assert state == State.BROKEN or row.said == "here"
+    assert state == FindingState.BROKEN or row.said == "here"
     assert row.version
 
 
 def test_what_cannot_be_run_is_said() -> None:
     """An engine that is not installed is no verdict; an interpreter that does not exist is named; a hang is ended."""
     (row,) = shown([made("", "no-such-engine")])
-    assert row.state == State.NOT_INSTALLED
+    assert row.state == FindingState.NOT_INSTALLED
     with pytest.raises(Missing, match="/no/such/python is no Python interpreter"):
         list(shown([made("")], "/no/such/python"))
 

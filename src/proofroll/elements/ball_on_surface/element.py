@@ -36,14 +36,8 @@ if TYPE_CHECKING:
 
 # What may be asked for besides the motion, and what a formulation must then be able to give.
 ASKED: Mapping[str, BallCapability] = {"orientation": BallCapability.ORIENTATION}
-# Rolling resistance that a scene without any is given to see what the term costs: f in radii (Blajer 2006, figure 5).
-_RESISTANCE = 0.02
-# An engine without a step is looked at after this part of the time in which its ball rolls by one radius.
-_PART = 1e-2
 # Part of the speed below which an initial slip is the round-off of rolling.
 _ROUND_OFF = 1e-12
-# Friction that is bounded far away from what rolling needs: this many times as much.
-_FAR = 10.0
 
 
 @dataclass(frozen=True)
@@ -176,24 +170,9 @@ class BallOnSurface:
     @cached_property
     def first_motion(self) -> FirstMotion | None:
         """See the protocol; None for a ball at rest under rolling resistance, which has no direction yet."""
-        from proofroll.elements.ball_on_surface.mechanics import (
-            initial_angular_acceleration,
-            initial_response,
-            natural_acceleration,
-        )
-        from proofroll.elements.ball_on_surface.resting import stands
+        from proofroll.elements.ball_on_surface.natural import first_motion
 
-        body = self.rolling
-        if stands(body, body.v0):
-            return None
-        speed = float(np.linalg.norm(body.v0)) or float(np.sqrt(self.ball.radius * np.linalg.norm(body.gravity)))
-        return FirstMotion(
-            initial_response(body)[0][None, :],
-            initial_angular_acceleration(body)[None, :],
-            natural_acceleration(body),
-            _PART * self.ball.radius / (speed or 1.0),
-            float(np.linalg.norm(body.gravity)) or None,
-        )
+        return first_motion(self.rolling)
 
     @property
     def softened(self) -> frozenset[str]:
@@ -289,25 +268,9 @@ class BallOnSurface:
 
     def optional_terms(self, parameters: Mapping[str, float], truth: xr.Dataset) -> list[OptionalTerm]:
         """See the protocol: rolling resistance, bounded friction and orientation."""
-        found: list[OptionalTerm] = []
-        if "rolling_resistance" in parameters:
-            f = self.contact.rolling_resistance or _RESISTANCE * self.ball.radius
-            because = (
-                "the scene has it" if self.contact.rolling_resistance else f"the scene has none; here with f = {f:g} m"
-            )
-            put, taken = {"rolling_resistance": f}, {"rolling_resistance": 0.0}
-            found.append(OptionalTerm("rolling resistance", because, put, taken))
-        if "mu_static" in parameters:
-            unbounded = dict.fromkeys((n for n in ("mu_static", "mu_kinetic") if n in parameters), math.inf)
-            if math.isfinite(self.contact.mu_static):
-                if BallCapability.SLIPPING_START not in self.requires:  # which has no motion without a bound
-                    found.append(OptionalTerm("bounded friction", "the scene bounds it", {}, unbounded))
-            else:
-                far = _FAR * (float(np.nanmax(truth["needed_friction"].to_numpy())) or 1.0)
-                because = f"the scene has no bound; here one of {far:.3g}, {_FAR:g} times what rolling needs"
-                found.append(OptionalTerm("bounded friction", because, dict.fromkeys(unbounded, far)))
-        because, need = "nothing else depends on it", BallCapability.ORIENTATION
-        return [*found, OptionalTerm("orientation asked", because, asks=("orientation",), capability=need)]
+        from proofroll.elements.ball_on_surface.optional_terms import optional_terms
+
+        return optional_terms(self, parameters, truth)
 
 
 def rolling_ball(scene: Scene) -> RollingBall:

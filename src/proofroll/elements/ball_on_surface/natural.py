@@ -1,4 +1,4 @@
-"""What a run's length and a step are measured by: the natural time of a ball, and dimensionless numbers of a step."""
+"""What runs and steps are measured by: natural time and first motion of a ball, dimensionless numbers of a step."""
 
 from __future__ import annotations
 
@@ -7,11 +7,20 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from proofroll.core.element import StepNumber
+from proofroll.core.element import FirstMotion, StepNumber
+from proofroll.elements.ball_on_surface.mechanics import (
+    initial_angular_acceleration,
+    initial_response,
+    natural_acceleration,
+)
 from proofroll.elements.ball_on_surface.model import RollingBall
+from proofroll.elements.ball_on_surface.resting import stands
 
 if TYPE_CHECKING:
     import xarray as xr
+
+# An engine without a step is looked at after this part of the time in which its ball rolls by one radius.
+_PART = 1e-2
 
 
 def turning_rate(body: RollingBall) -> float:
@@ -53,4 +62,18 @@ def step_numbers(body: RollingBall, h: float, truth: xr.Dataset | None) -> tuple
             None if fastest is None else fastest * h,
         ),
         StepNumber("fall", "h√(g/a)", "step in parts of the time of a fall by the radius", math.sqrt(gravity / a) * h),
+    )
+
+
+def first_motion(body: RollingBall) -> FirstMotion | None:
+    """See :class:`proofroll.core.element.Element`; None for a ball at rest under rolling resistance."""
+    if stands(body, body.v0):
+        return None
+    speed = float(np.linalg.norm(body.v0)) or float(np.sqrt(body.ball.radius * np.linalg.norm(body.gravity)))
+    return FirstMotion(
+        initial_response(body)[0][None, :],
+        initial_angular_acceleration(body)[None, :],
+        natural_acceleration(body),
+        _PART * body.ball.radius / (speed or 1.0),
+        float(np.linalg.norm(body.gravity)) or None,
     )

@@ -55,7 +55,7 @@ class Switched(Protocol):
         """The rates after the impulse at the contact that ends the slip."""
 
 
-class State(NamedTuple):
+class ContactState(NamedTuple):
     """Coordinates, their rates, and the contact that follows from them."""
 
     q: FloatArray
@@ -197,7 +197,7 @@ class SwitchedIntegration:
                 self.state, now = self._part(part), now + part
             self._land(now, end)
 
-    def _crossing(self, beyond: State, left: float) -> float:
+    def _crossing(self, beyond: ContactState, left: float) -> float:
         """How long from now until the contact changes [s], by ``left`` [s] at the latest."""
         from scipy.optimize import brentq
 
@@ -219,7 +219,7 @@ class SwitchedIntegration:
             self._switch("stick", now, self._before_t, end)
         if holds or touch.slip <= AT_REST * self.settings.dt * self.beta * self.mu_kinetic * touch.N:
             q, q_t = self.state.q, self.model.without_slip(self.state.q_t)
-            self.state = State(q, q_t, self.model.touch(q, q_t))
+            self.state = ContactState(q, q_t, self.model.touch(q, q_t))
 
     def _switch(self, kind: EventKind, now: float, low: float, high: float) -> None:
         self.events.append(Event(kind, now, low, high))
@@ -236,7 +236,7 @@ class SwitchedIntegration:
         else:
             self._switch("stick", now, self._before_t, now)
 
-    def _part(self, dt: float) -> State:
+    def _part(self, dt: float) -> ContactState:
         """The state after one step of another size [s] from the present one."""
         self._set_initial()
         self.model.hold(None if self.sticking else self.direction)
@@ -248,9 +248,9 @@ class SwitchedIntegration:
         data.SetODE2Coordinates(self.state.q, initial)
         data.SetODE2Coordinates_t(self.state.q_t, initial)
 
-    def _state(self, configuration: Any) -> State:
+    def _state(self, configuration: Any) -> ContactState:
         q, q_t = self._q(configuration), self._q_t(configuration)
-        return State(q, q_t, self.model.touch(q, q_t))
+        return ContactState(q, q_t, self.model.touch(q, q_t))
 
     def _restart(self) -> None:
         """A fresh solver in the present state."""

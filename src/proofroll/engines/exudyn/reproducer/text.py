@@ -1,24 +1,8 @@
-"""Writes the program that shows what Exudyn does with a ball on a wall, without proofroll."""
+"""Parts of the program as text: items of each formulation, solver, state of the ball."""
 
 from __future__ import annotations
 
-import math
-from typing import Any
-
-import numpy as np
-
-from proofroll.core.errors import Refused
-from proofroll.elements.ball_on_surface.model import RollingBall
-from proofroll.elements.ball_on_surface.reproducer_source import assigned, ball_numbers, wall_source
-from proofroll.engines.exudyn.carrier import Carrier
-from proofroll.engines.exudyn.contact import SURELY, PenaltyContact
-from proofroll.engines.exudyn.generic import Generic
-from proofroll.engines.exudyn.local_frame import curvature
-from proofroll.engines.exudyn.native import exu
-from proofroll.engines.exudyn.rolling_disc import RollingDisc
-from proofroll.engines.exudyn.settings import ExudynSettings
-
-_BALL = """
+BALL = """
 node = mbs.AddNode(items.NodeRigidBodyEP(
     referenceCoordinates=[*POSITION, 1.0, 0.0, 0.0, 0.0],
     initialVelocities=[*VELOCITY, 0.0, *(np.array(START_SPIN) / 2)],
@@ -29,7 +13,8 @@ weight = mbs.AddMarker(items.MarkerBodyMass(bodyNumber=body))
 mbs.AddLoad(items.LoadMassProportional(markerNumber=weight, loadVector=GRAVITY))
 """
 
-_RESISTANCE = """
+
+RESISTANCE = """
 
 def resistance(mbs, t, load):
     \"\"\"Moment of rolling resistance: the normal force, which follows from the path, acts LEVER further on.\"\"\"
@@ -46,7 +31,8 @@ mbs.AddLoad(items.LoadTorqueVector(
 ))
 """
 
-_CARRIER = """
+
+CARRIER = """
 ground = mbs.AddObject(items.ObjectGround())
 carrier_node = mbs.AddNode(items.NodeRigidBodyEP(
     referenceCoordinates=[0.0, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0],
@@ -69,7 +55,8 @@ for kind, axis, about, factor in ROLLING:
     mbs.AddObject(items.CoordinateConstraint(markerNumbers=[one, other], factor1=factor, velocityLevel=True))
 """
 
-_ROLLING_DISC = """
+
+ROLLING_DISC = """
 ground = mbs.AddObject(items.ObjectGround())
 plane = mbs.AddMarker(items.MarkerBodyRigid(bodyNumber=ground))
 e1, e2, _ = frame(np.array(POSITION))
@@ -89,7 +76,8 @@ def aim(mbs, t, newton_iteration, discontinuous_iteration):
 mbs.SetPreNewtonResidualUserFunction(aim)
 """
 
-_CONTACT = """
+
+CONTACT = """
 
 def hollow_centre(p):
     \"\"\"Centre of a hollow sphere that touches the wall where the ball at p does.\"\"\"
@@ -131,7 +119,8 @@ def watch(mbs, t):
 mbs.SetPostStepUserFunction(watch)
 """
 
-_GENERIC = """
+
+GENERIC = """
 # q = (distance towards the wall, the wall's two coordinates, and three whose rates are the spin along e1, e2, e3)
 ode = mbs.AddNode(items.NodeGenericODE2(
     referenceCoordinates=[0.0] * 6, initialCoordinates=[0.0, *COORDINATES, 0.0, 0.0, 0.0],
@@ -162,7 +151,8 @@ mbs.AddObject(items.CoordinateVectorConstraint(
 ))
 """
 
-_GENERIC_STATE = """
+
+GENERIC_STATE = """
 
 def state_of_ball():
     \"\"\"Centre, velocity and angular velocity in the world.\"\"\"
@@ -180,7 +170,8 @@ def state_of_ball():
     return p + q[0] * e[0], v @ e, np.array(rates[3:]) @ e
 """
 
-_SOLVER = """
+
+SOLVER = """
 mbs.Assemble()
 
 settings = exu.SimulationSettings()
@@ -232,90 +223,11 @@ def run(times):
         yield state_of_ball()
 """
 
-_BALL_STATE = """
+
+BALL_STATE = """
 
 def state_of_ball():
     \"\"\"Centre, velocity and angular velocity in the world.\"\"\"
     kinds = (exu.OutputVariableType.Position, exu.OutputVariableType.Velocity, exu.OutputVariableType.AngularVelocity)
     return tuple(np.array(mbs.GetNodeOutput(node, kind)) for kind in kinds)
 """
-
-
-def source(model: Any, body: RollingBall, settings: ExudynSettings) -> str:
-    """See :class:`proofroll.core.engine_abilities.Reproduces`.
-
-    Args:
-        model: of the formulation, at time 0.
-        body: the scene's.
-        settings: of the adapter.
-
-    Raises:
-        Refused: the scene has a term that the program has not.
-    """
-    generic, resists = isinstance(model, Generic), body.contact.rolling_resistance > 0
-    if generic and math.isfinite(body.contact.mu_static):
-        raise Refused("the loop that switches Exudyn's constraint of rolling off while the ball slips is proofroll's")
-    numbers = ball_numbers(body) | ({} if generic else {"START_SPIN": _start_spin(model)})
-    numbers |= {"LEVER": body.contact.rolling_resistance}
-    numbers |= {"CURVATURE": curvature(body.surface, body.u0)} if resists and not generic else {}
-    numbers |= {"STEP_SIZE": settings.dt, "NEWTON_TOLERANCE": settings.newton_tolerance}
-    start = _start(model)
-    lines = [
-        f"HALVINGS = {settings.halvings or 0}",
-        f"NEW_JACOBIAN = {settings.jacobian == 'step'}",
-        f"TRAPEZOIDAL = {settings.integrator == 'trapezoidal_index2'}",
-        f"SPECTRAL_RADIUS = {settings.spectral_radius!r}",
-        f"ACCELERATIONS = {start[0]!r}",
-        f"MULTIPLIERS = {start[1]!r}",
-        *_numbers(model, body),
-    ]
-    parts = {Generic: _GENERIC, Carrier: _CARRIER, RollingDisc: _ROLLING_DISC, PenaltyContact: _CONTACT}
-    return (
-        "import exudyn as exu\nimport exudyn.itemInterface as items\nimport numpy as np\n\n"
-        + assigned(**numbers)
-        + "\n".join(lines)
-        + "\n"
-        + wall_source(body)
-        + "\nexu.config.printToConsole = False\nmbs = exu.SystemContainer().AddSystem()\n"
-        + ("" if generic else _BALL + (_RESISTANCE if resists else ""))
-        + parts[type(model)]
-        + _SOLVER
-        + (_GENERIC_STATE if generic else _BALL_STATE)
-    )
-
-
-def _start_spin(model: Any) -> Any:
-    """Angular velocity of the ball in the model [rad/s]; a contact starts with the creep that holds the ball."""
-    data, initial = model.system.systemData, exu.ConfigurationType.Initial
-    # Rates of the Euler parameters of the first node, a body that is not turned, are half of it.
-    return 2 * np.array(data.GetODE2Coordinates_t(initial)[4:7])
-
-
-def _start(model: Any) -> tuple[list[float], list[float]]:
-    """Accelerations and multipliers at time 0, where the adapter gives them; else nothing."""
-    if isinstance(model, (PenaltyContact, Generic)):
-        return [], []  # Exudyn finds them
-    data = model.system.systemData
-    initial = data.GetODE2Coordinates_tt(exu.ConfigurationType.Initial)
-    return np.array(initial).tolist(), np.array(data.GetAECoordinates()).tolist()
-
-
-def _numbers(model: Any, body: RollingBall) -> list[str]:
-    """Assignments that only one formulation needs."""
-    if isinstance(model, (Carrier, Generic)):
-        return model.numbers(body)
-    if isinstance(model, PenaltyContact):
-        contact = model.system.GetObject(model.contact)
-        state = model.system.GetNode(model.data)["initialCoordinates"]
-        radii = [float(radius) for radius in contact["spheresRadii"]]
-        return [
-            f"HOLLOW = {sum(radii) - body.ball.radius!r}",
-            f"RADII = {radii!r}",
-            f"CONTACT_STATE = {np.array(state).tolist()!r}",
-            f"FRICTION = {float(contact['dynamicFriction'])!r}",
-            f"ZONE = {float(contact['frictionProportionalZone'])!r}",
-            f"BOUNDED = {model.bounded}",
-            f"SURELY = {SURELY!r}",
-            f"STIFFNESS = {float(contact['contactStiffness'])!r}",
-        ]
-    return []

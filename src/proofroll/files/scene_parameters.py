@@ -1,0 +1,144 @@
+"""Parameters of a scene: what a file may say of each, and the numbers that they take."""
+
+from __future__ import annotations
+
+import math
+import operator
+from collections.abc import Callable, Iterable, Mapping
+from dataclasses import dataclass
+from pathlib import Path
+
+from proofroll.core.errors import InputError, choices
+
+
+@dataclass(frozen=True)
+class Parameter:
+    """A number that a user may set by name.
+
+    Attributes:
+        value: default, or the name of the parameter whose value is the default.
+        unit: of the value; nothing is converted.
+        symbol: as equations write it.
+        meaning: what it is, in one line; messages say it.
+        source: where the number comes from.
+        above, at_least, below, at_most: bounds, as numbers or names of other parameters.
+        nonzero: why the value must not be zero.
+        unbounded: whether inf is allowed.
+        integer: whether it counts something.
+    """
+
+    value: float | str
+    unit: str
+    meaning: str
+    source: str
+    symbol: str = ""
+    above: float | str | None = None
+    at_least: float | str | None = None
+    below: float | str | None = None
+    at_most: float | str | None = None
+    nonzero: str | None = None
+    unbounded: bool = False
+    integer: bool = False
+
+
+def check_parameters(parameters: Mapping[str, Parameter], units: Iterable[str], path: Path) -> None:
+    """All that can be said of parameters without their values.
+
+    Args:
+        parameters: of a scene, by name.
+        units: that are known.
+        path: of the file, for messages.
+
+    Raises:
+        InputError: an unknown unit, or what a value or a bound refers to is not there.
+    """
+    known_units = dict.fromkeys(units)
+    for name, parameter in parameters.items():
+        where = f"{path}: parameters.{name}"
+        if parameter.unit not in known_units:
+            advice = f"this unit is not known, and nothing is converted; write the value in {choices(known_units)}"
+            raise InputError(f"{where}.unit", parameter.unit, advice)
+        for key in ("value", "above", "at_least", "below", "at_most"):
+            other = getattr(parameter, key)
+            if not isinstance(other, str):
+                continue
+            if other == name or other not in parameters:
+                known = choices(item for item in parameters if item != name)
+                advice = f"there is no such parameter to refer to; choose from {known}"
+                raise InputError(f"{where}.{key}", other, advice)
+            if parameters[other].unit != parameter.unit:
+                advice = f"its unit is {parameters[other].unit}, that of {name} is {parameter.unit}"
+                raise InputError(f"{where}.{key}", other, advice)
+        _check_end(parameters, name, f"{where}.value")
+
+
+def _check_end(parameters: Mapping[str, Parameter], name: str, where: str) -> None:
+    """The defaults that follow one another end at a number.
+
+    Raises:
+        InputError: they go round in a circle.
+    """
+    passed = [name]
+    while isinstance(following := parameters[passed[-1]].value, str) and following in parameters:
+        if following in passed:
+            raise InputError(where, " -> ".join([*passed, following]), "this goes round in a circle; give a number")
+        passed.append(following)
+
+
+def values_of(parameters: Mapping[str, Parameter], given: Mapping[str, object]) -> dict[str, float]:
+    """Every parameter's number: given, or default, or that of the parameter it follows.
+
+    Raises:
+        InputError: there is no such parameter, or a value is no number or out of its bounds.
+    """
+    for name, value in given.items():
+        if name not in parameters:
+            raise InputError(name, value, f"there is no such parameter; choose from {choices(parameters)}")
+    values: dict[str, float] = {}
+    for name, parameter in parameters.items():
+        source = name
+        while source not in given and isinstance(following := parameters[source].value, str):
+            source = following
+        values[name] = _number(name, given.get(source, parameters[source].value), parameter)
+    # Numbers first, then other parameters: a parameter is never blamed for the bad value of another.
+    for kind in (float, str):
+        for name, parameter in parameters.items():
+            _check_bounds(name, parameter, values, kind)
+    return values
+
+
+def _number(name: str, value: object, parameter: Parameter) -> float:
+    if isinstance(value, bool) or not isinstance(value, (int, float, str)):
+        raise InputError(name, value, f"this is not a number; give one in {parameter.unit}")
+    try:
+        number = float(value)
+    except (ValueError, OverflowError):
+        raise InputError(name, value, f"this is not a number; give one in {parameter.unit}") from None
+    if math.isnan(number) or (math.isinf(number) and not (parameter.unbounded and number > 0)):
+        raise InputError(name, value, f"the value must be finite; give a number in {parameter.unit}")
+    if parameter.integer and number != round(number):
+        raise InputError(name, value, f"{parameter.meaning} must be a whole number")
+    if parameter.nonzero is not None and number == 0:
+        raise InputError(name, value, f"{parameter.nonzero}; give a value other than 0 {parameter.unit}")
+    return number
+
+
+_Bound = tuple[str, float | str | None, Callable[[float, float], bool]]
+
+
+def _check_bounds(name: str, parameter: Parameter, values: Mapping[str, float], kind: type) -> None:
+    value = values[name]
+    bounds: tuple[_Bound, ...] = (
+        ("above", parameter.above, operator.gt),
+        ("at least", parameter.at_least, operator.ge),
+        ("below", parameter.below, operator.lt),
+        ("at most", parameter.at_most, operator.le),
+    )
+    for words, bound, holds in bounds:
+        if bound is None or not isinstance(bound, kind):
+            continue
+        limit = values[bound] if isinstance(bound, str) else bound
+        if not holds(value, limit):
+            shown = f"{bound} = {limit:g}" if isinstance(bound, str) else f"{limit:g}"
+            unit = "" if parameter.unit == "1" else f" {parameter.unit}"
+            raise InputError(name, value, f"{parameter.meaning} must be {words} {shown}{unit}")
