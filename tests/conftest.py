@@ -20,6 +20,7 @@ from warm_workers import WarmWorkers
 from proofroll import cli
 from proofroll.core.scene import Scene
 from proofroll.files.scene_file import load_scene
+from proofroll.running import stopwatch
 from proofroll.running.case import Case, EngineFacts
 
 PLUGINS = Path(__file__).parent / "plugins"
@@ -35,9 +36,23 @@ settings.register_profile(
 )
 settings.load_profile("repeatable")
 
+# Each measurement of speed is a real one, but short [s]: no test asks how exact it is.
+stopwatch.SECONDS = 0.002
+
 # Tests of Ctrl-C mean nothing where SIGINT was ignored when pytest began (nohup, a shell's "&"); children inherit that.
 if signal.getsignal(signal.SIGINT) is signal.SIG_IGN:
     signal.signal(signal.SIGINT, signal.default_int_handler)
+
+# Their many tests share nothing dear, and keep all processes busy.
+_LOOSE = {"agreement", "conformance"}
+
+
+def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
+    """One process runs the tests of a file: fixtures of a module are made once, and workers are warm."""
+    for item in items:
+        if item.path.parent.name not in _LOOSE and item.get_closest_marker("xdist_group") is None:
+            item.add_marker(pytest.mark.xdist_group(str(item.path)))
+
 
 # Nothing about this motion is zero or symmetric, so a lost sign or a swapped axis shows.
 GENERAL = {"speed": 3.3, "axial_speed": 0.7, "radial_spin": 12.0}
@@ -142,12 +157,17 @@ Proofroll = Callable[..., tuple[int, str, str]]
 
 @pytest.fixture
 def proofroll(
-    monkeypatch: pytest.MonkeyPatch,
-    capfd: pytest.CaptureFixture[str],
+    command_line: Proofroll,
     install_engines: Callable[[Mapping[str, str]], None],
 ) -> Proofroll:
-    """Runs the command line in this process; exit code, standard output, standard error."""
+    """As ``command_line``, with engines besides that misbehave."""
     install_engines(ENTRY_POINTS | {"broken": "broken:Broken", "laddered": "laddered:Laddered"})
+    return command_line
+
+
+@pytest.fixture
+def command_line(monkeypatch: pytest.MonkeyPatch, capfd: pytest.CaptureFixture[str]) -> Proofroll:
+    """Runs the command line in this process; exit code, standard output, standard error."""
     monkeypatch.setenv("COLUMNS", "100")
     monkeypatch.setattr(cli.options, "_SAID_EVERY", 3600.0)  # no test hangs on how long its work takes
 

@@ -59,20 +59,31 @@ def commands(program: str) -> list[str]:
 
 
 # Makes what a command does take less long: a shorter run, or one of the engines that tests/agreement runs all.
-SHORTER = {"recommend": ["--until", "0.2"], "ladder": ["--until", "0.05"], "compare": ["--engine", "projection"]}
+SHORTER = {
+    "recommend": ["--until", "0.2"],
+    "ladder": ["--until", "0.05", "--rounds", "2"],
+    "compare": ["--engine", "projection"],
+}
+
+
+@pytest.fixture(scope="session")
+def folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """Where a person types the commands, one after the other."""
+    return tmp_path_factory.mktemp("readme")
 
 
 @pytest.mark.slow
+@pytest.mark.xdist_group("readme")  # in one folder, with the same workers
 @pytest.mark.parametrize("line", commands("proofroll"))
 def test_a_command_of_the_readme_works(
-    line: str, proofroll: Callable[..., tuple[int, str, str]], tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+    line: str, command_line: Callable[..., tuple[int, str, str]], folder: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     """Every proofroll command of the README ends as expected."""
     words = shlex.split(line)[1:]
     words = [str(ROOT / word) if word.startswith("comparisons/") else word for word in words]
-    monkeypatch.chdir(tmp_path)
-    (tmp_path / "ROBOT.urdf").write_text(urdf(), encoding="utf-8")
-    code, out, err = proofroll(*words, *SHORTER.get(words[0], []))
+    monkeypatch.chdir(folder)
+    (folder / "ROBOT.urdf").write_text(urdf(), encoding="utf-8")
+    code, out, err = command_line(*words, *SHORTER.get(words[0], []))
     assert code == 0, err
     assert out
 

@@ -37,11 +37,11 @@ def run(
     as_json: Json = False,
 ) -> None:
     """Run one scene in one engine."""
-    import importlib
     import tempfile
     import threading
 
     from proofroll.core.time_grid import EVERY, time_grid
+    from proofroll.files.netcdf import import_xarray
     from proofroll.report.run import run_content, run_lines
     from proofroll.report.run_plot import require_ending
     from proofroll.running.runner import run_one
@@ -55,7 +55,7 @@ def run(
     if plot is not None:
         require_ending(plot)
     # The result is read with xarray, half a second to import: done while the worker's process is busy.
-    threading.Thread(target=importlib.import_module, args=("xarray",), daemon=True).start()
+    threading.Thread(target=import_xarray, daemon=True).start()
     workers = Workers()  # the process that tells the settings also makes the run
     case = single_case(
         scene,

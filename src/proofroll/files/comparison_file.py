@@ -12,6 +12,7 @@ from pydantic import ConfigDict, TypeAdapter, ValidationError
 
 from proofroll.core.comparison import Band, Comparison, ExceptAt, Row, Tolerance
 from proofroll.core.errors import InputError
+from proofroll.core.observable import Observable
 from proofroll.core.plugins import parse_engine, require_engine
 from proofroll.core.time_grid import time_grid
 from proofroll.core.verdict import Verdict
@@ -77,10 +78,11 @@ def _comparison(path: Path, content: dict[str, Any]) -> Comparison:
         raise first_problem(error, where) from None
     if math.prod(map(len, comparison.vary.values())) + len(comparison.points) > _MOST_POINTS:
         raise InputError(f"{where}: vary", list(comparison.vary), f"that is more than {_MOST_POINTS} points; vary less")
+    known = load_scene(comparison.scene).observables
     for name, band in comparison.bands.items():
-        _check_bounds(f"{where}: tolerances.{name}", comparison, band.bounds)
+        _check_bounds(f"{where}: tolerances.{name}", known, band.bounds)
     for index, row in enumerate(comparison.rows):
-        _check(f"{where}: rows.{index}", row, comparison)
+        _check(f"{where}: rows.{index}", row, comparison, known)
     _check_times(where, comparison)
     _check_brief(where, comparison)
     return comparison
@@ -134,7 +136,7 @@ def _prepared(where: str, content: object) -> dict[str, Any]:
     return row
 
 
-def _check(where: str, row: Row, comparison: Comparison) -> None:
+def _check(where: str, row: Row, comparison: Comparison, known: Mapping[str, Observable]) -> None:
     """What types cannot say."""
     _check_engine(where, row)
     if row.tolerance not in comparison.bands:
@@ -142,9 +144,9 @@ def _check(where: str, row: Row, comparison: Comparison) -> None:
     if row.ladder != [1.0]:
         _check_ladder(where, row.ladder)
     _check_expectations(where, row)
-    _check_bounds(where, comparison, dict.fromkeys([*row.expect_for, *row.order]))
-    _check_bounds(where, comparison, row.limit)
-    _check_bounds(where, comparison, row.bound)
+    _check_bounds(where, known, dict.fromkeys([*row.expect_for, *row.order]))
+    _check_bounds(where, known, row.limit)
+    _check_bounds(where, known, row.bound)
     _check_points(f"{where}.only", comparison, row.only)
     for exception in row.except_at:
         _check_points(f"{where}.except_at", comparison, exception.where)
@@ -197,9 +199,8 @@ def _check_ladder(where: str, ladder: list[float]) -> None:
         raise InputError(f"{where}.ladder", ladder, "neighbouring factors must have the same ratio")
 
 
-def _check_bounds(where: str, comparison: Comparison, bounds: Mapping[str, Tolerance | None]) -> None:
+def _check_bounds(where: str, known: Mapping[str, Observable], bounds: Mapping[str, Tolerance | None]) -> None:
     """Every name is an observable of the scene, and every tolerance is in its unit."""
-    known = load_scene(comparison.scene).observables
     for name, bound in bounds.items():
         if name not in known:
             raise InputError(

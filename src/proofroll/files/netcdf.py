@@ -2,8 +2,10 @@
 
 from __future__ import annotations
 
+import contextlib
 import io
-from collections.abc import Sequence
+import sys
+from collections.abc import Iterator, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -14,6 +16,30 @@ from proofroll.files.atomic import content, replacing
 
 if TYPE_CHECKING:
     import xarray as xr
+
+
+def import_xarray() -> None:
+    """Imports xarray, in a process that is ours alone: from then on it takes no array of dask's.
+
+    At its first array xarray imports all of dask, half of what a run of a second costs; no array of ours is dask's.
+    """
+    with _dask_aside():
+        import xarray as xr
+
+        xr.Variable((), 0.0)
+
+
+@contextlib.contextmanager
+def _dask_aside() -> Iterator[None]:
+    """Meanwhile dask is not found, unless it is imported already."""
+    hidden = "dask" not in sys.modules
+    if hidden:
+        sys.modules["dask"] = None  # type: ignore[assignment]  # what Python documents to make an import fail
+    try:
+        yield
+    finally:
+        if hidden:
+            sys.modules.pop("dask", None)
 
 
 def write(dataset: xr.Dataset, path: Path) -> None:
@@ -27,7 +53,8 @@ def write(dataset: xr.Dataset, path: Path) -> None:
     """
     plain: dict[Any, dict[str, Any]] = {name: {"_FillValue": None} for name in dataset.variables}
     # Made in memory first: a disk that fills meanwhile gives one reason, and no half of a file.
-    made = dataset.to_netcdf(None, engine="scipy", encoding=plain)
+    with _dask_aside():  # of which xarray would import the scheduler to learn that it writes nothing
+        made = dataset.to_netcdf(None, engine="scipy", encoding=plain)
     with replacing(path) as temporary:
         temporary.write_bytes(made)
 

@@ -44,11 +44,13 @@ class SceneSource(Protocol):
 def source_of(name: str) -> tuple[type[SceneSource], Path] | None:
     """Who reads the file of this name, and the file; None: it is none of another format."""
     path = Path(name)
-    source = _sources().get(path.suffix.lower())
     try:
-        return (source, path) if source is not None and path.is_file() else None
+        if not path.suffix or not path.is_file():
+            return None  # without loading those who read files: most names are of folders
     except (OSError, ValueError):  # too long for a file system, or a zero byte
         return None
+    source = _sources().get(path.suffix.lower())
+    return None if source is None else (source, path)
 
 
 @cache

@@ -21,7 +21,10 @@ from proofroll.running.time_case import clean_runs
 
 def run(case: dict[str, Any], out: str) -> dict[str, Any]:
     """Runs a case and writes its trajectory to ``out``; everything the case says comes back as a result."""
+    from proofroll.files.netcdf import import_xarray
+
     spent = Spent()
+    import_xarray()
     try:
         answer = dataclasses.asdict(_run(Case.from_dict(case), Path(out), spent)) | {"interpreter": sys.executable}
     finally:

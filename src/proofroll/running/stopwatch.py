@@ -27,15 +27,18 @@ class Stopwatch:
         self._lent = workers or Workers()
         self._workers: dict[str, Worker] = {}
 
-    def __call__(self, case: Case, seconds: float = SECONDS) -> float | None:
-        """Wall seconds per simulated second of a case, from clean runs that only advance; None: it did not run."""
+    def __call__(self, case: Case, seconds: float | None = None) -> float | None:
+        """Wall seconds per simulated second of a case, from clean runs that only advance; None: it did not run.
+
+        They last ``seconds``, by default :data:`SECONDS`.
+        """
         name = case.engine.name
         if name not in self._workers:
             try:
                 self._workers[name] = self._lent.take(name)
             except ProofrollError:  # another interpreter that does not serve any more
                 return None
-        request = {"do": "time", "case": dataclasses.asdict(case), "seconds": seconds}
+        request = {"do": "time", "case": dataclasses.asdict(case), "seconds": seconds or SECONDS}
         try:
             rate = self._workers[name].ask(request, _LIMIT).get("seconds_per_second")
         except WorkerDied:

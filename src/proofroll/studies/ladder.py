@@ -117,7 +117,7 @@ class Ladder:
         for error in self.engines.values():
             if isinstance(error, InputError):
                 raise error
-        truth = resolve([("truth", {})])[0]
+        truth = resolve([("truth", {})], runner.workers)[0]
         if not isinstance(truth, EngineFacts):
             raise truth
         self._truth_facts = truth
@@ -133,7 +133,7 @@ class Ladder:
         wanted = [rung.model for rung in self.ladder] + [m for s in self.switches for m in (s.on, s.off)]
         models = {key_of(model): model for model in wanted if model is not None}
         self._run_truths([dict(s.on.parameters) for s in self.switches if s.on is not None], progress)
-        facts = resolve([(model.engine, model.options) for model in models.values()])
+        facts = resolve([(model.engine, model.options) for model in models.values()], self._runner.workers)
         cases: dict[str, Case] = {}
         for (key, model), found in zip(models.items(), facts, strict=True):
             if isinstance(found, EngineFacts):
@@ -188,7 +188,7 @@ class Ladder:
 
     def _time(self, progress: Callable[[str], None]) -> None:
         timed = {key: answer.case for key, answer in self.answers.items() if answer.values is not None}
-        with Stopwatch() as stopwatch:
+        with Stopwatch(self._runner.workers) as stopwatch:
             timings = interleaved(
                 {key: _task(stopwatch, case) for key, case in timed.items() if case is not None},
                 self._rounds,

@@ -18,7 +18,7 @@ import numpy as np
 
 from proofroll.running.case import Case, Result, Status
 from proofroll.running.runner import Runner
-from proofroll.running.stopwatch import SECONDS, Stopwatch
+from proofroll.running.stopwatch import Stopwatch
 from proofroll.running.timing import ROUNDS, Timing, interleaved
 from proofroll.running.worker_pool import Workers
 from proofroll.studies.curve import Curve, CurvePoint, Question
@@ -154,7 +154,7 @@ def _truth_case(question: Question, references: Mapping[float, Reference], runne
 def _timed(found: Tradeoff, truth: Case, workers: Workers, rounds: int, progress: Progress | None) -> dict[str, Timing]:
     cases = {point.case.key: point.case for point in found.points if point.result.status == Status.DONE}
     cases[truth.key] = truth
-    seconds = BRIEF_SECONDS if found.brief else SECONDS
+    seconds = BRIEF_SECONDS if found.brief else None
     with Stopwatch(workers) as stopwatch:
         return interleaved(
             {key: lambda case=case: stopwatch(case, seconds) for key, case in cases.items()},  # type: ignore[misc]

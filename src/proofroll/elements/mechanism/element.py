@@ -8,7 +8,6 @@ from functools import cached_property
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
-from scipy.spatial.transform import Rotation
 
 from proofroll.core.arrays import FloatArray
 from proofroll.core.element import FirstMotion, OptionalTerm, Sign, StepNumber
@@ -82,6 +81,8 @@ class MechanismElement:
     def start(self) -> Placed:
         """The mechanism at time 0."""
         motion = self._solution.motion
+        from scipy.spatial.transform import Rotation
+
         quaternions = Rotation.from_matrix(motion.R_WB[:-1]).as_quat(scalar_first=True)
         state = (motion.p_WB[:-1], motion.v_WB[:-1], motion.w_WB[:-1], quaternions)
         return Placed(self.mechanism, np.zeros(1), *(part[None] for part in state))

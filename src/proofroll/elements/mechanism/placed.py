@@ -7,7 +7,6 @@ from dataclasses import dataclass
 from functools import cached_property
 
 import numpy as np
-from scipy.spatial.transform import Rotation
 
 from proofroll.core.arrays import FloatArray
 from proofroll.elements.mechanism.joint import FACTS
@@ -38,6 +37,8 @@ class Placed:
     def R_WB(self) -> FloatArray:
         """Rotations of the bodies, and of the world last, shape (time, bodies + 1, 3, 3)."""
         count, bodies = self.q_WB.shape[:2]
+        from scipy.spatial.transform import Rotation
+
         turned = Rotation.from_quat(self.q_WB.reshape(-1, 4), scalar_first=True).as_matrix()
         return np.concatenate([turned.reshape(count, bodies, 3, 3), np.broadcast_to(np.eye(3), (count, 1, 3, 3))], 1)
 

@@ -5,7 +5,6 @@ from __future__ import annotations
 from collections.abc import Callable, Iterator
 
 import numpy as np
-from scipy.integrate import DOP853
 
 from proofroll.core.errors import Diverged
 from proofroll.elements.mechanism.rotations import Array
@@ -39,6 +38,8 @@ def integrated(
     Raises:
         Diverged: the steps become too small or too many, or the state is not finite.
     """
+    from scipy.integrate import DOP853
+
     # scipy needs an end; it is moved from sample to sample, so that the step size survives
     solver = DOP853(rate, 0.0, start, float(times[-1]) or 1.0, rtol=1e-3, atol=tolerance)
     solver.rtol = tolerance  # scipy accepts no less than 2.2e-14, which is its caution, not the method's limit
