@@ -8,7 +8,7 @@ from typing import Any
 from rich.table import Table
 from rich.text import Text
 
-from proofroll.report.terminal import number
+from proofroll.report.labels import number
 
 _MEANING = {
     "reduced_over_engine": "reduced, against the fastest engine",

@@ -13,10 +13,10 @@ from scipy.spatial.transform import Rotation
 from proofroll.robots.body_recursion import body_recursion
 from proofroll.robots.layers import RobotTruth
 from proofroll.robots.model import WORLD, Robot, RobotBody, RobotJoint
-from proofroll.robots.plain_data import mechanism_tables, plain, robot_from, states_from
+from proofroll.robots.plain_data import plain, robot_from, states_from
 from proofroll.robots.robot_file import open_robot
 from proofroll.robots.states import random_states
-from proofroll.robots.two_formulations import poses, world_jacobians
+from proofroll.robots.two_formulations import world_jacobians
 from proofroll.robots.urdf import read_urdf
 
 KINDS = ["revolute", "prismatic", "spherical", "fixed", "revolute", "revolute", "spherical", "prismatic", "fixed"]
@@ -102,8 +102,6 @@ def test_link_called_world(tmp_path: Path) -> None:
         found = world_jacobians(robot, states)
         assert np.abs(found.M - body_recursion(robot, states).M).max() < 1e-12
         models.append(found.M)
-        bodies = [body["name"] for body in mechanism_tables(robot)["bodies"]]
-        assert "world" not in bodies
     assert np.array_equal(*models)
 
 
@@ -113,26 +111,6 @@ def test_plain_data_round_trip() -> None:
     states = random_states(robot, 2, 1)
     again, there = robot_from(plain(robot)), states_from(plain(states))
     assert np.array_equal(world_jacobians(again, there).M, world_jacobians(robot, states).M)
-
-
-def test_tables_of_a_mechanism(tmp_path: Path) -> None:
-    """The tables of a scene hold the same kinematics: frames composed from them are the robot's at coordinate 0."""
-    path = tmp_path / "arm.urdf"
-    path.write_text(urdf())
-    robot = read_urdf(open_robot(path))
-    tables = mechanism_tables(robot)
-    place = {"world": (np.zeros(3), np.eye(3))}
-    for joint in tables["joints"]:
-        p, R = place[joint["parent"]]
-        turned = R @ Rotation.from_euler("xyz", joint["orientation"]).as_matrix()
-        place[joint["child"]] = (p + R @ np.array(joint["position"]), turned)
-    states = random_states(robot, 1, 0)
-    states = dataclasses.replace(states, angle={name: np.zeros(1) for name in states.angle})
-    for name, (p, R) in poses(robot, states).items():
-        if name != WORLD:
-            assert np.allclose(place[name][0], p[0], atol=1e-14)
-            assert np.allclose(place[name][1], R[0], atol=1e-14)
-    assert tables["joints"][1]["limits"] == [-1.5, 1.2]
 
 
 def test_singular_mass_matrix() -> None:

@@ -71,10 +71,10 @@ def lack_behind(error: BaseException) -> BaseException | None:
     return found
 
 
-def choices(names: Iterable[str], most: int = 20) -> str:
-    """Names to choose from, of many the first."""
+def choices(names: Iterable[str]) -> str:
+    """Names to choose from, of many the first twenty."""
     shown = list(names)
-    return ", ".join(shown[:most] + ["…"] * (len(shown) > most))
+    return ", ".join(shown[:20] + ["…"] * (len(shown) > 20))
 
 
 def _shown(value: object) -> str:

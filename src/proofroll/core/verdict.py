@@ -7,7 +7,7 @@ from enum import StrEnum
 
 import numpy as np
 
-from proofroll.core.arrays import FloatArray
+from proofroll.core.arrays import FloatArray, largest_difference
 from proofroll.core.convergence import Limit
 
 # A ladder whose rungs differ by less than this part of the tolerance needs no order: were the differences never to
@@ -116,13 +116,13 @@ def judge(
         lost: the first of these steps that has no curve, and why, as a clause; empty if each has one.
         doubt: what an ill-posed question leaves to be judged.
     """
-    error = _distance(values, true)
+    error = largest_difference(values, true)
     # Below this nobody can tell a curve from the truth.
     floor = truth_error_bar + _ROUND_OFF * max(scale, float(np.max(np.abs(true), initial=0.0)))
     shown_unit = "" if unit == "1" else f" {unit}"
     rungs = _Ladder(LimitFinding.NOT_SHOWN if ladder else LimitFinding.NO_LADDER, lost=lost)
     if limit is not None:
-        rungs = _read(limit, _distance(limit.values, true), tolerance, floor, shown_unit)
+        rungs = _read(limit, largest_difference(limit.values, true), tolerance, floor, shown_unit)
     verdict = Verdict.NOT_JUDGED if truth_error_bar > tolerance else _verdict(error, tolerance, rungs, doubt)
     remark = f"within tolerance, but the limit of small steps is shown not to be the truth: {rungs.text}"
     return Judgement(
@@ -207,10 +207,3 @@ def _reason(verdict: Verdict, error: float, tolerance: float, truth_error_bar: f
     else:
         text += f"; {'limit ' if rungs.finding == LimitFinding.WITHIN else ''}{rungs.finding}: {rungs.text}"
     return f"the question is ill-posed here; {text}" if verdict == Verdict.ILL_POSED else text
-
-
-def _distance(values: FloatArray, true: FloatArray) -> float:
-    if values.shape != true.shape:
-        return float("inf")  # one of the two has what the other has not
-    distance = float(np.max(np.abs(values - true), initial=0.0))
-    return distance if np.isfinite(distance) else float("inf")

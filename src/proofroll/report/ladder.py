@@ -10,12 +10,14 @@ from typing import Any
 from rich.table import Table
 from rich.text import Text
 
+from proofroll.core.arrays import largest_difference
 from proofroll.core.dataset import scales
 from proofroll.core.errors import ProofrollError
-from proofroll.report.terminal import number, step
+from proofroll.report.labels import number
+from proofroll.report.terminal import step
 from proofroll.running.case import Status
 from proofroll.running.timing import Interval, machine, ratio
-from proofroll.studies.ladder import Ladder, absence, distance, key_of
+from proofroll.studies.ladder import Ladder, absence, key_of
 from proofroll.studies.ladder_models import LadderModel, Rung, Switch
 from proofroll.studies.term_worth import Side, Worth, worth
 
@@ -104,7 +106,7 @@ def _term(study: Ladder, switch: Switch) -> dict[str, Any]:
     point = dict(switch.on.parameters)
     answers = on, off = study.answers[key_of(switch.on)], study.answers[key_of(switch.off)]
     with_it, without = study.error(switch.on, point), study.error(switch.off, point)
-    change = distance(on.values, off.values) if on.values is not None and off.values is not None else None
+    change = largest_difference(on.values, off.values) if on.values is not None and off.values is not None else None
     cost = ratio(on.timing, off.timing) if on.timing and off.timing else None
     said = [f"{answer.result.status.value}, {answer.result.message}" for answer in answers]
     verdict, reason = worth(

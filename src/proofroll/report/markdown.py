@@ -7,9 +7,8 @@ from typing import Any
 
 from proofroll.core.comparison import Tolerance
 from proofroll.core.engine_abilities import Level
-from proofroll.report.labels import SYMBOLS, caveat_lines, verdict_text
-from proofroll.report.labels import number as short
-from proofroll.report.terminal import columns, number, step
+from proofroll.report.labels import SYMBOLS, caveat_lines, number, verdict_text
+from proofroll.report.terminal import columns, step
 from proofroll.report.tradeoff_tables import name_of, step_of
 from proofroll.studies.recommend import recommend
 from proofroll.studies.wish import Wish
@@ -49,7 +48,7 @@ def cheapest_table(study: Mapping[str, Any], tolerances: Sequence[float]) -> str
     unit = study["quantities"][name]["unit"]
     lines = [f"| {name} to | " + " | ".join(words for words, _ in _AMONG) + " |", "|---" * (1 + len(_AMONG)) + "|"]
     for tolerance in tolerances:
-        cells = [f"{short(tolerance)} {unit}"]
+        cells = [f"{number(tolerance)} {unit}"]
         for _, levels in _AMONG:
             choice = recommend(study, Wish(name, Tolerance(tolerance, False, unit), levels=levels))["choice"]
             cells.append(_cell(choice) if choice else "none")
@@ -58,4 +57,4 @@ def cheapest_table(study: Mapping[str, Any], tolerances: Sequence[float]) -> str
 
 
 def _cell(choice: Mapping[str, Any]) -> str:
-    return f"{name_of(choice)}, {step_of(choice)}: {short(choice['seconds_per_second'])} s/s"
+    return f"{name_of(choice)}, {step_of(choice)}: {number(choice['seconds_per_second'])} s/s"

@@ -105,11 +105,11 @@ def _explained(found: Mapping[str, Any] | None, symbols: Mapping[str, str]) -> s
     return f"{symbols[found['number']]} {number(found['low'])}…{number(found['high'])}"
 
 
-def silent_lines(study: Mapping[str, Any], count: int = 8) -> Iterator[str]:
-    """The worst silent cases as sentences, one for each engine, formulation, setting and axis."""
+def silent_lines(study: Mapping[str, Any]) -> Iterator[str]:
+    """The eight worst silent cases as sentences, one for each engine, formulation, setting and axis."""
     seen: set[tuple[str, str]] = set()
     for point in silent_ranking(study):
-        if (point["curve"], point["axis"]) in seen or len(seen) >= count:
+        if (point["curve"], point["axis"]) in seen or len(seen) >= 8:
             continue
         seen.add((point["curve"], point["axis"]))
         side = point["sides"][point["boundary"]]

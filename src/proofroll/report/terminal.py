@@ -9,7 +9,7 @@ from rich.table import Table
 from rich.text import Text
 
 from proofroll.core.verdict import Verdict
-from proofroll.report.labels import SYMBOLS, caveat_lines, headlines, names, verdict_text
+from proofroll.report.labels import SYMBOLS, caveat_lines, headlines, names, number, verdict_text
 from proofroll.report.screen import Screen
 from proofroll.report.study_parts import further, part_kinds
 from proofroll.studies.hosts import said_of
@@ -37,11 +37,6 @@ def console() -> Screen:
     elif not os.environ.get("COLUMNS", "").isdecimal():  # else rich has read it
         out.width = WIDTH
     return out
-
-
-def number(value: float | None, digits: int = 2) -> str:
-    """A number in few characters, a dash for none."""
-    return "–" if value is None else f"{value:.{digits}g}"
 
 
 def verdict_table(content: dict[str, Any]) -> Table:

@@ -7,6 +7,7 @@ from dataclasses import replace
 
 import numpy as np
 
+from proofroll.core.arrays import largest_difference
 from proofroll.files.netcdf import read
 from proofroll.running.case import Status
 from proofroll.running.runner import Runner
@@ -42,7 +43,5 @@ def _measured(point: CurvePoint, reference: Reference, runner: Runner) -> CurveP
     errors, bars = {}, {}
     for name, curve in curves.items():
         true, bar = reference.true(name, curve)
-        same = curve.shape == true.shape
-        error = float(np.max(np.abs(curve - true), initial=0.0)) if same else np.inf
-        errors[name], bars[name] = error if np.isfinite(error) else np.inf, bar
+        errors[name], bars[name] = largest_difference(curve, true), bar
     return replace(point, curves=curves, errors=errors, bars=bars)

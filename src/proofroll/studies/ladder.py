@@ -8,9 +8,7 @@ from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
 
-import numpy as np
-
-from proofroll.core.arrays import FloatArray
+from proofroll.core.arrays import FloatArray, largest_difference
 from proofroll.core.dataset import observe
 from proofroll.core.errors import InputError, ProofrollError, Refused
 from proofroll.core.observable import Role
@@ -184,7 +182,7 @@ class Ladder:
     def error(self, model: LadderModel, point: dict[str, float]) -> float | None:
         """Largest distance from the truth of the scene with these parameters; None: no answer."""
         values = self.answers[key_of(model)].values
-        return None if values is None else distance(values, self.truths[str(point)].values)
+        return None if values is None else largest_difference(values, self.truths[str(point)].values)
 
     def _time(self, progress: Callable[[str], None]) -> None:
         timed = {key: answer.case for key, answer in self.answers.items() if answer.values is not None}
@@ -212,11 +210,3 @@ def absence(error: ProofrollError) -> Result:
     if isinstance(error, WorkerDied):
         return Result(error.status, str(error))
     return Result(Status.REFUSED if isinstance(error, InputError) else Status.MISSING, str(error))
-
-
-def distance(one: FloatArray, other: FloatArray) -> float:
-    """Largest difference of two curves; inf where they cannot be compared."""
-    if one.shape != other.shape:
-        return math.inf
-    distance = float(np.max(np.abs(one - other), initial=0.0))
-    return distance if math.isfinite(distance) else math.inf

@@ -19,7 +19,6 @@ COMPOSED = 1e-9
 # Least angular acceleration over the natural one, to which differences are relative: a pose may have none.
 _LEAST = 1e-2
 _COMPOSED = "composed along the tree by the engine's own arithmetic"
-_CLOSED = "the start closes loops to 1e-12 m, and an engine may close them once more"
 # What a model may soften: quantity -> largest relative difference that any reason explains, and why.
 CAPS: Mapping[str, Regularised] = {
     name: Regularised(1.0, "a loop that is held by a stiff spring pulls by what it is open")

@@ -44,16 +44,6 @@ def depth_first(bodies: Sequence[Body], joints: Sequence[Joint]) -> tuple[Joint,
     return tuple(found)
 
 
-def clusters(joints: Sequence[Joint]) -> dict[str, list[str]]:
-    """Bodies that fixed joints hold together, by the body that leads them (``world``, or the first of its cluster)."""
-    leader = {WORLD: WORLD}
-    found: dict[str, list[str]] = {WORLD: []}
-    for joint in joints:  # sorted: the parent comes first
-        leader[joint.child] = leader[joint.parent] if joint.kind == "fixed" else joint.child
-        found.setdefault(leader[joint.child], []).append(joint.child)
-    return found
-
-
 def check_masses(bodies: Sequence[Body], joints: Sequence[Joint]) -> None:
     """Whatever a joint moves has a mass, if not in the body itself, then in one that it carries.
 

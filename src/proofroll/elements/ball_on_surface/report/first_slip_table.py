@@ -7,7 +7,7 @@ from typing import Any
 from rich.table import Table
 from rich.text import Text
 
-from proofroll.report.terminal import number
+from proofroll.report.labels import number
 
 
 def onset_table(content: dict[str, Any]) -> Table:
