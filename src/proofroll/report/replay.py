@@ -156,7 +156,7 @@ def replay_content(
         said = {"kind": kind, "group": title, "label": point_name(case.parameters) or scene.title, "scene": scene.title}
         cases.append(said | own | {"runs": _told(case, ghosts, own, frames, store), "arrays": drawn.arrays})
         numbers.append(packed(bytes(drawn.content)))
-    plainest = [load_scene(case.scene).digest == case.scene_digest for case, _ in found.values()]
+    plainest = [load_scene(case.scene, asks=case.asks).digest == case.scene_digest for case, _ in found.values()]
     start = plainest.index(True) if any(plainest) else 0
     return {"library": three(), "speeds": SPEEDS, "start": start, "cases": cases, "packed": numbers}
 

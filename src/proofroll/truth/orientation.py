@@ -12,7 +12,6 @@ import numpy as np
 from scipy.spatial.transform import Rotation
 
 from proofroll.core.arrays import FloatArray
-from proofroll.elements.ball_on_surface.motion import BallMotion
 from proofroll.truth import collocation
 
 # Turn of the ball within one step [rad], so small that a step's error is that of the spin itself.
@@ -24,26 +23,26 @@ Quadrature = tuple[FloatArray, Callable[[FloatArray, FloatArray], FloatArray]]
 
 
 def orientation(
-    motion: Callable[[FloatArray], BallMotion], times: FloatArray, kinks: Iterable[float], quadrature: Quadrature
+    spin: Callable[[FloatArray], FloatArray], times: FloatArray, kinks: Iterable[float], quadrature: Quadrature
 ) -> FloatArray:
     """q_WB at rising times [s], scalar first, continuous, shape (n, 4).
 
     Args:
-        motion: at rising times [s].
+        spin: w_WB [rad/s] at rising times [s], shape (n, 3).
         times: from 0 on.
         kinks: times at which the spin is not smooth [s].
         quadrature: :data:`QUATERNIONS` or :data:`MATRICES`.
     """
     nodes, turns = quadrature
     knots = np.union1d(np.append(times, 0.0), [time for time in kinks if 0 < time < times[-1]])
-    fastest = float(np.max(np.linalg.norm(motion(knots).w_WB, axis=-1)))
+    fastest = float(np.max(np.linalg.norm(spin(knots), axis=-1)))
     parts = np.maximum(np.ceil(np.diff(knots) * fastest / _TURN), 1).astype(int)
     h = np.repeat(np.diff(knots) / parts, parts)
     starts = np.repeat(knots[:-1], parts) + h * (np.arange(len(h)) - np.repeat(np.cumsum(parts) - parts, parts))
     q = [_IDENTITY]
     if len(h):
-        spin = motion((starts[:, None] + h[:, None] * nodes).ravel()).w_WB.reshape(len(h), len(nodes), 3)
-        for step in turns(h, spin):
+        at_nodes = spin((starts[:, None] + h[:, None] * nodes).ravel()).reshape(len(h), len(nodes), 3)
+        for step in turns(h, at_nodes):
             q.append(_left(step) @ q[-1])
     ends = np.concatenate([[0], np.cumsum(parts)])[np.searchsorted(knots, times)]
     return np.asarray(np.array(q)[ends])

@@ -108,7 +108,7 @@ def _dataset(scene: Scene, times: FloatArray, path: Path[FloatArray], route: str
     motion, sticking = path.motion(times, route)
     q_WB = None
     if BallCapability.ORIENTATION in scene.requires:
-        q_WB = orientation(lambda at: path.motion(at, route)[0], times, [leg.end for leg in path.legs], quadrature)
+        q_WB = orientation(lambda at: path.motion(at, route)[0].w_WB, times, [leg.end for leg in path.legs], quadrature)
     body = rolling_ball(scene)
     result = variables(body, times, motion.p_WB, motion.v_WB, motion.w_WB, force=motion.force, q_WB=q_WB)
     attributes = {"units": "1", "long_name": "whether the ball sticks (rolls without slip)"}

@@ -45,14 +45,23 @@ def unreduced(body: RollingBall, times: FloatArray) -> BallMotion:
     Raises:
         Diverged: the series could not be continued.
     """
-    series = _integrator(body, bounded=False)
-    series.time, series.state[:] = float(times[0]), np.concatenate([body.p0, body.v0, body.w0])
-    states = series.propagate_grid(np.asarray(times, dtype=np.float64))[-1] if len(times) > 1 else series.state[None, :]
-    if len(states) < len(times) or not np.all(np.isfinite(states)):
-        raise _stopped(series)
-    p, v, w = (np.array(part) for part in (states[:, :3], states[:, 3:6], states[:, 6:]))
+    p, v, w = (np.array(part) for part in np.split(states(body, times), 3, axis=1))
     force = np.array([newton_euler(body, *x)[2] for x in zip(p, v, w, strict=True)])
     return BallMotion(p, v, w, force, "unreduced Newton-Euler, Taylor series")
+
+
+def states(body: RollingBall, times: FloatArray) -> FloatArray:
+    """p, v and ω at rising times [s], shape (n, 9); without the forces, which take longer than all of it.
+
+    Raises:
+        Diverged: the series could not be continued.
+    """
+    series = _integrator(body, bounded=False)
+    series.time, series.state[:] = float(times[0]), np.concatenate([body.p0, body.v0, body.w0])
+    found = series.propagate_grid(np.asarray(times, dtype=np.float64))[-1] if len(times) > 1 else series.state[None, :]
+    if len(found) < len(times) or not np.all(np.isfinite(found)):
+        raise _stopped(series)
+    return np.array(found)
 
 
 def until_slip(

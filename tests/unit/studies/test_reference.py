@@ -8,10 +8,14 @@ import numpy as np
 
 from proofroll.core.engine_abilities import SharesEquations
 from proofroll.core.truth import truth
+from proofroll.elements.ball_on_surface.element import rolling_ball
 from proofroll.engines.reduced import Reduced
 from proofroll.files.scene_file import load_scene
 from proofroll.running.identity import resolve
 from proofroll.studies.reference import Reference
+from proofroll.truth.polar import Polar
+from proofroll.truth.rolling import reduced
+from proofroll.truth.taylor import SlidingTaylor
 
 
 def reference(**curves: list[float]) -> Reference:
@@ -39,15 +43,22 @@ def against(formulation: str, **parameters: float) -> str:
 
 def test_who_rests_on_a_route_of_the_truth_is_told() -> None:
     """The least model shares the route that the truth takes in this case, or not, and the other route is named."""
-    said = against("equations", rolling_resistance=5e-4)
-    assert said.startswith(
-        "rests on the same equations as the truth itself (reduced equations, DOP853): only unreduced"
-    )
+    for bound in ({}, {"mu_static": 0.35}):
+        said = against("equations", rolling_resistance=5e-4, **bound)
+        assert said.startswith("rests on the same equations as the truth itself (local frame with direction of slip")
+        assert said.endswith(": only world frame by signed distance, implicit collocation checks both")
     assert against("closed_form").startswith(
         "rests on the same equations as the truth itself (closed form (Blajer 2006))"
     )
     assert against("equations") == "", "here the truth is the closed form"
     assert against("closed_form", rolling_resistance=5e-4) == ""
+
+
+def test_declared_routes_are_those_of_the_truth() -> None:
+    """A route that shares the least model's equations is named as it names itself, so that renaming cannot hide it."""
+    body = rolling_ball(load_scene("sphere_in_cylinder", rolling_resistance=5e-4))
+    names = {SlidingTaylor.name, Polar.name, reduced(body, np.zeros(1)).route}
+    assert {name.partition(",")[0] for name in names} == set(Reduced.shares["equations"])
 
 
 def test_routes_are_declared_for_formulations_that_there_are() -> None:

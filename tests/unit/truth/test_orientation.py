@@ -12,17 +12,16 @@ from scipy.spatial.transform import Rotation
 from proofroll import load_scene, simulate
 from proofroll.core.arrays import FloatArray
 from proofroll.core.truth import truth
-from proofroll.elements.ball_on_surface.motion import BallMotion
 from proofroll.truth.orientation import MATRICES, QUATERNIONS, orientation
 
 ASKED = {"asks": ("orientation",)}
 
 
-def precessing(times: FloatArray) -> BallMotion:
-    """A ball that turns by 160 rad/s about an axis that itself turns by 20 rad/s about z, leaning by 0.7 rad."""
+def precessing(times: FloatArray) -> FloatArray:
+    """Spin of 160 rad/s about an axis that itself turns by 20 rad/s about z, leaning by 0.7 rad."""
     angle = 20 * times
-    w = 160 * np.stack([np.sin(0.7) * np.cos(angle), np.sin(0.7) * np.sin(angle), np.full_like(times, np.cos(0.7))], -1)
-    return BallMotion(np.zeros_like(w), np.zeros_like(w), w, np.zeros_like(w), "")
+    across, up = np.sin(0.7), np.full_like(times, np.cos(0.7))
+    return np.asarray(160 * np.stack([across * np.cos(angle), across * np.sin(angle), up], -1))
 
 
 @pytest.mark.parametrize("quadrature", [QUATERNIONS, MATRICES])
@@ -71,9 +70,8 @@ def test_what_nobody_asks_for_is_not_there() -> None:
 def test_kinks_are_not_stepped_over() -> None:
     """A spin that slows and stops is integrated to its stop and from there."""
 
-    def stopping(times: FloatArray) -> BallMotion:
-        w = np.maximum(60 * (0.3 - times), 0.0)[:, None] * [0, 0, 1.0]
-        return BallMotion(w, w, w, w, "")
+    def stopping(times: FloatArray) -> FloatArray:
+        return np.asarray(np.maximum(60 * (0.3 - times), 0.0)[:, None] * [0, 0, 1.0])
 
     for quadrature in (QUATERNIONS, MATRICES):
         q = orientation(stopping, np.array([0.0, 1.0]), [0.3], quadrature)

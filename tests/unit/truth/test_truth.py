@@ -211,8 +211,11 @@ def test_routes_are_named(times: np.ndarray) -> None:
     """The truth says how it was found and by what it was checked."""
     assert "closed form" in truth(load_scene("inclined_plane"), times[:3]).attrs["route"]
     resisting = truth(load_scene("inclined_plane", rolling_resistance=1e-4), times[:3])
-    assert "reduced" in resisting.attrs["route"]
-    assert "unreduced" in resisting.attrs["second_route"]
+    assert "surface coordinates" in resisting.attrs["route"]
+    assert "world frame" in resisting.attrs["second_route"]
+    swinging = truth(load_scene("bowl"), times[:3])
+    assert "reduced" in swinging.attrs["route"]
+    assert "unreduced" in swinging.attrs["second_route"]
 
 
 def test_samples_do_not_change_the_truth() -> None:

@@ -41,7 +41,11 @@ class Reduced:
     presets: ClassVar[Mapping[str, Mapping[str, ReducedSettings]]] = PRESETS
     levels: ClassVar[Mapping[str, Level]] = {"equations": Level.REDUCED, "closed_form": Level.CLOSED_FORM}
     shares: ClassVar[Mapping[str, Sequence[str]]] = {
-        "equations": ("reduced equations",),
+        "equations": (
+            "reduced equations",
+            "surface coordinates with direction of slip",
+            "local frame with direction of slip",
+        ),
         "closed_form": ("closed form",),
     }
     terms: ClassVar[Sequence[Term]] = ()  # the least model has nothing left to switch off

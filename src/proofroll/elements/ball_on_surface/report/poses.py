@@ -58,15 +58,13 @@ class Poses:
     state: npt.NDArray[np.uint8] | None
 
 
-def poses(body: RollingBall, sampled: Sampled, times: FloatArray, *, integrate: bool = False) -> Poses:
+def poses(body: RollingBall, sampled: Sampled, times: FloatArray) -> Poses:
     """The ball of a trajectory at the frames that it reaches.
 
     Args:
         body: the scene's ball.
         sampled: its samples: the variables :data:`NEEDED`, those that it has.
         times: of the frames [s], rising from 0.
-        integrate: for a trajectory without orientation, take the one that follows from the spin, the identity at
-            time 0; otherwise it has none.
     """
     from scipy.interpolate import CubicHermiteSpline
 
@@ -85,7 +83,7 @@ def poses(body: RollingBall, sampled: Sampled, times: FloatArray, *, integrate: 
     return Poses(
         time=times,
         p_WB=p_WB,
-        q_WB=_orientation(body.surface, sampled, times, integrate),
+        q_WB=_orientation(body.surface, sampled, times),
         contact=p_WB + (body.ball.radius + body.surface.gap(p_WB))[:, None] * normal,
         normal=normal,
         press=press,
@@ -104,9 +102,9 @@ def _state(sampled: Sampled, times: FloatArray) -> npt.NDArray[np.uint8] | None:
     return state
 
 
-def _orientation(surface: Surface, sampled: Sampled, times: FloatArray, integrate: bool) -> FloatArray | None:
+def _orientation(surface: Surface, sampled: Sampled, times: FloatArray) -> FloatArray | None:
     if "q_WB" not in sampled:
-        return _turned(surface, sampled, times) if integrate and times.size > 1 else None
+        return None
     grid, stored = sampled["time"], sampled["q_WB"]
     if times.size < 2:
         return np.asarray(stored[:1])

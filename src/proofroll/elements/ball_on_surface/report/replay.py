@@ -40,7 +40,7 @@ def drawn(replayed: Replayed) -> tuple[dict[str, Any], list[int], PackedNumbers]
     coordinates = body.surface.coordinates
     sampled = read_some(replayed.file, [*NEEDED, *coordinates])
     times = frame_times(float(sampled["time"][-1]), float(np.linalg.norm(sampled["w_WB"], axis=1).max()))
-    true = poses(body, sampled, times, integrate=True)
+    true = poses(body, sampled, times)
     ghosts = [
         _reachable(poses(body, read_some(ghost.file, list(NEEDED)), times), true, body) for ghost in replayed.ghosts
     ]
