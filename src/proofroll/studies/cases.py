@@ -21,7 +21,7 @@ def case_of(
         engine: with complete settings.
         until: last time [s].
         every: sampling interval [s].
-        **others: fields of :class:`proofroll.running.case.Case` that have defaults.
+        **others: fields of :class:`proofroll.running.case.Case` that have defaults, but what the scene says itself.
     """
     parameters = {parameter: scene.parameters[parameter] for parameter in given}
-    return Case(name, parameters, scene.digest, engine, until, every, **others)
+    return Case(name, parameters, scene.digest, engine, until, every, asks=scene.asks, **others)

@@ -146,8 +146,7 @@ class Ladder:
     def _case(self, facts: EngineFacts, model: LadderModel) -> Case:
         parameters = self._given | dict(model.parameters)
         scene = load_scene(self._name, asks=model.asks, **parameters)
-        limits = {"time_limit": _TIME_LIMIT, "asks": model.asks}
-        return case_of(self._name, scene, parameters, facts, self.until, _EVERY, **limits)
+        return case_of(self._name, scene, parameters, facts, self.until, _EVERY, time_limit=_TIME_LIMIT)
 
     def _run_truths(self, wanted: Sequence[dict[str, float]], progress: Callable[[str], None]) -> None:
         wanted = [point for point in wanted if str(point) not in self.truths]

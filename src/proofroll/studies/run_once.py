@@ -45,4 +45,4 @@ def single_case(
         raise facts
     if every is None:
         every = sampling_interval(facts.settings["dt"] if facts.resolution == "dt" else None)
-    return case_of(scene, loaded, parameters, facts, until, every, time_limit=time_limit, asks=tuple(asks))
+    return case_of(scene, loaded, parameters, facts, until, every, time_limit=time_limit)

@@ -1,4 +1,4 @@
-"""What is refused of a comparison before anything of it runs."""
+"""What a comparison asks of truths and engines, and what is refused of it before anything runs."""
 
 from __future__ import annotations
 
@@ -24,3 +24,10 @@ def test_a_wrong_setting_is_found_before_anything_runs(monkeypatch: pytest.Monke
     said = r"stick_slip\.toml: rows\.1\.engine = 'projection\[step=1\]'.*no such setting"
     with pytest.raises(InputError, match=said):
         planning.plan(dataclasses.replace(comparison, rows=rows))
+
+
+def test_the_truth_gives_all_that_can_be_asked_for() -> None:
+    """Of the truth everything is asked, so that a replay need invent nothing; of engines only what the scene asks."""
+    found = planning.plan(load_comparison("inclined_plane"), ["projection"])
+    assert {case.asks for case in found.truths.values()} == {("orientation",)}
+    assert {case.asks for run in found.runs for case in run.ladder.values()} == {()}
