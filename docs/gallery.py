@@ -2,8 +2,10 @@
 
 from __future__ import annotations
 
+import dataclasses
 import sys
 from pathlib import Path
+from typing import Any
 
 from proofroll.core.comparison import Comparison
 from proofroll.files.comparison_file import load_comparison
@@ -40,13 +42,21 @@ all points of the parameters; what the words mean: [read a verdict](read_a_verdi
 
 
 def comparisons() -> dict[str, Comparison]:
-    """The first comparison of each scene that has one."""
+    """The first comparison of each scene that has one, in the order of a report; nothing is timed here."""
+    files = [path for path in sorted(data_folder("comparisons").rglob("*.toml")) if study_of(path) is None]
     found: dict[str, Comparison] = {}
-    for path in sorted(data_folder("comparisons").rglob("*.toml")):
-        if study_of(path) is None:
-            comparison = load_comparison(str(path)).briefly()
-            found.setdefault(comparison.scene, comparison)
+    for comparison in sorted((load_comparison(str(path)) for path in files), key=lambda item: item.order):
+        found.setdefault(comparison.scene, dataclasses.replace(comparison.briefly(), timed=False))
     return found
+
+
+def failures(content: dict[str, Any]) -> str:
+    """Why rows have no result, a line each."""
+    return "".join(
+        f"- {row['name']} {row['formulation']} {row['setting']} failed, {row['reason']}.\n"
+        for row in content["rows"]
+        if row["verdict"] == "failed"
+    )
 
 
 def picture(scene: str) -> str:
@@ -91,7 +101,7 @@ def section(scene: str, comparison: Comparison | None, runner: Runner) -> str:
     parts += [f"**Asked** ({path}): {comparison.question}\n", f"**True**: {truth(outcome, runner)}\n"]
     # Without costs, which are measured in turns where that is asked.
     table = "".join(line.rstrip("\n").rsplit("|", 2)[0] + "|\n" for line in verdict_table(content).splitlines())
-    parts += [table, caveat_list(content)]
+    parts += [table, failures(content) + caveat_list(content)]
     return "\n".join(part for part in parts if part)
 
 
