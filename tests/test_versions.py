@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 import re
+import socket
 import tomllib
 from collections.abc import Callable
 from pathlib import Path
@@ -88,11 +89,13 @@ def test_what_changed_is_shown(versions: Callable[..., tuple[int, str, str]], tm
     assert table(found).row_count == 2
 
 
+@pytest.mark.xdist_group("cluster")
 def test_versions_that_do_the_same(versions: Callable[..., tuple[int, str, str]]) -> None:
-    """The same bits are said to be the same, within 80 columns, and nothing is exit code 0."""
-    code, out, err = versions("2.0", "2.0.1", "--rounds", "0")
+    """The same bits are said to be the same, on a cluster as at home, within 80 columns, and nothing is exit code 0."""
+    code, out, err = versions("2.0", "2.0.1", "--rounds", "0", "--scheduler", "local:1")
     assert code == 0, err
     assert "2 cases: 2 with the same bits; no verdict changed." in out
+    assert f"Made on machines of a cluster: 4 on {socket.gethostname()}." in " ".join(out.split())
     assert max(map(len, out.splitlines()[:-1])) <= 80
 
 

@@ -12,6 +12,7 @@ from typing import Annotated, Any
 import typer
 
 import proofroll
+from proofroll.cli.cite import cite
 from proofroll.cli.comparing import compare
 from proofroll.cli.engines import engines
 from proofroll.cli.export import export
@@ -37,7 +38,7 @@ app = typer.Typer(
     rich_markup_mode=None,
 )
 _STUDIES = (compare, report, tradeoff, recommend, ladder, stability, versions)
-for _command in (scenes, run, judge, plot, export, findings, *_STUDIES):
+for _command in (scenes, run, judge, plot, export, findings, cite, *_STUDIES):
     app.command()(_command)
 app.add_typer(new, name="new")
 app.add_typer(engines, name="engines")

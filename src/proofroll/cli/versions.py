@@ -20,6 +20,7 @@ from proofroll.cli.options import (
     Jobs,
     Json,
     Out,
+    Scheduler,
     complain,
     new_runner,
     progress_bar,
@@ -43,16 +44,20 @@ def versions(
     out: Out = Path("out"),
     fresh: Fresh = False,
     jobs: Jobs = None,
+    scheduler: Scheduler = None,
     as_json: Json = False,
 ) -> None:
     """Run the same cases in two versions of an engine and show what changed; exit 1 if a verdict did.
 
-    Environments that are missing are made, as by `proofroll engines add`. Speed never decides the exit code.
+    Environments that are missing are made, as by `proofroll engines add`; workers of a cluster need their own. Speed is
+    measured here, and never decides the exit code.
     """
     from proofroll.report.versions_content import heading, lines, page, robot_table, table
 
     readers = {point.name: point for point in entry_points(group=SUBJECTS)}
     robot = readers.get(Path(subject).suffix.removeprefix("."))
+    if robot is not None and scheduler is not None:
+        raise InputError("--scheduler", scheduler, "a robot file is checked here; leave the option out")
     if robot is None:
         from proofroll.studies.version_subjects import comparisons_about
 
@@ -66,7 +71,7 @@ def versions(
     else:
         from proofroll.studies.versions import compared
 
-        runner = new_runner(out, fresh, jobs)
+        runner = new_runner(out, fresh, jobs, scheduler)
         with progress_bar("cases") as advance:
             content = compared(sides, comparisons, runner, rounds, advance)
     _keep(content, page(content), out)

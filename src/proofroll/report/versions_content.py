@@ -9,6 +9,7 @@ from rich.table import Table
 from rich.text import Text
 
 from proofroll.report.labels import SYMBOLS, number
+from proofroll.studies.hosts import said_of
 
 _MOST = 12  # sentences of a kind on the terminal; the JSON document has all
 
@@ -120,6 +121,7 @@ def lines(content: Mapping[str, Any], most: int | None = _MOST) -> Iterator[str]
     ]
     yield from _some(defaults, most)
     yield from (f"?? {sentence}" for sentence in content["lost"])
+    yield from said_of(content["hosts"])
     yield answer(content)
 
 

@@ -43,6 +43,7 @@ def between(file: str, old: str, new: str) -> dict[str, Any]:
         "rows": [],
         "cases": [],
         "defaults": [],
+        "hosts": {},
         "robot": {"file": file, "layers": layers, "old": rows[0], "new": rows[1]},
         "changed": changed,
         "lost": [f"{row['engine']}: {row['refused']}" for row in rows if row["status"] == "missing"],

@@ -26,6 +26,7 @@ from typing import Any, TypeVar
 from proofroll.core.errors import InputError, Missing, ProofrollError
 from proofroll.files.data_folders import data_folder
 from proofroll.files.scene_file import scene_folder
+from proofroll.files.scene_sources import source_of
 from proofroll.running import cluster_task
 from proofroll.running.case import Case, Result, Status
 from proofroll.running.memory import VARIABLE, memory_limit
@@ -44,6 +45,7 @@ _PATIENCE = 10.0
 Item = TypeVar("Item")
 Found = TypeVar("Found")
 Make = Callable[[Path], Result]
+Arrived = Callable[[Case, Make], object]
 
 
 class Cluster:
@@ -66,7 +68,7 @@ class Cluster:
         self._client, own = _connected(address)
         self._close = weakref.finalize(self, _end, self._client, own, self._asked.command)
         self._room = threading.Condition()
-        self._sent: dict[Any, Case] = {}
+        self._sent: dict[Any, tuple[Case, Arrived]] = {}
         self._threads, self._counted = 0, -_COUNTED
         self._stopped = False
 
@@ -79,7 +81,7 @@ class Cluster:
     def serve(
         self,
         take: Callable[[str | None], Case | None],
-        arrived: Callable[[Case, Make], object],
+        arrived: Arrived,
         failed: Callable[[Exception], None],
     ) -> None:
         """Runs cases until there are none, for a runner.
@@ -97,8 +99,8 @@ class Cluster:
                 content = dataclasses.asdict(case) | {"timed": False}
                 future = self._submit(self._task, (content, _files(case)), case.key)
                 with self._room:
-                    self._sent[future] = case
-                future.add_done_callback(partial(self._come, arrived, failed))
+                    self._sent[future] = case, arrived
+                future.add_done_callback(partial(self._come, failed))
         except Exception as error:
             failed(self._gone(error))
 
@@ -164,25 +166,38 @@ class Cluster:
             self._threads, self._counted = sum(self._client.nthreads().values()), time.monotonic()
         return _AHEAD * self._threads + _AT_LEAST
 
-    def _come(self, arrived: Callable[[Case, Make], object], failed: Callable[[Exception], None], future: Any) -> None:
-        """Takes back what a worker sent, with whatever else has come by now: to fetch one costs as much as many."""
+    def _come(self, failed: Callable[[Exception], None], future: Any) -> None:
+        """Takes back what a worker sent, with whatever else has come by now: to fetch one costs as much as many.
+
+        Each goes to the run that sent it: a run may be over when Dask tells of the last that was fetched with others.
+        """
         with self._room:
+            if future not in self._sent:  # it has been fetched with others
+                return
             done = [item for item in self._sent if item.status == "finished"][:_TOGETHER]
-            done = done if future in done or future not in self._sent else [future]
-            cases = [self._sent.pop(item) for item in done]
+            done = done if future in done else [future]
+            sent = [(item, *self._sent.pop(item)) for item in done]
             self._room.notify()
+        self._fetch(sent, failed)
+
+    def _fetch(self, sent: Sequence[tuple[Any, Case, Arrived]], failed: Callable[[Exception], None]) -> None:
+        """Hands each case, with what a worker sent for it, to the run that it is of."""
         try:
-            found = self._client.gather(done)
+            found = self._client.gather([future for future, _, _ in sent])
         except Exception as error:
             from distributed.scheduler import KilledWorker
 
             if not isinstance(error, KilledWorker):
                 failed(self._gone(error))
-                return
-            said = f"each of {error.allowed_failures + 1} workers of the cluster that ran it was lost"
-            arrived(cases[0], lambda _: _raise(WorkerDied(Status.CRASHED, said)))
+            elif len(sent) > 1:  # of which one was lost meanwhile, and its workers again and again
+                for one in sent:
+                    self._fetch([one], failed)
+            else:
+                said = f"each of {error.allowed_failures + 1} workers of the cluster that ran it was lost"
+                ((_, case, arrived),) = sent
+                arrived(case, lambda _: _raise(WorkerDied(Status.CRASHED, said)))
             return
-        for case, (content, data) in zip(cases, found, strict=True):
+        for (_, case, arrived), (content, data) in zip(sent, found, strict=True):
             arrived(case, partial(_made, content, data))
 
     def _gone(self, error: Exception | None) -> ProofrollError:
@@ -209,7 +224,9 @@ def _made(content: dict[str, Any], data: bytes | None, path: Path) -> Result:
 
 
 def _files(case: Case) -> dict[str, bytes]:
-    """What is in the folder of a scene of the user's own, which no other machine need have."""
+    """What is in the folder of a scene of the user's own, or its robot file, which no other machine need have."""
+    if (source := source_of(case.scene)) is not None:
+        return {source[1].name: source[1].read_bytes()}
     folder = scene_folder(case.scene) if case.scene else Path()
     if folder.parent == data_folder("models"):
         return {}

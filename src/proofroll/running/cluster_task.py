@@ -84,7 +84,7 @@ def run_case(asked: Asked, content: dict[str, Any], files: Mapping[str, bytes]) 
     Args:
         asked: what the command wants of this place.
         content: of the case.
-        files: of the scene's folder, by name, where the scene does not come with proofroll.
+        files: of the scene's folder, by name, or the file that is the scene, where it does not come with proofroll.
 
     Raises:
         Unfit: results here are not those of the command's own machine.
@@ -93,11 +93,12 @@ def run_case(asked: Asked, content: dict[str, Any], files: Mapping[str, bytes]) 
     with tempfile.TemporaryDirectory() as name:
         place = Path(name)
         if files:
-            folder = place / Path(case.scene).name
-            folder.mkdir()
+            scene = place / Path(case.scene).name
+            if scene.name not in files:  # a folder, and not the file of a robot
+                scene.mkdir()
             for file, text in files.items():
-                (folder / file).write_bytes(text)
-            case = dataclasses.replace(case, scene=str(folder))
+                (scene / file if scene.is_dir() else scene).write_bytes(text)
+            case = dataclasses.replace(case, scene=str(scene))
         workers = _workers_of(asked)
         _check(asked, case, workers)
         out = place / "run.nc"

@@ -22,6 +22,7 @@ from proofroll.running.runner import Runner
 from proofroll.running.stopwatch import Stopwatch
 from proofroll.running.timing import interleaved, ratio
 from proofroll.studies.compare import evaluate
+from proofroll.studies.hosts import hosts
 from proofroll.studies.outcome import Run
 from proofroll.studies.planning import Plan, plan, point_name
 
@@ -78,6 +79,7 @@ def compared(
         "rows": _rows(told_cases, speeds),
         "cases": told_cases,
         "defaults": _defaults(*told),
+        "hosts": hosts(run.result for _, *pair in found for run in pair),
         "robot": None,
         "changed": [sentence for case in told_cases for sentence in case["changed"]],
         "lost": [

@@ -7,7 +7,7 @@ import sys
 
 import typer
 
-from proofroll.cli.options import CONTRADICTED, OK, Json, progress_bar, write_json
+from proofroll.cli.options import CONTRADICTED, OK, Json, Scheduler, new_cluster, progress_bar, write_json
 
 drill = typer.Typer(help="Do on purpose what must not break anything.", rich_markup_mode=None)
 
@@ -43,7 +43,7 @@ def faults(as_json: Json = False) -> None:
 
 
 @drill.command()
-def mutants(as_json: Json = False) -> None:
+def mutants(scheduler: Scheduler = None, as_json: Json = False) -> None:
     """Run engines with one planted fault each; exit 1 unless all are detected and nine of ten named."""
     import dataclasses
 
@@ -51,7 +51,7 @@ def mutants(as_json: Json = False) -> None:
     from proofroll_drill.mutants.drilling import mutants as all_mutants
 
     with progress_bar("mutants", total=len(all_mutants())) as advance:
-        rows = list(mutant_drill(advance))
+        rows = list(mutant_drill(advance, new_cluster(scheduler)))
     detected, named = sum(row.detected for row in rows), sum(row.named for row in rows)
     if as_json:
         content = [dataclasses.asdict(row) for row in rows]

@@ -19,18 +19,20 @@ from pathlib import Path
 import numpy as np
 import pytest
 from hostile import ENTRY_POINTS
+from robot_templates import urdf
 
 from proofroll.core.errors import InputError, ProofrollError
 from proofroll.elements.ball_on_surface.regimes_study import regime_map
 from proofroll.files.data_folders import data_folder
 from proofroll.files.netcdf import read
 from proofroll.files.scene_file import load_scene
-from proofroll.running.case import Case, Status
+from proofroll.running.case import Case, EngineFacts, Status
 from proofroll.running.cluster import Cluster
 from proofroll.running.runner import Runner
 from proofroll.running.store import Store
 from proofroll.running.worker_pool import Workers
 from proofroll.studies.run_once import single_case
+from proofroll_benchmarks.cluster import idle
 
 HOST = socket.gethostname()
 ASKED = Workers()
@@ -162,7 +164,10 @@ def test_results_are_those_of_home(dask: DaskCluster, tmp_path: Path, room: Path
     """One worker, two, and one that is lost in the middle give what home gives, stored once, but for speeds."""
     shutil.copytree(data_folder("models") / "inclined_plane", tmp_path / "mine" / "my_plane")
     own = str(tmp_path / "mine" / "my_plane")
+    robot = tmp_path / "arm.urdf"
+    robot.write_text(urdf(), encoding="utf-8")
     some = [case("oracle"), case("exits"), case("truth"), case("oracle", 1.5, own)]
+    some += [single_case(str(robot), {}, "truth", until=0.02, every=0.01, time_limit=60.0, workers=ASKED)]
     waiting = [case("waiting", speed) for speed in (3.0, 3.5)]
     home, away = Store(tmp_path / "home"), Store(tmp_path / "away")
 
@@ -202,6 +207,16 @@ def test_results_are_those_of_home(dask: DaskCluster, tmp_path: Path, room: Path
     one, other = grid(), grid(cluster=cluster)
     assert other.equals(one)
     assert (one.attrs["ran_on"], other.attrs["ran_on"]) == ("", HOST)
+
+
+def test_runs_one_after_another(dask: DaskCluster, tmp_path: Path) -> None:
+    """Each run has its own results, though Dask tells of the last of a run when the next has begun."""
+    dask.one_worker()
+    runner = Runner(Store(tmp_path / "store"), cluster=Cluster(dask.address, idle))
+    facts = EngineFacts("idle", "1", "none", {"seconds": 0.0})
+    for number in range(4):
+        cases = [Case("", {"speed": 100.0 * number + item}, "none", facts, 1.0, 0.1) for item in range(40)]
+        assert runner.run(cases).keys() == {case.key for case in cases}
 
 
 def test_a_scheduler_that_ends(dask: DaskCluster, tmp_path: Path, room: Path) -> None:

@@ -8,7 +8,7 @@ import inspect
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass
 from types import ModuleType
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
@@ -24,6 +24,9 @@ from proofroll.running.recording import record
 from proofroll.studies.reference import Reference
 from proofroll_drill.mutants import ball_models, ball_samples, mechanism_models, mechanism_samples
 from proofroll_drill.mutants.base import STEP, Mutant
+
+if TYPE_CHECKING:
+    from proofroll.running.cluster import Cluster
 
 MODULES: tuple[ModuleType, ...] = (ball_models, ball_samples, mechanism_models, mechanism_samples)
 # Tolerance of every observable, relative to its size: the projection method at this step is right to 1e-8.
@@ -44,6 +47,7 @@ class Mutated:
         by: what showed it.
         named: whether the diagnosis says the cause.
         said: what the diagnosis says; empty if nothing.
+        ran_on: name of the machine of a cluster on which it ran; empty: here.
     """
 
     fault: str
@@ -53,6 +57,7 @@ class Mutated:
     by: str
     named: bool
     said: str
+    ran_on: str = ""
 
 
 def mutants() -> list[type[Mutant]]:
@@ -65,11 +70,12 @@ def _names() -> set[str]:
     return {module.__name__ for module in MODULES}
 
 
-def mutant_drill(progress: Callable[[str], None] = lambda _: None) -> Iterator[Mutated]:
-    """Tries every mutant."""
-    for kind in mutants():
-        yield tried(kind)
-        progress(kind.fault)
+def mutant_drill(progress: Callable[[str], None] = lambda _: None, cluster: Cluster | None = None) -> Iterator[Mutated]:
+    """Tries every mutant, here or on a cluster."""
+    kinds = mutants()
+    for host, found in cluster.map(tried, kinds) if cluster else (("", tried(kind)) for kind in kinds):
+        yield dataclasses.replace(found, ran_on=host)
+        progress(found.fault)
 
 
 def tried(kind: type[Mutant]) -> Mutated:

@@ -1,0 +1,40 @@
+"""What to cite for a result."""
+
+from __future__ import annotations
+
+import sys
+from typing import Annotated
+
+import typer
+
+from proofroll.cli.options import Json, write_json
+
+
+def cite(
+    subject: Annotated[
+        list[str] | None,
+        typer.Argument(help="Results (.json of a command, .nc of a run), comparisons, scenes, or engines."),
+    ] = None,
+    bibtex: Annotated[bool, typer.Option("--bibtex", help="Print BibTeX instead of sentences.")] = False,
+    as_json: Json = False,
+) -> None:
+    """Print the references behind a result: engines with their versions, the scene, the truth, and proofroll itself."""
+    from proofroll.report.screen import printable
+    from proofroll.studies.citing import cited, content, sentence
+
+    told = cited(subject or [])
+    if as_json:
+        write_json({"cited": content(told)})
+        return
+    shown: set[str] = set()
+    lines = []
+    for item in told:
+        if bibtex:
+            fresh = [entry for entry in item.references if entry not in shown]
+            shown.update(fresh)
+            lines += [f"% {item.heading}{': ' + item.source if item.source else ''}", *fresh, ""]
+            continue
+        lines += [item.heading, *([f"  {item.source}"] if item.source else [])]
+        lines += [f"  {sentence(entry)}" for entry in item.references]
+        lines += [] if item.references or item.source else ["  no reference is known; see its own documentation"]
+    sys.stdout.write("".join(f"{printable(line) if not bibtex else line}\n" for line in lines))

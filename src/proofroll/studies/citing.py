@@ -1,0 +1,238 @@
+"""The references behind a result: of its engines, its scenes, the truth and proofroll itself.
+
+Each belongs to what it is about: a file ``references.bib`` beside an engine's module, a truth's, or a ``scene.toml``.
+"""
+
+from __future__ import annotations
+
+import dataclasses
+import json
+import re
+from collections.abc import Iterable
+from importlib.machinery import PathFinder
+from importlib.metadata import entry_points
+from importlib.util import find_spec
+from pathlib import Path
+from typing import Any
+
+import proofroll
+from proofroll.core.errors import InputError
+from proofroll.core.plugins import GROUP, engine_names, parse_engine, plain_name
+from proofroll.files.comparison_file import load_comparison
+from proofroll.files.scene_file import is_scene, read_scene_file, scene_folder
+from proofroll.files.toml import named_file
+
+FILE = "references.bib"
+TRUTHS = "proofroll.truths"
+_ENTRY = re.compile(r"^@(\w+)\{\s*([^\s,]+)\s*,\n(.*?)^\}", flags=re.DOTALL | re.MULTILINE)
+_FIELD = re.compile(r"^\s*(\w+)\s*=\s*\{(.*)\},?\s*$", flags=re.MULTILINE)
+
+
+@dataclasses.dataclass(frozen=True)
+class Cited:
+    """One thing that a result rests on, with what to cite for it.
+
+    Attributes:
+        kind: ``suite``, ``truth``, ``engine`` or ``scene``.
+        name: its own.
+        versions: that made the results; of several results there may be several.
+        source: a scene's own words on where it comes from.
+        references: entries of BibTeX; empty where none is known.
+    """
+
+    kind: str
+    name: str
+    versions: list[str] = dataclasses.field(default_factory=list)
+    source: str = ""
+    references: list[str] = dataclasses.field(default_factory=list)
+
+    @property
+    def heading(self) -> str:
+        """What it is, in a few words."""
+        known = f" {', '.join(self.versions)}" if self.versions else ""
+        return f"{self.name}{known}" if self.kind == "suite" else f"{self.kind} {self.name}{known}"
+
+
+class _Met:
+    """What was met in results, in the order in which it was."""
+
+    def __init__(self) -> None:
+        self.engines: dict[str, list[str]] = {}
+        self.scenes: dict[str, None] = {}
+        self.count = 0
+
+    def scene(self, name: str) -> None:
+        self.scenes[name] = None
+        self.count += 1
+
+    def engine(self, name: str, version: object = None) -> None:
+        self.count += 1
+        known = self.engines.setdefault(plain_name(name), [])
+        if version and str(version) not in known:
+            known.append(str(version))
+
+
+def cited(subjects: Iterable[str]) -> list[Cited]:
+    """What is behind results, comparisons, scenes or engines; without any, proofroll and its truths alone.
+
+    Args:
+        subjects: files of results (``.json`` of a command, ``.nc`` of a run), comparisons, scenes, names of engines.
+
+    Raises:
+        InputError: something is none of these.
+    """
+    met = _Met()
+    for subject in subjects:
+        _meet(subject, met)
+    told = [
+        Cited("suite", "proofroll", [proofroll.__version__], references=entries(Path(proofroll.__file__).parent)),
+        Cited("truth", "by two routes", references=_beside(TRUTHS)),
+    ]
+    told += [
+        Cited("engine", name, versions, references=_beside(GROUP, name))
+        for name, versions in met.engines.items()
+        if name != "truth"
+    ]
+    return told + [_scene(name) for name in met.scenes]
+
+
+def _meet(subject: str, met: _Met) -> None:
+    path = Path(subject)
+    if path.suffix in {".json", ".nc"} and path.is_file():
+        before = met.count
+        _walk(_document(path), met)
+        if met.count == before:
+            raise InputError("result", path.name, "it names neither an engine nor a scene; name a file of proofroll's")
+    elif named_file(subject) is None and is_scene(subject):
+        met.scene(subject)
+    elif subject in engine_names():
+        met.engine(subject)
+    else:
+        comparison = load_comparison(subject)
+        met.scene(comparison.scene)
+        for row in comparison.rows:
+            met.engine(parse_engine(row.engine).name)
+
+
+def _document(path: Path) -> object:
+    """What a file of results says of itself.
+
+    Raises:
+        InputError: it cannot be read as its ending says.
+    """
+    from proofroll.files.netcdf import read
+
+    try:
+        if path.suffix == ".json":
+            return json.loads(path.read_text(encoding="utf-8"))
+        said = dict(read(path).attrs)
+        return said | {"versions": json.loads(said.get("versions", "{}"))}
+    except (OSError, ValueError, TypeError) as error:
+        raise InputError("result", path.name, f"this cannot be read ({error})") from None
+
+
+def _walk(content: object, met: _Met) -> None:
+    """Every engine and scene that a document of ours names, wherever it does."""
+    if isinstance(content, list):
+        for item in content:
+            _walk(item, met)
+    if not isinstance(content, dict):
+        return
+    versions = content.get("versions")
+    names = {*engine_names(), "truth"}
+    for name, version in (versions if isinstance(versions, dict) else {}).items():
+        if plain_name(name) in names:
+            met.engine(name, version)
+    for key in ("engine", "name"):
+        name = content.get(key)
+        if isinstance(name, str) and plain_name(name.partition("[")[0]) in names:
+            met.engine(name.partition("[")[0], content.get("version"))
+    scene = content.get("scene")
+    if isinstance(scene, str) and is_scene(scene):
+        met.scene(scene)
+    for item in content.values():
+        _walk(item, met)
+
+
+def _scene(name: str) -> Cited:
+    try:
+        folder = scene_folder(name)
+    except InputError:  # the file of a robot
+        return Cited("scene", name, source=read_scene_file(name).source)
+    return Cited("scene", name, source=read_scene_file(name).source, references=entries(folder))
+
+
+def _beside(group: str, name: str = "") -> list[str]:
+    """Entries beside the modules that entry points name; the modules are not imported, for an engine may be absent."""
+    folders = [_folder(point.module) for point in entry_points(group=group) if not name or point.name == name]
+    return list(dict.fromkeys(entry for folder in folders if folder for entry in entries(folder)))
+
+
+def _folder(module: str) -> Path | None:
+    """Where the nearest ``references.bib`` of a module lies: beside it, or in a package around it."""
+    first, *rest = module.split(".")
+    spec, folders = find_spec(first), []
+    while spec is not None and spec.submodule_search_locations:
+        folders.append(Path(next(iter(spec.submodule_search_locations))))
+        spec = PathFinder.find_spec(".".join([spec.name, rest.pop(0)]), [str(folders[-1])]) if rest else None
+    if not folders and spec is not None and spec.origin:
+        folders.append(Path(spec.origin).parent)
+    return next((folder for folder in reversed(folders) if (folder / FILE).is_file()), None)
+
+
+def entries(folder: Path) -> list[str]:
+    """The entries of a folder's ``references.bib``; none where there is no such file.
+
+    Raises:
+        InputError: the file has something else than entries with a field in braces on each line.
+    """
+    path = folder / FILE
+    if not path.is_file():
+        return []
+    text = path.read_text(encoding="utf-8")
+    found = [match[0] for match in _ENTRY.finditer(text)]
+    rest = [line for line in _ENTRY.sub("", text).splitlines() if line.strip() and not line.startswith("%")]
+    if rest or not all("title" in fields(entry) for entry in found):
+        said = rest[0] if rest else "an entry without a title"
+        raise InputError(str(path), said, "write entries of BibTeX, a line for each field: name = {value},")
+    return found
+
+
+def fields(entry: str) -> dict[str, str]:
+    """The fields of an entry, as plain text."""
+    return {name.lower(): _plain(value) for name, value in _FIELD.findall(entry)}
+
+
+def _plain(text: str) -> str:
+    return text.replace("{", "").replace("}", "").replace("--", "–").replace("~", " ").replace("\\&", "&")
+
+
+def sentence(entry: str) -> str:
+    """A reference as a line of a bibliography: authors, title, where, year, how to find it."""
+    said = fields(entry)
+    where = said.get("journal") or said.get("booktitle") or said.get("publisher") or said.get("howpublished")
+    volume = f"{said.get('volume', '')}{'(' + said['number'] + ')' if 'number' in said else ''}"
+    parts = [
+        _names(said.get("author", "")),
+        said["title"],
+        " ".join(filter(None, [where, volume])),
+        said.get("year", ""),
+        said.get("pages", ""),
+        f"doi:{said['doi']}" if "doi" in said else said.get("url", ""),
+    ]
+    return ", ".join(filter(None, parts))
+
+
+def _names(authors: str) -> str:
+    """``Blajer, Wojciech and Izzo, Dario`` as a person would say it."""
+    turned = [author.partition(", ") for author in re.split(r"\s+and\s+", authors)]
+    *some, last = [f"{first} {family}".strip() for family, _, first in turned]
+    return f"{', '.join(some)} and {last}" if some else last
+
+
+def content(told: Iterable[Cited]) -> list[dict[str, Any]]:
+    """As plain data, for ``--json``."""
+    return [
+        dataclasses.asdict(item) | {"references": [{"bibtex": entry, **fields(entry)} for entry in item.references]}
+        for item in told
+    ]
