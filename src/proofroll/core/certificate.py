@@ -15,6 +15,8 @@ from proofroll.core.several import sample_of
 
 # Engines that compute in double precision reproduce the scene's numbers to this relative difference.
 EXACT = 1e-12
+# Numbers of one quantity that fit into a sentence: an inertia has nine.
+_SHOWN = 9
 
 
 class Standing(StrEnum):
@@ -81,11 +83,12 @@ def first_difference(lines: list[Line]) -> str | None:
             continue
         if all(np.isnan(line.found)):
             return f"the engine's model does not say its {line.quantity}, which the scene requires"
-        found, expected = _told_apart(line.found, line.expected)
+        found, expected = _told_apart(*_worst(line))
+        where = f" (the one of {len(line.found)} numbers that is furthest off)" if len(line.found) > _SHOWN else ""
         refused = f"; {line.quantity} {line.because}" if line.tolerance == EXACT and line.because else ""
         return (
             f"the engine's model differs from the scene: {line.quantity} is {found} instead of "
-            f"{expected} {line.unit} (relative difference {line.difference:.2g}, "
+            f"{expected} {line.unit}{where} (relative difference {line.difference:.2g}, "
             f"allowed {line.tolerance:.2g}){refused}{_single(line)}"
         )
     return None
@@ -94,6 +97,15 @@ def first_difference(lines: list[Line]) -> str | None:
 def not_reported(lines: Iterable[Mapping[str, Any]]) -> list[str]:
     """Quantities about which the engine is silent, of a stored certificate (:meth:`Line.as_dict`)."""
     return [str(line["quantity"]) for line in lines if line["standing"] == Standing.NOT_REPORTED]
+
+
+def _worst(line: Line) -> tuple[tuple[float, ...], tuple[float, ...]]:
+    """What was found and expected; of more numbers than a person reads only those that are furthest from each other."""
+    if len(line.found) <= _SHOWN or len(line.found) != len(line.expected):
+        return line.found, line.expected
+    apart = np.abs(np.array(line.found) - np.array(line.expected))
+    worst = int(np.argmax(np.where(np.isnan(apart), 0.0, apart)))
+    return (line.found[worst],), (line.expected[worst],)
 
 
 def _told_apart(found: tuple[float, ...], expected: tuple[float, ...]) -> tuple[str, str]:

@@ -7,9 +7,10 @@ from collections.abc import Mapping, Sequence
 from typing import Any
 
 from proofroll.core.element import Element
-from proofroll.core.engine import Sample
+from proofroll.core.engine import Sample, fixed_step
 from proofroll.core.engine_abilities import LocatesEvents, TellsRemarks, require_provided
 from proofroll.core.events import Event
+from proofroll.core.plugins import resolve_settings
 from proofroll.core.scene import Scene
 
 AnySample = Sample | Mapping[str, Sample]
@@ -20,12 +21,14 @@ class EachAlone:
     """The elements of a scene in models of their own, advanced together; by the names of the elements."""
 
     def __init__(self, kind: Any, scene: Scene, settings: Any) -> None:
-        self.parts = {
-            element.name: kind.build(
-                dataclasses.replace(scene, elements=(element,), asks=tuple(filter(element.asked, scene.asks))), settings
-            )
-            for element in scene.elements
-        }
+        self.parts, self._others = {}, []
+        for element in scene.elements:
+            alone = dataclasses.replace(scene, elements=(element,), asks=tuple(filter(element.asked, scene.asks)))
+            own = _settings_for(kind, alone, settings)
+            require_provided(kind, own.formulation, alone)
+            self.parts[element.name] = kind.build(alone, own)
+            if own.formulation != settings.formulation:
+                self._others.append(f"{element.name} is in formulation {own.formulation}, preset {own.preset}")
 
     def advance(self, t: float) -> None:
         """See :class:`proofroll.core.engine.Engine`."""
@@ -41,9 +44,9 @@ class EachAlone:
         return {name: part.built() for name, part in self.parts.items()}
 
     def remarks(self) -> Sequence[str]:
-        """Those of all."""
+        """Those of all, and which elements are of a kind that another formulation is for."""
         telling = [part for part in self.parts.values() if isinstance(part, TellsRemarks)]
-        return [remark for part in telling for remark in part.remarks()]
+        return [*self._others, *(remark for part in telling for remark in part.remarks())]
 
 
 def build(kind: Any, scene: Scene, settings: Any) -> Any:
@@ -52,8 +55,26 @@ def build(kind: Any, scene: Scene, settings: Any) -> Any:
     Raises:
         Refused: the formulation does not provide what the scene requires, or cannot represent it.
     """
+    if len(scene.elements) > 1:
+        return EachAlone(kind, scene, settings)
     require_provided(kind, settings.formulation, scene)
-    return kind.build(scene, settings) if len(scene.elements) == 1 else EachAlone(kind, scene, settings)
+    return kind.build(scene, settings)
+
+
+def _settings_for(kind: Any, alone: Scene, settings: Any) -> Any:
+    """The settings themselves, or, for a kind of element that their formulation knows nothing of, those of the first.
+
+    That is the first formulation that provides what the element requires, with the same preset, if it has it, and step.
+    """
+    known = {type(capability) for capability in kind.provides[settings.formulation]}
+    able = [name for name in kind.presets if alone.requires <= kind.provides[name]]
+    if not able or known & {type(capability) for capability in alone.requires}:
+        return settings
+    presets = kind.presets[able[0]]
+    options = {"formulation": able[0]} | ({"preset": settings.preset} if settings.preset in presets else {})
+    own = resolve_settings(kind, options)
+    step = fixed_step(settings)
+    return own if step is None or fixed_step(own) is None else dataclasses.replace(own, dt=step)
 
 
 def sample_of(scene: Scene, element: Element, sample: AnySample) -> Sample:

@@ -12,6 +12,7 @@ from proofroll.core.errors import InputError, Refused
 from proofroll.core.plugins import load_engine, parse_engine, resolve_settings
 from proofroll.core.scene import Scene
 from proofroll.core.time_grid import EVERY, sampling_interval, time_grid
+from proofroll.files.scene_file import load_scene
 from proofroll.running.identity import truth_version
 from proofroll.running.manifest import manifest, versions
 from proofroll.running.recording import off_grid, record
@@ -54,7 +55,7 @@ def _build(scene: Scene, kind: Any, settings: Any) -> Any:
 
 
 def simulate(
-    scene: Scene,
+    scene: Scene | str,
     engine: Any = "truth",
     *,
     until: float = 2.0,
@@ -64,7 +65,7 @@ def simulate(
     """The trajectory of a scene in an engine, with units on every variable.
 
     Args:
-        scene: from :func:`proofroll.load_scene`.
+        scene: from :func:`proofroll.load_scene`, or the name or path that it takes.
         engine: ``truth``, ``name``, ``name[key=value,…]``, or the class, which no package needs to announce.
         until: last time [s].
         every: interval between samples [s]; by default 0.01 s, or the nearest whole number of steps.
@@ -80,6 +81,8 @@ def simulate(
         Missing: the engine is not installed.
         Refused: the engine cannot represent the scene, or built something else than the scene says.
     """
+    if isinstance(scene, str):
+        scene = load_scene(scene)
     spec = parse_engine(engine) if isinstance(engine, str) else None
     if spec is not None and spec.name == "truth":
         options = {**spec.options, **settings}

@@ -8,6 +8,7 @@ import numpy as np
 import pytest
 
 from proofroll.core.dataset import observe
+from proofroll.core.errors import Refused
 from proofroll.core.scene import Scene
 from proofroll.files.scene_file import load_scene
 from proofroll.running.simulation import simulate
@@ -32,3 +33,29 @@ def test_each_element_moves_as_it_does_alone(balls: Scene, engine: str) -> None:
         for name in alone.observables:
             if name in seen:
                 assert np.array_equal(both[balls.label(element, name)], seen[name]), name
+
+
+@pytest.fixture
+def mixed(balls: Scene) -> Scene:
+    """The paper's ball beside a pendulum."""
+    (pendulum,) = load_scene("pendulum").elements
+    return dataclasses.replace(balls, elements=(balls.elements[0], pendulum))
+
+
+@pytest.mark.parametrize("engine", ["projection", "exudyn", "pinocchio", "mujoco"])
+def test_elements_of_two_kinds_take_the_formulation_that_each_needs(mixed: Scene, engine: str) -> None:
+    """Beside a mechanism a ball moves as alone, and the run says in which formulation the mechanism is."""
+    both = simulate(mixed, engine, until=0.1, every=0.05)
+    alone = dataclasses.replace(mixed, elements=mixed.elements[:1])
+    ball, seen = mixed.elements[0], observe(alone, simulate(alone, engine, until=0.1, every=0.05))
+    found = observe(mixed, both)
+    for name in alone.observables:
+        if name in seen:
+            assert np.array_equal(found[mixed.label(ball, name)], seen[name]), name
+    assert "mechanism is in formulation" in str(both.attrs)
+
+
+def test_what_no_formulation_of_an_engine_has_is_still_refused(mixed: Scene) -> None:
+    """Equations of a ball alone do not become those of a pendulum."""
+    with pytest.raises(Refused, match="needs revolute joints"):
+        simulate(mixed, "reduced", until=0.1, every=0.05)

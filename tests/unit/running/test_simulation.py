@@ -138,3 +138,9 @@ def test_data_folders() -> None:
     assert (data_folder("models") / "sphere_in_cylinder" / "scene.toml").is_file()
     with pytest.raises(proofroll.core.errors.ProofrollError, match="reinstall"):
         data_folder("no_such_kind")
+
+
+def test_a_scene_may_be_named() -> None:
+    """The name of a scene gives what the scene itself gives."""
+    one, two = (proofroll.simulate(scene, until=0.1, every=0.1) for scene in ("pendulum", proofroll.XX
+    assert np.array_equal(one["p_WB"], two["p_WB"])

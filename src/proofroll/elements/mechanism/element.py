@@ -88,8 +88,17 @@ class MechanismElement:
         return Placed(self.mechanism, np.zeros(1), *(part[None] for part in state))
 
     @cached_property
+    def _equations(self) -> JointCoordinates:
+        return JointCoordinates(self.mechanism)
+
+    @cached_property
     def _solution(self) -> Solution:
-        return JointCoordinates(self.mechanism).solve(*self.mechanism.start())
+        return self._equations.solve(*self.mechanism.start())
+
+    @cached_property
+    def noise(self) -> float:
+        """What round-off makes of the first accelerations [m/s², rad/s²]."""
+        return self._equations.sensitivity()[1]
 
     @cached_property
     def length(self) -> float:

@@ -21,6 +21,7 @@ def integrated(
     tolerance: float,
     corrected: Callable[[Array], Array] | None = None,
     most_steps: int = 200_000,
+    least: Array | None = None,
 ) -> Iterator[Array]:
     """The state at each time; the solver steps exactly onto it, for its interpolation is of lower order.
 
@@ -34,6 +35,7 @@ def integrated(
         tolerance: absolute and relative, of each step.
         corrected: puts a state back on its constraints; applied after every step.
         most_steps: that the whole way may take.
+        least: absolute tolerance of each component; None: ``tolerance``.
 
     Raises:
         Diverged: the steps become too small or too many, or the state is not finite.
@@ -42,6 +44,7 @@ def integrated(
 
     # scipy needs an end; it is moved from sample to sample, so that the step size survives
     solver = DOP853(rate, 0.0, start, float(times[-1]) or 1.0, rtol=1e-3, atol=tolerance)
+    solver.atol = tolerance if least is None else least
     solver.rtol = tolerance  # scipy accepts no less than 2.2e-14, which is its caution, not the method's limit
     steps, largest, small, lost = 0, 0.0, 0, np.zeros_like(start)
     for time in times:

@@ -29,6 +29,7 @@ from proofroll.truth.mechanism.maximal_equations import (
     MaximalEquations,
 )
 from proofroll.truth.mechanism.maximal_taylor import MaximalTaylor
+from proofroll.truth.mechanism.rolling_rows import RollingContact
 
 RANK = 1e-8  # see analysis.RANK; this route finds its own rank
 
@@ -131,12 +132,13 @@ class MaximalCoordinates:
 
     Args:
         mechanism: see :class:`~proofroll.truth.mechanism.maximal_equations.MaximalEquations` for what is refused.
+        rolling: balls among its bodies that roll on walls; their forces come after those of joints and loops.
     """
 
-    def __init__(self, mechanism: Mechanism) -> None:
+    def __init__(self, mechanism: Mechanism, rolling: Sequence[RollingContact] = ()) -> None:
         self.mechanism = mechanism
-        self.lean = NumericEquations(MaximalEquations(mechanism, allow_planar=True))
-        self._whole = NumericEquations(MaximalEquations(mechanism, allow_planar=False))
+        self.lean = NumericEquations(MaximalEquations(mechanism, allow_planar=True, rolling=rolling))
+        self._whole = NumericEquations(MaximalEquations(mechanism, allow_planar=False, rolling=rolling))
         self._armature = np.array([joint.armature for joint in mechanism.joints for _ in range(joint.nv)])
         self._compiled: dict[bool, MaximalTaylor] = {}
 

@@ -20,6 +20,7 @@ from proofroll.elements.mechanism.joint import FACTS
 from proofroll.elements.mechanism.model import Mechanism
 from proofroll.elements.mechanism.rotations import Array
 from proofroll.truth.mechanism.maximal_bodies import GROUND, BodyInScalars, made_bodies, placed_bodies
+from proofroll.truth.mechanism.rolling_rows import RollingContact
 from proofroll.truth.mechanism.scalars import (
     Scalar,
     add,
@@ -43,7 +44,7 @@ _AXES = ((1.0, 0.0, 0.0), (0.0, 1.0, 0.0), (0.0, 0.0, 1.0))
 
 @dataclass(frozen=True)
 class Connection:
-    """A joint or loop between two bodies: places from the centres of mass, frames by rows, in body axes."""
+    """A joint, loop or rolling contact of two bodies: places from the centres of mass, frames by rows, in body axes."""
 
     kind: str
     a: int
@@ -98,12 +99,13 @@ class MaximalEquations:
     Args:
         mechanism: any without dry friction.
         allow_planar: give bodies of plane mechanisms three coordinates; their rows are those within the plane.
+        rolling: which of its bodies, free ones without joints of their own, are balls that roll on a wall.
 
     Raises:
         Refused: the mechanism has something of that.
     """
 
-    def __init__(self, mechanism: Mechanism, allow_planar: bool) -> None:
+    def __init__(self, mechanism: Mechanism, allow_planar: bool, rolling: Sequence[RollingContact] = ()) -> None:
         for joint in mechanism.joints:
             if joint.friction:
                 raise Refused(f"joint {joint.name} has dry friction; no route of the truth follows its switching")
@@ -128,6 +130,10 @@ class MaximalEquations:
         ] + [
             self._connection(c.kind, c.body_a, c.body_b, c.position_a, c.position_b, c.frame_a, c.frame_b)
             for c in mechanism.loops
+        ]
+        self._rolling = dict(enumerate(rolling, len(self.connections)))
+        self.connections += [
+            self._connection("rolling", WORLD, ball.body, _NONE, _NONE, np.eye(3), np.eye(3)) for ball in rolling
         ]
         self._ends = [
             (index[s.body_a], self._place(s.body_a, s.position_a), index[s.body_b], self._place(s.body_b, s.position_b))
@@ -168,7 +174,8 @@ class MaximalEquations:
         rows: list[ConstraintRow] = []
         laws, angle_rate = [], []
         for number, connection in enumerate(self.connections):
-            rows += self._rows_of(number, connection, views)
+            rolls = number in self._rolling
+            rows += (self._rolling_rows if rolls else self._rows_of)(number, connection, views)
             if number < len(self.mechanism.joints):
                 own = [angle for angle, (k, _) in zip(angles, self.angles, strict=True) if k == number]
                 law, rates = self._law(number, connection, views, own, force)
@@ -245,6 +252,19 @@ class MaximalEquations:
             bias = add(dot(cross(a.w, x_rate), y), mul(2.0, dot(x_rate, y_rate)), dot(x, cross(b.w, y_rate)))
             back = scaled(-1.0, t)
             rows.append(self._row(number, views, dot(x, y), bias, (_NONE, t), (_NONE, back), (_NONE, t)))
+        return rows
+
+    def _rolling_rows(self, number: int, c: Connection, views: list[BodyInScalars]) -> list[ConstraintRow]:
+        """The contact point of a ball does not move; only its distance from the wall can be violated by a place."""
+        ball, view = self._rolling[number], views[c.b]
+        gap, e1, e1_rate = ball.normal(view.r, view.v)
+        arm = scaled(ball.radius, e1)
+        towards = scaled(ball.radius, cross(view.w, e1_rate))
+        rows = []
+        for n in _AXES:
+            residual = scaled(-1.0, scaled(gap, e1))
+            on_b, on_a = (n, cross(arm, n)), (scaled(-1.0, n), _NONE)
+            rows.append(self._row(number, views, dot(n, residual), dot(n, towards), on_b, on_a, (n, _NONE)))
         return rows
 
     def _rate_row(self, number: int, kind: str, views: list[BodyInScalars]) -> ConstraintRow:

@@ -1,0 +1,15 @@
+"""What a certificate says of a quantity that differs."""
+
+from __future__ import annotations
+
+from proofroll.core.certificate import Line, first_difference
+
+
+def test_of_many_numbers_the_one_furthest_off_is_shown() -> None:
+    """Accelerations of eighty bodies are two hundred and forty numbers, of which a sentence holds one."""
+    expected = tuple(float(n) for n in range(240))
+    found = (*expected[:100], 100.5, *expected[101:])
+    said = first_difference([Line("acceleration", "m/s^2", expected, found, 0.5 / 239, 1e-9)])
+    assert said is not None
+    assert "is 100.5 instead of 100 m/s^2 (the one of 240 numbers that is furthest off)" in said
+    assert len(said) < 240
