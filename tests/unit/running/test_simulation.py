@@ -142,5 +142,7 @@ def test_data_folders() -> None:
 
 def test_a_scene_may_be_named() -> None:
     """The name of a scene gives what the scene itself gives."""
-    one, two = (proofroll.simulate(scene, until=0.1, every=0.1) for scene in ("pendulum", proofroll.XX
+    one, two = (
+        proofroll.simulate(scene, until=0.1, every=0.1) for scene in ("pendulum", proofroll.load_scene("pendulum"))
+    )
     assert np.array_equal(one["p_WB"], two["p_WB"])
