@@ -160,9 +160,10 @@ def test_dry_friction_is_refused():
         bodies=(Body("a", 1.0, (0, 0, -1), (1, 1, 1)),),
         joints=(Joint("j", "revolute", "world", "a", axis=(1, 0, 0), friction=0.1),),
     )
-    for route in (JointCoordinates, MaximalCoordinates):
-        with pytest.raises(Refused, match=r"joint j has dry friction|dry friction in joint j"):
-            route(mechanism)
+    with pytest.raises(Refused, match="dry friction in joint j"):
+        JointCoordinates(mechanism).run(np.array([0.1]))
+    with pytest.raises(Refused, match="joint j has dry friction"):
+        MaximalCoordinates(mechanism)
 
 
 def test_a_singular_pose_stops_error_control_in_time(scene):
