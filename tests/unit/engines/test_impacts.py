@@ -16,6 +16,8 @@ from proofroll.running.simulation import simulate
     [
         ("pinocchio[formulation=contact]", 1e-2),
         ("pinocchio[formulation=contact,preset=default]", 1e-2),
+        ("exudyn[formulation=contact]", 5e-3),
+        ("exudyn[formulation=contact,preset=default]", 1e-2),
         ("mujoco[formulation=free]", 1e-2),
         ("mujoco[formulation=free,dt=1e-4]", 1e-3),
     ],
@@ -33,7 +35,7 @@ def test_height_after_each_impact(engine: str, off: float, e: float) -> None:
     ("engine", "said"),
     [
         ("projection", "impacts on the wall"),
-        ("exudyn[formulation=contact]", "follows a ball that touches the wall"),
+        ("exudyn[formulation=generic]", "use contact"),
         ("mujoco[formulation=chart]", "use free"),
         ("mujoco[formulation=free,preset=tuned]", "integrator=Euler"),
         ("pinocchio[formulation=free_flyer]", "use contact"),
@@ -43,3 +45,11 @@ def test_who_cannot_let_a_ball_land_says_so(engine: str, said: str) -> None:
     """A formulation without restitution refuses, and says what to take or why."""
     with pytest.raises(Refused, match=said):
         simulate(load_scene("bouncing_ball"), engine, until=0.1, every=0.05)
+
+
+@pytest.mark.parametrize("e", [0.0, 1.0])
+def test_dead_and_perfect_impacts(e: float) -> None:
+    """With e = 0 the ball stays where it lands, with 1 it comes back to its height, in Exudyn's contact as in truth."""
+    scene = load_scene("bouncing_ball", restitution=e, height=0.3)
+    true, found = (simulate(scene, name, until=0.6, every=0.02) for name in ("truth", "exudyn[formulation=contact]"))
+    np.testing.assert_allclose(found["gap"], true["gap"], rtol=0, atol=2e-3)

@@ -1,16 +1,17 @@
 """Exudyn (https://github.com/jgerstmayr/EXUDYN), an engine for flexible and rigid multibody systems.
 
 It has no joint for a sphere on a curved wall. Four models of one are built here from what it has; see the modules
-:mod:`generic`, :mod:`carrier`, :mod:`rolling_disc` and :mod:`contact`. The first and the last let the ball slip. In all
-but the first the ball is a rigid body, whose orientation is in the model, asked for or not: the node's Euler parameters
-are its coordinates.
+:mod:`generic` (and of it, where the wall does not slide along itself or moves, :mod:`world_coordinates`),
+:mod:`carrier`, :mod:`rolling_disc` and :mod:`contact`. The first and the last let the ball slip. In all but the first
+the ball is a rigid body, whose orientation is in the model, asked for or not: the node's Euler parameters are its
+coordinates.
 
 Mechanisms are bodies in redundant coordinates (:mod:`redundant`) or its kinematic tree (:mod:`tree`).
 """
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from importlib.metadata import version
 from typing import Any, ClassVar, Self
 
@@ -20,26 +21,34 @@ from proofroll.core.errors import Refused
 from proofroll.core.events import Event
 from proofroll.core.scene import Scene
 from proofroll.elements.ball_on_surface.element import rolling_ball
-from proofroll.elements.ball_on_surface.model import ALL_OF_A_BALL, ROLLS, BallCapability
+from proofroll.elements.ball_on_surface.model import ALL_OF_A_BALL, ROLLS, BallCapability, RollingBall
 from proofroll.elements.mechanism.sampling import MechanismBuilt
 from proofroll.engines.exudyn import redundant, tree
 from proofroll.engines.exudyn.carrier import Carrier
 from proofroll.engines.exudyn.contact import PenaltyContact
 from proofroll.engines.exudyn.generic import Generic
+from proofroll.engines.exudyn.local_frame import slides
 from proofroll.engines.exudyn.redundant import Redundant
 from proofroll.engines.exudyn.rolling_disc import RollingDisc
 from proofroll.engines.exudyn.settings import PRESETS, ExudynSettings
 from proofroll.engines.exudyn.tree import KinematicTree
+from proofroll.engines.exudyn.world_coordinates import WorldCoordinates
 
-OfBall = Generic | Carrier | RollingDisc | PenaltyContact
+OfBall = Generic | WorldCoordinates | Carrier | RollingDisc | PenaltyContact
 OfMechanism = Redundant | KinematicTree
-MODELS: Mapping[str, type[OfBall]] = {
-    "generic": Generic,
+MODELS: Mapping[str, Callable[[RollingBall, ExudynSettings], OfBall]] = {
+    "generic": lambda body, settings: (Generic if slides(body) else WorldCoordinates)(body, settings),
     "carrier": Carrier,
     "rolling_disc": RollingDisc,
     "contact": PenaltyContact,
 }
 OF_MECHANISMS: Mapping[str, type[OfMechanism]] = {"redundant": Redundant, "tree": KinematicTree}
+_HELD = "its constraint holds the ball on the wall; use contact"
+_ROLLS_AT_REST: Mapping[str, str] = {
+    BallCapability.IMPACTS: _HELD,
+    BallCapability.BOUNDED_FRICTION: "its joint rolls without slip; use generic or contact",
+    BallCapability.MOVING_WALL: "its joint rolls on what is at rest; use generic",
+}
 
 
 class Exudyn:
@@ -48,18 +57,24 @@ class Exudyn:
     name: ClassVar[str] = "exudyn"
     oldest: ClassVar[str] = "1.13"  # before, settings and items have other names
     provides: ClassVar[Mapping[str, frozenset[str]]] = {
-        "generic": ALL_OF_A_BALL - {BallCapability.ORIENTATION},
+        "generic": (ALL_OF_A_BALL | {BallCapability.MOVING_WALL}) - {BallCapability.ORIENTATION},
         "carrier": ROLLS | {BallCapability.ORIENTATION},
         "rolling_disc": ROLLS | {BallCapability.ORIENTATION},
-        "contact": ALL_OF_A_BALL,
+        "contact": ALL_OF_A_BALL | {BallCapability.IMPACTS},
         "redundant": redundant.PROVIDES,
         "tree": tree.PROVIDES,
     }
     lacking: ClassVar[Mapping[str, Mapping[str, str]]] = {
-        "generic": {BallCapability.ORIENTATION: "the spin of generic is a quasi-velocity, the rate of no orientation"},
-        "contact": {BallCapability.IMPACTS: "its hollow sphere follows a ball that touches the wall"},
-        "carrier": {BallCapability.BOUNDED_FRICTION: "its joint rolls without slip; use generic or contact"},
-        "rolling_disc": {BallCapability.BOUNDED_FRICTION: "its joint rolls without slip; use generic or contact"},
+        "generic": {
+            BallCapability.ORIENTATION: "the spin of generic is a quasi-velocity, the rate of no orientation",
+            BallCapability.IMPACTS: _HELD,
+        },
+        "contact": {
+            BallCapability.TANGENTIAL_RESTITUTION: "its friction stops the contact point, and has no restitution",
+            BallCapability.MOVING_WALL: "its hollow sphere has no velocity; use generic",
+        },
+        "carrier": _ROLLS_AT_REST,
+        "rolling_disc": _ROLLS_AT_REST,
         "redundant": redundant.LACKING,
         "tree": tree.LACKING,
     }

@@ -4,6 +4,10 @@ Exudyn has no contact between a ball and a curved wall, but one between a ball a
 (``ObjectContactSphereSphere``). The hollow sphere is moved along before every Newton residual so that it touches the
 wall where the ball does; then its normal and its distance are those of the wall. Its friction is proportional to the
 slip velocity up to ``friction_zone`` and constant beyond, so that a ball that sticks creeps.
+
+A ball that flies meets it, too, where it meets the wall. Its impacts are Exudyn's own: a damping of the normal force
+that stands for a coefficient of restitution (``impactModel`` 2, the mixed model of Gonthier et al. and of Carvalho and
+Martins), while friction stops the contact point.
 """
 
 from __future__ import annotations
@@ -39,6 +43,8 @@ SURELY = 2.0
 LETTING_GO = 0.01
 # Looked up once: the functions that Exudyn calls ask for them at every iterate and step.
 POSITION, COORDINATES = Output.Position, Output.Coordinates
+# Exudyn wants a coefficient of restitution above zero.
+DEAD = 1e-6
 # What double precision leaves of any quantity, relative to its scale.
 ROUND_OFF = 1e-12
 
@@ -55,11 +61,12 @@ class PenaltyContact:
         self._natural = body.ball.mass * natural_acceleration(body)
         stiffness, self.zone, self._grip = settings.penalty
         mu = law.mu_kinetic if self.bounded else self._grip
-        e1 = body.surface.frame(body.u0)[:, 0]
+        e1 = body.surface.normal(body.p0)
         slips = bool(np.any(body.slip0))
-        force = initial_response(body)[1] if slips else newton_euler(body, body.p0, body.v0, body.w0)[2]
+        given = slips or body.gap0 > 0
+        force = initial_response(body)[1] if given else newton_euler(body, body.p0, body.v0, body.w0)[2]
         N = float(-force @ e1)
-        if N <= 0:
+        if N <= 0 and not body.gap0:
             raise Refused("nothing presses the ball against the wall at time 0, so its contact is not closed")
         friction = force + N * e1
         # With this slip velocity the softened friction is the one that rolling needs, and need not build up.
@@ -81,7 +88,7 @@ class PenaltyContact:
         )
         self.data = self.system.AddNode(
             items.NodeGenericData(
-                initialCoordinates=[-sunk, float(np.linalg.norm(body.slip0 + creep)), 0.0, 0.0],
+                initialCoordinates=[body.gap0 - sunk, float(np.linalg.norm(body.slip0 + creep)), 0.0, 0.0],
                 numberOfDataCoordinates=4,
             )
         )
@@ -95,6 +102,11 @@ class PenaltyContact:
                 dynamicFriction=mu,
                 frictionProportionalZone=self.zone,
                 contactStiffness=stiffness,
+                **(
+                    {}
+                    if law.restitution is None
+                    else {"restitutionCoefficient": max(law.restitution, DEAD), "impactModel": 2}
+                ),
             )
         )
         self.system.SetPreNewtonResidualUserFunction(
@@ -105,10 +117,12 @@ class PenaltyContact:
         self._t, self._events = 0.0, []
         self._left: tuple[float, float] | None = None
         self._sticks = needed <= mu * N and not slips
-        if not self._sticks:
+        if not self._sticks and not body.flies:
             self._events.append(Event("slip", 0.0, 0.0, 0.0))
-        self.system.SetPostStepUserFunction(self._watch)
-        self.integration = Integration(self.system, settings)
+        if not body.flies:  # else slip and stick are those of impacts, shorter than any sample
+            self.system.SetPostStepUserFunction(self._watch)
+        self._flies = body.flies
+        self.integration = Integration(self.system, settings, impacts=body.flies)
 
     def _watch(self, system: Any, t: float) -> bool:
         """Called by Exudyn after each step, and once where it starts."""
@@ -155,18 +169,26 @@ class PenaltyContact:
     def sample(self) -> Sample:
         """See :class:`proofroll.core.engine.Engine`. The force is that of the contact."""
         force = self.system.GetObjectOutput(self.contact, Output.Force)
-        return dataclasses.replace(self.ball.sample(force), sticking=self._sticks if self.bounded else None)
+        return dataclasses.replace(
+            self.ball.sample(force), sticking=self._sticks if self.bounded and not self._flies else None
+        )
 
     def built(self) -> Built:
         """See :class:`proofroll.core.engine.Engine`."""
         contact = self.system.GetObject(self.contact)
         gap = float(self.system.GetObjectOutput(self.contact, Output.DisplacementLocal))
-        built = self.ball.built(float(contact["spheresRadii"][0] + gap / 2), gap)
+        # The hollow sphere is no measure of how far from the wall a ball flies.
+        built = self.ball.built(float(contact["spheresRadii"][0] + min(gap, 0.0) / 2), None if gap > 0 else gap)
         mu = float(contact["dynamicFriction"])
         terms = built.terms or frozenset()
         if mu != self._grip:
             terms |= {BallCapability.BOUNDED_FRICTION}
         return dataclasses.replace(built, mu_static=mu, mu_kinetic=mu, terms=terms, regularised=self._softened)
+
+
+def _impacts(restitution: float | None) -> dict[str, float]:
+    """Arguments of the contact that damp its impacts; none where nothing is said of them."""
+    return {} if restitution is None else {"restitutionCoefficient": max(restitution, DEAD), "impactModel": 2}
 
 
 def _follower(
@@ -181,7 +203,7 @@ def _follower(
     def follow(system: Any, t: float, newton_iteration: int, discontinuous_iteration: int) -> None:  # noqa: ARG001 -- Exudyn's signature
         x, y, z = output(node, POSITION).tolist()
         gap, e1x, e1y, e1z = nearby(x, y, z)
-        back = gap - distance
+        back = _back(gap, distance)
         move(marker, "localPosition", [x + back * e1x, y + back * e1y, z + back * e1z])
 
     return follow
@@ -239,4 +261,9 @@ def _softened(
 def _centre(body: RollingBall, distance: float) -> FloatArray:
     """Centre of the hollow sphere at time 0 [m], shape (3,): a touching ball's centre is ``distance`` away from it."""
     gap, *e1 = body.surface.nearby(*body.p0.tolist())
-    return np.asarray(body.p0 + (gap - distance) * np.array(e1))
+    return np.asarray(body.p0 + _back(gap, distance) * np.array(e1))
+
+
+def _back(gap: float, distance: float) -> float:
+    """Where the centre of the hollow sphere is along e1 from the ball's [m]; of a ball far off, not beyond it."""
+    return min(gap, 0.5 * distance) - distance

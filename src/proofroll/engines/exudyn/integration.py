@@ -13,6 +13,9 @@ from proofroll.core.errors import Diverged, Refused
 from proofroll.engines.exudyn.native import exu
 from proofroll.engines.exudyn.settings import EXPLICIT, ExudynSettings
 
+# At 4 m/s the ball comes 0.3 micrometres nearer in a step of 1e-4 s that is halved so much oftener than ten times.
+_FOR_IMPACTS = 4
+
 
 def new_system() -> tuple[Any, Any]:
     """An empty container and system; what is global in Exudyn is set back to its defaults, and it is silent."""
@@ -22,10 +25,11 @@ def new_system() -> tuple[Any, Any]:
     return container, container.AddSystem()
 
 
-def simulation_settings(settings: ExudynSettings, *, dependent: bool = False) -> Any:
+def simulation_settings(settings: ExudynSettings, *, dependent: bool = False, impacts: bool = False) -> Any:
     """The settings in Exudyn's own structure: no files, one thread, a step that never changes on its own.
 
-    ``dependent``: constraints may depend on each other, which needs a linear solver that looks for it.
+    ``dependent``: constraints may depend on each other, which needs a linear solver that looks for it. ``impacts``:
+    steps end where contacts close and open, for which they are halved more often.
     """
     result = exu.SimulationSettings()
     if dependent:
@@ -39,7 +43,7 @@ def simulation_settings(settings: ExudynSettings, *, dependent: bool = False) ->
     # Left alone, a failing Newton iteration halves the step down to 1e-8 s, and the run crawls for minutes.
     time.adaptiveStep = bool(settings.halvings)
     if settings.halvings:
-        time.minimumStepSize = settings.dt / 2**settings.halvings
+        time.minimumStepSize = settings.dt / 2 ** (settings.halvings + (_FOR_IMPACTS if impacts else 0))
     time.newton.relativeTolerance = settings.newton_tolerance
     time.newton.absoluteTolerance = settings.newton_tolerance / 100
     time.newton.modifiedNewtonJacUpdatePerStep = settings.jacobian == "step"
@@ -73,6 +77,7 @@ class Integration:
         at: float = 0.0,
         *,
         dependent: bool = False,
+        impacts: bool = False,
     ) -> None:
         """Initialises the solver in the system's initial configuration.
 
@@ -83,6 +88,7 @@ class Integration:
                 them itself; None: the engine solves for them.
             at: time of that configuration [s].
             dependent: whether constraints depend on each other.
+            impacts: whether steps may end where contacts close and open.
 
         Raises:
             Refused: the engine does not accept the model.
@@ -91,7 +97,7 @@ class Integration:
         self.complaint: str | None = None
         self.dt = settings.dt
         self.system = system
-        self.options = simulation_settings(settings, dependent=dependent)
+        self.options = simulation_settings(settings, dependent=dependent, impacts=impacts)
         explicit = settings.integrator in EXPLICIT
         self.solver = exu.MainSolverExplicit() if explicit else exu.MainSolverImplicitSecondOrder()
         if start is not None:

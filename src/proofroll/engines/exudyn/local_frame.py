@@ -8,6 +8,7 @@ import numpy as np
 
 from proofroll.core.arrays import FloatArray
 from proofroll.core.errors import Refused
+from proofroll.elements.ball_on_surface.model import RollingBall
 from proofroll.elements.ball_on_surface.surfaces import Generator, Surface
 
 
@@ -28,6 +29,11 @@ class LocalGeometry:
     generators: tuple[Generator, Generator]
 
 
+def slides(body: RollingBall) -> bool:
+    """Whether the wall is at rest and two rigid motions slide it along itself: the coefficients may be constant."""
+    return body.surface.generators is not None and body.wall_rate is None
+
+
 def local_geometry(surface: Surface, u0: FloatArray) -> LocalGeometry:
     """Constant local coefficients of a homogeneous surface.
 
@@ -36,7 +42,9 @@ def local_geometry(surface: Surface, u0: FloatArray) -> LocalGeometry:
     """
     generators = surface.generators
     if generators is None:
-        raise Refused("the wall does not slide along itself, so its rolling constraint has no constant coefficients")
+        raise Refused(
+            "the wall does not slide along itself, so rolling has no constant coefficients; use generic or rolling_disc"
+        )
     here = _coefficients(surface, generators, u0)
     # Two generators that do not commute give a frame that slides along itself but derivatives that change.
     for step in ((0.3, 0.0), (0.0, 0.3), (-0.7, 0.4)):

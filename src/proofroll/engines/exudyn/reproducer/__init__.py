@@ -28,6 +28,7 @@ from proofroll.engines.exudyn.reproducer.text import (
 )
 from proofroll.engines.exudyn.rolling_disc import RollingDisc
 from proofroll.engines.exudyn.settings import ExudynSettings
+from proofroll.engines.exudyn.world_coordinates import WorldCoordinates
 
 
 def source(model: Any, body: RollingBall, settings: ExudynSettings) -> str:
@@ -41,6 +42,10 @@ def source(model: Any, body: RollingBall, settings: ExudynSettings) -> str:
     Raises:
         Refused: the scene has a term that the program has not.
     """
+    if isinstance(model, WorldCoordinates):
+        raise Refused("there is no program for generic on such a wall yet; rolling_disc has one")
+    if body.flies:
+        raise Refused("there is no program with impacts yet")
     generic, resists = isinstance(model, Generic), body.contact.rolling_resistance > 0
     if generic and math.isfinite(body.contact.mu_static):
         raise Refused("the loop that switches Exudyn's constraint of rolling off while the ball slips is proofroll's")

@@ -1,0 +1,169 @@
+"""``generic`` on walls that do not slide along themselves, or that move: world coordinates, and rolling as one vector.
+
+Two mass points, one of the mass at the ball's centre and one of its inertia, whose velocity is the angular velocity:
+for a ball J ω̇ is the whole of Euler's equation. Rolling, v + a ω × e1 = W × (p + a e1), is a constraint on velocities
+by user functions (``CoordinateVectorConstraint``); along e1 it is the wall. As in :mod:`generic`, what is tested is
+Exudyn's integration of a system with multipliers.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable
+from typing import Any
+
+import numpy as np
+
+from proofroll.core.arrays import FloatArray
+from proofroll.core.engine import Built, Sample
+from proofroll.core.errors import Refused
+from proofroll.core.events import Event
+from proofroll.elements.ball_on_surface.mechanics import resistance_moment
+from proofroll.elements.ball_on_surface.model import BallCapability, RollingBall
+from proofroll.engines.exudyn.integration import Integration, consistent_start, initial_matrices, new_system
+from proofroll.engines.exudyn.native import Output, items
+from proofroll.engines.exudyn.resistance import slow
+from proofroll.engines.exudyn.settings import ExudynSettings
+
+
+class WorldCoordinates:
+    """Two ``MassPoint`` and a ``CoordinateVectorConstraint`` with user functions; needs no generators of the wall."""
+
+    def __init__(self, body: RollingBall, settings: ExudynSettings) -> None:
+        """Builds and initialises; raises Refused if friction is bounded."""
+        if math.isfinite(body.contact.mu_static):
+            raise Refused(
+                "generic lets a ball slip only on a wall at rest that slides along itself, in whose coordinates its "
+                "friction is built; use contact"
+            )
+        self._body = body
+        self.container, self.system = new_system()
+        add = self.system
+        m, J = body.ball.mass, body.ball.inertia
+        centre, spin = (
+            add.AddNode(items.NodePoint(referenceCoordinates=p.tolist(), initialVelocities=v.tolist()))
+            for p, v in ((body.p0, body.v0), (np.zeros(3), body.w0))
+        )
+        self._nodes = centre, spin
+        self._objects = tuple(
+            add.AddObject(items.MassPoint(mass=inertia, nodeNumber=node)) for inertia, node in ((m, centre), (J, spin))
+        )
+        marker = add.AddMarker(items.MarkerBodyMass(bodyNumber=self._objects[0]))
+        self._weight = add.AddLoad(items.LoadMassProportional(markerNumber=marker, loadVector=body.gravity.tolist()))
+        self._resistance = self._resist() if body.contact.rolling_resistance else None
+        self._rolling = add.AddObject(
+            items.CoordinateVectorConstraint(
+                markerNumbers=[add.AddMarker(items.MarkerNodeCoordinates(nodeNumber=node)) for node in self._nodes],
+                scalingMarker0=np.zeros((3, 1)),  # says how many rows there are
+                velocityLevel=True,
+                constraintUserFunction=_rolling(body),
+                jacobianUserFunction=_along(body),
+            )
+        )
+        self.system.Assemble()
+        # The derivative of the rows without p̈ and ω̇, of which Exudyn cannot know.
+        a, e1_rate = body.ball.radius, body.surface.normal_gradient(body.p0) @ body.v0
+        turning = -a * np.cross(body.w0, e1_rate)
+        if body.wall_rate is not None:
+            turning += np.cross(body.wall_rate, body.v0 + a * e1_rate)
+        start = consistent_start(self.system, settings, {self._rolling: turning})
+        # Of a ball that turns: the rows are a times a matrix of which two singular values are 1, and one is 0.
+        _, jacobian, _ = initial_matrices(self.system, settings)
+        self._radius = float(np.linalg.norm(jacobian[6:, 3:6])) / math.sqrt(2)
+        self.integration = Integration(self.system, settings, start)
+
+    def _resist(self) -> Any:
+        """The moment of the rolling resistance, a force on what has the angular velocity for its velocity.
+
+        N follows from the state: along e1 the centre accelerates by -v·(∂e1/∂p)v.
+        """
+        body, (centre, spin) = self._body, self._nodes
+        surface, m, least = body.surface, body.ball.mass, slow(body)
+        output, position, velocity = self.system.GetNodeOutput, Output.Position, Output.Velocity
+
+        def moment(system: Any, t: float, load: list[float]) -> FloatArray:  # noqa: ARG001 -- Exudyn's signature
+            p, v = output(centre, position), output(centre, velocity)
+            e1 = surface.normal(p)
+            N = m * (e1 @ body.gravity + v @ surface.normal_gradient(p) @ v)
+            speed = float(np.linalg.norm(v))
+            return resistance_moment(load[0], N, e1, v) * min(1.0, speed / least if least else 1.0)
+
+        return self.system.AddLoad(
+            items.LoadForceVector(
+                markerNumber=self.system.AddMarker(items.MarkerNodePosition(nodeNumber=spin)),
+                # Not used as a force: it hands f to the function, and can be read back.
+                loadVector=[body.contact.rolling_resistance, 0.0, 0.0],
+                loadVectorUserFunction=moment,
+            )
+        )
+
+    def sample(self) -> Sample:
+        """See :class:`proofroll.core.engine.Engine`. The velocity ω is the rate of no orientation."""
+        output, (centre, spin) = self.system.GetNodeOutput, self._nodes
+        return Sample(
+            p_WB=output(centre, Output.Position),
+            v_WB=output(centre, Output.Velocity),
+            w_WB=output(spin, Output.Velocity),
+            force=-np.array(self.system.systemData.GetAECoordinates()),
+        )
+
+    def events(self) -> list[Event]:
+        """None: the ball never slips."""
+        return []
+
+    def built(self) -> Built:
+        """See :class:`proofroll.core.engine.Engine`. The constraint holds velocities only and knows no distance."""
+        mass, inertia = (float(self.system.GetObject(item)["mass"]) for item in self._objects)
+        f = 0.0 if self._resistance is None else float(self.system.GetLoad(self._resistance)["loadVector"][0])
+        acceleration = self.system.systemData.GetODE2Coordinates_tt()
+        return Built(
+            mass=mass,
+            inertia=np.full(3, inertia),
+            gravity=np.array(self.system.GetLoad(self._weight)["loadVector"]),
+            ball_radius=self._radius,
+            rolling_resistance=f,
+            gap=None,
+            acceleration=acceleration[:3],
+            angular_acceleration=acceleration[3:],
+            terms=frozenset({BallCapability.ROLLING_RESISTANCE} if f else ()),
+        )
+
+
+def _rolling(body: RollingBall) -> Callable[..., FloatArray]:
+    """Velocity of the ball at the contact, less that of the wall there [m/s]."""
+    a, normal, wall_rate = body.ball.radius, body.surface.normal, body.wall_rate
+
+    def constraint(
+        system: Any,  # noqa: ARG001 -- Exudyn's signature, here and below
+        t: float,  # noqa: ARG001
+        item: int,  # noqa: ARG001
+        q: Any,
+        q_t: Any,
+        velocity_level: bool,  # noqa: ARG001
+    ) -> FloatArray:
+        p, rates = np.array(q)[:3], np.array(q_t)
+        e1 = normal(p)
+        relative = rates[:3] + a * np.cross(rates[3:], e1)
+        return relative if wall_rate is None else relative - np.cross(wall_rate, p + a * e1)
+
+    return constraint
+
+
+def _along(body: RollingBall) -> Callable[..., FloatArray]:
+    """The rows' derivatives by the velocities: 1, and -a [e1]×."""
+    a, nearby = body.ball.radius, body.surface.nearby
+
+    def jacobian(
+        system: Any,  # noqa: ARG001
+        t: float,  # noqa: ARG001
+        item: int,  # noqa: ARG001
+        q: Any,
+        q_t: Any,  # noqa: ARG001
+        velocity_level: bool,  # noqa: ARG001
+    ) -> FloatArray:
+        _, x, y, z = nearby(*np.array(q)[:3].tolist())
+        return np.array(
+            [[1, 0, 0, 0, a * z, -a * y], [0, 1, 0, -a * z, 0, a * x], [0, 0, 1, a * y, -a * x, 0]], dtype=np.float64
+        )
+
+    return jacobian
