@@ -37,6 +37,12 @@ ENGINES = [
 ]
 
 
+def need(engine: str) -> None:
+    """Skips the test where the package of an engine that is not ours is not installed."""
+    if not engine.startswith(("reduced", "projection")):
+        pytest.importorskip(engine.partition("[")[0])
+
+
 def lying(mu: float = math.inf) -> Scene:
     """The paper's cylinder on its side, the ball at 2.7 m/s from its bottom: too slow to pass the top."""
     scene = load_scene("sphere_in_cylinder", speed=2.7, mu_static=mu)
@@ -46,7 +52,7 @@ def lying(mu: float = math.inf) -> Scene:
 @pytest.mark.parametrize(("engine", "late", "apart", "flies"), ENGINES)
 def test_lift_off(engine: str, late: float, apart: float, flies: bool) -> None:
     """With unbounded friction the lift-off is an event with a bracket; a model that cannot let go ends there."""
-    pytest.importorskip(engine.partition("[")[0]) if not engine.startswith(("reduced", "projection")) else None
+    need(engine)
     scene = lying()
     true = truth(scene, TIMES)
     (event,) = events_of(true)
@@ -66,7 +72,7 @@ def test_lift_off(engine: str, late: float, apart: float, flies: bool) -> None:
 @pytest.mark.parametrize("engine", ["projection", "exudyn", "exudyn[formulation=contact]", "pinocchio"])
 def test_with_a_bound_it_slips_first(engine: str) -> None:
     """With friction of any bound the ball slips and then leaves, when the truth's does."""
-    pytest.importorskip(engine.partition("[")[0]) if engine != "projection" else None
+    need(engine)
     scene = lying(0.5)
     recording = record(build(scene, engine), scene, TIMES)
     assert recording.failure is None

@@ -12,7 +12,7 @@ from proofroll.core.arrays import FloatArray
 from proofroll.core.engine import Sample
 from proofroll.core.scene import Scene
 from proofroll.elements.ball_on_surface.element import rolling_ball
-from proofroll_drill.mutants.base import STEP, Mutant
+from proofroll_drill.mutants.base import STEP, Mutant, OneStepBehind
 
 
 class _Told(Mutant):
@@ -189,20 +189,11 @@ class Shifted(_Told):
         return t + 0.004
 
 
-class LateForce(_Told):
+class LateForce(OneStepBehind, _Told):
     """The state is of now, the force of the step before."""
 
     fault = "force of the step before"
     named = ("force is one step (0.002 s) late",)
-
-    def __init__(self, scene: Scene, settings: Any) -> None:
-        super().__init__(scene, settings)
-        self.behind: Any = type(self.inner).build(scene, settings)
-
-    def advance(self, t: float) -> None:
-        """Both."""
-        super().advance(t)
-        self.behind.advance(t - STEP)
 
     def misreport(self, sample: Sample) -> Sample:
         """The other's force."""

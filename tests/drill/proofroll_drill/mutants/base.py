@@ -95,3 +95,20 @@ class Honest(Mutant):
     def built(self) -> Built | Any:
         """Read back."""
         return self.inner.built()
+
+
+class OneStepBehind(Mutant):
+    """It has a second model, one step behind.
+
+    Attributes:
+        behind: that model.
+    """
+
+    def __init__(self, scene: Scene, settings: Any) -> None:
+        super().__init__(scene, settings)
+        self.behind: Any = type(self.inner).build(scene, settings)
+
+    def advance(self, t: float) -> None:
+        """Both."""
+        super().advance(t)
+        self.behind.advance(t - STEP)

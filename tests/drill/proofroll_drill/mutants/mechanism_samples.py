@@ -10,7 +10,7 @@ from scipy.spatial.transform import Rotation
 
 from proofroll.core.engine import Sample
 from proofroll.core.scene import Scene
-from proofroll_drill.mutants.base import STEP, Mutant
+from proofroll_drill.mutants.base import STEP, Mutant, OneStepBehind
 from proofroll_drill.mutants.mechanism_models import CRANK, PENDULUM, TOP
 
 
@@ -148,20 +148,11 @@ class ScalarLast(_Told):
         return dataclasses.replace(sample, q_WB=np.roll(sample.q_WB, -1, axis=-1)) if self.t else sample
 
 
-class LateReaction(_Told):
+class LateReaction(OneStepBehind, _Told):
     """The reactions of the step before."""
 
     fault = "reactions of the step before"
     named = ("force is one step (0.002 s) late",)
-
-    def __init__(self, scene: Scene, settings: Any) -> None:
-        super().__init__(scene, settings)
-        self.behind: Any = type(self.inner).build(scene, settings)
-
-    def advance(self, t: float) -> None:
-        """Both."""
-        super().advance(t)
-        self.behind.advance(t - STEP)
 
     def misreport(self, sample: Sample) -> Sample:
         """The other's."""
