@@ -57,8 +57,7 @@ def load_engine(name: str) -> Any:
     oldest = found.oldest if isinstance(found, SupportsFrom) else ""
     if oldest and release(found.version()) < release(oldest):
         said = f"{name} {found.version()} is older than its adapter supports, {oldest}"
-        ours = point.value.startswith("proofroll.")
-        raise Missing(f"{said}; pip install --upgrade 'proofroll[{name}]'" if ours else f"{said}; install a later one")
+        raise Missing(f"{said}; install a later {name}")
     return found
 
 

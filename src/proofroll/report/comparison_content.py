@@ -12,6 +12,7 @@ from proofroll.core.verdict import Judgement, Verdict
 from proofroll.files.json_data import plain
 from proofroll.files.scene_file import load_scene
 from proofroll.running.case import Status
+from proofroll.running.environments import shown_name
 from proofroll.running.timing import machine
 from proofroll.studies.hosts import hosts
 from proofroll.studies.outcome import Outcome, Run
@@ -187,7 +188,7 @@ def _settings(run: Run) -> dict[str, Any]:
     settings = run.facts.settings if run.facts else {}
     resolution = run.facts.resolution if run.facts else None
     return {
-        "name": run.facts.name if run.facts else run.row.engine.partition("[")[0],
+        "name": shown_name(run.facts.name if run.facts else run.row.engine.partition("[")[0]),
         "formulation": settings.get("formulation"),
         "preset": settings.get("preset"),
         "setting": _setting(run, settings.get("preset"), resolution),

@@ -80,6 +80,17 @@ def find(name: str, label: str) -> Environment | None:
     return _read(place(name, label)) if re.fullmatch(_LABEL, label) else None
 
 
+def shown_name(engine: str) -> str:
+    """``NAME@PLACE`` in few words: the label of an environment for the path of its Python, or the folder's name."""
+    name, where = plain_name(engine), place_of(engine)
+    if os.sep not in where:
+        return engine
+    path = Path(os.path.abspath(Path(where).expanduser()))
+    known = (item.label for item in remembered() if path in {item.python, item.folder / "venv"})
+    folder = path.parent.parent if path.parent.name == "bin" else path
+    return f"{name}@{next(known, folder.name)}"
+
+
 def place(name: str, label: str) -> Path:
     """The folder of an environment.
 

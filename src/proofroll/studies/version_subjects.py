@@ -1,23 +1,17 @@
-"""What two versions of an engine are compared on: comparisons, or a scene."""
+"""Which cases two versions of an engine are asked for: comparisons, a scene, or all that there is."""
 
 from __future__ import annotations
 
-from proofroll.core.comparison import Band, Comparison, Row, Tolerance
+import dataclasses
+
+from proofroll.core.comparison import Comparison, Row
 from proofroll.core.errors import InputError
 from proofroll.core.plugins import parse_engine
 from proofroll.files.comparison_file import comparison_names, load_comparison
 from proofroll.files.data_folders import study_folders
-from proofroll.files.scene_file import load_scene, read_scene_file, scene_folder
+from proofroll.files.scene_file import scene_folder
 from proofroll.files.toml import study_of
-from proofroll.running.asking import describe
-
-# Of a scene about which no comparison is written.
-_UNTIL, _EVERY = 2.0, 0.01
-
-
-_BECAUSE = (
-    "a thousandth of its size is what a measurement or a picture would show; no comparison says more about this scene"
-)
+from proofroll.studies import first_look
 
 
 def comparisons_about(subject: str, engine: str) -> list[Comparison]:
@@ -53,26 +47,10 @@ def _rows_of(comparison: Comparison, engine: str) -> list[Row]:
 
 
 def _of_scene(name: str, engine: str) -> Comparison:
-    """Every formulation and preset of an engine on a scene, held to a thousandth of what decides there."""
-    scene = load_scene(name)
-    told = describe(engine) if named_engine(engine) else None
-    if told is None:
-        raise InputError("engine", engine, f"no comparison about {name} has rows of it, and it is not installed here")
-    rows = [
-        Row(f"{engine}[formulation={formulation},preset={preset}]", "thousandth")
-        for formulation, presets in told["presets"].items()
-        if set(scene.requires) & set(told["provides"][formulation])
-        for preset in presets
-    ]
+    """What a comparison of a scene alone has of an engine."""
+    looked = first_look.compared(name, {})
+    rows = _rows_of(looked, engine)
     if not rows:
-        raise InputError("engine", engine, f"none of its formulations is for scenes like {name}")
-    bands = {"thousandth": Band(_BECAUSE, {scene.deciding: Tolerance(1e-3, True)})}
-    title = read_scene_file(name).title
-    return Comparison(name, title, title, name, _UNTIL, _EVERY, bands=bands, rows=rows, timed=False)
-
-
-def named_engine(name: str) -> bool:
-    """Whether an installed package announces this engine."""
-    from proofroll.core.plugins import engine_names
-
-    return name in engine_names()
+        why = f"no comparison about {name} has rows of it, and no formulation of it that is installed here can"
+        raise InputError("engine", engine, why)
+    return dataclasses.replace(looked, rows=rows, timed=False)

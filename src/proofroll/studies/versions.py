@@ -5,35 +5,21 @@ from __future__ import annotations
 import dataclasses
 from collections import Counter
 from collections.abc import Callable, Mapping, Sequence
-from typing import TYPE_CHECKING, Any
-
-import numpy as np
+from typing import Any
 
 from proofroll.core.comparison import Comparison
-from proofroll.core.dataset import observe, scales
-from proofroll.core.observable import Role
 from proofroll.core.plugins import parse_engine
-from proofroll.core.scene import Scene
-from proofroll.files.netcdf import read
-from proofroll.files.scene_file import load_scene
 from proofroll.running.asking import describe
-from proofroll.running.case import Result, Status
+from proofroll.running.case import Status
 from proofroll.running.runner import Runner
 from proofroll.running.stopwatch import Stopwatch
 from proofroll.running.timing import interleaved, ratio
 from proofroll.studies.compare import evaluate
 from proofroll.studies.hosts import hosts
 from proofroll.studies.outcome import Run
-from proofroll.studies.planning import Plan, plan, point_name
+from proofroll.studies.planning import Plan, plan
+from proofroll.studies.version_difference import case_difference, setting_of
 
-if TYPE_CHECKING:
-    import xarray as xr
-
-# Of two runs relative to the size of the quantity: another compiler or another order of sums moves numbers by some
-# 1e-13, and the solvers of constraints stop at tolerances of theirs; what physics or a method changes is far above.
-ROUND_OFF = 1e-9
-# Two observed orders that are further apart are different methods: a ladder shows a whole order to a tenth or two.
-_ANOTHER_ORDER = 0.5
 # Rounds of timing: with twelve one estimate moved by 5 % between series, with twenty the interval is some 4 % wide.
 ROUNDS = 20
 
@@ -51,7 +37,7 @@ def compared(
 
     Args:
         sides: the engine twice, ``NAME`` or ``NAME@PLACE``: the old version and the new one.
-        comparisons: from :func:`comparisons_about`.
+        comparisons: from :func:`proofroll.studies.version_subjects.comparisons_about`.
         runner: where the cases are run.
         rounds: of timing; 0 times nothing.
         progress: called with what has just been done.
@@ -69,7 +55,7 @@ def compared(
         runs = evaluate(item, results, runner).runs
         one, other = ([run for run in runs if parse_engine(run.row.engine).name == side] for side in sides)
         found += [(item, before, after) for before, after in zip(one, other, strict=True)]
-    told_cases = [_case(item, before, after, results, runner) for item, before, after in found]
+    told_cases = [case_difference(item, before, after, results, runner) for item, before, after in found]
     speeds = _speeds(found, runner, rounds, progress) if rounds else {}
     return {
         "engine": parse_engine(sides[0]).name.partition("@")[0],
@@ -93,97 +79,6 @@ def compared(
 
 def _side(name: str, told: Mapping[str, Any]) -> dict[str, Any]:
     return {"name": name, "version": told["version"], "interpreter": told["interpreter"]}
-
-
-def _setting(run: Run) -> str:
-    """Settings as the file writes them, without the engine."""
-    return ", ".join(f"{key}={value}" for key, value in parse_engine(run.row.engine).options.items()) or "as it is"
-
-
-def _case(item: Plan, before: Run, after: Run, results: Mapping[str, Result], runner: Runner) -> dict[str, Any]:
-    """One case in both versions."""
-    setting, point = _setting(before), point_name(before.parameters)
-    where = f"{item.comparison.name}: {setting}" + (f" at {point}" if point else "")
-    sides = {name: _told(run) for name, run in (("old", before), ("new", after))}
-    verdicts = [
-        (one.observable, one.verdict, other.verdict)
-        for one in before.judgements
-        for other in after.judgements
-        if one.observable == other.observable and one.verdict != other.verdict
-    ]
-    changed = []
-    if before.result.status != after.result.status:
-        changed.append(f"{where}: {_ending(before)} → {_ending(after)}")
-    elif before.verdict != after.verdict or verdicts:
-        which = ", ".join(f"{name} {one} → {other}" for name, one, other in verdicts)
-        changed.append(f"{where}: {which or f'{before.verdict} → {after.verdict}'}")
-    orders = [
-        {"quantity": one.observable, "old": one.order, "new": other.order}
-        for one in before.judgements
-        for other in after.judgements
-        if one.observable == other.observable and one.order and other.order
-        if abs(one.order - other.order) > _ANOTHER_ORDER
-    ]
-    return {
-        "comparison": item.comparison.name,
-        "scene": item.comparison.scene,
-        "setting": setting,
-        "point": point,
-        **sides,
-        "numbers": _numbers(item, before, after, results, runner),
-        "orders": orders,
-        "changed": changed,
-    }
-
-
-def _told(run: Run) -> dict[str, Any]:
-    return {
-        "status": run.result.status,
-        "message": run.result.message,
-        "verdict": run.verdict,
-        "declared_order": run.facts.order if run.facts else None,
-        "errors": {judgement.observable: judgement.error for judgement in run.judgements},
-        "versions": run.result.versions,
-    }
-
-
-def _ending(run: Run) -> str:
-    return str(run.verdict) if run.result.status == Status.DONE else f"{run.result.status} ({run.result.message})"
-
-
-def _numbers(
-    item: Plan, before: Run, after: Run, results: Mapping[str, Result], runner: Runner
-) -> dict[str, Any] | None:
-    """How far the trajectories are apart, by the observable that differs most for its size; None: there are none."""
-    if before.case is None or after.case is None or not before.result.trajectory or not after.result.trajectory:
-        return None
-    one, other = (read(runner.store.trajectory(run.case)) for run in (before, after) if run.case is not None)
-    scene = load_scene(item.comparison.scene, **before.parameters)
-    truth = item.truths[point_name(before.parameters)]
-    sizes = scales(scene, read(runner.store.trajectory(truth))) if results[truth.key].trajectory else {}
-    return _apart(scene, one, other, sizes)
-
-
-def _apart(scene: Scene, one: xr.Dataset, other: xr.Dataset, sizes: Mapping[str, float]) -> dict[str, Any]:
-    found = {"quantity": "", "unit": "", "difference": 0.0, "relative": 0.0, "kind": "same bits"}
-    values, others = observe(scene, one), observe(scene, other)
-    for name, mine in values.items():
-        item, theirs = scene.observables[name], others.get(name)
-        if theirs is None or item.role not in {Role.MOTION, Role.REACTION} or mine.ndim != theirs.ndim:
-            continue
-        count = min(len(mine), len(theirs))
-        if mine[:count].shape != theirs[:count].shape or np.array_equal(mine[:count], theirs[:count], equal_nan=True):
-            continue
-        apart = np.abs(mine[:count] - theirs[:count])
-        difference = float(np.nanmax(apart, initial=0.0))
-        size = sizes.get(name) or float(np.nanmax(np.abs(mine), initial=0.0)) or 1.0
-        if found["kind"] == "same bits":
-            found["kind"] = "round-off"
-        if difference / size >= float(str(found["relative"])):
-            found |= {"quantity": name, "unit": item.unit, "difference": difference, "relative": difference / size}
-    if float(str(found["relative"])) > ROUND_OFF:
-        found["kind"] = "changed"
-    return found
 
 
 def _rows(cases: Sequence[dict[str, Any]], speeds: Mapping[tuple[str, str], dict[str, Any]]) -> list[dict[str, Any]]:
@@ -219,7 +114,7 @@ def _speeds(
     chosen: dict[tuple[str, str], tuple[Run, Run]] = {}
     for item, before, after in found:
         if before.result.status == after.result.status == Status.DONE:
-            chosen.setdefault((item.comparison.name, _setting(before)), (before, after))
+            chosen.setdefault((item.comparison.name, setting_of(before)), (before, after))
     speeds = {}
     with Stopwatch(runner.workers) as watch:
         for key, (before, after) in chosen.items():

@@ -14,6 +14,7 @@ from typing import TYPE_CHECKING, Any, Protocol, runtime_checkable
 
 import numpy as np
 
+from proofroll.core.arrays import FloatArray
 from proofroll.core.element import Element
 
 if TYPE_CHECKING:
@@ -159,3 +160,11 @@ def hypotheses_of(element: Element) -> Sequence[Any]:
 def worth(difference: float, size: float) -> bool:
     """Whether a difference is large enough to have a cause other than round-off."""
     return bool(np.isfinite(difference) and difference > _LEAST * max(size, 1e-300))
+
+
+def apart(one: FloatArray, other: FloatArray) -> float:
+    """Largest difference; infinite where something is not finite in one of them alone."""
+    difference = np.abs(np.asarray(one) - np.asarray(other))
+    known = difference[~(np.isnan(one) & np.isnan(other))] if difference.size else difference
+    found = float(np.max(known, initial=0.0))
+    return found if np.isfinite(found) else float("inf")

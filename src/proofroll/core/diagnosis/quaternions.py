@@ -8,8 +8,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from proofroll.core.arrays import FloatArray
-from proofroll.core.diagnosis import Cause, worth
-from proofroll.core.diagnosis.vectors import apart
+from proofroll.core.diagnosis import Cause, apart, worth
 
 if TYPE_CHECKING:
     import xarray as xr

@@ -13,12 +13,11 @@ from dataclasses import dataclass, field
 import numpy as np
 
 from proofroll.core.arrays import FloatArray
-from proofroll.core.diagnosis import Cause, worth
-from proofroll.core.diagnosis.fitting import said_factor
+from proofroll.core.diagnosis import Cause, apart, worth
+from proofroll.core.diagnosis.clocks import late, said_delay
+from proofroll.core.diagnosis.fitting import known_factor, said_factor
 
 WORLD = "world"
-_SPLINE = 5
-_SHIFTS = 6
 # A rotation is fitted with three numbers, a scale or a shift with one, a limit with one.
 _PERMUTATIONS = [
     (order, signs)
@@ -130,6 +129,8 @@ class Reported:
         square = float(np.sum(self.true**2))
         if square:
             factor = float(np.sum(self.said * self.true)) / square
+            if np.count_nonzero(self.true) < 2 and known_factor(factor) is None:
+                return  # some factor takes any number to any other
             times = (
                 "times the step, as an impulse" if step and abs(factor - step) < 1e-3 * step else said_factor(factor)
             )
@@ -157,51 +158,6 @@ class Reported:
         yield Cause(f"late.{self.name}", says, self.name, self.unit, before, after, remedy, 1)
 
 
-def apart(one: FloatArray, other: FloatArray) -> float:
-    """Largest difference; infinite where something is not finite in one of them alone."""
-    difference = np.abs(np.asarray(one) - np.asarray(other))
-    known = difference[~(np.isnan(one) & np.isnan(other))] if difference.size else difference
-    found = float(np.max(known, initial=0.0))
-    return found if np.isfinite(found) else float("inf")
-
-
 def into(frame: FloatArray, vectors: FloatArray) -> FloatArray:
     """Components along the axes of frames."""
     return np.asarray(np.einsum("...ji,...j->...i", frame, vectors))
-
-
-def late(time: FloatArray, said: FloatArray, true: FloatArray) -> tuple[float, float, float] | None:
-    """By how much what is said is late [s], and the differences without and with that; None: too few samples.
-
-    The true curve is laid through its samples; the first and last few, beyond which a shift would lead, are left out.
-    """
-    from scipy.interpolate import make_interp_spline
-
-    if len(time) < 3 * (_SPLINE + 1):
-        return None
-    flat, held = said.reshape(len(time), -1), true.reshape(len(time), -1)
-    known = np.isfinite(flat).all(0) & np.isfinite(held).all(0)
-    if not known.any():
-        return None
-    inner = slice(_SPLINE, -_SPLINE)
-    flat, curve = flat[inner][:, known], make_interp_spline(time, held[:, known], k=_SPLINE)
-    rate, delay, reach = curve.derivative(), 0.0, time[_SPLINE] - time[0]
-    for _ in range(_SHIFTS):
-        slope = rate(time[inner] - delay)
-        square = float(np.sum(slope**2))
-        if not square:
-            return None
-        delay -= float(np.sum((flat - curve(time[inner] - delay)) * slope)) / square
-        delay = float(np.clip(delay, -reach, reach))
-    return delay, apart(flat, held[inner][:, known]), apart(flat, curve(time[inner] - delay))
-
-
-def said_delay(delay: float, step: float | None) -> str:
-    """A shift in time, in steps where it is some."""
-    word = "late" if delay > 0 else "early"
-    if step:
-        steps = abs(delay) / step
-        for number, words in ((0.5, "half a step"), (1.0, "one step"), (2.0, "two steps")):
-            if abs(steps - number) <= 0.05 * number:
-                return f"{words} ({abs(delay):.3g} s) {word}"
-    return f"{abs(delay):.3g} s {word}"

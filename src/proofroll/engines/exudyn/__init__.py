@@ -28,6 +28,7 @@ from proofroll.engines.exudyn.carrier import Carrier
 from proofroll.engines.exudyn.contact import PenaltyContact
 from proofroll.engines.exudyn.generic import Generic
 from proofroll.engines.exudyn.local_frame import slides
+from proofroll.engines.exudyn.native import exu
 from proofroll.engines.exudyn.redundant import Redundant
 from proofroll.engines.exudyn.rolling_disc import RollingDisc
 from proofroll.engines.exudyn.settings import PRESETS, ExudynSettings
@@ -49,13 +50,15 @@ _ROLLS_AT_REST: Mapping[str, str] = {
     BallCapability.BOUNDED_FRICTION: "its joint rolls without slip; use generic or contact",
     BallCapability.MOVING_WALL: "its joint rolls on what is at rest; use generic",
 }
+# Formulations whose joints are given by whole frames (exudyn.HT).
+_WITH_FRAMES = {"carrier", *OF_MECHANISMS}
 
 
 class Exudyn:
     """Exudyn's implicit integration of multibody systems with constraints, or with its penalty contact."""
 
     name: ClassVar[str] = "exudyn"
-    oldest: ClassVar[str] = "1.13"  # before, settings and items have other names
+    oldest: ClassVar[str] = "1.11"  # the oldest that was tried
     provides: ClassVar[Mapping[str, frozenset[str]]] = {
         "generic": (ALL_OF_A_BALL | {BallCapability.MOVING_WALL}) - {BallCapability.ORIENTATION},
         "carrier": ROLLS | {BallCapability.ORIENTATION},
@@ -144,6 +147,10 @@ class Exudyn:
     @classmethod
     def build(cls, scene: Scene, settings: ExudynSettings) -> Self:
         """See :class:`proofroll.core.engine.Engine`."""
+        if settings.formulation in _WITH_FRAMES and not hasattr(exu, "HT"):
+            raise Refused(
+                f"{settings.formulation} needs the frames of markers of exudyn 1.13, and this is {cls.version()}"
+            )
         if settings.formulation in OF_MECHANISMS:
             return cls(OF_MECHANISMS[settings.formulation](scene, settings))
         return cls(MODELS[settings.formulation](rolling_ball(scene), settings))

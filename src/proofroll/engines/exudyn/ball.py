@@ -14,7 +14,7 @@ from proofroll.core.engine import Built, Sample
 from proofroll.elements.ball_on_surface.model import BallCapability, RollingBall
 from proofroll.elements.ball_on_surface.surfaces import Surface
 from proofroll.engines.exudyn.local_frame import curvature
-from proofroll.engines.exudyn.native import Output, items, loads
+from proofroll.engines.exudyn.native import Output, add_rigid_body, items, loads, rigid_body
 from proofroll.engines.exudyn.resistance import slow
 
 
@@ -51,7 +51,7 @@ class RigidBall:
 
     def built(self, ball_radius: float | None, gap: float | None) -> Built:
         """Everything but the radius [m] and the gap [m], which joints or contact hold."""
-        body = self.system.GetObject(self.body)
+        body = rigid_body(self.system, self.body)
         return Built(
             mass=body["mass"],
             inertia=np.array(body["inertia"][:3]),
@@ -82,9 +82,7 @@ def add_body(system: Any, mass: float, inertia: float, p: FloatArray, v: FloatAr
             initialVelocities=[*v, 0.0, *(w / 2)],  # rates of the Euler parameters of a body that is not turned
         )
     )
-    body = system.AddObject(
-        items.ObjectRigidBody(mass=mass, inertia=[inertia, inertia, inertia, 0.0, 0.0, 0.0], nodeNumber=node)
-    )
+    body = add_rigid_body(system, mass, [inertia, inertia, inertia, 0.0, 0.0, 0.0], node)
     return node, body
 
 

@@ -10,7 +10,7 @@ import numpy as np
 from proofroll.core.arrays import FloatArray
 from proofroll.core.engine import whole_steps
 from proofroll.core.errors import Diverged, Refused
-from proofroll.engines.exudyn.native import exu
+from proofroll.engines.exudyn.native import ExudynError, exu, new_settings
 from proofroll.engines.exudyn.settings import EXPLICIT, ExudynSettings
 
 # At 4 m/s the ball comes 0.3 micrometres nearer in a step of 1e-4 s that is halved so much oftener than ten times.
@@ -31,12 +31,8 @@ def simulation_settings(settings: ExudynSettings, *, dependent: bool = False, im
     ``dependent``: constraints may depend on each other, which needs a linear solver that looks for it. ``impacts``:
     steps end where contacts close and open, for which they are halved more often.
     """
-    result = exu.SimulationSettings()
-    if dependent:
-        result.linearSolver.solverType = exu.LinearSolverType.EigenDense
-        result.linearSolver.ignoreSingularJacobian = True
-    result.solution.file.write = False
-    result.solution.sensors.active = False
+    kind = getattr(exu.DynamicSolverType, settings.integrator.upper()) if settings.integrator in EXPLICIT else None
+    result = new_settings(dependent=dependent, explicit=kind)
     result.parallel.numberOfThreads = 1
     time = result.timeIntegration
     time.verboseMode = 0
@@ -51,8 +47,6 @@ def simulation_settings(settings: ExudynSettings, *, dependent: bool = False, im
     if settings.spectral_radius is not None:
         alpha.spectralRadius = settings.spectral_radius
     alpha.useNewmark = alpha.useIndex2Constraints = settings.integrator == "trapezoidal_index2"
-    if settings.integrator in EXPLICIT:
-        time.solverType = getattr(exu.DynamicSolverType, settings.integrator.upper())
     time.numberOfSteps = 1
     time.endTime = settings.dt
     return result
@@ -105,7 +99,7 @@ class Integration:
             system.systemData.SetODE2Coordinates_tt(start[0], exu.ConfigurationType.Initial)
         try:
             accepted = self.solver.InitializeSolver(system, self.options)
-        except exu.ExudynError as error:
+        except ExudynError as error:
             raise Refused(f"Exudyn does not accept the model: {_sentence(error)}") from None
         if not accepted:
             raise Refused(f"Exudyn does not accept the model: {_sentence(self.solver.GetErrorString())}")

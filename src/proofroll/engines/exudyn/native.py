@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from typing import Any
 
 import exudyn
@@ -10,6 +11,57 @@ import exudyn.itemInterface
 exu: Any = exudyn
 items: Any = exudyn.itemInterface
 Output: Any = exudyn.OutputVariableType
+# In 1.11 settings and properties of bodies have other names than in 1.13, and errors are Python's own.
+ExudynError: Any = getattr(exudyn, "ExudynError", RuntimeError)
+
+
+def new_settings(*, dependent: bool, explicit: Any = None) -> Any:
+    """Exudyn's simulation settings, by the names of its version: no files, no sensors.
+
+    Args:
+        dependent: whether constraints may depend on each other, which needs a linear solver that looks for it.
+        explicit: type of an explicit solver; None: an implicit one.
+    """
+    found = exu.SimulationSettings()
+    renamed = not hasattr(found, "solution")
+    if dependent:
+        kind = exu.LinearSolverType.EigenDense
+        if renamed:
+            found.linearSolverType = kind
+        else:
+            found.linearSolver.solverType = kind
+        (found.linearSolverSettings if renamed else found.linearSolver).ignoreSingularJacobian = True
+    if renamed:
+        found.solutionSettings.writeSolutionToFile = found.solutionSettings.sensorsStoreAndWriteFiles = False
+    else:
+        found.solution.file.write = found.solution.sensors.active = False
+    if explicit is not None:
+        time = found.timeIntegration
+        if renamed:
+            time.explicitIntegration.dynamicSolverType = explicit
+        else:
+            time.solverType = explicit
+    return found
+
+
+def add_rigid_body(system: Any, mass: float, inertia: Sequence[float], node: Any) -> Any:
+    """A rigid body on a node: mass [kg], moments and products xx, yy, zz, yz, xz, xy about the node [kg m²]."""
+    made = items.ObjectRigidBody(nodeNumber=node)
+    prefix = "" if hasattr(made, "mass") else "physics"
+    for name, value in (("mass", mass), ("inertia", list(inertia))):
+        setattr(made, _named(prefix, name), value)
+    return system.AddObject(made)
+
+
+def rigid_body(system: Any, number: Any) -> dict[str, Any]:
+    """What Exudyn holds of a rigid body: ``mass``, ``inertia`` as above, ``centerOfMass``."""
+    found = system.GetObject(number)
+    prefix = "" if "mass" in found else "physics"
+    return {name: found[_named(prefix, name)] for name in ("mass", "inertia", "centerOfMass")}
+
+
+def _named(prefix: str, name: str) -> str:
+    return prefix + name[0].upper() + name[1:] if prefix else name
 
 
 def loads(system: Any) -> list[str]:

@@ -19,7 +19,7 @@ from proofroll.elements.mechanism.rotations import Array, quaternion_rate, to_qu
 from proofroll.elements.mechanism.sampling import WITH_AXIS, MechanismBuilt, independent, mechanism_of, unsaid
 from proofroll.engines.exudyn.connections import Connections
 from proofroll.engines.exudyn.integration import Integration, initial_matrices, new_system
-from proofroll.engines.exudyn.native import Output, exu, items
+from proofroll.engines.exudyn.native import Output, add_rigid_body, exu, items, rigid_body
 from proofroll.engines.exudyn.settings import ExudynSettings
 
 PROVIDES = frozenset(ALL_JOINTS | ALL_LOOPS | FORCES | {MechanismCapability.REDUNDANT})
@@ -78,9 +78,7 @@ class Redundant:
                 )
             )
             (xx, xy, xz), (_, yy, yz), (_, _, zz) = body.inertia
-            made = system.AddObject(
-                items.ObjectRigidBody(mass=body.mass, inertia=[xx, yy, zz, yz, xz, xy], nodeNumber=node)
-            )
+            made = add_rigid_body(system, body.mass, [xx, yy, zz, yz, xz, xy], node)
             self._bodies[body.name] = made
             marker = system.AddMarker(items.MarkerBodyMass(bodyNumber=made))
             system.AddLoad(items.LoadMassProportional(markerNumber=marker, loadVector=self._mechanism.gravity))
@@ -118,7 +116,7 @@ class Redundant:
     def built(self) -> MechanismBuilt:
         """See :class:`proofroll.core.engine.Engine`."""
         system, bodies = self._system, self._mechanism.bodies
-        data = [system.GetObject(self._bodies[body.name]) for body in bodies]
+        data = [rigid_body(system, self._bodies[body.name]) for body in bodies]
         joints = self._joints[: len(self._mechanism.joints)]
         axes = np.full((len(joints), 3), np.nan)
         for number, (joint, made) in enumerate(zip(self._mechanism.joints, joints, strict=True)):

@@ -12,6 +12,7 @@ from proofroll.elements.mechanism import Mechanism
 from proofroll.elements.mechanism.rotations import Array
 from proofroll.elements.mechanism.sampling import DEPENDENT, WITH_AXIS, MechanismBuilt, independent
 from proofroll.engines.mujoco.mechanism_model import PARTS
+from proofroll.engines.mujoco.running import mass_matrix
 
 # The hard answer has round-off of its own, most where rows depend on each other.
 _MARGIN = 1.1
@@ -86,9 +87,7 @@ def _softened(
     Hard loops have the accelerations that MuJoCo's own terms want (``efc_aref``), exactly. The tolerance is thus what
     softness explains and no more: rows that are wrong or missing are so in both answers.
     """
-    M = np.zeros((model.nv, model.nv))
-    mujoco.mj_fullM(model, data, M)
-    into = np.linalg.solve(M, rows.T)
+    into = np.linalg.solve(mass_matrix(model, data), rows.T)
     without = data.qacc - into @ data.efc_force[: data.ne]
     missing = data.efc_aref[: data.ne] - rows @ without
     data.qacc[:] = without + into @ np.linalg.pinv(rows @ into, DEPENDENT, hermitian=True) @ missing

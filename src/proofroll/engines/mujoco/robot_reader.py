@@ -110,6 +110,8 @@ def _at(
 ) -> AtState:
     import mujoco
 
+    from proofroll.engines.mujoco.running import mass_matrix
+
     states = request.states
     T = np.eye(model.nv)
     data.qpos[:], data.qvel[:] = model.qpos0, 0.0
@@ -134,11 +136,7 @@ def _at(
     data.qfrc_applied[:] = 0.0
     mujoco.mj_forward(model, data)
     frames.append((data.xpos.copy(), data.xmat.copy()))
-    M = np.zeros((model.nv, model.nv))
-    try:
-        mujoco.mj_fullM(model, data, M)
-    except TypeError:  # before 3.10
-        mujoco.mj_fullM(model, M, data.qM)
+    M = mass_matrix(model, data)
 
     def inverse(acceleration: Array) -> Array:
         data.qacc[:] = acceleration

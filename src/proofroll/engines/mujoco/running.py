@@ -7,7 +7,9 @@ from contextlib import contextmanager
 from typing import Any
 
 import mujoco
+import numpy as np
 
+from proofroll.core.arrays import FloatArray
 from proofroll.core.errors import Diverged, Refused
 
 _FATAL = (
@@ -58,3 +60,13 @@ def raise_if_fatal(data: Any, t: float) -> None:
     for kind, meaning in _FATAL:
         if warnings[kind].number:
             raise Diverged(f"MuJoCo gave up before {t:g} s: {meaning}")
+
+
+def mass_matrix(model: Any, data: Any) -> FloatArray:
+    """The whole mass matrix in the present configuration, shape (nv, nv)."""
+    M = np.zeros((model.nv, model.nv))
+    try:
+        mujoco.mj_fullM(model, data, M)
+    except TypeError:  # before 3.10
+        mujoco.mj_fullM(model, M, data.qM)
+    return M

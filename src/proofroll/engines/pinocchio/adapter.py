@@ -24,6 +24,9 @@ from proofroll.engines.pinocchio.null_space import NullSpace
 from proofroll.engines.pinocchio.rows_run import RowsRun
 from proofroll.engines.pinocchio.settings import OF_MECHANISMS, PRESETS, PinocchioSettings
 
+# Before 4.0 the constraints have other signatures and other results.
+_OF_PINOCCHIO_4 = {"contact", "constraint_dynamics"}
+
 
 class Pinocchio:
     """Pinocchio's equations of motion with rows of rolling put to them, or its own solver of contact with friction."""
@@ -106,10 +109,10 @@ class Pinocchio:
     @classmethod
     def build(cls, scene: Scene, settings: PinocchioSettings) -> Self:
         """See :class:`proofroll.core.engine.Engine`."""
+        if settings.formulation in _OF_PINOCCHIO_4 and release(cls.version()) < (4,):
+            raise Refused(f"{settings.formulation} needs the constraints of pinocchio 4.0, and this is {cls.version()}")
         if settings.formulation in OF_MECHANISMS:
             return cls(MechanismRun.build(scene, settings))
-        if settings.formulation == "contact" and release(cls.version()) < (4,):
-            raise Refused(f"contact needs the constraints of pinocchio 4.0, and this is {cls.version()}")
         settings = _decided(scene, settings)
         return cls((ContactRun if settings.formulation == "contact" else RowsRun)(rolling_ball(scene), settings))
 

@@ -161,8 +161,14 @@ class StaticForKinetic(Mutant):
         return _contact(scene, mu_kinetic=0.2)
 
 
-class _Newton(Mutant):
-    """Runge-Kutta 4 on the unreduced equations, with a fault in them."""
+class NewtonMutant(Mutant):
+    """Runge-Kutta 4 on the unreduced equations, with a fault in them.
+
+    Attributes:
+        h: step by which it moves for each that it counts [s].
+    """
+
+    h: ClassVar[float] = STEP
 
     def __init__(self, scene: Scene, settings: Any) -> None:
         super().__init__(scene, settings)
@@ -180,12 +186,13 @@ class _Newton(Mutant):
 
     def advance(self, t: float) -> None:
         """See :class:`proofroll.core.engine.Engine`."""
+        h = self.h
         for _ in range(round((t - self.t) / STEP)):
             k1 = self.rates(self.x)
-            k2 = self.rates(self.x + STEP / 2 * k1)
-            k3 = self.rates(self.x + STEP / 2 * k2)
-            k4 = self.rates(self.x + STEP * k3)
-            self.x = self.after_step(self.x + STEP / 6 * (k1 + 2 * k2 + 2 * k3 + k4))
+            k2 = self.rates(self.x + h / 2 * k1)
+            k3 = self.rates(self.x + h / 2 * k2)
+            k4 = self.rates(self.x + h * k3)
+            self.x = self.after_step(self.x + h / 6 * (k1 + 2 * k2 + 2 * k3 + k4))
         self.t = t
 
     def after_step(self, x: FloatArray) -> FloatArray:
@@ -201,8 +208,13 @@ class _Newton(Mutant):
         """None."""
         return []
 
+    def built(self) -> Any:
+        """What it was given; how it sets off is that of its own equations."""
+        a, alpha, _ = self.response(self.x)
+        return dataclasses.replace(self.claimed.built(), acceleration=a, angular_acceleration=alpha)
 
-class Damped(_Newton):
+
+class Damped(NewtonMutant):
     """Velocity and spin shrink at each step, as engines for games have it by default."""
 
     fault = "damping of 0.04 per second left on"
@@ -213,7 +225,7 @@ class Damped(_Newton):
         return np.stack([x[0], *(x[1:] * (1 - 0.04 * STEP))])
 
 
-class AgainstSpin(_Newton):
+class AgainstSpin(NewtonMutant):
     """The resistance opposes ω as a whole."""
 
     fault = "rolling resistance against the spin"

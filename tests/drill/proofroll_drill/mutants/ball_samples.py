@@ -15,7 +15,7 @@ from proofroll.elements.ball_on_surface.element import rolling_ball
 from proofroll_drill.mutants.base import STEP, Mutant, OneStepBehind
 
 
-class _Told(Mutant):
+class ToldBall(Mutant):
     """What a ball's samples are made wrong with."""
 
     asks = ("orientation",)
@@ -29,7 +29,7 @@ class _Told(Mutant):
         return np.asarray(self.body.surface.frame(self.body.surface.locate(p[None]))[0])
 
 
-class BodySpin(_Told):
+class BodySpin(ToldBall):
     """ω along the body's axes."""
 
     fault = "body spin for world spin"
@@ -42,7 +42,7 @@ class BodySpin(_Told):
         return dataclasses.replace(sample, w_WB=turn.inv().apply(sample.w_WB))
 
 
-class LocalSpin(_Told):
+class LocalSpin(ToldBall):
     """ω along e1, e2, e3."""
 
     fault = "spin along the surface's axes"
@@ -53,7 +53,7 @@ class LocalSpin(_Told):
         return dataclasses.replace(sample, w_WB=self.local(sample.p_WB).T @ sample.w_WB)
 
 
-class NegativeForce(_Told):
+class NegativeForce(ToldBall):
     """The force on the wall."""
 
     fault = "force of the ball on the wall"
@@ -65,7 +65,7 @@ class NegativeForce(_Told):
         return dataclasses.replace(sample, force=-sample.force)
 
 
-class LocalForce(_Told):
+class LocalForce(ToldBall):
     """The force along e1, e2, e3."""
 
     fault = "force in the surface's axes"
@@ -77,7 +77,7 @@ class LocalForce(_Told):
         return dataclasses.replace(sample, force=self.local(sample.p_WB).T @ sample.force)
 
 
-class BodyForce(_Told):
+class BodyForce(ToldBall):
     """The force along the body's axes."""
 
     fault = "force in body axes"
@@ -91,7 +91,7 @@ class BodyForce(_Told):
         return dataclasses.replace(sample, force=turn.inv().apply(sample.force))
 
 
-class FrictionSign(_Told):
+class FrictionSign(ToldBall):
     """N is right, the friction points the other way."""
 
     fault = "friction with the wrong sign"
@@ -104,7 +104,7 @@ class FrictionSign(_Told):
         return dataclasses.replace(sample, force=2 * (sample.force @ e1) * e1 - sample.force)
 
 
-class StaleNormal(_Told):
+class StaleAxes(ToldBall):
     """The force is put along the axes of the step before."""
 
     fault = "stale normal: the force along the axes of a step before"
@@ -117,7 +117,7 @@ class StaleNormal(_Told):
         return dataclasses.replace(sample, force=self.local(before) @ self.local(sample.p_WB).T @ sample.force)
 
 
-class Impulse(_Told):
+class Impulse(ToldBall):
     """The solver's impulse over the wrong step."""
 
     fault = "impulse instead of force"
@@ -129,7 +129,7 @@ class Impulse(_Told):
         return dataclasses.replace(sample, force=sample.force * STEP)
 
 
-class Clamped(_Told):
+class Clamped(ToldBall):
     """No component of the spin is beyond 100 rad/s."""
 
     fault = "spin clamped at 100 rad/s"
@@ -140,7 +140,7 @@ class Clamped(_Told):
         return dataclasses.replace(sample, w_WB=np.clip(sample.w_WB, -100, 100) if self.t else sample.w_WB)
 
 
-class Single(_Told):
+class Single(ToldBall):
     """All numbers are cut to 24 bits."""
 
     fault = "float32"
@@ -152,7 +152,7 @@ class Single(_Told):
         return dataclasses.replace(sample, **cut)  # type: ignore[arg-type]  # vectors by name
 
 
-class Late(_Told):
+class Late(ToldBall):
     """A state of a step before."""
 
     fault = "one step of lag"
@@ -163,7 +163,7 @@ class Late(_Told):
         return t - STEP
 
 
-class OneTooMany(_Told):
+class OneTooMany(ToldBall):
     """A step more than asked for at the first call."""
 
     fault = "one step too many"
@@ -174,7 +174,7 @@ class OneTooMany(_Told):
         return t + STEP
 
 
-class Shifted(_Told):
+class Shifted(ToldBall):
     """Its clock begins at 4 ms."""
 
     fault = "time grid shifted by 4 ms"
@@ -189,7 +189,7 @@ class Shifted(_Told):
         return t + 0.004
 
 
-class LateForce(OneStepBehind, _Told):
+class LateForce(OneStepBehind, ToldBall):
     """The state is of now, the force of the step before."""
 
     fault = "force of the step before"
@@ -200,7 +200,7 @@ class LateForce(OneStepBehind, _Told):
         return dataclasses.replace(sample, force=self.behind.sample().force)
 
 
-class ContactPoint(_Told):
+class ContactPoint(ToldBall):
     """The contact point's place."""
 
     fault = "position of the contact point"
@@ -212,7 +212,7 @@ class ContactPoint(_Told):
         return dataclasses.replace(sample, p_WB=sample.p_WB + out)
 
 
-class ScalarLast(_Told):
+class BallScalarLast(ToldBall):
     """Another convention for quaternions."""
 
     fault = "quaternion with its scalar last"
@@ -224,7 +224,7 @@ class ScalarLast(_Told):
         return dataclasses.replace(sample, q_WB=np.roll(sample.q_WB, -1))
 
 
-class Inverse(_Told):
+class Inverse(ToldBall):
     """The world in the body."""
 
     fault = "quaternion of the inverse rotation"

@@ -22,13 +22,27 @@ from proofroll.core.verdict import Judgement, Verdict, judge
 from proofroll.files.scene_file import load_scene
 from proofroll.running.recording import record
 from proofroll.studies.reference import Reference
-from proofroll_drill.mutants import ball_models, ball_samples, mechanism_models, mechanism_samples
+from proofroll_drill.mutants import (
+    ball_models,
+    ball_samples,
+    ball_settings,
+    mechanism_models,
+    mechanism_samples,
+    mechanism_settings,
+)
 from proofroll_drill.mutants.base import STEP, Mutant
 
 if TYPE_CHECKING:
     from proofroll.running.cluster import Cluster
 
-MODULES: tuple[ModuleType, ...] = (ball_models, ball_samples, mechanism_models, mechanism_samples)
+MODULES: tuple[ModuleType, ...] = (
+    ball_models,
+    ball_samples,
+    ball_settings,
+    mechanism_models,
+    mechanism_samples,
+    mechanism_settings,
+)
 # Tolerance of every observable, relative to its size: the projection method at this step is right to 1e-8.
 _TOLERANCE = 1e-6
 # Part of the mutants whose fault has to be named.

@@ -22,7 +22,7 @@ TOP: Any = ("heavy_top", {})
 SPRUNG: Any = ("oscillators", {})
 
 
-class _Mechanism(Mutant):
+class MechanismMutant(Mutant):
     """Builds a changed mechanism."""
 
     formulation: ClassVar[str] = "dependent"
@@ -44,15 +44,17 @@ class _Mechanism(Mutant):
         return []
 
 
-def _bodies(mechanism: Mechanism, change: Any) -> Mechanism:
+def of_bodies(mechanism: Mechanism, change: Any) -> Mechanism:
+    """Each body changed."""
     return dataclasses.replace(mechanism, bodies=tuple(change(body) for body in mechanism.bodies))
 
 
-def _joints(mechanism: Mechanism, change: Any) -> Mechanism:
+def of_joints(mechanism: Mechanism, change: Any) -> Mechanism:
+    """Each joint changed."""
     return dataclasses.replace(mechanism, joints=tuple(change(joint) for joint in mechanism.joints))
 
 
-class AboutOrigin(_Mechanism):
+class AboutOrigin(MechanismMutant):
     """The inertia about the joint is taken for that about the centre of mass."""
 
     fault = "inertia about the wrong point"
@@ -65,10 +67,10 @@ class AboutOrigin(_Mechanism):
             c = np.array(body.com)
             return dataclasses.replace(body, inertia=body.inertia + body.mass * (c @ c * np.eye(3) - np.outer(c, c)))
 
-        return _bodies(mechanism, about_origin)
+        return of_bodies(mechanism, about_origin)
 
 
-class HeavyBody(_Mechanism):
+class HeavyBody(MechanismMutant):
     """One body is added twice."""
 
     fault = "mass of one body counted twice"
@@ -76,12 +78,12 @@ class HeavyBody(_Mechanism):
 
     def other(self, mechanism: Mechanism) -> Mechanism:
         """The lower one, with the inertia of one."""
-        return _bodies(
+        return of_bodies(
             mechanism, lambda body: dataclasses.replace(body, mass=2 * body.mass) if body.name == "lower" else body
         )
 
 
-class NoCentres(_Mechanism):
+class NoCentres(MechanismMutant):
     """Centres of mass stay at the origins of the frames."""
 
     fault = "centres of mass forgotten"
@@ -90,10 +92,10 @@ class NoCentres(_Mechanism):
 
     def other(self, mechanism: Mechanism) -> Mechanism:
         """All zero."""
-        return _bodies(mechanism, lambda body: dataclasses.replace(body, com=(0, 0, 0)))
+        return of_bodies(mechanism, lambda body: dataclasses.replace(body, com=(0, 0, 0)))
 
 
-class Falling(_Mechanism):
+class Falling(MechanismMutant):
     """Gravity upwards."""
 
     fault = "gravity of a mechanism with the wrong sign"
@@ -104,7 +106,7 @@ class Falling(_Mechanism):
         return dataclasses.replace(mechanism, gravity=tuple(-x for x in mechanism.gravity))  # type: ignore[arg-type]  # three of them
 
 
-class Undamped(_Mechanism):
+class Undamped(MechanismMutant):
     """The joints' damping is read and forgotten."""
 
     fault = "joint damping ignored"
@@ -113,10 +115,10 @@ class Undamped(_Mechanism):
 
     def other(self, mechanism: Mechanism) -> Mechanism:
         """None."""
-        return _joints(mechanism, lambda joint: dataclasses.replace(joint, damping=0.0))
+        return of_joints(mechanism, lambda joint: dataclasses.replace(joint, damping=0.0))
 
 
-class DampedJoints(_Mechanism):
+class DampedJoints(MechanismMutant):
     """The engine's own damping is on."""
 
     fault = "joint damping left on"
@@ -124,10 +126,10 @@ class DampedJoints(_Mechanism):
 
     def other(self, mechanism: Mechanism) -> Mechanism:
         """0.1 N m s."""
-        return _joints(mechanism, lambda joint: dataclasses.replace(joint, damping=0.1))
+        return of_joints(mechanism, lambda joint: dataclasses.replace(joint, damping=0.1))
 
 
-class Degrees(_Mechanism):
+class Degrees(MechanismMutant):
     """The stiffness of angles is per degree."""
 
     fault = "joint stiffness per degree"
@@ -136,10 +138,10 @@ class Degrees(_Mechanism):
 
     def other(self, mechanism: Mechanism) -> Mechanism:
         """All of it."""
-        return _joints(mechanism, lambda joint: dataclasses.replace(joint, stiffness=joint.stiffness * np.pi / 180))
+        return of_joints(mechanism, lambda joint: dataclasses.replace(joint, stiffness=joint.stiffness * np.pi / 180))
 
 
-class TiltedAxis(_Mechanism):
+class TiltedAxis(MechanismMutant):
     """The elbow turns about an axis a twentieth off."""
 
     fault = "wrong joint axis"
@@ -149,7 +151,7 @@ class TiltedAxis(_Mechanism):
     def other(self, mechanism: Mechanism) -> Mechanism:
         """Tilted on parent and child."""
         tilted = (0.0, 0.05, 1.0)
-        return _joints(
+        return of_joints(
             mechanism, lambda joint: dataclasses.replace(joint, axis=tilted) if joint.name == "elbow" else joint
         )
 
@@ -170,7 +172,7 @@ class ToldAxis(TiltedAxis):
         return self.inner.built()
 
 
-class _Joints(_Mechanism):
+class JointsMutant(MechanismMutant):
     """Runge-Kutta 4 on equations in joint coordinates that have a fault; it gives no reactions."""
 
     def __init__(self, scene: Scene, settings: Any) -> None:
@@ -203,7 +205,7 @@ class _Joints(_Mechanism):
         return dataclasses.replace(self.claimed.built(), acceleration=None, angular_acceleration=None)
 
 
-class Armature(_Joints):
+class Armature(JointsMutant):
     """A rotor inertia that an actuator brings."""
 
     fault = "armature"
@@ -211,10 +213,10 @@ class Armature(_Joints):
 
     def faulty(self, mechanism: Mechanism) -> JointCoordinates:
         """In each joint."""
-        return JointCoordinates(_joints(mechanism, lambda joint: dataclasses.replace(joint, armature=0.05)))
+        return JointCoordinates(of_joints(mechanism, lambda joint: dataclasses.replace(joint, armature=0.05)))
 
 
-class MissingRow(_Joints):
+class LoopWithoutRow(JointsMutant):
     """The rod's end may leave the guide's line."""
 
     fault = "loop with a missing row"
@@ -233,7 +235,7 @@ class MissingRow(_Joints):
         return found
 
 
-class OutOfOrder(_Joints):
+class OutOfOrder(JointsMutant):
     """The mass matrix lacks the terms between the rods."""
 
     fault = "tree out of order: terms of the mass matrix lost"

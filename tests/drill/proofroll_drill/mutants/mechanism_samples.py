@@ -14,7 +14,7 @@ from proofroll_drill.mutants.base import STEP, Mutant, OneStepBehind
 from proofroll_drill.mutants.mechanism_models import CRANK, PENDULUM, TOP
 
 
-class _Told(Mutant):
+class ToldMechanism(Mutant):
     """Samples that are made wrong."""
 
     formulation: ClassVar[str] = "dependent"
@@ -35,7 +35,7 @@ def _turns(sample: Sample) -> Rotation:
     return Rotation.from_quat(sample.q_WB, scalar_first=True)
 
 
-class BodyRates(_Told):
+class BodyRates(ToldMechanism):
     """ω along each body's own axes."""
 
     fault = "body spin for world spin of a top"
@@ -47,7 +47,7 @@ class BodyRates(_Told):
         return dataclasses.replace(sample, w_WB=_turns(sample).inv().apply(sample.w_WB)) if self.t else sample
 
 
-class CentrePosition(_Told):
+class CentrePosition(ToldMechanism):
     """Positions of the centres of mass."""
 
     fault = "positions of the centres of mass"
@@ -58,7 +58,7 @@ class CentrePosition(_Told):
         return dataclasses.replace(sample, p_WB=sample.p_WB + _turns(sample).apply(self.com)) if self.t else sample
 
 
-class CentreVelocity(_Told):
+class CentreVelocity(ToldMechanism):
     """Velocities of the centres of mass."""
 
     fault = "velocities of the centres of mass"
@@ -70,7 +70,7 @@ class CentreVelocity(_Told):
         return dataclasses.replace(sample, v_WB=sample.v_WB + np.cross(sample.w_WB, arm)) if self.t else sample
 
 
-class OnParent(_Told):
+class OnParent(ToldMechanism):
     """The wrench on the parent."""
 
     fault = "reaction on the wrong body"
@@ -83,7 +83,7 @@ class OnParent(_Told):
         return dataclasses.replace(sample, joint_force=-sample.joint_force, joint_torque=-sample.joint_torque)
 
 
-class BodyReaction(_Told):
+class BodyReaction(ToldMechanism):
     """The wrench along the child's axes."""
 
     fault = "reaction in body axes"
@@ -95,7 +95,7 @@ class BodyReaction(_Told):
         return dataclasses.replace(sample, joint_force=_turns(sample).inv().apply(sample.joint_force))
 
 
-class Swapped(_Told):
+class Swapped(ToldMechanism):
     """The joints' reactions in another order."""
 
     fault = "reactions in another order of joints"
@@ -108,7 +108,7 @@ class Swapped(_Told):
         return dataclasses.replace(sample, joint_force=sample.joint_force[::-1], joint_torque=sample.joint_torque[::-1])
 
 
-class AboutCentre(_Told):
+class AboutCentre(ToldMechanism):
     """Moments about the centre of mass."""
 
     fault = "moment about the centre of mass"
@@ -122,7 +122,7 @@ class AboutCentre(_Told):
         return dataclasses.replace(sample, joint_torque=sample.joint_torque - np.cross(arm, sample.joint_force))
 
 
-class Unnormalised(_Told):
+class Unnormalised(ToldMechanism):
     """The quaternion grows, and its matrix is taken as if it did not."""
 
     fault = "quaternion not normalised"
@@ -135,7 +135,7 @@ class Unnormalised(_Told):
         return dataclasses.replace(sample, q_WB=sample.q_WB * (1 + 0.05 * self.t))
 
 
-class ScalarLast(_Told):
+class MechanismScalarLast(ToldMechanism):
     """Another convention for quaternions."""
 
     fault = "quaternions of bodies with their scalar last"
@@ -148,7 +148,7 @@ class ScalarLast(_Told):
         return dataclasses.replace(sample, q_WB=np.roll(sample.q_WB, -1, axis=-1)) if self.t else sample
 
 
-class LateReaction(OneStepBehind, _Told):
+class LateReaction(OneStepBehind, ToldMechanism):
     """The reactions of the step before."""
 
     fault = "reactions of the step before"
@@ -160,7 +160,7 @@ class LateReaction(OneStepBehind, _Told):
         return dataclasses.replace(sample, joint_force=old.joint_force, joint_torque=old.joint_torque)
 
 
-class LateMechanism(_Told):
+class LateMechanism(ToldMechanism):
     """A state of a step before."""
 
     fault = "a mechanism one step late"

@@ -1,10 +1,14 @@
-"""Why a ball's run is not the scene's: what an engine says otherwise, and by which other laws it moves."""
+"""Why the run of a ball is not the scene's: what an engine says otherwise, and what it moves instead."""
 
 from __future__ import annotations
 
 from typing import Any
 
+from proofroll.core.diagnosis.held import AnyGravity
+from proofroll.elements.ball_on_surface.diagnosis.contact_laws import CONTACT_LAWS
+from proofroll.elements.ball_on_surface.diagnosis.held import falling, held_against
+from proofroll.elements.ball_on_surface.diagnosis.numbers import NUMBERS
 from proofroll.elements.ball_on_surface.diagnosis.said import SAID
-from proofroll.elements.ball_on_surface.diagnosis.scene import LAWS
 
-HYPOTHESES: tuple[Any, ...] = (*SAID, *LAWS)
+GRAVITY = AnyGravity(held_against, lambda element: element.rolling.gravity, falling)
+HYPOTHESES: tuple[Any, ...] = (*SAID, *NUMBERS, *CONTACT_LAWS, GRAVITY)

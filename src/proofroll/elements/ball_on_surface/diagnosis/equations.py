@@ -27,7 +27,7 @@ _DEGREE, _ENDS, _SAMPLES = 7, 5, 24
 
 
 @dataclass(frozen=True)
-class States:
+class BallStates:
     """A run at some of its samples, away from events.
 
     Attributes:
@@ -52,7 +52,8 @@ class Law:
 
     Attributes:
         body: with what the law takes its numbers to be.
-        force, moment: applied besides [N, N m], of velocity and angular velocity.
+        force: applied besides [N], of the velocity.
+        moment: applied besides [N m], of e1, the velocity and the angular velocity.
         resisting: moment of the rolling resistance [N m] for N and the angular velocity; None: that of the scene.
         slipping: friction [N] for N and the centre's velocity; None: Coulomb's.
         lever: distance of the friction from the centre [m]; None: the radius.
@@ -60,13 +61,13 @@ class Law:
 
     body: RollingBall
     force: Callable[[FloatArray], FloatArray] | None = None
-    moment: Callable[[FloatArray], FloatArray] | None = None
+    moment: Callable[[FloatArray, FloatArray, FloatArray], FloatArray] | None = None
     resisting: Callable[[RollingBall, float, FloatArray], FloatArray] | None = None
     slipping: Callable[[RollingBall, float, FloatArray], FloatArray] | None = None
     lever: float | None = None
 
 
-def states(body: RollingBall, dataset: xr.Dataset) -> States | None:
+def states(body: RollingBall, dataset: xr.Dataset) -> BallStates | None:
     """The run at its samples; None: too few of them lie between events."""
     t = dataset["time"].to_numpy()
     cuts = [0, *np.searchsorted(t, [event.time for event in events_of(dataset)]).tolist(), len(t)]
@@ -77,10 +78,10 @@ def states(body: RollingBall, dataset: xr.Dataset) -> States | None:
     columns = zip(*(dataclasses.astuple(part) for part in found), strict=True)
     whole = [None if column[0] is None else np.concatenate(column) for column in columns]
     pick = np.unique(np.linspace(0, len(whole[0]) - 1, _SAMPLES).astype(int))  # type: ignore[arg-type]  # positions are there
-    return States(*(None if part is None else part[pick] for part in whole))  # type: ignore[arg-type]  # only a force is None
+    return BallStates(*(None if part is None else part[pick] for part in whole))  # type: ignore[arg-type]  # only a force is None
 
 
-def _states(body: RollingBall, part: xr.Dataset) -> States:
+def _states(body: RollingBall, part: xr.Dataset) -> BallStates:
     surface, t, inner = body.surface, part["time"].to_numpy(), slice(_ENDS, -_ENDS)
     u = np.stack([part[name].to_numpy() for name in surface.coordinates], axis=-1)
     rates = np.stack([part[f"{name}_rate"].to_numpy() for name in surface.coordinates], axis=-1)
@@ -96,10 +97,10 @@ def _states(body: RollingBall, part: xr.Dataset) -> States:
         force = force[inner] if np.all(np.isfinite(force[inner])) else None
     sticks = part["sticking"].to_numpy() if "sticking" in part else np.ones(len(t))
     p, v = part["p_WB"].to_numpy(), part["v_WB"].to_numpy()
-    return States(p[inner], v[inner], w[inner], a[inner], alpha[inner], force, sticks[inner])
+    return BallStates(p[inner], v[inner], w[inner], a[inner], alpha[inner], force, sticks[inner])
 
 
-def residuals(body: RollingBall, seen: States, law: Law) -> FloatArray:
+def residuals(body: RollingBall, seen: BallStates, law: Law) -> FloatArray:
     """What the law leaves of accelerations, turning times the radius, and force over mass [m/s²]."""
     left = []
     for i in range(len(seen.p)):
@@ -120,7 +121,7 @@ def response(
     e1 = body.surface.normal(p)
     bend = body.surface.normal_gradient(p) @ v
     applied = m * body.gravity + (law.force(v) if law.force else 0.0)
-    turning = law.moment(w) if law.moment else np.zeros(3)
+    turning = law.moment(e1, v, w) if law.moment else np.zeros(3)
 
     def resisting(N: float) -> FloatArray:
         if law.resisting is not None:

@@ -2,26 +2,25 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping
 from typing import TYPE_CHECKING, Any, ClassVar
 
 import numpy as np
-from scipy.interpolate import make_interp_spline
 from scipy.spatial.transform import Rotation
 
 from proofroll.core.arrays import FloatArray
-from proofroll.core.diagnosis import Cause, Evidence, worth
+from proofroll.core.diagnosis import Cause, Evidence, apart, worth
+from proofroll.core.diagnosis.at_start import AtStart
+from proofroll.core.diagnosis.clocks import said_delay
 from proofroll.core.diagnosis.fitting import fitted
-from proofroll.core.diagnosis.lines import differing, single_precision
-from proofroll.core.diagnosis.quaternions import quaternions, rounded
-from proofroll.core.diagnosis.vectors import Reported, apart, into, late, said_delay
-from proofroll.elements.ball_on_surface.model import RollingBall
+from proofroll.core.diagnosis.lines import differing
+from proofroll.core.diagnosis.samples import AnotherClock, Attitudes, ReportedVectors, SinglePrecision, both
+from proofroll.core.diagnosis.vectors import Reported, into
+from proofroll.elements.ball_on_surface.diagnosis.attitudes import SURFACE, attitudes, forces, frames
 
 if TYPE_CHECKING:
     import xarray as xr
 
-SURFACE, BODY = "the surface's axes e1, e2, e3", "body axes"
-_SUBSTEPS = 32
 _FORCE = "the wall's force on the ball"
 _UNITS = {
     "p_WB": ("the centre", "m"),
@@ -30,63 +29,40 @@ _UNITS = {
 }
 
 
-def frames(body: RollingBall, truth: xr.Dataset) -> dict[str, FloatArray]:
-    """The frames in which a vector may be given by mistake, at each time of the true run."""
-    local = body.surface.frame(body.surface.locate(truth["p_WB"].to_numpy()))
-    return {SURFACE: local, BODY: attitudes(truth["time"].to_numpy(), truth["w_WB"].to_numpy())}
+def _state(element: Any, data: xr.Dataset) -> FloatArray:
+    """Centre, velocities by the time in which the ball falls or turns by itself [m]."""
+    a = element.rolling.ball.radius
+    return np.concatenate([data["p_WB"], data["v_WB"] * a, data["w_WB"] * a**2], axis=-1)
 
 
-def attitudes(time: FloatArray, w_WB: FloatArray) -> FloatArray:
-    """Rotations of the body from its true angular velocity; the identity at time 0, shape (time, 3, 3)."""
-    if len(time) < 2:
-        return np.eye(3)[None]
-    spin, h = make_interp_spline(time, w_WB, k=min(7, len(time) - 1)), np.diff(time) / _SUBSTEPS
-    turned, found = Rotation.identity(len(h)), [np.eye(3)]
-    for step in range(_SUBSTEPS):
-        one, two = (spin(time[:-1] + (step + 0.5 + side / np.sqrt(12)) * h) for side in (-1, 1))
-        bent = h[:, None] * (one + two) / 2 - np.sqrt(3) / 12 * h[:, None] ** 2 * np.cross(one, two)
-        turned = Rotation.from_rotvec(bent) * turned
-    for rotation in turned.as_matrix():
-        found.append(rotation @ found[-1])
-    return np.array(found)
+def _frames(evidence: Evidence) -> dict[str, FloatArray]:
+    assert evidence.truth is not None
+    return frames(evidence.element.rolling, evidence.truth)
 
 
-def forces(body: RollingBall, dataset: xr.Dataset) -> FloatArray:
-    """The wall's force on the ball in the world, NaN where it is not said, shape (time, 3)."""
-    frame = body.surface.frame(body.surface.locate(dataset["p_WB"].to_numpy()))
-    local = np.stack([-dataset["N"].to_numpy(), dataset["F2"].to_numpy(), dataset["F3"].to_numpy()], axis=-1)
-    return np.asarray(np.einsum("tij,tj->ti", frame, local))
+CLOCK = AnotherClock(_state, ("p_WB", "v_WB", "w_WB", "force", "motion"))
 
 
-class Vectors:
-    """Position, velocity, angular velocity and force, one by one."""
+class ReportedForce:
+    """The wall's force, and its friction by itself."""
 
-    id: ClassVar[str] = "said"
-    grounds: ClassVar[str] = (
-        "the true vector with another sign, unit, order of axes, frame, limit or time is what the engine says, sample "
-        "by sample; no equation is needed"
-    )
+    id: ClassVar[str] = "said force"
+    grounds: ClassVar[str] = "the true force with another sign, unit, frame or time is what the engine says"
 
     @staticmethod
     def test(evidence: Evidence) -> Iterator[Cause]:
         """See :class:`proofroll.core.diagnosis.Hypothesis`."""
-        run, truth, body = evidence.run, evidence.truth, evidence.element.rolling
-        if run is None or truth is None or run.sizes["time"] < 3:
+        found, body = both(evidence), evidence.element.rolling
+        if found is None or "N" not in found[0] or "N" not in found[1] or CLOCK.proven(evidence):
             return
-        if any(cause.proven for cause in WholeRun.test(evidence)):
-            return
+        run, truth = found
         time, axes = truth["time"].to_numpy(), frames(body, truth)
-        for name, (what, unit) in _UNITS.items():
-            yield from Reported.after_start(
-                name, what, unit, run[name].to_numpy(), truth[name].to_numpy(), time, axes
-            ).causes(evidence.step)
-        if "N" in run and "N" in truth:
-            said, true = forces(body, run), forces(body, truth)
-            known = np.all(np.isfinite(said) & np.isfinite(true), axis=-1)
-            own = {name: frame[known] for name, frame in axes.items()}
-            told = Reported.after_start("force", _FORCE, "N", said[known], true[known], time[known], own)
-            yield _friction_reversed(told, frames(body, truth.isel(time=known))[SURFACE][-len(told.true) :, :, 0])
-            yield from told.causes(evidence.step)
+        said, true = forces(body, run), forces(body, truth)
+        known = np.all(np.isfinite(said) & np.isfinite(true), axis=-1)
+        own = {name: frame[known] for name, frame in axes.items()}
+        told = Reported.after_start("force", _FORCE, "N", said[known], true[known], time[known], own)
+        yield _friction_reversed(told, own[SURFACE][-len(told.true) :, :, 0])
+        yield from told.causes(evidence.step)
 
 
 def _friction_reversed(told: Reported, e1: FloatArray) -> Cause:
@@ -96,49 +72,28 @@ def _friction_reversed(told: Reported, e1: FloatArray) -> Cause:
     return told.cause("friction sign", says, 2 * normal - told.true, "give the friction on the ball, not on the wall")
 
 
-class WholeRun:
-    """All that is said belongs to another time than it is said to."""
+class StartsLate:
+    """A start that lies on the true path a moment before or after time 0, from the certificate's line alone."""
 
-    id: ClassVar[str] = "late"
-    grounds: ClassVar[str] = "position, velocity and angular velocity are the true ones, all shifted by one time"
+    id: ClassVar[str] = "late start"
+    grounds: ClassVar[str] = "the position at time 0 is that of the true path at another time, to second order"
 
     @staticmethod
     def test(evidence: Evidence) -> Iterator[Cause]:
         """See :class:`proofroll.core.diagnosis.Hypothesis`."""
-        run, truth, a = evidence.run, evidence.truth, evidence.element.rolling.ball.radius
-        if run is None or truth is None:
-            yield from _late_at_start(evidence)
+        lines = {line["quantity"]: line for line in differing(evidence.lines)}
+        if evidence.run is not None or "position" not in lines:
             return
-        said, true = (
-            np.concatenate([data["p_WB"], data["v_WB"] * a, data["w_WB"] * a**2], axis=-1) for data in (run, truth)
-        )
-        if said.shape != true.shape or not worth(apart(said, true), float(np.max(np.abs(true)))):
+        v = evidence.element.rolling.v0
+        off = np.subtract(lines["position"]["found"], lines["position"]["expected"])
+        if not v @ v:
             return
-        found = late(truth["time"].to_numpy(), said, true)
-        if found is not None:
-            delay, before, after = found
-            says = f"every sample is {said_delay(delay, evidence.step)}: the path is right at another time"
-            remedy = "advance(t) has to end at t, neither a step before nor after it"
-            yield Cause(
-                "late", says, "state", "m", before, after, remedy, 1, ("p_WB", "v_WB", "w_WB", "force", "motion")
-            )
-
-
-def _late_at_start(evidence: Evidence) -> Iterator[Cause]:
-    """A start that lies on the true path a moment before or after time 0, from the certificate's line alone."""
-    lines = {line["quantity"]: line for line in differing(evidence.lines)}
-    if "position" not in lines:
-        return
-    v = evidence.element.rolling.v0
-    off = np.subtract(lines["position"]["found"], lines["position"]["expected"])
-    if not v @ v:
-        return
-    ahead = float(off @ v / (v @ v))
-    start = evidence.element.first_motion
-    bend = start.acceleration[0] * ahead**2 / 2 if start is not None else 0.0
-    before, after = float(np.max(np.abs(off))), float(np.max(np.abs(off - v * ahead - bend)))
-    says = f"the start is {said_delay(-ahead, evidence.step)}: the ball has moved before time 0"
-    yield Cause("late", says, "position at time 0", "m", before, after, "sample before the first step", 1)
+        ahead = float(off @ v / (v @ v))
+        start = evidence.element.first_motion
+        bend = start.acceleration[0] * ahead**2 / 2 if start is not None else 0.0
+        before, after = float(np.max(np.abs(off))), float(np.max(np.abs(off - v * ahead - bend)))
+        says = f"the start is {said_delay(-ahead, evidence.step)}: the ball has moved before time 0"
+        yield Cause("late", says, "position at time 0", "m", before, after, "sample before the first step", 1)
 
 
 class AtTheContact:
@@ -203,73 +158,49 @@ class StaleNormal:
         yield Cause("stale normal", says, "force", "N", apart(said, true), after, remedy, 1)
 
 
-class AtStart:
-    """Signs and axes of what is said at time 0, from the certificate."""
+class ForceAtStart:
+    """The wall's force at time 0, from the certificate."""
 
-    id: ClassVar[str] = "said at time 0"
-    grounds: ClassVar[str] = "the scene's own vector with another sign, unit or axes is the one of the certificate"
+    id: ClassVar[str] = "force at time 0"
+    grounds: ClassVar[str] = "the scene's own force with another sign, unit or axes is the one of the certificate"
 
     @staticmethod
     def test(evidence: Evidence) -> Iterator[Cause]:
         """See :class:`proofroll.core.diagnosis.Hypothesis`."""
         lines, body = {line["quantity"]: line for line in evidence.lines}, evidence.element.rolling
-        wrong = {line["quantity"] for line in differing(evidence.lines)}
+        wrong, parts = {line["quantity"] for line in differing(evidence.lines)}, ("N", "F2", "F3")
+        if not wrong or not wrong <= set(parts) or not all(lines[name]["found"] for name in parts):
+            return
         frame = body.surface.frame(body.u0)
-        vectors = [
-            (name, what, unit, lines[name]["found"], lines[name]["expected"])
-            for name, what, unit in (
-                ("velocity", "the velocity of the centre", "m/s"),
-                ("spin", "the angular velocity", "rad/s"),
-                ("acceleration", "the acceleration of the centre", "m/s^2"),
-                ("angular acceleration", "the angular acceleration", "rad/s^2"),
-            )
-            if name in wrong
-        ]
-        if wrong & {"N", "F2", "F3"} and all(lines[name]["found"] for name in ("N", "F2", "F3")):
-            said, true = (
-                frame @ np.array([-lines["N"][key][0], lines["F2"][key][0], lines["F3"][key][0]])
-                for key in ("found", "expected")
-            )
-            vectors.append(("force", _FORCE, "N", said, true))
-        for name, what, unit, said, true in vectors:
-            told = np.atleast_2d(np.asarray(said)), np.atleast_2d(np.asarray(true))
-            own = {"N", "F2", "F3"} if name == "force" else {name, "slip"}
-            if told[0].shape == told[1].shape and wrong <= own:
-                at_start = Reported(name, what, unit, *told, np.zeros(1), {SURFACE: frame[None]})
-                if name == "force":
-                    yield _friction_reversed(at_start, frame[None, :, 0])
-                yield from at_start.causes(evidence.step)
+        said, true = (
+            frame @ np.array([-lines["N"][key][0], lines["F2"][key][0], lines["F3"][key][0]])
+            for key in ("found", "expected")
+        )
+        told = Reported("force", _FORCE, "N", said[None], true[None], np.zeros(1), {SURFACE: frame[None]})
+        yield _friction_reversed(told, frame[None, :, 0])
+        yield from told.causes(evidence.step)
 
 
-class SinglePrecision:
-    """Numbers of 24 bits."""
-
-    id: ClassVar[str] = "float32"
-    grounds: ClassVar[str] = "every number of the run, or each built one that differs, is exactly a float32"
-
-    @staticmethod
-    def test(evidence: Evidence) -> Iterator[Cause]:
-        """See :class:`proofroll.core.diagnosis.Hypothesis`."""
-        yield from single_precision(evidence.lines)
-        if evidence.run is None or evidence.truth is None:
-            return
-        yield from rounded(evidence.run, evidence.truth, ("p_WB", "v_WB", "w_WB"))
+def _axes_at_start(element: Any) -> Mapping[str, FloatArray]:
+    body = element.rolling
+    return {SURFACE: body.surface.frame(body.u0)[None]}
 
 
-class Attitude:
-    """The quaternion is in another order, of the inverse rotation, or not of unit length."""
-
-    id: ClassVar[str] = "quaternion"
-    grounds: ClassVar[str] = "the true quaternion in another order or inverted is what is said, up to its sign"
-
-    @staticmethod
-    def test(evidence: Evidence) -> Iterator[Cause]:
-        """See :class:`proofroll.core.diagnosis.Hypothesis`."""
-        if evidence.run is None or evidence.truth is None or "q_WB" not in evidence.run:
-            return
-        body_axes = attitudes(evidence.truth["time"].to_numpy(), evidence.truth["w_WB"].to_numpy())
-        true = Rotation.from_matrix(body_axes).as_quat(scalar_first=True)
-        yield from quaternions(evidence.run["q_WB"].to_numpy(), true)
+def _attitudes(evidence: Evidence) -> FloatArray:
+    assert evidence.truth is not None
+    turned = attitudes(evidence.truth["time"].to_numpy(), evidence.truth["w_WB"].to_numpy())
+    return np.asarray(Rotation.from_matrix(turned).as_quat(scalar_first=True))
 
 
-SAID: tuple[type[Any], ...] = (WholeRun, Vectors, AtTheContact, StaleNormal, AtStart, SinglePrecision, Attitude)
+SAID: tuple[Any, ...] = (
+    CLOCK,
+    StartsLate,
+    ReportedVectors(_UNITS, _frames, CLOCK),
+    ReportedForce,
+    AtTheContact,
+    StaleNormal,
+    AtStart(_axes_at_start, frozenset({"slip", "N", "F2", "F3"})),
+    ForceAtStart,
+    SinglePrecision,
+    Attitudes(_attitudes),
+)

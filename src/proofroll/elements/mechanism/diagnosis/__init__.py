@@ -4,7 +4,31 @@ from __future__ import annotations
 
 from typing import Any
 
-from proofroll.elements.mechanism.diagnosis.laws import LAWS
-from proofroll.elements.mechanism.diagnosis.said import SAID
+import numpy as np
 
-HYPOTHESES: tuple[Any, ...] = (*SAID, *LAWS)
+from proofroll.core.diagnosis.held import AnyGravity
+from proofroll.elements.mechanism.diagnosis.axes import OtherAxis
+from proofroll.elements.mechanism.diagnosis.equations import Change
+from proofroll.elements.mechanism.diagnosis.factors import FACTORS_OF_ALL
+from proofroll.elements.mechanism.diagnosis.held import held_against
+from proofroll.elements.mechanism.diagnosis.one_by_one import OfEachBody, OfEachJoint
+from proofroll.elements.mechanism.diagnosis.reactions import Reactions
+from proofroll.elements.mechanism.diagnosis.said import SAID
+from proofroll.elements.mechanism.diagnosis.structure import LoopLacksRow, LostCoupling
+
+GRAVITY = AnyGravity(
+    held_against,
+    lambda element: np.array(element.mechanism.gravity),
+    lambda element, gravity: Change(element.mechanism, gravity=gravity),
+)
+HYPOTHESES: tuple[Any, ...] = (
+    *SAID,
+    Reactions,
+    OtherAxis,
+    *FACTORS_OF_ALL,
+    OfEachBody(),
+    OfEachJoint(),
+    LostCoupling(),
+    LoopLacksRow(),
+    GRAVITY,
+)

@@ -24,11 +24,12 @@ from proofroll.elements.mechanism.rotations import skews
 
 _DEGREE, _ENDS, _SAMPLES = 7, 5, 16
 _DEPENDENT = 1e-7
+_GONE = 1e-9
 _CONSISTENT = 1e-3
 
 
 @dataclass(frozen=True)
-class State:
+class MechanismState:
     """Everything that the equations need at one instant of a run.
 
     Attributes:
@@ -43,7 +44,7 @@ class State:
     acceleration: FloatArray
 
 
-class States:
+class MechanismStates:
     """A run, or the moment of its certificate, as states of a tree.
 
     Attributes:
@@ -55,7 +56,7 @@ class States:
     def __init__(self, mechanism: Mechanism, placed: Placed, acceleration: FloatArray, which: FloatArray) -> None:
         self.mechanism, self.tree = mechanism, Tree(mechanism)
         coordinates = placed.coordinates()
-        self.each: list[State] = []
+        self.each: list[MechanismState] = []
         self.consistent = True
         for i in which.tolist():
             q = np.concatenate([_coordinate(placed, coordinates, joint, i) for joint in mechanism.joints])
@@ -64,14 +65,14 @@ class States:
             v = np.linalg.lstsq(still.J[:-1].reshape(-1, mechanism.nv), twists.ravel(), rcond=None)[0]
             off = np.abs(still.J[:-1].reshape(-1, mechanism.nv) @ v - twists.ravel())
             self.consistent &= bool(np.max(off) <= _CONSISTENT * max(float(np.max(np.abs(twists))), 1e-300))
-            self.each.append(State(q, v, self.tree.at(q, v), acceleration[i]))
+            self.each.append(MechanismState(q, v, self.tree.at(q, v), acceleration[i]))
 
     @cached_property
     def allowed(self) -> list[FloatArray]:
         """Directions of the tree's velocities that the loops allow, (nv, directions), at each state."""
         return [self.free(state, ()) for state in self.each]
 
-    def free(self, state: State, without: tuple[int, ...]) -> FloatArray:
+    def free(self, state: MechanismState, without: tuple[int, ...]) -> FloatArray:
         """The same at one state, without some rows of the loops."""
         rows = self.tree.loop_rows(state.motion)
         C = np.delete(rows.C, without, axis=0)
@@ -93,21 +94,32 @@ class States:
     @cached_property
     def scale(self) -> FloatArray:
         """What each balance is relative to: the largest that inertia or loads make of it."""
-        sizes = self.parts(Change(self.mechanism)).reshape(-1, self.mechanism.nv)
+        sizes = self._own[:, :2].reshape(-1, self.mechanism.nv)
         largest = np.max(np.abs(sizes), axis=0, initial=0.0)
         return np.where(largest > 1e-9 * np.max(largest), largest, np.max(largest) or 1.0)
 
     def parts(self, change: Change) -> FloatArray:
-        """Inertia and loads of a mechanism at each state along each velocity of the tree, (states, 2, nv)."""
+        """Inertia, loads and the size of their terms at each state along each velocity of the tree, (states, 3, nv)."""
         return np.array([change.balance(self, i) for i in range(len(self.each))])
 
     def left(self, change: Change, without: tuple[int, ...] = ()) -> FloatArray:
-        """What does not balance, relative, along the motions that are allowed."""
-        found = []
-        for i, both in enumerate(self.parts(change)):
+        """What does not balance, relative, along the motions that are allowed.
+
+        A change that takes away all of a velocity's inertia and loads balances nothing there: what the mechanism itself
+        leaves is left.
+        """
+        found, parts, own = [], self.parts(change), self._own
+        gone = np.max(parts[:, 2], axis=0) <= _GONE * np.max(own[:, 2], axis=0)
+        balance = np.where(gone, own[:, 0] - own[:, 1], parts[:, 0] - parts[:, 1])
+        for i, row in enumerate(balance):
             directions = self.free(self.each[i], without) if without else self.allowed[i]
-            found.append(directions.T @ (both[0] - both[1]) / (np.abs(directions.T) @ self.scale))
+            found.append(directions.T @ row / (np.abs(directions.T) @ self.scale))
         return np.concatenate(found)
+
+    @cached_property
+    def _own(self) -> FloatArray:
+        """Those of the mechanism itself."""
+        return self.parts(Change(self.mechanism))
 
 
 @dataclass(frozen=True)
@@ -119,7 +131,8 @@ class Change:
         mass, com, inertia: of the bodies; None: the mechanism's.
         gravity: [m/s²].
         damping, stiffness, torque, armature: factors on those of the joints, or, ``added``, further ones by velocity.
-        springs: factor on the springs.
+        springs, spring_damping: factors on stiffness and damping of the springs.
+        weight_at_origin: whether weights act at the origins of the bodies' frames.
         added: further damping by velocity of the tree, and further armature.
         gyroscopic: factor on ω × I ω.
         coupling: pairs of velocities that lose their term of the mass matrix.
@@ -135,13 +148,15 @@ class Change:
     torque: float = 1.0
     armature: float = 1.0
     springs: float = 1.0
+    spring_damping: float = 1.0
+    weight_at_origin: bool = False
     added_damping: FloatArray | float = 0.0
     added_armature: FloatArray | float = 0.0
     gyroscopic: float = 1.0
     coupling: FloatArray | None = None
 
-    def balance(self, states: States, i: int) -> tuple[FloatArray, FloatArray]:
-        """What inertia needs and what acts, along each velocity of the tree."""
+    def balance(self, states: MechanismStates, i: int) -> FloatArray:
+        """What inertia needs, what acts, and the size of all their terms, along each velocity of the tree."""
         m, state, mechanism = states.mechanism, states.each[i], self.mechanism
         motion, n = state.motion, len(m.bodies)
         mass = np.array([b.mass for b in mechanism.bodies]) if self.mass is None else self.mass
@@ -156,36 +171,39 @@ class Change:
         alpha = state.acceleration[:, 3:]
         at_com = state.acceleration[:, :3] + np.cross(alpha, arm) + np.cross(w, np.cross(w, arm))
         spin = np.cross(w, np.einsum("nij,nj->ni", inertia, w)) * self.gyroscopic
-        moment = np.einsum("nij,nj->ni", inertia, alpha) + spin
-        needed = np.einsum("nij,ni->j", J[:, :3], mass[:, None] * at_com) + np.einsum("nij,ni->j", J[:, 3:], moment)
-        acts = np.einsum("nij,ni->j", J[:, :3], mass[:, None] * g)
+        force, moment = mass[:, None] * at_com, np.einsum("nij,nj->ni", inertia, alpha)
+        terms = [np.einsum("nij,ni->j", J[:, :3], force)]
+        terms += [np.einsum("nij,ni->j", J[:, 3:], item) for item in (moment, spin)]
+        carries = motion.J[:n, :3] if self.weight_at_origin else J[:, :3]
+        acts = np.einsum("nij,ni->j", carries, mass[:, None] * g)
         by_v = [joint for joint in mechanism.joints for _ in range(joint.nv)]
         rate = states.v_rates[i]
-        needed = needed + (self.armature * np.array([j.armature for j in by_v]) + self.added_armature) * rate
+        terms.append((self.armature * np.array([j.armature for j in by_v]) + self.added_armature) * rate)
         if self.coupling is not None:
             weighted = np.concatenate([mass[:, None, None] * J[:, :3], inertia @ J[:, 3:]], axis=1)
             M = J.reshape(-1, m.nv).T @ weighted.reshape(-1, m.nv)
-            needed = needed - (M * self.coupling) @ rate
+            terms.append(-(M * self.coupling) @ rate)
         acts = acts + self.torque * np.array([j.torque for j in by_v])
         acts = acts - (self.damping * np.array([j.damping for j in by_v]) + self.added_damping) * state.v
         for joint, at_q, at_v in zip(mechanism.joints, m.q_slices, m.v_slices, strict=True):
             if joint.stiffness:
                 acts[at_v] -= self.stiffness * joint.stiffness * (state.q[at_q] - joint.rest)
-        return needed, acts + self.springs * _spring_loads(states, state, mechanism)
+        acts = acts + self._spring_loads(states, state)
+        return np.array([sum(terms), acts, sum(map(np.abs, terms)) + np.abs(acts)])
 
-
-def _spring_loads(states: States, state: State, mechanism: Mechanism) -> FloatArray:
-    found = np.zeros(mechanism.nv)
-    for spring in mechanism.springs:
-        (p_a, v_a, J_a, _), (p_b, v_b, J_b, _) = (
-            states.tree.point(state.motion, body, np.array(position))
-            for body, position in ((spring.body_a, spring.position_a), (spring.body_b, spring.position_b))
-        )
-        length = float(np.linalg.norm(p_b - p_a))
-        along = (p_b - p_a) / length
-        pull = spring.stiffness * (length - spring.length) + spring.damping * (along @ (v_b - v_a))
-        found += pull * along @ (J_a - J_b)
-    return found
+    def _spring_loads(self, states: MechanismStates, state: MechanismState) -> FloatArray:
+        found: FloatArray = np.zeros(self.mechanism.nv)
+        for spring in self.mechanism.springs:
+            (p_a, v_a, J_a, _), (p_b, v_b, J_b, _) = (
+                states.tree.point(state.motion, body, np.array(position))
+                for body, position in ((spring.body_a, spring.position_a), (spring.body_b, spring.position_b))
+            )
+            length = float(np.linalg.norm(p_b - p_a))
+            along = (p_b - p_a) / length
+            stretched = self.springs * spring.stiffness * (length - spring.length)
+            damped = self.spring_damping * spring.damping * float(along @ (v_b - v_a))
+            found += (stretched + damped) * along @ (J_a - J_b)
+        return found
 
 
 def placed_of(mechanism: Mechanism, dataset: Any) -> Placed:
@@ -194,7 +212,7 @@ def placed_of(mechanism: Mechanism, dataset: Any) -> Placed:
     return Placed(mechanism, dataset["time"].to_numpy(), *parts)
 
 
-def of_run(mechanism: Mechanism, dataset: Any) -> States | None:
+def of_run(mechanism: Mechanism, dataset: Any) -> MechanismStates | None:
     """The states of a run away from its ends; None: too few samples for its accelerations, or not all are numbers."""
     placed = placed_of(mechanism, dataset)
     if len(placed.time) <= _DEGREE + 2 * _ENDS or not np.all(np.isfinite(placed.q_WB)):
@@ -204,10 +222,10 @@ def of_run(mechanism: Mechanism, dataset: Any) -> States | None:
     twists = np.concatenate([placed.v_WB, placed.w_WB], axis=-1)
     acceleration = make_interp_spline(placed.time, twists, k=_DEGREE).derivative()(placed.time)
     which = np.unique(np.linspace(_ENDS, len(placed.time) - 1 - _ENDS, _SAMPLES).astype(int))
-    return States(mechanism, placed, acceleration, which)
+    return MechanismStates(mechanism, placed, acceleration, which)
 
 
-def of_start(evidence: Evidence) -> States | None:
+def of_start(evidence: Evidence) -> MechanismStates | None:
     """The start with the accelerations of the certificate; None: it does not say them."""
     element = evidence.element
     lines = {line["quantity"]: line for line in evidence.lines}
@@ -219,7 +237,9 @@ def of_start(evidence: Evidence) -> States | None:
         if line is None or not line["found"]:
             return None
         rows.append(np.reshape(line["found"], (len(element.bodies), 3)))
-    return States(element.mechanism, element.start, np.concatenate(rows, axis=-1)[None], np.zeros(1, dtype=int))
+    return MechanismStates(
+        element.mechanism, element.start, np.concatenate(rows, axis=-1)[None], np.zeros(1, dtype=int)
+    )
 
 
 def _coordinate(placed: Placed, known: dict[str, tuple[FloatArray, FloatArray]], joint: Any, i: int) -> FloatArray:

@@ -1,0 +1,76 @@
+"""Whether what is said at one time is true at another: a shift of all times, or a factor on them.
+
+The true curve is laid through its samples; the first and last few, beyond which it would be needed, are left out.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+
+from proofroll.core.arrays import FloatArray
+from proofroll.core.diagnosis import apart
+from proofroll.core.diagnosis.fitting import fitted
+
+_SPLINE = 5
+_SHIFTS = 6
+# A clock that is further off than this is another fault [relative].
+_PACE = 0.25
+
+
+def _comparable(time: FloatArray, said: FloatArray, true: FloatArray) -> tuple[FloatArray, FloatArray] | None:
+    """What both say throughout, shape (time, numbers); None: too few samples."""
+    if len(time) < 3 * (_SPLINE + 1):
+        return None
+    flat, held = said.reshape(len(time), -1), true.reshape(len(time), -1)
+    known = np.isfinite(flat).all(0) & np.isfinite(held).all(0)
+    return (flat[:, known], held[:, known]) if known.any() else None
+
+
+def late(time: FloatArray, said: FloatArray, true: FloatArray) -> tuple[float, float, float] | None:
+    """By how much what is said is late [s], and the differences without and with that; None: too few samples."""
+    from scipy.interpolate import make_interp_spline
+
+    found = _comparable(time, said, true)
+    if found is None:
+        return None
+    flat, held = found
+    inner = slice(_SPLINE, -_SPLINE)
+    flat, curve = flat[inner], make_interp_spline(time, held, k=_SPLINE)
+    rate, delay, reach = curve.derivative(), 0.0, time[_SPLINE] - time[0]
+    for _ in range(_SHIFTS):
+        slope = rate(time[inner] - delay)
+        square = float(np.sum(slope**2))
+        if not square:
+            return None
+        delay -= float(np.sum((flat - curve(time[inner] - delay)) * slope)) / square
+        delay = float(np.clip(delay, -reach, reach))
+    return delay, apart(flat, held[inner]), apart(flat, curve(time[inner] - delay))
+
+
+def stretched(time: FloatArray, said: FloatArray, true: FloatArray) -> tuple[float, float, float] | None:
+    """How many times as fast time runs in what is said, and the differences without and with that; None: too few."""
+    from scipy.interpolate import make_interp_spline
+
+    found = _comparable(time, said, true)
+    if found is None:
+        return None
+    since = time - time[0]
+    inner = since <= since[-1] / (1 + _PACE)
+    curve, flat = make_interp_spline(since, found[1], k=_SPLINE), found[0][inner]
+
+    def left(faster: float) -> FloatArray:
+        return np.asarray(flat - curve(since[inner] * (1 + float(np.clip(faster, -_PACE, _PACE))))).ravel()
+
+    faster = float(np.clip(fitted(left, 0.0, 1.0), -_PACE, _PACE))
+    return 1 + faster, float(np.max(np.abs(left(0.0)))), float(np.max(np.abs(left(faster))))
+
+
+def said_delay(delay: float, step: float | None) -> str:
+    """A shift in time, in steps where it is some."""
+    word = "late" if delay > 0 else "early"
+    if step:
+        steps = abs(delay) / step
+        for number, words in ((0.5, "half a step"), (1.0, "one step"), (2.0, "two steps")):
+            if abs(steps - number) <= 0.05 * number:
+                return f"{words} ({abs(delay):.3g} s) {word}"
+    return f"{abs(delay):.3g} s {word}"

@@ -1,0 +1,176 @@
+"""Hypotheses that rolling resistance or friction follow another law than the scene's."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+
+from proofroll.core.arrays import FloatArray
+from proofroll.core.diagnosis import Cause, Evidence, apart
+from proofroll.core.events import events_of
+from proofroll.elements.ball_on_surface.diagnosis.equations import Law
+from proofroll.elements.ball_on_surface.diagnosis.held import COVERED, has_resistance, held_against, is_bounded
+from proofroll.elements.ball_on_surface.mechanics import resistance_moment
+from proofroll.elements.ball_on_surface.model import RollingBall
+
+_ANGLES = 90
+_FEWEST = 5
+# Along one direction every cone has its edge or its face: the slip has to turn by this much to tell [rad].
+# A face that is fitted comes near any short arc of slip: an elliptic cone that lags left a fiftieth.
+_PYRAMID = 1 / 100
+_TURNS = 0.4
+
+
+@dataclass(frozen=True)
+class OtherLaw:
+    """A law of the contact that is another than the scene's, without a number to fit.
+
+    Attributes:
+        id: of the hypothesis.
+        says: what the engine does.
+        laws: possible ones for a ball, with how many numbers were chosen for each.
+        remedy: what to look at.
+        applies: whether the scene has what the law is about.
+    """
+
+    id: str
+    says: str
+    laws: Callable[[RollingBall], Iterator[Law]]
+    remedy: str
+    applies: Callable[[RollingBall], bool]
+    fitted: int = 0
+    grounds: str = "the other law gives the accelerations and forces at every sample, with no number or one angle"
+
+    def test(self, evidence: Evidence) -> Iterator[Cause]:
+        """See :class:`proofroll.core.diagnosis.Hypothesis`."""
+        body = evidence.element.rolling
+        if not self.applies(body):
+            return
+        for held in held_against(evidence):
+            best = min(self.laws(body), key=held.largest)
+            yield held.cause(self.id, self.says, best, self.remedy, self.fitted)
+
+
+@dataclass(frozen=True)
+class StartsToSlip:
+    """The bound of sticking is another than the scene's."""
+
+    id: str = "static friction"
+    grounds: str = "up to the first slip the path is the true one, so the friction that it needs then is the bound"
+
+    def test(self, evidence: Evidence) -> Iterator[Cause]:
+        """See :class:`proofroll.core.diagnosis.Hypothesis`."""
+        run, truth, contact = evidence.run, evidence.truth, evidence.element.contact
+        if run is None or truth is None or not np.isfinite(contact.mu_static) or "sticking" not in truth:
+            return
+        first, true = (
+            next((event.time for event in events_of(data) if event.kind == "slip"), float(data["time"][-1]))
+            for data in (run, truth)
+        )
+        if contact.mu_kinetic >= contact.mu_static or first == true:
+            return
+        time, needed = truth["time"].to_numpy(), truth["needed_friction"].to_numpy()
+        held = (time <= true) & (truth["sticking"].to_numpy() > 0) & np.isfinite(needed)
+        above = np.flatnonzero(held & (needed >= contact.mu_kinetic))
+        if not len(above) or above[0] == 0:
+            return
+        i = int(above[0])
+        share = (contact.mu_kinetic - needed[i - 1]) / (needed[i] - needed[i - 1])
+        crossing = float(time[i - 1] + share * (time[i] - time[i - 1]))
+        both = f"the kinetic friction {contact.mu_kinetic:g}, not at the static {contact.mu_static:g}"
+        says = f"the ball begins to slip at {both}"
+        remedy = "the ball sticks up to the static friction, and only slips at the kinetic one"
+        yield Cause(
+            self.id, says, "first slip", "s", abs(first - true), abs(first - crossing), remedy, 0, ("motion", "force")
+        )
+
+
+@dataclass(frozen=True)
+class PyramidalCone:
+    """Friction depends on the direction of the slip."""
+
+    id: str = "pyramidal cone"
+    grounds: str = (
+        "while it slips, the reported friction is that of a cone of four faces at one angle, sample by sample"
+    )
+
+    def test(self, evidence: Evidence) -> Iterator[Cause]:
+        """See :class:`proofroll.core.diagnosis.Hypothesis`."""
+        run, body = evidence.run, evidence.element.rolling
+        if run is None or "sticking" not in run or "N" not in run or not is_bounded(body):
+            return
+        slips = run["sticking"].to_numpy() == 0
+        slip = np.stack([run[name].to_numpy()[slips] for name in ("slip2", "slip3")], axis=-1)
+        said = np.stack([run[name].to_numpy()[slips] for name in ("F2", "F3")], axis=-1)
+        most = body.contact.mu_kinetic * run["N"].to_numpy()[slips][:, None]
+        sizes = np.linalg.norm(slip, axis=-1, keepdims=True)
+        if len(slip) < _FEWEST or not np.all(sizes > 0) or not np.all(np.isfinite(said)):
+            return
+        directions = np.unwrap(np.arctan2(slip[:, 1], slip[:, 0]))
+        if np.ptp(directions) < _TURNS:
+            return
+        before = apart(said, -most * slip / sizes)
+        after = np.inf
+        for angle in np.arange(_ANGLES) * np.pi / 2 / _ANGLES:
+            turn = np.array([[np.cos(angle), -np.sin(angle)], [np.sin(angle), np.cos(angle)]])
+            along = slip @ turn
+            corner = np.abs(along) == np.max(np.abs(along), axis=-1, keepdims=True)
+            for kind in (corner, 1.0):
+                after = min(after, apart(said, -most * (np.sign(along) * kind) @ turn.T))
+        says = "the friction cone is a pyramid: the friction depends on the direction of the slip"
+        remedy = "choose an elliptic (quadratic) cone"
+        covered = ("motion", *COVERED)
+        yield Cause(self.id, says, "friction while slipping", "N", before, after, remedy, 1, covered, closes=_PYRAMID)
+
+
+def _along_spin(body: RollingBall) -> Iterator[Law]:
+    def moment(ball: RollingBall, N: float, w: FloatArray) -> FloatArray:
+        return -ball.contact.rolling_resistance * N * w / (float(np.linalg.norm(w)) or 1.0)
+
+    yield Law(body, resisting=moment)
+
+
+def _by_weight(body: RollingBall) -> Iterator[Law]:
+    weight = body.ball.mass * float(np.linalg.norm(body.gravity))
+
+    def moment(e1: FloatArray, v: FloatArray, _: FloatArray) -> FloatArray:
+        return resistance_moment(body.contact.rolling_resistance, weight, e1, v)
+
+    yield Law(body, moment=moment, resisting=lambda *_: np.zeros(3))
+
+
+def _as_velocity(body: RollingBall) -> Iterator[Law]:
+    def friction(ball: RollingBall, N: float, v: FloatArray) -> FloatArray:
+        return -ball.contact.mu_kinetic * N * v / (float(np.linalg.norm(v)) or 1.0)
+
+    yield Law(body, slipping=friction)
+
+
+CONTACT_LAWS: tuple[Any, ...] = (
+    OtherLaw(
+        "resistance along spin",
+        "the rolling resistance acts against the whole angular velocity, spin about the normal included",
+        _along_spin,
+        "the moment of the rolling resistance is f (v/V) x (-N e1): it is against the rolling alone",
+        has_resistance,
+    ),
+    OtherLaw(
+        "resistance by weight",
+        "the rolling resistance is f times the ball's weight, not f times the force of the wall",
+        _by_weight,
+        "the moment of the rolling resistance is f N, with the N of that moment",
+        has_resistance,
+    ),
+    OtherLaw(
+        "friction against velocity",
+        "the friction acts against the velocity of the centre, not against the slip of the contact point",
+        _as_velocity,
+        "friction is against v + w x a e1",
+        is_bounded,
+    ),
+    PyramidalCone(),
+    StartsToSlip(),
+)
