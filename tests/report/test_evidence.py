@@ -17,7 +17,7 @@ from proofroll.core.dataset import observe
 from proofroll.core.verdict import Verdict, judge
 from proofroll.files.netcdf import read, write
 from proofroll.files.scene_file import load_scene
-from proofroll.report.evidence import add_evidence, cost
+from proofroll.report.evidence import claims, cost
 from proofroll.report.html import page
 from proofroll.report.labels import error
 from proofroll.report.plots import MOST_POINTS, kept, point_curves
@@ -149,17 +149,13 @@ def test_all_that_is_claimed_of_a_row_is_said() -> None:
         limit={"gamma": Tolerance(1e-6, False, "rad")},
         bound={"N": Tolerance(1e-3, True)},
     )  # fmt: skip
-    run = type("Run", (), {"row": row, "result": type("Result", (), {"timings": []})})
-    comparison = type("Comparison", (), {"scene": "inclined_plane"})
-    outcome: Any = type("Outcome", (), {"runs": [run], "truths": {}, "comparison": comparison})
     entry = {
         "name": "alpha", "formulation": None, "setting": "", "resolution": None, "engine": "alpha",
         "expected": ["agrees"],
         "expected_for": {}, "because": "", "tolerance": "band", "resolution_value": None,
+        "claims": claims(row),
     }  # fmt: skip
-    content: dict[str, Any] = {"rows": [entry], "runs": [{}]}
-    add_evidence(content, outcome)
-    assert expectations(content)[0]["further"] == (
+    assert expectations({"rows": [entry]})[0]["further"] == (
         "N within 0.1 % of its scale",
         "order of z 1.9 to 2.1",
         "limit of γ within 1e-06 rad",

@@ -1,34 +1,15 @@
-"""What a comparison's section shows besides verdicts: its scene, all that is claimed, and cost with intervals."""
+"""What a comparison's section shows besides verdicts: all that is claimed, and cost with intervals."""
 
 from __future__ import annotations
 
 from typing import TYPE_CHECKING, Any
 
-from proofroll.files.json_data import plain
-from proofroll.report.comparison_content import by_row
-from proofroll.report.scene_sheet import scene_sheet
 from proofroll.running.timing import Timing
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
 
     from proofroll.core.comparison import Row, Tolerance
-    from proofroll.studies.outcome import Outcome
-
-
-def add_evidence(content: dict[str, Any], outcome: Outcome) -> None:
-    """Gives a comparison's content its ``sheet``, each row its ``claims``, and each timed run its ``cost``.
-
-    Args:
-        content: of the comparison.
-        outcome: what it found.
-    """
-    points = [case.parameters for case in outcome.truths.values()]
-    content["sheet"] = plain(scene_sheet(outcome.comparison.scene, points))
-    for entry, runs in zip(content["rows"], by_row(outcome).values(), strict=True):
-        entry["claims"] = plain(_claims(runs[0].row))
-    for entry, run in zip(content["runs"], outcome.runs, strict=True):
-        entry["cost"] = plain(cost(run.result.timings))
 
 
 def cost(timings: Sequence[float]) -> dict[str, Any] | None:
@@ -45,7 +26,7 @@ def cost(timings: Sequence[float]) -> dict[str, Any] | None:
     return {"median": interval.value, **ends, "runs": len(timings)}
 
 
-def _claims(row: Row) -> dict[str, Any]:
+def claims(row: Row) -> dict[str, Any]:
     """What is expected of a row besides its verdict: bounds of its own, orders, limits, and other points' verdicts."""
     return {
         "bound": {name: _text(bound) for name, bound in row.bound.items()},

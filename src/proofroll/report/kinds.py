@@ -51,8 +51,14 @@ class ReportKind(Protocol):
         """What is told of a truth besides its route and error bars."""
 
     @staticmethod
-    def add_to_runs(content: dict[str, Any], runs: Sequence[Run], store: Store) -> None:
-        """Gives the runs of a comparison's content what the kind knows of them."""
+    def run_facts(truths: Sequence[Mapping[str, Any]], runs: Sequence[Run], store: Store) -> list[dict[str, Any]]:
+        """What is told of each run of a comparison besides its verdicts.
+
+        Args:
+            truths: entries of the truth at each point, with their :meth:`truth_facts`.
+            runs: of the comparison.
+            store: where the trajectories are.
+        """
 
     @staticmethod
     def curves(scene: Scene, truth: xr.Dataset) -> Sequence[Observable]:

@@ -8,11 +8,12 @@ from typing import TYPE_CHECKING, Any
 from proofroll.files.json_data import plain
 from proofroll.files.netcdf import read
 from proofroll.files.scene_file import load_scene
-from proofroll.report.comparison_content import environment, outcome_content
-from proofroll.report.evidence import add_evidence
+from proofroll.report.comparison_content import by_row, environment, outcome_content
+from proofroll.report.evidence import claims, cost
 from proofroll.report.findings import findings
 from proofroll.report.growth import growth
 from proofroll.report.kinds import kind_of
+from proofroll.report.scene_sheet import scene_sheet
 from proofroll.report.study_parts import part_kinds
 from proofroll.report.summary import three_sentences
 
@@ -28,19 +29,7 @@ def report_content(outcomes: list[Outcome], store: Store, command: str) -> dict[
     entries of further studies under the key of their kind, ``date`` and ``environment``. Paths of files are relative to
     the folder of the report.
     """
-    comparisons = []
-    for outcome in outcomes:
-        content = outcome_content(outcome)
-        for run in content["runs"]:
-            run["trajectory"] = run["trajectory"] and f"{store.folder.name}/{run['trajectory']}"
-        content["truths"] = _truths(outcome, store)
-        content["findings"] = findings(content)
-        kind = kind_of(load_scene(outcome.comparison.scene))
-        if kind is not None:
-            kind.add_to_runs(content, outcome.runs, store)
-        add_evidence(content, outcome)
-        content["growth"] = growth(content)
-        comparisons.append(content)
+    comparisons = [_comparison(outcome, store) for outcome in outcomes]
     versions: dict[str, str] = {}
     for outcome in outcomes:
         for run in outcome.runs:
@@ -54,6 +43,29 @@ def report_content(outcomes: list[Outcome], store: Store, command: str) -> dict[
     }
     content["findings"] = {"sentences": three_sentences(content)}
     return dict(plain(content))
+
+
+def _comparison(outcome: Outcome, store: Store) -> dict[str, Any]:
+    """A comparison's content with its truths, what its kind of scene tells of each run, claims, costs and findings."""
+    content, truths = outcome_content(outcome), _truths(outcome, store)
+    kind = kind_of(load_scene(outcome.comparison.scene))
+    facts = kind.run_facts(truths, outcome.runs, store) if kind is not None else [{} for _ in outcome.runs]
+    runs = [
+        {
+            **entry,
+            "trajectory": entry["trajectory"] and f"{store.folder.name}/{entry['trajectory']}",
+            **of_kind,
+            "cost": cost(run.result.timings),
+        }
+        for entry, run, of_kind in zip(content["runs"], outcome.runs, facts, strict=True)
+    ]
+    rows = [
+        {**entry, "claims": claims(of_row[0].row)}
+        for entry, of_row in zip(content["rows"], by_row(outcome).values(), strict=True)
+    ]
+    sheet = scene_sheet(outcome.comparison.scene, [case.parameters for case in outcome.truths.values()])
+    told: dict[str, Any] = plain({**content, "rows": rows, "runs": runs, "truths": truths, "sheet": sheet})
+    return {**told, "findings": findings(told), "growth": growth(told)}
 
 
 def _truths(outcome: Outcome, store: Store) -> list[dict[str, Any]]:

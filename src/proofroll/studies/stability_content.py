@@ -87,9 +87,6 @@ def _point(point: MapPoint) -> dict[str, Any]:
         "timed_out": point.timeouts > 0,
         "runs": len(point.results),
         "problem": place.problem,
-        "reproducer": None,
-        "reproducer_needs": [],
-        "reproducer_note": None,
     }
 
 

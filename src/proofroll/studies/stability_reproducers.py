@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 import re
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
@@ -22,42 +24,59 @@ _NOTHING_TO_SHOW = {
 }
 
 
-def write_reproducers(found: StabilityMap, study: dict[str, Any], folder: Path, workers: Workers | None = None) -> None:
-    """Puts the path of each program into its point of the study, and why it needs proofroll, or why there is none.
+@dataclass(frozen=True)
+class Reproducer:
+    """A program of one point.
+
+    Attributes:
+        reproducer: its path; None: there is none.
+        reproducer_needs: packages that it imports.
+        reproducer_note: why it needs proofroll, or why there is none.
+    """
+
+    reproducer: str | None = None
+    reproducer_needs: Sequence[str] = ()
+    reproducer_note: str | None = None
+
+
+def write_reproducers(
+    found: StabilityMap, entries: Sequence[Mapping[str, Any]], folder: Path, workers: Workers | None = None
+) -> list[Reproducer]:
+    """Writes a program for each point that shows a failure; one answer for each point.
 
     Args:
         found: the map.
-        study: the same as :func:`proofroll.studies.stability_content.content` has it; its points are in its order.
+        entries: its points as :func:`proofroll.studies.stability_content.content` has them.
         folder: where the programs go.
         workers: idle ones that may be asked.
     """
-    wanted: list[tuple[MapPoint, dict[str, Any], dict[str, Any], Case, str]] = []
-    for point, entry in zip(found.points, study["points"], strict=True):
-        name, side = _shown(entry)
-        if side is None or side["failure"] is None:
-            continue
+    written = [Reproducer() for _ in entries]
+    wanted: list[tuple[int, str, Case]] = []
+    for index, (point, entry) in enumerate(zip(found.points, entries, strict=True)):
+        name = _shown(entry)
+        side = entry["sides"][name]
         if side["failure"] in _NOTHING_TO_SHOW:
-            entry["reproducer_note"] = _NOTHING_TO_SHOW[side["failure"]]
-            continue
-        rung = point.ladder.index(side["beyond"])
-        wanted.append((point, entry, side, point.cases[rung], name))
-    for (point, entry, side, case, name), (engine, reason) in zip(
-        wanted, programs([item[3] for item in wanted], workers), strict=True
+            written[index] = Reproducer(reproducer_note=_NOTHING_TO_SHOW[side["failure"]])
+        elif side["failure"] is not None:
+            wanted.append((index, name, point.cases[point.ladder.index(side["beyond"])]))
+    for (index, name, case), (engine, reason) in zip(
+        wanted, programs([item[-1] for item in wanted], workers), strict=True
     ):
-        entry["reproducer_note"] = None if engine is not None else reason
+        point, entry = found.points[index], entries[index]
         element = point.place.scene.elements[0] if point.place.scene is not None else None
         if not isinstance(element, WritesPrograms):
-            entry["reproducer_note"] = "elements of this kind offer no program"
+            written[index] = Reproducer(reproducer_note="elements of this kind offer no program")
             continue
+        note = None if engine is not None else reason
         path = folder / f"{_file_name(entry)}.py"
-        text = element.failure_program(_failed(point, entry, side, case, name), engine)
+        text = element.failure_program(_failed(point, entry, case, name, note), engine)
         write_text(path, text)
-        entry["reproducer"] = str(path)
-        entry["reproducer_needs"] = [name for name in imported(text) if name != "sys"]
+        written[index] = Reproducer(str(path), [package for package in imported(text) if package != "sys"], note)
+    return written
 
 
-def _failed(point: MapPoint, entry: dict[str, Any], side: dict[str, Any], case: Case, boundary: str) -> FailedRun:
-    yardstick, facts = point.place.yardstick, case.engine
+def _failed(point: MapPoint, entry: Mapping[str, Any], case: Case, boundary: str, note: str | None) -> FailedRun:
+    yardstick, facts, side = point.place.yardstick, case.engine, entry["sides"][boundary]
     assert yardstick is not None  # a point has one
     return FailedRun(
         scene=case.scene,
@@ -75,20 +94,20 @@ def _failed(point: MapPoint, entry: dict[str, Any], side: dict[str, Any], case: 
         truth=yardstick.truth,
         scale=yardstick.scale,
         allowed=WRONG if boundary == "stable" else ACCURATE,
-        note=entry["reproducer_note"] or "",
+        note=note or "",
     )
 
 
-def _shown(entry: dict[str, Any]) -> tuple[str, dict[str, Any] | None]:
+def _shown(entry: Mapping[str, Any]) -> str:
     """The boundary that a program can show: that of stability, or else that of accuracy."""
     for name in ("stable", "accurate"):
-        side = entry["sides"][name]
-        if side["failure"] and side["failure"] not in _NOTHING_TO_SHOW:
-            return name, side
-    return entry["boundary"], entry["sides"][entry["boundary"]]
+        failure = entry["sides"][name]["failure"]
+        if failure and failure not in _NOTHING_TO_SHOW:
+            return name
+    return str(entry["boundary"])
 
 
-def _file_name(entry: dict[str, Any]) -> str:
+def _file_name(entry: Mapping[str, Any]) -> str:
     settings = entry["settings"]
     words = (entry["engine"], settings.get("formulation"), settings.get("preset"), entry["axis"], f"{entry['value']:g}")
     return re.sub(r"[^\w.+-]+", "_", "-".join(str(word) for word in words if word))

@@ -97,13 +97,16 @@ def make_tradeoff(
     from proofroll.studies.tradeoff_content import content
 
     found = tradeoff(question, runner, engines=engines, over=over, brief=brief, progress=progress)
-    study = content(found)
+    measured = content(found)
     judged = claims if not engines else None
-    study["engines"] = sorted(engines)
-    study["claims"] = {
-        "file": claims.name if claims else None,
-        "contradictions": judged.contradictions(study) if judged else [],
-        "undecided": judged.undecided(study) if judged else [],
+    study = {
+        **measured,
+        "engines": sorted(engines),
+        "claims": {
+            "file": claims.name if claims else None,
+            "contradictions": judged.contradictions(measured) if judged else [],
+            "undecided": judged.undecided(measured) if judged else [],
+        },
     }
     path = stored(folder, question, engines, brief=brief)
     keep(study, path)
@@ -147,12 +150,21 @@ def make_stability(
     from proofroll.studies.stability_reproducers import write_reproducers
 
     found = stability(asked.scene, axes, runner, engines=engines, effort=effort, progress=progress)
-    study = content(found)
+    map_alone = content(found)
     path = stability_path(folder, asked, axes, engines, effort)
-    write_reproducers(found, study, path.with_suffix(""), runner.workers)
-    study["claims"] = {"file": asked.name, "contradictions": asked.contradictions(study)}
-    study |= {"effort": dataclasses.asdict(effort), "measured": installed.measured()}
-    study = plain(study)
+    written = write_reproducers(found, map_alone["points"], path.with_suffix(""), runner.workers)
+    study: dict[str, Any] = plain(
+        {
+            **map_alone,
+            "points": [
+                {**entry, **dataclasses.asdict(program)}
+                for entry, program in zip(map_alone["points"], written, strict=True)
+            ],
+            "claims": {"file": asked.name, "contradictions": asked.contradictions(map_alone)},
+            "effort": dataclasses.asdict(effort),
+            "measured": installed.measured(),
+        }
+    )
     keep(study, path)
     return study, path
 

@@ -145,9 +145,9 @@ def programs(tmp_path_factory: pytest.TempPathFactory) -> dict[str, dict[str, An
     ]
     axis = Axis("V0", "m/s", "initial speed", [4.0], {"speed": AxisTerm()})
     found = mapped(folder, engines, [axis])
-    study = plain(content(found))
-    write_reproducers(found, study, folder / "reproducers")
-    return {point["engine"]: point for point in study["points"]}
+    points = content(found)["points"]
+    written = write_reproducers(found, points, folder / "reproducers")
+    return {entry["engine"]: entry | dataclasses.asdict(one) for entry, one in zip(points, written, strict=True)}
 
 
 @pytest.mark.parametrize("engine", ["mujoco", "exudyn", "pinocchio"])
@@ -167,14 +167,14 @@ def test_what_is_ours_is_shown_through_proofroll(tmp_path: Path) -> None:
     """Where an engine has no program of its own, the program asks proofroll, says why, and exits with 1."""
     axis = Axis("V0", "m/s", "initial speed", [4.0], {"speed": AxisTerm()})
     found = mapped(tmp_path, ["projection[formulation=euler,preset=default]"], [axis])
-    study = plain(content(found))
-    write_reproducers(found, study, tmp_path / "reproducers")
-    (point,) = study["points"]
-    assert point["reproducer_needs"] == ["numpy", "proofroll"]
-    assert "no program of its own" in point["reproducer_note"]
-    assert point["reproducer_note"] in Path(point["reproducer"]).read_text()
+    (written,) = write_reproducers(found, content(found)["points"], tmp_path / "reproducers")
+    assert written.reproducer_needs == ["numpy", "proofroll"]
+    assert written.reproducer is not None
+    assert written.reproducer_note is not None
+    assert "no program of its own" in written.reproducer_note
+    assert written.reproducer_note in Path(written.reproducer).read_text()
     run = subprocess.run(
-        [sys.executable, point["reproducer"]], capture_output=True, text=True, timeout=1500, check=False
+        [sys.executable, written.reproducer], capture_output=True, text=True, timeout=1500, check=False
     )
     assert run.returncode == 1, run.stdout + run.stderr
     assert ": shown" in run.stdout

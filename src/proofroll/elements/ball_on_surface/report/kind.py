@@ -51,9 +51,9 @@ class BallReport:
         return onsets.truth_facts(dataset, scene)
 
     @staticmethod
-    def add_to_runs(content: dict[str, Any], runs: Sequence[Run], store: Store) -> None:
+    def run_facts(truths: Sequence[Mapping[str, Any]], runs: Sequence[Run], store: Store) -> list[dict[str, Any]]:
         """Their slips."""
-        onsets.add_events(content, list(runs), store)
+        return onsets.run_facts(truths, runs, store)
 
     @staticmethod
     def curves(scene: Scene, truth: xr.Dataset) -> Sequence[Observable]:  # noqa: ARG004 -- the protocol's

@@ -11,9 +11,11 @@ from proofroll.elements.ball_on_surface.element import rolling_ball
 from proofroll.elements.ball_on_surface.onset_study import onset_verdict as judged_onset
 from proofroll.files.json_data import plain
 from proofroll.files.netcdf import read_some
+from proofroll.studies.planning import point_name
 from proofroll.truth.onset import Onset
 
 if TYPE_CHECKING:
+    from collections.abc import Mapping, Sequence
     from pathlib import Path
 
     import xarray as xr
@@ -39,26 +41,27 @@ def truth_facts(dataset: xr.Dataset, scene: Scene) -> dict[str, Any]:
     }
 
 
-def add_events(content: dict[str, Any], runs: list[Run], store: Store) -> None:
-    """Gives each run of the content its ``events``, and where friction is bounded the ``onset_verdict``.
+def run_facts(truths: Sequence[Mapping[str, Any]], runs: Sequence[Run], store: Store) -> list[dict[str, Any]]:
+    """The ``events`` of each run, and where friction is bounded the ``onset_verdict``.
 
     Args:
-        content: of a comparison, with its ``truths``.
-        runs: those of the content, in the same order.
+        truths: of a comparison, with their :func:`truth_facts`.
+        runs: of the comparison.
         store: where the trajectories are.
     """
-    known = {truth["point"]: Onset(**truth["onset"]) for truth in content["truths"] if "onset" in truth}
-    for entry, run in zip(content["runs"], runs, strict=True):
-        entry["events"] = []
-        truth = known.get(entry["point"])
-        if truth is None:
-            continue
-        events = []
-        if run.case is not None and run.result.trajectory is not None and store.trajectory(run.case).is_file():
-            events = _events(store.trajectory(run.case))
-        first = next((event for event in events if event.kind == "slip"), None)
-        entry["events"] = [plain(dataclasses.asdict(event)) for event in events]
-        entry["onset_verdict"] = judged_onset(truth, run.result, first)
+    known = {truth["point"]: Onset(**truth["onset"]) for truth in truths if "onset" in truth}
+    return [_run_facts(known.get(point_name(run.parameters)), run, store) for run in runs]
+
+
+def _run_facts(truth: Onset | None, run: Run, store: Store) -> dict[str, Any]:
+    if truth is None:
+        return {"events": []}
+    events = []
+    if run.case is not None and run.result.trajectory is not None and store.trajectory(run.case).is_file():
+        events = _events(store.trajectory(run.case))
+    first = next((event for event in events if event.kind == "slip"), None)
+    told = [plain(dataclasses.asdict(event)) for event in events]
+    return {"events": told, "onset_verdict": judged_onset(truth, run.result, first)}
 
 
 def mark(content: dict[str, Any], curves: list[dict[str, Any]]) -> list[dict[str, Any]]:

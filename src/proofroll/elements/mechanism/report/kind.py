@@ -48,8 +48,9 @@ class MechanismReport:
         return {}
 
     @staticmethod
-    def add_to_runs(content: dict[str, Any], runs: Sequence[Run], store: Store) -> None:
+    def run_facts(truths: Sequence[Mapping[str, Any]], runs: Sequence[Run], store: Store) -> list[dict[str, Any]]:  # noqa: ARG004 -- the protocol's
         """Nothing."""
+        return [{} for _ in runs]
 
     @staticmethod
     def curves(scene: Scene, truth: xr.Dataset) -> Sequence[Observable]:
