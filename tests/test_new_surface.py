@@ -1,4 +1,4 @@
-"""A surface of another package, said by a position and a distance, goes through run, compare, drawing and replay."""
+"""Surfaces of another package, said by a point or a profile curve, go through run, compare, drawing and replay."""
 
 from __future__ import annotations
 
@@ -55,6 +55,11 @@ coordinates = [0.4, 0.0]
 velocity = [0.1, 0.3]
 spin = 5.0
 """
+DISH = (
+    SCENE.replace('kind = "trough"', 'kind = "dish"')
+    .replace('radius = "$radius"', 'focus = "$radius"')
+    .replace("[0.4, 0.0]", "[0.0, 0.2]")
+)
 COMPARISON = """
 title = "A trough"
 question = "Does anybody's surface go through?"
@@ -96,7 +101,7 @@ def trough(
     info = tmp_path / "site3" / "troughs-1.0.dist-info"
     info.mkdir(parents=True)
     (info / "METADATA").write_text("Metadata-Version: 2.1\nName: troughs\nVersion: 1.0\n")
-    (info / "entry_points.txt").write_text("[proofroll.surfaces]\ntrough = trough:Trough\n")
+    (info / "entry_points.txt").write_text("[proofroll.surfaces]\ntrough = trough:Trough\ndish = dish:Dish\n")
     places = [str(info.parent), str(PLUGINS), os.environ.get("PYTHONPATH", "")]
     monkeypatch.setenv("PYTHONPATH", os.pathsep.join(places))
     monkeypatch.syspath_prepend(str(info.parent))
@@ -109,10 +114,14 @@ def trough(
     _look_again()
 
 
-def test_compare(proofroll: Proofroll, trough: Path) -> None:
+@pytest.mark.parametrize("kind", ["trough", "dish"])
+def test_compare(proofroll: Proofroll, trough: Path, kind: str) -> None:
     """The truth has its error bar by two routes, and engines that know any surface agree with it."""
-    file = trough.parent / "trough.toml"
-    file.write_text(COMPARISON.format(scene=str(trough)))
+    file, comparison = trough.parent / "trough.toml", COMPARISON.format(scene=str(trough))
+    if kind == "dish":
+        (trough / "scene.toml").write_text(DISH)
+        comparison = comparison.replace("angle =", "gamma =").replace("way =", "s =")
+    file.write_text(comparison)
     code, out, err = proofroll("compare", str(file), "--json", "--out", str(trough.parent / "out"))
     assert code == 0, err + out
     document = json.loads(out)

@@ -35,8 +35,9 @@ _local = threading.local()
 
 def available(body: RollingBall) -> bool:
     """Whether heyoka is installed, and has these equations: of a surface that does not resist rolling."""
-    known = isinstance(body.surface, (Cylinder, Plane, Declared)) and not body.contact.rolling_resistance
-    return known and library.available()
+    surface = body.surface
+    known = surface.knows_distance if isinstance(surface, Declared) else isinstance(surface, (Cylinder, Plane))
+    return known and not body.contact.rolling_resistance and library.available()
 
 
 def unreduced(body: RollingBall, times: FloatArray) -> BallMotion:

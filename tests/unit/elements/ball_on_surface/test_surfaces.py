@@ -1,12 +1,14 @@
 from __future__ import annotations
 
+import dataclasses
 from typing import Any
 
 import numpy as np
 import pytest
 from scipy.spatial.transform import Rotation
 
-from proofroll.elements.ball_on_surface.surfaces import Bowl, Cone, Cylinder, Generator, Plane, Torus
+from proofroll.core.errors import InputError
+from proofroll.elements.ball_on_surface.surfaces import Bowl, Cone, Cylinder, Generator, Plane, Revolved, Torus
 
 STEP = 1e-5  # [m or rad]; a central difference is then off by STEP² and by round-off/STEP, both below 1e-9
 CLOSE = 1e-9
@@ -192,3 +194,55 @@ def test_one_point_is_as_many(surface: Any) -> None:
         np.testing.assert_allclose(rate, surface.normal_gradient(p[None])[0] @ v, rtol=1e-12, atol=1e-13)
         together = surface.moving_triad(*p.tolist(), *v.tolist())
         np.testing.assert_allclose(together, [gap, *triad.T.ravel(), *rate], rtol=1e-12, atol=1e-14)
+
+
+class ConeByProfile(Cone):
+    """A cone that says its profile curve alone."""
+
+    away, along, offset = Revolved.away, Revolved.along, Revolved.offset  # type: ignore[assignment]
+
+
+class TorusByProfile(Torus):
+    """A ring that says its profile curve alone."""
+
+    away, along, offset = Revolved.away, Revolved.along, Revolved.offset  # type: ignore[assignment]
+
+
+@pytest.mark.parametrize(
+    ("formula", "profile", "radius"),
+    [
+        (Cone("wall", 0.6), ConeByProfile("wall", 0.6), 0.025),
+        (Torus("wall", 0.234, 0.009), TorusByProfile("wall", 0.234, 0.009), 0.12),
+    ],
+)
+def test_profile_alone(formula: Revolved, profile: Revolved, radius: float) -> None:
+    """A profile curve alone gives the surface of the centre, its distance and curvature as formulas do."""
+    known, found = formula.offset(radius), profile.offset(radius)
+    assert known.knows_distance
+    assert not found.knows_distance
+    found.checked()
+    p = np.random.default_rng(1).uniform(0.1, 0.4, (2, 5, 3))
+    for name in ("gap", "normal", "normal_gradient"):
+        np.testing.assert_allclose(getattr(found, name)(p), getattr(known, name)(p), rtol=0, atol=1e-13)
+        np.testing.assert_allclose(getattr(found, name)(p[0, 0]), getattr(known, name)(p[0, 0]), rtol=0, atol=1e-13)
+
+
+@dataclasses.dataclass(frozen=True)
+class Paraboloid(Revolved):
+    """z = r²/(4 f), bent most at its bottom, with the radius 2 f."""
+
+    name: str = "wall"
+    kind: str = "paraboloid"
+    coordinates = ("gamma", "s")
+    extent = (0.0, 0.5)
+
+    def profile(self, s: Any) -> tuple[Any, Any]:
+        """With f = 0.1 m."""
+        return s, s * s / 0.4
+
+
+def test_a_ball_that_does_not_fit_into_the_curve_is_refused() -> None:
+    """Where a profile curve bends more than the ball its centre would have no surface, which one line says."""
+    Paraboloid().offset(0.19).checked()
+    with pytest.raises(InputError, match=r"must be smaller than wall's curve, 0\.2.* m"):
+        Paraboloid().offset(0.21)

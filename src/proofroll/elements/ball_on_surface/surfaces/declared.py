@@ -1,4 +1,4 @@
-"""Surfaces that are declared by a position and a distance; everything else that engines ask follows from these."""
+"""Surfaces that are declared by a position and, if it is known, a distance; what engines ask besides follows."""
 
 from __future__ import annotations
 
@@ -13,6 +13,7 @@ import numpy.typing as npt
 from proofroll.core.arrays import FloatArray
 from proofroll.core.errors import InputError
 from proofroll.elements.ball_on_surface.surfaces.formula import differentiated
+from proofroll.elements.ball_on_surface.surfaces.nearest import distance_by_nearest
 from proofroll.elements.ball_on_surface.surfaces.surface import Generator
 
 # Places along each coordinate at which a declaration is checked, and from which the nearest point is looked for.
@@ -27,8 +28,8 @@ class Declared:
 
     * ``coordinates``, ``units``, ``periods``, ``domain``, in such an order that the product of the tangents points to
       the wall;
-    * :meth:`point` and :meth:`distance`, in ``+ - * /``, ``**`` and the functions of
-      :mod:`proofroll.elements.ball_on_surface.surfaces.formula`, so that they can be differentiated;
+    * :meth:`point`, and where it has a formula, which is faster, :meth:`distance`, in ``+ - * /``, ``**`` and the
+      functions of :mod:`proofroll.elements.ball_on_surface.surfaces.formula`, so that they can be differentiated;
     * :meth:`offset`, and where it is known, which is faster, :meth:`locate`.
 
     Tangents, curvature, frame and normal are derivatives.
@@ -55,9 +56,18 @@ class Declared:
         """Components of the place in the world with the coordinates u [m]."""
         raise NotImplementedError
 
-    def distance(self, x: Any, y: Any, z: Any) -> Any:
-        """Distance of a place in the world from the surface [m]: positive where balls are, negative behind the wall."""
-        raise NotImplementedError
+    @property
+    def knows_distance(self) -> bool:
+        """Whether :meth:`distance` is a formula; if not, distances are those from the nearest point."""
+        return type(self).distance is not Declared.distance
+
+    def distance(self, x: Any, y: Any, z: Any) -> Any:  # noqa: ARG002 -- said by subclasses
+        """Distance of a place in the world from the surface [m]: positive where balls are, negative behind the wall.
+
+        Raises:
+            InputError: it is not said.
+        """
+        raise InputError(f"{self.name}: kind", self.kind, "a formula of the distance is needed here, and it has none")
 
     def checked(self) -> None:
         """Holds the two descriptions against each other all over the domain.
@@ -199,7 +209,7 @@ def _chart(surface: Declared) -> tuple[Callable[..., Any], Callable[..., Any]]:
 
 @lru_cache
 def _field(surface: Declared) -> tuple[Callable[..., Any], Callable[..., Any]]:
-    return differentiated(surface.distance, 3)
+    return differentiated(surface.distance, 3) if surface.knows_distance else distance_by_nearest(surface)
 
 
 def _triad(x2: float, y2: float, z2: float, x: float, y: float, z: float) -> tuple[float, ...]:

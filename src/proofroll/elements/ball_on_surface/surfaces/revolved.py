@@ -15,13 +15,18 @@ from proofroll.core.bounds import OutOfBounds, bounded
 from proofroll.core.errors import InputError
 from proofroll.elements.ball_on_surface.surfaces.declared import Declared
 from proofroll.elements.ball_on_surface.surfaces.formula import cos, sin, sqrt
+from proofroll.elements.ball_on_surface.surfaces.jet import Jet, variables
+
+# Places along a curve from which the nearest point is looked for, and steps to it.
+_PLACES, _NEWTON, _ROUND_OFF = 65, 30, 1e-15
 
 
 class Revolved(Declared):
     """A profile curve in the half-plane of radius r and height z, turned about the axis by the angle gamma.
 
-    A subclass says :meth:`profile`, :meth:`away` and :meth:`along` of the curve, and ``extent``. The second coordinate
-    leads along the curve so that the ball is to its left, seen with r to the right and z upwards.
+    A subclass says :meth:`profile` of the curve and ``extent``, and where they have formulas, which are faster,
+    :meth:`away`, :meth:`along` and :meth:`offset`. The second coordinate leads along the curve so that the ball is to
+    its left, seen with r to the right and z upwards.
     """
 
     units: tuple[str, str] = ("rad", "m")
@@ -38,11 +43,35 @@ class Revolved(Declared):
 
     def away(self, r: Any, z: Any) -> Any:
         """Distance from the curve [m], positive where balls are."""
-        raise NotImplementedError
+        return Declared.distance(self, r, 0.0, z)
 
     def along(self, r: FloatArray, z: FloatArray) -> FloatArray:
-        """The coordinate of the nearest point of the curve."""
-        raise NotImplementedError
+        """The coordinate of the nearest point of the curve: Newton's method, from the nearest of many."""
+        r, z = np.broadcast_arrays(r, z)
+        low, high = self.extent
+        known = low + (high - low) * (np.arange(_PLACES) + 0.5) / _PLACES
+        at_r, at_z = (np.broadcast_to(part, known.shape) for part in self.profile(known))
+        s = known[np.argmin((r[..., None] - at_r) ** 2 + (z[..., None] - at_z) ** 2, axis=-1)]
+        for _ in range(_NEWTON):
+            (r0, r1, r2), (z0, z1, z2) = (_derivatives(part) for part in self.profile(variables(s)[0]))
+            off_r, off_z = r0 - r, z0 - z
+            step = (off_r * r1 + off_z * z1) / (r1 * r1 + z1 * z1 + off_r * r2 + off_z * z2)
+            s = s - step
+            if np.all(np.abs(step) <= _ROUND_OFF * (high - low)):
+                break
+        period = self.periods[1]
+        return np.asarray(s if period is None else s - period * np.ceil(s / period - 0.5))
+
+    def offset(self, ball_radius: float) -> Revolved:
+        """See :class:`Surface`."""
+        from proofroll.elements.ball_on_surface.surfaces.parallel import Parallel  # which is such a surface, too
+
+        return Parallel(self, ball_radius)
+
+    @property
+    def knows_distance(self) -> bool:
+        """See :class:`Declared`."""
+        return type(self).away is not Revolved.away
 
     @property
     def domain(self) -> tuple[tuple[float, float], tuple[float, float]]:
@@ -62,6 +91,11 @@ class Revolved(Declared):
         """See :class:`Surface`."""
         x, y, z = np.moveaxis(np.asarray(p_WB, dtype=np.float64), -1, 0)
         return np.stack([np.arctan2(y, x), self.along(np.hypot(x, y), z)], axis=-1)
+
+
+def _derivatives(part: Any) -> tuple[Any, Any, Any]:
+    """Value, first and second derivative of a function of one variable."""
+    return (part.value, part.first[0], part.second[0]) if isinstance(part, Jet) else (part, 0.0, 0.0)
 
 
 @dataclass(frozen=True)

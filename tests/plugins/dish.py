@@ -1,0 +1,30 @@
+"""A surface that somebody else declares by its profile curve alone."""
+
+# ruff: noqa: D102 -- what the method means is said in Revolved
+
+from __future__ import annotations
+
+import dataclasses
+from typing import Any, Literal
+
+from proofroll.elements.ball_on_surface.surfaces import Revolved
+
+
+@dataclasses.dataclass(frozen=True)
+class Dish(Revolved):
+    """Inside of a paraboloid.
+
+    Attributes:
+        name: by which contacts name it.
+        focus: height of the focus above the bottom [m].
+        kind: which surface it is.
+    """
+
+    name: str
+    focus: float = dataclasses.field(metadata={"unit": "m"})
+    kind: Literal["dish"] = "dish"
+    coordinates = ("gamma", "s")
+    extent = (0.0, 0.5)
+
+    def profile(self, s: Any) -> tuple[Any, Any]:
+        return s, s * s / (4 * self.focus)
