@@ -8,7 +8,7 @@ import pytest
 from robot_templates import inertial, urdf
 
 from proofroll.robots.lint import lint
-from proofroll.robots.robot_file import Finding, open_robot
+from proofroll.robots.robot_file import LintFinding, open_robot
 from proofroll.robots.urdf import read_urdf
 
 MESH = '<collision><geometry><mesh filename="package://x/y.stl"/></geometry></collision>'
@@ -39,7 +39,7 @@ PLANTED = {
 }
 
 
-def _findings(text: str, folder: Path) -> list[Finding]:
+def _findings(text: str, folder: Path) -> list[LintFinding]:
     path = folder / "robot.urdf"
     path.write_text(text)
     file = open_robot(path)

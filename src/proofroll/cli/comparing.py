@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
 
@@ -51,7 +52,7 @@ def compare(
     """
     from proofroll.report.comparison_content import outcome_content
 
-    loaded = _asked(comparison, assignments(settings or []))
+    loaded = asked(comparison, assignments(settings or []))
     outcomes = outcomes_of([loaded], engine or [], new_runner(out, fresh, jobs, scheduler))
     content = outcome_content(outcomes[0])
     if as_json:
@@ -61,7 +62,7 @@ def compare(
     raise typer.Exit(exit_code(outcomes))
 
 
-def _asked(name: str, parameters: dict[str, str]) -> Comparison:
+def asked(name: str, parameters: Mapping[str, str]) -> Comparison:
     """The comparison of this name, or that of a scene about which no file says anything.
 
     Raises:

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
-from proofroll.cli.comparing import exit_code, outcomes_of, print_outcome
+from proofroll.cli.comparing import asked, exit_code, outcomes_of, print_outcome
 from proofroll.cli.options import (
     CONTRADICTED,
     ENGINE,
@@ -34,7 +34,8 @@ if TYPE_CHECKING:
 
 def report(
     studies: Annotated[
-        list[str] | None, typer.Argument(help="Comparisons and other studies: files or names; all by default.")
+        list[str] | None,
+        typer.Argument(help="Comparisons, other studies, scenes, robot files; all studies by default."),
     ] = None,
     engine: Engines = None,
     out: Out = Path("out"),
@@ -49,12 +50,12 @@ def report(
     study. A study that is kept and still holds is used as it is; otherwise it is made briefly, as is a comparison that
     says so, and the report names the command that makes it whole.
     """
-    from proofroll.files.comparison_file import comparison_names, load_comparison
+    from proofroll.files.comparison_file import comparison_names
     from proofroll.report.growing_report import begun
     from proofroll.report.study_parts import all_parts, parts_of
 
     names, parts = parts_of(studies, engine or []) if studies else (comparison_names(), all_parts(engine or [], out))
-    loaded = [load_comparison(name) for name in names]
+    loaded = [asked(name, {}) for name in names]
     if not studies:
         loaded = [item.briefly() for item in loaded]
     runner = new_runner(out, fresh, jobs, scheduler)

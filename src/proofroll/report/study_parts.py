@@ -12,6 +12,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any, ClassVar, Protocol
 
 from proofroll.core.errors import InputError, ProofrollError
+from proofroll.files.scene_sources import source_of
 from proofroll.files.toml import named_file, read_toml, study_files
 
 if TYPE_CHECKING:
@@ -93,7 +94,7 @@ def parts_of(names: Sequence[str], engines: Sequence[str]) -> tuple[list[str], l
     """The names of comparisons, and the parts that other names stand for.
 
     Args:
-        names: of comparisons and of files for other studies, or paths.
+        names: of comparisons, scenes and files for other studies, or paths, of robot files too.
         engines: to which studies are restricted.
 
     Raises:
@@ -103,7 +104,7 @@ def parts_of(names: Sequence[str], engines: Sequence[str]) -> tuple[list[str], l
     comparisons: list[str] = []
     found: list[Part] = []
     for name in names:
-        path = named_file(name)
+        path = named_file(name) if source_of(name) is None else None
         study = None if path is None else read_toml(path).get("study")
         if path is None or study is None:
             comparisons.append(name)

@@ -8,11 +8,11 @@ from __future__ import annotations
 import numpy as np
 
 from proofroll.robots.model import WORLD, Array, Robot, RobotBody, RobotJoint
-from proofroll.robots.states import States
+from proofroll.robots.states import RobotStates
 from proofroll.robots.two_formulations import Dynamics, armature, skew, within
 
 
-def body_recursion(robot: Robot, states: States) -> Dynamics:
+def body_recursion(robot: Robot, states: RobotStates) -> Dynamics:
     """Formulation B."""
     count, n = states.count, robot.dofs
     v = states.stacked(states.velocity, robot)[:, None]
@@ -24,7 +24,7 @@ def body_recursion(robot: Robot, states: States) -> Dynamics:
     return Dynamics(M + np.diag(armature(robot)), g, h)
 
 
-def newton_euler(robot: Robot, states: States, v: Array, a: Array, gravity: Array) -> Array:
+def newton_euler(robot: Robot, states: RobotStates, v: Array, a: Array, gravity: Array) -> Array:
     """Torques for velocities and accelerations of shape (states, any, n), without armature; the same shape."""
     start = np.zeros((*v.shape[:2], 6))
     falling = start.copy()

@@ -21,7 +21,7 @@ from proofroll.robots.layers import LAYERS, RobotTruth
 from proofroll.robots.lint import lint
 from proofroll.robots.protocol import Request
 from proofroll.robots.robot_file import RobotFile, open_robot
-from proofroll.robots.states import States, random_states
+from proofroll.robots.states import RobotStates, random_states
 from proofroll.robots.two_formulations import poses
 from proofroll.robots.urdf import BASE_JOINT
 from proofroll.running.interpreters import start
@@ -154,7 +154,7 @@ def _skeleton(truth: RobotTruth) -> dict[str, Any]:
     upright = {joint.name: np.eye(3)[None] for joint in robot.moving}
     origin = {joint.name: np.zeros((1, 3)) for joint in robot.moving}
     still = {joint.name: np.zeros((1, joint.dofs)) for joint in robot.moving}
-    placed = poses(robot, States(zero, upright, origin, still, still))
+    placed = poses(robot, RobotStates(zero, upright, origin, still, still))
     return {
         "name": robot.name,
         "joints": [

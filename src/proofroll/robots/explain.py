@@ -6,7 +6,7 @@ import dataclasses
 from collections.abc import Callable, Mapping
 from xml.etree.ElementTree import Element
 
-from proofroll.robots.hypotheses import Evidence, Hypothesis, hypotheses
+from proofroll.robots.hypotheses import RobotEvidence, RobotHypothesis, hypotheses
 from proofroll.robots.layers import LAYERS, RobotTruth, differences, first_failing
 from proofroll.robots.model import Array, Robot
 from proofroll.robots.protocol import Reading
@@ -19,7 +19,7 @@ _BRANCHES = 3
 
 
 @dataclasses.dataclass(frozen=True)
-class Cause:
+class RobotCause:
     """A cause with its proof.
 
     Attributes:
@@ -46,7 +46,7 @@ class _Step:
 
     truth: RobotTruth
     found: dict[str, float]
-    causes: tuple[Cause, ...] = ()
+    causes: tuple[RobotCause, ...] = ()
 
 
 def explain(
@@ -57,7 +57,7 @@ def explain(
     engine: str,
     tolerances: dict[str, float],
     recompiled: Callable[[Element], Robot | None] = lambda _: None,
-) -> tuple[tuple[Cause, ...], str | None]:
+) -> tuple[tuple[RobotCause, ...], str | None]:
     """The causes of all differences, and the first layer that they leave unexplained.
 
     Args:
@@ -67,7 +67,7 @@ def explain(
         reading: what the engine holds.
         engine: its name.
         tolerances: layer -> difference up to which it holds.
-        recompiled: see :class:`proofroll.robots.hypotheses.Evidence`.
+        recompiled: see :class:`proofroll.robots.hypotheses.RobotEvidence`.
     """
     step = _Step(truth, differences(truth, torques, reading))
     ranked = sorted(hypotheses(), key=lambda item: engine not in item.known)
@@ -88,8 +88,8 @@ class _Trial:
     reading: Reading
     recompiled: Callable[[Element], Robot | None]
 
-    def __call__(self, step: _Step, hypothesis: Hypothesis, layer: str) -> _Step | None:
-        robot = hypothesis.change(Evidence(self.file, step.truth.robot, self.reading, self.recompiled))
+    def __call__(self, step: _Step, hypothesis: RobotHypothesis, layer: str) -> _Step | None:
+        robot = hypothesis.change(RobotEvidence(self.file, step.truth.robot, self.reading, self.recompiled))
         if robot is None or robot is step.truth.robot or not robot.moving:
             return None
         truth = RobotTruth.of(robot, step.truth.states, like=step.truth)
@@ -98,17 +98,17 @@ class _Trial:
             return None
         known = ", ".join(f"{name} {versions}".strip() for name, versions in hypothesis.known.items())
         before, after = step.found[layer], found[layer]
-        cause = Cause(hypothesis.id, hypothesis.name, layer, before, after, hypothesis.remedy, known)
+        cause = RobotCause(hypothesis.id, hypothesis.name, layer, before, after, hypothesis.remedy, known)
         return _Step(truth, found, (*step.causes, cause))
 
 
 def _closed(
     step: _Step,
     layer: str,
-    ranked: list[Hypothesis],
+    ranked: list[RobotHypothesis],
     engine: str,
     tolerances: Mapping[str, float],
-    trial: Callable[[_Step, Hypothesis, str], _Step | None],
+    trial: Callable[[_Step, RobotHypothesis, str], _Step | None],
 ) -> _Step | None:
     """The step after the causes that close a layer: one alone if there is one, else several one after another."""
     limit = tolerances[layer]

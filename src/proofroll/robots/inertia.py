@@ -6,7 +6,7 @@ from collections.abc import Callable, Iterator
 
 import numpy as np
 
-from proofroll.robots.hypotheses import Evidence
+from proofroll.robots.hypotheses import RobotEvidence
 from proofroll.robots.model import Array, Robot, RobotBody
 
 # Round-off of numbers that were written with six or more digits is no defect of a body.
@@ -29,13 +29,13 @@ def breaks_triangle(inertia: Array) -> bool:
     return bool(large > (small + middle) * (1 + _ROUNDING))
 
 
-def replaced(evidence: Evidence, instead: Callable[[RobotBody], RobotBody]) -> Robot | None:
+def replaced(evidence: RobotEvidence, instead: Callable[[RobotBody], RobotBody]) -> Robot | None:
     """The robot with other values for each body whose inertia is impossible and that the engine holds differently."""
     bodies = [instead(body) for body in _suspects(evidence)]
     return evidence.robot.with_bodies(bodies) if bodies else None
 
 
-def _suspects(evidence: Evidence) -> Iterator[RobotBody]:
+def _suspects(evidence: RobotEvidence) -> Iterator[RobotBody]:
     """An engine's own rule of what is impossible is not predicted: what it holds is looked at."""
     robot, reading = evidence.robot, evidence.reading
     scale = max((float(np.abs(group.inertia).max()) for group in robot.groups.values()), default=1.0)

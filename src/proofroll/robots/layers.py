@@ -10,7 +10,7 @@ import numpy as np
 
 from proofroll.robots.model import Array, Robot, RobotBody
 from proofroll.robots.protocol import Reading
-from proofroll.robots.states import States
+from proofroll.robots.states import RobotStates
 from proofroll.robots.two_formulations import Dynamics, passive, poses, world_jacobians
 
 LAYERS = {
@@ -38,13 +38,13 @@ class RobotTruth:
     """A robot with what it does at some states."""
 
     robot: Robot
-    states: States
+    states: RobotStates
     dynamics: Dynamics
     passive: Array
     like: RobotTruth | None = None
 
     @classmethod
-    def of(cls, robot: Robot, states: States, like: RobotTruth | None = None) -> RobotTruth:
+    def of(cls, robot: Robot, states: RobotStates, like: RobotTruth | None = None) -> RobotTruth:
         """Evaluated by the first formulation.
 
         Args:

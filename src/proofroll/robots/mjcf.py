@@ -9,7 +9,7 @@ from pathlib import Path
 from xml.etree.ElementTree import Element
 
 from proofroll.core.errors import InputError
-from proofroll.robots.robot_file import Finding
+from proofroll.robots.robot_file import LintFinding
 from proofroll.robots.safe_xml import MOST_ELEMENTS, read_xml
 
 # How deep files may include files.
@@ -31,7 +31,7 @@ _LOOKS = {
 _UNCOVERED = {"extension", "deformable", "flexcomp", "composite", "replicate", "attach", "plugin"}
 
 
-def stripped(root: Element, path: Path) -> tuple[Element, list[Finding]]:
+def stripped(root: Element, path: Path) -> tuple[Element, list[LintFinding]]:
     """A copy that names no file but meshes that exist beside it, and what was left out.
 
     Raises:
@@ -85,7 +85,7 @@ def _inside(folder: Path, name: str) -> Path | None:
     return target if target.is_relative_to(folder) and target != folder else None
 
 
-def _meshes(root: Element, folder: Path) -> Iterator[Finding]:
+def _meshes(root: Element, folder: Path) -> Iterator[LintFinding]:
     """Leaves out meshes that weigh nothing or cannot be read; others are named by their whole path."""
     compilers = list(root.iter("compiler"))
     inferred = any(compiler.get("inertiafromgeom") == "true" for compiler in compilers)
@@ -110,7 +110,7 @@ def _meshes(root: Element, folder: Path) -> Iterator[Finding]:
                 lost += weighed
         if lost:
             words = f"{lost} meshes that would give it mass are not in the file's folder; all engines read it without"
-            yield Finding("warning", f"body {body.get('name', '')}", words)
+            yield LintFinding("warning", f"body {body.get('name', '')}", words)
     for world in root.iter("worldbody"):
         for geom in [geom for geom in world.findall("geom") if geom.get("mesh")]:
             world.remove(geom)

@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 
 from proofroll.robots.model import Mimic, Robot, RobotBody, RobotJoint
-from proofroll.robots.states import States
+from proofroll.robots.states import RobotStates
 
 
 def plain(value: Any) -> Any:
@@ -35,9 +35,9 @@ def robot_from(data: Mapping[str, Any]) -> Robot:
     )
 
 
-def states_from(data: Mapping[str, Any]) -> States:
+def states_from(data: Mapping[str, Any]) -> RobotStates:
     """The states of which :func:`plain` made this."""
-    return States(**{field: _arrays(by_joint) for field, by_joint in data.items()})
+    return RobotStates(**{field: _arrays(by_joint) for field, by_joint in data.items()})
 
 
 def _arrays(values: Mapping[str, Any]) -> dict[str, Any]:

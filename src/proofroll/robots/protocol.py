@@ -14,7 +14,7 @@ from typing import Any, ClassVar, Protocol
 import numpy as np
 
 from proofroll.robots.model import Array, Robot
-from proofroll.robots.states import States
+from proofroll.robots.states import RobotStates
 
 GROUP = "proofroll.robot_readers"
 
@@ -42,7 +42,7 @@ class Request:
     base_joint: str
     options: Mapping[str, bool]
     children: Mapping[str, str]
-    states: States
+    states: RobotStates
     torques: Mapping[str, Array]
     gravity: Array
     robot: Robot

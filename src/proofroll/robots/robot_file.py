@@ -15,7 +15,7 @@ BASES = ("fixed", "free")
 
 
 @dataclasses.dataclass(frozen=True)
-class Finding:
+class LintFinding:
     """What is noticed in a file.
 
     Attributes:
@@ -45,7 +45,7 @@ class RobotFile:
     kind: str
     root: Element
     base: str = "fixed"
-    findings: tuple[Finding, ...] = ()
+    findings: tuple[LintFinding, ...] = ()
 
 
 def open_robot(path: Path, base: str = "fixed") -> RobotFile:

@@ -22,7 +22,7 @@ from proofroll.robots.judging import TIME_LIMIT, meaning
 from proofroll.robots.model import WORLD, Array, Robot, RobotJoint
 from proofroll.robots.reading import write
 from proofroll.robots.robot_file import BASES, RobotFile, open_robot
-from proofroll.robots.states import States, random_states
+from proofroll.robots.states import RobotStates, random_states
 
 _DURATION = 1.0  # s: an arm falls through much of its reach, and few are chaotic so early
 # Parameters: default, unit, meaning, bounds.
@@ -132,7 +132,7 @@ def _names(robot: Robot) -> dict[str, str]:
 
 
 def _joint(
-    robot: Robot, joint: RobotJoint, names: Mapping[str, str], start: States, values: Mapping[str, float]
+    robot: Robot, joint: RobotJoint, names: Mapping[str, str], start: RobotStates, values: Mapping[str, float]
 ) -> dict[str, Any]:
     """A joint between what its parent and its child are welded to."""
     home, p, R = robot.welded[joint.parent]

@@ -19,7 +19,7 @@ _SLOWEST = 0.2
 
 
 @dataclasses.dataclass(frozen=True)
-class States:
+class RobotStates:
     """States by joint; the first axis counts states.
 
     Attributes:
@@ -46,7 +46,7 @@ class States:
         return np.concatenate([rates[joint.name] for joint in robot.moving], axis=1)
 
 
-def random_states(robot: Robot, count: int, seed: int) -> States:
+def random_states(robot: Robot, count: int, seed: int) -> RobotStates:
     """States within the limits of the joints (or ±π, ±1 m), of moderate velocities, which obey the mimics."""
     random = np.random.default_rng(seed)
     angle, rotation, position = {}, {}, {}
@@ -69,4 +69,4 @@ def random_states(robot: Robot, count: int, seed: int) -> States:
         angle[mimic.joint] = mimic.multiplier * angle[mimic.other] + mimic.offset
         for rates in (velocity, acceleration):
             rates[mimic.joint] = mimic.multiplier * rates[mimic.other]
-    return States(angle, rotation, position, velocity, acceleration)
+    return RobotStates(angle, rotation, position, velocity, acceleration)

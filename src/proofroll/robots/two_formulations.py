@@ -12,7 +12,7 @@ import numpy as np
 from scipy.spatial.transform import Rotation
 
 from proofroll.robots.model import WORLD, Array, Robot, RobotJoint
-from proofroll.robots.states import States
+from proofroll.robots.states import RobotStates
 
 
 @dataclasses.dataclass(frozen=True)
@@ -30,7 +30,7 @@ class Dynamics:
     h: Array
 
 
-def passive(robot: Robot, states: States) -> Array:
+def passive(robot: Robot, states: RobotStates) -> Array:
     """Damping, Coulomb friction and springs as a torque against the motion, shape (states, n)."""
     v = states.stacked(states.velocity, robot)
     found = np.zeros_like(v)
@@ -42,7 +42,7 @@ def passive(robot: Robot, states: States) -> Array:
     return found
 
 
-def within(joint: RobotJoint, states: States) -> tuple[Array, Array]:
+def within(joint: RobotJoint, states: RobotStates) -> tuple[Array, Array]:
     """Position and rotation of the child in its parent's frame, shapes (states, 3) and (states, 3, 3)."""
     count = states.count
     slid = np.zeros((count, 3))
@@ -59,7 +59,7 @@ def within(joint: RobotJoint, states: States) -> tuple[Array, Array]:
     return joint.position + slid @ joint.rotation.T - R @ joint.child_position, R
 
 
-def poses(robot: Robot, states: States) -> dict[str, tuple[Array, Array]]:
+def poses(robot: Robot, states: RobotStates) -> dict[str, tuple[Array, Array]]:
     """Position of the origin and rotation of every body in the world, shapes (states, 3) and (states, 3, 3)."""
     found = {WORLD: (np.zeros((states.count, 3)), np.broadcast_to(np.eye(3), (states.count, 3, 3)))}
     for joint in robot.joints:
@@ -92,7 +92,7 @@ class _Motion:
     alpha: Array
 
 
-def world_jacobians(robot: Robot, states: States) -> Dynamics:
+def world_jacobians(robot: Robot, states: RobotStates) -> Dynamics:
     """Formulation A."""
     count, n = states.count, robot.dofs
     v = states.stacked(states.velocity, robot)

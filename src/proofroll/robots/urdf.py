@@ -12,7 +12,7 @@ from scipy.spatial.transform import Rotation
 
 from proofroll.core.errors import InputError
 from proofroll.robots.model import WORLD, Array, Mimic, Robot, RobotBody, RobotJoint
-from proofroll.robots.robot_file import Finding, RobotFile
+from proofroll.robots.robot_file import LintFinding, RobotFile
 from proofroll.robots.safe_xml import numbers
 
 # What carries the root; no name in a file begins so.
@@ -22,16 +22,18 @@ _MOMENTS = ("xx", "xy", "xz", "yy", "yz", "zz")
 _PRIMITIVES = {"box", "sphere", "cylinder", "capsule"}
 
 
-def stripped(root: Element) -> tuple[Element, list[Finding]]:
+def stripped(root: Element) -> tuple[Element, list[LintFinding]]:
     """A copy without what needs other files or speaks to one engine alone, and what that was."""
     root, findings = copy.deepcopy(root), []
     for child in list(root):
         if child.tag not in {"link", "joint"}:
             root.remove(child)
             if child.tag in {"gazebo", "mujoco", "transmission", "drake:proximity_properties"}:
-                findings.append(Finding("note", child.tag, "options for one program; left out for every engine"))
+                findings.append(LintFinding("note", child.tag, "options for one program; left out for every engine"))
             elif child.tag not in {"material", "group_state", "link_state"}:
-                findings.append(Finding("warning", str(child.tag), "the specification has no such element; left out"))
+                findings.append(
+                    LintFinding("warning", str(child.tag), "the specification has no such element; left out")
+                )
     meshes = 0
     for link in root.iter("link"):
         removed = 0
@@ -46,10 +48,10 @@ def stripped(root: Element) -> tuple[Element, list[Finding]]:
             words = (
                 "its collision mesh was left out, and it has no <inertial>: engines that weigh shapes find less mass"
             )
-            findings.append(Finding("warning", f"link {link.get('name')}", words))
+            findings.append(LintFinding("warning", f"link {link.get('name')}", words))
     if meshes:
         words = f"{meshes} collision meshes left out for every engine: masses come from <inertial> alone"
-        findings.append(Finding("note", "links", words))
+        findings.append(LintFinding("note", "links", words))
     return root, findings
 
 

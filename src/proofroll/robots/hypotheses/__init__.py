@@ -19,7 +19,7 @@ from proofroll.robots.robot_file import RobotFile
 
 
 @dataclasses.dataclass(frozen=True)
-class Evidence:
+class RobotEvidence:
     """What a hypothesis may look at.
 
     Attributes:
@@ -36,7 +36,7 @@ class Evidence:
 
 
 @dataclasses.dataclass(frozen=True)
-class Hypothesis:
+class RobotHypothesis:
     """A cause.
 
     Attributes:
@@ -50,12 +50,12 @@ class Hypothesis:
     name: str
     known: Mapping[str, str]
     remedy: str
-    change: Callable[[Evidence], Robot | None]
+    change: Callable[[RobotEvidence], Robot | None]
     id: str = ""
 
 
 @functools.cache
-def hypotheses() -> tuple[Hypothesis, ...]:
+def hypotheses() -> tuple[RobotHypothesis, ...]:
     """All causes: what the modules of this package call ``HYPOTHESIS``."""
     names = sorted(module.name for module in pkgutil.iter_modules(__path__))
     return tuple(

@@ -4,11 +4,11 @@ from __future__ import annotations
 
 import dataclasses
 
-from proofroll.robots.hypotheses import Evidence, Hypothesis
+from proofroll.robots.hypotheses import RobotEvidence, RobotHypothesis
 from proofroll.robots.model import Robot
 
 
-def _change(evidence: Evidence) -> Robot | None:
+def _change(evidence: RobotEvidence) -> Robot | None:
     robot = evidence.robot
     if all(joint.actuated or not joint.armature for joint in robot.moving):
         return None
@@ -16,7 +16,7 @@ def _change(evidence: Evidence) -> Robot | None:
     return robot.change(joints=tuple(joints))
 
 
-HYPOTHESIS = Hypothesis(
+HYPOTHESIS = RobotHypothesis(
     "armature is used only of joints that have an actuator",
     {"drake": "1.51.1"},
     "give every joint with armature an actuator",

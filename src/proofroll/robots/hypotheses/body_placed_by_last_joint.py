@@ -6,11 +6,11 @@ import dataclasses
 
 import numpy as np
 
-from proofroll.robots.hypotheses import Evidence, Hypothesis
+from proofroll.robots.hypotheses import RobotEvidence, RobotHypothesis
 from proofroll.robots.model import Robot
 
 
-def _change(evidence: Evidence) -> Robot | None:
+def _change(evidence: RobotEvidence) -> Robot | None:
     robot = evidence.robot
     chains: dict[str, list[int]] = {}
     for index, joint in enumerate(robot.joints):
@@ -28,7 +28,7 @@ def _change(evidence: Evidence) -> Robot | None:
     return robot.change(joints=tuple(joints)) if len(chains) < len(joints) else None
 
 
-HYPOTHESIS = Hypothesis(
+HYPOTHESIS = RobotHypothesis(
     "of several joints in one body all but the last are placed in the parent's frame",
     {"drake": "1.51.1"},
     "give each further joint a body of its own without mass",

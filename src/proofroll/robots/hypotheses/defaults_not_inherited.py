@@ -7,13 +7,13 @@ import dataclasses
 from typing import Any
 from xml.etree.ElementTree import SubElement
 
-from proofroll.robots.hypotheses import Evidence, Hypothesis
+from proofroll.robots.hypotheses import RobotEvidence, RobotHypothesis
 from proofroll.robots.model import Robot
 
 _LAWS = ("damping", "armature", "stiffness", "friction")
 
 
-def _change(evidence: Evidence) -> Robot | None:
+def _change(evidence: RobotEvidence) -> Robot | None:
     robot, root = evidence.robot, copy.deepcopy(evidence.file.root)
     bare = [
         inner for outer in root.iter("default") for inner in outer.findall("default") if inner.find("joint") is None
@@ -36,7 +36,7 @@ def _change(evidence: Evidence) -> Robot | None:
     )
 
 
-HYPOTHESIS = Hypothesis(
+HYPOTHESIS = RobotHypothesis(
     "a default class without a <joint> of its own loses the joint defaults of the class around it",
     {"drake": "1.51.1"},
     "put an empty <joint/> into every default class",

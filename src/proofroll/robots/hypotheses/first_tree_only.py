@@ -2,11 +2,11 @@
 
 from __future__ import annotations
 
-from proofroll.robots.hypotheses import Evidence, Hypothesis
+from proofroll.robots.hypotheses import RobotEvidence, RobotHypothesis
 from proofroll.robots.model import WORLD, Robot, RobotJoint
 
 
-def _change(evidence: Evidence) -> Robot | None:
+def _change(evidence: RobotEvidence) -> Robot | None:
     robot, kept = evidence.robot, {WORLD}
     joints: list[RobotJoint] = []
     for joint in robot.joints:
@@ -21,7 +21,7 @@ def _change(evidence: Evidence) -> Robot | None:
     return robot.change(joints=tuple(joints), bodies=bodies, mimics=mimics)
 
 
-HYPOTHESIS = Hypothesis(
+HYPOTHESIS = RobotHypothesis(
     "only the first tree under the world is read",
     {"pinocchio": "4.1.0"},
     "put everything under one body of the world, or read each tree from a file of its own",

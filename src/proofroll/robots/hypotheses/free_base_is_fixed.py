@@ -4,11 +4,11 @@ from __future__ import annotations
 
 import dataclasses
 
-from proofroll.robots.hypotheses import Evidence, Hypothesis
+from proofroll.robots.hypotheses import RobotEvidence, RobotHypothesis
 from proofroll.robots.model import Robot
 
 
-def _change(evidence: Evidence) -> Robot | None:
+def _change(evidence: RobotEvidence) -> Robot | None:
     robot = evidence.robot
     known = set(evidence.reading.joints)
     lost = [joint for joint in robot.joints if joint.kind == "free" and joint.name not in known]
@@ -18,7 +18,7 @@ def _change(evidence: Evidence) -> Robot | None:
     return robot.change(joints=tuple(joints))
 
 
-HYPOTHESIS = Hypothesis(
+HYPOTHESIS = RobotHypothesis(
     "a free base without mass is fixed to the world",
     {"pybullet": "3.2.7"},
     "give the root link a mass",

@@ -6,7 +6,7 @@ import dataclasses
 
 import numpy as np
 
-from proofroll.robots.hypotheses import Evidence, Hypothesis
+from proofroll.robots.hypotheses import RobotEvidence, RobotHypothesis
 from proofroll.robots.model import Robot, RobotJoint
 
 
@@ -19,14 +19,14 @@ def _offset(joint: RobotJoint, robot: Robot) -> RobotJoint:
     return dataclasses.replace(joint, position=offset) if np.any(offset) else joint
 
 
-def _change(evidence: Evidence) -> Robot | None:
+def _change(evidence: RobotEvidence) -> Robot | None:
     robot = evidence.robot
     joints = tuple(_offset(joint, robot) for joint in robot.joints)
     changed = any(one is not other for one, other in zip(joints, robot.joints, strict=True))
     return robot.change(joints=joints) if changed else None
 
 
-HYPOTHESIS = Hypothesis(
+HYPOTHESIS = RobotHypothesis(
     "a free body whose pose (p, R) in the file is turned is offset by p − R p",
     {"pinocchio": "4.1.0"},
     "write free bodies with pos 0 0 0 or without rotation, and set the start in the coordinates",

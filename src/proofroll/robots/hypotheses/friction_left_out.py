@@ -2,16 +2,16 @@
 
 from __future__ import annotations
 
-from proofroll.robots.hypotheses import Evidence, Hypothesis
+from proofroll.robots.hypotheses import RobotEvidence, RobotHypothesis
 from proofroll.robots.model import Robot
 
 
-def _change(evidence: Evidence) -> Robot | None:
+def _change(evidence: RobotEvidence) -> Robot | None:
     rubbing = any(joint.friction for joint in evidence.robot.moving)
     return evidence.robot.with_joints(friction=0.0) if rubbing else None
 
 
-HYPOTHESIS = Hypothesis(
+HYPOTHESIS = RobotHypothesis(
     "friction of joints is not used in the forward dynamics",
     {
         "pinocchio": "all versions so far",

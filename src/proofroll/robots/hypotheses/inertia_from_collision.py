@@ -7,7 +7,7 @@ from typing import Any
 
 import numpy as np
 
-from proofroll.robots.hypotheses import Evidence, Hypothesis
+from proofroll.robots.hypotheses import RobotEvidence, RobotHypothesis
 from proofroll.robots.model import Array, Robot
 
 # Bullet's margin around shapes, also around none [m].
@@ -35,7 +35,7 @@ def _box(mass: float, shapes: list[Any], com: Array, frame: Array) -> Array | No
     return mass / 12 * np.array([y + z, x + z, x + y])
 
 
-def _change(evidence: Evidence) -> Robot | None:
+def _change(evidence: RobotEvidence) -> Robot | None:
     robot, bodies = evidence.robot, []
     for name, source in robot.sources.items():
         body = robot.bodies.get(name)
@@ -49,7 +49,7 @@ def _change(evidence: Evidence) -> Robot | None:
     return robot.with_bodies(bodies) if bodies else None
 
 
-HYPOTHESIS = Hypothesis(
+HYPOTHESIS = RobotHypothesis(
     "inertias are computed from collision shapes, not taken from the file",
     {"pybullet": "default of 3.2.7"},
     "load with flags=URDF_USE_INERTIA_FROM_FILE",

@@ -6,11 +6,11 @@ import dataclasses
 
 import numpy as np
 
-from proofroll.robots.hypotheses import Evidence, Hypothesis
+from proofroll.robots.hypotheses import RobotEvidence, RobotHypothesis
 from proofroll.robots.model import Robot
 
 
-def _change(evidence: Evidence) -> Robot | None:
+def _change(evidence: RobotEvidence) -> Robot | None:
     robot = evidence.robot
     turned = [
         dataclasses.replace(robot.bodies[name], inertia=np.array(source["written"]))
@@ -20,7 +20,7 @@ def _change(evidence: Evidence) -> Robot | None:
     return robot.with_bodies(turned) if turned else None
 
 
-HYPOTHESIS = Hypothesis(
+HYPOTHESIS = RobotHypothesis(
     "the rpy of <inertial> is ignored",
     {"mujoco": "3.1.3 to 3.13.0"},
     "update the engine, or write the inertia in the axes of the link with rpy 0",

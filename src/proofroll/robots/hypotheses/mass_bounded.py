@@ -6,7 +6,7 @@ import dataclasses
 
 import numpy as np
 
-from proofroll.robots.hypotheses import Evidence, Hypothesis
+from proofroll.robots.hypotheses import RobotEvidence, RobotHypothesis
 from proofroll.robots.model import Array, Robot, RobotBody
 
 # As URDF importers of MuJoCo are commonly asked for, and as our option asks [kg], [kg m²].
@@ -19,7 +19,7 @@ def _raised(body: RobotBody, com: Array) -> RobotBody:
     return dataclasses.replace(body, mass=max(body.mass, _MASS), com=com, inertia=bounded)
 
 
-def _change(evidence: Evidence) -> Robot | None:
+def _change(evidence: RobotEvidence) -> Robot | None:
     robot = evidence.robot
     small = []
     for joint in robot.joints:
@@ -31,7 +31,7 @@ def _change(evidence: Evidence) -> Robot | None:
     return robot.with_bodies(small) if small else None
 
 
-HYPOTHESIS = Hypothesis(
+HYPOTHESIS = RobotHypothesis(
     "small masses and inertias are raised to a bound (1e-6 kg, 1e-8 kg m²)",
     {"mujoco": "with boundmass, boundinertia"},
     "leave the bounds out, or correct the masses in the file",

@@ -7,7 +7,7 @@ import dataclasses
 import numpy as np
 from scipy.optimize import linear_sum_assignment
 
-from proofroll.robots.hypotheses import Evidence, Hypothesis
+from proofroll.robots.hypotheses import RobotEvidence, RobotHypothesis
 from proofroll.robots.model import Array, Robot, RobotBody
 
 
@@ -18,7 +18,7 @@ def _moments(inertia: Array) -> Array:
     return np.asarray(values[order])
 
 
-def _change(evidence: Evidence) -> Robot | None:
+def _change(evidence: RobotEvidence) -> Robot | None:
     robot = evidence.robot
     bodies: list[RobotBody] = []
     for home in robot.columns:
@@ -33,7 +33,7 @@ def _change(evidence: Evidence) -> Robot | None:
     return robot.with_bodies(bodies) if bodies else None
 
 
-HYPOTHESIS = Hypothesis(
+HYPOTHESIS = RobotHypothesis(
     "links at fixed joints are merged by their origins: inertial origins and rotations are dropped",
     {"pybullet": "3.2.7 with URDF_MERGE_FIXED_LINKS"},
     "load without URDF_MERGE_FIXED_LINKS",

@@ -12,7 +12,7 @@ import dataclasses
 import numpy as np
 from scipy.spatial.transform import Rotation
 
-from proofroll.robots.hypotheses import Evidence, Hypothesis
+from proofroll.robots.hypotheses import RobotEvidence, RobotHypothesis
 from proofroll.robots.model import WORLD, Array, Robot
 
 # MuJoCo ends its rotations at this size of an off-diagonal element, and takes moments that differ by less as equal.
@@ -41,7 +41,7 @@ def principal(inertia: Array) -> tuple[Array, Array]:
     return moments, axes
 
 
-def misplaced(evidence: Evidence, *, turned: bool) -> Robot | None:
+def misplaced(evidence: RobotEvidence, *, turned: bool) -> Robot | None:
     """The robot with such links.
 
     Args:
@@ -62,11 +62,11 @@ def misplaced(evidence: Evidence, *, turned: bool) -> Robot | None:
     return robot.with_bodies(bodies) if bodies else None
 
 
-def _change(evidence: Evidence) -> Robot | None:
+def _change(evidence: RobotEvidence) -> Robot | None:
     return misplaced(evidence, turned=True)
 
 
-HYPOTHESIS = Hypothesis(
+HYPOTHESIS = RobotHypothesis(
     "the inertial of a merged link is placed in the wrong order (default fusestatic for URDF)",
     {"mujoco": "3.8.1 to 3.10.0"},
     'update MuJoCo, or put <mujoco><compiler fusestatic="false"/></mujoco> into the file',

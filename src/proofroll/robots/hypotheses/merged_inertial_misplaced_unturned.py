@@ -2,16 +2,16 @@
 
 from __future__ import annotations
 
-from proofroll.robots.hypotheses import Evidence, Hypothesis
+from proofroll.robots.hypotheses import RobotEvidence, RobotHypothesis
 from proofroll.robots.hypotheses.merged_inertial_misplaced import misplaced
 from proofroll.robots.model import Robot
 
 
-def _change(evidence: Evidence) -> Robot | None:
+def _change(evidence: RobotEvidence) -> Robot | None:
     return misplaced(evidence, turned=False)
 
 
-HYPOTHESIS = Hypothesis(
+HYPOTHESIS = RobotHypothesis(
     "the inertial of a merged link is placed in the wrong order and not turned (default fusestatic for URDF)",
     {"mujoco": "3.3.3"},
     'update MuJoCo, or put <mujoco><compiler fusestatic="false"/></mujoco> into the file',

@@ -2,15 +2,15 @@
 
 from __future__ import annotations
 
-from proofroll.robots.hypotheses import Evidence, Hypothesis
+from proofroll.robots.hypotheses import RobotEvidence, RobotHypothesis
 from proofroll.robots.model import Robot
 
 
-def _change(evidence: Evidence) -> Robot | None:
+def _change(evidence: RobotEvidence) -> Robot | None:
     return evidence.robot.change(mimics=()) if evidence.robot.mimics else None
 
 
-HYPOTHESIS = Hypothesis(
+HYPOTHESIS = RobotHypothesis(
     "mimic is ignored: the following joint moves freely",
     {
         "pinocchio": "default of all versions",

@@ -8,14 +8,14 @@ from xml.etree.ElementTree import SubElement
 
 import numpy as np
 
-from proofroll.robots.hypotheses import Evidence, Hypothesis
+from proofroll.robots.hypotheses import RobotEvidence, RobotHypothesis
 from proofroll.robots.model import Robot
 
 # A body must weigh something to be compiled; what it weighs is taken away again.
 _STAND_IN = {"pos": "0 0 0", "mass": "1", "diaginertia": "1 1 1"}
 
 
-def _change(evidence: Evidence) -> Robot | None:
+def _change(evidence: RobotEvidence) -> Robot | None:
     robot, root = evidence.robot, copy.deepcopy(evidence.file.root)
     bare, touched = set(), False
     for body in root.iter("body"):
@@ -41,7 +41,7 @@ def _change(evidence: Evidence) -> Robot | None:
     return robot.with_bodies(body for body in lighter if body.name in robot.bodies)
 
 
-HYPOTHESIS = Hypothesis(
+HYPOTHESIS = RobotHypothesis(
     "shapes that collide with nothing (contype 0, conaffinity 0) give no mass",
     {"pinocchio": "4.1.0"},
     "give every body an <inertial>; compile once with MuJoCo and save (mj_saveLastXML) to get one",

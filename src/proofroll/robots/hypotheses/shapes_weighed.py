@@ -8,7 +8,7 @@ from typing import Any
 
 import numpy as np
 
-from proofroll.robots.hypotheses import Evidence, Hypothesis
+from proofroll.robots.hypotheses import RobotEvidence, RobotHypothesis
 from proofroll.robots.model import Array, Robot, RobotBody, composed
 
 _DENSITY = 1000.0
@@ -43,14 +43,14 @@ def _weighed(name: str, shapes: list[Any]) -> RobotBody | None:
     return composed(name, parts) if parts else None
 
 
-def _change(evidence: Evidence) -> Robot | None:
+def _change(evidence: RobotEvidence) -> Robot | None:
     robot = evidence.robot
     bare = {name: source for name, source in robot.sources.items() if not source.get("inertial", True)}
     bodies = [body for name, source in bare.items() if (body := _weighed(name, source["shapes"])) is not None]
     return robot.with_bodies(bodies) if bodies else None
 
 
-HYPOTHESIS = Hypothesis(
+HYPOTHESIS = RobotHypothesis(
     "collision shapes of links without <inertial> are weighed at 1000 kg/m³",
     {"mujoco": "all versions so far"},
     "give every link an <inertial>",

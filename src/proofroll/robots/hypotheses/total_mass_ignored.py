@@ -4,11 +4,11 @@ from __future__ import annotations
 
 import dataclasses
 
-from proofroll.robots.hypotheses import Evidence, Hypothesis
+from proofroll.robots.hypotheses import RobotEvidence, RobotHypothesis
 from proofroll.robots.model import Robot
 
 
-def _change(evidence: Evidence) -> Robot | None:
+def _change(evidence: RobotEvidence) -> Robot | None:
     robot, held = evidence.robot, evidence.reading.mass
     if not any(compiler.get("settotalmass") for compiler in evidence.file.root.iter("compiler")):
         return None
@@ -22,7 +22,7 @@ def _change(evidence: Evidence) -> Robot | None:
     )
 
 
-HYPOTHESIS = Hypothesis(
+HYPOTHESIS = RobotHypothesis(
     "settotalmass is ignored: masses are as written",
     {"pinocchio": "4.1.0", "drake": "1.51.1"},
     "compile the file once with MuJoCo, save it (mj_saveLastXML), and give others the saved file",

@@ -6,7 +6,7 @@ import dataclasses
 
 import numpy as np
 
-from proofroll.robots.hypotheses import Evidence, Hypothesis
+from proofroll.robots.hypotheses import RobotEvidence, RobotHypothesis
 from proofroll.robots.inertia import replaced
 from proofroll.robots.model import Robot, RobotBody
 
@@ -20,11 +20,11 @@ def _sphere(body: RobotBody) -> RobotBody:
     return dataclasses.replace(body, mass=mass, inertia=0.4 * mass * radius**2 * np.eye(3))
 
 
-def _change(evidence: Evidence) -> Robot | None:
+def _change(evidence: RobotEvidence) -> Robot | None:
     return replaced(evidence, _sphere)
 
 
-HYPOTHESIS = Hypothesis(
+HYPOTHESIS = RobotHypothesis(
     "an impossible inertia is replaced by that of a sphere of water (of 1 kg where the mass is 0)",
     {"drake": "1.51.1 (a line of its log says so)"},
     "correct the inertia in the file",

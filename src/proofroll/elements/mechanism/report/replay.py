@@ -92,7 +92,10 @@ def drawn(replayed: Replayed) -> tuple[dict[str, Any], list[int], PackedNumbers]
         "bodies": [{"com": coms.get(name), "rods": [[coms[name], at] for at in skeleton[name] if name in coms]}
                    for name in bodies],
         "joints": [{"body": index[body], "at": at} for _, body, at in joints],
-        "springs": [[index[s.body_a], s.position_a, index[s.body_b], s.position_b] for s in mechanism.springs],
+        "springs": [[index[s.body_a], s.position_a, index[s.body_b], s.position_b] for s in mechanism.springs]
+                   + [[index[j.parent], j.position, index[j.child], j.child_position]
+                      for j in mechanism.joints if j.kind in {"prismatic", "planar"}],
+        "falls": any(joint.kind == "free" for joint in mechanism.joints),
     }  # fmt: skip
     return dict(plain(case)), [motion.time.size for motion in ghosts], numbers
 

@@ -77,7 +77,8 @@ replayed.mechanism = (replay) => {
   function build(scene) {
     const { T } = replay.view, { shown } = replay, truth = shown.runs[0];
     const box = new T.Box3().setFromArray(truth.extent.values).expandByScalar(shown.scale);
-    const size = 0.5 * box.getSize(new T.Vector3()).length();
+    const edges = box.getSize(new T.Vector3());
+    const size = Math.max(0.5 * edges.length(), 0.65 * Math.max(...edges.toArray())); // of a long way its ends are in view
     stage = { runs: shown.runs.map((_, index) => skeleton(scene, index)), arrows: [] };
     stage.paths = shown.runs.map((run, index) => {
       const tone = css(index ? `--e${run.colour}` : "--link");
@@ -128,7 +129,7 @@ replayed.mechanism = (replay) => {
   ];
 
   // The camera follows where the mechanism would be lost in its way.
-  const reach = (size) => (size > 75 * replay.shown.scale ? 30 * replay.shown.scale : size);
+  const reach = (size) => (size > (replay.shown.falls ? 40 : 75) * replay.shown.scale ? 30 * replay.shown.scale : size);
 
   return { columns, rows, write, compare, build, draw, key, reach };
 };
