@@ -132,6 +132,21 @@ def test_what_no_scene_has_is_refused_by_name(robot):
             load_scene(robot(name, text))
 
 
+def test_what_an_mjcf_disables_or_has_beyond_a_scene(robot):
+    """Flags take gravity and springs away; a ball joint's spring is refused by name, one that is not linear at once."""
+    text = """<mujoco><option><flag gravity="disable" spring="disable"/></option><worldbody><body name="a" gravcomp="1">
+    <joint name="k1" type="KIND" stiffness="9" damping="1"/><geom size="0.1" pos="0.2 0 0"/></body></worldbody></mujoco>"""
+    mechanism = load_scene(robot("flags.xml", text.replace("KIND", "hinge"))).elements[0].mechanism
+    hinge = mechanism.joints[0]
+    assert (mechanism.gravity, hinge.stiffness, hinge.damping) == ((0, 0, 0), 0, 1)
+    ball = robot("ball.xml", text.replace("KIND", "ball").replace('spring="disable"', ""))
+    with pytest.raises(Refused, match=r"the stiffness of the spherical joint k1 \(stiffness=0 leaves all out\)"):
+        simulate(load_scene(ball), "mujoco", until=0.1)
+    assert load_scene(ball, stiffness=0).elements[0].mechanism.joints[0].damping == 1
+    with pytest.raises(InputError, match="not linear"):
+        load_scene(robot("cubic.xml", text.replace("KIND", "hinge").replace('"9"', '"9 2"')))
+
+
 def test_stops_are_there_when_asked_for(robot):
     """With limits=1 a motion that passes a stop has no truth, and the joint and the time are named."""
     pytest.importorskip("heyoka")
@@ -141,7 +156,7 @@ def test_stops_are_there_when_asked_for(robot):
 
 
 def test_commands_take_a_robot_file_for_a_scene(robot, tmp_path):
-    """Run, compare and stability start from the file alone; compare holds every engine that is asked to the truth."""
+    """Run, compare, report and stability start from the file alone; engines that are asked are held to the truth."""
     path = robot("arm.urdf", urdf())
     out = ["--out", str(tmp_path / "out"), "--json"]
     run = CliRunner().invoke(app, ["run", path, "--engine", "mujoco", "--until", "0.1", "--json"])
@@ -152,6 +167,8 @@ def test_commands_take_a_robot_file_for_a_scene(robot, tmp_path):
     content = json.loads(compared.stdout)
     assert {row["verdict"] for row in content["rows"]} == {"agrees"}
     assert content["vary"] == {"speed": [0.5]}
+    reported = CliRunner().invoke(app, ["report", path, "--engine", "mujoco", *out])
+    assert [len(case["bodies"]) for case in json.loads(reported.stdout)["replay"]] == [4], reported.output
     from proofroll.studies.stability_claims import file_for
 
     assert {"speed", "gravity", "horizon"} <= {axis.name for axis in file_for(path).axes}

@@ -110,7 +110,7 @@ def _offending(truth: RobotTruth, held: Any) -> list[str]:
 
 
 def meaning(file: RobotFile, written: Path, time_limit: float) -> tuple[Robot, str]:
-    """The robot that a file means, and who says so.
+    """The robot that a file means, and the engine here that defines the format, with its version; empty: we read it.
 
     Args:
         file: what was read.
@@ -121,10 +121,10 @@ def meaning(file: RobotFile, written: Path, time_limit: float) -> tuple[Robot, s
         InputError: it has no meaning.
     """
     if file.kind == "urdf":
-        return read_urdf(file), "our own reading of the file"
+        return read_urdf(file), ""
     with Worker() as worker:
         try:
             robot, by = reading.compiled(worker, file, written, time_limit)
         except WorkerDied as error:
             raise InputError("file", str(file.path), f"it could not be compiled: {error}") from None
-    return robot.change(name=file.root.get("model", "robot")), f"the model that {by} compiles"
+    return robot.change(name=file.root.get("model", "robot")), by

@@ -48,7 +48,7 @@ def stripped(root: Element, path: Path) -> tuple[Element, list[LintFinding]]:
             if child.tag in _LOOKS or child.get("hfield"):
                 parent.remove(child)
         parent.attrib.pop("material", None)
-    findings = list(_meshes(root, path.resolve().parent))
+    findings = [*_meshes(root, path.resolve().parent), *_gravity_compensations(root)]
     _name(root)
     return root, findings
 
@@ -120,6 +120,14 @@ def _meshes(root: Element, folder: Path) -> Iterator[LintFinding]:
                 asset.remove(mesh)
             elif mesh.get("file"):
                 mesh.set("file", str(files[_mesh_name(mesh)]))
+
+
+def _gravity_compensations(root: Element) -> Iterator[LintFinding]:
+    """Leaves out what carries bodies against gravity, as actuators are."""
+    for body in root.iter("body"):
+        if body.attrib.pop("gravcomp", "0") not in {"0", "0.0"}:
+            words = "its gravity compensation is left out, as actuators are; all engines read it without"
+            yield LintFinding("note", f"body {body.get('name', '')}", words)
 
 
 def _mesh_name(mesh: Element) -> str:

@@ -17,6 +17,7 @@ import numpy as np
 from scipy.spatial.transform import Rotation
 
 from proofroll.core.errors import InputError
+from proofroll.elements.mechanism.joint import LAWS
 from proofroll.elements.mechanism.rotations import to_rpy
 from proofroll.robots.judging import TIME_LIMIT, meaning
 from proofroll.robots.model import WORLD, Array, Robot, RobotJoint
@@ -102,7 +103,13 @@ class RobotScenes:
                 if joint.name not in carriers
             ],
             "unmodelled": [
-                f"{what} (couplings=0 leaves it out)" for what in _couplings(file, robot) if values["couplings"]
+                *(f"{what} (couplings=0 leaves it out)" for what in _couplings(file, robot) if values["couplings"]),
+                *(
+                    f"the {law} of the {joint.kind} joint {joint.name} ({law}=0 leaves all out)"
+                    for joint in robot.moving
+                    for law in _FACTORS
+                    if values.get(law, 0) * getattr(joint, law) and joint.kind not in LAWS[law]
+                ),
             ],
         }
 
@@ -140,7 +147,9 @@ def _joint(
     table: dict[str, Any] = {"name": joint.name, "kind": joint.kind}
     table |= {"parent": "world" if home == WORLD else names[carrier], "child": names[joint.child]}
     table["child_position"] = joint.child_position.tolist()
-    laws = {law: values[law] * getattr(joint, law) for law in _FACTORS if getattr(joint, law)}
+    laws = {
+        law: values[law] * getattr(joint, law) for law in _FACTORS if joint.kind in LAWS[law] and getattr(joint, law)
+    }
     v = values["speed"] * start.velocity[joint.name][0]
     if joint.kind == "free":  # its coordinates are of the world, whatever it hangs on
         turned = start.rotation[joint.name][0]

@@ -44,7 +44,7 @@ FACTS: dict[str, Facts] = {
 WITH_AXIS = ("revolute", "prismatic", "universal", "planar")
 _WITH_QUATERNION = ("spherical", "free")
 # which kinds may have a law along their coordinates: there a coordinate, a rate or a unit is missing elsewhere
-_LAWS: dict[str, tuple[str, ...]] = {
+LAWS: dict[str, tuple[str, ...]] = {
     "stiffness": ("revolute", "prismatic", "universal"),
     "rest": ("revolute", "prismatic", "universal"),
     "damping": ("revolute", "prismatic", "universal", "spherical"),
@@ -125,7 +125,7 @@ class Joint:
                 raise InputError(f"{field}.second_axis", self.second_axis, "must be perpendicular to axis")
             checks.assign(self, second_axis=second)
         self._check_start(field)
-        for key, kinds in _LAWS.items():
+        for key, kinds in LAWS.items():
             least = None if key in {"rest", "torque"} else 0.0
             value = checks.number(f"{field}.{key}", getattr(self, key), at_least=least)
             if value and self.kind not in kinds:

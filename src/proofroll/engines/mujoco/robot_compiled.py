@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from typing import Any
 
+import mujoco
 import numpy as np
 from scipy.spatial.transform import Rotation
 
@@ -19,10 +20,12 @@ def robot_of(model: Any) -> Robot:
     Coordinates count from ``qpos0``, the pose that the file describes.
 
     Raises:
-        Refused: the model has what changes its mass matrix and is not covered (armature of a tendon).
+        Refused: the model has what is not covered: armature of a tendon, springs or dampers that are not linear.
     """
     if np.any(getattr(model, "tendon_armature", np.zeros(0))):
         raise Refused("a tendon has armature, which the check does not cover")
+    if any(np.any(getattr(model, f"{name}poly", 0)) for name in ("jnt_stiffness", "dof_damping")):
+        raise Refused("a joint has a spring or damper that is not linear, which the check does not cover")
     names = [WORLD, *(model.body(index).name for index in range(1, model.nbody))]
     bodies: dict[str, RobotBody] = {}
     joints: list[RobotJoint] = []
@@ -43,7 +46,17 @@ def robot_of(model: Any) -> Robot:
                 bodies[child] = RobotBody(child, 0.0, np.zeros(3), np.zeros((3, 3)))
             joints.append(_joint(model, joint, parent, child, position, rotation, joint in driven))
             parent, position, rotation = child, np.zeros(3), np.eye(3)
-    return Robot("robot", bodies, tuple(joints), _mimics(model), np.array(model.opt.gravity), _sources(model, names))
+    gravity = np.zeros(3) if _off(model, "GRAVITY") else np.array(model.opt.gravity)
+    robot = Robot("robot", bodies, tuple(joints), _mimics(model), gravity, _sources(model, names))
+    laws = {"SPRING": "stiffness", "DAMPER": "damping", "FRICTIONLOSS": "friction"}
+    return robot.with_joints(**{law: 0.0 for flag, law in laws.items() if _off(model, flag)})
+
+
+def _off(model: Any, flag: str) -> bool:
+    """Whether the file disables a part of the physics; MuJoCo up to 3.3 has one flag for springs and dampers."""
+    bits = mujoco.mjtDisableBit
+    name = "PASSIVE" if flag in {"SPRING", "DAMPER"} and not hasattr(bits, f"mjDSBL_{flag}") else flag
+    return bool(model.opt.disableflags & int(getattr(bits, f"mjDSBL_{name}")))
 
 
 def _sources(model: Any, names: list[str]) -> dict[str, dict[str, Any]]:
