@@ -134,8 +134,9 @@ def test_what_no_scene_has_is_refused_by_name(robot):
 
 def test_what_an_mjcf_disables_or_has_beyond_a_scene(robot):
     """Flags take gravity and springs away; a ball joint's spring is refused by name, one that is not linear at once."""
-    text = """<mujoco><option><flag gravity="disable" spring="disable"/></option><worldbody><body name="a" gravcomp="1">
-    <joint name="k1" type="KIND" stiffness="9" damping="1"/><geom size="0.1" pos="0.2 0 0"/></body></worldbody></mujoco>"""
+    text = """<mujoco><option><flag gravity="disable" spring="disable"/></option><worldbody><body gravcomp="1">
+    <joint name="k1" type="KIND" stiffness="9" damping="1"/><geom size="1" pos="1 1 1"/></body>
+    </worldbody></mujoco>"""
     mechanism = load_scene(robot("flags.xml", text.replace("KIND", "hinge"))).elements[0].mechanism
     hinge = mechanism.joints[0]
     assert (mechanism.gravity, hinge.stiffness, hinge.damping) == ((0, 0, 0), 0, 1)
