@@ -7,7 +7,7 @@ from collections.abc import Sequence
 from rich.table import Table
 from rich.text import Text
 
-from proofroll.studies.findings import Finding, FindingState, Shown
+from proofroll.studies.findings import EngineFinding, FindingState, Shown
 
 _STYLES = {
     FindingState.SHOWS: "red",
@@ -28,7 +28,7 @@ def findings_table(rows: Sequence[Shown]) -> Table:
     return table
 
 
-def findings_list(findings: Sequence[Finding]) -> Table:
+def findings_list(findings: Sequence[EngineFinding]) -> Table:
     """One line per finding: what it is, in which versions it was seen, and where it is discussed."""
     table = Table(box=None, padding=(0, 1, 0, 0))
     for name in ("finding", "seen in", "gone in", "issue"):

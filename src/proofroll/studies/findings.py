@@ -29,7 +29,7 @@ print(json.dumps({name: known[name] for name in sys.argv[1:] if name in known}))
 
 
 @dataclass(frozen=True)
-class Finding:
+class EngineFinding:
     """One file of ``findings/``.
 
     Attributes:
@@ -75,13 +75,13 @@ class Shown:
         said: the last line of the program.
     """
 
-    finding: Finding
+    finding: EngineFinding
     state: FindingState
     version: str
     said: str
 
 
-def load_findings(engines: Iterable[str] = ()) -> list[Finding]:
+def load_findings(engines: Iterable[str] = ()) -> list[EngineFinding]:
     """All findings, by name; of some engines alone, if any are named.
 
     Raises:
@@ -96,7 +96,7 @@ def load_findings(engines: Iterable[str] = ()) -> list[Finding]:
     return [item for item in found if not wanted or item.engine in wanted]
 
 
-def read_finding(path: Path) -> Finding:
+def read_finding(path: Path) -> EngineFinding:
     """One file: TOML between lines of +++, then text with one Python program.
 
     Raises:
@@ -117,10 +117,10 @@ def read_finding(path: Path) -> Finding:
         if not isinstance(front.get(name), str):
             raise InputError(f"{path}: {name}", front.get(name), "give a text; it may be empty")
     told = {name: front[name] for name in names}
-    return Finding(name=path.stem, **told, text=_PROGRAM.sub("", parts[2]).strip(), program=programs[0])
+    return EngineFinding(name=path.stem, **told, text=_PROGRAM.sub("", parts[2]).strip(), program=programs[0])
 
 
-def shown(findings: Sequence[Finding], python: str = "", time_limit: float = 300.0) -> Iterator[Shown]:
+def shown(findings: Sequence[EngineFinding], python: str = "", time_limit: float = 300.0) -> Iterator[Shown]:
     """Runs each program in a process of its own.
 
     Args:

@@ -11,12 +11,12 @@ from typer.testing import CliRunner
 
 from proofroll.cli import app
 from proofroll.core.errors import InputError, Missing
-from proofroll.studies.findings import Finding, FindingState, load_findings, read_finding, shown
+from proofroll.studies.findings import EngineFinding, FindingState, load_findings, read_finding, shown
 
 
-def made(program: str, package: str = "numpy") -> Finding:
+def made(program: str, package: str = "numpy") -> EngineFinding:
     """A finding with this program."""
-    return Finding("made", "it does", "numpy", package, "1", "", "", "text", program)
+    return EngineFinding("made", "it does", "numpy", package, "1", "", "", "text", program)
 
 
 def test_every_file_is_sound() -> None:
