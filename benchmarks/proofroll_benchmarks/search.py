@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 
 from proofroll.core.arrays import FloatArray
-from proofroll.core.engine_abilities import Level
+from proofroll.core.engine_abilities import Level, Term
 from proofroll.core.errors import ProofrollError
 from proofroll.core.plugins import engine_names
 from proofroll.core.scene import Scene
@@ -128,15 +128,15 @@ def _kinds() -> Iterator[tuple[EngineFacts, bool]]:
             described = describe(name)
         except ProofrollError:
             continue
-        levels = described["levels"]
-        for formulation, presets in described["presets"].items():
+        levels = described.levels
+        for formulation, presets in described.presets.items():
             level = levels.get(formulation)
             contact = level in {Level.CONTACT, Level.FACETS}
             for preset, settings in presets.items():
                 if settings.get("integrator") == "taylor":
                     continue
                 base = {"formulation": formulation, "preset": preset}
-                for variant in ({}, *_without(described["terms"], formulation, settings)):
+                for variant in ({}, *_without(described.terms, formulation, settings)):
                     wanted.append((name, base | dict(variant)))
                     contacts.append(contact)
     for facts, contact in zip(resolve(wanted), contacts, strict=True):
@@ -144,13 +144,11 @@ def _kinds() -> Iterator[tuple[EngineFacts, bool]]:
             yield facts, contact
 
 
-def _without(
-    terms: Sequence[Mapping[str, Any]], formulation: str, settings: Mapping[str, Any]
-) -> Iterator[Mapping[str, Any]]:
+def _without(terms: Sequence[Term], formulation: str, settings: Mapping[str, Any]) -> Iterator[Mapping[str, Any]]:
     """For each of the engine's own terms that the settings may have: what leaves it out."""
     for term in terms:
-        if formulation in term["formulations"] and any(settings[key] != value for key, value in term["off"].items()):
-            yield term["off"]
+        if formulation in term.formulations and any(settings[key] != value for key, value in term.off.items()):
+            yield term.off
 
 
 def _values(facts: EngineFacts, every: float, rung: int) -> list[float]:

@@ -45,8 +45,8 @@ def study_cases(engines: Sequence[str], seconds: float = LEAST_SECONDS) -> list[
     wanted = [
         (name, {"formulation": formulation, "preset": "matched"})
         for name, said in described.items()
-        for formulation, presets in said["presets"].items()
-        if "matched" in presets and needed <= set(said["provides"][formulation])
+        for formulation, presets in said.presets.items()
+        if "matched" in presets and needed <= set(said.provides[formulation])
     ]
     cases = []
     with Stopwatch() as stopwatch:

@@ -114,8 +114,8 @@ def run_figures(
     assert isinstance(facts, EngineFacts)  # for the type checker, as the next line
     assert isinstance(truth, EngineFacts)
     # Asked for only of an engine that has it: without it all but the angles can still be drawn.
-    formulation = facts.settings.get("formulation")
-    follows = spec.name != TRUTH and ASKED[ORIENTATION] in describe(spec.name, runner.workers)["provides"][formulation]
+    formulation = str(facts.settings.get("formulation"))
+    follows = spec.name != TRUTH and ASKED[ORIENTATION] in describe(spec.name, runner.workers).provides[formulation]
     asks = (ORIENTATION,) if follows and figures.wants_orientation else ()
     cases = {name: _case(figures, planned.parameters, facts, asks) for name, planned in figures.runs.items()}
     truths = {

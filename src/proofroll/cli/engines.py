@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import dataclasses
 import sys
 from concurrent.futures import ThreadPoolExecutor
 from typing import Annotated, Any
@@ -86,7 +87,7 @@ def _described(name: str) -> dict[str, Any]:
     from proofroll.running.asking import describe
 
     try:
-        return {"status": "installed", **describe(name)}
+        return {"status": "installed", **dataclasses.asdict(describe(name))}
     except Missing as error:
         return {"name": name, "status": "missing", "message": str(error)}
     except ProofrollError as error:

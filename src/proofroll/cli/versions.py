@@ -122,7 +122,7 @@ def _place(engine: str, text: str) -> str:
         raise InputError("version", text, f"no environment of {engine} has this label; see proofroll engines")
     if engine in engine_names():
         with contextlib.suppress(ProofrollError):  # it is not installed here
-            if release(describe(engine)["version"]) == release(text):
+            if release(describe(engine).version) == release(text):
                 return engine
     return _made(engine, text)
 

@@ -15,7 +15,7 @@ from proofroll.core.dataset import scales
 from proofroll.core.errors import ProofrollError
 from proofroll.report.labels import number
 from proofroll.report.terminal import step
-from proofroll.running.case import Status
+from proofroll.running.case import EngineDescription, Status
 from proofroll.running.timing import Interval, machine, ratio
 from proofroll.studies.ladder import Ladder, absence, key_of
 from proofroll.studies.ladder_models import LadderModel, Rung, Switch
@@ -59,7 +59,9 @@ def ladder_content(study: Ladder) -> dict[str, Any]:
             for name, told in study.engines.items()
             if isinstance(told, ProofrollError)
         },
-        "unplaced": [name for name, told in study.engines.items() if isinstance(told, dict) and not told["levels"]],
+        "unplaced": [
+            name for name, told in study.engines.items() if isinstance(told, EngineDescription) and not told.levels
+        ],
         "machine": machine(),
     }
     return content | {"findings": list(_findings(content))}

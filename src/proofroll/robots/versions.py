@@ -51,7 +51,7 @@ def between(file: str, old: str, new: str) -> dict[str, Any]:
 
 
 def _side(name: str, row: dict[str, Any]) -> dict[str, Any]:
-    return {"name": name, "version": row["version"] or "", "interpreter": describe(name)["interpreter"]}
+    return {"name": name, "version": row["version"] or "", "interpreter": describe(name).interpreter}
 
 
 def _causes(row: dict[str, Any]) -> str:

@@ -9,22 +9,24 @@ from collections.abc import Collection, Iterator, Mapping, Sequence
 from concurrent.futures import ThreadPoolExecutor
 from typing import Any
 
+from proofroll.core.engine_abilities import Term
 from proofroll.core.errors import ProofrollError
-from proofroll.running.case import Case, EngineFacts
+from proofroll.running.case import Case, EngineDescription, EngineFacts
 from proofroll.running.process import WorkerDied
 from proofroll.running.worker_pool import Workers
 
 _START_UP_SECONDS = 60.0
 
 
-def describe(engine: str, workers: Workers | None = None) -> dict[str, Any]:
+def describe(engine: str, workers: Workers | None = None) -> EngineDescription:
     """What an engine is, provides and has as presets; asked in a process of its own.
 
     Raises:
         InputError, Missing, WorkerDied: it cannot be asked.
     """
     with lent_workers(workers) as lent, lent.lend(engine) as worker:
-        return worker.request({"do": "describe", "engine": engine}, _START_UP_SECONDS)
+        told = worker.request({"do": "describe", "engine": engine}, _START_UP_SECONDS)
+    return EngineDescription(**{**told, "terms": [Term(**term) for term in told["terms"]]})
 
 
 def resolve(

@@ -6,9 +6,12 @@ import hashlib
 import json
 from dataclasses import asdict, dataclass, field
 from enum import StrEnum
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 from proofroll.core.plugins import plain_name
+
+if TYPE_CHECKING:
+    from proofroll.core.engine_abilities import Term
 
 
 class Status(StrEnum):
@@ -26,6 +29,35 @@ class Status(StrEnum):
 
 # A crash, a hang or a missing engine may be gone next time; these three are the engine's answer and stay.
 LASTING = frozenset({Status.DONE, Status.DIVERGED, Status.REFUSED})
+
+
+@dataclass(frozen=True)
+class EngineDescription:
+    """What an engine tells of itself before any settings are chosen.
+
+    Attributes:
+        name: of the engine, with the place of another interpreter in which it runs, ``mujoco@3.8.1``.
+        version: of the engine.
+        interpreter: path of the Python that it runs in.
+        provides: formulation -> what it can represent, sorted.
+        presets: formulation -> preset -> complete settings.
+        summary: one line for a person.
+        levels: formulation -> rung of the ladder of models; empty where it does not tell.
+        terms: what can be switched on and off.
+        inherent: formulation -> what is always in its model -> why.
+        defaults: what it takes where nobody chooses.
+    """
+
+    name: str
+    version: str
+    interpreter: str
+    provides: dict[str, list[str]]
+    presets: dict[str, dict[str, dict[str, Any]]]
+    summary: str
+    levels: dict[str, str]
+    terms: list[Term]
+    inherent: dict[str, dict[str, str]]
+    defaults: dict[str, Any]
 
 
 @dataclass(frozen=True)

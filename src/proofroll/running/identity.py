@@ -16,7 +16,7 @@ import proofroll
 from proofroll.core.errors import InputError
 from proofroll.core.truth import load_truths
 from proofroll.files.json_data import plain
-from proofroll.running.case import EngineFacts
+from proofroll.running.case import EngineDescription, EngineFacts
 
 # Folders on which every result rests; reports and the command line are not among them.
 FOUNDATION = ("core", "elements", "files", "running")
@@ -47,20 +47,20 @@ def describe(engine: str) -> dict[str, Any]:
         formulation: {preset: dataclasses.asdict(settings) for preset, settings in by_preset.items()}
         for formulation, by_preset in kind.presets.items()
     }
-    return {
-        "name": engine,
-        "version": kind.version(),
-        "interpreter": sys.executable,
-        "provides": {formulation: sorted(names) for formulation, names in kind.provides.items()},
-        "presets": presets,
-        "summary": (inspect.getdoc(kind) or "").split("\n", 1)[0],
-        "levels": dict(kind.levels) if isinstance(kind, TellsLevels) else {},
-        "terms": [dataclasses.asdict(term) for term in kind.terms] if isinstance(kind, TellsLevels) else [],
-        "inherent": {key: dict(terms) for key, terms in kind.inherent.items()}
-        if isinstance(kind, CannotLeaveOut)
-        else {},
-        "defaults": plain(dict(kind.defaults())) if isinstance(kind, TellsDefaults) else {},
-    }
+    inherent = kind.inherent.items() if isinstance(kind, CannotLeaveOut) else ()
+    found = EngineDescription(
+        name=engine,
+        version=kind.version(),
+        interpreter=sys.executable,
+        provides={formulation: sorted(names) for formulation, names in kind.provides.items()},
+        presets=presets,
+        summary=(inspect.getdoc(kind) or "").split("\n", 1)[0],
+        levels=dict(kind.levels) if isinstance(kind, TellsLevels) else {},
+        terms=list(kind.terms) if isinstance(kind, TellsLevels) else [],
+        inherent={key: dict(terms) for key, terms in inherent},
+        defaults=plain(dict(kind.defaults())) if isinstance(kind, TellsDefaults) else {},
+    )
+    return dataclasses.asdict(found)
 
 
 def resolve(engine: str, options: dict[str, Any], requires: Sequence[str] = ()) -> dict[str, Any]:

@@ -125,7 +125,7 @@ def _made(
     tell(f"importing {name}")
     python = venv / "bin" / "python"
     try:
-        version = describe(f"{name}@{python}")["version"]
+        version = describe(f"{name}@{python}").version
     except ProofrollError as error:
         said = str(error).replace(f"{name}@{python}: ", "")
         raise ProofrollError(f"{name} does not work with {', '.join(requirements)}: {said}") from None

@@ -2,13 +2,12 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Mapping
-from typing import Any
+from collections.abc import Iterable
 
 from proofroll.core.errors import InputError, ProofrollError
 from proofroll.core.plugins import EngineSpec, engine_names, parse_engine
 from proofroll.running.asking import describe, resolve
-from proofroll.running.case import EngineFacts
+from proofroll.running.case import EngineDescription, EngineFacts
 from proofroll.running.worker_pool import Workers
 from proofroll.studies.curve import Curve
 
@@ -41,7 +40,7 @@ def curves_of(
         if any(parse_engine(name).name == spec.name for name, _ in wanted):
             absent.pop(spec.name, None)
         elif spec.name not in absent:
-            raise InputError("engine", text, f"{spec.name} has {', '.join(described['presets'])}")
+            raise InputError("engine", text, f"{spec.name} has {', '.join(described.presets)}")
     specs = [parse_engine(name) for name, _ in wanted]
     curves = []
     resolved = resolve([(spec.name, spec.options) for spec in specs], workers)
@@ -56,21 +55,20 @@ def curves_of(
 
 
 def _chosen(
-    spec: EngineSpec, described: Mapping[str, Any], requires: frozenset[str]
+    spec: EngineSpec, described: EngineDescription, requires: frozenset[str]
 ) -> tuple[list[tuple[str, str | None]], bool]:
     """Formulations and presets that a specification means, each with its level; whether some are for other scenes."""
-    levels: Mapping[str, str] = described.get("levels", {})
     chosen: list[tuple[str, str | None]] = []
     foreign = False
-    for formulation, presets in described["presets"].items():
+    for formulation, presets in described.presets.items():
         if spec.options.get("formulation", formulation) != formulation:
             continue
-        if requires and not requires & set(described["provides"][formulation]):
+        if requires and not requires & set(described.provides[formulation]):
             foreign = True
             continue
         for preset in presets:
             if spec.options.get("preset", preset) == preset:
                 options = {"formulation": formulation, "preset": preset, **spec.options}
                 inner = ",".join(f"{key}={value}" for key, value in options.items())
-                chosen.append((f"{spec.name}[{inner}]", levels.get(formulation)))
+                chosen.append((f"{spec.name}[{inner}]", described.levels.get(formulation)))
     return chosen, foreign

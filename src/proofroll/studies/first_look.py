@@ -64,7 +64,7 @@ def able(scene: Scene, *, first: bool = False) -> list[str]:
     found = []
     for engine in engine_names():
         try:
-            provides = describe(engine)["provides"]
+            provides = describe(engine).provides
         except ProofrollError:
             continue
         fitting = [name for name, given in provides.items() if scene.requires <= set(given)]

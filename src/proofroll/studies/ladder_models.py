@@ -12,6 +12,7 @@ from proofroll.core.errors import ProofrollError
 from proofroll.core.plugins import engine_names
 from proofroll.core.scene import Scene
 from proofroll.running.asking import describe
+from proofroll.running.case import EngineDescription
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -76,9 +77,9 @@ class Switch:
     because: str
 
 
-def described(engines: Sequence[str]) -> dict[str, dict[str, Any] | ProofrollError]:
+def described(engines: Sequence[str]) -> dict[str, EngineDescription | ProofrollError]:
     """What every engine tells of itself, or why it cannot; all that are announced if none is named."""
-    found: dict[str, dict[str, Any] | ProofrollError] = {}
+    found: dict[str, EngineDescription | ProofrollError] = {}
     for name in engines or engine_names():
         try:
             found[name] = describe(name)
@@ -87,7 +88,7 @@ def described(engines: Sequence[str]) -> dict[str, dict[str, Any] | ProofrollErr
     return found
 
 
-def rungs(engines: Mapping[str, dict[str, Any] | ProofrollError], requires: frozenset[str]) -> list[Rung]:
+def rungs(engines: Mapping[str, EngineDescription | ProofrollError], requires: frozenset[str]) -> list[Rung]:
     """The ladder from the least model to the most, each formulation with its best preset that tunes nothing."""
     ladder: list[Rung] = []
     for level in Level:
@@ -95,14 +96,14 @@ def rungs(engines: Mapping[str, dict[str, Any] | ProofrollError], requires: froz
         for told in engines.values():
             if isinstance(told, ProofrollError):
                 continue
-            for formulation, presets in told["presets"].items():
-                if told["levels"].get(formulation) != level or not requires & set(told["provides"][formulation]):
+            for formulation, presets in told.presets.items():
+                if told.levels.get(formulation) != level or not requires & set(told.provides[formulation]):
                     continue
-                model = LadderModel(told["name"], {"formulation": formulation, "preset": _preset(presets)})
+                model = LadderModel(told.name, {"formulation": formulation, "preset": _preset(presets)})
                 ladder.append(Rung(level, model))
-                for term in told["terms"]:
-                    if term["rung"] and formulation in term["formulations"]:
-                        ladder.append(Rung(level, _with(model, term["on"]), _written(term["on"])))
+                for term in told.terms:
+                    if term.rung and formulation in term.formulations:
+                        ladder.append(Rung(level, _with(model, term.on), _written(term.on)))
         if len(ladder) == before:
             ladder.append(Rung(level, None, message="no engine that was asked has a model of this level"))
     return ladder
@@ -121,7 +122,7 @@ def _written(options: Mapping[str, Any]) -> str:
 
 
 def switches(
-    ladder: Sequence[Rung], engines: Mapping[str, dict[str, Any] | ProofrollError], scene: Scene, truth: xr.Dataset
+    ladder: Sequence[Rung], engines: Mapping[str, EngineDescription | ProofrollError], scene: Scene, truth: xr.Dataset
 ) -> list[Switch]:
     """Every optional term: the scene's in one model of each engine and level, the engine's in each model that has it.
 
@@ -136,17 +137,17 @@ def switches(
     seen: set[tuple[str, Level]] = set()
     for level, model in models:
         told = engines[model.engine]
-        assert isinstance(told, dict)  # it has a rung
+        assert isinstance(told, EngineDescription)  # it has a rung
         if (model.engine, level) not in seen:
-            found += _of_the_scene(model, scene, truth, told["inherent"].get(model.formulation, {}))
+            found += _of_the_scene(model, scene, truth, told.inherent.get(model.formulation, {}))
         seen.add((model.engine, level))
     for _, model in models:
         told = engines[model.engine]
-        assert isinstance(told, dict)
+        assert isinstance(told, EngineDescription)
         found += [
-            Switch(term["name"], "engine", model, _with(model, term["on"]), _with(model, term["off"]), term["because"])
-            for term in told["terms"]
-            if model.formulation in term["formulations"]
+            Switch(term.name, "engine", model, _with(model, term.on), _with(model, term.off), term.because)
+            for term in told.terms
+            if model.formulation in term.formulations
         ]
     return found
 

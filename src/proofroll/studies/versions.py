@@ -10,7 +10,7 @@ from typing import Any
 from proofroll.core.comparison import Comparison
 from proofroll.core.plugins import parse_engine
 from proofroll.running.asking import describe
-from proofroll.running.case import Status
+from proofroll.running.case import EngineDescription, Status
 from proofroll.running.runner import Runner
 from proofroll.running.stopwatch import Stopwatch
 from proofroll.running.timing import interleaved, ratio
@@ -77,8 +77,8 @@ def compared(
     }
 
 
-def _side(name: str, told: Mapping[str, Any]) -> dict[str, Any]:
-    return {"name": name, "version": told["version"], "interpreter": told["interpreter"]}
+def _side(name: str, told: EngineDescription) -> dict[str, Any]:
+    return {"name": name, "version": told.version, "interpreter": told.interpreter}
 
 
 def _rows(cases: Sequence[dict[str, Any]], speeds: Mapping[tuple[str, str], dict[str, Any]]) -> list[dict[str, Any]]:
@@ -128,11 +128,10 @@ def _speeds(
     return speeds
 
 
-def _defaults(old: Mapping[str, Any], new: Mapping[str, Any]) -> list[dict[str, Any]]:
+def _defaults(old: EngineDescription, new: EngineDescription) -> list[dict[str, Any]]:
     """What the engine itself takes where nobody chooses, and what formulations can represent, if that changed."""
     found = []
-    for kind in ("defaults", "provides"):
-        one, other = old.get(kind) or {}, new.get(kind) or {}
+    for one, other in ((old.defaults, new.defaults), (old.provides, new.provides)):
         for name in sorted(one.keys() | other.keys()):
             if one.get(name) != other.get(name):
                 found.append({"name": name, "old": one.get(name), "new": other.get(name)})

@@ -183,7 +183,7 @@ def test_noise_is_not_an_answer(tmp_path: Path) -> None:
     """A Python that prints when it starts serves nevertheless."""
     python = seeing(tmp_path / "venv", "1.0")
     (site_of(python) / "noise.pth").write_text("import sys; print('noise'); print('noise', file=sys.stderr)\n")
-    assert describe(f"aged@{python}")["version"] == "1.0"
+    assert describe(f"aged@{python}").version == "1.0"
 
 
 def test_no_engine_of_another_interpreter_is_loaded_here(old: Path) -> None:

@@ -259,10 +259,10 @@ def test_capabilities_are_checked_before_anything_is_built(tmp_path: Path, make_
 def test_describe() -> None:
     """An engine is described by itself, from a process of its own."""
     found = describe("oracle")
-    assert found["version"] == "1"
-    assert found["provides"] == {"only": ["a curved surface", "rolling without slip"]}
-    assert found["presets"] == {"only": {"matched": {"formulation": "only", "preset": "matched", "dt": 1e-2}}}
-    assert found["summary"].startswith("Well behaved")
+    assert found.version == "1"
+    assert found.provides == {"only": ["a curved surface", "rolling without slip"]}
+    assert found.presets == {"only": {"matched": {"formulation": "only", "preset": "matched", "dt": 1e-2}}}
+    assert found.summary.startswith("Well behaved")
 
 
 def test_describe_what_cannot_be_described() -> None:

@@ -92,7 +92,7 @@ def default_engines(workers: Workers | None = None) -> list[str]:
         except ProofrollError:
             found.append(name)  # the row says why it cannot run
             continue
-        provided = described["provides"].items()
+        provided = described.provides.items()
         found += [f"{name}[formulation={key}]" for key, texts in provided if BallCapability.BOUNDED_FRICTION in texts]
     return found
 
