@@ -97,12 +97,16 @@ class BallOnSurfaceKind:
 
     @staticmethod
     def truth_scenes() -> Mapping[str, Scene]:
-        """Turned about the axis, tilted, spinning about e1; slow and fast."""
+        """Turned about the axis, tilted, spinning; slow, fast; through a bowl's bottom; on a wall that moves."""
+        from proofroll.files.scene_file import load_scene
+
         scenes = BallOnSurfaceKind.conformance_scenes()
         return {
             "plane": scenes["plane"],
             "slow": _turned(scenes["cylinder-resisting"], -1.0, 0.05, velocity=(1.2, 0.2), spin=5.0),
             "fast": _turned(scenes["cylinder"], 2.0, -0.2, velocity=(4.5, -0.7)),
+            "bottom": load_scene("bowl", start=-0.02, speed=0.6, cross_speed=0.02, normal_spin=12.0),
+            "turntable": load_scene("turntable", tilt=0.2, normal_spin=12.0),
         }
 
     @staticmethod

@@ -154,9 +154,10 @@ class ContactSteps:
             shift2 = self._lever * (x2 * tx + y2 * ty + z2 * tz)
             shift3 = -self._lever * (x3 * tx + y3 * ty + z3 * tz)
             shift1 -= 0.5 * self.dt * (rx * vx + ry * vy + rz * vz)
-        if self._wall_rate is not None:  # where the ball will be in the middle of the step that the velocity is for
+        if self._wall_rate is not None:  # where the ball will be at the time that the velocity is for
             x1, y1, z1, x2, y2, z2, x3, y3, z3 = triad
-            there = np.array(place) + 0.5 * self.dt * np.array(along) + self._radius * np.array((x1, y1, z1))
+            ahead = (0.5 if self.leapfrog else 1.0) * self.dt
+            there = np.array(place) + ahead * np.array(along) + self._radius * np.array((x1, y1, z1))
             carried = np.cross(self._wall_rate, there)
             shift2 -= float(carried @ (x2, y2, z2))
             shift3 += float(carried @ (x3, y3, z3))
