@@ -11,8 +11,8 @@ import pytest
 
 from proofroll.core.engine_abilities import Level
 from proofroll.core.errors import InputError
+from proofroll.files.json_data import plain
 from proofroll.files.scene_file import load_scene
-from proofroll.report.comparison_content import plain
 from proofroll.report.ladder import ladder_content, rung_table, term_table
 from proofroll.report.terminal import WIDTH, console
 from proofroll.running.runner import Runner

@@ -2,8 +2,8 @@
 
 from __future__ import annotations
 
-from proofroll.elements.mechanism.checks import Vector
-from proofroll.elements.mechanism.model import WORLD, Mechanism
+from proofroll.elements.mechanism.checks import WORLD, Vector
+from proofroll.elements.mechanism.model import Mechanism
 
 
 def fastened(mechanism: Mechanism) -> dict[str, list[Vector]]:

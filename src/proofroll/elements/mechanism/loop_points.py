@@ -5,7 +5,8 @@ from __future__ import annotations
 import numpy as np
 
 from proofroll.elements.mechanism.kinematics import Tree
-from proofroll.elements.mechanism.model import Loop, Mechanism
+from proofroll.elements.mechanism.model import Mechanism
+from proofroll.elements.mechanism.parts import Loop
 from proofroll.elements.mechanism.rotations import Array
 
 # Part of the mechanism's size by which the two points on the axis of a revolute loop are apart.

@@ -22,8 +22,6 @@ from proofroll.elements.mechanism.parts import Body, Loop, Point, Spring
 from proofroll.elements.mechanism.rotations import Array
 from proofroll.elements.mechanism.tree import check_masses, depth_first
 
-__all__ = ["WORLD", "Body", "Joint", "Loop", "Mechanism", "Point", "Spring"]
-
 
 @dataclass(frozen=True)
 class Mechanism:

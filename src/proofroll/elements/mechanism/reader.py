@@ -15,7 +15,9 @@ from proofroll.core.errors import InputError
 from proofroll.elements.mechanism import checks
 from proofroll.elements.mechanism.assembly import assembled, check_start
 from proofroll.elements.mechanism.expressions import substituted
-from proofroll.elements.mechanism.model import Body, Joint, Loop, Mechanism, Point, Spring
+from proofroll.elements.mechanism.joint import Joint
+from proofroll.elements.mechanism.model import Mechanism
+from proofroll.elements.mechanism.parts import Body, Loop, Point, Spring
 
 KINDS: dict[str, type[Any]] = {"bodies": Body, "joints": Joint, "loops": Loop, "springs": Spring, "points": Point}
 _TEXTS = ("name", "kind", "parent", "child", "body", "body_a", "body_b")

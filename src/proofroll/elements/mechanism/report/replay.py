@@ -13,9 +13,9 @@ from scipy.spatial.transform import Rotation
 
 from proofroll.core.arrays import FloatArray
 from proofroll.core.scene import Scene
+from proofroll.elements.mechanism.checks import WORLD
 from proofroll.elements.mechanism.element import MechanismElement
 from proofroll.elements.mechanism.fastened import fastened
-from proofroll.elements.mechanism.model import WORLD
 from proofroll.elements.mechanism.placed import Placed
 from proofroll.elements.mechanism.report.drawing import direction
 from proofroll.files.json_data import plain
