@@ -16,6 +16,7 @@ from proofroll.report.kinds import kind_of
 from proofroll.report.scene_sheet import scene_sheet
 from proofroll.report.study_parts import part_kinds
 from proofroll.report.summary import three_sentences
+from proofroll.studies.findings import load_findings
 
 if TYPE_CHECKING:
     from proofroll.running.store import Store
@@ -25,9 +26,9 @@ if TYPE_CHECKING:
 def report_content(outcomes: list[Outcome], store: Store, command: str) -> dict[str, Any]:
     """All that the report says, as plain data.
 
-    ``findings`` on the whole, ``comparisons``, ``awaited`` (titles of comparisons that are still being run), the
-    entries of further studies under the key of their kind, ``date`` and ``environment``. Paths of files are relative to
-    the folder of the report.
+    ``findings`` on the whole, ``engine_findings`` (what is known of engines), ``comparisons``, ``awaited`` (titles of
+    comparisons that are still being run), the entries of further studies under the key of their kind, ``date`` and
+    ``environment``. Paths of files are relative to the folder of the report.
     """
     comparisons = [_comparison(outcome, store) for outcome in outcomes]
     versions: dict[str, str] = {}
@@ -38,6 +39,9 @@ def report_content(outcomes: list[Outcome], store: Store, command: str) -> dict[
         "date": datetime.now(UTC).isoformat(timespec="seconds"),
         "comparisons": comparisons,
         "awaited": [],
+        "engine_findings": [
+            {key: getattr(item, key) for key in ("name", "engine", "title", "seen", "gone")} for item in load_findings()
+        ],
         **{kind.key: [] for kind in part_kinds()},
         "environment": environment(command, versions),
     }
