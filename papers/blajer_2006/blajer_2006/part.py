@@ -64,7 +64,9 @@ class FiguresPart:
 
         self.study = run_figures(self.asked, runner, None, lambda case, _: tell(case.engine.name, 1))
         for name in dict.fromkeys(figure.regimes for figure in self.asked.figures if figure.regimes):
-            self.maps[name] = regime_maps(load_regimes(name), runner.jobs, lambda _: tell("runs of the truth", 0))
+            self.maps[name] = regime_maps(
+                load_regimes(name).briefly(), runner.jobs, lambda _: tell("runs of the truth", 0)
+            )
 
     def content(self) -> dict[str, Any]:
         """Captions, runs and statements."""

@@ -26,7 +26,7 @@ _LOOSER = (1.0, 10.0, 100.0)
 BROKEN = 0.1
 # A curve is refined while that still takes off this part of the error; the finest step is short enough to end that,
 # and how fast the machine is must not.
-_GAIN = 0.4
+GAIN = 0.4
 
 
 Progress = Callable[[Case, Result], None]
@@ -38,11 +38,12 @@ def sweep(
     runner: Runner,
     progress: Progress | None = None,
     finer: Sequence[float] = FINER,
+    gain: float = GAIN,
 ) -> dict[float, Reference]:
     """Fills the curves with points, and returns the truth by sampling interval.
 
     Every curve begins with the same steps. It is then extended to coarser ones until it breaks, and to ``finer`` ones,
-    in sampling intervals, while they pay.
+    in sampling intervals, while each takes off this part of the error, ``gain``.
     """
     references: dict[float, Reference] = {}
     asked: list[set[float]] = [set() for _ in curves]
@@ -51,7 +52,7 @@ def sweep(
             (index, value)
             for index, curve in enumerate(curves)
             for value in (
-                _first(question, curve) if first else _further(question, curve, references, asked[index], finer)
+                _first(question, curve) if first else _further(question, curve, references, asked[index], finer, gain)
             )
             if value not in asked[index]
         ]
@@ -78,6 +79,7 @@ def _further(
     references: Mapping[float, Reference],
     asked: set[float],
     finer_steps: Sequence[float] = FINER,
+    gain: float = GAIN,
 ) -> list[float]:
     """One coarser step or looser tolerance if the coarsest is not broken yet, one of ``finer_steps`` if that pays."""
     if curve.facts.resolution is None or not curve.points:
@@ -95,7 +97,7 @@ def _further(
     finer = next((step for step in map(question.step, finer_steps) if step not in asked), None)
     if finer is not None and len(curve.points) > 1:
         now, before = (point.errors.get(question.quantity, np.inf) for point in (finest, curve.points[-2]))
-        if now < (1 - _GAIN) * before:
+        if now < (1 - gain) * before:
             found.append(finer)
     return found
 

@@ -26,14 +26,15 @@ from proofroll.studies.curve_points import judged
 from proofroll.studies.curves_asked import curves_of
 from proofroll.studies.pareto import envelope, front
 from proofroll.studies.reference import Reference
-from proofroll.studies.sweep import FINER, sweep
+from proofroll.studies.sweep import FINER, GAIN, sweep
 
 # What makes up most of a study's time is the repetition of measurements. A brief one repeats less: two rounds
 # show how far a cost can be trusted; a run longer than this [s] warms itself up, and is measured once.
 # A shorter measurement scatters more, which the interval of the rounds shows.
 BRIEF_ROUNDS, BRIEF_ONCE, BRIEF_SECONDS = 2, 0.1, 0.02
-# The finest steps take as long as all others together, and tell little of a choice: at most this part of an interval.
-BRIEF_FINER = tuple(part for part in FINER if part >= 1e-3)
+# The finest steps take as long as all others together, and tell little of a choice: at most this part of an interval,
+# and only where a step takes off as much of the error as with order 2: with order 1 the curve goes on as it came.
+BRIEF_FINER, BRIEF_GAIN = tuple(part for part in FINER if part >= 1e-3), 0.65
 
 
 @dataclass(frozen=True)
@@ -117,7 +118,7 @@ def tradeoff(
         over: parameter -> values; every combination is a corner of the range.
         rounds: how often every speed is measured.
         brief: measure every speed :data:`BRIEF_ROUNDS` times at most, and that of a long run once; leave out the
-            finest steps.
+            finest steps, but for those of curves that fall with order 2 or more.
         progress: called with a short text after every run and every measurement.
 
     Raises:
@@ -131,7 +132,8 @@ def tradeoff(
         if progress:
             progress(case.engine.name)
 
-    references = sweep(question, curves, runner, told, BRIEF_FINER if brief else FINER)
+    finer, gain = (BRIEF_FINER, BRIEF_GAIN) if brief else (FINER, GAIN)
+    references = sweep(question, curves, runner, told, finer, gain)
     found = Tradeoff(question, curves, absent, references, brief=brief)
     truth = _truth_case(question, references, runner)
     found.timings = _timed(found, truth, runner.workers, rounds, progress)

@@ -56,14 +56,16 @@ class RegimesPart:
         return False
 
     def make(self, runner: Runner, out: Path, tell: Tell) -> None:  # noqa: ARG002 -- the protocol's
-        """The whole maps."""
-        self.maps = regime_maps(self.asked, runner.jobs, lambda _: tell("runs of the truth", 0))
+        """The maps, briefly."""
+        self.maps = regime_maps(self.asked.briefly(), runner.jobs, lambda _: tell("runs of the truth", 0))
 
     def content(self) -> dict[str, Any]:
         """Counts and analytic boundaries."""
         from proofroll.elements.ball_on_surface.report.regime_map import counts
 
-        return {"study": {"maps": counts(self.maps)}, "contradictions": [], "lost": []}
+        maps = counts(self.maps)
+        left_out = self.asked.runs - sum(item["runs"] for item in maps)
+        return {"study": {"maps": maps, "left_out": left_out}, "contradictions": [], "lost": []}
 
     def pictures(self, prefix: str) -> dict[str, str]:
         """All maps side by side."""
