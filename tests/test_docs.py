@@ -6,13 +6,13 @@ import re
 import shlex
 import subprocess
 import sys
+from collections.abc import Callable
 from pathlib import Path
 
 import pytest
 import yaml
 
 ROOT = Path(__file__).resolve().parents[1]
-PROOFROLL = str(Path(sys.executable).with_name("proofroll"))
 # README.md and the pages whose snippets have tests of their own.
 ELSEWHERE = {"agreement_in_your_tests", "vocabulary", "write_an_engine", "write_an_element", "worker_protocol"}
 PAGES = sorted(path.stem for path in (ROOT / "docs").glob("*.md") if path.stem not in ELSEWHERE)
@@ -39,8 +39,11 @@ def commands(text: str) -> list[tuple[list[str], int]]:
 
 @pytest.mark.slow
 @pytest.mark.parametrize("page", [page for page in PAGES if blocks(page)])
-def test_a_page_can_be_followed(page: str, tmp_path: Path) -> None:
+def test_a_page_can_be_followed(
+    page: str, tmp_path: Path, command_line: Callable[..., tuple[int, str, str]], monkeypatch: pytest.MonkeyPatch
+) -> None:
     """Every file, command and snippet of a page works, one after the other; scripts for other systems parse."""
+    monkeypatch.chdir(tmp_path)
     for language, text in blocks(page):
         if language in {"toml", "xml"}:
             named = NAMED.match(text)
@@ -57,9 +60,8 @@ def test_a_page_can_be_followed(page: str, tmp_path: Path) -> None:
             assert language == "", f"nothing executes {language}"
             for words, code in commands(text):
                 assert words[0] == "proofroll"
-                command = [PROOFROLL, *words[1:]]
-                done = subprocess.run(command, cwd=tmp_path, capture_output=True, text=True, check=False)
-                assert done.returncode == code, (words, done.stderr, done.stdout)
+                found, out, err = command_line(*words[1:])
+                assert found == code, (words, err, out)
 
 
 def test_every_page_is_in_the_contents() -> None:

@@ -77,7 +77,6 @@ parameters = {{ stiffness = {{}} }}
 
 @pytest.fixture
 def springs(
-    proofroll: Proofroll,  # noqa: ARG001 -- it announces its engines first
     tmp_path: Path,
     monkeypatch: pytest.MonkeyPatch,
 ) -> Iterator[Path]:
@@ -104,41 +103,41 @@ def springs(
     truth.load_truths.cache_clear()
 
 
-def test_run(proofroll: Proofroll, springs: Path) -> None:
+def test_run(command_line: Proofroll, springs: Path) -> None:
     """Run gives the truth with its error bars, and the engine's end near it."""
     ends = {}
     for engine in ("truth", "sprung"):
-        code, out, err = proofroll("run", str(springs), "--engine", engine, "--until", "1", "--json")
+        code, out, err = command_line("run", str(springs), "--engine", engine, "--until", "1", "--json")
         assert code == 0, err
         ends[engine] = json.loads(out)["final"]["x"]
     assert ends["sprung"] == pytest.approx(ends["truth"], abs=1e-4)
 
 
 @pytest.mark.usefixtures("springs")
-def test_compare(proofroll: Proofroll) -> None:
+def test_compare(command_line: Proofroll) -> None:
     """Compare judges every observable of the new kind."""
-    code, out, err = proofroll("compare", "springs.toml", "--json")
+    code, out, err = command_line("compare", "springs.toml", "--json")
     assert code == 0, err
     document = json.loads(out)
     content = document.get("comparisons", [document])[0]
     assert {j["observable"] for run in content["runs"] for j in run["judgements"]} == {"x", "pull", "energy_error"}
 
 
-def test_tradeoff_and_recommend(proofroll: Proofroll, springs: Path) -> None:
+def test_tradeoff_and_recommend(command_line: Proofroll, springs: Path) -> None:
     """Tradeoff goes by the deciding observable, and recommend answers from it."""
-    code, out, err = proofroll("tradeoff", str(springs), "--engine", "sprung", "--until", "0.5", "--json")
+    code, out, err = command_line("tradeoff", str(springs), "--engine", "sprung", "--until", "0.5", "--json")
     assert code == 0, err
     assert json.loads(out)["quantity"] == "x"
     arguments = ("--until", "0.5", "--tolerance", "1e-3", "--engine", "sprung", "--json")
-    code, out, err = proofroll("recommend", str(springs), *arguments)
+    code, out, err = command_line("recommend", str(springs), *arguments)
     assert code == 0, err
     assert json.loads(out)["choice"]["engine"].startswith("sprung")
 
 
 @pytest.mark.usefixtures("springs")
-def test_stability(proofroll: Proofroll) -> None:
+def test_stability(command_line: Proofroll) -> None:
     """Stability finds boundaries, measures them by the kind's own number and names its own sign of failure."""
-    code, out, err = proofroll("stability", "hard.toml", "--engine", "sprung", "--quick", "--json")
+    code, out, err = command_line("stability", "hard.toml", "--engine", "sprung", "--quick", "--json")
     assert code == 0, err
     study = json.loads(out)
     assert study["step_symbols"] == {"phase": "ωh"}
@@ -146,17 +145,17 @@ def test_stability(proofroll: Proofroll) -> None:
     assert all(point["sides"]["accurate"]["largest"] for point in study["points"])
 
 
-def test_ladder(proofroll: Proofroll, springs: Path) -> None:
+def test_ladder(command_line: Proofroll, springs: Path) -> None:
     """Ladder puts the engine on its rung."""
-    code, out, err = proofroll("ladder", str(springs), "--engine", "sprung", "--until", "0.5", "--json")
+    code, out, err = command_line("ladder", str(springs), "--engine", "sprung", "--until", "0.5", "--json")
     assert code == 0, err
     assert [rung["engine"] for rung in json.loads(out)["rungs"] if rung["engine"]] == ["sprung"]
 
 
 @pytest.mark.usefixtures("springs")
-def test_report(proofroll: Proofroll, tmp_path: Path) -> None:
+def test_report(command_line: Proofroll, tmp_path: Path) -> None:
     """Report writes a page about it."""
-    code, _, err = proofroll("report", "springs.toml", "--out", str(tmp_path / "out"))
+    code, _, err = command_line("report", "springs.toml", "--out", str(tmp_path / "out"))
     assert code == 0, err
     assert "A mass on a spring" in (tmp_path / "out" / "report.html").read_text(encoding="utf-8")
 

@@ -6,7 +6,7 @@ import os
 import subprocess
 import sys
 import tomllib
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from pathlib import Path
 
 import pytest
@@ -35,11 +35,14 @@ def test_a_scene(proofroll: Proofroll) -> None:
 
 
 @pytest.mark.parametrize("scene", ["inclined_plane", "./rod"])
-def test_a_comparison(proofroll: Proofroll, scene: str) -> None:
+def test_a_comparison(
+    command_line: Proofroll, install_engines: Callable[[Mapping[str, str]], None], scene: str
+) -> None:
     """A new comparison is sound, of balls and of mechanisms, and has a row for each engine that can."""
-    assert proofroll("new", "scene", "rod")[0] == 0
-    assert proofroll("new", "comparison", "claim", "--scene", scene)[0] == 0
-    code, out, err = proofroll("check", "claim.toml")
+    install_engines({"absent": "no_such_module_anywhere:Engine"})
+    assert command_line("new", "scene", "rod")[0] == 0
+    assert command_line("new", "comparison", "claim", "--scene", scene)[0] == 0
+    code, out, err = command_line("check", "claim.toml")
     assert (code, err) == (0, "")
     assert out.startswith("claim is sound: comparison, ")
     names = {row.engine.partition("[")[0] for row in load_comparison("claim.toml").rows}
