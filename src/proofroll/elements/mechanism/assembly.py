@@ -18,6 +18,7 @@ from proofroll.elements.mechanism.rotations import Array
 CLOSED = 1e-12  # m, 1, m/s, 1/s: what round-off leaves of a loop that closes
 _ROUNDS = 50  # Newton's steps; from a fair guess it needs five
 _STILL = 1e-12  # least eigenvalue of a mass matrix with ones on its diagonal: below it, round-off decides
+_PART = 1e-6  # of the largest velocity in a motion: less is round-off
 _LARGEST = 0.5  # rad or m in one step: beyond it, the linearisation says nothing
 ADVICE = "correct q0, or give the joints that follow from the loops dependent = true and q0 as a guess"
 
@@ -62,13 +63,11 @@ def _check_inertia(mechanism: Mechanism, M: Array) -> None:
     size = np.sqrt(np.where(np.diag(M) > 0, np.diag(M), 1.0))
     values, vectors = np.linalg.eigh(M / np.outer(size, size))
     if len(values) and values[0] < _STILL:
-        joint = next(
-            joint
-            for joint, at in zip(mechanism.joints, mechanism.v_slices, strict=True)
-            if np.abs(vectors[at, 0]).max(initial=0.0) == np.abs(vectors[:, 0]).max()
-        )
-        advice = "nothing with inertia moves along a coordinate of it, alone or with others; give it some, or fix it"
-        raise InputError(f"joints.{joint.name}.child", joint.child, advice)
+        still = np.abs(vectors[:, 0] / size) > _PART * np.abs(vectors[:, 0] / size).max()
+        joints = zip(mechanism.joints, mechanism.v_slices, strict=True)
+        names = ", ".join(joint.name for joint, at in joints if still[at].any())
+        advice = "can move so that nothing with inertia does; give a body that they move mass and moments, or fix one"
+        raise InputError("joints", names, advice)
 
 
 def check_start(mechanism: Mechanism) -> None:
