@@ -31,7 +31,7 @@ format: install
 	$(BIN)/ruff check --fix .
 	$(BIN)/ruff format .
 
-# The pictures and the tables of README.md, from real runs; some minutes, on a machine that does nothing else.
+# The pictures of README.md and the tables of docs/sphere_in_cylinder.md, from real runs; some minutes, on a machine that does nothing else.
 readme: install
 	$(BIN)/python docs/update_readme.py
 

@@ -1,4 +1,4 @@
-"""What the table of verdicts in README.md hangs on, as one short hash: a stale table is noticed without a run."""
+"""What the table of verdicts on a page hangs on, as one short hash: a stale table is noticed without a run."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Regenerates the tables and the pictures of README.md from real runs: ``make readme``."""
+"""Regenerates README.md's pictures and the tables of docs/sphere_in_cylinder.md from real runs: ``make readme``."""
 
 from __future__ import annotations
 
@@ -99,8 +99,8 @@ def main() -> None:
         study = measured(runner)
     draw_work_precision(study, [study["quantity"]], ROOT / "docs" / "work_precision.svg")
     draw_regimes(regime_maps(load_regimes("regimes"), workers=os.cpu_count() or 1), ROOT / "docs" / "regimes.svg")
-    readme = ROOT / "README.md"
-    text = readme.read_text(encoding="utf-8")
+    target = ROOT / "docs" / "sphere_in_cylinder.md"
+    text = target.read_text(encoding="utf-8")
     for name, table in (
         ("verdicts", verdict_table(outcome_content(outcome))),
         ("caveats", caveat_list(outcome_content(outcome))),
@@ -112,7 +112,7 @@ def main() -> None:
             text,
             flags=re.DOTALL,
         )
-    readme.write_text(restamped(text, stamp("paper", facts("paper"))), encoding="utf-8")
+    target.write_text(restamped(text, stamp("paper", facts("paper"))), encoding="utf-8")
 
 
 if __name__ == "__main__":

@@ -1,4 +1,4 @@
-"""README.md and CONTRIBUTING.md: whatever they tell a person to type works."""
+"""README.md and CONTRIBUTING.md, and the page of the founding scene: whatever they tell a person to type works."""
 
 from __future__ import annotations
 
@@ -30,6 +30,8 @@ assert _SPEC is not None
 assert _SPEC.loader is not None
 made_from = importlib.util.module_from_spec(_SPEC)
 _SPEC.loader.exec_module(made_from)
+# The page with the tables and pictures of the founding scene.
+PAGE = ROOT / "docs" / "sphere_in_cylinder.md"
 # Where the files of the project lie; beside them are those of tools.
 TOPS = (
     "findings",
@@ -58,7 +60,7 @@ def commands(program: str) -> list[str]:
     return [line for line in lines if line.startswith(f"{program} ")]
 
 
-# Makes what a command does take less long: a shorter run, or one of the engines that tests/agreement runs all.
+# Makes what a command does take less long: one of the engines that tests/agreement runs all.
 SHORTER = {
     "recommend": ["--until", "0.2"],
     "ladder": ["--until", "0.05", "--rounds", "2"],
@@ -118,20 +120,24 @@ def test_an_entry_point_is_valid_toml(name: str) -> None:
         assert all(groups.values())
 
 
-@pytest.mark.parametrize("name", ["docs/picture.svg", "docs/regimes.svg", "docs/work_precision.svg"])
-def test_a_picture_is_there(name: str) -> None:
-    """Every picture that the README shows is there, and is a picture."""
-    assert f"]({name})" in (ROOT / "README.md").read_text(encoding="utf-8")
-    path = ROOT / name
+@pytest.mark.parametrize(
+    ("page", "name"),
+    [("README.md", "docs/picture.svg"), (PAGE.name, "regimes.svg"), (PAGE.name, "work_precision.svg")],
+)
+def test_a_picture_is_there(page: str, name: str) -> None:
+    """Every picture that README and the page of the founding scene show is there, and is a picture."""
+    document = ROOT / page if page == "README.md" else PAGE
+    assert f"]({name})" in document.read_text(encoding="utf-8")
+    path = document.parent / name
     assert path.is_file()
     assert "<svg" in path.read_text(encoding="utf-8")[:2000]
 
 
 def test_the_picture_of_the_report_is_that_of_the_table() -> None:
     """The picture shows the rows of the paper's comparison with the verdicts of the table, in 300 kB at most."""
-    text = (ROOT / "README.md").read_text(encoding="utf-8")
+    text = PAGE.read_text(encoding="utf-8")
     path = ROOT / "docs" / "report.png"
-    assert "](docs/report.png)" in text
+    assert "](docs/report.png)" in (ROOT / "README.md").read_text(encoding="utf-8")
     assert path.stat().st_size <= 300_000
     shown = json.loads(Image.open(path).text["verdicts"])
     assert [engine for engine, _ in shown] == [row.engine for row in load_comparison("paper").rows]
@@ -140,12 +146,12 @@ def test_the_picture_of_the_report_is_that_of_the_table() -> None:
 
 
 def verdict_lines(text: str) -> list[list[str]]:
-    """The cells of the README's table of verdicts, without its head."""
+    """The cells of the table of verdicts, without its head."""
     table = text.partition("<!-- verdicts:begin -->\n")[2].partition("<!-- verdicts:end -->")[0].splitlines()
     return [[cell.strip() for cell in line.split("|")[1:-1]] for line in table[2:]]
 
 
-STALE = "the table of verdicts in README.md is stale; make readme"
+STALE = "the table of verdicts in docs/sphere_in_cylinder.md is stale; make readme"
 
 
 def complaint(text: str, settings: list[EngineFacts], now: str) -> str:
@@ -168,7 +174,7 @@ def test_the_verdict_table_is_of_today() -> None:
     """Rows, settings, steps and verdicts are those of the comparison, and what it was made from has not changed."""
     settings = made_from.facts("paper")
     now = made_from.stamp("paper", settings)
-    text = (ROOT / "README.md").read_text(encoding="utf-8")
+    text = PAGE.read_text(encoding="utf-8")
     assert complaint(text, settings, now) == ""
 
     table = text.partition("<!-- verdicts:begin -->\n")[2].partition("<!-- verdicts:end -->")[0]
@@ -219,8 +225,8 @@ def test_the_stamp_of_the_verdict_table_follows_what_it_is_made_from(
 
 
 def test_the_table_of_the_cheapest_is_as_claimed() -> None:
-    """For every claim of tradeoff.toml the README's table has a line, which names the engine and its formulation."""
-    text = (ROOT / "README.md").read_text(encoding="utf-8")
+    """For every claim of tradeoff.toml the table has a line, which names the engine and its formulation."""
+    text = PAGE.read_text(encoding="utf-8")
     table = text.partition("<!-- cheapest:begin -->\n")[2].partition("<!-- cheapest:end -->")[0].splitlines()
     lines = {line.split("|")[1].strip(): line.split("|") for line in table[2:]}
     claims = claims_for("sphere_in_cylinder")
