@@ -14,6 +14,8 @@ from proofroll.core.errors import ProofrollError, Refused
 from proofroll.running.timing import Interval, Timing, interleaved, ratio
 
 SCENE = "sphere_in_cylinder"
+# A tree of one joint, where an adapter's own cost shows most, and one with loops that depend on each other.
+MECHANISMS = ("pendulum", "four_bar")
 # The study's usual sampling interval, and the longest run [s].
 EVERY, UNTIL = 0.02, 2.0
 # A measurement is repeated within a round until it has lasted this long [s], so that a ratio means something.
@@ -36,11 +38,11 @@ class AdapterRow:
     """One engine with one model.
 
     Attributes:
-        engine, formulation, preset, variant: what was run.
+        engine, formulation, preset, variant: what was run; the variant is one of the ball's, or a mechanism's scene.
         ratio: adapter over bare loop, with its interval; None if there is none.
         message: why there is none, else how far apart the two ended.
         adapter, bare: median seconds of the process per simulated second, if measured.
-        distance: between the ball's centres at the end [m].
+        distance: between the ball's centres, or the bodies' origins, at the end [m].
         tolerance, because: what it may be [m], and why it is not zero.
         until: simulated seconds of one run [s].
         within_goal: whether the ratio is at most :data:`GOAL`.
@@ -66,7 +68,12 @@ class AdapterRow:
 
 
 def measure_adapter(
-    engine: str, options: Mapping[str, Any], parameters: Mapping[str, float], rounds: int, seconds: float
+    engine: str,
+    options: Mapping[str, Any],
+    parameters: Mapping[str, float],
+    rounds: int,
+    seconds: float,
+    scene_name: str = SCENE,
 ) -> dict[str, Any]:
     """Runs in a worker: centres of both loops, and their timings per simulated second, in turns.
 
@@ -79,7 +86,7 @@ def measure_adapter(
 
     prepare = load_bare_loop(engine)
     kind = load_engine(engine)
-    settings, scene = resolve_settings(kind, options), load_scene(SCENE, **parameters)
+    settings, scene = resolve_settings(kind, options), load_scene(scene_name, **parameters)
     # Both loops compute without a pause in this process, so its own time is what they take, whoever else computes here.
     clock = time.process_time
 
@@ -142,21 +149,22 @@ def bench_adapters(
     from proofroll_benchmarks.loops import announced
 
     rows: list[AdapterRow] = []
-    needed = load_scene(SCENE).requires
+    asked = {name: load_scene(name).requires for name in (SCENE, *MECHANISMS)}
     for engine in engines:
         worker = Worker()
         try:
             try:
                 described = worker.request({"do": "describe", "engine": engine}, _LIMIT)
                 formulations = [
-                    (name, preset if preset in presets else next(iter(presets)))
+                    (name, preset if preset in presets else next(iter(presets)), scene)
+                    for scene, needed in asked.items()
                     for name, presets in described["presets"].items()
                     if needed <= set(described["provides"][name])
                 ]
             except ProofrollError as error:
                 rows.append(AdapterRow(engine, "", preset, "", None, str(error)))
                 continue
-            if preset not in {found for _, found in formulations}:
+            if preset not in {found for _, found, _ in formulations}:
                 rows.append(AdapterRow(engine, "", preset, "", None, f"no formulation has the preset {preset}"))
                 continue
             try:
@@ -164,8 +172,8 @@ def bench_adapters(
             except Refused as error:
                 rows.append(AdapterRow(engine, "", preset, "", None, str(error)))  # once, not for every variant
                 continue
-            for formulation, found in formulations:
-                for variant, parameters in VARIANTS.items():
+            for formulation, found, scene in formulations:
+                for variant, parameters in (VARIANTS if scene == SCENE else {scene: {}}).items():
                     if progress:
                         progress(f"{engine} {formulation} {variant}")
                     arguments = {
@@ -174,6 +182,7 @@ def bench_adapters(
                         "parameters": dict(parameters),
                         "rounds": rounds,
                         "seconds": seconds,
+                        "scene_name": scene,
                     }
                     request = {"do": "call", "function": f"{__name__}:measure_adapter", "arguments": arguments}
                     try:
@@ -202,7 +211,7 @@ def _row(answer: dict[str, Any]) -> dict[str, Any]:
     adapter, bare = (Timing(tuple(answer[name])) for name in ("adapter", "bare"))
     return facts | {
         "ratio": ratio(adapter, bare),
-        "message": f"same centre to {answer['distance']:.1g} m",
+        "message": f"same place to {answer['distance']:.1g} m",
         "adapter": adapter.interval.value,
         "bare": bare.interval.value,
     }
@@ -224,4 +233,11 @@ def content(rows: Sequence[AdapterRow]) -> dict[str, Any]:
             "message": None if measured else own[0].message,
             "rows": [dataclasses.asdict(row) | {"within_goal": row.within_goal} for row in own],
         }
-    return {"goal": GOAL, "scene": SCENE, "every": EVERY, "machine": machine(), "engines": engines}
+    return {
+        "goal": GOAL,
+        "scene": SCENE,
+        "mechanisms": list(MECHANISMS),
+        "every": EVERY,
+        "machine": machine(),
+        "engines": engines,
+    }

@@ -2,8 +2,9 @@
 
 A bare loop is announced as an entry point of the group ``proofroll.bare_loops``, under the name of its engine. It is a
 function of a scene and of the engine's settings that prepares a run, untimed, and gives a :class:`Bare`. It may know
-the scene (these here know the vertical cylinder), steps with the same method and step as the adapter, passes the same
-times, and at each of them has what ``sample`` would tell at hand. It raises Refused for what it is not written for.
+the scene (these here know the vertical cylinder and revolute joints), steps with the same method and step as the
+adapter, passes the same times, and at each of them has what ``sample`` would tell at hand. It raises Refused for what
+it is not written for.
 """
 
 from __future__ import annotations
@@ -17,6 +18,7 @@ from proofroll.core.scene import Scene
 from proofroll.elements.ball_on_surface.element import rolling_ball
 from proofroll.elements.ball_on_surface.model import RollingBall
 from proofroll.elements.ball_on_surface.surfaces import Cylinder
+from proofroll.elements.mechanism.element import MechanismElement
 
 GROUP = "proofroll.bare_loops"
 
@@ -27,7 +29,7 @@ class Bare:
 
     Attributes:
         run: goes from time 0 over these times [s], the first of which is 0, to the last; gives the ball's centre there
-            [m], shape (3,). Called once, and timed.
+            [m], shape (3,), or the origins of a mechanism's bodies, shape (bodies, 3). Called once, and timed.
         tolerance: largest distance [m] from the adapter's centre that the two loops explain.
         because: why it is not zero.
     """
@@ -35,6 +37,11 @@ class Bare:
     run: Callable[[FloatArray], FloatArray]
     tolerance: float
     because: str
+
+
+def is_mechanism(scene: Scene) -> bool:
+    """Whether the scene is one of bodies and joints."""
+    return isinstance(scene.elements[0], MechanismElement)
 
 
 def in_vertical_cylinder(scene: Scene) -> RollingBall:

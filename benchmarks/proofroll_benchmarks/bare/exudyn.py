@@ -22,13 +22,16 @@ from proofroll.engines.exudyn.contact import PenaltyContact
 from proofroll.engines.exudyn.integration import new_system, simulation_settings
 from proofroll.engines.exudyn.native import Output, exu, items
 from proofroll.engines.exudyn.rolling_disc import RollingDisc
-from proofroll_benchmarks.bare import Bare, in_vertical_cylinder
+from proofroll_benchmarks.bare import Bare, in_vertical_cylinder, is_mechanism
+from proofroll_benchmarks.bare.mechanisms import exudyn_solver
 
 Start = tuple[FloatArray, FloatArray]
 
 
 def prepare(scene: Scene, settings: Any) -> Bare:
     """See :mod:`proofroll_benchmarks.bare`; with bounded friction ``generic`` watches for slip, and ends there."""
+    if is_mechanism(scene):
+        return exudyn_solver(scene, settings)
     body = in_vertical_cylinder(scene)
     loop = {"generic": _generic, "carrier": _carrier, "rolling_disc": _rolling_disc, "contact": _contact}
     tolerances = {

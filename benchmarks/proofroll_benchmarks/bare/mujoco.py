@@ -18,7 +18,8 @@ from proofroll.core.errors import Diverged, Refused
 from proofroll.core.scene import Scene
 from proofroll.elements.ball_on_surface.model import RollingBall
 from proofroll.engines.mujoco import Mujoco
-from proofroll_benchmarks.bare import Bare, in_vertical_cylinder
+from proofroll_benchmarks.bare import Bare, in_vertical_cylinder, is_mechanism
+from proofroll_benchmarks.bare.mechanisms import mujoco_steps
 
 _ON_CONE = 1 - 1e-9
 _FATAL = (mujoco.mjtWarning.mjWARN_BADQPOS, mujoco.mjtWarning.mjWARN_BADQVEL, mujoco.mjtWarning.mjWARN_BADQACC)
@@ -26,6 +27,8 @@ _FATAL = (mujoco.mjtWarning.mjWARN_BADQPOS, mujoco.mjtWarning.mjWARN_BADQVEL, mu
 
 def prepare(scene: Scene, settings: Any) -> Bare:
     """See :mod:`proofroll_benchmarks.bare`; all formulations without edits of the contact's reference acceleration."""
+    if is_mechanism(scene):
+        return mujoco_steps(scene, settings)
     body = in_vertical_cylinder(scene)
     if settings.curvature or settings.cone_correction:
         raise Refused("there is no bare loop with edits of the contact's reference acceleration")

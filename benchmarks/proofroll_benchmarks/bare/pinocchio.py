@@ -17,7 +17,8 @@ from proofroll.core.arrays import FloatArray
 from proofroll.core.errors import Diverged, Refused
 from proofroll.core.scene import Scene
 from proofroll.elements.ball_on_surface.model import BallCapability, RollingBall
-from proofroll_benchmarks.bare import Bare, in_vertical_cylinder
+from proofroll_benchmarks.bare import Bare, in_vertical_cylinder, is_mechanism
+from proofroll_benchmarks.bare.mechanisms import pinocchio_null_space
 
 # What the adapter gives Pinocchio's cone where friction is unbounded.
 _UNBOUNDED = 1e6
@@ -25,6 +26,8 @@ _UNBOUNDED = 1e6
 
 def prepare(scene: Scene, settings: Any) -> Bare:
     """See :mod:`proofroll_benchmarks.bare`; with bounded friction the rows watch for slip, and end there."""
+    if is_mechanism(scene):
+        return pinocchio_null_space(scene, settings)
     body = in_vertical_cylinder(scene)
     if settings.formulation == "contact":
         if settings.solver != "pgs":

@@ -18,13 +18,16 @@ from proofroll.core.arrays import FloatArray
 from proofroll.core.errors import Diverged
 from proofroll.core.scene import Scene
 from proofroll.elements.ball_on_surface.model import RollingBall
-from proofroll_benchmarks.bare import Bare, in_vertical_cylinder
+from proofroll_benchmarks.bare import Bare, in_vertical_cylinder, is_mechanism
+from proofroll_benchmarks.bare.mechanisms import projection_rows
 
 Equations = tuple[FloatArray, Callable[[float, FloatArray], FloatArray], Callable[[FloatArray], FloatArray], FloatArray]
 
 
 def prepare(scene: Scene, settings: Any) -> Bare:
     """See :mod:`proofroll_benchmarks.bare`; with bounded friction it watches for slip, and ends there."""
+    if is_mechanism(scene):
+        return projection_rows(scene, settings)
     body = in_vertical_cylinder(scene)
     equations = (_euler if settings.formulation == "euler" else _rotating_frame)(body)
     return Bare(

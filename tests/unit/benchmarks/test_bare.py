@@ -11,7 +11,7 @@ from proofroll.core.engine_abilities import require_provided
 from proofroll.core.errors import Diverged, Refused
 from proofroll.core.plugins import load_engine, resolve_settings
 from proofroll.files.scene_file import load_scene
-from proofroll_benchmarks.adapters import VARIANTS
+from proofroll_benchmarks.adapters import MECHANISMS, VARIANTS
 from proofroll_benchmarks.loops import load_bare_loop
 
 FORMULATIONS = [
@@ -90,3 +90,26 @@ def test_another_scene_is_refused(engine: str) -> None:
     kind = load_engine(engine)
     with pytest.raises(Refused, match="cylinder"):
         load_bare_loop(engine)(load_scene("inclined_plane"), resolve_settings(kind, {}))
+
+
+@pytest.mark.parametrize("scene", MECHANISMS)
+@pytest.mark.parametrize(
+    ("engine", "formulation", "preset"),
+    [
+        ("mujoco", "joints", "matched"),
+        ("exudyn", "redundant", "matched"),
+        ("pinocchio", "null_space", "matched"),
+        ("projection", "dependent", "default"),
+    ],
+)
+def test_bare_mechanisms_end_where_the_adapters_do(engine: str, formulation: str, preset: str, scene: str) -> None:
+    """A ratio compares the same motion: the origins of all bodies are where the adapter has them, and have moved."""
+    kind = load_engine(engine)
+    settings = resolve_settings(kind, {"formulation": formulation, "preset": preset})
+    built = kind.build(load_scene(scene), settings)
+    before = np.array(built.sample().q_WB)
+    bare = load_bare_loop(engine)(load_scene(scene), settings)
+    built.advance(0.04)
+    after = built.sample()
+    assert np.abs(np.array(after.q_WB) - before).max() > 1e-4
+    assert np.linalg.norm(bare.run(np.array([0.0, 0.02, 0.04])) - after.p_WB) <= bare.tolerance

@@ -66,6 +66,11 @@ class Redundant:
         self._rank = independent(self._rows)
         self.integration = Integration(self._system, settings, dependent=self._rank < len(self._rows))
 
+    @property
+    def native(self) -> tuple[Any, Mapping[str, Any]]:
+        """Exudyn's own system, and its numbers of the bodies."""
+        return self._system, self._bodies
+
     def _add_bodies(self) -> None:
         system, motion = self._system, Tree(self._mechanism).at(*self._mechanism.start())
         for number, body in enumerate(self._mechanism.bodies):

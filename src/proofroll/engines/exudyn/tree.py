@@ -12,6 +12,7 @@ from typing import Any
 import numpy as np
 
 from proofroll.core.engine import Sample
+from proofroll.core.errors import Diverged
 from proofroll.elements.mechanism import WORLD
 from proofroll.elements.mechanism.capabilities import ALL_JOINTS, ALL_LOOPS, FORCES, MechanismCapability, require
 from proofroll.elements.mechanism.rotations import Array, to_quaternion
@@ -137,6 +138,8 @@ class KinematicTree:
     def sample(self) -> Sample:
         """See :class:`proofroll.core.engine.Engine`; the tree knows no reactions."""
         links = self._read(self._sensors["RotationMatrix"]).reshape(-1, 3, 3)
+        if not np.isfinite(links).all():  # Exudyn's explicit steps go on with such numbers
+            raise Diverged(f"the state is not finite at t = {self.integration.t:.6g} s")
         bodies = [R @ self._frames[body.name][0] for R, body in zip(links, self._mechanism.bodies, strict=True)]
         return Sample(
             p_WB=self._read(self._sensors["Position"]),

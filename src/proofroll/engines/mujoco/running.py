@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
-from contextlib import contextmanager
 from typing import Any
 
 import mujoco
@@ -39,15 +37,21 @@ def forget_callbacks() -> None:
         getattr(mujoco, f"set_mjcb_{name}")(None)
 
 
-@contextmanager
-def silent() -> Iterator[None]:
+class silent:  # noqa: N801 -- used as a statement; a generator's context would cost as much as a step
     """Keeps MuJoCo from printing, and from writing MUJOCO_LOG.TXT; warnings are read from MjData instead."""
-    before = mujoco.get_mju_user_warning()
-    mujoco.set_mju_user_warning(lambda _: None)
-    try:
-        yield
-    finally:
-        mujoco.set_mju_user_warning(before)
+
+    __slots__ = ("_before",)
+
+    def __enter__(self) -> None:
+        self._before = mujoco.get_mju_user_warning()
+        mujoco.set_mju_user_warning(_nothing)
+
+    def __exit__(self, *_: object) -> None:
+        mujoco.set_mju_user_warning(self._before)
+
+
+def _nothing(_: str) -> None:
+    pass
 
 
 def raise_if_fatal(data: Any, t: float) -> None:
@@ -57,6 +61,8 @@ def raise_if_fatal(data: Any, t: float) -> None:
         Diverged: one of them means that the state is worthless.
     """
     warnings = data.warning
+    if not any(warnings.number.tolist()):
+        return
     for kind, meaning in _FATAL:
         if warnings[kind].number:
             raise Diverged(f"MuJoCo gave up before {t:g} s: {meaning}")

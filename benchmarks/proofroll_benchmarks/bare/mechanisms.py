@@ -1,0 +1,203 @@
+"""Mechanisms without adapters: MuJoCo's and Exudyn's own loops, and plain numpy around Pinocchio's terms.
+
+Models come from the adapters' builders, since a user would make the same bodies, joints and constraints; what runs in
+time is written here, for revolute joints and loops. Each engine is imported where it is used.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from typing import Any
+
+import numpy as np
+
+from proofroll.core.arrays import FloatArray
+from proofroll.core.errors import Diverged, Refused
+from proofroll.core.scene import Scene
+from proofroll.elements.mechanism.sampling import independent, mechanism_of
+from proofroll_benchmarks.bare import Bare
+
+_SAME_STEPS = "the same steps; sums are in another order"
+_RESTARTED = "Newton's method is restarted at every sample by the adapter, and ends anywhere within its tolerance"
+
+
+def mujoco_steps(scene: Scene, settings: Any) -> Bare:
+    """``mj_step`` from sample to sample, without the sensors that only a sample asks for."""
+    import mujoco
+
+    from proofroll.engines.mujoco.mechanism import MujocoMechanism
+
+    model, data = MujocoMechanism.build(scene, settings).native
+    model.opt.disableflags |= int(mujoco.mjtDisableBit.mjDSBL_SENSOR)
+    bodies = [model.body(body.name).id for body in mechanism_of(scene).bodies]
+    bad = mujoco.mjtWarning.mjWARN_BADQACC
+
+    def run(times: FloatArray) -> FloatArray:
+        for interval in np.diff(times).tolist():
+            mujoco.mj_step(model, data, round(interval / settings.dt))
+            if data.warning[bad].number:
+                raise Diverged("MuJoCo's accelerations are not finite or huge")
+        mujoco.mj_forward(model, data)
+        return np.array(data.xpos[bodies])
+
+    return Bare(run, 1e-12, _SAME_STEPS)
+
+
+def exudyn_solver(scene: Scene, settings: Any) -> Bare:
+    """One call of Exudyn's solver over the whole time, with sensors that keep what a sample would tell."""
+    from proofroll.engines.exudyn.integration import simulation_settings
+    from proofroll.engines.exudyn.native import Output, exu, items
+    from proofroll.engines.exudyn.redundant import Redundant
+
+    if settings.formulation != "redundant":
+        raise Refused("there is a bare loop of mechanisms only for redundant coordinates")
+    built = Redundant(scene, settings)
+    (system, bodies), mechanism = built.native, mechanism_of(scene)
+    dependent = built.integration.options.linearSolver.ignoreSingularJacobian
+    kept: dict[str, int] = {}
+    for body in mechanism.bodies:
+        for variable in (Output.Position, Output.Velocity, Output.AngularVelocity, Output.RotationMatrix):
+            number = system.AddSensor(
+                items.SensorBody(
+                    bodyNumber=bodies[body.name],
+                    localPosition=[-float(x) for x in body.com],
+                    storeInternal=True,
+                    writeToFile=False,
+                    outputVariableType=variable,
+                )
+            )
+            if variable == Output.Position:
+                kept[body.name] = number
+    system.Assemble()
+    options = simulation_settings(settings, dependent=dependent)
+    options.solution.sensors.active = True
+    solver = exu.MainSolverImplicitSecondOrder()
+
+    def run(times: FloatArray) -> FloatArray:
+        time = options.timeIntegration
+        time.numberOfSteps, time.endTime = round(float(times[-1]) / settings.dt), float(times[-1])
+        options.solution.sensors.writePeriod = float(times[1])
+        solver.InitializeSolver(system, options)
+        timer = solver.timer
+        timer.useTimer = False
+        solver.timer = timer
+        if not solver.SolveSteps(system, options):
+            raise Diverged("Exudyn's solver failed")
+        return np.array([system.GetSensorStoredData(kept[body.name])[-1, 1:4] for body in mechanism.bodies])
+
+    return Bare(run, 1e-7, _RESTARTED)
+
+
+def pinocchio_null_space(scene: Scene, settings: Any) -> Bare:
+    """Runge and Kutta's method on ``aba``, or on the null space of the rows of revolute loops."""
+    import pinocchio as pin
+
+    from proofroll.engines.pinocchio.joint_tree import JointTree
+
+    mechanism = mechanism_of(scene)
+    if settings.formulation != "null_space" or settings.integrator != "rk4":
+        raise Refused("there is a bare loop of mechanisms only for null_space with rk4")
+    _only_revolute(mechanism)
+    tree = JointTree(mechanism)
+    model, n = tree.model, tree.model.nv
+    data, tau, rest = model.createData(), np.zeros(n), np.zeros(n)
+    world = pin.LOCAL_WORLD_ALIGNED
+
+    def rows(q: FloatArray, v: FloatArray) -> tuple[FloatArray, FloatArray, FloatArray]:
+        """Violations, rows and drifts: points together, x and y of the one axis system across z of the other."""
+        pin.forwardKinematics(model, data, q, v, rest)
+        pin.computeJointJacobians(model, data, q)
+        pin.updateFramePlacements(model, data)
+        off, C, drift = [], [], []
+        for a, b in tree.loops:
+            J_a, J_b = (pin.getFrameJacobian(model, data, frame, world) for frame in (a, b))
+            w_a, w_b = (pin.getFrameVelocity(model, data, frame, world).angular for frame in (a, b))
+            acc_a, acc_b = (pin.getFrameClassicalAcceleration(model, data, frame, world) for frame in (a, b))
+            A, B = data.oMf[a].rotation, data.oMf[b].rotation
+            x, z, J = A[:, :2].T, B[:, 2], J_b - J_a
+            t = np.cross(z, x)
+            x_rate, z_rate = np.cross(w_a, x), np.cross(w_b, z)
+            off += [data.oMf[b].translation - data.oMf[a].translation, x @ z]
+            C += [J[:3], t @ J[3:]]
+            turned = np.cross(w_a, x_rate) @ z + 2 * x_rate @ z_rate + x @ np.cross(w_b, z_rate)
+            drift += [acc_b.linear - acc_a.linear, t @ (acc_b.angular - acc_a.angular) + turned]
+        return np.concatenate(off), np.concatenate(C), np.concatenate(drift)
+
+    rank = independent(rows(tree.q0, tree.v0)[1]) if tree.loops else 0
+
+    def split(C: FloatArray, into: FloatArray) -> tuple[FloatArray, FloatArray]:
+        U, S, Vt = np.linalg.svd(C @ into, full_matrices=False)
+        return into @ Vt[:rank].T, U[:, :rank].T / S[:rank, None]
+
+    def root(q: FloatArray) -> FloatArray:
+        M = pin.crba(model, data, q)
+        return np.linalg.inv(np.linalg.cholesky(np.triu(M) + np.triu(M, 1).T)).T
+
+    def rates(y: FloatArray) -> FloatArray:
+        q, v = y[:n], y[n:]
+        if not rank:
+            return np.concatenate([v, pin.aba(model, data, q, v, tau)])
+        _, C, drift = rows(q, v)
+        into = root(q)
+        free = into @ (into.T @ (tau - pin.rnea(model, data, q, v, rest)))
+        locked, back = split(C, into)
+        return np.concatenate([v, free - locked @ (back @ (drift + C @ free))])
+
+    def eliminated(y: FloatArray) -> FloatArray:
+        q, v = y[:n], y[n:]
+        off, C, _ = rows(q, v)
+        locked, back = split(C, root(q))
+        return np.concatenate([q - locked @ (back @ off), v - locked @ (back @ (C @ v))])
+
+    eliminates = bool(settings.projection and rank)
+
+    def run(times: FloatArray) -> FloatArray:
+        y = _rk4(rates, np.concatenate([tree.q0, tree.v0]), times, settings.dt, eliminated if eliminates else None)
+        pin.framesForwardKinematics(model, data, y[:n])
+        return np.array([data.oMf[frame].translation for frame in tree.body])
+
+    return Bare(run, 1e-11, _SAME_STEPS)
+
+
+def projection_rows(scene: Scene, settings: Any) -> Bare:
+    """Runge and Kutta's method on bodies cut apart, with the rows of revolute joints, in numpy."""
+    if settings.integrator != "rk4":
+        raise Refused("there is a bare loop of mechanisms only with rk4")
+    from proofroll_benchmarks.bare.bodies import CutApart
+
+    mechanism = mechanism_of(scene)
+    _only_revolute(mechanism)
+    bodies = CutApart(mechanism)
+
+    def run(times: FloatArray) -> FloatArray:
+        after = bodies.eliminated if settings.eliminates else bodies.normalised
+        return bodies.origins(_rk4(bodies.rates, bodies.start, times, settings.dt, after))
+
+    return Bare(run, 1e-10, _SAME_STEPS)
+
+
+def _rk4(
+    rates: Callable[[FloatArray], FloatArray],
+    y: FloatArray,
+    times: FloatArray,
+    h: float,
+    after: Callable[[FloatArray], FloatArray] | None,
+) -> FloatArray:
+    for interval in np.diff(times).tolist():
+        for _ in range(round(interval / h)):
+            k1 = rates(y)
+            k2 = rates(y + h / 2 * k1)
+            k3 = rates(y + h / 2 * k2)
+            y = y + h / 6 * (k1 + 2 * (k2 + k3) + rates(y + h * k3))
+            if after is not None:
+                y = after(y)
+            if not np.isfinite(y.sum()):
+                raise Diverged("the state is not finite")
+    return y
+
+
+def _only_revolute(mechanism: Any) -> None:
+    kinds = {item.kind for item in (*mechanism.joints, *mechanism.loops)}
+    laws = [joint.stiffness or joint.damping or joint.torque for joint in mechanism.joints]
+    if kinds != {"revolute"} or any(laws) or mechanism.springs:
+        raise Refused("the bare loop of mechanisms is written for revolute joints and loops without springs")
