@@ -140,8 +140,8 @@ def _turned(parameters: dict[str, float]) -> tuple[str, ...]:
 
 def _case(figures: Figures, parameters: dict[str, float], facts: EngineFacts, asks: tuple[str, ...]) -> Case:
     scene = load_scene(figures.scene, asks=asks, **parameters)
-    limits = {"time_limit": figures.time_limit, "asks": asks}
-    return case_of(figures.scene, scene, parameters, facts, figures.until, figures.every, **limits)
+    limit = figures.time_limit
+    return case_of(figures.scene, scene, parameters, facts, figures.until, figures.every, time_limit=limit)
 
 
 def _made(figures: Figures, case: Case, result: Result, runner: Runner) -> FigureRun:
