@@ -3,7 +3,9 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from typing import TYPE_CHECKING, Any
+from dataclasses import dataclass
+from enum import StrEnum
+from typing import TYPE_CHECKING, Self
 
 import numpy as np
 
@@ -11,6 +13,7 @@ from proofroll.core.dataset import observe, scales
 from proofroll.core.observable import Role
 from proofroll.core.plugins import parse_engine
 from proofroll.core.scene import Scene
+from proofroll.core.verdict import Verdict
 from proofroll.files.netcdf import read
 from proofroll.files.scene_file import load_scene
 from proofroll.running.case import Result, Status
@@ -33,13 +36,97 @@ def setting_of(run: Run) -> str:
     return ", ".join(f"{key}={value}" for key, value in parse_engine(run.row.engine).options.items()) or "as it is"
 
 
+class NumberKind(StrEnum):
+    """How far numbers of two versions are apart."""
+
+    SAME_BITS = "same bits"
+    ROUND_OFF = "round-off"
+    CHANGED = "changed"
+
+
+@dataclass(frozen=True)
+class NumbersApart:
+    """How far two trajectories are apart, by the observable that differs most for its size.
+
+    Attributes:
+        quantity, unit: of that observable; empty where nothing differs.
+        difference: the largest, in its unit.
+        relative: the same in parts of its size [-].
+        kind: what that means.
+    """
+
+    quantity: str = ""
+    unit: str = ""
+    difference: float = 0.0
+    relative: float = 0.0
+    kind: NumberKind = NumberKind.SAME_BITS
+
+
+@dataclass(frozen=True)
+class RunInVersion:
+    """A case in one of the versions.
+
+    Attributes:
+        status, message: how it ended.
+        verdict: of its worst observable.
+        declared_order: of the engine with these settings, or None.
+        errors: largest error of each observable that is judged.
+        versions: of all that it ran on.
+    """
+
+    status: Status
+    message: str
+    verdict: Verdict
+    declared_order: int | None
+    errors: dict[str, float]
+    versions: dict[str, str]
+
+    @classmethod
+    def of(cls, run: Run) -> Self:
+        """What is told of a judged run."""
+        order = run.facts.order if run.facts else None
+        errors = {judgement.observable: judgement.error for judgement in run.judgements}
+        return cls(run.result.status, run.result.message, run.verdict, order, errors, run.result.versions)
+
+
+@dataclass(frozen=True)
+class OrderChange:
+    """Observed orders of convergence of a quantity that are those of different methods."""
+
+    quantity: str
+    old: float
+    new: float
+
+
+@dataclass(frozen=True)
+class CaseDifference:
+    """One case in both versions.
+
+    Attributes:
+        comparison, scene, setting, point: which case.
+        old, new: how it went.
+        numbers: how far they are apart; None where one has no trajectory.
+        orders: observed orders that changed.
+        changed: sentences about verdicts that did.
+    """
+
+    comparison: str
+    scene: str
+    setting: str
+    point: str
+    old: RunInVersion
+    new: RunInVersion
+    numbers: NumbersApart | None
+    orders: list[OrderChange]
+    changed: list[str]
+
+
 def case_difference(
     item: Plan, before: Run, after: Run, results: Mapping[str, Result], runner: Runner
-) -> dict[str, Any]:
+) -> CaseDifference:
     """One case in both versions."""
     setting, point = setting_of(before), point_name(before.parameters)
     where = f"{item.comparison.name}: {setting}" + (f" at {point}" if point else "")
-    sides = {name: _told(run) for name, run in (("old", before), ("new", after))}
     verdicts = [
         (one.observable, one.verdict, other.verdict)
         for one in before.judgements
@@ -53,43 +140,31 @@ def case_difference(
         which = ", ".join(f"{name} {one} → {other}" for name, one, other in verdicts)
         changed.append(f"{where}: {which or f'{before.verdict} → {after.verdict}'}")
     orders = [
-        {"quantity": one.observable, "old": one.order, "new": other.order}
+        OrderChange(one.observable, one.order, other.order)
         for one in before.judgements
         for other in after.judgements
         if one.observable == other.observable and one.order and other.order
         if abs(one.order - other.order) > _ANOTHER_ORDER
     ]
-    return {
-        "comparison": item.comparison.name,
-        "scene": item.comparison.scene,
-        "setting": setting,
-        "point": point,
-        **sides,
-        "numbers": _numbers(item, before, after, results, runner),
-        "orders": orders,
-        "changed": changed,
-    }
-
-
-def _told(run: Run) -> dict[str, Any]:
-    return {
-        "status": run.result.status,
-        "message": run.result.message,
-        "verdict": run.verdict,
-        "declared_order": run.facts.order if run.facts else None,
-        "errors": {judgement.observable: judgement.error for judgement in run.judgements},
-        "versions": run.result.versions,
-    }
+    return CaseDifference(
+        comparison=item.comparison.name,
+        scene=item.comparison.scene,
+        setting=setting,
+        point=point,
+        old=RunInVersion.of(before),
+        new=RunInVersion.of(after),
+        numbers=_numbers(item, before, after, results, runner),
+        orders=orders,
+        changed=changed,
+    )
 
 
 def _ending(run: Run) -> str:
     return str(run.verdict) if run.result.status == Status.DONE else f"{run.result.status} ({run.result.message})"
 
 
-def _numbers(
-    item: Plan, before: Run, after: Run, results: Mapping[str, Result], runner: Runner
-) -> dict[str, Any] | None:
-    """How far the trajectories are apart, by the observable that differs most for its size; None: there are none."""
+def _numbers(item: Plan, before: Run, after: Run, results: Mapping[str, Result], runner: Runner) -> NumbersApart | None:
+    """How far the trajectories are apart; None: there are none."""
     if before.case is None or after.case is None or not before.result.trajectory or not after.result.trajectory:
         return None
     one, other = (read(runner.store.trajectory(run.case)) for run in (before, after) if run.case is not None)
@@ -99,8 +174,8 @@ def _numbers(
     return _apart(scene, one, other, sizes)
 
 
-def _apart(scene: Scene, one: xr.Dataset, other: xr.Dataset, sizes: Mapping[str, float]) -> dict[str, Any]:
-    found = {"quantity": "", "unit": "", "difference": 0.0, "relative": 0.0, "kind": "same bits"}
+def _apart(scene: Scene, one: xr.Dataset, other: xr.Dataset, sizes: Mapping[str, float]) -> NumbersApart:
+    found = NumbersApart()
     values, others = observe(scene, one), observe(scene, other)
     for name, mine in values.items():
         item, theirs = scene.observables[name], others.get(name)
@@ -109,13 +184,9 @@ def _apart(scene: Scene, one: xr.Dataset, other: xr.Dataset, sizes: Mapping[str,
         count = min(len(mine), len(theirs))
         if mine[:count].shape != theirs[:count].shape or np.array_equal(mine[:count], theirs[:count], equal_nan=True):
             continue
-        apart = np.abs(mine[:count] - theirs[:count])
-        difference = float(np.nanmax(apart, initial=0.0))
-        size = sizes.get(name) or float(np.nanmax(np.abs(mine), initial=0.0)) or 1.0
-        if found["kind"] == "same bits":
-            found["kind"] = "round-off"
-        if difference / size >= float(str(found["relative"])):
-            found |= {"quantity": name, "unit": item.unit, "difference": difference, "relative": difference / size}
-    if float(str(found["relative"])) > ROUND_OFF:
-        found["kind"] = "changed"
+        difference = float(np.nanmax(np.abs(mine[:count] - theirs[:count]), initial=0.0))
+        relative = difference / (sizes.get(name) or float(np.nanmax(np.abs(mine), initial=0.0)) or 1.0)
+        if not relative < found.relative:  # also where it is not a number: then they differ
+            kind = NumberKind.CHANGED if relative > ROUND_OFF else NumberKind.ROUND_OFF
+            found = NumbersApart(name, item.unit, difference, relative, kind)
     return found

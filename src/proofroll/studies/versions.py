@@ -5,6 +5,7 @@ from __future__ import annotations
 import dataclasses
 from collections import Counter
 from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass
 from typing import Any
 
 from proofroll.core.comparison import Comparison
@@ -13,17 +14,50 @@ from proofroll.running.asking import describe
 from proofroll.running.case import EngineDescription, Status
 from proofroll.running.runner import Runner
 from proofroll.running.stopwatch import Stopwatch
-from proofroll.running.timing import interleaved, ratio
+from proofroll.running.timing import Interval, interleaved, ratio
 from proofroll.studies.compare import evaluate
 from proofroll.studies.hosts import hosts
 from proofroll.studies.outcome import Run
 from proofroll.studies.planning import Plan, plan
-from proofroll.studies.version_difference import case_difference, setting_of
+from proofroll.studies.version_difference import (
+    CaseDifference,
+    NumberKind,
+    NumbersApart,
+    OrderChange,
+    case_difference,
+    setting_of,
+)
 
 # Rounds of timing: with twelve one estimate moved by 5 % between series, with twenty the interval is some 4 % wide.
 ROUNDS = 20
 
 Progress = Callable[[str], None]
+
+
+@dataclass(frozen=True)
+class SettingDifference:
+    """All points of a setting in both versions.
+
+    Attributes:
+        comparison, setting: which.
+        cases: how many points.
+        verdicts: ``old`` and ``new`` -> verdict -> how many cases.
+        numbers: of the case whose numbers are farthest apart.
+        declared_order: ``old`` and ``new``.
+        orders: observed orders that changed, of all cases.
+        changed: how many cases have another verdict.
+        speed: time of the new version over that of the old one, or None.
+    """
+
+    comparison: str
+    setting: str
+    cases: int
+    verdicts: dict[str, dict[str, int]]
+    numbers: NumbersApart | None
+    declared_order: dict[str, int | None]
+    orders: list[OrderChange]
+    changed: int
+    speed: Interval | None
 
 
 def compared(
@@ -55,24 +89,24 @@ def compared(
         runs = evaluate(item, results, runner).runs
         one, other = ([run for run in runs if parse_engine(run.row.engine).name == side] for side in sides)
         found += [(item, before, after) for before, after in zip(one, other, strict=True)]
-    told_cases = [case_difference(item, before, after, results, runner) for item, before, after in found]
+    differences = [case_difference(item, before, after, results, runner) for item, before, after in found]
     speeds = _speeds(found, runner, rounds, progress) if rounds else {}
     return {
         "engine": parse_engine(sides[0]).name.partition("@")[0],
         "old": _side(sides[0], told[0]),
         "new": _side(sides[1], told[1]),
         "comparisons": [item.name for item in comparisons],
-        "rows": _rows(told_cases, speeds),
-        "cases": told_cases,
+        "rows": [dataclasses.asdict(row) for row in _rows(differences, speeds)],
+        "cases": [dataclasses.asdict(case) for case in differences],
         "defaults": _defaults(*told),
         "hosts": hosts(run.result for _, *pair in found for run in pair),
         "robot": None,
-        "changed": [sentence for case in told_cases for sentence in case["changed"]],
+        "changed": [sentence for case in differences for sentence in case.changed],
         "lost": [
-            f"{side} {case['setting']} at {case['point'] or 'its only point'}: {case[side]['message']}"
-            for case in told_cases
-            for side in ("old", "new")
-            if case[side]["status"] == Status.MISSING
+            f"{name} {case.setting} at {case.point or 'its only point'}: {side.message}"
+            for case in differences
+            for name, side in (("old", case.old), ("new", case.new))
+            if side.status == Status.MISSING
         ],
     }
 
@@ -81,35 +115,37 @@ def _side(name: str, told: EngineDescription) -> dict[str, Any]:
     return {"name": name, "version": told.version, "interpreter": told.interpreter}
 
 
-def _rows(cases: Sequence[dict[str, Any]], speeds: Mapping[tuple[str, str], dict[str, Any]]) -> list[dict[str, Any]]:
+def _rows(cases: Sequence[CaseDifference], speeds: Mapping[tuple[str, str], Interval]) -> list[SettingDifference]:
     """Summaries of all points of a setting."""
-    grouped: dict[tuple[str, str], list[dict[str, Any]]] = {}
+    grouped: dict[tuple[str, str], list[CaseDifference]] = {}
     for case in cases:
-        grouped.setdefault((case["comparison"], case["setting"]), []).append(case)
-    rows = []
-    for key, group in grouped.items():
-        numbers = [case["numbers"] for case in group if case["numbers"]]
-        rows.append(
-            {
-                "comparison": key[0],
-                "setting": key[1],
-                "cases": len(group),
-                "verdicts": {
-                    side: dict(Counter(str(case[side]["verdict"]) for case in group)) for side in ("old", "new")
-                },
-                "numbers": max(numbers, key=lambda item: (item["relative"], item["kind"] != "same bits"), default=None),
-                "declared_order": {side: group[0][side]["declared_order"] for side in ("old", "new")},
-                "orders": [order for case in group for order in case["orders"]],
-                "changed": sum(bool(case["changed"]) for case in group),
-                "speed": speeds.get(key),
-            }
+        grouped.setdefault((case.comparison, case.setting), []).append(case)
+    return [
+        SettingDifference(
+            comparison=key[0],
+            setting=key[1],
+            cases=len(group),
+            verdicts={
+                "old": dict(Counter(str(case.old.verdict) for case in group)),
+                "new": dict(Counter(str(case.new.verdict) for case in group)),
+            },
+            numbers=max(
+                (case.numbers for case in group if case.numbers is not None),
+                key=lambda item: (item.relative, item.kind != NumberKind.SAME_BITS),
+                default=None,
+            ),
+            declared_order={"old": group[0].old.declared_order, "new": group[0].new.declared_order},
+            orders=[order for case in group for order in case.orders],
+            changed=sum(bool(case.changed) for case in group),
+            speed=speeds.get(key),
         )
-    return rows
+        for key, group in grouped.items()
+    ]
 
 
 def _speeds(
     found: Sequence[tuple[Plan, Run, Run]], runner: Runner, rounds: int, progress: Progress
-) -> dict[tuple[str, str], dict[str, Any]]:
+) -> dict[tuple[str, str], Interval]:
     """Time of the new version over that of the old one, for the first point of each setting that both run."""
     chosen: dict[tuple[str, str], tuple[Run, Run]] = {}
     for item, before, after in found:
@@ -124,7 +160,7 @@ def _speeds(
             timings = interleaved({"old": lambda c=old: watch(c), "new": lambda c=new: watch(c)}, rounds)  # type: ignore[misc]  # bound now
             progress(f"timing {key[1]}")
             if timings.keys() == {"old", "new"} and len(timings["old"].values) == len(timings["new"].values):
-                speeds[key] = dataclasses.asdict(ratio(timings["new"], timings["old"]))
+                speeds[key] = ratio(timings["new"], timings["old"])
     return speeds
 
 
