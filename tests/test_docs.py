@@ -70,3 +70,16 @@ def test_every_page_is_in_the_contents() -> None:
     trees = re.findall(r"```\{toctree\}\n(.*?)```", index, flags=re.DOTALL)
     named = [line for tree in trees for line in tree.splitlines() if line and not line.startswith(":")]
     assert sorted([*named, "index"]) == sorted(path.stem for path in (ROOT / "docs").glob("*.md"))
+
+
+def test_the_workflow_runs_the_two_commands() -> None:
+    """The workflow of the public CI parses, covers every Python that is supported, and runs what a person types."""
+    workflow = yaml.safe_load((ROOT / ".github" / "workflows" / "ci.yml").read_text(encoding="utf-8"))
+    (job,) = workflow["jobs"].values()
+    assert job["strategy"]["matrix"]["python"] == ["3.11", "3.12", "3.13"]
+    commands = [step["run"] for step in job["steps"] if "run" in step]
+    assert commands == [".ci/run", "make report"]
+    within = (ROOT / ".ci" / "run").read_text(encoding="utf-8").splitlines()
+    assert {"make check", "make docs", "make test"} <= set(within)
+    for line in [*commands[1:], "make check", "make docs", "make test"]:
+        subprocess.run(["make", "--dry-run", *line.split()[1:]], cwd=ROOT, check=True, capture_output=True)
