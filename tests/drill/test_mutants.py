@@ -11,6 +11,7 @@ from typer.testing import CliRunner
 
 from proofroll.cli import app
 from proofroll.core.diagnosis import CLOSES, Cause, Evidence, diagnose, hypotheses_of
+from proofroll.core.diagnosis.fitting import telling
 from proofroll.core.plugins import load_element_kinds
 from proofroll.core.truth import truth
 from proofroll.files.scene_file import load_scene
@@ -66,6 +67,11 @@ def test_every_hypothesis_says_its_grounds() -> None:
         names = [item.id for item in kind.hypotheses()]
         assert all(len(item.grounds) > 20 for item in kind.hypotheses())
         assert len(names) - len(set(names)) <= 2  # three loads are one hypothesis
+
+
+def test_a_factor_near_one_accuses_nobody() -> None:
+    """What a coarse step makes of inertia is within a hundredth; mistakes are known factors, or further off."""
+    assert [telling(factor) for factor in (0.99752, 1.00249, 0.0, 0.5, 1.05)] == [False, False, True, True, True]
 
 
 def test_a_cause_that_leaves_too_much_is_not_told() -> None:

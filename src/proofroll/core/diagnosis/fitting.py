@@ -10,6 +10,9 @@ from proofroll.core.arrays import FloatArray
 
 _ROUNDS = 8
 _STEP = 1e-4
+# A step that is coarse for a motion changes its equations as a factor near one does (Hairer, Lubich and Wanner 2006,
+# chapter IX: modified equations); a factor that nobody makes by mistake says nothing nearer to one than this.
+_METHOD = 1e-2
 # Numbers that mistakes make: a fitted factor this near to one of them is taken to be it.
 _NEAR = 2e-3
 _NOTHING = 1e-5
@@ -61,3 +64,8 @@ def said_factor(factor: float) -> str:
     """A factor in words."""
     known = known_factor(factor)
     return known[1] if known else f"{factor:.6g} times"
+
+
+def telling(factor: float) -> bool:
+    """Whether a factor is a mistake's, or too far from one for a method's error."""
+    return known_factor(factor) is not None or abs(factor - 1) > _METHOD

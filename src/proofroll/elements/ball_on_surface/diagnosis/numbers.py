@@ -11,7 +11,7 @@ from typing import Any
 import numpy as np
 
 from proofroll.core.diagnosis import Cause, Evidence
-from proofroll.core.diagnosis.fitting import known_factor, said_factor
+from proofroll.core.diagnosis.fitting import known_factor, said_factor, telling
 from proofroll.elements.ball_on_surface.diagnosis.equations import Law
 from proofroll.elements.ball_on_surface.diagnosis.held import has_resistance, held_against, is_bounded
 from proofroll.elements.ball_on_surface.model import RollingBall
@@ -67,6 +67,8 @@ class Number:
             return
         for held in held_against(evidence):
             factor = _snapped(held.fit(lambda x: self._law(body, x * scene), 1.0))
+            if not telling(factor):
+                continue
             says = f"the engine moves a ball with {self.what} {self._said(factor, scene)}"
             yield held.cause(self.id, says, self._law(body, factor * scene), self.remedy, 1)
 

@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 
 from proofroll.core.diagnosis import Cause, Evidence
-from proofroll.core.diagnosis.fitting import said_factor
+from proofroll.core.diagnosis.fitting import said_factor, telling
 from proofroll.elements.mechanism.diagnosis.equations import Change
 from proofroll.elements.mechanism.diagnosis.held import best, held_against
 from proofroll.elements.mechanism.model import Mechanism
@@ -41,6 +41,8 @@ class Factor:
             return
         for held in held_against(evidence):
             factor, number = best(held, lambda x: self.change(mechanism, x))
+            if not telling(factor):
+                continue
             says = f"the engine moves it with {self.what} {said_factor(factor)}"
             yield held.cause(self.id, says, self.change(mechanism, factor), self.remedy, number)
 

@@ -11,7 +11,7 @@ import numpy as np
 
 from proofroll.core.arrays import FloatArray
 from proofroll.core.diagnosis import Cause, Evidence
-from proofroll.core.diagnosis.fitting import said_factor
+from proofroll.core.diagnosis.fitting import said_factor, telling
 from proofroll.core.diagnosis.held import Held
 from proofroll.elements.mechanism.diagnosis.equations import Change
 from proofroll.elements.mechanism.diagnosis.held import best, held_against
@@ -42,6 +42,8 @@ class OfEachBody:
 
                 for what, change in (("mass", heavier), ("inertia", stiffer)):
                     factor, number = best(held, change)
+                    if not telling(factor):
+                        continue
                     says = f"the engine moves the body {body.name} with its {what} {said_factor(factor)}"
                     yield held.cause(
                         f"{what} of {body.name}", says, change(factor), f"give {body.name} its {what} once", number
