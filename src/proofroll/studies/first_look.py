@@ -2,11 +2,12 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+import contextlib
+from collections.abc import Collection, Iterator, Mapping
 from typing import Any
 
 from proofroll.core.comparison import Band, Comparison, Row, Tolerance
-from proofroll.core.errors import ProofrollError
+from proofroll.core.errors import InputError, ProofrollError
 from proofroll.core.observable import Role
 from proofroll.core.plugins import engine_names
 from proofroll.core.scene import Scene
@@ -29,11 +30,13 @@ def compared(name: str, parameters: Mapping[str, Any]) -> Comparison:
         parameters: that the user sets.
 
     Raises:
-        InputError: there is no such scene, or a parameter makes no sense.
+        InputError: there is no such scene, a parameter makes no sense, or no installed engine can represent it.
     """
     file, scene = read_scene_file(name), load_scene(name, **parameters)
     until = file.duration or _UNTIL
     rows = [Row(engine, _CLOSE, list(Verdict), because=_BECAUSE) for engine in able(scene)]
+    if not rows:
+        raise InputError("scene", name, f"no installed engine has {', '.join(_lacking(scene))}")
     return Comparison(
         name=scene.name,
         title=file.title,
@@ -59,17 +62,26 @@ def bounds(scene: Scene) -> dict[str, Tolerance]:
 
 def able(scene: Scene, *, first: bool = False) -> list[str]:
     """Formulations of installed engines that can represent the scene, as files write them; ``first``: one of each."""
-    from proofroll.running.asking import describe
-
     found = []
-    for engine in engine_names():
-        try:
-            provides = describe(engine).provides
-        except ProofrollError:
-            continue
+    for engine, provides in _provided():
         fitting = [name for name, given in provides.items() if scene.requires <= set(given)]
         found += [f"{engine}[formulation={name}]" for name in fitting[: 1 if first else None]]
     return found
+
+
+def _provided() -> Iterator[tuple[str, Mapping[str, Collection[str]]]]:
+    """What the formulations of each installed engine provide."""
+    from proofroll.running.asking import describe
+
+    for engine in engine_names():
+        with contextlib.suppress(ProofrollError):
+            yield engine, describe(engine).provides
+
+
+def _lacking(scene: Scene) -> list[str]:
+    """What no formulation provides; all that the scene requires where each is provided by some."""
+    given = {item for _, provides in _provided() for items in provides.values() for item in items}
+    return sorted(scene.requires - given) or ["all of", *sorted(scene.requires)]
 
 
 def axes_of(name: str) -> list[Axis]:
