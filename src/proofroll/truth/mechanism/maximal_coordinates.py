@@ -21,11 +21,10 @@ from proofroll.elements.mechanism.model import Mechanism
 from proofroll.elements.mechanism.record import Record, gathered
 from proofroll.elements.mechanism.rotations import Array
 from proofroll.elements.mechanism.stepping import integrated
+from proofroll.truth.mechanism.constraint_rows import Connection, ConstraintRow
 from proofroll.truth.mechanism.maximal_bodies import BodyInScalars
 from proofroll.truth.mechanism.maximal_equations import (
-    Connection,
     ConstrainedEquations,
-    ConstraintRow,
     MaximalEquations,
 )
 from proofroll.truth.mechanism.maximal_taylor import MaximalTaylor

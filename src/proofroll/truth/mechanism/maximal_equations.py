@@ -1,4 +1,4 @@
-"""Equations of route 2: constraint rows and forces of bodies that are each alone in space.
+"""Equations of route 2: forces and constraint rows of bodies that are each alone in space.
 
 They are written once in plain additions and multiplications, so that numbers, long doubles and symbols pass through.
 """
@@ -16,9 +16,9 @@ from scipy.linalg import block_diag
 
 from proofroll.core.errors import Refused
 from proofroll.elements.mechanism.checks import WORLD
-from proofroll.elements.mechanism.joint import FACTS
 from proofroll.elements.mechanism.model import Mechanism
 from proofroll.elements.mechanism.rotations import Array
+from proofroll.truth.mechanism.constraint_rows import Connection, ConstraintRow, ConstraintRows, columns, speed_at
 from proofroll.truth.mechanism.maximal_bodies import GROUND, BodyInScalars, made_bodies, placed_bodies
 from proofroll.truth.mechanism.rolling_rows import RollingContact
 from proofroll.truth.mechanism.scalars import (
@@ -38,33 +38,6 @@ from proofroll.truth.mechanism.scalars import (
 
 FUNCTIONS: Mapping[str, Callable[[Any], Any]] = {"sin": math.sin, "cos": math.cos, "sqrt": math.sqrt}
 _NONE = (0.0, 0.0, 0.0)
-_Wrench = tuple[Sequence[Scalar], Sequence[Scalar]]
-_AXES = ((1.0, 0.0, 0.0), (0.0, 1.0, 0.0), (0.0, 0.0, 1.0))
-
-
-@dataclass(frozen=True)
-class Connection:
-    """A joint, loop or rolling contact of two bodies: places from the centres of mass, frames by rows, in body axes."""
-
-    kind: str
-    a: int
-    b: int
-    place_a: Sequence[float]
-    place_b: Sequence[float]
-    frame_a: Sequence[Sequence[float]]
-    frame_b: Sequence[Sequence[float]]
-
-
-@dataclass
-class ConstraintRow:
-    """One constraint: Φ = 0, Σ coefficient·u = 0, Σ coefficient·u̇ + bias = 0, and what it applies to body b."""
-
-    residual: Scalar
-    coefficients: dict[int, Scalar]
-    bias: Scalar
-    connection: int
-    force: Sequence[Scalar]
-    torque: Sequence[Scalar]
 
 
 class Drive(NamedTuple):
@@ -171,11 +144,11 @@ class MaximalEquations:
             weight = [float(body.mass * g) for g in self.mechanism.gravity]
             force += plus(body.gyroscopic(u[at_u]), body.projected(view, weight, _NONE))
             rate += body.rate(x[at_x], u[at_u])
+        made = ConstraintRows(self.bodies, self.u_slices, self.connections, self._rolling, views)
         rows: list[ConstraintRow] = []
         laws, angle_rate = [], []
         for number, connection in enumerate(self.connections):
-            rolls = number in self._rolling
-            rows += (self._rolling_rows if rolls else self._rows_of)(number, connection, views)
+            rows += made.of(number)
             if number < len(self.mechanism.joints):
                 own = [angle for angle, (k, _) in zip(angles, self.angles, strict=True) if k == number]
                 law, rates = self._law(number, connection, views, own, force)
@@ -187,12 +160,12 @@ class MaximalEquations:
             length = functions["sqrt"](dot(d, d))
             pull = spring.stiffness * (1.0 - spring.length / length)
             if spring.damping:
-                slide = minus(_speed(views[b], arm_b), _speed(views[a], arm_a))
+                slide = minus(speed_at(views[b], arm_b), speed_at(views[a], arm_a))
                 pull = add(pull, mul(spring.damping, dot(slide, d) / (length * length)))
             self._apply(force, views, a, scaled(pull, d), arm_a)
             self._apply(force, views, b, scaled(-1.0, scaled(pull, d)), arm_b)
         drives = [
-            Drive(self._rate_row(number, joint.kind, views), float(joint.armature))
+            Drive(made.of_rate(number, joint.kind), float(joint.armature))
             for number, joint in enumerate(self.mechanism.joints)
             if joint.armature
         ]
@@ -229,89 +202,6 @@ class MaximalEquations:
         for place, entry in enumerate(entries, self.u_slices[body].start):
             force[place] = add(force[place], entry)
 
-    def _rows_of(self, number: int, c: Connection, views: list[BodyInScalars]) -> list[ConstraintRow]:
-        a, b = views[c.a], views[c.b]
-        A, B = _columns(product(a.R, c.frame_a)), _columns(product(b.R, c.frame_b))
-        arm_a, arm_b = turned(a.R, c.place_a), turned(b.R, c.place_b)
-        d = minus(plus(b.r, arm_b), plus(a.r, arm_a))
-        towards = minus(cross(b.w, cross(b.w, arm_b)), cross(a.w, cross(a.w, arm_a)))
-        rows = []
-        facts = FACTS[c.kind]
-        for k in facts.translations:
-            if len(facts.translations) < 3:
-                rows.append(self._sliding(number, views, A[k]))
-                continue
-            n: Sequence[Scalar] = _AXES[k]  # along the world's axes
-            on_b, on_a = cross(arm_b, n), scaled(-1.0, cross(arm_a, n))
-            given = ((n, on_b), (scaled(-1.0, n), on_a), (n, _NONE))
-            rows.append(self._row(number, views, dot(n, d), dot(n, towards), *given))
-        for k, m in facts.rotations:
-            x, y = A[k], B[m]
-            t = cross(y, x)
-            x_rate, y_rate = cross(a.w, x), cross(b.w, y)
-            bias = add(dot(cross(a.w, x_rate), y), mul(2.0, dot(x_rate, y_rate)), dot(x, cross(b.w, y_rate)))
-            back = scaled(-1.0, t)
-            rows.append(self._row(number, views, dot(x, y), bias, (_NONE, t), (_NONE, back), (_NONE, t)))
-        return rows
-
-    def _rolling_rows(self, number: int, c: Connection, views: list[BodyInScalars]) -> list[ConstraintRow]:
-        """The contact point of a ball does not move; only its distance from the wall can be violated by a place."""
-        ball, view = self._rolling[number], views[c.b]
-        gap, e1, e1_rate = ball.normal(view.r, view.v)
-        arm = scaled(ball.radius, e1)
-        towards = scaled(ball.radius, cross(view.w, e1_rate))
-        rows = []
-        for n in _AXES:
-            residual = scaled(-1.0, scaled(gap, e1))
-            on_b, on_a = (n, cross(arm, n)), (scaled(-1.0, n), _NONE)
-            rows.append(self._row(number, views, dot(n, residual), dot(n, towards), on_b, on_a, (n, _NONE)))
-        return rows
-
-    def _rate_row(self, number: int, kind: str, views: list[BodyInScalars]) -> ConstraintRow:
-        """The rate of a revolute or prismatic joint's coordinate as a row; its wrench acts along the coordinate."""
-        c = self.connections[number]
-        a, b = views[c.a], views[c.b]
-        axis = _columns(product(a.R, c.frame_a))[2]
-        back = scaled(-1.0, axis)
-        if kind == "revolute":
-            bias = dot(cross(a.w, axis), minus(b.w, a.w))
-            return self._row(number, views, 0.0, bias, (_NONE, axis), (_NONE, back), (_NONE, axis))
-        return self._sliding(number, views, axis)
-
-    def _sliding(self, number: int, views: list[BodyInScalars], n: Sequence[Scalar]) -> ConstraintRow:
-        """How far two points are apart along an axis that turns with body a, as a row."""
-        c = self.connections[number]
-        a, b = views[c.a], views[c.b]
-        arm_a, arm_b = turned(a.R, c.place_a), turned(b.R, c.place_b)
-        d = minus(plus(b.r, arm_b), plus(a.r, arm_a))
-        towards = minus(cross(b.w, cross(b.w, arm_b)), cross(a.w, cross(a.w, arm_a)))
-        slide = minus(_speed(b, arm_b), _speed(a, arm_a))
-        n_rate = cross(a.w, n)
-        bias = add(dot(n, towards), mul(2.0, dot(n_rate, slide)), dot(cross(a.w, n_rate), d))
-        on_b, on_a = cross(arm_b, n), scaled(-1.0, cross(plus(arm_a, d), n))
-        return self._row(number, views, dot(n, d), bias, (n, on_b), (scaled(-1.0, n), on_a), (n, _NONE))
-
-    def _row(
-        self,
-        number: int,
-        views: list[BodyInScalars],
-        residual: Scalar,
-        bias: Scalar,
-        on_b: _Wrench,
-        on_a: _Wrench,
-        given: _Wrench,
-    ) -> ConstraintRow:
-        """A row from what its unit multiplier applies to each body, and what that is at the joint on b."""
-        c = self.connections[number]
-        coefficients: dict[int, Scalar] = {}
-        for body, (push, moment) in ((c.b, on_b), (c.a, on_a)):
-            if body >= 0:
-                entries = self.bodies[body].projected(views[body], push, moment)
-                for place, entry in enumerate(entries, self.u_slices[body].start):
-                    if not is_zero(entry):
-                        coefficients[place] = entry
-        return ConstraintRow(residual, coefficients, bias, number, *given)
-
     def _law(
         self, number: int, c: Connection, views: list[BodyInScalars], angles: list[Scalar], force: list[Scalar]
     ) -> tuple[tuple[list[Scalar], list[Scalar]], list[Scalar]]:
@@ -323,13 +213,13 @@ class MaximalEquations:
         if not (joint.stiffness or joint.damping or joint.torque):
             return (push, moment), rates
         arm_a, arm_b = turned(a.R, c.place_a), turned(b.R, c.place_b)
-        A, B = _columns(product(a.R, c.frame_a)), _columns(product(b.R, c.frame_b))
+        A, B = columns(product(a.R, c.frame_a)), columns(product(b.R, c.frame_b))
         turning = minus(b.w, a.w)
         d = minus(plus(b.r, arm_b), plus(a.r, arm_a))
         if joint.kind == "spherical":
             moment = scaled(-joint.damping, turning)
         elif joint.kind == "prismatic":
-            slide = minus(minus(_speed(b, arm_b), _speed(a, arm_a)), cross(a.w, d))
+            slide = minus(minus(speed_at(b, arm_b), speed_at(a, arm_a)), cross(a.w, d))
             push = scaled(_along(joint, dot(A[2], d), dot(A[2], slide)), A[2])
         else:
             axes = [A[2]] if joint.kind == "revolute" else [A[2], B[0]]
@@ -350,16 +240,8 @@ def _along(joint: Any, q: Scalar, speed: Scalar) -> Scalar:
     return add(float(joint.torque), spring, mul(-joint.damping, speed) if joint.damping else 0.0)
 
 
-def _speed(view: BodyInScalars, arm: Sequence[Scalar]) -> list[Scalar]:
-    return plus(view.v, cross(view.w, arm))
-
-
 def _rows(matrix: Array) -> list[list[float]]:
     return [[float(round(x)) if abs(x - round(x)) < 1e-15 else float(x) for x in row] for row in matrix]
-
-
-def _columns(matrix: Sequence[Sequence[Scalar]]) -> list[list[Scalar]]:
-    return [list(column) for column in zip(*matrix, strict=True)]
 
 
 def _slices(counts: Sequence[int]) -> list[slice]:

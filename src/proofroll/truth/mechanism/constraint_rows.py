@@ -1,0 +1,171 @@
+"""Constraint rows of joints, loops and rolling contacts between bodies that are each free in space."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+
+from proofroll.elements.mechanism.joint import FACTS
+from proofroll.truth.mechanism.maximal_bodies import BodyInScalars, GeneralBody, Planar
+from proofroll.truth.mechanism.rolling_rows import RollingContact
+from proofroll.truth.mechanism.scalars import (
+    Scalar,
+    add,
+    cross,
+    dot,
+    is_zero,
+    minus,
+    mul,
+    plus,
+    product,
+    scaled,
+    turned,
+)
+
+_NONE = (0.0, 0.0, 0.0)
+_Wrench = tuple[Sequence[Scalar], Sequence[Scalar]]
+_AXES = ((1.0, 0.0, 0.0), (0.0, 1.0, 0.0), (0.0, 0.0, 1.0))
+
+
+@dataclass(frozen=True)
+class Connection:
+    """A joint, loop or rolling contact of two bodies: places from the centres of mass, frames by rows, in body axes."""
+
+    kind: str
+    a: int
+    b: int
+    place_a: Sequence[float]
+    place_b: Sequence[float]
+    frame_a: Sequence[Sequence[float]]
+    frame_b: Sequence[Sequence[float]]
+
+
+@dataclass
+class ConstraintRow:
+    """One constraint: Φ = 0, Σ coefficient·u = 0, Σ coefficient·u̇ + bias = 0, and what it applies to body b."""
+
+    residual: Scalar
+    coefficients: dict[int, Scalar]
+    bias: Scalar
+    connection: int
+    force: Sequence[Scalar]
+    torque: Sequence[Scalar]
+
+
+class ConstraintRows:
+    """Makes the rows for one state.
+
+    Args:
+        bodies: of the mechanism.
+        u_slices: where the velocities of each lie among all.
+        connections: joints, loops and rolling contacts.
+        rolling: those of them that are rolling contacts.
+        views: place, attitude and velocities of each body, the ground's last.
+    """
+
+    def __init__(
+        self,
+        bodies: Sequence[GeneralBody | Planar],
+        u_slices: Sequence[slice],
+        connections: Sequence[Connection],
+        rolling: Mapping[int, RollingContact],
+        views: Sequence[BodyInScalars],
+    ) -> None:
+        self._bodies, self._u_slices, self._connections = bodies, u_slices, connections
+        self._rolling, self._views = rolling, views
+
+    def of(self, number: int) -> list[ConstraintRow]:
+        """All rows of a joint, loop or rolling contact."""
+        if number in self._rolling:
+            return self._of_rolling(number)
+        c = self._connections[number]
+        a, b = self._views[c.a], self._views[c.b]
+        A, B = columns(product(a.R, c.frame_a)), columns(product(b.R, c.frame_b))
+        arm_a, arm_b = turned(a.R, c.place_a), turned(b.R, c.place_b)
+        d = minus(plus(b.r, arm_b), plus(a.r, arm_a))
+        towards = minus(cross(b.w, cross(b.w, arm_b)), cross(a.w, cross(a.w, arm_a)))
+        rows = []
+        facts = FACTS[c.kind]
+        for k in facts.translations:
+            if len(facts.translations) < 3:
+                rows.append(self._sliding(number, A[k]))
+                continue
+            n: Sequence[Scalar] = _AXES[k]  # along the world's axes
+            on_b, on_a = cross(arm_b, n), scaled(-1.0, cross(arm_a, n))
+            given = ((n, on_b), (scaled(-1.0, n), on_a), (n, _NONE))
+            rows.append(self._row(number, dot(n, d), dot(n, towards), *given))
+        for k, m in facts.rotations:
+            x, y = A[k], B[m]
+            t = cross(y, x)
+            x_rate, y_rate = cross(a.w, x), cross(b.w, y)
+            bias = add(dot(cross(a.w, x_rate), y), mul(2.0, dot(x_rate, y_rate)), dot(x, cross(b.w, y_rate)))
+            back = scaled(-1.0, t)
+            rows.append(self._row(number, dot(x, y), bias, (_NONE, t), (_NONE, back), (_NONE, t)))
+        return rows
+
+    def _of_rolling(self, number: int) -> list[ConstraintRow]:
+        """The contact point of a ball does not move; only its distance from the wall can be violated by a place."""
+        ball, view = self._rolling[number], self._views[self._connections[number].b]
+        gap, e1, e1_rate = ball.normal(view.r, view.v)
+        arm = scaled(ball.radius, e1)
+        towards = scaled(ball.radius, cross(view.w, e1_rate))
+        rows = []
+        for n in _AXES:
+            residual = scaled(-1.0, scaled(gap, e1))
+            on_b, on_a = (n, cross(arm, n)), (scaled(-1.0, n), _NONE)
+            rows.append(self._row(number, dot(n, residual), dot(n, towards), on_b, on_a, (n, _NONE)))
+        return rows
+
+    def of_rate(self, number: int, kind: str) -> ConstraintRow:
+        """The rate of a revolute or prismatic joint's coordinate as a row; its wrench acts along the coordinate."""
+        c = self._connections[number]
+        a, b = self._views[c.a], self._views[c.b]
+        axis = columns(product(a.R, c.frame_a))[2]
+        back = scaled(-1.0, axis)
+        if kind == "revolute":
+            bias = dot(cross(a.w, axis), minus(b.w, a.w))
+            return self._row(number, 0.0, bias, (_NONE, axis), (_NONE, back), (_NONE, axis))
+        return self._sliding(number, axis)
+
+    def _sliding(self, number: int, n: Sequence[Scalar]) -> ConstraintRow:
+        """How far two points are apart along an axis that turns with body a, as a row."""
+        c = self._connections[number]
+        a, b = self._views[c.a], self._views[c.b]
+        arm_a, arm_b = turned(a.R, c.place_a), turned(b.R, c.place_b)
+        d = minus(plus(b.r, arm_b), plus(a.r, arm_a))
+        towards = minus(cross(b.w, cross(b.w, arm_b)), cross(a.w, cross(a.w, arm_a)))
+        slide = minus(speed_at(b, arm_b), speed_at(a, arm_a))
+        n_rate = cross(a.w, n)
+        bias = add(dot(n, towards), mul(2.0, dot(n_rate, slide)), dot(cross(a.w, n_rate), d))
+        on_b, on_a = cross(arm_b, n), scaled(-1.0, cross(plus(arm_a, d), n))
+        return self._row(number, dot(n, d), bias, (n, on_b), (scaled(-1.0, n), on_a), (n, _NONE))
+
+    def _row(
+        self,
+        number: int,
+        residual: Scalar,
+        bias: Scalar,
+        on_b: _Wrench,
+        on_a: _Wrench,
+        given: _Wrench,
+    ) -> ConstraintRow:
+        """A row from what its unit multiplier applies to each body, and what that is at the joint on b."""
+        c = self._connections[number]
+        coefficients: dict[int, Scalar] = {}
+        for body, (push, moment) in ((c.b, on_b), (c.a, on_a)):
+            if body >= 0:
+                entries = self._bodies[body].projected(self._views[body], push, moment)
+                for place, entry in enumerate(entries, self._u_slices[body].start):
+                    if not is_zero(entry):
+                        coefficients[place] = entry
+        return ConstraintRow(residual, coefficients, bias, number, *given)
+
+
+def speed_at(view: BodyInScalars, arm: Sequence[Scalar]) -> list[Scalar]:
+    """Velocity of a point of a body, in world axes; ``arm`` leads there from the centre of mass."""
+    return plus(view.v, cross(view.w, arm))
+
+
+def columns(matrix: Sequence[Sequence[Scalar]]) -> list[list[Scalar]]:
+    """Columns of a matrix of scalars."""
+    return [list(column) for column in zip(*matrix, strict=True)]
