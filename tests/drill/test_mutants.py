@@ -2,19 +2,25 @@
 
 from __future__ import annotations
 
+import dataclasses
 import functools
 import json
+from collections.abc import Callable
+from pathlib import Path
 
 import numpy as np
 import pytest
 from typer.testing import CliRunner
 
 from proofroll.cli import app
+from proofroll.conformance.explaining import explained
+from proofroll.conformance.subject import Subject
 from proofroll.core.diagnosis import CLOSES, Cause, Evidence, diagnose, hypotheses_of
 from proofroll.core.diagnosis.fitting import telling
 from proofroll.core.plugins import load_element_kinds
 from proofroll.core.truth import truth
 from proofroll.files.scene_file import load_scene
+from proofroll_drill.mutants import ball_models
 from proofroll_drill.mutants.drilling import ENOUGH
 
 
@@ -57,6 +63,41 @@ def test_small_errors_of_an_honest_engine_have_no_cause(scene: str, parameters: 
     for element in loaded.elements:
         for run in (true, noisy):
             assert diagnose(Evidence(element, [], run, true, 1e-3), hypotheses_of(element)) == []
+
+
+CLAIM = """title = "A mutant"
+question = "Does it agree?"
+scene = "sphere_in_cylinder"
+until = 0.1
+every = 0.01
+[tolerances.close]
+because = "it is refused before it is judged"
+z = "1e-3 m"
+[[rows]]
+engine = "mutant[preset=default,dt=0.002]"
+tolerance = "close"
+"""
+
+
+def test_everybody_is_told_the_same_cause(
+    proofroll: Callable[..., tuple[int, str, str]],
+    install_engines: Callable[[dict[str, str]], None],
+    tmp_path: Path,
+) -> None:
+    """Conformance, run and compare name the cause of a wrong model in the same words."""
+    mutant = ball_models.ToldInertia
+    settings = dataclasses.replace(mutant.presets[mutant.formulation]["default"], dt=2e-3)
+    told = explained(Subject(mutant, settings, load_scene(mutant.scene[0])), "It is not")
+    install_engines({"mutant": "proofroll_drill.mutants.ball_models:ToldInertia"})
+    claim, out = tmp_path / "claim.toml", ("--json", "--out", str(tmp_path / "out"))
+    claim.write_text(CLAIM, encoding="utf-8")
+    ran = proofroll("run", mutant.scene[0], "--engine", "mutant[preset=default,dt=0.002]", *out)
+    compared = proofroll("compare", str(claim), *out)
+    assert ran[1], ran[2]
+    (cause,) = json.loads(ran[1])["diagnosis"]
+    assert mutant.named[0] in cause["sentence"]
+    assert cause["sentence"] in told
+    assert [item["sentence"] for item in json.loads(compared[1])["rows"][0]["diagnosis"]] == [cause["sentence"]]
 
 
 def test_every_hypothesis_says_its_grounds() -> None:

@@ -19,11 +19,11 @@ from proofroll.core.events import Event
 from proofroll.core.scene import Scene
 from proofroll.elements.ball_on_surface.element import rolling_ball
 from proofroll.elements.ball_on_surface.mechanics import natural_acceleration
-from proofroll.elements.ball_on_surface.model import BallCapability, RollingBall
+from proofroll.elements.ball_on_surface.model import ALL_OF_A_BALL, BallCapability, RollingBall
 from proofroll_pybullet.settings import PybulletSettings
 from proofroll_pybullet.world import connected, gravity_of
 
-PROVIDES: frozenset[str] = frozenset(BallCapability)
+PROVIDES: frozenset[str] = ALL_OF_A_BALL
 INHERENT = {BallCapability.ORIENTATION: "every rigid body of PyBullet has one"}
 # Friction without bound needs a number; in double precision this one leaves the cone's other numbers their digits.
 UNBOUNDED = 1e6
