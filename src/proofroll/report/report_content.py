@@ -86,12 +86,13 @@ def _truths(outcome: Outcome, store: Store) -> list[dict[str, Any]]:
         if path.is_file():
             dataset = read(path)
             entry |= {key: dataset.attrs.get(key, "") for key in ("route", "second_route")}
+            scene = load_scene(case.scene, **case.parameters)
+            observables = scene.observables
             entry["error_bars"] = {
                 str(key): {"value": float(curve.attrs["error_bar"]), "unit": curve.attrs["units"]}
                 for key, curve in dataset.data_vars.items()
-                if curve.dims == ("time",) and "error_bar" in curve.attrs
+                if (curve.dims == ("time",) or key in observables) and "error_bar" in curve.attrs
             }
-            scene = load_scene(case.scene, **case.parameters)
             kind = kind_of(scene)
             entry |= kind.truth_facts(scene, dataset) if kind is not None else {}
         found.append(entry)

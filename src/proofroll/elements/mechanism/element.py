@@ -12,6 +12,7 @@ import numpy as np
 from proofroll.core.arrays import FloatArray
 from proofroll.core.element import FirstMotion, OptionalTerm, Sign, StepNumber
 from proofroll.core.engine import Sample
+from proofroll.core.failed_run import FailedRun
 from proofroll.core.observable import Observable, Role
 from proofroll.elements.mechanism.analysis import Analysis, analysed
 from proofroll.elements.mechanism.capabilities import MechanismCapability, required
@@ -261,6 +262,13 @@ class MechanismElement:
             energy = dataset["energy"].to_numpy()
             shown.append(Sign(ENERGY_GAIN, energy - energy[0] > GAIN * self._force * self.length))
         return shown
+
+    def failure_program(self, failed: FailedRun, engine: str | None) -> str:
+        """See :class:`proofroll.core.element_abilities.WritesPrograms`."""
+        from proofroll.elements.mechanism.failure_program import program
+
+        gain = GAIN * self._force * self.length if self.conservative else 0.0
+        return program(self, failed, engine, gain, OPEN * self.length)
 
     def optional_terms(self, parameters: Mapping[str, float], truth: xr.Dataset) -> list[OptionalTerm]:  # noqa: ARG002 -- the protocol's
         """None yet."""

@@ -161,7 +161,7 @@ class Exudyn:
         from proofroll.engines.exudyn.reproducer import source
 
         if settings.formulation in OF_MECHANISMS:
-            raise Refused("there is no program for mechanisms yet")
+            raise Refused("mechanisms have no program with Exudyn alone")
         body = rolling_ball(scene)
         return source(MODELS[settings.formulation](body, settings), body, settings)
 

@@ -11,12 +11,12 @@ import numpy as np
 
 from proofroll.core.engine import Built, Sample, whole_steps
 from proofroll.core.engine_abilities import Level, Term
-from proofroll.core.errors import Refused
 from proofroll.core.events import Event
 from proofroll.core.scene import Scene
 from proofroll.elements.ball_on_surface.element import rolling_ball
 from proofroll.elements.ball_on_surface.mechanics import natural_acceleration
 from proofroll.elements.ball_on_surface.model import ALL_OF_A_BALL, BallCapability, RollingBall
+from proofroll.elements.mechanism.sampling import mechanism_of
 from proofroll.engines.mujoco import mechanism
 from proofroll.engines.mujoco.chart import Chart
 from proofroll.engines.mujoco.contact import Resistance, contact_coefficient, contact_force
@@ -161,7 +161,7 @@ class Mujoco:
     def model_file(cls, scene: Scene, settings: MujocoSettings) -> str:
         """MJCF, whose keyframe ``start`` is time 0; see :class:`proofroll.core.engine_abilities.WritesModels`."""
         if settings.formulation == "joints":
-            raise Refused("the model of a mechanism is not written yet")
+            return MujocoMechanism.model_file(scene, settings)
         engine, body = cls._build_ball(scene, settings), rolling_ball(scene)
         spec = read_spec(scene, body, settings.formulation)
         write_physics(spec, body, settings)
@@ -180,7 +180,9 @@ class Mujoco:
         from proofroll.engines.mujoco.reproducer import source
 
         if settings.formulation == "joints":
-            raise Refused("there is no program for mechanisms yet")
+            from proofroll.engines.mujoco.reproducer import mechanism
+
+            return mechanism.source(MujocoMechanism.model_file(scene, settings), mechanism_of(scene))
         body = rolling_ball(scene)
         built = cls._build_ball(scene, settings)
         spec = read_spec(scene, body, settings.formulation)

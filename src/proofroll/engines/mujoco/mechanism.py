@@ -9,7 +9,7 @@ import mujoco
 import numpy as np
 
 from proofroll.core.engine import Sample, whole_steps
-from proofroll.core.errors import InputError
+from proofroll.core.errors import InputError, Refused
 from proofroll.elements.mechanism import Joint, Mechanism
 from proofroll.elements.mechanism.capabilities import ALL_JOINTS, FORCES, MechanismCapability, require
 from proofroll.elements.mechanism.joint_motion import placed
@@ -60,6 +60,22 @@ class MujocoMechanism:
         """See :class:`proofroll.core.engine.Engine`; ``scene`` may be a mechanism."""
         check(settings)
         return cls(mechanism_of(scene), settings)
+
+    @classmethod
+    def model_file(cls, scene: Any, settings: MujocoSettings) -> str:
+        """MJCF, whose keyframe ``start`` is time 0.
+
+        Raises:
+            Refused: a joint has a constant drive, which is no part of a model but of its state.
+        """
+        run, mechanism = cls.build(scene, settings), mechanism_of(scene)
+        driven = [joint.name for joint in mechanism.joints if joint.torque]
+        if driven:
+            raise Refused(f"the constant drive of {driven[0]} is set from outside in every step, and in no MJCF")
+        spec = mechanism_model.write(mechanism, settings)
+        spec.add_key(name="start", qpos=run._data.qpos, qvel=run._data.qvel)
+        compiled(spec)
+        return str(spec.to_xml())
 
     def _start(self, number: int, joint: Joint) -> None:
         """Puts a joint's coordinates, velocities and drive into the state."""

@@ -122,7 +122,7 @@ class Pinocchio:
         from proofroll.engines.pinocchio.reproducer import source
 
         if settings.formulation in OF_MECHANISMS:
-            raise Refused("there is no program for mechanisms yet")
+            raise Refused("the integrator around Pinocchio's terms is proofroll's")
         return source(rolling_ball(scene), _decided(scene, settings))
 
     def advance(self, t: float) -> None:
