@@ -29,14 +29,9 @@ def written(engine: str, options: dict[str, Any]) -> str:
         part, note = kind.reproducer(scene, settings), ""
     except Refused as error:
         part, note = None, str(error)
-    facts = {
-        "scene": "pendulum",
-        "parameters": {},
-        "engine": engine,
-        "version": "1",
-        "settings": dataclasses.asdict(settings),
-    }
-    case = {"resolution": "dt", "until": 5.0, "every": 0.1, "where": "a place", "boundary": "accurate", "silent": True}
+    facts: dict[str, Any] = {"scene": "pendulum", "parameters": {}, "engine": engine, "version": "1"}
+    facts |= {"settings": dataclasses.asdict(settings), "resolution": "dt", "until": 5.0, "every": 0.1}
+    case: dict[str, Any] = {"where": "a place", "boundary": "accurate", "silent": True}
     scale = Yardstick.of(scene, truth).scale
     failed = FailedRun(**facts, **case, failure="lost phase", truth=truth, scale=scale, allowed=0.01, note=note)
     return element.failure_program(failed, part)
