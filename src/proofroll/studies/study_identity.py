@@ -10,6 +10,7 @@ from pathlib import Path
 
 import proofroll
 from proofroll.core.plugins import GROUP
+from proofroll.running.environments import remembered
 from proofroll.running.timing import machine
 
 # Folders of the package on which no result hangs.
@@ -17,7 +18,10 @@ _ASIDE = frozenset({"cli", "conformance", "report"})
 
 
 def versions() -> dict[str, str]:
-    """Versions of proofroll, of what it can use, and of every package that announces an engine."""
+    """Versions of proofroll, of what it can use, of packages that announce engines, and of remembered environments.
+
+    An environment ``NAME@LABEL`` has the hash of all that is installed in it for its version.
+    """
     names = _required() | {point.dist.name for point in entry_points(group=GROUP) if point.dist is not None}
     found = {}
     for name in sorted(names, key=str.lower):
@@ -25,6 +29,9 @@ def versions() -> dict[str, str]:
             found[name] = version(name)
         except PackageNotFoundError:
             continue
+    for item in remembered():
+        content = "\n".join([item.version, item.interpreter, *item.packages])
+        found[f"{item.name}@{item.label}"] = hashlib.sha256(content.encode()).hexdigest()[:12]
     return found
 
 
@@ -67,6 +74,8 @@ def changes(measured: dict[str, object]) -> list[str]:
     for name in sorted(then.keys() | now.keys(), key=str.lower):
         if name not in then and name not in own:
             continue  # a further engine, which was not measured and changes nothing of what was
+        if "@" in name and name not in now:
+            continue  # an environment that is gone was not made anew with something else
         if then.get(name) != now.get(name):
             found.append(f"{name} {then.get(name, 'absent')} then, {now.get(name, 'absent')} now")
     if measured.get("code") != code():

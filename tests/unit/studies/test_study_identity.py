@@ -2,6 +2,11 @@
 
 from __future__ import annotations
 
+from pathlib import Path
+
+import pytest
+
+from proofroll.running.environments import STAMP, VARIABLE, Environment
 from proofroll.running.timing import machine
 from proofroll.studies import study_identity as installed
 
@@ -19,6 +24,25 @@ def test_nothing_has_changed_since_now() -> None:
 def test_engines_are_among_the_versions() -> None:
     """Every engine's package is told with its version, without importing it."""
     assert {"proofroll", "mujoco", "exudyn", "pin", "numpy", "scipy"} <= installed.versions().keys()
+
+
+def test_an_environment_that_was_made_anew_is_a_change(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """The same label with other packages outdates a study; a further label, or one that is gone, does not."""
+    monkeypatch.setenv(VARIABLE, str(tmp_path))
+
+    def make(label: str, *packages: str) -> None:
+        (tmp_path / "aged" / label).mkdir(parents=True, exist_ok=True)
+        Environment("aged", label, tmp_path / "aged" / label, "1.0", [], "3.11", list(packages)).stamp()
+
+    make("1.0", "numpy==2.0")
+    before = measured()
+    make("2.0", "numpy==2.0")
+    assert installed.changes(before) == []
+    make("1.0", "numpy==2.1")
+    (change,) = installed.changes(before)
+    assert change.startswith("aged@1.0 ")
+    (tmp_path / "aged" / "1.0" / STAMP).unlink()
+    assert installed.changes(before) == []
 
 
 def test_each_change_is_told() -> None:
