@@ -102,11 +102,7 @@ class PenaltyContact:
                 dynamicFriction=mu,
                 frictionProportionalZone=self.zone,
                 contactStiffness=stiffness,
-                **(
-                    {}
-                    if law.restitution is None
-                    else {"restitutionCoefficient": max(law.restitution, DEAD), "impactModel": 2}
-                ),
+                **_impacts(law.restitution),
             )
         )
         self.system.SetPreNewtonResidualUserFunction(
