@@ -29,7 +29,7 @@ from proofroll.report import replay_library
 from proofroll.report.growing_report import _described
 from proofroll.report.html import page
 from proofroll.report.plots import point_curves
-from proofroll.report.replay import WIDEST_TURN, frame_times
+from proofroll.report.replay import WIDEST_TURN, frame_times, replay_content
 from proofroll.report.replay_library import thinned, three
 from proofroll.report.report_content import report_content
 
@@ -188,7 +188,7 @@ def test_numbers_survive_being_packed() -> None:
 
 def test_every_truth_is_a_case_with_the_default_settings_as_ghosts(made: Any) -> None:
     """One ghost of each engine is shown at first: the default one where there is one; the numbers fill what is said."""
-    content = BallReport.replay([made[0]], made[1])
+    content = replay_content([made[0]], made[1], BallReport.replay())
     assert [case["label"] for case in content["cases"]] == ["speed=3", "speed=4"]
     assert content["start"] == 1, "the scene as its file has it"
     for case, numbers in zip(content["cases"], content["packed"], strict=True):
@@ -212,7 +212,7 @@ def test_the_furthest_of_the_other_settings_is_there_if_it_is_seen(made: Any) ->
         dataset = read(file)
         dataset["p_WB"] = dataset["p_WB"] + 1e-3
         write(dataset, file)
-        balls = BallReport.replay([outcome], store)["cases"][0]["runs"]
+        balls = replay_content([outcome], store, BallReport.replay())["cases"][0]["runs"]
     finally:
         file.write_bytes(kept)
     assert {ball["name"]: ball["shown"] for ball in balls}["alpha fine matched (dt 1e-3)"] is False
@@ -229,10 +229,11 @@ def test_a_ball_that_flies_off_is_dropped_where_it_leaves(made: Any) -> None:
         dataset = read(file)
         dataset["p_WB"][25:] = dataset["p_WB"][25:] * 1e9
         write(dataset, file)
-        ball = next(b for b in BallReport.replay([outcome], store)["cases"][0]["runs"] if b["name"].startswith("beta"))
+        whole = replay_content([outcome], store, BallReport.replay())["cases"][0]
+        ball = next(run for run in whole["runs"] if run["name"].startswith("beta"))
     finally:
         file.write_bytes(kept)
-    assert 0 < ball["frames"] < BallReport.replay([outcome], store)["cases"][0]["frames"]
+    assert 0 < ball["frames"] < whole["frames"]
     assert "leaves the picture" in ball["message"]
 
 
@@ -281,7 +282,7 @@ def test_without_three_js_there_is_no_library(what: str, monkeypatch: pytest.Mon
 def test_what_engines_and_files_say_stays_text(made: Any, parse: Callable[[str], Any]) -> None:
     """Markup in a title, a point, a name or a message makes no element."""
     evil = "</script><script>alert(1)</script><img src=x onerror=alert(2)>"
-    replay = BallReport.replay([made[0]], made[1])
+    replay = replay_content([made[0]], made[1], BallReport.replay())
     case = replay["cases"][0]
     case |= {"group": evil, "label": evil, "scene": evil}
     case["runs"][1] |= {"name": evil, "message": evil}
@@ -422,7 +423,7 @@ def test_without_a_picture_the_values_follow_the_time(
     lacking: str, made: Any, tmp_path: Path, open_: Callable[..., Visit]
 ) -> None:
     """One sentence says what is missing; time and values run, and nothing fails."""
-    replay = BallReport.replay([made[0]], made[1])
+    replay = replay_content([made[0]], made[1], BallReport.replay())
     if lacking == "three.js":
         replay["library"] = None
     file = tmp_path / "report.html"

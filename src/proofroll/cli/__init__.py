@@ -22,7 +22,7 @@ from proofroll.cli.ladder import ladder
 from proofroll.cli.lists import scenes
 from proofroll.cli.new import new
 from proofroll.cli.options import ENGINE, INTERRUPTED, OK, USAGE, complain
-from proofroll.cli.plot import plot
+from proofroll.cli.plot import plot, replay
 from proofroll.cli.recommend import recommend
 from proofroll.cli.report import report
 from proofroll.cli.run import run
@@ -38,7 +38,7 @@ app = typer.Typer(
     rich_markup_mode=None,
 )
 _STUDIES = (compare, report, tradeoff, recommend, ladder, stability, versions)
-for _command in (scenes, run, judge, plot, export, findings, cite, *_STUDIES):
+for _command in (scenes, run, judge, plot, replay, export, findings, cite, *_STUDIES):
     app.command()(_command)
 app.add_typer(new, name="new")
 app.add_typer(engines, name="engines")

@@ -1,4 +1,4 @@
-"""A person's own run as a picture."""
+"""A person's own run as a picture, and in motion."""
 
 from __future__ import annotations
 
@@ -8,7 +8,8 @@ from typing import Annotated
 
 import typer
 
-from proofroll.cli.options import require_writable
+from proofroll.cli.options import require_writable, spinner
+from proofroll.core.errors import InputError
 
 
 def plot(
@@ -25,3 +26,23 @@ def plot(
     require_writable(target)
     draw_run(read_run(trajectory), target)
     sys.stdout.write(f"The plot is in {target}.\n")
+
+
+def replay(
+    trajectory: Annotated[Path, typer.Argument(help="A netCDF file that proofroll run --out has written.")],
+    out: Annotated[Path | None, typer.Option(help="Page to write; RUN-replay.html by default.")] = None,
+) -> None:
+    """Show a run in motion beside the truth, as a page for a browser."""
+    from proofroll.report.run_plot import read_run
+    from proofroll.report.run_replay import replay_page
+    from proofroll.running.store import write_text
+
+    target = trajectory.with_name(f"{trajectory.stem}-replay.html") if out is None else out
+    if target.suffix.lower() != ".html":
+        raise InputError("--out", str(target), "a replay is a page: end the name of the file in .html")
+    require_writable(target)
+    run = read_run(trajectory)
+    with spinner("the truth"):
+        text = replay_page(trajectory, run)
+    write_text(target, text)
+    sys.stdout.write(f"The replay is in {target}.\n")

@@ -9,9 +9,10 @@ from __future__ import annotations
 import hashlib
 import json
 from collections.abc import Mapping
-from dataclasses import asdict, dataclass, field
+from dataclasses import asdict, dataclass, field, replace
 from functools import cached_property
 from pathlib import Path
+from typing import Self
 
 from proofroll.core.element import Element
 from proofroll.core.errors import InputError, choices
@@ -54,6 +55,12 @@ class Scene:
                 known = choices(dict.fromkeys(known for element in self.elements for known in element.askable))
                 advice = f"no element of the scene has that to ask for; choose {known}" if known else "ask for nothing"
                 raise InputError("asks", name, advice)
+
+    @property
+    def fully_asked(self) -> Self:
+        """The scene with all that can be asked for besides the motion, as of its truth."""
+        asks = dict.fromkeys(ask for element in self.elements for ask in element.askable)
+        return replace(self, asks=tuple(asks))
 
     @cached_property
     def requires(self) -> frozenset[str]:

@@ -15,7 +15,7 @@ from proofroll.files.scene_file import load_scene
 from proofroll.report.html import page
 from proofroll.report.kinds import kind_of
 from proofroll.report.plots import point_curves
-from proofroll.report.replay import joined
+from proofroll.report.replay import joined, replay_content
 from proofroll.report.report_content import report_content
 from proofroll.report.study_parts import Part, absent, attempt, entry
 from proofroll.report.summary import three_sentences
@@ -136,7 +136,9 @@ def _replay(outcomes: list[Outcome], store: Store) -> dict[str, Any]:
     """The replay of the comparisons, one kind of scenes after the other."""
     kinds = {id(item): kind_of(load_scene(item.comparison.scene)) for item in outcomes}
     found = dict.fromkeys(kind for kind in kinds.values() if kind is not None)
-    return joined([kind.replay([item for item in outcomes if kinds[id(item)] is kind], store) for kind in found])
+    return joined(
+        [replay_content([item for item in outcomes if kinds[id(item)] is kind], store, kind.replay()) for kind in found]
+    )
 
 
 def _described(replay: dict[str, Any]) -> list[dict[str, Any]]:

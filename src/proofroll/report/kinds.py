@@ -12,8 +12,9 @@ if TYPE_CHECKING:
 
     from proofroll.core.observable import Observable
     from proofroll.core.scene import Scene
+    from proofroll.report.replay import ReplayKind
     from proofroll.running.store import Store
-    from proofroll.studies.outcome import Outcome, Run
+    from proofroll.studies.outcome import Run
 
 GROUP = "proofroll.report_kinds"
 
@@ -69,8 +70,8 @@ class ReportKind(Protocol):
         """The curves of a comparison with its marks."""
 
     @staticmethod
-    def replay(outcomes: Sequence[Outcome], store: Store) -> dict[str, Any]:
-        """What the replay draws of these comparisons, from :func:`proofroll.report.replay.replay_content`."""
+    def replay() -> ReplayKind:
+        """How the replay draws its scenes."""
 
 
 @cache

@@ -2,10 +2,10 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
 from pathlib import Path
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 
@@ -38,34 +38,32 @@ class Ghost:
     """A run that can be shown beside the truth.
 
     Attributes:
-        run: the run.
+        key: of its case; one run has one.
+        engine: name of the engine.
+        settings: of the engine, complete.
         name, colour: as in the figures of its comparison.
         distance: of its bodies from the true ones, at most [m].
         file: its trajectory.
+        message: why it ended early; empty if it did not.
     """
 
-    run: Run
+    key: str
+    engine: str
+    settings: Mapping[str, Any]
     name: str
     colour: int
     distance: float
     file: Path
-
-    @property
-    def engine(self) -> str:
-        """Name of the engine."""
-        assert self.run.facts is not None  # it ran
-        return self.run.facts.name
+    message: str = ""
 
     @property
     def default(self) -> bool:
         """Whether it is what a user gets by writing the obvious model."""
-        assert self.run.facts is not None  # it ran
-        return self.run.facts.settings.get("preset") == "default"
+        return self.settings.get("preset") == "default"
 
     def ending(self, reached: float) -> str:
         """Why it is not there until the end, where its last frame is at ``reached`` [s]."""
-        reason = "it leaves the picture" if self.run.result.status == Status.DONE else self.run.result.message
-        return f"until {reached:.3g} s: {reason}"
+        return f"until {reached:.3g} s: {self.message or 'it leaves the picture'}"
 
 
 @dataclass(frozen=True)
@@ -114,9 +112,21 @@ class PackedNumbers:
 Drawer = Callable[[Replayed], tuple[dict[str, Any], list[int], PackedNumbers]]
 
 
-def replay_content(
-    outcomes: list[Outcome], store: Store, kind: str, seen: Callable[[Scene], float], draw: Drawer
-) -> dict[str, Any]:
+class ReplayKind(NamedTuple):
+    """How a kind of scene is replayed.
+
+    Attributes:
+        name: under which the page's program knows how to draw it.
+        seen: how far a body of a scene can be off and look right [m].
+        draw: what is drawn of a truth and its ghosts.
+    """
+
+    name: str
+    seen: Callable[[Scene], float]
+    draw: Drawer
+
+
+def replay_content(outcomes: list[Outcome], store: Store, kind: ReplayKind) -> dict[str, Any]:
     """Everything that the replay draws, as plain data.
 
     There is one case for each truth of the comparisons. Its ghosts are what the engines make of it with ``default``
@@ -126,9 +136,7 @@ def replay_content(
     Args:
         outcomes: comparisons of scenes of one kind.
         store: with their trajectories.
-        kind: under which name the page's program knows how to draw them.
-        seen: how far a body of a scene can be off and look right [m].
-        draw: what is drawn of a truth and its ghosts.
+        kind: of these scenes.
 
     Returns:
         ``library``: from :func:`proofroll.report.replay_library.three`; ``speeds``; ``start``: number of the case to
@@ -149,13 +157,15 @@ def replay_content(
             for outcome, point in shared
             for ghost in _ghosts(_runs(outcome, point, store), looks[id(outcome)], true, store)
         ]
-        ghosts = _chosen(ghosts, seen(scene))
+        ghosts = _chosen(ghosts, kind.seen(scene))
         # The comparison that has most to show at this point names the case.
         title = max(shared, key=lambda pair: len(_runs(pair[0], pair[1], store)))[0].comparison.title
-        own, frames, drawn = draw(Replayed(scene, store.trajectory(case), ghosts))
-        said = {"kind": kind, "group": title, "label": point_name(case.parameters) or scene.title, "scene": scene.title}
-        cases.append(said | own | {"runs": _told(case, ghosts, own, frames, store), "arrays": drawn.arrays})
-        numbers.append(packed(bytes(drawn.content)))
+        said = {"group": title, "label": point_name(case.parameters) or scene.title}
+        content, packed_numbers = case_content(
+            Replayed(scene, store.trajectory(case), ghosts), kind, lambda file: f"{store.folder.name}/{file.name}"
+        )
+        cases.append(said | content)
+        numbers.append(packed_numbers)
     plainest = [load_scene(case.scene, asks=case.asks).digest == case.scene_digest for case, _ in found.values()]
     start = plainest.index(True) if any(plainest) else 0
     return {"library": three(), "speeds": SPEEDS, "start": start, "cases": cases, "packed": numbers}
@@ -182,15 +192,20 @@ def frame_times(until: float, fastest: float) -> FloatArray:
     return np.linspace(0.0, until, 1 + int(np.ceil(max(min(wanted, MOST_FRAMES), turned / WIDEST_TURN))))
 
 
-def _told(
-    case: Case, ghosts: list[Ghost], drawn: dict[str, Any], frames: list[int], store: Store
-) -> list[dict[str, Any]]:
-    """The truth and its ghosts in words; of each engine the one furthest off is shown at first."""
-    first = {ghost.engine: ghost for ghost in reversed(ghosts)}  # the one furthest off comes first
-    until, whole = drawn["until"], drawn["frames"]
-    truth = {"name": "truth", "colour": -1, "shown": True, "frames": whole, "message": ""}
-    return [
-        truth | {"trajectory": _name(store.trajectory(case), store)},
+def case_content(replayed: Replayed, kind: ReplayKind, named: Callable[[Path], str]) -> tuple[dict[str, Any], str]:
+    """A truth and its ghosts in words, with what is drawn of them; and the numbers, packed.
+
+    Args:
+        replayed: what is shown.
+        kind: how.
+        named: what the page calls a file.
+    """
+    own, frames, drawn = kind.draw(replayed)
+    first = {ghost.engine: ghost for ghost in reversed(replayed.ghosts)}  # the one furthest off comes first
+    until, whole = own["until"], own["frames"]
+    runs = [
+        {"name": "truth", "colour": -1, "shown": True, "frames": whole, "message": ""}
+        | {"trajectory": named(replayed.file)},
         *(
             {
                 "name": ghost.name,
@@ -198,16 +213,20 @@ def _told(
                 "shown": first[ghost.engine] is ghost,
                 "frames": count,
                 "message": ghost.ending(until * (count - 1) / max(1, whole - 1)) if count < whole else "",
-                "trajectory": _name(ghost.file, store),
-                "settings": plain(ghost.run.facts.settings if ghost.run.facts else {}),
+                "trajectory": named(ghost.file),
+                "settings": plain(dict(ghost.settings)),
             }
-            for ghost, count in zip(ghosts, frames, strict=True)
+            for ghost, count in zip(replayed.ghosts, frames, strict=True)
         ),
     ]
+    said = {"kind": kind.name, "scene": replayed.scene.title}
+    return said | own | {"runs": runs, "arrays": drawn.arrays}, packed(bytes(drawn.content))
 
 
-def _name(file: Path, store: Store) -> str:
-    return f"{store.folder.name}/{file.name}"
+def distance(path: FloatArray, true: FloatArray) -> float:
+    """The largest distance between bodies [m]; a run that ended early has fewer samples."""
+    count = min(len(path), len(true))
+    return float(np.linalg.norm(path[:count] - true[:count], axis=-1).max())
 
 
 def _runs(outcome: Outcome, point: str, store: Store) -> list[tuple[int, Run]]:
@@ -229,10 +248,11 @@ def _looks(outcome: Outcome) -> list[tuple[str, int]]:
 def _ghosts(runs: list[tuple[int, Run]], looks: list[tuple[str, int]], true: FloatArray, store: Store) -> list[Ghost]:
     ghosts = []
     for number, run in runs:
-        path = read_some(_file(run, store), ["p_WB"])["p_WB"]
-        count = min(len(path), len(true))  # a run that ended early has fewer samples
-        distance = float(np.linalg.norm(path[:count] - true[:count], axis=-1).max())
-        ghosts.append(Ghost(run, *looks[number], distance, _file(run, store)))
+        assert run.case is not None  # it has a trajectory
+        engine, file = run.case.engine, _file(run, store)
+        away = distance(read_some(file, ["p_WB"])["p_WB"], true)
+        message = "" if run.result.status == Status.DONE else run.result.message
+        ghosts.append(Ghost(run.case.key, engine.name, engine.settings, *looks[number], away, file, message))
     return ghosts
 
 
@@ -241,7 +261,7 @@ def _chosen(ghosts: list[Ghost], seen: float) -> list[Ghost]:
 
     All that are ``default``, and of the others the furthest, if it is off by more than ``seen`` [m] or there is none.
     """
-    once = {_key(ghost.run): ghost for ghost in reversed(ghosts)}  # the first comparison's name stays
+    once = {ghost.key: ghost for ghost in reversed(ghosts)}  # the first comparison's name stays
     chosen = []
     for engine in dict.fromkeys(ghost.engine for ghost in ghosts):
         own = sorted((ghost for ghost in once.values() if ghost.engine == engine), key=lambda ghost: -ghost.distance)
@@ -249,11 +269,6 @@ def _chosen(ghosts: list[Ghost], seen: float) -> list[Ghost]:
         other = [ghost for ghost in own if not ghost.default][:1]
         chosen += default + [ghost for ghost in other if ghost.distance > seen or not default]
     return chosen
-
-
-def _key(run: Run) -> str:
-    assert run.case is not None  # it has a trajectory
-    return run.case.key
 
 
 def _file(run: Run, store: Store) -> Path:

@@ -78,7 +78,7 @@ def plan(comparison: Comparison, engines: Iterable[str] = (), workers: Workers |
     for row, facts, ladder_facts in zip(rows, resolved, rungs, strict=True):
         for point in comparison.variations(row):
             scene = load_scene(comparison.scene, **point)
-            truths.setdefault(point_name(point), _case(comparison, _whole(scene), point, truth_facts))
+            truths.setdefault(point_name(point), _case(comparison, scene.fully_asked, point, truth_facts))
             if not isinstance(facts, EngineFacts):
                 runs.append(Planned(row, point, facts))
                 continue
@@ -146,11 +146,6 @@ def _rungs(
 def _scaled(facts: EngineFacts, factor: float) -> float:
     """Factor on the resolution: a tolerance is loosened by decades where a step is doubled."""
     return factor if facts.resolution == "dt" else float(10 ** np.log2(factor))
-
-
-def _whole(scene: Scene) -> Scene:
-    """The scene with all that can be asked for: the truth has it, whether engines are asked for it or not."""
-    return replace(scene, asks=tuple(dict.fromkeys(name for element in scene.elements for name in element.askable)))
 
 
 def _case(

@@ -1,15 +1,16 @@
-"""``proofroll plot`` and ``run --plot``: a person's own run as a picture."""
+"""``proofroll plot``, ``run --plot`` and ``proofroll replay``: a person's own run as a picture, and in motion."""
 
 from __future__ import annotations
 
 import json
+import re
 from collections.abc import Callable
 from pathlib import Path
 
 import pytest
 import xarray as xr
 
-from proofroll.files.netcdf import read
+from proofroll.files.netcdf import read, write
 from proofroll.report.run_plot import curves
 
 Proofroll = Callable[..., tuple[int, str, str]]
@@ -63,6 +64,43 @@ def test_bad_files(proofroll: Proofroll, tmp_path: Path) -> None:
         assert (code, out, err.count("\n")) == (2, "", 1)
         assert word in err
     assert [path.name for path in tmp_path.iterdir() if path.suffix in {".html", ".gif"}] == []
+
+
+@pytest.mark.parametrize(
+    ("words", "shown"),
+    [(["sphere_in_cylinder", "--set", "speed=3", "--engine", "oracle"], ["truth", "oracle"]),
+     (["pendulum", "--engine", "truth"], ["truth"])],
+)  # fmt: skip
+def test_a_run_in_motion(proofroll: Proofroll, tmp_path: Path, words: list[str], shown: list[str]) -> None:
+    """The page holds the truth and beside it the run, of whatever kind of element, named by what is not default."""
+    run = tmp_path / "run.nc"
+    assert proofroll("run", *words, *RUN, "--out", str(run))[0] == 0
+    code, out, err = proofroll("replay", str(run))
+    assert (code, err) == (0, "")
+    assert "run-replay.html" in out
+    page = (tmp_path / "run-replay.html").read_text(encoding="utf-8")
+    (found,) = re.findall(r'data-part="cases">(.*?)</script>', page, flags=re.DOTALL)
+    (case,) = json.loads(found)
+    assert [item["name"] for item in case["runs"]] == shown
+    assert case["label"] == ("speed=3" if "--set" in words else case["scene"])
+
+
+def test_what_cannot_be_replayed(proofroll: Proofroll, tmp_path: Path) -> None:
+    """A file that is no page, a run of no scene, and a scene that has changed since: one line, exit code 2."""
+    run = tmp_path / "run.nc"
+    assert proofroll("run", "pendulum", "--engine", "truth", *RUN, "--out", str(run))[0] == 0
+    dataset = read(run)
+    write(dataset.assign_attrs(scene_digest="another"), tmp_path / "old.nc")
+    del dataset.attrs["scene"]
+    write(dataset, tmp_path / "none.nc")
+    for arguments, word in (
+        ([str(run), "--out", str(tmp_path / "run.svg")], ".html"),
+        ([str(tmp_path / "old.nc")], "has changed since this run"),
+        ([str(tmp_path / "none.nc")], "does not say which scene"),
+    ):
+        code, out, err = proofroll("replay", *arguments)
+        assert (code, out, err.count("\n")) == (2, "", 1)
+        assert word in err
 
 
 def test_what_has_no_value_is_not_drawn() -> None:

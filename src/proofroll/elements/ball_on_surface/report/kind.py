@@ -13,8 +13,9 @@ if TYPE_CHECKING:
     import xarray as xr
 
     from proofroll.core.observable import Observable
+    from proofroll.report.replay import ReplayKind
     from proofroll.running.store import Store
-    from proofroll.studies.outcome import Outcome, Run
+    from proofroll.studies.outcome import Run
 
 
 class BallReport:
@@ -66,9 +67,9 @@ class BallReport:
         return onsets.mark(content, curves)
 
     @staticmethod
-    def replay(outcomes: Sequence[Outcome], store: Store) -> dict[str, Any]:
+    def replay() -> ReplayKind:
         """Balls rolling on their wall."""
         from proofroll.elements.ball_on_surface.report.replay import drawn, seen
-        from proofroll.report.replay import replay_content
+        from proofroll.report.replay import ReplayKind
 
-        return replay_content(list(outcomes), store, "ball", seen, drawn)
+        return ReplayKind("ball", seen, drawn)

@@ -12,8 +12,9 @@ if TYPE_CHECKING:
     import xarray as xr
 
     from proofroll.core.observable import Observable
+    from proofroll.report.replay import ReplayKind
     from proofroll.running.store import Store
-    from proofroll.studies.outcome import Outcome, Run
+    from proofroll.studies.outcome import Run
 
 
 class MechanismReport:
@@ -67,9 +68,9 @@ class MechanismReport:
         return curves
 
     @staticmethod
-    def replay(outcomes: Sequence[Outcome], store: Store) -> dict[str, Any]:
+    def replay() -> ReplayKind:
         """Bodies and joints in motion."""
         from proofroll.elements.mechanism.report.replay import drawn, seen
-        from proofroll.report.replay import replay_content
+        from proofroll.report.replay import ReplayKind
 
-        return replay_content(list(outcomes), store, "mechanism", seen, drawn)
+        return ReplayKind("mechanism", seen, drawn)

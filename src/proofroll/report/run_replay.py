@@ -1,0 +1,99 @@
+"""A person's own run in motion, beside the truth, as a page of its own."""
+
+from __future__ import annotations
+
+import json
+import tempfile
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+from proofroll.core.errors import InputError
+from proofroll.core.scene import Scene
+from proofroll.core.truth import truth
+from proofroll.files.netcdf import write
+from proofroll.files.scene_file import load_scene
+from proofroll.report.kinds import kind_of, report_kinds
+from proofroll.report.labels import settings_text
+from proofroll.report.replay import SPEEDS, Ghost, Replayed, case_content, distance
+from proofroll.report.replay_library import three
+from proofroll.studies.planning import point_name
+
+if TYPE_CHECKING:
+    import xarray as xr
+
+_WRITES = "proofroll run … --out writes such a file"
+
+
+def replay_page(path: Path, run: xr.Dataset) -> str:
+    """The page: the truth of the run's scene, solid, and the run, translucent.
+
+    Args:
+        path: of the run's file.
+        run: what it holds.
+
+    Raises:
+        InputError: it does not say of what it is a run, the scene is another by now, or nothing draws such scenes.
+        ProofrollError: the scene has no truth.
+    """
+    from proofroll.report.html import templates
+
+    scene = _scene(path, run)
+    kind = kind_of(scene)
+    if kind is None or not kind.replay_script:
+        raise InputError("run", str(path), f"nothing that is installed draws the scene {scene.title}")
+    with tempfile.TemporaryDirectory() as folder:
+        file = Path(folder) / "truth.nc"
+        true = truth(scene, run["time"].to_numpy())
+        write(true, file)
+        content, numbers = case_content(Replayed(scene, file, _ghosts(path, run, true)), kind.replay(), lambda _: "")
+    usual = load_scene(str(run.attrs["scene"])).parameters
+    label = point_name({name: value for name, value in scene.parameters.items() if value != usual[name]})
+    case = {"group": scene.title, "label": label or scene.title} | content
+    replay = {"library": three(), "speeds": SPEEDS, "start": 0, "cases": [case], "packed": [numbers]}
+    return (
+        templates()
+        .get_template("run_replay.html")
+        .render(
+            scene=scene,
+            replay=replay,
+            said=_said(run),
+            replay_scripts=[other.replay_script for other in report_kinds() if other.replay_script],
+        )
+    )
+
+
+def _said(run: xr.Dataset) -> str:
+    engine = str(run.attrs["engine"])
+    if engine == "truth":
+        return "The truth."
+    given = json.loads(run.attrs["settings"])
+    settings = settings_text({name: value for name, value in given.items() if value is not None})
+    return f"The truth, solid, and {engine} ({settings}), translucent; where it agrees it is hidden in the truth."
+
+
+def _scene(path: Path, run: xr.Dataset) -> Scene:
+    """The scene of a run, with all that can be asked of its truth."""
+    try:
+        name, digest = str(run.attrs["scene"]), str(run.attrs["scene_digest"])
+        parameters = _parameters(run)
+    except (KeyError, ValueError):
+        raise InputError("run", str(path), f"it does not say which scene it is of; {_WRITES}") from None
+    scene = load_scene(name, **parameters)
+    if digest not in {scene.digest, scene.fully_asked.digest}:
+        raise InputError("run", str(path), f"the scene {name} has changed since this run; run it again")
+    return scene.fully_asked
+
+
+def _parameters(run: xr.Dataset) -> dict[str, Any]:
+    return dict(json.loads(run.attrs["parameters"]))
+
+
+def _ghosts(path: Path, run: xr.Dataset, true: xr.Dataset) -> list[Ghost]:
+    """The run as a ghost; none if it is the truth itself."""
+    engine = str(run.attrs["engine"])
+    if engine == "truth":
+        return []
+    settings = json.loads(run.attrs["settings"])
+    message = "" if run.attrs["status"] == "done" else str(run.attrs["message"])
+    away = distance(run["p_WB"].to_numpy(), true["p_WB"].to_numpy())
+    return [Ghost("", engine, settings, engine, 0, away, path, message)]
