@@ -55,6 +55,8 @@ class ReportedForce:
         found, body = both(evidence), evidence.element.rolling
         if found is None or "N" not in found[0] or "N" not in found[1] or CLOCK.proven(evidence):
             return
+        if body.flies:  # a force that is there and gone: an impact a moment later is no force that is told late
+            return
         run, truth = found
         time, axes = truth["time"].to_numpy(), frames(body, truth)
         said, true = forces(body, run), forces(body, truth)

@@ -121,4 +121,8 @@ def differentiated(formula: Callable[..., Any], count: int) -> tuple[Callable[..
         except (ValueError, ArithmeticError):  # numpy gives NaN there
             return missing
 
-    return floats, of_arrays["calculated"]
+    def arrays(*at: Any) -> Any:
+        with np.errstate(invalid="ignore", divide="ignore"):
+            return of_arrays["calculated"](*at)
+
+    return floats, arrays
