@@ -142,7 +142,8 @@ def _dataset(run: Run, scene: Scene) -> xr.Dataset:
         try:
             run = read(Path(run))
         except (OSError, ValueError) as error:
-            raise InputError("run", str(run), f"it cannot be read as netCDF-3 ({error})") from None
+            advice = f"it cannot be read ({error}); xarray writes it by to_netcdf(path, format='NETCDF3_64BIT')"
+            raise InputError("run", str(run), advice) from None
     given = {str(name): np.asarray(run[name]) for name in run} if not isinstance(run, xr.Dataset) else None
     if given is not None:
         if "time" not in given:
