@@ -195,15 +195,16 @@ class Drill:
         folder = Path(os.environ[FOLDER])
         cured = (folder / "cured" / settings.formulation).exists()
         self._where, self._deed = DEEDS["well" if cured else settings.formulation]
-        self._alive = (folder / f"alive-{settings.formulation}").open("w")
-        fcntl.flock(self._alive, fcntl.LOCK_SH)  # held by this process and every child of it, until the last has ended
-        os.set_inheritable(self._alive.fileno(), True)
+        self._mark = folder / f"alive-{settings.formulation}"
         self._do("build")
         self._inner = Projection.build(scene, Projection.settings(formulation="rotating_frame", rtol=settings.rtol))
         self._t = 0.0
 
     def _do(self, where: str) -> None:
         if self._where == where:
+            self._alive = self._mark.open("w")  # only now: whoever waits for it kills in the middle of the deed
+            fcntl.flock(self._alive, fcntl.LOCK_SH)  # held by this process and every child of it, until the last ended
+            os.set_inheritable(self._alive.fileno(), True)
             self._deed()
 
     def advance(self, t: float) -> None:
