@@ -7,6 +7,7 @@ import json
 import shutil
 import sys
 from pathlib import Path
+from typing import Any
 
 from PIL import Image
 from PIL.PngImagePlugin import PngInfo
@@ -41,7 +42,7 @@ def screenshot(report: Path, picture: Path) -> None:
         )
         page.goto(report.resolve().as_uri())
         end = page.locator(".matrix").first.evaluate("(table) => table.getBoundingClientRect().bottom + 16")
-        area = {"x": 0, "y": 0, "width": WIDTH, "height": min(end, MOST_HEIGHT)}
+        area: Any = {"x": 0, "y": 0, "width": WIDTH, "height": min(end, MOST_HEIGHT)}
         image = Image.open(io.BytesIO(page.screenshot(clip=area)))
         said = PngInfo()
         said.add_text("verdicts", json.dumps(page.evaluate(ROWS)))

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import os
-import re
 import sys
 import tempfile
 from pathlib import Path
@@ -88,6 +87,13 @@ def measured(runner: Runner) -> dict[str, Any]:
     return study
 
 
+def between(text: str, name: str, table: str) -> str:
+    """The page with this table between the two marks of a name."""
+    begin, end = f"<!-- {name}:begin -->\n", f"<!-- {name}:end -->"
+    head, tail = text.partition(begin)[0], text.partition(end)[2]
+    return head + begin + table + end + tail
+
+
 def main() -> None:
     """Runs the studies and rewrites tables and pictures."""
     with tempfile.TemporaryDirectory() as folder:
@@ -106,12 +112,7 @@ def main() -> None:
         ("caveats", caveat_list(outcome_content(outcome))),
         ("cheapest", cheapest_table(study, TOLERANCES)),
     ):
-        text = re.sub(
-            rf"(<!-- {name}:begin -->\n).*?(<!-- {name}:end -->)",
-            lambda match, table=table: match[1] + table + match[2],
-            text,
-            flags=re.DOTALL,
-        )
+        text = between(text, name, table)
     target.write_text(restamped(text, stamp("paper", facts("paper"))), encoding="utf-8")
 
 
