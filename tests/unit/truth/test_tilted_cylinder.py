@@ -63,3 +63,12 @@ def test_where_it_leaves_the_wall(k: float, speed: float) -> None:
     assert event.kind == "lift_off"
     at = float(np.interp(event.time, found["time"], found["gamma"]))
     assert np.cos(at) == pytest.approx(-(speed**2 * (1 + k) - 2 * pull) / (pull * (3 + k)), abs=1e-5)
+
+
+@pytest.mark.parametrize(("part", "leaves"), [(0.995, True), (1.005, False)])
+def test_speed_that_it_takes_round_a_lying_cylinder(part: float, leaves: bool) -> None:
+    """A homogeneous ball from the bottom of a lying cylinder stays on the wall from V0² = 27 g c/7 on."""
+    scene = load_scene("tilted_cylinder", tilt=np.pi / 2, speed=part * np.sqrt(27 * G * C / 7))
+    found = truth(scene, np.linspace(0, 0.36, 61))
+    assert [event.kind for event in events_of(found)] == (["lift_off"] if leaves else [])
+    assert float(np.abs(np.unwrap(found["gamma"])[-1])) > (2.8 if leaves else np.pi)
