@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import itertools
 from collections.abc import Iterator, Mapping
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 
 import numpy as np
 
@@ -25,6 +25,8 @@ _PERMUTATIONS = [
     for signs in itertools.product((1.0, -1.0), repeat=3)
     if order != (0, 1, 2) or len(set(signs)) > 1
 ]
+# A unit is exact: a factor that nobody makes by mistake has to leave less, or few samples of anything would be alike.
+_EXACT = 1e-3
 _SIGN = "an engine may give what acts on the other body: look at whose vector it is"
 
 
@@ -127,17 +129,24 @@ class Reported:
 
     def _scaled(self, step: float | None) -> Iterator[Cause]:
         square = float(np.sum(self.true**2))
-        if square:
-            factor = float(np.sum(self.said * self.true)) / square
-            if np.count_nonzero(self.true) < 2 and known_factor(factor) is None:
-                return  # some factor takes any number to any other
-            times = (
-                "times the step, as an impulse" if step and abs(factor - step) < 1e-3 * step else said_factor(factor)
-            )
-            says = f"{self.name} is {self.what} {times}"
-            yield self.cause("scaled", says, factor * self.true, f"look at the unit of {self.name}", 1)
+        if not square:
+            return
+        factor = float(np.sum(self.said * self.true)) / square
+        impulse = bool(step) and abs(factor - (step or 0.0)) < 1e-3 * (step or 0.0)
+        known = impulse or known_factor(factor) is not None
+        if np.count_nonzero(self.true) < 2 and not known:
+            return  # some factor takes any number to any other
+        times = "times the step, as an impulse" if impulse else said_factor(factor)
+        says = f"{self.name} is {self.what} {times}"
+        cause = self.cause("scaled", says, factor * self.true, f"look at the unit of {self.name}", 1)
+        yield cause if known else replace(cause, closes=_EXACT)
 
     def _clamped(self) -> Iterator[Cause]:
+        """A limit is held exactly, as a unit is."""
+        for cause in self._limits():
+            yield replace(cause, closes=_EXACT)
+
+    def _limits(self) -> Iterator[Cause]:
         limit = float(np.max(np.abs(self.said)))
         remedy = f"find what limits {self.name} to {limit:.6g} {self.unit}"
         says = f"{self.name} is clamped at {limit:.6g} {self.unit}"
