@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import json
 import re
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from pathlib import Path
 
 import pytest
@@ -48,12 +48,18 @@ def fields(title: str) -> set[str]:
     ids=["scenes", "check-scene", "check-study", "run", "compare", "engines"],
 )
 def test_fields(
-    proofroll: Proofroll, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, title: str, arguments: list[str]
+    command_line: Proofroll,
+    install_engines: Callable[[Mapping[str, str]], None],
+    tmp_path: Path,
+    monkeypatch: pytest.MonkeyPatch,
+    title: str,
+    arguments: list[str],
 ) -> None:
     """The document has each field of its table, and the table each of the document."""
+    install_engines({"oracle": "hostile:Oracle", "absent": "no_such_module_anywhere:Engine"})
     monkeypatch.chdir(tmp_path)
     Path("claim.toml").write_text(CLAIM, encoding="utf-8")
-    code, out, _ = proofroll(*arguments, "--json")
+    code, out, _ = command_line(*arguments, "--json")
     found = json.loads(out)
     assert code in {0, 1}
     items = found if isinstance(found, list) else [found]
