@@ -14,6 +14,8 @@ from proofroll.elements.ball_on_surface.model import RollingBall
 from proofroll.elements.ball_on_surface.resting import setting_off, stands, stays
 from proofroll.elements.ball_on_surface.surfaces import Declared
 
+_PULLS = 1e-9  # of the whole force: a smaller pull is round-off
+
 
 def slip_velocity(radius: float, e1: FloatArray, v_WB: FloatArray, w_WB: FloatArray) -> FloatArray:
     """Velocity of the ball's contact point in the world [m/s], shape (..., 3): v + ω × a e1."""
@@ -84,7 +86,8 @@ def initial_response(body: RollingBall) -> tuple[FloatArray, FloatArray]:
     the last three equations are the constraints differentiated, using the signed distance and its derivatives.
     Where that needs more friction than there is, the ball begins to slip against it: N is the same, for friction
     along the wall does not change it. A ball at rest stays so where rolling resistance and friction can hold it. A
-    ball that starts slipping has kinetic friction against its slip, and one off the wall falls.
+    ball that starts slipping has kinetic friction against its slip, and one off the wall falls, as does one that only a
+    pull would hold there.
     """
     if body.gap0:
         return body.gravity, np.zeros(3)
@@ -96,7 +99,10 @@ def initial_response(body: RollingBall) -> tuple[FloatArray, FloatArray]:
     acceleration, _, force = newton_euler(body, body.p0, _way(body), body.w0)
     e1 = body.surface.normal(body.p0)
     normal = (force @ e1) * e1
-    friction, press = force - normal, float(np.linalg.norm(normal))
+    friction, press = force - normal, -float(force @ e1)
+    if press < -_PULLS * float(np.linalg.norm(force)):  # no wall pulls: the ball falls off
+        return body.gravity, np.zeros(3)
+    press = abs(press)
     needed = float(np.linalg.norm(friction))
     if needed <= body.contact.mu_static * press * (1 + 1e-12):
         return acceleration, force

@@ -250,3 +250,11 @@ def test_friction_that_the_scene_does_not_bound() -> None:
         sentence = first_difference(certify(Stub(scene, mu_static=mu), scene))
         assert sentence is not None
         assert "1 / static friction" in sentence
+
+
+def test_a_ball_that_only_a_pull_would_hold_falls() -> None:
+    """Below the ring of a torus at rest, nothing presses: the scene's own first motion is a fall, without a force."""
+    body = rolling_ball(load_scene("torus_rim", start=3.1))
+    acceleration, force = initial_response(body)
+    assert acceleration == pytest.approx(body.gravity)
+    assert not np.any(force)
