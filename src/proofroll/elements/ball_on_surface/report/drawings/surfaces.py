@@ -64,16 +64,19 @@ def _cylinder(wall: Cylinder, body: RollingBall) -> list[Drawing]:
 
 @overview.register
 def _plane(wall: Plane, body: RollingBall) -> list[Drawing]:
-    """A slope with its angle, the ball on it, and its speeds down and across."""
+    """A slope with its angle, the ball on it or above, and its speeds down and across."""
     a, surface = body.ball.radius, body.surface
-    size = 6.0 * a
+    size = max(6.0 * a, body.gap0)
     drawn, at = Drawing(), View(direction(-62, 22), (0, 0, 1), SIZE / size)
     corners = [(-0.8, -0.7), (1.3, -0.7), (1.3, 0.7), (-0.8, 0.7)]
     low, high = (wall.position(size * np.array(u)) for u in (corners[2], corners[3]))
     drawn.path(at([wall.position(size * np.array(u)) for u in corners]), "wall", closed=True)
     _slope(drawn, at, low, high)
-    start, frame = surface.position(body.u0), surface.frame(body.u0)
-    foot = start + a * frame[:, 0]
+    start, touching, frame = body.p0, surface.position(body.u0), surface.frame(body.u0)
+    foot = touching + a * frame[:, 0]
+    if body.gap0:
+        drawn.path(at([start, touching]), "hidden")
+        drawn.disc(at(touching).tolist(), a * at.scale, "ghost")
     for index, symbol in ((1, "V_0"), (2, "V_3")):
         way = at([foot, foot + 0.95 * size * frame[:, index]])
         drawn.arrow(way, "thin")
