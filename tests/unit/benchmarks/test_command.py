@@ -49,17 +49,19 @@ def test_adapters_json(proofroll: Proofroll, tmp_path: Path) -> None:
     assert code in (0, 1), err
     assert kept.read_text(encoding="utf-8") == out
     found = json.loads(out)
-    assert set(found) == {"goal", "scene", "every", "machine", "engines"}
+    assert set(found) == {"goal", "scene", "mechanisms", "every", "machine", "engines"}
     assert set(found["engines"]) == {"projection"}
     engine = found["engines"]["projection"]
     assert set(engine["ratio"]) == INTERVAL
     assert engine["ratio"]["value"] > 0
     assert code == (0 if engine["within_goal"] else 1)
-    assert {row["formulation"] for row in engine["rows"]} == {"euler", "rotating_frame"}
+    assert {row["formulation"] for row in engine["rows"]} == {"euler", "rotating_frame", "dependent"}
     for row in engine["rows"]:
         if "slips" in row["variant"]:
             assert row["ratio"] is None
             assert "slips" in row["message"]
+        elif row["formulation"] == "dependent" and row["ratio"] is None:
+            assert "only with rk4" in row["message"]
         else:
             assert set(row["ratio"]) == INTERVAL
             assert row["distance"] <= row["tolerance"]

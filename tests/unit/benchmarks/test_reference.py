@@ -11,6 +11,7 @@ import numpy as np
 import pytest
 from rich.console import Console
 
+from proofroll.core.engine_abilities import Term
 from proofroll.core.errors import Refused
 from proofroll.elements.ball_on_surface.compiled import library
 from proofroll.elements.ball_on_surface.element import rolling_ball
@@ -71,8 +72,8 @@ def test_search_takes_what_holds(monkeypatch: pytest.MonkeyPatch, tmp_path: Path
 def test_search_leaves_out_what_an_engine_can_do_without() -> None:
     """Each term of the formulation that the preset has gives a variant without it; others give none."""
     terms = [
-        {"formulations": ("a", "b"), "off": {"exact": False}},
-        {"formulations": ("b",), "off": {"drift": None, "damping": 0.0}},
+        Term("exactness", ("a", "b"), {}, {"exact": False}, ""),
+        Term("damping", ("b",), {}, {"drift": None, "damping": 0.0}, ""),
     ]
     settings = {"exact": True, "drift": None, "damping": 0.5}
     assert list(searching._without(terms, "a", settings)) == [{"exact": False}]
