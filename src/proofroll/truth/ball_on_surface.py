@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING
 
 from proofroll.core.arrays import FloatArray
 from proofroll.core.element import Element
-from proofroll.core.errors import InputError
+from proofroll.core.errors import Diverged, InputError
 from proofroll.core.scene import Scene
 from proofroll.elements.ball_on_surface.element import BallOnSurface
 from proofroll.elements.ball_on_surface.model import BallCapability
@@ -34,7 +34,11 @@ class BallOnSurfaceTruth:
     def truth(element: Element, times: FloatArray, asks: Sequence[str]) -> xr.Dataset:
         """See :func:`proofroll.truth.truth.truth`; with bounded friction also the conditioning of the first slip."""
         scene = Scene(element.name, "", (element,), asks=tuple(asks))
-        found = truth(scene, times)
+        try:
+            found = truth(scene, times)
+        except ZeroDivisionError:
+            said = "the ball comes to a point where its wall has no curvature, as at the apex of a cone"
+            raise Diverged(f"{said}; start further off") from None
         if "sticking" in found and BallCapability.SLIPPING_START not in element.requires:
             first = onset(scene, float(times[-1]))
             found.attrs["onset"] = json.dumps(dataclasses.asdict(first))

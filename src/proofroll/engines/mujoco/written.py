@@ -63,8 +63,9 @@ def written(body: RollingBall, name: str, formulation: str) -> str:
         raise Refused(f"{formulation} needs a wall made of MuJoCo's shapes, mujoco_{formulation}.xml beside the scene")
     if body.surface.generators is None:
         raise Refused(
-            "chart needs a wall that two rigid motions slide along itself: elsewhere its joints would not follow the "
-            "wall's curvature, and the J̇v that MuJoCo leaves out would remain; use free"
+            "chart moves the ball by two joints in a row that slide its wall along itself, as those of planes and "
+            "cylinders do: on a sphere they are singular at the bottom, elsewhere they would not follow the wall's "
+            "curvature, and the J̇v that MuJoCo leaves out would remain; use free"
         )
     first, second = (_JOINTS[generator.kind] for generator in body.surface.generators)
     return _CHART.format(**known, first=first, second=second)
