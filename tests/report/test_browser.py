@@ -154,3 +154,13 @@ def test_first_slips_and_bounds_of_friction_are_drawn(drawn: Visit) -> None:
     assert figure.get_by_text("μ kinetic = 0.2").count() == 1
     slips = "(figure) => figure.querySelector('.canvas').data.filter((trace) => trace.name === 'first slip').length"
     assert figure.evaluate(slips) == 5, "of the truth and of four runs"
+
+
+def test_the_contents_follow_the_reader(report_page: Path, visit: Visiting) -> None:
+    """Wherever a reader is, the contents are in sight and mark the section that is being read."""
+    with visit(report_page) as seen:
+        for name in ("findings", "replay", "verdicts"):
+            seen.page.evaluate(f"document.getElementById('{name}').scrollIntoView()")
+            seen.page.wait_for_function(f"document.querySelector('nav a[aria-current]')?.hash === '#{name}'")
+            assert seen.page.evaluate("document.querySelector('nav').getBoundingClientRect().top") < 200
+        assert seen.page.locator("nav a[aria-current]").count() == 1

@@ -19,3 +19,21 @@ const stored = unpack;
   });
   reveal();
 })();
+
+// The contents mark the section that is being read, and keep its link in sight.
+(() => {
+  const contents = document.querySelector("nav");
+  const links = [...contents.querySelectorAll("a")].map((link) => [link, document.getElementById(link.hash.slice(1))]);
+  let marked = null;
+  function follow() {
+    const begun = links.filter(([, section]) => section && section.getBoundingClientRect().top < innerHeight / 3);
+    const link = begun.length ? begun[begun.length - 1][0] : null;
+    if (link === marked) return;
+    if (marked) marked.removeAttribute("aria-current");
+    if (link) link.setAttribute("aria-current", "true");
+    contents.scrollLeft = link ? link.offsetLeft - contents.offsetLeft - 40 : 0;
+    marked = link;
+  }
+  addEventListener("scroll", follow, { passive: true });
+  follow();
+})();
