@@ -436,3 +436,12 @@ def test_without_a_picture_the_values_follow_the_time(
     part(opened, "play").click()
     passes(opened, 0.02)
     assert opened.messages == []
+
+
+def test_a_ball_in_the_air_is_off_the_wall() -> None:
+    """Before it lands and between bounces nobody says that it rolls, though its friction has no bound."""
+    scene = load_scene("bouncing_ball", mu_static=np.inf)
+    data = sampled(truth(scene, np.linspace(0, 0.6, 13)))
+    state = poses(rolling_ball(scene), data, data["time"]).state
+    assert state is not None
+    assert set(state.tolist()) == {AWAY}

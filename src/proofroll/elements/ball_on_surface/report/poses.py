@@ -88,15 +88,19 @@ def poses(body: RollingBall, sampled: Sampled, times: FloatArray) -> Poses:
         normal=normal,
         press=press,
         friction=friction,
-        state=_state(sampled, times),
+        state=_state(sampled, times, flies=body.gap0 > 0),
     )
 
 
-def _state(sampled: Sampled, times: FloatArray) -> npt.NDArray[np.uint8] | None:
-    """What the contact does at each frame, as the events tell it, which are finer in time than the samples."""
-    if "sticking" not in sampled:
+def _state(sampled: Sampled, times: FloatArray, flies: bool) -> npt.NDArray[np.uint8] | None:
+    """What the contact does at each frame, as the events tell it, which are finer in time than the samples.
+
+    Without a bound on its friction a ball that touches the wall sticks; ``flies``: it does not touch it at first.
+    """
+    if "sticking" not in sampled and not flies and not len(sampled.get("event_kind", ())):
         return None
-    state = np.full(times.shape, int(sampled["sticking"][0]), dtype=np.uint8)
+    first = AWAY if flies else int(sampled["sticking"][0]) if "sticking" in sampled else STICKS
+    state = np.full(times.shape, first, dtype=np.uint8)
     for kind, time in zip(sampled.get("event_kind", ()), sampled.get("event_time", ()), strict=True):
         state[times >= time] = _AFTER[kind.decode() if isinstance(kind, bytes) else str(kind)]  # never, if it is NaN
     return state
