@@ -161,6 +161,6 @@ def test_the_contents_follow_the_reader(report_page: Path, visit: Visiting) -> N
     with visit(report_page) as seen:
         for name in ("findings", "replay", "verdicts"):
             seen.page.evaluate(f"document.getElementById('{name}').scrollIntoView()")
-            seen.page.wait_for_function(f"document.querySelector('nav a[aria-current]')?.hash === '#{name}'")
+            seen.page.locator(f"nav a[aria-current][href='#{name}']").wait_for(state="attached")
             assert seen.page.evaluate("document.querySelector('nav').getBoundingClientRect().top") < 200
         assert seen.page.locator("nav a[aria-current]").count() == 1
