@@ -7,6 +7,8 @@ import json
 from collections.abc import Sequence
 from typing import TYPE_CHECKING
 
+import numpy as np
+
 from proofroll.core.arrays import FloatArray
 from proofroll.core.element import Element
 from proofroll.core.errors import Diverged, InputError
@@ -35,7 +37,9 @@ class BallOnSurfaceTruth:
         """See :func:`proofroll.truth.truth.truth`; with bounded friction also the conditioning of the first slip."""
         scene = Scene(element.name, "", (element,), asks=tuple(asks))
         try:
-            found = truth(scene, times)
+            # What is not finite is refused by name; a warning before that says nothing more.
+            with np.errstate(invalid="ignore", divide="ignore"):
+                found = truth(scene, times)
         except ZeroDivisionError:
             said = "the ball comes to a point where its wall has no curvature, as at the apex of a cone"
             raise Diverged(f"{said}; start further off") from None

@@ -141,7 +141,6 @@ INERTIA = ((0.02, 0.001, 0.0), (0.001, 0.03, 0.002), (0.0, 0.002, 0.025))
 
 def test_bodies_without_inertia_are_carried_by_others():
     """Massless bodies and point masses on fixed joints: both routes agree on the motion and on every wrench."""
-    pytest.importorskip("heyoka")
     bodies = (
         Body("ground", 0.0),
         Body("arm", 1.0, (0.1, 0.02, 0), INERTIA),
@@ -168,7 +167,6 @@ def test_bodies_without_inertia_are_carried_by_others():
 
 def test_moving_bodies_without_inertia_are_moved_by_what_they_carry():
     """Massless bodies and points between joints: both routes agree on the motion and on every wrench."""
-    pytest.importorskip("heyoka")
     bodies = (
         Body("hub", 0.0),
         Body("ring", 0.0),
