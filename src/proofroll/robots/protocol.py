@@ -86,6 +86,9 @@ class Reading:
 class RobotReader(Protocol):
     """An engine's importer.
 
+    A reader whose engine defines a format names it as ``defines`` and has ``compiled(path)``, which returns what the
+    engine makes of a file as a :class:`Robot`: that is what the file means.
+
     Attributes:
         kinds: formats that it reads.
         options: documented options of the importer that a user may give, each with what it does.
@@ -111,15 +114,6 @@ class RobotReader(Protocol):
         Raises:
             Refused: it cannot be read or evaluated; any other exception counts as the same.
         """
-
-
-class DefinesFormat(Protocol):
-    """A reader whose engine defines a format: what it compiles from a file is what the file means."""
-
-    defines: ClassVar[str]
-
-    def compiled(self, path: Path) -> Robot:
-        """The compiled model as plain data."""
 
 
 @dataclasses.dataclass(frozen=True)

@@ -1,4 +1,4 @@
-"""Known causes why an engine holds another robot than the file describes, a module each.
+"""Known causes why an engine holds another robot than the file describes, a function each.
 
 A cause is proven by computation: the truth is evaluated for the robot that the engine would hold because of it, and
 the engine's difference from that has to vanish.
@@ -35,29 +35,36 @@ class RobotEvidence:
     recompiled: Callable[[Element], Robot | None] = lambda _: None
 
 
+Change = Callable[[RobotEvidence], Robot | None]
+
+
 @dataclasses.dataclass(frozen=True)
 class RobotHypothesis:
     """A cause.
 
     Attributes:
+        id: name of the function that makes the robot.
         name: what the engine does, in a few words.
         known: engine -> versions in which it was seen; those are tried first.
         remedy: what a user does about it.
         change: the robot that the engine would hold; None, or the same robot: the file gives no occasion for it.
-        id: name of the module.
     """
 
+    id: str
     name: str
     known: Mapping[str, str]
     remedy: str
-    change: Callable[[RobotEvidence], Robot | None]
-    id: str = ""
+    change: Change
+
+
+def hypothesis(name: str, known: Mapping[str, str], remedy: str) -> Callable[[Change], RobotHypothesis]:
+    """Makes a hypothesis of a function; see :class:`RobotHypothesis`."""
+    return lambda change: RobotHypothesis(change.__name__, name, known, remedy, change)
 
 
 @functools.cache
 def hypotheses() -> tuple[RobotHypothesis, ...]:
-    """All causes: what the modules of this package call ``HYPOTHESIS``."""
-    names = sorted(module.name for module in pkgutil.iter_modules(__path__))
-    return tuple(
-        dataclasses.replace(importlib.import_module(f"{__name__}.{name}").HYPOTHESIS, id=name) for name in names
-    )
+    """All causes in the modules of this package, by their names."""
+    modules = [importlib.import_module(f"{__name__}.{module.name}") for module in pkgutil.iter_modules(__path__)]
+    found = [item for module in modules for item in vars(module).values() if isinstance(item, RobotHypothesis)]
+    return tuple(sorted(found, key=lambda item: item.id))

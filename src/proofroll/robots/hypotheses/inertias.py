@@ -1,0 +1,140 @@
+"""Causes that change masses and inertias which the file gives: impossible, small, turned or scaled ones."""
+
+from __future__ import annotations
+
+import dataclasses
+from collections.abc import Callable, Iterator
+
+import numpy as np
+
+from proofroll.robots.hypotheses import RobotEvidence, hypothesis
+from proofroll.robots.inertia import breaks_triangle, not_positive
+from proofroll.robots.model import Array, Robot, RobotBody
+
+
+def _suspects(evidence: RobotEvidence) -> Iterator[RobotBody]:
+    """An engine's own rule of what is impossible is not predicted: what it holds is looked at."""
+    robot, reading = evidence.robot, evidence.reading
+    scale = max((float(np.abs(group.inertia).max()) for group in robot.groups.values()), default=1.0)
+    other = {
+        name
+        for name, group in robot.groups.items()
+        if name in reading.inertia and np.abs(reading.inertia[name] - group.inertia).max() > 1e-10 * scale
+    }
+    for name, (home, _, _) in robot.welded.items():
+        body = robot.bodies.get(name)
+        alone = sum(carrier == home for carrier, _, _ in robot.welded.values()) == 1
+        if body is not None and home in other:
+            impossible = breaks_triangle(body.inertia) or not_positive(body.inertia)
+            if alone or (impossible and np.any(body.inertia)) or (not body.mass and np.any(body.inertia)):
+                yield body
+
+
+def _replaced(evidence: RobotEvidence, instead: Callable[[RobotBody], RobotBody]) -> Robot | None:
+    """The robot with other values for each body whose inertia is impossible and that the engine holds differently."""
+    bodies = [instead(body) for body in _suspects(evidence)]
+    return evidence.robot.with_bodies(bodies) if bodies else None
+
+
+@hypothesis(
+    "an impossible inertia is replaced by zero",
+    {"pybullet": "3.2.7", "mujoco": "4.0.0 (of a link without mass)"},
+    "correct the inertia in the file",
+)
+def impossible_inertia_zeroed(evidence: RobotEvidence) -> Robot | None:
+    """An impossible inertia is replaced by zero."""
+    return _replaced(evidence, lambda body: dataclasses.replace(body, inertia=np.zeros((3, 3))))
+
+
+@hypothesis(
+    "an impossible inertia is replaced by a sphere with the mean of its principal moments",
+    {"mujoco": "with balanceinertia"},
+    "correct the inertia in the file, and leave balanceinertia out",
+)
+def inertia_balanced(evidence: RobotEvidence) -> Robot | None:
+    """An impossible inertia is replaced by a sphere with the mean principal moment."""
+    return _replaced(evidence, lambda body: dataclasses.replace(body, inertia=np.trace(body.inertia) / 3 * np.eye(3)))
+
+
+# Density of water [kg/m³].
+_WATER = 1000.0
+
+
+def _sphere_of_water(body: RobotBody) -> RobotBody:
+    mass = body.mass or 1.0
+    radius = (3 * mass / (4 * np.pi * _WATER)) ** (1 / 3)
+    return dataclasses.replace(body, mass=mass, inertia=0.4 * mass * radius**2 * np.eye(3))
+
+
+@hypothesis(
+    "an impossible inertia is replaced by that of a sphere of water (of 1 kg where the mass is 0)",
+    {"drake": "1.51.1 (a line of its log says so)"},
+    "correct the inertia in the file",
+)
+def water_sphere(evidence: RobotEvidence) -> Robot | None:
+    """An impossible inertia is replaced by that of a sphere of water with the same mass."""
+    return _replaced(evidence, _sphere_of_water)
+
+
+# As URDF importers of MuJoCo are commonly asked for, and as our option asks [kg], [kg m²].
+_MASS, _MOMENT = 1e-6, 1e-8
+
+
+def _raised(body: RobotBody, com: Array) -> RobotBody:
+    values, axes = np.linalg.eigh(body.inertia)
+    bounded = axes @ np.diag(np.maximum(values, _MOMENT)) @ axes.T
+    return dataclasses.replace(body, mass=max(body.mass, _MASS), com=com, inertia=bounded)
+
+
+@hypothesis(
+    "small masses and inertias are raised to a bound (1e-6 kg, 1e-8 kg m²)",
+    {"mujoco": "with boundmass, boundinertia"},
+    "leave the bounds out, or correct the masses in the file",
+)
+def mass_bounded(evidence: RobotEvidence) -> Robot | None:
+    """Masses and principal moments are raised to a bound."""
+    robot = evidence.robot
+    small = []
+    for joint in robot.joints:
+        body = robot.bodies[joint.child]
+        if body.mass < _MASS or np.linalg.eigvalsh(body.inertia)[0] < _MOMENT:
+            # MuJoCo 4.0.0 puts the centre of mass of a link without <inertial> where its frame is in the parent's
+            given = robot.sources.get(body.name, {}).get("inertial", True)
+            small.append(_raised(body, body.com if given else joint.position))
+    return robot.with_bodies(small) if small else None
+
+
+@hypothesis(
+    "the rpy of <inertial> is ignored",
+    {"mujoco": "3.1.3 to 3.13.0"},
+    "update the engine, or write the inertia in the axes of the link with rpy 0",
+)
+def inertial_rotation_ignored(evidence: RobotEvidence) -> Robot | None:
+    """The rpy of an inertial is ignored: its moments are taken in the axes of the link."""
+    robot = evidence.robot
+    turned = [
+        dataclasses.replace(robot.bodies[name], inertia=np.array(source["written"]))
+        for name, source in robot.sources.items()
+        if name in robot.bodies and "written" in source and np.any(np.array(source["frame"]) != np.eye(3))
+    ]
+    return robot.with_bodies(turned) if turned else None
+
+
+@hypothesis(
+    "settotalmass is ignored: masses are as written",
+    {"pinocchio": "4.1.0", "drake": "1.51.1"},
+    "compile the file once with MuJoCo, save it (mj_saveLastXML), and give others the saved file",
+)
+def total_mass_ignored(evidence: RobotEvidence) -> Robot | None:
+    """The total mass that the file asks for is not set: all masses and inertias keep the scale that was written."""
+    robot, held = evidence.robot, evidence.reading.mass
+    if not any(compiler.get("settotalmass") for compiler in evidence.file.root.iter("compiler")):
+        return None
+    scaled = sum(group.mass for name, group in robot.groups.items() if name in held)
+    if not scaled:
+        return None
+    factor = sum(mass for name, mass in held.items() if name in robot.groups) / scaled
+    return robot.with_bodies(
+        dataclasses.replace(body, mass=factor * body.mass, inertia=factor * body.inertia)
+        for body in robot.bodies.values()
+    )

@@ -1,0 +1,107 @@
+"""Causes that misplace bodies or lose them, and gravity."""
+
+from __future__ import annotations
+
+import dataclasses
+
+import numpy as np
+
+from proofroll.robots.hypotheses import RobotEvidence, hypothesis
+from proofroll.robots.model import WORLD, Robot, RobotJoint
+
+
+@hypothesis(
+    "of several joints in one body all but the last are placed in the parent's frame",
+    {"drake": "1.51.1"},
+    "give each further joint a body of its own without mass",
+)
+def body_placed_by_last_joint(evidence: RobotEvidence) -> Robot | None:
+    """Of several joints in one body all but the last sit in the parent's frame; the body's pose comes with the last."""
+    robot = evidence.robot
+    chains: dict[str, list[int]] = {}
+    for index, joint in enumerate(robot.joints):
+        body, _, extra = joint.child.rpartition("/")
+        chains.setdefault(body if extra.isdigit() else joint.child, []).append(index)
+    joints = list(robot.joints)
+    for chain in chains.values():
+        first, last = joints[chain[0]], joints[chain[-1]]
+        if len(chain) == 1:
+            continue
+        p = first.position - first.rotation @ first.child_position
+        joints[chain[0]] = dataclasses.replace(first, position=first.child_position, rotation=np.eye(3))
+        placed = p + first.rotation @ last.child_position
+        joints[chain[-1]] = dataclasses.replace(last, position=placed, rotation=first.rotation)
+    return robot.change(joints=tuple(joints)) if len(chains) < len(joints) else None
+
+
+_DEFAULT = np.array([0.0, 0.0, -9.81])
+
+
+@hypothesis(
+    "the file's gravity is ignored: 9.81 m/s² downwards instead",
+    {"pinocchio": "4.1.0", "drake": "1.51.1"},
+    "set the gravity of the model yourself (Pinocchio: model.gravity.linear)",
+)
+def default_gravity(evidence: RobotEvidence) -> Robot | None:
+    """The gravity of the file is ignored."""
+    robot = evidence.robot
+    return None if np.array_equal(robot.gravity, _DEFAULT) else robot.change(gravity=_DEFAULT)
+
+
+@hypothesis(
+    "only the first tree under the world is read",
+    {"pinocchio": "4.1.0"},
+    "put everything under one body of the world, or read each tree from a file of its own",
+)
+def first_tree_only(evidence: RobotEvidence) -> Robot | None:
+    """Of several trees under the world only the first is kept."""
+    robot, kept = evidence.robot, {WORLD}
+    joints: list[RobotJoint] = []
+    for joint in robot.joints:
+        if joint.parent in kept and not (joint.parent == WORLD and joints):
+            kept.add(joint.child)
+            joints.append(joint)
+    if len(joints) == len(robot.joints):
+        return None
+    moving = {joint.name for joint in joints}
+    mimics = tuple(mimic for mimic in robot.mimics if {mimic.joint, mimic.other} <= moving)
+    bodies = {name: body for name, body in robot.bodies.items() if name in kept}
+    return robot.change(joints=tuple(joints), bodies=bodies, mimics=mimics)
+
+
+@hypothesis(
+    "a free base without mass is fixed to the world",
+    {"pybullet": "3.2.7"},
+    "give the root link a mass",
+)
+def free_base_is_fixed(evidence: RobotEvidence) -> Robot | None:
+    """A free base is fixed to the world."""
+    robot = evidence.robot
+    known = set(evidence.reading.joints)
+    lost = [joint for joint in robot.joints if joint.kind == "free" and joint.name not in known]
+    if not lost:
+        return None
+    joints = (dataclasses.replace(joint, kind="fixed") if joint in lost else joint for joint in robot.joints)
+    return robot.change(joints=tuple(joints))
+
+
+def _offset(joint: RobotJoint, robot: Robot) -> RobotJoint:
+    source = robot.sources.get(joint.child, {})
+    if joint.kind != "free" or "rotation" not in source:
+        return joint
+    p = np.array(source["position"])
+    offset = p - np.array(source["rotation"]) @ p
+    return dataclasses.replace(joint, position=offset) if np.any(offset) else joint
+
+
+@hypothesis(
+    "a free body whose pose (p, R) in the file is turned is offset by p − R p",
+    {"pinocchio": "4.1.0"},
+    "write free bodies with pos 0 0 0 or without rotation, and set the start in the coordinates",
+)
+def free_body_offset(evidence: RobotEvidence) -> Robot | None:
+    """A free body that the file turns is offset: its pose (p, R) is undone in the wrong order, which leaves p − R p."""
+    robot = evidence.robot
+    joints = tuple(_offset(joint, robot) for joint in robot.joints)
+    changed = any(one is not other for one, other in zip(joints, robot.joints, strict=True))
+    return robot.change(joints=joints) if changed else None

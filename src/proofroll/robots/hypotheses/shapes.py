@@ -1,0 +1,154 @@
+"""Causes by which shapes give a body its mass and inertia, or do not."""
+
+from __future__ import annotations
+
+import copy
+import dataclasses
+import math
+from collections.abc import Mapping
+from typing import Any
+from xml.etree.ElementTree import SubElement
+
+import numpy as np
+
+from proofroll.robots.hypotheses import RobotEvidence, hypothesis
+from proofroll.robots.model import Array, Robot, RobotBody, composed
+
+# Bullet's margin around shapes, also around none [m].
+_MARGIN = 1e-3
+
+
+def _half(kind: str, sizes: dict[str, str]) -> Array | None:
+    """Half lengths of a shape's own box; None: not known here."""
+    if kind == "box":
+        return np.array([float(part) / 2 for part in sizes["size"].split()])
+    return np.full(3, float(sizes["radius"])) if kind == "sphere" else None
+
+
+def _box(mass: float, shapes: list[Any], com: Array, frame: Array) -> Array | None:
+    """Principal moments in the inertial's axes, shape (3,); None: a shape whose box is not known here."""
+    low, high = (np.full(3, np.inf), np.full(3, -np.inf)) if shapes else (np.zeros(3), np.zeros(3))
+    for kind, sizes, position, rotation in shapes:
+        half = _half(kind, sizes)
+        if half is None:
+            return None
+        centre, reach = frame.T @ (position - com), np.abs(frame.T @ rotation) @ half
+        reach = reach if kind == "box" else half
+        low, high = np.minimum(low, centre - reach), np.maximum(high, centre + reach)
+    x, y, z = (high - low + 2 * _MARGIN) ** 2
+    return mass / 12 * np.array([y + z, x + z, x + y])
+
+
+@hypothesis(
+    "inertias are computed from collision shapes, not taken from the file",
+    {"pybullet": "default of 3.2.7"},
+    "load with flags=URDF_USE_INERTIA_FROM_FILE",
+)
+def inertia_from_collision(evidence: RobotEvidence) -> Robot | None:
+    """Inertias are those of a box around the collision shapes, in the axes of the file's inertial."""
+    robot, bodies = evidence.robot, []
+    for name, source in robot.sources.items():
+        body = robot.bodies.get(name)
+        if body is None or not source.get("inertial") or not body.mass:
+            continue
+        moments = _box(body.mass, source["shapes"], body.com, source["frame"])
+        if moments is None:
+            return None
+        frame = source["frame"]
+        bodies.append(dataclasses.replace(body, inertia=frame @ np.diag(moments) @ frame.T))
+    return robot.with_bodies(bodies) if bodies else None
+
+
+# A body must weigh something to be compiled; what it weighs is taken away again.
+_STAND_IN = {"pos": "0 0 0", "mass": "1", "diaginertia": "1 1 1"}
+
+
+@hypothesis(
+    "shapes that collide with nothing (contype 0, conaffinity 0) give no mass",
+    {"pinocchio": "4.1.0"},
+    "give every body an <inertial>; compile once with MuJoCo and save (mj_saveLastXML) to get one",
+)
+def noncolliding_shapes_weightless(evidence: RobotEvidence) -> Robot | None:
+    """Shapes that collide with nothing (contype and conaffinity 0) give a body no mass."""
+    robot, root = evidence.robot, copy.deepcopy(evidence.file.root)
+    bare, touched = set(), False
+    for body in root.iter("body"):
+        name, shapes = str(body.get("name")), body.findall("geom")
+        collides = robot.sources.get(name, {}).get("collides", [])
+        if len(shapes) != len(collides) or all(collides):
+            continue
+        touched = True
+        for shape, hits in zip(shapes, collides, strict=True):
+            if not hits:
+                body.remove(shape)
+        if not any(collides) and body.find("inertial") is None:
+            SubElement(body, "inertial", _STAND_IN)
+            bare.add(name)
+    compiled = evidence.recompiled(root) if touched else None
+    if compiled is None:
+        return None
+    nothing = np.zeros((3, 3))
+    lighter = (
+        dataclasses.replace(body, mass=0.0, com=np.zeros(3), inertia=nothing) if body.name in bare else body
+        for body in compiled.bodies.values()
+    )
+    return robot.with_bodies(body for body in lighter if body.name in robot.bodies)
+
+
+_DENSITY = 1000.0
+
+
+def _solid(kind: str, sizes: Mapping[str, str]) -> tuple[float, Array] | None:
+    """Mass and principal moments of a shape; None: not a solid that is known here."""
+    if kind == "box":
+        x, y, z = (float(part) for part in sizes["size"].split())
+        m = _DENSITY * x * y * z
+        return m, m / 12 * np.array([y * y + z * z, x * x + z * z, x * x + y * y])
+    if kind == "sphere":
+        r = float(sizes["radius"])
+        m = _DENSITY * 4 / 3 * math.pi * r**3
+        return m, np.full(3, 0.4 * m * r * r)
+    if kind == "cylinder":
+        r, length = float(sizes["radius"]), float(sizes["length"])
+        m = _DENSITY * math.pi * r * r * length
+        across = m * (r * r / 4 + length * length / 12)
+        return m, np.array([across, across, m * r * r / 2])
+    return None
+
+
+def _weighed(name: str, shapes: list[Any]) -> RobotBody | None:
+    parts = []
+    for kind, sizes, position, rotation in shapes:
+        solid = _solid(kind, sizes)
+        if solid is None:
+            return None
+        mass, moments = solid
+        parts.append((RobotBody("", mass, np.zeros(3), np.diag(moments)), np.array(position), np.array(rotation)))
+    return composed(name, parts) if parts else None
+
+
+@hypothesis(
+    "collision shapes of links without <inertial> are weighed at 1000 kg/m³",
+    {"mujoco": "all versions so far"},
+    "give every link an <inertial>",
+)
+def shapes_weighed(evidence: RobotEvidence) -> Robot | None:
+    """A link without <inertial> gets the mass of its collision shapes at the density of water."""
+    robot = evidence.robot
+    bare = {name: source for name, source in robot.sources.items() if not source.get("inertial", True)}
+    bodies = [body for name, source in bare.items() if (body := _weighed(name, source["shapes"])) is not None]
+    return robot.with_bodies(bodies) if bodies else None
+
+
+@hypothesis(
+    "links without <inertial> are given 1 kg and unit inertia",
+    {"pybullet": "3.2.7"},
+    "give every link an <inertial>; a massless one with mass 0 and inertia 0",
+)
+def unit_mass_without_inertial(evidence: RobotEvidence) -> Robot | None:
+    """A link without <inertial> weighs 1 kg and has unit inertia."""
+    robot = evidence.robot
+    bare = [name for name, source in robot.sources.items() if name in robot.bodies and not source.get("inertial", True)]
+    if not bare:
+        return None
+    return robot.with_bodies(RobotBody(name, 1.0, np.zeros(3), np.eye(3)) for name in bare)
