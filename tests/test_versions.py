@@ -73,7 +73,7 @@ def test_what_changed_is_shown(versions: Callable[..., tuple[int, str, str]], tm
     assert set(found) == set(re.findall(r"^\| `(\w+)` \|", section[1], flags=re.MULTILINE))
     assert [found[side]["version"] for side in ("old", "new")] == ["1.0", "2.0"]
     midpoint, walls = found["rows"]
-    assert midpoint["declared_order"] == {"old": 1, "new": 2}
+    assert midpoint["declared_order"] == {"old": [1], "new": [2]}
     assert midpoint["verdicts"]["new"] == {"agrees": 1} != midpoint["verdicts"]["old"]
     assert midpoint["numbers"]["kind"] == "changed"
     assert midpoint["speed"]["low"] <= midpoint["speed"]["value"] <= midpoint["speed"]["high"]

@@ -109,7 +109,10 @@ class Settings(Protocol):
 
     @property
     def order(self) -> int | None:
-        """Order of convergence in ``dt`` that conformance holds it to; None: none is declared, or the step adapts."""
+        """Order of convergence in ``dt`` that conformance holds it to; None: none is declared, or the step adapts.
+
+        It may hang on the engine's version; what in a scene lowers it, :class:`engine_abilities.LowersOrder` says.
+        """
 
 
 class Engine(Protocol):

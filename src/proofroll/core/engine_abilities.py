@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Collection, Mapping, Sequence
 from dataclasses import dataclass
 from enum import StrEnum
 from typing import Any, ClassVar, Protocol, runtime_checkable
@@ -82,6 +82,26 @@ class TellsCaveats(Protocol):
     @staticmethod
     def caveat(settings: Any) -> str:
         """What is not the engine's own with these settings: one clause without a full stop; empty: nothing."""
+
+
+@runtime_checkable
+class LowersOrder(Protocol):
+    """What an engine has besides, if something in a scene lowers the order of convergence of its settings."""
+
+    @staticmethod
+    def lowered(settings: Any) -> Mapping[str, int]:
+        """What a scene may require, in the words of ``provides`` -> the order with it, where that is the lower one."""
+
+
+def lowest(order: int | None, lowered: Mapping[str, int], requires: Collection[str]) -> int | None:
+    """The order for a scene that requires this, of one without it and what lowers it; None: none is declared."""
+    return None if order is None else min([order, *(lowered[name] for name in lowered.keys() & set(requires))])
+
+
+def declared_order(engine: Any, settings: Any, scene: Scene) -> int | None:
+    """The order of convergence in ``dt`` that an engine declares for a scene; None: none."""
+    lowered = engine.lowered(settings) if isinstance(engine, LowersOrder) else {}
+    return lowest(settings.order, lowered, scene.requires)
 
 
 @runtime_checkable

@@ -12,6 +12,7 @@ from proofroll.core.arrays import FloatArray
 from proofroll.core.certificate import Line
 from proofroll.core.element import Element, FirstMotion
 from proofroll.core.engine import fixed_step
+from proofroll.core.engine_abilities import declared_order
 from proofroll.core.errors import Diverged, Refused
 from proofroll.core.scene import Scene
 from proofroll.core.several import build, sample_of
@@ -60,7 +61,8 @@ def _lines(kind: Any, scene: Scene, settings: Any, index: int, start: FirstMotio
     (_, coarse), (parabola, fine) = (
         _derivatives(kind, scene, element, chosen, interval) for chosen, interval in ((settings, h), (finer, h / 2))
     )
-    found = fine + ((fine - coarse) / (2**settings.order - 1) if step and settings.order else 0.0)
+    order = declared_order(kind, settings, scene) if step else None
+    found = fine + ((fine - coarse) / (2**order - 1) if order else 0.0)
     unknown = np.abs(fine - coarse) + np.abs(fine - parabola)
     lines = []
     for row, (quantity, unit, expected, scale) in enumerate(

@@ -57,10 +57,9 @@ def numbers_text(row: Mapping[str, Any]) -> str:
 
 
 def order_text(row: Mapping[str, Any]) -> str:
-    """The declared order, then and now."""
-    old, new = (row["declared_order"][side] for side in ("old", "new"))
-    shown = ["–" if item is None else str(item) for item in (old, new)]
-    return shown[0] if old == new else " → ".join(shown)
+    """The declared orders of all points, then and now."""
+    old, new = (", ".join(map(str, row["declared_order"][side])) or "–" for side in ("old", "new"))
+    return old if old == new else f"{old} → {new}"
 
 
 def speed_text(row: Mapping[str, Any]) -> str:
@@ -75,7 +74,7 @@ def table(content: Mapping[str, Any]) -> Table:
     made.add_column("setting", overflow="fold", min_width=16)
     made.add_column("verdicts")
     made.add_column("numbers", justify="right")
-    made.add_column("order", no_wrap=True)
+    made.add_column("declared\norder", no_wrap=True)
     if any(row["speed"] for row in content["rows"]):
         made.add_column("time", no_wrap=True)
     before = ""

@@ -4,10 +4,12 @@ from __future__ import annotations
 
 import hashlib
 import json
-from dataclasses import asdict, dataclass, field
+from collections.abc import Collection
+from dataclasses import asdict, dataclass, field, replace
 from enum import StrEnum
 from typing import TYPE_CHECKING, Any
 
+from proofroll.core.engine_abilities import lowest
 from proofroll.core.plugins import plain_name
 
 if TYPE_CHECKING:
@@ -71,6 +73,8 @@ class EngineFacts:
         settings: complete settings, by name.
         resolution: name of the setting that trades speed for accuracy, ``dt`` or ``rtol``.
         order: declared order of convergence, or None.
+        lowered: what a scene may require -> the order with it, see
+            :class:`proofroll.core.engine_abilities.LowersOrder`.
         shares: routes of the truth that it shares, see :class:`proofroll.core.engine_abilities.SharesEquations`.
         caveat: what of these settings is not the engine's own, to be said wherever it is judged; empty: nothing.
         libraries: versions of Python, numpy and scipy, on which the last digits hang; in another interpreter also a
@@ -83,9 +87,14 @@ class EngineFacts:
     settings: dict[str, Any]
     resolution: str | None = None
     order: int | None = None
+    lowered: dict[str, int] = field(default_factory=dict)
     shares: list[str] = field(default_factory=list)
     caveat: str = ""
     libraries: dict[str, str] = field(default_factory=dict)
+
+    def on(self, requires: Collection[str]) -> EngineFacts:
+        """The same, with the order for a scene that requires this."""
+        return replace(self, order=lowest(self.order, self.lowered, requires), lowered={})
 
 
 @dataclass(frozen=True)

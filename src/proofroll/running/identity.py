@@ -70,7 +70,7 @@ def resolve(engine: str, options: dict[str, Any], requires: Sequence[str] = ()) 
             raise InputError("truth", ", ".join(options), "the truth has no settings; leave them out")
         code = digest([Path(inspect.getfile(truth)).parent for truth in load_truths()])
         return dataclasses.asdict(EngineFacts("truth", truth_version(), code, {}))
-    from proofroll.core.engine_abilities import SharesEquations, TellsCaveats
+    from proofroll.core.engine_abilities import LowersOrder, SharesEquations, TellsCaveats
     from proofroll.core.plugins import resolve_settings
     from proofroll.running.handshake import libraries
     from proofroll.running.loading import load
@@ -86,6 +86,7 @@ def resolve(engine: str, options: dict[str, Any], requires: Sequence[str] = ()) 
         settings=dataclasses.asdict(settings),
         resolution=settings.resolution,
         order=settings.order,
+        lowered=dict(kind.lowered(settings)) if isinstance(kind, LowersOrder) else {},
         shares=list(kind.shares.get(settings.formulation, ())) if isinstance(kind, SharesEquations) else [],
         caveat=kind.caveat(settings) if isinstance(kind, TellsCaveats) else "",
         libraries=libraries(engine),

@@ -48,7 +48,7 @@ def curves_of(
         if isinstance(facts, InputError):
             raise facts
         if isinstance(facts, EngineFacts):
-            curves.append(Curve(name, facts, level))
+            curves.append(Curve(name, facts.on(requires), level))
         else:
             absent[name] = str(facts)
     return curves, absent

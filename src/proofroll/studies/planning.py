@@ -86,7 +86,7 @@ def plan(comparison: Comparison, engines: Iterable[str] = (), workers: Workers |
                 factor: _case(comparison, scene, point, rung, timed=comparison.timed and factor == 1)
                 for factor, rung in ladder_facts.items()
             }
-            runs.append(Planned(row, point, facts, ladder))
+            runs.append(Planned(row, point, facts.on(scene.requires), ladder))
     return Plan(comparison, truths, runs)
 
 

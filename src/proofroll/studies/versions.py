@@ -43,7 +43,7 @@ class SettingDifference:
         cases: how many points.
         verdicts: ``old`` and ``new`` -> verdict -> how many cases.
         numbers: of the case whose numbers are farthest apart.
-        declared_order: ``old`` and ``new``.
+        declared_order: ``old`` and ``new`` -> those of its points, without repetition; none declared is left out.
         orders: observed orders that changed, of all cases.
         changed: how many cases have another verdict.
         speed: time of the new version over that of the old one, or None.
@@ -54,7 +54,7 @@ class SettingDifference:
     cases: int
     verdicts: dict[str, dict[str, int]]
     numbers: NumbersApart | None
-    declared_order: dict[str, int | None]
+    declared_order: dict[str, list[int]]
     orders: list[OrderChange]
     changed: int
     speed: Interval | None
@@ -134,7 +134,10 @@ def _rows(cases: Sequence[CaseDifference], speeds: Mapping[tuple[str, str], Inte
                 key=lambda item: (item.relative, item.kind != NumberKind.SAME_BITS),
                 default=None,
             ),
-            declared_order={"old": group[0].old.declared_order, "new": group[0].new.declared_order},
+            declared_order={
+                "old": sorted({order for case in group if (order := case.old.declared_order)}),
+                "new": sorted({order for case in group if (order := case.new.declared_order)}),
+            },
             orders=[order for case in group for order in case.orders],
             changed=sum(bool(case.changed) for case in group),
             speed=speeds.get(key),

@@ -9,19 +9,23 @@ import mujoco
 import numpy as np
 import pytest
 
+from proofroll.conformance.motion import order_is_as_declared
+from proofroll.conformance.subject import Subject, scenes
 from proofroll.core.certificate import certify, first_difference
 from proofroll.core.engine import Sample
+from proofroll.core.engine_abilities import declared_order
 from proofroll.core.errors import Diverged, InputError, Refused
 from proofroll.core.scene import Scene
 from proofroll.core.time_grid import time_grid
 from proofroll.elements.ball_on_surface.element import changed, rolling_ball
 from proofroll.elements.ball_on_surface.surfaces import Cylinder
 from proofroll.engines.mujoco import Mujoco
-from proofroll.engines.mujoco.settings import PRESETS
+from proofroll.engines.mujoco.settings import ORDER_OF_TURNING, PRESETS
 from proofroll.files.scene_file import load_scene
 from proofroll.running.recording import record
 from proofroll.running.simulation import build, simulate
 
+SCENES = scenes()
 CYLINDER, PLANE = "sphere_in_cylinder", "inclined_plane"
 MODELS = [
     (formulation, preset) for formulation, presets in PRESETS.items() if formulation != "joints" for preset in presets
@@ -46,6 +50,22 @@ def error(scene: str, engine: str, variable: str, *, until: float = 1.0, signed:
 def numbers(sample: Sample) -> np.ndarray:
     """Everything in a sample as one row."""
     return np.concatenate([sample.p_WB, sample.v_WB, sample.w_WB, sample.q_WB, sample.force])
+
+
+@pytest.mark.parametrize(
+    ("model", "scene", "order"),
+    [
+        (("chart", "default"), SCENES["plane"], ORDER_OF_TURNING),
+        (("chart", "default"), SCENES["plane-resisting"], 2),
+        (("joints", "matched"), SCENES["heavy_top"], ORDER_OF_TURNING),
+        (("joints", "matched"), SCENES["double_pendulum"], 4),
+    ],
+)
+def test_order_hangs_on_the_scene(model: tuple[str, str], scene: Scene, order: int) -> None:
+    """RK4 shows the order that is declared: its own, less by a resistance, and before 4.0 by quaternions."""
+    settings = PRESETS[model[0]][model[1]]
+    assert declared_order(Mujoco, settings, scene) == order
+    order_is_as_declared(Subject(Mujoco, settings, scene))
 
 
 # z's range is 0.12 m. Each bound is about 1.5 times what MuJoCo 4.0 gives, so that a change of the method is seen.

@@ -25,7 +25,15 @@ from proofroll.engines.mujoco.friction import BoundedFriction, check_coefficient
 from proofroll.engines.mujoco.mechanism import MujocoMechanism
 from proofroll.engines.mujoco.model import read_spec, write_physics
 from proofroll.engines.mujoco.running import compiled, forget_callbacks, raise_if_fatal, silent
-from proofroll.engines.mujoco.settings import PRESETS, ROLLS, MujocoSettings, check, check_restitution, velocity_lag
+from proofroll.engines.mujoco.settings import (
+    PRESETS,
+    ROLLS,
+    MujocoSettings,
+    check,
+    check_restitution,
+    lowered,
+    velocity_lag,
+)
 from proofroll.engines.mujoco.softness import softness
 from proofroll.engines.mujoco.start import EVALUATIONS, accelerations, start
 from proofroll.engines.mujoco.terms import TERMS
@@ -87,6 +95,7 @@ class Mujoco:
         "joints": mechanism.LACKING,
     }
     settings: ClassVar[type[Any]] = MujocoSettings
+    lowered = staticmethod(lowered)
     presets: ClassVar[Mapping[str, Mapping[str, Any]]] = PRESETS
     levels: ClassVar[Mapping[str, Level]] = {
         "chart": Level.CONTACT,

@@ -6,10 +6,14 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import Annotated, Literal
 
+import mujoco
 from annotated_types import Ge, Gt, Le, Lt
 from pydantic import BeforeValidator
 
 from proofroll.core.errors import InputError, Refused
+from proofroll.core.plugins import release
+from proofroll.elements.ball_on_surface.model import BallCapability
+from proofroll.elements.mechanism.capabilities import ALL_LOOPS, MechanismCapability
 
 # What a MuJoCo model has whose author writes nothing: step, friction, solref [s], solimp (dmin, dmax).
 DEFAULT_STEP = 2e-3
@@ -18,6 +22,8 @@ DEFAULT_FRICTION = 1.0
 DEFAULT_TURNING, DEFAULT_ROLLING = 5e-3, 1e-4
 DEFAULT_TIME_CONSTANT = 0.02
 DEFAULT_IMPEDANCE = (0.9, 0.95)
+# Of RK4 where joints have quaternions; those without have 4 in every version.
+ORDER_OF_TURNING = 4 if release(mujoco.__version__) >= (4,) else 2
 # Dimensions of a contact (condim) from which on it resists sliding, turning about the normal, and rolling.
 SLIDES, TURNS, ROLLS = 3, 4, 6
 # MuJoCo clips to these without a word: mjMINIMP, mjMAXIMP, and two steps (refsafe).
@@ -93,17 +99,29 @@ class MujocoSettings:
 
     @property
     def order(self) -> int | None:
-        """Measured, and the least of all scenes; a time constant that does not shrink has another limit.
+        """Measured; what in a scene takes it down, :func:`lowered` says.
 
-        Such a contact is a smooth spring, which RK4 follows at its own order of 4. Rolling resistance takes that down
-        to 2, for its torque uses a normal force that is extrapolated linearly in time. The same holds of the chart's
-        other contacts and of J̇v.
+        A time constant that does not shrink has another limit: such a contact is a smooth spring, which RK4 follows at
+        its own order. The chart's other contacts and J̇v are of order 2.
         """
-        if self.formulation == "joints":  # of velocities where a loop is a soft constraint; RK4 has 4 on a tree
-            return 1
-        if self.time_constant is None and self.integrator != "RK4":
-            return 1
+        if self.formulation == "joints":
+            return 4 if self.integrator == "RK4" else 1
+        if self.time_constant is None and self.formulation == "chart":
+            return ORDER_OF_TURNING if self.integrator == "RK4" else 1
         return 2 if self.curvature or self.formulation == "chart" else 1
+
+
+def lowered(settings: MujocoSettings) -> Mapping[str, int]:
+    """See :class:`proofroll.core.engine_abilities.LowersOrder`; measured.
+
+    A soft constraint, as every loop and dry friction is one, leaves velocities of first order; so does a switch between
+    sticking and slipping, which may come anywhere in a step. The torque of rolling resistance uses a normal force
+    that is extrapolated linearly in time.
+    """
+    if settings.formulation != "joints":
+        return {BallCapability.ROLLING_RESISTANCE: 2, BallCapability.BOUNDED_FRICTION: 1}
+    turning: dict[str, int] = dict.fromkeys((MechanismCapability.SPHERICAL, MechanismCapability.FREE), ORDER_OF_TURNING)
+    return turning | dict.fromkeys((*ALL_LOOPS, MechanismCapability.JOINT_FRICTION), 1)
 
 
 def velocity_lag(settings: MujocoSettings) -> float:

@@ -22,7 +22,7 @@ from proofroll.engines.pinocchio.contact_run import ContactRun
 from proofroll.engines.pinocchio.mechanism_run import MechanismRun
 from proofroll.engines.pinocchio.null_space import NullSpace
 from proofroll.engines.pinocchio.rows_run import RowsRun
-from proofroll.engines.pinocchio.settings import OF_MECHANISMS, PRESETS, PinocchioSettings
+from proofroll.engines.pinocchio.settings import OF_MECHANISMS, PRESETS, PinocchioSettings, lowered
 
 # Before 4.0 the constraints have other signatures and other results.
 _OF_PINOCCHIO_4 = {"contact", "constraint_dynamics"}
@@ -48,6 +48,7 @@ class Pinocchio:
         "constraint_dynamics": ConstraintDynamics.lacking,
     }
     settings: ClassVar[type[Any]] = PinocchioSettings
+    lowered = staticmethod(lowered)
     presets: ClassVar[Mapping[str, Mapping[str, PinocchioSettings]]] = PRESETS
     levels: ClassVar[Mapping[str, Level]] = {
         "composite": Level.CONSTRAINT,

@@ -10,6 +10,7 @@ import numpy as np
 from annotated_types import Ge, Gt
 
 from proofroll.core.errors import InputError
+from proofroll.elements.ball_on_surface.model import BallCapability
 
 # scipy raises anything below 100 machine epsilons to it, with no more than a warning.
 TIGHTEST_RTOL = 100 * float(np.finfo(float).eps)
@@ -128,14 +129,18 @@ class PinocchioSettings:
         """See :class:`proofroll.core.engine.Settings`.
 
         rk4 is of order 4 only where configurations form a vector space, that is without the orientation: see
-        :mod:`proofroll.engines.pinocchio.integrators`. Where the scene decides, this is the order for one that does
-        not ask for it.
+        :mod:`proofroll.engines.pinocchio.integrators`. Where the scene decides, :func:`lowered` says the other.
         """
         if self.formulation in OF_MECHANISMS:
             return 4 if self.integrator == "rk4" else None
         if self.integrator == "rk4" and not self.orientation:
             return 4
         return _ORDERS.get(self.integrator)
+
+
+def lowered(settings: PinocchioSettings) -> Mapping[str, int]:
+    """See :class:`proofroll.core.engine_abilities.LowersOrder`."""
+    return {BallCapability.ORIENTATION: _ORDERS["rk4"]} if settings.integrator == "rk4" else {}
 
 
 # Of 1e-12 to 1e-5 any gave accelerations to 1e-13; without it, dependent rows give NaN.
