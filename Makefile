@@ -20,7 +20,7 @@ tradeoff: install
 	$(BIN)/proofroll tradeoff sphere_in_cylinder --out $(OUT)
 
 test: install
-	$(BIN)/python -m pytest -n 2 --dist loadgroup
+	$(BIN)/python -m pytest -n 2
 
 check: install
 	$(BIN)/ruff check .

@@ -20,8 +20,6 @@ from proofroll.studies.curve import Question
 from proofroll.studies.study_store import keep
 from proofroll.studies.tradeoff import stored
 
-pytestmark = pytest.mark.xdist_group("tradeoff")  # one process makes the study that most of them read
-
 Proofroll = Callable[..., tuple[int, str, str]]
 ENGINE = "exudyn[formulation=generic,preset=matched]"
 

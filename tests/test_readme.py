@@ -75,7 +75,6 @@ def folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
 
 
 @pytest.mark.slow
-@pytest.mark.xdist_group("readme")  # in one folder, with the same workers
 @pytest.mark.parametrize("line", commands("proofroll"))
 def test_a_command_of_the_readme_works(
     line: str, command_line: Callable[..., tuple[int, str, str]], folder: Path, monkeypatch: pytest.MonkeyPatch

@@ -89,7 +89,6 @@ def test_what_changed_is_shown(versions: Callable[..., tuple[int, str, str]], tm
     assert table(found).row_count == 2
 
 
-@pytest.mark.xdist_group("cluster")
 def test_versions_that_do_the_same(versions: Callable[..., tuple[int, str, str]]) -> None:
     """The same bits are said to be the same, on a cluster as at home, within 80 columns, and nothing is exit code 0."""
     code, out, err = versions("2.0", "2.0.1", "--rounds", "0", "--scheduler", "local:1")

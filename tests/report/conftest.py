@@ -30,14 +30,6 @@ from proofroll.running.store import Store
 from proofroll.studies.outcome import Outcome, Run
 from proofroll.studies.planning import point_name
 
-
-def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
-    """The tests of this folder share a browser, pages and figures: one process makes them once."""
-    for item in items:
-        if Path(__file__).parent in item.path.parents:
-            item.add_marker(pytest.mark.xdist_group("report"))
-
-
 UNTIL, EVERY = 1.0, 0.02
 
 

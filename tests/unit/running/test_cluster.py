@@ -38,8 +38,6 @@ HOST = socket.gethostname()
 ASKED = Workers()
 PLUGINS = Path(__file__).parents[2] / "plugins"
 
-pytestmark = pytest.mark.xdist_group("cluster")  # one process starts the cluster, which costs more than its tests
-
 
 def case(engine: str, speed: float = 4.0, scene: str = "sphere_in_cylinder") -> Case:
     """A short case with the engine's own facts."""
