@@ -11,12 +11,12 @@ import numpy as np
 
 from proofroll.core.arrays import FloatArray
 from proofroll.core.scene import Scene
-from proofroll.elements.ball_on_surface.compiled.first_slip import FirstSlip, Model, first_slip
-from proofroll.elements.ball_on_surface.compiled.first_slips import first_slips
 from proofroll.elements.ball_on_surface.compiled.library import TIGHTEST
 from proofroll.elements.ball_on_surface.element import rolling_ball
 from proofroll.files.scene_file import load_scene
 from proofroll.running.simulation import build
+from proofroll_benchmarks.first_slip import FirstSlip, Model, first_slip
+from proofroll_benchmarks.first_slips import first_slips
 
 # A measurement lasts about this long [s], so that the clock and one interruption do not matter.
 _SECONDS = 0.05

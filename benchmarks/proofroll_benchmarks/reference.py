@@ -15,7 +15,6 @@ from typing import Any
 import numpy as np
 
 from proofroll.core.arrays import FloatArray
-from proofroll.elements.ball_on_surface.compiled.first_slip import first_slip
 from proofroll.elements.ball_on_surface.compiled.library import require_heyoka
 from proofroll.elements.ball_on_surface.element import rolling_ball
 from proofroll.files.scene_file import load_scene
@@ -27,6 +26,7 @@ from proofroll.running.timing import Interval, Timing, interleaved, machine, rat
 from proofroll.truth.onset import first_slip as true_first_slip
 from proofroll.truth.rolling import unreduced
 from proofroll_benchmarks.compiled import Onsets, Timed, compiled, numeric
+from proofroll_benchmarks.first_slip import first_slip
 from proofroll_benchmarks.search import SAMPLES, Configuration, search
 
 _SCENE = "sphere_in_cylinder"

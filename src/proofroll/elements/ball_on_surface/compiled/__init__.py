@@ -1,1 +1,1 @@
-"""Equations of motion as compiled Taylor series (heyoka): for engines, for the truth, and for first slips in bulk."""
+"""Equations of motion as compiled Taylor series (heyoka): for engines, for the truth, and for the benchmarks."""

@@ -20,7 +20,6 @@ from typing import Any, Literal
 import numpy as np
 import numpy.typing as npt
 
-from proofroll.core.arrays import FloatArray
 from proofroll.elements.ball_on_surface.compiled.rolling import Function
 from proofroll.elements.ball_on_surface.model import RollingBall
 from proofroll.elements.ball_on_surface.surfaces import Cylinder
@@ -86,14 +85,6 @@ def parameters(body: RollingBall) -> list[float]:
     return [j, 1 / j, per_S, ball.radius, body.contact.rolling_resistance, *body.gravity.tolist(), c, 1 / c**2]
 
 
-def start(body: RollingBall, formulation: Formulation) -> FloatArray:
-    """State [q, s] at time 0; the angles start at θ = π/2, as far from the singularity as can be (Blajer 2006)."""
-    if formulation == "rotating_frame":
-        return np.concatenate([body.u0, body.udot0, body.surface.frame(body.u0).T @ body.w0])
-    w_x, w_y, w_z = body.w0  # there φ turns about -y, θ about x and ψ about z
-    return np.concatenate([body.u0, [0.0, np.pi / 2, 0.0], body.udot0, [-w_y, w_x, w_z]])
-
-
 @dataclass(frozen=True)
 class ProjectionEquations:
     """In symbols.
@@ -112,11 +103,6 @@ class ProjectionEquations:
     def state(self) -> list[Any]:
         """The state variables."""
         return [variable for variable, _ in self.system]
-
-    def excess(self, mu: Any) -> Any:
-        """Zero where the needed friction is ``mu`` times the normal force, positive where it is more."""
-        first, second = self.multipliers
-        return first**2 + second**2 - (mu * self.N) ** 2
 
 
 def equations(form: Structure) -> ProjectionEquations:

@@ -74,7 +74,7 @@ class FirstSlip:
             pars = [*rolling.parameters(body), mu]
         else:
             compiled, margin = _projected(projection.structure(body, model), tolerance)
-            self._start = projection.start(body, model)
+            self._start = _projected_start(body, model)
             pars = [*projection.parameters(body), mu]
             self._scales = np.ones(2)
         self._integrator = copy.copy(compiled)
@@ -129,6 +129,14 @@ def require_supported(body: RollingBall, resistance: bool) -> None:
     require_heyoka("a compiled first slip")
 
 
+def _projected_start(body: RollingBall, formulation: projection.Formulation) -> FloatArray:
+    """State [q, s] at time 0; the angles start at θ = π/2, as far from the singularity as can be (Blajer 2006)."""
+    if formulation == "rotating_frame":
+        return np.concatenate([body.u0, body.udot0, body.surface.frame(body.u0).T @ body.w0])
+    w_x, w_y, w_z = body.w0  # there φ turns about -y, θ about x and ψ about z
+    return np.concatenate([body.u0, [0.0, np.pi / 2, 0.0], body.udot0, [-w_y, w_x, w_z]])
+
+
 def _always_moves(body: RollingBall) -> bool:
     """Whether a pressed ball cannot stand still: what presses it is its speed alone."""
     return isinstance(body.surface, Cylinder) and rolling.is_uniform(body)
@@ -162,8 +170,9 @@ def _projected(form: projection.Structure, tolerance: float) -> tuple[Any, rolli
     import heyoka as hy
 
     found = projection.equations(form)
-    mu = hy.par[len(projection.PARAMETERS)]
-    return _stopping(found.system, found.excess(mu), (mu * found.N) ** 2, tolerance)
+    first, second = found.multipliers
+    available = (hy.par[len(projection.PARAMETERS)] * found.N) ** 2
+    return _stopping(found.system, first**2 + second**2 - available, available, tolerance)
 
 
 def _stopping(

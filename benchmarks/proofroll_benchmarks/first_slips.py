@@ -1,8 +1,8 @@
 """First slips in bulk: one compiled integrator whose vector lanes each roll a ball of their own.
 
 A lane whose ball has slipped, or whose time is over, takes the next ball at once, inside the integrator's own loop.
-The equations are those of :mod:`compiled.rolling` without the arc length and height, on which nothing
-depends where gravity is uniform along the surface; the event is that of :mod:`compiled.first_slip`.
+The equations are those of the element's compiled rolling without the arc length and height, on which nothing depends
+where gravity is uniform along the surface; the event is that of :mod:`proofroll_benchmarks.first_slip`.
 """
 
 from __future__ import annotations
@@ -20,14 +20,14 @@ from proofroll.core.arrays import FloatArray
 from proofroll.core.errors import Diverged, InputError
 from proofroll.core.scene import Scene
 from proofroll.elements.ball_on_surface.compiled import rolling
-from proofroll.elements.ball_on_surface.compiled.first_slip import (
+from proofroll.elements.ball_on_surface.element import rolling_ball
+from proofroll.elements.ball_on_surface.surfaces import Cylinder
+from proofroll_benchmarks.first_slip import (
     UNREACHABLE,
     margins,
     require_supported,
     slips_at_once,
 )
-from proofroll.elements.ball_on_surface.element import rolling_ball
-from proofroll.elements.ball_on_surface.surfaces import Cylinder
 
 # What may differ from ball to ball: parameters of the equations, and the start.
 _PARAMETERS = (*rolling.PARAMETERS, "mu")
@@ -59,7 +59,7 @@ def first_slips(
 
     All arrays are broadcast against each other, and so is the result; None is the scene's own value. The start is
     rolling without slip at the scene's point of the surface. A single time is as accurate as that of
-    :func:`proofroll.elements.ball_on_surface.compiled.first_slip.first_slip`.
+    :func:`proofroll_benchmarks.first_slip.first_slip`.
 
     Args:
         scene: a ball on a cylinder or plane.
