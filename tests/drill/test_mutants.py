@@ -2,8 +2,8 @@
 
 from __future__ import annotations
 
-import dataclasses
 import functools
+import html
 import json
 from collections.abc import Callable
 from pathlib import Path
@@ -13,8 +13,7 @@ import pytest
 from typer.testing import CliRunner
 
 from proofroll.cli import app
-from proofroll.conformance.explaining import explained
-from proofroll.conformance.subject import Subject
+from proofroll.conformance import run_check
 from proofroll.core.diagnosis import CLOSES, Cause, Evidence, diagnose, hypotheses_of
 from proofroll.core.diagnosis.fitting import telling
 from proofroll.core.plugins import load_element_kinds
@@ -84,20 +83,23 @@ def test_everybody_is_told_the_same_cause(
     install_engines: Callable[[dict[str, str]], None],
     tmp_path: Path,
 ) -> None:
-    """Conformance, run and compare name the cause of a wrong model in the same words."""
+    """A conformance check, run and report, data and page, name the cause of a wrong model in the same words."""
     mutant = ball_models.ToldInertia
-    settings = dataclasses.replace(mutant.presets[mutant.formulation]["default"], dt=2e-3)
-    told = explained(Subject(mutant, settings, load_scene(mutant.scene[0])), "It is not")
+    with pytest.raises(AssertionError) as told:
+        run_check(mutant, f"certificate_holds[{mutant.formulation}-default-plane]")
     install_engines({"mutant": "proofroll_drill.mutants.ball_models:ToldInertia"})
     claim, out = tmp_path / "claim.toml", ("--json", "--out", str(tmp_path / "out"))
     claim.write_text(CLAIM, encoding="utf-8")
     ran = proofroll("run", mutant.scene[0], "--engine", "mutant[preset=default,dt=0.002]", *out)
-    compared = proofroll("compare", str(claim), *out)
+    assert proofroll("report", str(claim), *out)[0] == 1
     assert ran[1], ran[2]
     (cause,) = json.loads(ran[1])["diagnosis"]
     assert mutant.named[0] in cause["sentence"]
-    assert cause["sentence"] in told
-    assert [item["sentence"] for item in json.loads(compared[1])["rows"][0]["diagnosis"]] == [cause["sentence"]]
+    assert f"cause: the engine moves a ball with a {mutant.named[0]}" in str(told.value)
+    report = json.loads((tmp_path / "out" / "report.json").read_text(encoding="utf-8"))
+    assert [item["sentence"] for item in report["comparisons"][0]["rows"][0]["diagnosis"]] == [cause["sentence"]]
+    page = (tmp_path / "out" / "report.html").read_text(encoding="utf-8")
+    assert f"{cause['sentence']}: {cause['remedy']}." in html.unescape(page)
 
 
 def test_every_hypothesis_says_its_grounds() -> None:

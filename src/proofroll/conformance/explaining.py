@@ -37,4 +37,4 @@ def explained(subject: Subject, sentence: str) -> str:
             causes = diagnosed(scene, lines, from_samples(scene, times, samples), truth(scene, times), step)
     except (Diverged, Refused, InputError):
         return sentence  # the check has said what it found; there is no run that tells more
-    return ". ".join([sentence, *(f"{item.sentence}: {item.cause.remedy}" for item in causes)])
+    return "\n".join([sentence, *(f"cause: {item.sentence}: {item.cause.remedy}" for item in causes)])

@@ -18,7 +18,8 @@ from proofroll.elements.ball_on_surface.model import RollingBall
 
 _ANGLES = 90
 _FEWEST = 5
-# Along one direction every cone has its edge or its face: the slip has to turn by this much to tell [rad].
+# Along one direction every cone has its edge or its face: the slip has to turn by this much to tell [rad], or the
+# friction, for at an edge of a pyramid the slip stays, and the friction is now that of one face, now of the other.
 # A face that is fitted comes near any short arc of slip: an elliptic cone that lags left a fiftieth.
 _PYRAMID = 1 / 100
 _TURNS = 0.4
@@ -109,8 +110,7 @@ class PyramidalCone:
         sizes = np.linalg.norm(slip, axis=-1, keepdims=True)
         if len(slip) < _FEWEST or not np.all(sizes > 0) or not np.all(np.isfinite(said)):
             return
-        directions = np.unwrap(np.arctan2(slip[:, 1], slip[:, 0]))
-        if np.ptp(directions) < _TURNS:
+        if max(np.ptp(np.unwrap(np.arctan2(of[:, 1], of[:, 0]))) for of in (slip, said)) < _TURNS:
             return
         before = apart(said, -most * slip / sizes)
         after = np.inf
