@@ -40,12 +40,19 @@ def run(
     import tempfile
     import threading
 
+    from proofroll.running.asking import prepare
+    from proofroll.running.worker_pool import Workers
+
+    workers = Workers()  # the process that tells the settings also makes the run
+    # It imports the engine while this process imports what reads scenes and results: each takes half a second.
+    preparing = threading.Thread(target=prepare, args=(engine, workers), daemon=True)
+    preparing.start()
+
     from proofroll.core.time_grid import EVERY, time_grid
     from proofroll.files.netcdf import import_xarray
     from proofroll.report.run import run_content, run_lines
     from proofroll.report.run_plot import require_ending
     from proofroll.running.runner import run_one
-    from proofroll.running.worker_pool import Workers
     from proofroll.studies.run_once import single_case
 
     time_grid(until, EVERY if every is None else every)
@@ -54,9 +61,8 @@ def run(
             require_writable(file)
     if plot is not None:
         require_ending(plot)
-    # The result is read with xarray, half a second to import: done while the worker's process is busy.
-    threading.Thread(target=import_xarray, daemon=True).start()
-    workers = Workers()  # the process that tells the settings also makes the run
+    import_xarray()
+    preparing.join()
     case = single_case(
         scene,
         assignments(settings or []),

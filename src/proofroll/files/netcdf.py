@@ -19,14 +19,16 @@ if TYPE_CHECKING:
 
 
 def import_xarray() -> None:
-    """Imports xarray, in a process that is ours alone: from then on it takes no array of dask's.
+    """Imports xarray and its backend, in a process that is ours alone: from then on it takes no array of dask's.
 
     At its first array xarray imports all of dask, half of what a run of a second costs; no array of ours is dask's.
     """
     with _dask_aside():
+        import scipy.io
         import xarray as xr
 
         xr.Variable((), 0.0)
+        assert scipy.io.netcdf_file  # the backend of read and write, which would import it at the first file
 
 
 @contextlib.contextmanager

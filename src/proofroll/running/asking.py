@@ -11,6 +11,7 @@ from typing import Any
 
 from proofroll.core.engine_abilities import Term
 from proofroll.core.errors import ProofrollError
+from proofroll.core.plugins import parse_engine
 from proofroll.running.case import Case, EngineDescription, EngineFacts
 from proofroll.running.process import WorkerDied
 from proofroll.running.worker_pool import Workers
@@ -70,6 +71,17 @@ def resolve(
     with lent_workers(workers) as lent, ThreadPoolExecutor(os.cpu_count() or 1) as pool:
         list(pool.map(lambda name: ask(name, lent), dict.fromkeys(name for name, _ in engines)))
     return found
+
+
+def prepare(engine: str, workers: Workers) -> None:
+    """Starts an engine's process and lets it import what a run needs, while the caller has other things to do.
+
+    What is wrong with the engine is left to whoever asks it next.
+    """
+    with contextlib.suppress(ProofrollError), workers.lend(parse_engine(engine).name) as worker:
+        worker.request({"do": "resolve", "engine": parse_engine(engine).name, "options": {}}, _START_UP_SECONDS)
+        importing = {"function": "proofroll.files.netcdf:import_xarray", "arguments": {}}
+        worker.request({"do": "call", **importing}, _START_UP_SECONDS)
 
 
 def programs(cases: Sequence[Case], workers: Workers | None = None) -> list[tuple[str | None, str]]:

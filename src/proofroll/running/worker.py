@@ -91,10 +91,10 @@ def call(function: str, arguments: dict[str, Any]) -> dict[str, Any]:
     """A function of another package in this process, ``module:name``, e.g. one that measures an engine."""
     gc.freeze()  # modules need not be looked at again in every collection
     try:
-        answer: dict[str, Any] = pkgutil.resolve_name(function)(**arguments)
+        answer: dict[str, Any] | None = pkgutil.resolve_name(function)(**arguments)
     except (Refused, Diverged) as error:
         return {"message": str(error)}
-    return answer
+    return answer or {}
 
 
 def one_line(error: BaseException) -> str:

@@ -6,7 +6,7 @@ from pathlib import Path
 
 import pytest
 
-from proofroll.running.asking import resolve
+from proofroll.running.asking import prepare, resolve
 from proofroll.running.process import Worker
 from proofroll.running.runner import Runner
 from proofroll.running.store import Store
@@ -34,6 +34,17 @@ def test_a_worker_is_kept_for_its_engine() -> None:
     with workers.lend("truth") as worker:
         assert process(worker) == first
         worker.request(ASK, 60)
+    workers.close()
+
+
+def test_a_prepared_worker_serves_the_engine_and_a_wrong_name_is_left_to_who_asks_next() -> None:
+    """An engine's process is kept once it has imported what a run needs; of nonsense nothing is kept or raised."""
+    workers = Workers()
+    prepare("projection[dt=1e-3", workers)
+    prepare("no_such_engine", workers)
+    prepare("projection", workers)
+    with workers.lend("projection") as worker:
+        assert worker._asked == 2  # its settings, and the import
     workers.close()
 
 
