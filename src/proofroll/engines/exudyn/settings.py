@@ -160,10 +160,10 @@ PRESETS: Mapping[str, Mapping[str, ExudynSettings]] = {
         # takes four fifths of the error out of the forces of stiff small mechanisms; a new Jacobian at every step
         # ends Newton's method where constraints depend on each other.
         "matched": ExudynSettings("redundant", "matched", 1e-3, "generalized_alpha", 0.9, 1e-10, "reused"),
-        # Constraints at velocity level: loops open by 1e-6 m at 1e-3 s, and forces are a hundred times as accurate. On the
-        # slider-crank they are off by 8e-3 of 87 N, at second order, which no other reading of multipliers mends: the
-        # motion's own error is 5e-5 rad, and exact reactions at its states are off by 1.4e-2 N. Newmark's β below 1/4,
-        # which Exudyn offers too, and nodes without Euler parameters do worse.
+        # Constraints at velocity level: loops open by 1e-6 m at 1e-3 s, and forces are a hundred times as accurate: on
+        # the slider-crank off by 8e-3 of 87 N, at second order. No other reading of multipliers mends that, for exact
+        # reactions at these states, 5e-5 rad off themselves, are off by 1.4e-2 N; Newmark's β below 1/4, which Exudyn
+        # offers too, and nodes without Euler parameters do worse.
         # Dependent constraints leave Newton's method with more round-off than a tighter tolerance asks for.
         "tuned": ExudynSettings("redundant", "tuned", 1e-3, "trapezoidal_index2", None, 1e-8, "reused"),
     },

@@ -300,8 +300,8 @@ PRESETS: Mapping[str, Mapping[str, MujocoSettings]] = {
         # Ten steps: the loops' forces are as accurate as they get (of the slider-crank 3e-5 of 60 N at 1e-4 s, where
         # two steps leave 2e-2 N at every step), at the price of ten times the error of positions.
         "matched": MujocoSettings("joints", "matched", time_constant=FORCES_TIME_CONSTANT),
-        # Best in positions. The shortest that MuJoCo allows lets the slider-crank, whose error is the largest, be off by
-        # a fifth more and its forces by two thirds more; Bricard, four-bar and squeezer lose 5 to 26 % of 1e-8 m and less.
+        # Best in positions. With the shortest that MuJoCo allows the slider-crank, whose error is the largest, is off
+        # by a fifth more and its forces by two thirds; Bricard, four-bar and squeezer gain 5 to 26 % of 3e-8 m or less.
         "tuned": MujocoSettings("joints", "tuned", time_constant=POSITIONS_TIME_CONSTANT),
     },
 }
