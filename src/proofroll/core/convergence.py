@@ -24,8 +24,8 @@ class Limit:
 
     Attributes:
         values: Richardson's extrapolation, shape (time,).
-        error_bar: its uncertainty, largest over time: twice what the last extrapolation changed, or, where the order
-            is no integer, how far two extrapolations differ.
+        error_bar: its uncertainty, largest over time: how far extrapolations differ, or, where nothing is extrapolated,
+            what a further refinement may still change.
         order: observed order of convergence, NaN where there is none in (0, 20].
         shown: whether the differences shrink, so that there is a limit to speak of.
     """
@@ -41,10 +41,10 @@ def richardson(curves: Sequence[FloatArray], steps: Sequence[float], declared: i
 
     The observed order p follows from the size of the two differences (Roache 1998, section 5.9). Where it is that of
     the scheme the ladder is asymptotic: the extrapolation removes the term h^p, then h^(p+1), and is trusted to twice
-    its last change. So it is where curves show another whole order and differ by one shape, which scatter does not; the
-    bar then has what the rounding of that order changes, too. Elsewhere extrapolating would spread the error of the
-    coarse curves; the finest curve stands for the limit, trusted to twice what the last refinement changed (more, where
-    the order is below one).
+    its last change, or to what removing a term h^(p-1), which may hide beside h^p, would have made of it. So it is
+    where curves show another whole order and differ by one shape, which scatter does not; the bar then has what the
+    rounding of that order changes, too. Elsewhere extrapolating would spread the error of the coarse curves; the finest
+    curve stands for the limit, trusted to twice what the last refinement changed (more, where the order is below one).
 
     Args:
         curves: three arrays of one shape.
@@ -59,7 +59,8 @@ def richardson(curves: Sequence[FloatArray], steps: Sequence[float], declared: i
     order = observed_order(first, last, h)
     if not np.isfinite(order) or order < _NO_CONVERGENCE:
         # The finest curve, as uncertain as the largest change seen; from one that vanishes at once no order follows.
-        return Limit(fine, max(first, last), float("nan"), shown=last < first * (h[1] / h[0]) ** _NO_CONVERGENCE)
+        shown = last < first * (h[1] / h[0]) ** _NO_CONVERGENCE
+        return Limit(fine, max(first, last, _walked(middle - coarse, fine - middle)), float("nan"), shown)
     power, rounding = declared or max(1, round(order)), 0.0
     if abs(order - power) > _ASYMPTOTIC:
         power = max(1, round(order))
@@ -69,10 +70,22 @@ def richardson(curves: Sequence[FloatArray], steps: Sequence[float], declared: i
         rounding = last * abs(1 / (h[1] ** order - 1) - 1 / (h[1] ** power - 1))
     before = middle + (middle - coarse) / ((h[0] / h[1]) ** power - 1)
     after = fine + (fine - middle) / (h[1] ** power - 1)
-    # What the two extrapolations keep of the term h^(p+1)
-    kept = [_kept(h[0], h[1], power), _kept(h[1], h[2], power)]
-    values = after + (after - before) * kept[1] / (kept[0] - kept[1])
-    return Limit(values, 2 * max(size(values - after), rounding), order)
+    finer = _removes(power + 1, h, power)
+    hidden = _removes(power - 1, h, power) if power > 1 else 0.0
+    change = size(after - before)
+    bar = max(2 * abs(finer) * change, abs(hidden - finer) * change, 2 * rounding)
+    return Limit(after + (after - before) * finer, bar, order)
+
+
+def _walked(first: FloatArray, last: FloatArray) -> float:
+    """What three further changes come to on average, where these two grow in one direction; else zero.
+
+    By more than a factor of four, what halving does to h^-2, no law grows: that is a jump of one of the runs.
+    """
+    growth = size(last) / max(size(first), np.finfo(float).tiny)
+    if not 1 < growth <= 4.5 or size(last - growth * first) > size(last) / 2:
+        return 0.0
+    return size(last) * (growth + growth**2 + growth**3) / 3
 
 
 def observed_order(first: float, last: float, steps: Sequence[float] | FloatArray) -> float:
@@ -96,15 +109,24 @@ def observed_order(first: float, last: float, steps: Sequence[float] | FloatArra
     return float(brentq(excess, low, high)) if excess(low) < 0 < excess(high) else float("nan")
 
 
-def _kept(coarse: float, fine: float, power: int) -> float:
-    """What extrapolating from two steps leaves of a term h^(p+1), as its factor."""
-    return float(fine ** (power + 1) - (coarse ** (power + 1) - fine ** (power + 1)) / ((coarse / fine) ** power - 1))
+def _removes(term: int, h: FloatArray, power: int) -> float:
+    """How often the change from one extrapolation to the next is added once more to remove a term h^term."""
+    before, after = (
+        float(fine**term - (coarse**term - fine**term) / ((coarse / fine) ** power - 1))
+        for coarse, fine in itertools.pairwise(h)
+    )
+    return after / (before - after)
 
 
 def tightest(curves: Sequence[FloatArray]) -> Limit:
-    """Limit of an adaptive method: its tightest curve, as uncertain as the last tightening changed it."""
+    """Limit of an adaptive method: its tightest curve.
+
+    It is as uncertain as what the last tightening changed, or as all further ones would if each shrank as that one did.
+    """
     changes = [size(after - before) for before, after in itertools.pairwise(curves)]
-    return Limit(curves[-1], changes[-1], float("nan"), shown=len(changes) == 1 or changes[-1] < changes[-2])
+    shown, last = len(changes) == 1 or changes[-1] < changes[-2], changes[-1]
+    rest = last / (changes[-2] / last - 1) if shown and len(changes) > 1 and last > 0 else 0.0
+    return Limit(curves[-1], max(last, rest), float("nan"), shown)
 
 
 def size(values: FloatArray) -> float:

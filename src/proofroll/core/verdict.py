@@ -16,8 +16,8 @@ _FLAT = 1 / 20
 # Scatter that may be this many times as large without leaving the tolerance is no doubt.
 _SEVERAL = 3
 # A limit is shown to be wrong by this many of its error bars: extrapolations of engines of second order that solve the
-# scene's own equations were off by up to 8 of theirs, those of softened contacts by 20 to 20,000.
-_SHOWN_WRONG = 10
+# scene's own equations were off by up to 2.3 of theirs, those of softened contacts by 6 to 6,000.
+_SHOWN_WRONG = 4
 # Round-off of a curve, relative to its size: a thousand operations, each off by one machine epsilon.
 _ROUND_OFF = 1e3 * np.finfo(float).eps
 
@@ -66,7 +66,7 @@ class Judgement:
         verdict: see :class:`Verdict`.
         order: observed order, or None.
         limit_error: distance of the limit of small steps from the truth, or None without a ladder.
-        limit_error_bar: uncertainty of that limit.
+        limit_error_bar: uncertainty of that distance.
         limit: what the ladder says, see :class:`LimitFinding`.
         reason: why this verdict, as a clause with numbers.
         remarks: what a reader must know though it does not change the verdict, one clause each.
@@ -117,13 +117,14 @@ def judge(
         doubt: what an ill-posed question leaves to be judged.
     """
     error = largest_difference(values, true)
-    # Below this nobody can tell a curve from the truth.
-    floor = truth_error_bar + _ROUND_OFF * max(scale, float(np.max(np.abs(true), initial=0.0)))
+    round_off = _ROUND_OFF * max(scale, float(np.max(np.abs(true), initial=0.0)))
     shown_unit = "" if unit == "1" else f" {unit}"
     rungs = _Ladder(LimitFinding.NOT_SHOWN if ladder else LimitFinding.NO_LADDER, lost=lost)
     if limit is not None:
-        rungs = _read(limit, largest_difference(limit.values, true), tolerance, floor, shown_unit)
-    verdict = Verdict.NOT_JUDGED if truth_error_bar > tolerance else _verdict(error, tolerance, rungs, doubt)
+        rungs = _read(limit, largest_difference(limit.values, true), tolerance, truth_error_bar, round_off, shown_unit)
+    verdict = _verdict(error, tolerance, rungs, doubt)
+    if truth_error_bar > tolerance or (verdict != Verdict.CONVERGES and abs(error - tolerance) <= truth_error_bar):
+        verdict = Verdict.NOT_JUDGED
     remark = f"within tolerance, but the limit of small steps is shown not to be the truth: {rungs.text}"
     return Judgement(
         observable=name,
@@ -165,17 +166,18 @@ class _Ladder:
     lost: str = ""
 
 
-def _read(limit: Limit, error: float, tolerance: float, floor: float, unit: str) -> _Ladder:
+def _read(limit: Limit, error: float, tolerance: float, truth_bar: float, round_off: float, unit: str) -> _Ladder:
     """Reads a limit that is off by ``error``. Rungs that differ by as much as their error show no limit."""
-    bar, order = limit.error_bar, limit.order if np.isfinite(limit.order) else None
-    settled = limit.shown or bar <= max(_FLAT * tolerance, floor)
+    bar, order = limit.error_bar + truth_bar, limit.order if np.isfinite(limit.order) else None
+    flat = bar <= truth_bar + round_off
+    settled = limit.shown or flat or bar <= _FLAT * tolerance
     far_inside = error + _SEVERAL * bar <= tolerance  # scatter, but none that could leave the tolerance
     finding, leaves = LimitFinding.NOT_SHOWN, error - bar > tolerance
     if far_inside or (settled and error <= tolerance and bar <= tolerance):
         finding = LimitFinding.WITHIN
-    elif settled and leaves:
+    elif leaves and (limit.shown or flat or error - bar / _FLAT > tolerance):
         finding = LimitFinding.ANOTHER
-    wrong = finding == LimitFinding.WITHIN and error > _SHOWN_WRONG * bar + floor
+    wrong = finding == LimitFinding.WITHIN and error > _SHOWN_WRONG * bar + round_off
     text = f"off by {error:.2g} ± {bar:.1g}{unit}, {'no order' if order is None else f'order {order:.3g}'}"
     return _Ladder(finding, error, bar, order, leaves, wrong, text)
 
@@ -194,10 +196,14 @@ def _verdict(error: float, tolerance: float, rungs: _Ladder, doubt: Doubt) -> Ve
 
 def _reason(verdict: Verdict, error: float, tolerance: float, truth_error_bar: float, unit: str, rungs: _Ladder) -> str:
     """Why the verdict, as a clause with numbers."""
+    found, allowed, bar = *_told_apart(error, tolerance), f"{truth_error_bar:.2g}{unit}"
+    if truth_error_bar > tolerance:
+        return f"not judged: the truth's error bar {bar} exceeds the tolerance {allowed}{unit}"
     if verdict == Verdict.NOT_JUDGED:
-        bar = f"{truth_error_bar:.2g}{unit}"
-        return f"not judged: the truth's error bar {bar} exceeds the tolerance {tolerance:.2g}{unit}"
-    text = f"error {error:.2g}{unit} {'within' if error <= tolerance else 'beyond'} {tolerance:.2g}{unit}"
+        return (
+            f"not judged: error {found}{unit} ± {bar}, the truth's error bar, may be within {allowed}{unit} or beyond"
+        )
+    text = f"error {found}{unit} {'within' if error <= tolerance else 'beyond'} {allowed}{unit}"
     if not np.isfinite(error):
         text = "not finite, or not as many values as the truth"
     if rungs.finding == LimitFinding.NO_LADDER:
@@ -207,3 +213,9 @@ def _reason(verdict: Verdict, error: float, tolerance: float, truth_error_bar: f
     else:
         text += f"; {'limit ' if rungs.finding == LimitFinding.WITHIN else ''}{rungs.finding}: {rungs.text}"
     return f"the question is ill-posed here; {text}" if verdict == Verdict.ILL_POSED else text
+
+
+def _told_apart(one: float, other: float) -> tuple[str, str]:
+    """Two numbers with two digits, or as many as show that they are not the same."""
+    texts = ((f"{one:.{digits}g}", f"{other:.{digits}g}") for digits in range(2, 18))
+    return next((pair for pair in texts if one == other or pair[0] != pair[1]), (repr(one), repr(other)))

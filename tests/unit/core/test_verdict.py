@@ -129,9 +129,35 @@ def test_a_right_limit_is_not_remarked() -> None:
 
 
 def test_an_extrapolation_that_is_off_by_a_few_of_its_bars_is_not_remarked() -> None:
-    """Error bars of limits are estimates; nobody is told to have another limit by eight of them."""
-    for bars, count in ((8, 0), (12, 1)):
+    """Error bars of limits are estimates; nobody is told to have another limit by three of them."""
+    for bars, count in ((3, 0), (5, 1)):
         assert len(verdict_of(1e-4, Limit(TRUE + bars * 1e-6, 1e-6, 2.0)).remarks) == count
+
+
+@pytest.mark.parametrize("declared", [1, 2, None])
+def test_a_term_of_lower_order_is_no_other_limit(declared: int | None) -> None:
+    """The errors 4 mm x² + 1.5 mm x vanish with the step x; no ladder of them shows another limit than the truth."""
+    off = [4e-3 * x**2 + 1.5e-3 * x for x in (4.0, 2.0, 1.0)]
+    found = verdict_of(off[-1], errors(*off, declared=declared), tolerance=1e-4)
+    assert (found.verdict, found.limit) == (Verdict.DIFFERS, LimitFinding.NOT_SHOWN)
+    assert found.limit_error is not None
+    assert found.limit_error_bar is not None
+    assert found.limit_error <= found.limit_error_bar
+
+
+def test_changes_that_grow_confirm_nothing() -> None:
+    """Off by 20 µm and by twice as much after each halving, 0.1 mm is left soon: no limit is confirmed."""
+    found = verdict_of(2e-5, errors(0.5e-5, 1e-5, 2e-5), tolerance=1e-4)
+    assert (found.verdict, found.limit) == (Verdict.UNCONFIRMED, LimitFinding.NOT_SHOWN)
+    jumped = verdict_of(2e-5, errors(0, 1e-7, 2e-5), tolerance=1e-4)
+    assert jumped.verdict is Verdict.AGREES, "one run that jumps far inside the tolerance is scatter"
+
+
+def test_a_drift_that_never_shrinks_is_no_limit() -> None:
+    """Runs that drift towards the truth by a hundredth of the tolerance each show no other limit at 1.05 of it."""
+    found = verdict_of(1.05e-3, errors(1.07e-3, 1.06e-3, 1.05e-3))
+    assert (found.verdict, found.limit) == (Verdict.DIFFERS, LimitFinding.NOT_SHOWN)
+    assert verdict_of(2e-3, errors(2.02e-3, 2.01e-3, 2e-3)).limit is LimitFinding.ANOTHER
 
 
 def test_converges_if_the_limit_is_the_truth() -> None:
@@ -164,6 +190,13 @@ def test_an_adaptive_method_converges_by_its_tightest_curve() -> None:
     limit = tightest([TRUE + 5e-3, TRUE + 2e-4, TRUE + 1e-5])
     assert verdict_of(5e-3, limit).verdict is Verdict.CONVERGES
     assert verdict_of(5e-3, tightest([TRUE + 4e-3, TRUE + 5e-3, TRUE + 0.9e-3])).verdict is Verdict.DIFFERS
+
+
+def test_an_adaptive_method_that_hardly_settles_is_not_confirmed() -> None:
+    """Tightenings that change 1 mm, then 0.9 mm, may change nine times that in all: no agreement within 1 mm."""
+    found = verdict_of(0.5e-3, tightest([TRUE + 2.4e-3, TRUE + 1.4e-3, TRUE + 0.5e-3]))
+    assert (found.verdict, found.limit) == (Verdict.UNCONFIRMED, LimitFinding.NOT_SHOWN)
+    assert found.limit_error_bar == pytest.approx(8.1e-3)
 
 
 def test_another_limit_and_no_limit_are_two_answers() -> None:
@@ -214,6 +247,22 @@ def test_a_tolerance_below_the_error_bar_of_the_truth_judges_nobody(error: float
         assert found.verdict is Verdict.NOT_JUDGED
         assert "truth's error bar 3.8e-13 m exceeds the tolerance 1e-13 m" in found.reason
     assert verdict_of(0.0, bar=3.8e-13, tolerance=4e-13).verdict is Verdict.AGREES
+
+
+@pytest.mark.parametrize("error", [0.2e-3, 1.8e-3])
+def test_an_error_that_the_truth_cannot_place_is_not_judged(error: float) -> None:
+    """Where the truth's own error bar reaches across the tolerance nobody is said to agree or to differ."""
+    found = verdict_of(error, bar=0.9e-3)
+    assert found.verdict is Verdict.NOT_JUDGED
+    assert found.reason.endswith("m ± 0.0009 m, the truth's error bar, may be within 0.001 m or beyond")
+    assert verdict_of(0.05e-3, bar=0.9e-3).verdict is Verdict.AGREES
+    assert verdict_of(1.95e-3, bar=0.9e-3).verdict is Verdict.DIFFERS
+
+
+def test_a_reason_never_sets_a_number_against_itself() -> None:
+    """An error a millionth beyond the tolerance is written with as many digits as show it."""
+    assert verdict_of(1.000001e-3).reason.startswith("error 0.001000001 m beyond 0.001 m")
+    assert verdict_of(2e-3).reason.startswith("error 0.002 m beyond 0.001 m")
 
 
 @pytest.mark.parametrize(
