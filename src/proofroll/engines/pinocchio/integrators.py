@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from typing import Any, Protocol
+from typing import Any
 
 import numpy as np
 import pinocchio as pin
@@ -15,21 +15,26 @@ from proofroll.engines.pinocchio.mechanism import BallWithRows, left_the_wall
 from proofroll.engines.pinocchio.settings import PinocchioSettings
 
 
-class TangentIntegrator(Protocol):
+class TangentIntegrator:
     """Moves the state of a mechanism.
 
     Attributes:
         q, v: joint configuration and velocity now.
-        left: that the ball left the wall, which ended the run, or None.
+        turns: whether the orientation of the ball is integrated.
+        events: so far; of a ball that cannot slip, that it left the wall.
+        mu_static: largest |F|/N while sticking [-]; None: the rows of rolling hold always.
+        sticking: whether the ball sticks now; None where it cannot slip.
     """
 
-    q: FloatArray
-    v: FloatArray
-    left: Event | None
+    mu_static: float | None = None
+    sticking: bool | None = None
 
-    @property
-    def turns(self) -> bool:
-        """Whether the orientation of the ball is integrated."""
+    def __init__(self, mechanism: BallWithRows, settings: PinocchioSettings) -> None:
+        self._mechanism, self._settings = mechanism, settings
+        self._model, self._data = mechanism.model, mechanism.model.createData()
+        self.turns = bool(settings.orientation)
+        self.events: list[Event] = []
+        self.q, self.v = mechanism.q0.copy(), mechanism.v0.copy()
 
     def advance(self, start: float, end: float) -> None:
         """From ``start`` to ``end`` [s].
@@ -37,43 +42,25 @@ class TangentIntegrator(Protocol):
         Raises:
             Diverged: no step is small enough, the rows have become dependent, or the wall would have to pull.
         """
+        raise NotImplementedError
+
+    def reaction(self, data: Any) -> tuple[FloatArray, FloatArray]:
+        """Joint acceleration, and force of the wall on the ball in the world [N], now."""
+        return self._mechanism.reaction(data, self.q, self.v)
 
 
-def integrator(mechanism: BallWithRows, settings: PinocchioSettings) -> TangentIntegrator:
-    """The integrator that the settings ask for."""
-    if settings.integrator == "dop853":
-        return Adaptive(mechanism, settings)
-    if settings.integrator == "semi_implicit_euler":
-        return SemiImplicitEuler(mechanism, settings)
-    return TangentRungeKutta4(mechanism, settings)
-
-
-def _moving(mechanism: BallWithRows, settings: PinocchioSettings) -> FloatArray:
-    """Factors on the joint velocity where it moves the configuration: 0 holds the ball's orientation, shape (nv,)."""
-    factors = np.ones(mechanism.model.nv)
-    if not settings.orientation:
-        # Isotropy: the inertia of the ball is the same in any axes fixed in it, so at each instant axes may be chosen
-        # that coincide with the carriage's (or the world's). In both formulations the spin is last.
-        factors[-3:] = 0.0
-    return factors
-
-
-class FixedStep:
+class FixedStep(TangentIntegrator):
     """Steps of ``dt``; subclasses say what one step is."""
 
     def __init__(self, mechanism: BallWithRows, settings: PinocchioSettings) -> None:
-        self._mechanism, self._settings = mechanism, settings
-        self._model, self._data = mechanism.model, mechanism.model.createData()
-        self._moving = _moving(mechanism, settings)
+        super().__init__(mechanism, settings)
+        # Factors on the joint velocity where it moves the configuration: 0 holds the ball's orientation. Isotropy: the
+        # inertia of the ball is the same in any axes fixed in it, so at each instant axes may be chosen that coincide
+        # with the carriage's (or the world's). In both formulations the spin is last.
+        self._moving = np.ones(self._model.nv)
+        self._moving[-3:] = float(self.turns)
         self._dt = float(settings.dt or 0.0)
         self._start: FloatArray | None = None
-        self.left: Event | None = None
-        self.q, self.v = mechanism.q0.copy(), mechanism.v0.copy()
-
-    @property
-    def turns(self) -> bool:
-        """See :class:`TangentIntegrator`."""
-        return bool(np.any(self._moving[-3:]))
 
     def advance(self, start: float, end: float) -> None:
         """See :class:`TangentIntegrator`."""
@@ -93,7 +80,7 @@ class FixedStep:
         """Acceleration at the end of a step, with which the next one starts; ends the run if the wall would pull."""
         acceleration = self._acceleration(self.q, self.v)
         if self._mechanism.normal_force(self._data) < -self._mechanism.faint:
-            self.left = Event("lift_off", time - 0.5 * self._dt, time - self._dt, time)
+            self.events.append(Event("lift_off", time - 0.5 * self._dt, time - self._dt, time))
             raise left_the_wall(f"before {time:.6g} s")
         return acceleration
 
@@ -150,7 +137,7 @@ PATIENCE = 500
 _QUATERNION = 4
 
 
-class Adaptive:
+class Adaptive(TangentIntegrator):
     """DOP853 on configuration and velocity together, the quaternion by its rate (pin.tangentMap) if it is integrated.
 
     One solver lives from event to event. Its bound moves from sample to sample, so that a step ends at each: the dense
@@ -158,27 +145,18 @@ class Adaptive:
     """
 
     def __init__(self, mechanism: BallWithRows, settings: PinocchioSettings) -> None:
-        self._mechanism, self._settings = mechanism, settings
-        self._model, self._data = mechanism.model, mechanism.model.createData()
-        # In both formulations the orientation is last. Without it, see _moving, no more than the place is integrated,
+        super().__init__(mechanism, settings)
+        # In both formulations the orientation is last. Without it, see FixedStep, no more than the place is integrated,
         # and its rates are velocities of the joints.
-        self._turns = bool(settings.orientation)
-        self._places = self._model.nq if self._turns else self._model.nq - _QUATERNION
+        self._places = self._model.nq if self.turns else self._model.nq - _QUATERNION
         self._rtol = float(settings.rtol or 0.0)
         # Components in the ball's turning axes pass through zero all the time: a hundredth of their natural size
         # keeps the tolerance relative to most of their range.
         self._atol = 1e-2 * self._rtol * np.concatenate([mechanism.q_scale[: self._places], mechanism.v_scale])
         self._turning_time = mechanism.q_scale[0] / mechanism.v_scale[0]
         self._solver: Any = None
-        self.left: Event | None = None
         self._short_steps = 0
-        self.q, self.v = mechanism.q0.copy(), mechanism.v0.copy()
         self._q = mechanism.q0.copy()
-
-    @property
-    def turns(self) -> bool:
-        """See :class:`TangentIntegrator`."""
-        return self._turns
 
     def _joined(self, q: FloatArray, v: FloatArray) -> FloatArray:
         """What is integrated."""
@@ -187,7 +165,7 @@ class Adaptive:
     def _split(self, y: FloatArray) -> tuple[FloatArray, FloatArray]:
         """Configuration and velocity; the next call overwrites the configuration."""
         n = self._places
-        if self._turns:  # the rates must not depend on the length to which the quaternion has drifted
+        if self.turns:  # the rates must not depend on the length to which the quaternion has drifted
             return pin.normalize(self._model, y[:n]), y[n:]
         self._q[:n] = y[:n]
         return self._q, y[n:]
@@ -195,11 +173,11 @@ class Adaptive:
     def _moved(self, q: FloatArray, v: FloatArray, acceleration: FloatArray) -> FloatArray:
         """Rates of what is integrated."""
         return np.concatenate(
-            [pin.tangentMap(self._model, q).dot(v) if self._turns else v[: self._places], acceleration]
+            [pin.tangentMap(self._model, q).dot(v) if self.turns else v[: self._places], acceleration]
         )
 
     def _rates(self, _: float, y: FloatArray) -> FloatArray:
-        if self._turns:
+        if self.turns:
             q, v = self._split(y)
             return self._moved(q, v, self._mechanism.accelerate(self._data, q, v))
         # The same as plain statements, for it runs a dozen times a step.
@@ -229,7 +207,7 @@ class Adaptive:
                     self._put_back(solver)
                 # The rates that were found last are those at the end of the step, with projection or without.
                 if self._mechanism.normal_force(self._data) < -self._mechanism.faint:
-                    self.left = Event("lift_off", 0.5 * (solver.t_old + solver.t), solver.t_old, solver.t)
+                    self.events.append(Event("lift_off", 0.5 * (solver.t_old + solver.t), solver.t_old, solver.t))
                     raise left_the_wall(f"before {solver.t:.6g} s")
         except np.linalg.LinAlgError as error:
             raise Diverged(f"the equations became singular between {start:g} s and {end:g} s ({error})") from None

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterator
-from typing import Any
 
 import numpy as np
 import pinocchio as pin
@@ -15,10 +14,24 @@ from proofroll.core.events import Event
 from proofroll.elements.ball_on_surface.model import BallCapability, RollingBall
 from proofroll.engines.pinocchio.composite import Composite
 from proofroll.engines.pinocchio.free_flyer import FreeFlyer
-from proofroll.engines.pinocchio.friction import StickSlipIntegrator, stick_slip
-from proofroll.engines.pinocchio.integrators import TangentIntegrator, integrator
+from proofroll.engines.pinocchio.integrators import Adaptive, SemiImplicitEuler, TangentIntegrator, TangentRungeKutta4
 from proofroll.engines.pinocchio.mechanism import BallWithRows
 from proofroll.engines.pinocchio.settings import PinocchioSettings
+from proofroll.engines.pinocchio.stick_slip import AdaptiveStickSlip
+from proofroll.engines.pinocchio.stick_slip_steps import StickSlipEuler, StickSlipRungeKutta4
+
+_INTEGRATORS = {
+    "dop853": Adaptive,
+    "semi_implicit_euler": SemiImplicitEuler,
+    "rk4": TangentRungeKutta4,
+    "rk4_dexpinv": TangentRungeKutta4,
+}
+_THAT_SLIPS = {
+    "dop853": AdaptiveStickSlip,
+    "semi_implicit_euler": StickSlipEuler,
+    "rk4": StickSlipRungeKutta4,
+    "rk4_dexpinv": StickSlipRungeKutta4,
+}
 
 
 class RowsRun:
@@ -28,11 +41,11 @@ class RowsRun:
         """At time 0; the settings say whether the orientation is integrated, no longer the scene."""
         kind = Composite if settings.formulation == "composite" else FreeFlyer
         self.mechanism: BallWithRows = kind(body, bool(settings.orientation))
-        self.motion: TangentIntegrator = (
-            stick_slip(self.mechanism, settings, body.contact)
-            if math.isfinite(body.contact.mu_static)
-            else integrator(self.mechanism, settings)
-        )
+        self.motion: TangentIntegrator
+        if math.isfinite(body.contact.mu_static):
+            self.motion = _THAT_SLIPS[settings.integrator](self.mechanism, settings, body.contact)
+        else:
+            self.motion = _INTEGRATORS[settings.integrator](self.mechanism, settings)
         self._looked_at = self.mechanism.model.createData()  # for sampling, which leaves the running data alone
 
     def advance(self, start: float, end: float) -> None:
@@ -42,7 +55,7 @@ class RowsRun:
     def sample(self) -> Sample:
         """See :class:`proofroll.core.engine.Engine`; no orientation where it is not integrated."""
         model, ball, data = self.mechanism.model, self.mechanism.ball, self._looked_at
-        force = self._reaction(data)[1]
+        force = self.motion.reaction(data)[1]
         velocity = pin.getVelocity(model, data, ball, pin.LOCAL_WORLD_ALIGNED)
         pose = data.oMi[ball]
         return Sample(
@@ -51,14 +64,12 @@ class RowsRun:
             w_WB=velocity.angular.copy(),
             q_WB=np.roll(pin.Quaternion(pose.rotation).coeffs(), 1) if self.motion.turns else None,
             force=force,
-            sticking=self.motion.sticking if isinstance(self.motion, StickSlipIntegrator) else None,
+            sticking=self.motion.sticking,
         )
 
     def events(self) -> tuple[Event, ...]:
         """See :class:`proofroll.core.engine_abilities.LocatesEvents`; unbounded friction has but leaving the wall."""
-        if isinstance(self.motion, StickSlipIntegrator):
-            return tuple(self.motion.events)
-        return () if self.motion.left is None else (self.motion.left,)
+        return tuple(self.motion.events)
 
     def built(self) -> Built:
         """See :class:`proofroll.core.engine.Engine`: from the model, and from its rows and torques at the state now."""
@@ -69,11 +80,10 @@ class RowsRun:
         # rolling resistance the length f. At rest that has no direction, so it is looked at in motion.
         radius = float(np.linalg.norm(mechanism.rolling_row(data, q, v)[-3:]))
         torque = mechanism.resistance(data, q, mechanism.along(data, q))
-        mu_static, mu_kinetic = None, None  # without a bound nothing stands for it: the rows of rolling hold always
-        if isinstance(self.motion, StickSlipIntegrator):
-            mu_static = self.motion.mu_static
+        mu_kinetic = None  # without a bound nothing stands for it
+        if self.motion.mu_static is not None:
             mu_kinetic = float(np.linalg.norm(mechanism.friction(1.0, np.array([1.0, 0.0]))))
-        acceleration = self._reaction(data)[0]
+        acceleration = self.motion.reaction(data)[0]
         pin.forwardKinematics(model, data, q, v, acceleration)
         of_ball = pin.getClassicalAcceleration(model, data, ball, pin.LOCAL_WORLD_ALIGNED)
         return Built(
@@ -82,7 +92,7 @@ class RowsRun:
             gravity=model.gravity.linear.copy(),
             ball_radius=radius,
             rolling_resistance=0.0 if torque is None else float(np.linalg.norm(torque[-3:])),
-            mu_static=mu_static,
+            mu_static=self.motion.mu_static,
             mu_kinetic=mu_kinetic,
             gap=mechanism.gap(q),
             acceleration=of_ball.linear.copy(),
@@ -94,13 +104,7 @@ class RowsRun:
         """What there is besides rolling, with the torque of rolling resistance as it is put to the joints."""
         if torque is not None:
             yield BallCapability.ROLLING_RESISTANCE
-        if isinstance(self.motion, StickSlipIntegrator):
+        if self.motion.mu_static is not None:
             yield BallCapability.BOUNDED_FRICTION
         if self.motion.turns:
             yield BallCapability.ORIENTATION
-
-    def _reaction(self, data: Any) -> tuple[FloatArray, FloatArray]:
-        """Joint acceleration, and force of the wall on the ball in the world [N], now."""
-        if isinstance(self.motion, StickSlipIntegrator):
-            return self.motion.reaction(data)
-        return self.mechanism.reaction(data, self.motion.q, self.motion.v)

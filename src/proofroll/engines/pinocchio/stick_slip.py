@@ -56,13 +56,9 @@ class FrictionLaw(Enum):
 
 
 class AdaptiveStickSlip(Adaptive):
-    """DOP853 from event to event.
+    """DOP853 from event to event."""
 
-    Attributes:
-        events: so far.
-        mu_static: largest |F|/N while sticking [-].
-        sticking: whether the ball sticks now.
-    """
+    mu_static: float
 
     def __init__(self, mechanism: BallWithRows, settings: PinocchioSettings, contact: Contact) -> None:
         super().__init__(mechanism, settings)
@@ -70,7 +66,6 @@ class AdaptiveStickSlip(Adaptive):
         self._span = _SPAN * self._turning_time
         self._handover = self._floor = self._least = 0.0
         self._mode = FrictionLaw.STICKING
-        self.events: list[Event] = []
         self._monitored = 0.0, 0.0, 0.0
         y = self._joined(self.q, self.v)
         if mechanism.slips0:
@@ -83,14 +78,14 @@ class AdaptiveStickSlip(Adaptive):
             self._creep(y)
 
     @property
-    def sticking(self) -> bool:
+    def sticking(self) -> bool:  # type: ignore[override]  # follows the mode
         """Whether the ball sticks now."""
         return self._mode is FrictionLaw.STICKING
 
     def reaction(self, data: Any) -> tuple[FloatArray, FloatArray]:
-        """Joint acceleration, and force of the wall on the ball in the world [N], now."""
+        """See :class:`~proofroll.engines.pinocchio.integrators.TangentIntegrator`."""
         if self.sticking:
-            return self._mechanism.reaction(data, self.q, self.v)
+            return super().reaction(data)
         direction = self._direction(data, self._joined(self.q, self.v))
         return self._mechanism.sliding_reaction(data, self.q, self.v, direction)
 

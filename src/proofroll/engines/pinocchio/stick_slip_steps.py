@@ -19,16 +19,15 @@ from proofroll.engines.pinocchio.slip_excess import excess, unit
 class FixedStickSlip(FixedStep):
     """Mixin for the schemes of :mod:`~proofroll.engines.pinocchio.integrators`.
 
-    Attributes:
-        events: so far; the time is interpolated, the bracket is the step.
-        mu_static: largest |F|/N while sticking [-].
-        sticking: whether the ball sticks now.
+    The time of an event is interpolated, its bracket is the step.
     """
+
+    mu_static: float
+    sticking: bool
 
     def __init__(self, mechanism: BallWithRows, settings: PinocchioSettings, contact: Contact) -> None:
         super().__init__(mechanism, settings)
         self.mu_static = contact.mu_static
-        self.events: list[Event] = []
         self._excess, self._normal_force = excess(mechanism, self._data, self.q, self.v, self.mu_static)
         self.sticking = self._excess <= 0 and not mechanism.slips0
         self._free = self._without_friction()
@@ -36,9 +35,9 @@ class FixedStickSlip(FixedStep):
             self.events.append(Event("slip", 0.0, 0.0, 0.0))
 
     def reaction(self, data: Any) -> tuple[FloatArray, FloatArray]:
-        """Joint acceleration, and force of the wall on the ball in the world [N], now."""
+        """See :class:`~proofroll.engines.pinocchio.integrators.TangentIntegrator`."""
         if self.sticking:
-            return self._mechanism.reaction(data, self.q, self.v)
+            return super().reaction(data)
         direction = self._direction(data, self.q, self.v)
         return self._mechanism.sliding_reaction(data, self.q, self.v, direction)
 
