@@ -5,7 +5,6 @@ from __future__ import annotations
 import dataclasses
 import sys
 from pathlib import Path
-from typing import Any
 
 from proofroll.core.comparison import Comparison
 from proofroll.files.comparison_file import load_comparison
@@ -14,6 +13,7 @@ from proofroll.files.netcdf import read
 from proofroll.files.scene_file import load_scene, read_scene_file, scene_names
 from proofroll.files.toml import study_of
 from proofroll.report.comparison_content import outcome_content
+from proofroll.report.comparison_records import ReportedComparison
 from proofroll.report.html import templates
 from proofroll.report.labels import number
 from proofroll.report.markdown import caveat_list, verdict_table
@@ -50,27 +50,27 @@ def comparisons() -> dict[str, Comparison]:
     return found
 
 
-def failures(content: dict[str, Any]) -> str:
+def failures(content: ReportedComparison) -> str:
     """Why rows have no result, a line each."""
     return "".join(
         f"- {row['name']} {row['formulation']} {row['setting']} failed, {row['reason']}.\n"
-        for row in content["rows"]
+        for row in content.rows
         if row["verdict"] == "failed"
     )
 
 
 def picture(scene: str) -> str:
     """Draws the scene into a file; its line of Markdown, empty where there is no drawing."""
-    drawings = scene_sheet(scene, [])["drawings"]
+    drawings = scene_sheet(scene, []).drawings
     if not drawings:
         return ""
     markup = str(templates().get_template("scene.html").module.picture(drawings[0], scene))  # type: ignore[attr-defined]
-    width, height = drawings[0]["box"][2:]
+    width, height = drawings[0].box[2:]
     head = f'<svg xmlns="http://www.w3.org/2000/svg" width="{width:g}" height="{height:g}"'
     lines = [line for line in markup.splitlines() if line.strip()]
     text = "\n".join(lines).replace("<svg", head, 1).replace(">", f">\n{STYLE}", 1)
     (PICTURES / f"{scene}.svg").write_text(text + "\n", encoding="utf-8")
-    return f"```{{image}} gallery/{scene}.svg\n:alt: {scene}, {drawings[0]['label']}\n```\n"
+    return f"```{{image}} gallery/{scene}.svg\n:alt: {scene}, {drawings[0].label}\n```\n"
 
 
 def truth(outcome: Outcome, runner: Runner) -> str:

@@ -17,6 +17,7 @@ from proofroll.elements.ball_on_surface.element import rolling_ball
 from proofroll.elements.ball_on_surface.report.drawings import overview
 from proofroll.elements.ball_on_surface.report.wall import wall
 from proofroll.elements.ball_on_surface.surfaces.catalogue import surface_kinds
+from proofroll.files.json_data import plain
 from proofroll.files.scene_file import load_scene
 
 PLUGINS = Path(__file__).parent / "plugins"
@@ -150,7 +151,7 @@ def test_mujoco_reads_what_is_exported(proofroll: Proofroll, trough: Path) -> No
 def test_it_is_drawn_and_replayed(trough: Path) -> None:
     """The drawing has the coordinates' names, and the replay's wall lies on the trough, within its ends."""
     body = rolling_ball(load_scene(str(trough)))
-    whole = overview(body.wall, body)[0].content()
+    whole = plain(overview(body.wall, body)[0].picture(""))
     texts = {part["text"] for mark in whole["marks"] for part in mark.get("parts", ())}
     assert {"angle", "way", "v", "g"} <= texts
     built = wall(body, np.array([[0.4, 0.0], [-0.4, 0.1]]))

@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, fields, is_dataclass, replace
+from enum import Enum
 from typing import Any
 
 from proofroll.core.verdict import Verdict
@@ -34,21 +35,24 @@ class Poison:
         )
 
     def content(self, value: Any, *, names: bool = True) -> Any:
-        """Plain data with poison in every string that is not a word of our own, and under poisoned names besides.
+        """Data with poison in every string that is not a word of our own, and under poisoned names besides.
 
         Where the page knows the names of an entry, those it does not know change nothing; where it lists whatever
         names there are, it lists the poisoned ones too.
 
         Args:
-            value: what :mod:`json` can write.
+            value: records, or what :mod:`json` can write.
             names: also the names of entries.
         """
         if isinstance(value, dict):
             found = {name: self.content(item, names=names) for name, item in value.items()}
             return found | ({self.dose(name): item for name, item in found.items()} if names else {})
-        if isinstance(value, list):
+        if is_dataclass(value) and not isinstance(value, type):
+            told = {item.name: self.content(getattr(value, item.name), names=names) for item in fields(value)}
+            return replace(value, **told)
+        if isinstance(value, (list, tuple)):
             return [self.content(item, names=names) for item in value]
-        if isinstance(value, str) and value not in OUR_WORDS:
+        if isinstance(value, str) and not isinstance(value, Enum) and value not in OUR_WORDS:
             self.said.add(value)
             return self.dose(value)
         return value

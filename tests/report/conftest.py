@@ -4,9 +4,10 @@ from __future__ import annotations
 
 import base64
 import gzip
+import json
 from collections.abc import Callable, Iterator
 from contextlib import AbstractContextManager
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import partial
 from html.parser import HTMLParser
 from pathlib import Path
@@ -19,16 +20,22 @@ from invented import figures_part, further, regimes_part
 
 from proofroll.core.comparison import Band, Comparison, Row, Tolerance
 from proofroll.core.dataset import observe, scales
+from proofroll.core.events import Event
 from proofroll.core.truth import truth
 from proofroll.core.verdict import Verdict, judge
+from proofroll.elements.ball_on_surface.report.onsets import RunSlips, TrueSlips
 from proofroll.files.netcdf import write
 from proofroll.files.scene_file import load_scene
 from proofroll.report.growing_report import begun, write_report
 from proofroll.report.html import page
+from proofroll.report.plots import PointCurves
+from proofroll.report.replay import Replay
+from proofroll.report.report_content import ReportContent, report_content
 from proofroll.running.case import Case, EngineFacts, Result, Status
 from proofroll.running.store import Store
 from proofroll.studies.outcome import Outcome, Run
 from proofroll.studies.planning import point_name
+from proofroll.truth.onset import Onset
 
 UNTIL, EVERY = 1.0, 0.02
 
@@ -116,9 +123,16 @@ def made(tmp_path_factory: pytest.TempPathFactory) -> tuple[Outcome, Store]:
 
 @pytest.fixture(scope="session")
 def written(made: tuple[Outcome, Store], tmp_path_factory: pytest.TempPathFactory) -> tuple[dict[str, Any], Path]:
-    """The content and the folder of a written report."""
+    """What stands in report.json, and the folder of a written report."""
     out = tmp_path_factory.mktemp("out")
-    return write_report([made[0]], made[1], out, "proofroll report invented"), out
+    write_report([made[0]], made[1], out, "proofroll report invented")
+    return json.loads((out / "report.json").read_text(encoding="utf-8")), out
+
+
+@pytest.fixture(scope="session")
+def content(made: tuple[Outcome, Store]) -> ReportContent:
+    """What the report says, as records."""
+    return report_content([made[0]], made[1], "proofroll report invented")
 
 
 class Elements(HTMLParser):
@@ -180,10 +194,10 @@ def unpack(parse: Callable[[str], Elements]) -> Callable[[str, str], str]:
 class Parts:
     """What a page is made of."""
 
-    content: dict[str, Any]
-    curves: list[list[dict[str, Any]]]
+    content: ReportContent
+    curves: list[list[PointCurves]]
     pictures: dict[str, str]
-    replay: dict[str, Any]
+    replay: Replay | None
 
     def write(self, file: Path) -> Path:
         """The page as a file."""
@@ -198,15 +212,14 @@ def everything(made: tuple[Outcome, Store], tmp_path_factory: pytest.TempPathFac
     for part in (figures_part(tmp_path_factory.mktemp("figures")), regimes_part(), *further()):
         whole.parts.append(part)
         whole.make(part, lambda: None)
-    content = whole.content
-    comparison = content["comparisons"][0]
-    event = {"kind": "slip", "time": 0.5, "time_low": 0.5, "time_high": 0.51}
-    known = dict.fromkeys(("by_mu", "by_f", "edge_below", "edge_above", "distance", "earliest", "latest"))
-    onset = {**known, "time": 0.5, "uncertainty": 1e-3, "verdict": "well-posed"}
-    comparison["truths"][0] |= {"events": [event], "mu_static": 0.3, "mu_kinetic": 0.2, "onset": onset}
-    for run in comparison["runs"]:
-        run |= {"events": [event], "onset_verdict": "agree"}
-    return Parts(content, whole.curves, whole.pictures, whole.replay)
+    comparison = whole.content.comparisons[0]
+    event = Event("slip", 0.5, 0.5, 0.51)
+    onset = Onset(0.5, None, None, None, None, np.inf, 1e-3, "well-posed", None, None)
+    assert comparison.evidence is not None
+    truths = comparison.evidence.truths
+    truths[0] = replace(truths[0], own=TrueSlips(0.3, 0.2, onset, [event]))
+    comparison.runs[:] = [replace(run, own=RunSlips([event], "agree")) for run in comparison.runs]
+    return Parts(whole.content, whole.curves, whole.pictures, whole.replay)
 
 
 @pytest.fixture(scope="session")

@@ -2,6 +2,9 @@
 
 from __future__ import annotations
 
+from types import SimpleNamespace
+from typing import Any
+
 import pytest
 from invented import stability_study, tradeoff_study
 
@@ -55,11 +58,12 @@ def test_a_caveat_is_one_clause() -> None:
 
 def test_a_caveat_stands_beside_verdicts_and_advice() -> None:
     """Below the table once for all of its settings, beside a name that is blamed, and in a recommendation."""
-    row = {"name": "machine", "formulation": "free", "setting": "default", "caveat": "somebody else's steps"}
-    rows = [row, row | {"setting": "matched"}, row | {"caveat": ""}]
+    row = SimpleNamespace(name="machine", formulation="free", setting="default", caveat="somebody else's steps")
+    changed = [SimpleNamespace(**vars(row) | change) for change in ({"setting": "matched"}, {"caveat": ""})]
+    rows: list[Any] = [row, *changed]
     assert caveat_lines(rows) == ["Somebody else's steps: machine free default, free matched."]
-    assert with_caveat("machine free", row) == "machine free (somebody else's steps)"
-    assert with_caveat("machine free", rows[2]) == "machine free"
+    assert with_caveat("machine free", row.caveat) == "machine free (somebody else's steps)"
+    assert with_caveat("machine free", "") == "machine free"
 
 
 def test_advice_and_silent_failures_carry_the_caveat() -> None:

@@ -20,5 +20,5 @@ def _run(speed: float, error: float, tolerance: float) -> Any:
 def test_the_largest_error_of_a_row_is_that_of_all_its_cases() -> None:
     """The case that is furthest beyond its own tolerance need not have the largest error; both are said."""
     found = _worst([_run(2.0, 0.5, 0.1), _run(6.0, 0.9, 1.0)], "N")
-    assert (found["error"], found["point"]) == (0.5, "speed=2")
-    assert found["largest"] == 0.9
+    assert (found.error, found.point) == (0.5, "speed=2")
+    assert found.largest == 0.9

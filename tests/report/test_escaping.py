@@ -43,10 +43,10 @@ def poison() -> Poison:
 @pytest.fixture(scope="module")
 def poisoned_page(everything: Any, poison: Poison, tmp_path_factory: pytest.TempPathFactory) -> Path:
     """A page that has every part of a report, each string in it poisoned."""
-    others = {name: value for name, value in everything.content.items() if name != "replay"}
+    others = poison.content(dataclasses.replace(everything.content, replay=None))
     bad = dataclasses.replace(
         everything,
-        content=everything.content | poison.content(others),
+        content=dataclasses.replace(others, replay=everything.content.replay),
         curves=poison.content(everything.curves, names=False),
     )
     return bad.write(tmp_path_factory.mktemp("poisoned") / "report.html")

@@ -2,11 +2,11 @@
 
 from __future__ import annotations
 
-import copy
 import dataclasses
 import json
 import re
 from pathlib import Path
+from types import SimpleNamespace
 from typing import Any
 
 import numpy as np
@@ -15,9 +15,10 @@ import pytest
 from proofroll.core.comparison import ExceptAt, Row, Tolerance
 from proofroll.core.dataset import observe
 from proofroll.core.verdict import Verdict, judge
+from proofroll.files.json_data import plain
 from proofroll.files.netcdf import read, write
 from proofroll.files.scene_file import load_scene
-from proofroll.report.evidence import claims, cost
+from proofroll.report.evidence import Claims, Cost
 from proofroll.report.html import page
 from proofroll.report.labels import error
 from proofroll.report.plots import MOST_POINTS, kept, point_curves
@@ -70,10 +71,10 @@ def test_largest_error_that_is_drawn_is_the_judged_one(made: tuple[Outcome, Stor
         if key in {"gamma", "z", "N", "F2", "F3"}
     }
     one = dataclasses.replace(outcome, runs=[run], truths={name: outcome.truths[name]})
-    drawn = {item["name"]: item["engines"][0] for item in point_curves(one, store)[0]["observables"]}
+    drawn = {item.name: item.engines[0] for item in point_curves(one, store)[0].observables}
     for key, judgement in judged.items():
-        assert len(drawn[key]["at"]) < times.size / 5
-        largest = max(abs(value) for value in drawn[key]["difference"] if value is not None)
+        assert len(drawn[key].at or ()) < times.size / 5
+        largest = max(abs(value) for value in drawn[key].difference if value is not None)
         assert error(largest, 3) == error(judgement.error, 3), key
 
 
@@ -89,36 +90,39 @@ def test_tolerances_and_limits_go_with_the_curves(made: tuple[Outcome, Store]) -
         if judgement.observable != "F3"
     ]
     runs = [dataclasses.replace(first, judgements=limited), *outcome.runs[1:]]
-    curves = point_curves(dataclasses.replace(outcome, runs=runs), store)[0]["observables"]
-    drawn = {item["name"]: next(engine for engine in item["engines"] if engine["row"] == 0) for item in curves}
+    curves = point_curves(dataclasses.replace(outcome, runs=runs), store)[0].observables
+    drawn = {item.name: next(engine for engine in item.engines if engine.row == 0) for item in curves}
     z = next(judgement for judgement in first.judgements if judgement.observable == "z")
-    assert drawn["z"]["tolerance"] == pytest.approx(z.tolerance, rel=1e-3)
-    assert drawn["z"]["limit"] == [3.21e-7, 1.5e-8, 2.0]
-    assert drawn["gamma"]["limit"] == [None, 1.0, None], "what is not finite is null"
-    assert not {"tolerance", "limit"} & set(drawn["F3"])
-    assert "limit" not in curves[0]["engines"][1]
+    assert drawn["z"].tolerance == pytest.approx(z.tolerance, rel=1e-3)
+    assert drawn["z"].limit == [3.21e-7, 1.5e-8, 2.0]
+    assert drawn["gamma"].limit == [None, 1.0, None], "what is not finite is null"
+    assert not {"tolerance", "limit"} & set(plain(drawn["F3"]))
+    assert "limit" not in plain(curves[0].engines[1])
 
 
 def test_no_two_rows_of_an_engine_look_alike_and_none_by_colour_alone() -> None:
     """Symbols differ within an engine; beyond a dozen they are hollow. Each has an outline for the legend."""
-    row = {"name": "alpha", "formulation": "one", "preset": "matched", "verdict": "agrees"}
-    looks = [(style["colour"], style["symbol"]) for style in styles([row] * 20 + [{**row, "name": "beta"}])]
+    row = SimpleNamespace(name="alpha", formulation="one", preset="matched", verdict="agrees")
+    rows: list[Any] = [row] * 20 + [SimpleNamespace(**vars(row) | {"name": "beta"})]
+    looks = [(style.colour, style.symbol) for style in styles(rows)]
     assert len(set(looks)) == 21
     assert {symbol.removesuffix("-open") for _, symbol in looks} == set(OUTLINES)
 
 
 def test_cost_has_an_interval_where_there_is_one() -> None:
     """Six runs or more: 95 % or more; three: their range, which holds the median in three cases of four; one: none."""
-    assert cost([]) is None
-    assert cost([2.0]) == {"median": 2.0, "low": None, "high": None, "confidence": None, "runs": 1}
-    three = cost([3.0, 1.0, 2.0])
-    assert three == {"median": 2.0, "low": 1.0, "high": 3.0, "confidence": 0.75, "runs": 3}
-    many = cost([1.0, 1.1, 1.2, 1.3, 1.4, 1.5, 9.0])
+    assert Cost.of([]) is None
+    assert Cost.of([2.0]) == Cost(2.0, None, None, None, 1)
+    three = Cost.of([3.0, 1.0, 2.0])
+    assert three == Cost(2.0, 1.0, 3.0, 0.75, 3)
+    many = Cost.of([1.0, 1.1, 1.2, 1.3, 1.4, 1.5, 9.0])
     assert many
-    assert many["confidence"] == 1 - 2 / 2**7
-    assert 1.0 <= many["low"] < many["median"] == 1.3 < many["high"] <= 9.0
+    assert many.low
+    assert many.high
+    assert many.confidence == 1 - 2 / 2**7
+    assert 1.0 <= many.low < many.median == 1.3 < many.high <= 9.0
     assert "holds it with 75 %" in cost_title(three)
-    assert "no interval" in cost_title(cost([2.0]))
+    assert "no interval" in cost_title(Cost.of([2.0]))
 
 
 def test_costs_are_on_the_page(made: tuple[Outcome, Store], parse: Any) -> None:
@@ -131,9 +135,9 @@ def test_costs_are_on_the_page(made: tuple[Outcome, Store], parse: Any) -> None:
         seen += run.row is outcome.runs[0].row
         runs.append(dataclasses.replace(run, result=dataclasses.replace(run.result, timings=timings)))
     content = report_content([dataclasses.replace(outcome, runs=runs)], store, "proofroll report invented")
-    lines = costs(content["comparisons"][0])
+    lines = costs(content.comparisons[0])
     assert len(lines) == 3
-    assert (lines[0]["slowest"]["cost"]["median"], lines[0]["fastest"]["cost"]["median"]) == (0.45, 0.25)
+    assert [run.cost.median for run in lines[0][1:] if run.cost] == [0.45, 0.25]
     text = " ".join(parse(page(content, [point_curves(*made)])).text.split())
     assert "0.4 to 0.5" in text
     assert "0.2 to 0.3" in text
@@ -149,13 +153,11 @@ def test_all_that_is_claimed_of_a_row_is_said() -> None:
         limit={"gamma": Tolerance(1e-6, False, "rad")},
         bound={"N": Tolerance(1e-3, True)},
     )  # fmt: skip
-    entry = {
-        "name": "alpha", "formulation": None, "setting": "", "resolution": None, "engine": "alpha",
-        "expected": ["agrees"],
-        "expected_for": {}, "because": "", "tolerance": "band", "resolution_value": None,
-        "claims": claims(row),
-    }  # fmt: skip
-    assert expectations({"rows": [entry]})[0]["further"] == (
+    entry: Any = SimpleNamespace(
+        name="alpha", formulation=None, setting="", resolution=None, engine="alpha", expected=["agrees"],
+        expected_for={}, because="", tolerance="band", resolution_value=None, claims=Claims.of(row),
+    )  # fmt: skip
+    assert expectations([entry])[0].further == (
         "N within 0.1 % of its scale",
         "order of z 1.9 to 2.1",
         "limit of γ within 1e-06 rad",
@@ -181,6 +183,7 @@ def test_legend_has_lines_symbols_and_verdicts_and_can_be_reached(html: str, par
 def test_whatever_the_limits_the_page_is_json(made: tuple[Outcome, Store], unpack: Any) -> None:
     """Curves with limits that are not finite do not break the script's data."""
     content = report_content([made[0]], made[1], "proofroll report invented")
-    curves = copy.deepcopy([point_curves(*made)])
-    curves[0][0]["observables"][0]["engines"][0]["limit"] = [None, None, None]
-    assert json.loads(unpack(page(content, curves), "curves"))["points"]
+    curves = point_curves(*made)
+    engines = curves[0].observables[0].engines
+    engines[0] = dataclasses.replace(engines[0], limit=[None, None, None])
+    assert json.loads(unpack(page(content, [curves]), "curves"))["points"]

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import copy
+import dataclasses
 from collections.abc import Callable, Iterator
 from contextlib import AbstractContextManager
 from pathlib import Path
@@ -21,11 +22,10 @@ FIGURE = 'figure[data-p="0"][data-o="1"] .canvas'  # z at the first point
 @pytest.fixture(scope="module")
 def limits_page(everything: Any, tmp_path_factory: pytest.TempPathFactory) -> Path:
     """A page whose first row has a ladder of steps: for z a limit, for γ one that holds the truth exactly."""
-    curves = copy.deepcopy(everything.curves)
-    gamma, z = curves[0][0]["observables"][:2]
-    gamma["engines"][0]["limit"] = [0.0, 1e-12, None]
-    z["engines"][0]["limit"] = [3e-7, 1e-7, 2.0]
-    z["engines"][1]["tolerance"] = 1e-4
+    curves, change = copy.deepcopy(everything.curves), dataclasses.replace
+    gamma, z = (item.engines for item in curves[0][0].observables[:2])
+    gamma[0] = change(gamma[0], limit=[0.0, 1e-12, None])
+    z[:2] = change(z[0], limit=[3e-7, 1e-7, 2.0]), change(z[1], tolerance=1e-4)
     file = tmp_path_factory.mktemp("limits") / "report.html"
     file.write_text(page(everything.content, [*curves], everything.pictures), encoding="utf-8")
     return file
@@ -61,11 +61,11 @@ def test_limits_have_the_engines_error_bar(seen: Visit) -> None:
 
 def test_truth_and_tolerances_have_their_lines(seen: Visit, everything: Any) -> None:
     """The band ends at the truth's error bar; each tolerance is a line of the rows that have it, and goes with them."""
-    z = everything.curves[0][0]["observables"][1]
+    z = everything.curves[0][0].observables[1]
     band = seen.page.evaluate(f"document.querySelector('{FIGURE}').layout.shapes.find((s) => s.type === 'rect').y1")
-    assert band == z["error_bar"] > 0
+    assert band == z.error_bar > 0
     lines = traces(seen, "Array.isArray(t.meta)")
-    assert {tuple(line["meta"]): line["y"][0] for line in lines} == {(0, 2): z["engines"][0]["tolerance"], (1,): 1e-4}
+    assert {tuple(line["meta"]): line["y"][0] for line in lines} == {(0, 2): z.engines[0].tolerance, (1,): 1e-4}
     seen.page.locator('.legend [data-row="1"]').first.click()
     assert {tuple(line["meta"]): line["visible"] for line in traces(seen, "Array.isArray(t.meta)")} == {
         (0, 2): True,
@@ -75,11 +75,11 @@ def test_truth_and_tolerances_have_their_lines(seen: Visit, everything: Any) -> 
 
 def test_largest_distance_in_the_figure_is_the_judged_error(seen: Visit, everything: Any) -> None:
     """What the eye reads off the curve is what the table says, to the digits shown."""
-    runs = [run for run in everything.content["comparisons"][0]["runs"] if run["point"] == "speed=3"]
+    runs = [run for run in everything.content.comparisons[0].runs if run.point == "speed=3"]
     for row in (0, 1, 2):
         (curve,) = traces(seen, f"t.yaxis === 'y2' && t.meta === {row} && t.xaxis !== 'x2'")
-        judged = next(j for j in runs[row]["judgements"] if j["observable"] == "z")
-        assert error(max(y for y in curve["y"] if y is not None), 3) == error(judged["error"], 3)
+        judged = next(j for j in runs[row].judgements if j.observable == "z")
+        assert error(max(y for y in curve["y"] if y is not None), 3) == error(judged.error, 3)
 
 
 def test_keyboard_reads_and_zooms(seen: Visit) -> None:

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import copy
 import dataclasses
 import json
 import math
@@ -16,11 +15,12 @@ import pytest
 from poison import Poison
 
 import proofroll.report.html
+from proofroll.files.json_data import plain
 from proofroll.report.compression import packed
 from proofroll.report.growing_report import write_report
 from proofroll.report.html import page
 from proofroll.report.labels import number, symbol
-from proofroll.report.plots import kept, point_curves
+from proofroll.report.plots import EngineCurve, kept, point_curves
 from proofroll.report.report_content import report_content
 from proofroll.report.scores import Score, recommendation
 from proofroll.running.store import Store
@@ -125,43 +125,40 @@ def test_numbers_that_are_not_finite_do_not_break_the_page(made: tuple[Outcome, 
     lost = [dataclasses.replace(judgement, error=math.inf, order=math.nan) for judgement in first.judgements]
     runs = [dataclasses.replace(first, judgements=lost), *outcome.runs[1:]]
     content = write_report([dataclasses.replace(outcome, runs=runs)], store, tmp_path, COMMAND)
-    assert content["comparisons"][0]["runs"][0]["judgements"][0]["error"] is None
+    assert plain(content)["comparisons"][0]["runs"][0]["judgements"][0]["error"] is None
     assert "∞" in (tmp_path / "report.html").read_text(encoding="utf-8").rpartition('<script type="text/plain"')[0]
 
 
 def test_the_largest_report_we_make_stays_small(made: tuple[Outcome, Store]) -> None:
     """Six points, 24 rows and 201 samples: what the default study has."""
     content = report_content([made[0]], made[1], COMMAND)
-    comparison = content["comparisons"][0]
-    rows, points = 24, 6
-    comparison["rows"] = [copy.deepcopy(comparison["rows"][0]) for _ in range(rows)]
-    good, known = comparison["runs"][0], comparison["truths"][0]
-    comparison["runs"] = [{**good, "row": row, "point": f"p{p}"} for p in range(points) for row in range(rows)]
-    comparison["truths"] = [{**known, "point": f"p{p}"} for p in range(points)]
-    for row in comparison["rows"]:
-        for judgement in row["observables"].values():
-            judgement["point"] = "p0"
-    for run in comparison["runs"]:
-        run["certificate"] = run["certificate"] * 14
+    comparison, change = content.comparisons[0], dataclasses.replace
+    rows, points = 24, [f"p{number}" for number in range(6)]
+    row, good = comparison.rows[0], comparison.runs[0]
+    worst = {name: change(judgement, point="p0") for name, judgement in row.observables.items()}
+    comparison.rows[:] = [change(row, observables=worst)] * rows
+    good = change(good, certificate=good.certificate * 14)
+    comparison.runs[:] = [change(good, row=row, point=point) for point in points for row in range(rows)]
+    assert comparison.evidence
+    truths = comparison.evidence.truths
+    truths[:] = [change(truths[0], point=point) for point in points]
     curves = point_curves(*made)[0]
-    for observable in curves["observables"]:
-        observable["engines"] = [
-            {"row": row, "difference": [-1.23e-10] * 201, "name": row} for row in range(rows)
-        ]  # the longest form that a rounded number has
-    html = page(content, [[{**curves, "point": f"p{p}"} for p in range(points)]])
+    for observable in curves.observables:  # the longest form that a rounded number has
+        observable.engines[:] = [EngineCurve(row, [-1.23e-10] * 201, None, None, None) for row in range(rows)]
+    html = page(content, [[change(curves, point=point) for point in points]])
     assert len(html.encode()) < 5e6
 
 
 def test_curves_are_the_difference_from_the_truth(made: tuple[Outcome, Store]) -> None:
     """Rows keep their numbers, and what an engine does not say is not drawn."""
     entry = point_curves(*made)[1]
-    z = next(observable for observable in entry["observables"] if observable["name"] == "z")
-    assert entry["point"] == "speed=4"
-    assert [engine["row"] for engine in z["engines"]] == [0, 1, 2]
-    assert max(abs(value) for value in z["engines"][1]["difference"]) == pytest.approx(1e-3 * z["scale"], rel=0.01)
-    normal = next(observable for observable in entry["observables"] if observable["name"] == "N")
-    assert [engine["row"] for engine in normal["engines"]] == [0, 1], "the third row is silent about forces"
-    assert normal["engines"][0]["difference"][0] is None, "a reaction at time 0 is the certificate's"
+    z = next(observable for observable in entry.observables if observable.name == "z")
+    assert entry.point == "speed=4"
+    assert [engine.row for engine in z.engines] == [0, 1, 2]
+    assert max(abs(value or 0.0) for value in z.engines[1].difference) == pytest.approx(1e-3 * z.scale, rel=0.01)
+    normal = next(observable for observable in entry.observables if observable.name == "N")
+    assert [engine.row for engine in normal.engines] == [0, 1], "the third row is silent about forces"
+    assert normal.engines[0].difference[0] is None, "a reaction at time 0 is the certificate's"
 
 
 def test_thinning_keeps_extrema_and_ends() -> None:
@@ -177,11 +174,12 @@ def test_recommendation_is_the_cheapest_that_is_good_enough() -> None:
     """Cheap but rough where that is enough, exact below, and nothing that was lost."""
     rows = [Score(0, "exact", 1e-12, 1e-11, 2.0), Score(1, "fast", 3e-4, 0.02, 0.1), Score(2, "lost", None, None, 0.01)]
     found = recommendation(rows)
-    assert found[0]["motion"]["name"] == "fast"
-    best = {entry["within"]: entry["motion_and_forces"] for entry in found}
-    assert best[0.1]["name"] == "fast"
-    assert best[0.01]["name"] == "exact"
-    assert found[-1]["down_to"] == pytest.approx(1e-12)
+    assert found[0].motion
+    assert found[0].motion.name == "fast"
+    best = {entry.within: entry.motion_and_forces.name for entry in found if entry.motion_and_forces}
+    assert best[0.1] == "fast"
+    assert best[0.01] == "exact"
+    assert found[-1].down_to == pytest.approx(1e-12)
     assert recommendation([rows[2]]) == []
 
 
@@ -223,9 +221,10 @@ def test_a_comparison_of_which_nothing_is_left_is_still_a_report(made: tuple[Out
     outcome, store = made
     lost = [run for run in outcome.runs if run.row.engine == "gamma"]
     content = write_report([dataclasses.replace(outcome, runs=lost)], store, tmp_path, COMMAND)
-    found = content["comparisons"][0]["findings"]
-    assert found["answer"].startswith("Of 1 engine settings, 1 gives no result somewhere")
-    assert found["recommendation"] == []
+    assert content.comparisons[0].evidence
+    found = content.comparisons[0].evidence.findings
+    assert found.answer.startswith("Of 1 engine settings, 1 gives no result somewhere")
+    assert found.recommendation == []
     assert "gamma is not installed here" in (tmp_path / "report.html").read_text(encoding="utf-8")
 
 

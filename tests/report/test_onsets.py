@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import copy
 import dataclasses
 import json
 import math
@@ -18,21 +17,23 @@ from proofroll.core.truth import truth
 from proofroll.core.verdict import Judgement, Verdict
 from proofroll.elements.ball_on_surface.report.onset_tables import bracket, clock, conditioning, slip_table
 from proofroll.elements.ball_on_surface.report.onsets import CURVE, mark
+from proofroll.files.json_data import plain
 from proofroll.files.netcdf import write
 from proofroll.files.scene_file import load_scene
+from proofroll.report.comparison_records import ReportedRun
 from proofroll.report.growing_report import write_report
 from proofroll.report.html import page
 from proofroll.report.labels import MEANINGS, SYMBOLS
 from proofroll.report.markdown import verdict_table as markdown_table
-from proofroll.report.plots import point_curves
-from proofroll.report.report_content import report_content
+from proofroll.report.plots import Bound, point_curves
+from proofroll.report.report_content import ReportContent, ReportedTruth, report_content
 from proofroll.report.scores import scores
 from proofroll.report.terminal import closing_lines, console, verdict_table
 from proofroll.running.case import Case, EngineFacts, Result, Status
 from proofroll.running.store import Store
 from proofroll.studies.outcome import Outcome, Run
 from proofroll.studies.planning import point_name
-from proofroll.truth.onset import onset
+from proofroll.truth.onset import Onset, onset
 
 UNTIL, EVERY = 2.1, 0.05
 WELL = {"speed": 4.0, "rolling_resistance": 5e-4, "mu_static": 0.35}
@@ -93,85 +94,84 @@ def slipping(tmp_path_factory: pytest.TempPathFactory) -> tuple[Outcome, Store]:
 
 
 @pytest.fixture(scope="module")
-def content(slipping: tuple[Outcome, Store]) -> dict[str, Any]:
+def content(slipping: tuple[Outcome, Store]) -> ReportContent:
     """The report's content."""
     return report_content([slipping[0]], slipping[1], COMMAND)
 
 
-def shown(content: dict[str, Any], slipping: tuple[Outcome, Store]) -> str:
+def shown(content: ReportContent, slipping: tuple[Outcome, Store]) -> str:
     """The page."""
     return page(content, [point_curves(*slipping)])
 
 
-def runs_at(content: dict[str, Any], point: dict[str, float]) -> dict[str, dict[str, Any]]:
+def runs_at(content: ReportContent, point: dict[str, float]) -> dict[str, ReportedRun]:
     """The runs at a point by engine."""
-    found = content["comparisons"][0]["runs"]
-    return {run["engine"]: run for run in found if run["point"] == point_name(point)}
+    return {run.engine: run for run in content.comparisons[0].runs if run.point == point_name(point)}
 
 
-def truth_at(content: dict[str, Any], point: dict[str, float]) -> dict[str, Any]:
+def truth_at(content: ReportContent, point: dict[str, float]) -> ReportedTruth:
     """The truth's entry of a point."""
-    entries = content["comparisons"][0]["truths"]
-    return next(dict(entry) for entry in entries if entry["point"] == point_name(point))
+    evidence = content.comparisons[0].evidence
+    assert evidence
+    return next(entry for entry in evidence.truths if entry.point == point_name(point))
 
 
-def test_data_holds_events_onsets_and_their_verdicts(content: dict[str, Any]) -> None:
+def test_data_holds_events_onsets_and_their_verdicts(content: ReportContent) -> None:
     """Each run its events with brackets, each truth its conditioning; where friction has no bound, neither."""
     runs = runs_at(content, WELL)
-    assert [event["kind"] for event in runs["alpha"]["events"]] == ["slip", "stick"]
-    assert set(runs["alpha"]["events"][0]) == {"kind", "time", "time_low", "time_high"}
-    assert runs["gamma"]["events"] == runs["delta"]["events"] == []
-    verdicts = {name: run["onset_verdict"] for name, run in runs.items()}
+    assert [event.kind for event in runs["alpha"].own.events] == ["slip", "stick"]
+    assert set(plain(runs["alpha"])["events"][0]) == {"kind", "time", "time_low", "time_high"}
+    assert runs["gamma"].own.events == runs["delta"].own.events == []
+    verdicts = {name: run.own.onset_verdict for name, run in runs.items()}
     assert verdicts == {"alpha": "agree", "beta": "disagree", "gamma": "disagree", "delta": "refused"}
     entry = truth_at(content, WELL)
-    assert entry["onset"]["time"] == pytest.approx(1.7201831716, abs=1e-8)
-    assert entry["onset"]["verdict"] == "well-posed"
-    assert (entry["mu_static"], len(entry["events"])) == (0.35, 2)
-    assert "onset" not in truth_at(content, FREE)
-    assert "onset_verdict" not in runs_at(content, FREE)["alpha"]
-    assert {run["onset_verdict"] for run in runs_at(content, EDGE).values()} == {"ill-posed", "refused"}
+    assert entry.own.onset.time == pytest.approx(1.7201831716, abs=1e-8)
+    assert entry.own.onset.verdict == "well-posed"
+    assert (entry.own.mu_static, len(entry.own.events)) == (0.35, 2)
+    assert "onset" not in plain(truth_at(content, FREE))
+    assert "onset_verdict" not in plain(runs_at(content, FREE)["alpha"])
+    assert {run.own.onset_verdict for run in runs_at(content, EDGE).values()} == {"ill-posed", "refused"}
 
 
-def test_table_says_what_is_missing_added_and_left_out(content: dict[str, Any]) -> None:
+def test_table_says_what_is_missing_added_and_left_out(content: ReportContent) -> None:
     """Events stand beside the truth's of the same number; more than the table holds are counted."""
-    table = slip_table(content["comparisons"][0], 0, 0, truth_at(content, WELL))
-    alpha, beta, gamma, delta = table["lines"]
-    assert alpha["in_order"]
-    assert alpha["difference"] == alpha["cells"][0]["difference"] == "+1e-7"
-    assert [cell["wrong"] for cell in beta["cells"]] == ["", "", "not in the truth", "not in the truth"]
-    assert (beta["count"], beta["more"], beta["in_order"]) == (6, 2, False)
-    assert [cell["wrong"] for cell in gamma["cells"]] == ["missing", "missing", "", ""]
-    assert (gamma["first"], gamma["difference"]) == (None, "–")
-    assert delta["message"] == "refused: needs <b>more</b>"
-    assert table["wrong"] == "differs"
-    assert slip_table(content["comparisons"][0], 0, 1, truth_at(content, EDGE))["wrong"] == "ill-posed"
+    well, edge = truth_at(content, WELL), truth_at(content, EDGE)
+    table = slip_table(content.comparisons[0], 0, 0, well.point, well.own)
+    alpha, beta, gamma, delta = table.lines
+    assert alpha.in_order
+    assert alpha.difference == alpha.cells[0].difference == "+1e-7"
+    assert [cell.wrong for cell in beta.cells] == ["", "", "not in the truth", "not in the truth"]
+    assert (beta.count, beta.more, beta.in_order) == (6, 2, False)
+    assert [cell.wrong for cell in gamma.cells] == ["missing", "missing", "", ""]
+    assert (gamma.first, gamma.difference) == (None, "–")
+    assert delta.message == "refused: needs <b>more</b>"
+    assert table.wrong == "differs"
+    assert slip_table(content.comparisons[0], 0, 1, edge.point, edge.own).wrong == "ill-posed"
 
 
-def test_conditioning_names_the_edges(content: dict[str, Any]) -> None:
+def test_conditioning_names_the_edges(content: ReportContent) -> None:
     """Time, sensitivities, edges and the distance to the nearer of them; and what there is to say without a slip."""
-    facts = dict(conditioning(truth_at(content, WELL), UNTIL))
+    facts = dict(conditioning(truth_at(content, WELL).own, UNTIL))
     assert facts["First slip"].startswith("1.72018317 s; 1.71963 s with μ smaller")
     assert facts["d ln t / d ln μ"] == "0.3227"
     assert "μ = 0.391459 above, the nearest 11.8 % from μ = 0.35" in facts["Stair edges"]
-    never = truth_at(content, WELL)
-    never["onset"] = {**dict.fromkeys(never["onset"]), "uncertainty": 1e-3, "verdict": "well-posed"}
+    nothing = Onset(None, None, None, None, None, math.inf, 1e-3, "well-posed", None, None)
+    never = dataclasses.replace(truth_at(content, WELL).own, onset=nothing)
     assert dict(conditioning(never, UNTIL)) == {"First slip": "none until 2.1 s", "Stair edges": "none until 2.1 s"}
 
 
-def test_first_slips_are_marked_on_the_needed_friction(
-    content: dict[str, Any], slipping: tuple[Outcome, Store]
-) -> None:
+def test_first_slips_are_marked_on_the_needed_friction(content: ReportContent, slipping: tuple[Outcome, Store]) -> None:
     """The bound and every onset, on that curve alone and only where friction is bounded."""
-    entries = mark(content["comparisons"][0], point_curves(*slipping))
-    by_point = {entry["point"]: {item["name"]: item for item in entry["observables"]} for entry in entries}
+    entries = mark(content.comparisons[0], point_curves(*slipping))
+    by_point = {entry.point: {item.name: item for item in entry.observables} for entry in entries}
     marked = by_point[point_name(WELL)][CURVE]
-    assert [item["row"] for item in marked["marks"]] == [-1, 0, 1]
-    assert marked["bounds"] == [{"name": "μ static", "value": 0.35}]
-    assert not any("marks" in item for item in by_point[point_name(FREE)].values())
-    assert "marks" not in by_point[point_name(WELL)]["z"]
+    assert [item.row for item in marked.marks or ()] == [-1, 0, 1]
+    assert marked.bounds == [Bound("μ static", 0.35)]
+    assert not any(item.marks for item in by_point[point_name(FREE)].values())
+    assert "marks" not in plain(by_point[point_name(WELL)]["z"])
 
 
-def test_page_shows_ill_posed_points_without_colour(content: dict[str, Any], slipping: Any, parse: Any) -> None:
+def test_page_shows_ill_posed_points_without_colour(content: ReportContent, slipping: Any, parse: Any) -> None:
     """A sign and a word for the verdict, its meaning in the legend, and no blame for other events."""
     html = shown(content, slipping)
     text = " ".join(parse(html).text.split())
@@ -185,12 +185,13 @@ def test_page_shows_ill_posed_points_without_colour(content: dict[str, Any], sli
     assert "3 points of their own" in text
 
 
-def test_every_verdict_can_be_said(content: dict[str, Any]) -> None:
+def test_every_verdict_can_be_said(content: ReportContent) -> None:
     """Signs, meanings, terminal and Markdown know every verdict."""
     assert set(SYMBOLS) == set(MEANINGS) == {verdict.value for verdict in Verdict}
     assert len(set(SYMBOLS.values())) == len(SYMBOLS)
-    changed = copy.deepcopy(content["comparisons"][0])
-    changed["rows"][0] |= {"verdict": "ill-posed", "verdicts": {"ill-posed": 1}}
+    first, *others = content.comparisons[0].rows
+    first = dataclasses.replace(first, verdict=Verdict.ILL_POSED, verdicts={"ill-posed": 1})
+    changed = dataclasses.replace(content.comparisons[0], rows=[first, *others])
     out = console()
     with out.capture() as capture:
         out.print(verdict_table(changed))
@@ -199,10 +200,11 @@ def test_every_verdict_can_be_said(content: dict[str, Any]) -> None:
     assert "? ill-posed" in markdown_table(changed)
 
 
-def test_findings_and_scores_leave_ill_posed_points_out(content: dict[str, Any]) -> None:
+def test_findings_and_scores_leave_ill_posed_points_out(content: ReportContent) -> None:
     """Nobody is measured there, and a sentence says where that is; wrong orders elsewhere are named."""
-    comparison = content["comparisons"][0]
-    said = " ".join(comparison["findings"]["sentences"])
+    comparison = content.comparisons[0]
+    assert comparison.evidence
+    said = " ".join(comparison.evidence.findings.sentences)
     assert (
         "In 1 of 2 cases the first slip is ill-posed (speed=4, rolling_resistance=0.0005, mu_static=0.391459)" in said
     )
@@ -210,14 +212,15 @@ def test_findings_and_scores_leave_ill_posed_points_out(content: dict[str, Any])
     assert [score.motion for score in scores(comparison)] == [pytest.approx(1e-6, rel=1e-5)] * 3 + [None]
 
 
-def test_events_without_numbers_do_not_break_the_page(content: dict[str, Any], slipping: Any) -> None:
+def test_events_without_numbers_do_not_break_the_page(content: ReportContent, slipping: Any) -> None:
     """What is not finite is null in the data and a dash on the page."""
-    changed = copy.deepcopy(content)
-    empty = {"kind": "slip", "time": None, "time_low": None, "time_high": None}
-    for run in changed["comparisons"][0]["runs"]:
-        run["events"] = [empty, {**empty, "time": 1.0}] if run["events"] else []
-    changed["comparisons"][0]["truths"][0]["onset"]["distance"] = None
-    assert "no bracket" in shown(changed, slipping)
+    empty = [Event("slip", math.nan, math.nan, math.nan), Event("slip", 1.0, -math.inf, math.inf)]
+    runs = [
+        dataclasses.replace(run, own=dataclasses.replace(run.own, events=empty if run.own.events else []))
+        for run in content.comparisons[0].runs
+    ]
+    changed = dataclasses.replace(content.comparisons[0], runs=runs)
+    assert "no bracket" in shown(dataclasses.replace(content, comparisons=[changed]), slipping)
 
 
 @pytest.mark.parametrize(
@@ -231,8 +234,8 @@ def test_events_without_numbers_do_not_break_the_page(content: dict[str, Any], s
 )
 def test_times_are_shown_to_the_digits_of_their_brackets(event: tuple[float, ...], said: tuple[str, str]) -> None:
     """No digit that the bracket takes away."""
-    named = dict(zip(("time", "time_low", "time_high"), event, strict=True))
-    assert (clock(named), bracket(named)) == said
+    slip = Event("slip", *event)
+    assert (clock(slip), bracket(slip)) == said
 
 
 def test_written_report_names_no_finite_number_it_has_not(slipping: tuple[Outcome, Store], tmp_path: Path) -> None:

@@ -66,8 +66,8 @@ def test_report_shows_the_maps(made: tuple[Outcome, Store], maps: Any, tmp_path:
     for part in parts:
         whole.make(part, lambda: None)
     whole.write(tmp_path)
-    assert [len(item["study"]["maps"]) for item in whole.content["regimes"]] == [2, 2]
-    assert part_lines(whole.content)[0] == f"regimes: {RegimesPart.line(whole.content['regimes'][0])}."
+    assert [len(item.study["maps"]) for item in whole.content.entries["regimes"]] == [2, 2]
+    assert part_lines(whole.content)[0] == f"regimes: {RegimesPart.line(whole.content.entries['regimes'][0])}."
     html = (tmp_path / "report.html").read_text(encoding="utf-8")
     elements = parse(html)
     ids = [attributes["id"] for _, attributes in elements.tags if "id" in attributes]

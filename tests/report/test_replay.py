@@ -7,6 +7,7 @@ import gzip
 import json
 from collections.abc import Callable, Iterator
 from contextlib import AbstractContextManager, ExitStack
+from dataclasses import replace
 from importlib.metadata import PackageNotFoundError
 from pathlib import Path
 from typing import Any
@@ -23,10 +24,10 @@ from proofroll.elements.ball_on_surface.report.kind import BallReport
 from proofroll.elements.ball_on_surface.report.poses import AWAY, SLIPS, STICKS, poses
 from proofroll.elements.ball_on_surface.report.replay import LENGTH
 from proofroll.elements.ball_on_surface.report.wall import middle, wall
+from proofroll.files.json_data import plain
 from proofroll.files.netcdf import read, write
 from proofroll.files.scene_file import load_scene
 from proofroll.report import replay_library
-from proofroll.report.growing_report import _described
 from proofroll.report.html import page
 from proofroll.report.plots import point_curves
 from proofroll.report.replay import WIDEST_TURN, frame_times, replay_content
@@ -188,7 +189,7 @@ def test_numbers_survive_being_packed() -> None:
 
 def test_every_truth_is_a_case_with_the_default_settings_as_ghosts(made: Any) -> None:
     """One ghost of each engine is shown at first: the default one where there is one; the numbers fill what is said."""
-    content = replay_content([made[0]], made[1], BallReport.replay())
+    content = plain(replay_content([made[0]], made[1], BallReport.replay()))
     assert [case["label"] for case in content["cases"]] == ["speed=3", "speed=4"]
     assert content["start"] == 1, "the scene as its file has it"
     for case, numbers in zip(content["cases"], content["packed"], strict=True):
@@ -212,7 +213,7 @@ def test_the_furthest_of_the_other_settings_is_there_if_it_is_seen(made: Any) ->
         dataset = read(file)
         dataset["p_WB"] = dataset["p_WB"] + 1e-3
         write(dataset, file)
-        balls = replay_content([outcome], store, BallReport.replay())["cases"][0]["runs"]
+        balls = plain(replay_content([outcome], store, BallReport.replay()))["cases"][0]["runs"]
     finally:
         file.write_bytes(kept)
     assert {ball["name"]: ball["shown"] for ball in balls}["alpha fine matched (dt 1e-3)"] is False
@@ -229,7 +230,7 @@ def test_a_ball_that_flies_off_is_dropped_where_it_leaves(made: Any) -> None:
         dataset = read(file)
         dataset["p_WB"][25:] = dataset["p_WB"][25:] * 1e9
         write(dataset, file)
-        whole = replay_content([outcome], store, BallReport.replay())["cases"][0]
+        whole = plain(replay_content([outcome], store, BallReport.replay()))["cases"][0]
         ball = next(run for run in whole["runs"] if run["name"].startswith("beta"))
     finally:
         file.write_bytes(kept)
@@ -283,9 +284,9 @@ def test_what_engines_and_files_say_stays_text(made: Any, parse: Callable[[str],
     """Markup in a title, a point, a name or a message makes no element."""
     evil = "</script><script>alert(1)</script><img src=x onerror=alert(2)>"
     replay = replay_content([made[0]], made[1], BallReport.replay())
-    case = replay["cases"][0]
-    case |= {"group": evil, "label": evil, "scene": evil}
-    case["runs"][1] |= {"name": evil, "message": evil}
+    case = replay.cases[0]
+    case.runs[1] = replace(case.runs[1], name=evil, message=evil)
+    replay.cases[0] = replace(case, group=evil, label=evil, scene=evil)
     html = page(report_content([made[0]], made[1], "proofroll report"), [point_curves(*made)], replay=replay)
     elements = parse(html)
     assert "img" not in {tag for tag, _ in elements.tags}
@@ -425,9 +426,9 @@ def test_without_a_picture_the_values_follow_the_time(
     """One sentence says what is missing; time and values run, and nothing fails."""
     replay = replay_content([made[0]], made[1], BallReport.replay())
     if lacking == "three.js":
-        replay["library"] = None
+        replay = replace(replay, library=None)
     file = tmp_path / "report.html"
-    content = report_content([made[0]], made[1], "proofroll report") | {"replay": _described(replay)}
+    content = report_content([made[0]], made[1], "proofroll report")
     file.write_text(page(content, [point_curves(*made)], replay=replay), encoding="utf-8")
     blind = "HTMLCanvasElement.prototype.getContext = () => null;" if lacking == "WebGL" else ""
     opened = open_(file, before=blind)

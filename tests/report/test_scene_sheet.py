@@ -9,14 +9,15 @@ import pytest
 
 from proofroll.elements.ball_on_surface.report import drawings
 from proofroll.files.scene_file import read_scene_file
-from proofroll.report.scene_sheet import scene_sheet
+from proofroll.report.pen import Lettering, Letters
+from proofroll.report.scene_sheet import SceneSheet, ShownParameter, scene_sheet
 
 POINTS = [{"speed": v, "rolling_resistance": f} for v in (2.0, 4.0, 6.0) for f in (0.0, 5e-4)]
 
 
-def entries(sheet: dict[str, Any]) -> dict[str, dict[str, Any]]:
+def entries(sheet: SceneSheet) -> dict[str, ShownParameter]:
     """Parameters by name."""
-    return {entry["name"]: entry for entry in sheet["parameters"]}
+    return {entry.name: entry for entry in sheet.parameters}
 
 
 def test_every_parameter_has_values_unit_meaning_and_source() -> None:
@@ -24,33 +25,33 @@ def test_every_parameter_has_values_unit_meaning_and_source() -> None:
     file, found = read_scene_file("sphere_in_cylinder"), entries(scene_sheet("sphere_in_cylinder", POINTS))
     assert list(found) == list(file.parameters)
     for name, parameter in file.parameters.items():
-        assert (found[name]["meaning"], found[name]["source"]) == (parameter.meaning, parameter.source)
-    assert (found["speed"]["symbol"], found["speed"]["values"], found["speed"]["unit"]) == ("V0", "2, 4, 6", "m/s")
-    assert found["rolling_resistance"]["values"] == "0, 0.0005"
-    assert [name for name, entry in found.items() if entry["varied"]] == ["speed", "rolling_resistance"]
-    assert (found["gravity"]["values"], found["gravity"]["unit"]) == ("9.81", "m/s²")
+        assert (found[name].meaning, found[name].source) == (parameter.meaning, parameter.source)
+    assert (found["speed"].symbol, found["speed"].values, found["speed"].unit) == ("V0", "2, 4, 6", "m/s")
+    assert found["rolling_resistance"].values == "0, 0.0005"
+    assert [name for name, entry in found.items() if entry.varied] == ["speed", "rolling_resistance"]
+    assert (found["gravity"].values, found["gravity"].unit) == ("9.81", "m/s²")
 
 
 def test_defaults_that_are_other_parameters_or_unbounded_can_be_read() -> None:
     """Infinity has its sign, and a default that follows another parameter names it by its symbol."""
     found = entries(scene_sheet("sphere_in_cylinder", []))
-    assert (found["mu_static"]["symbol"], found["mu_static"]["values"]) == ("μs", "∞")
-    assert found["mu_kinetic"]["values"] == "= μs"
-    assert found["radial_spin"]["symbol"] == "ω1(0)"
+    assert (found["mu_static"].symbol, found["mu_static"].values) == ("μs", "∞")
+    assert found["mu_kinetic"].values == "= μs"
+    assert found["radial_spin"].symbol == "ω1(0)"
 
 
 def test_many_values_are_not_all_listed() -> None:
     """A long list says how many more there are."""
     found = entries(scene_sheet("sphere_in_cylinder", [{"speed": 2.0 + k} for k in range(9)]))
-    assert found["speed"]["values"] == "2, 3, 4, 5, 6 and 4 more"
+    assert found["speed"].values == "2, 3, 4, 5, 6 and 4 more"
 
 
 def test_rolling_resistance_is_drawn_where_any_case_has_it() -> None:
     """One drawing stands for all cases."""
 
-    def arm(sheet: dict[str, Any]) -> bool:
-        marks = sheet["drawings"][1]["marks"]
-        return any(mark.get("parts") == [{"text": "f", "sub": False}] for mark in marks)
+    def arm(sheet: SceneSheet) -> bool:
+        marks = sheet.drawings[1].marks
+        return any(isinstance(mark, Lettering) and mark.parts == [Letters("f", False)] for mark in marks)
 
     assert arm(scene_sheet("inclined_plane", [{"tilt": 0.2}, {"rolling_resistance": 1e-4}]))
     assert not arm(scene_sheet("inclined_plane", [{"tilt": 0.2}]))
@@ -60,9 +61,9 @@ def test_a_surface_without_a_drawing_says_so(monkeypatch: pytest.MonkeyPatch) ->
     """The parameters are there all the same."""
     monkeypatch.setattr(drawings, "overview", lambda wall, body: [])  # noqa: ARG005 -- as it is called
     sheet = scene_sheet("inclined_plane", [])
-    assert sheet["drawings"] == []
-    assert sheet["undrawn"] == "There is no drawing for a wall of the kind Plane."
-    assert len(sheet["parameters"]) == len(read_scene_file("inclined_plane").parameters)
+    assert sheet.drawings == []
+    assert sheet.undrawn == "There is no drawing for a wall of the kind Plane."
+    assert len(sheet.parameters) == len(read_scene_file("inclined_plane").parameters)
 
 
 def test_drawing_and_parameters_are_on_the_page(written: tuple[dict[str, Any], Path], html: str, parse: Any) -> None:

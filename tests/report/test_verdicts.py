@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import copy
 import dataclasses
 import io
 from collections.abc import Mapping
@@ -15,6 +14,7 @@ from rich.console import Console
 from proofroll.core.convergence import Limit, richardson
 from proofroll.core.verdict import judge
 from proofroll.report.comparison_content import outcome_content
+from proofroll.report.comparison_records import ReportedComparison
 from proofroll.report.html import page
 from proofroll.report.labels import SYMBOLS, detail, verdict_text
 from proofroll.report.markdown import verdict_table as markdown_table
@@ -64,7 +64,7 @@ def outcome(made: tuple[Outcome, Store]) -> Outcome:
     return with_runs(made[0], runs)
 
 
-def printed(content: dict[str, Any], width: int) -> str:
+def printed(content: ReportedComparison, width: int) -> str:
     """The table and the lines under it as they stand on a terminal of this width."""
     out = io.StringIO()
     console = Console(file=out, width=width, highlight=False)
@@ -82,14 +82,16 @@ def test_one_refused_case_of_eleven_shows_the_ten(made: tuple[Outcome, Store]) -
     runs[3] = dataclasses.replace(runs[3], result=Result(Status.REFUSED, "one coefficient only"), judgements=[])
     runs[5] = dataclasses.replace(answered(run, 0.05, OTHER), parameters=points[5])
     content = outcome_content(with_runs(made[0], {0: runs}))
-    row = content["rows"][0]
-    assert row["verdict"] == "failed"
+    row = content.rows[0]
+    assert row.verdict == "failed"
     assert verdict_text(row) == "failed 1/11 ✗1 ✓9"
-    assert row["reason"] == "refused at speed=6: one coefficient only"
+    assert row.reason == "refused at speed=6: one coefficient only"
     assert "failed 1/11 ✗1 ✓9" in printed(content, 100)
     assert "failed 1/11 ✗1 ✓9" in markdown_table(content)
-    first = next(iter(overview(content, 0)["groups"].values()))[0]
-    assert (first["verdict_text"], first["judged"]["z"]["verdict"]) == ("failed 1/11 ✗1 ✓9", "differs")
+    table = overview(content, 0)
+    first = next(iter(table.groups.values()))[0]
+    cells = {column.name: cell.verdict for column, cell in zip(table.columns, first.cells, strict=True) if cell}
+    assert (first.verdict_text, cells["z"]) == ("failed 1/11 ✗1 ✓9", "differs")
 
 
 def test_another_limit_and_no_limit_are_two_answers_on_the_terminal(outcome: Outcome) -> None:
@@ -109,33 +111,33 @@ def test_nothing_is_cut_on_a_narrow_terminal(outcome: Outcome, width: int) -> No
     text = printed(content, width)
     assert "…" not in text
     assert max(map(len, text.splitlines())) <= width
-    for row in content["rows"]:
-        assert f"{SYMBOLS[row['verdict']]} {row['verdict']}" in text
+    for row in content.rows:
+        assert f"{SYMBOLS[row.verdict]} {row.verdict}" in text
 
 
 def test_a_wrong_limit_within_tolerance_is_marked(outcome: Outcome) -> None:
     """The row agrees, with a star that leads to the limit's error; JSON, terminal and page have it."""
     content = outcome_content(outcome)
-    row = content["rows"][2]
-    assert row["verdict"] == "agrees"
+    row = content.rows[2]
+    assert row.verdict == "agrees"
     assert "✓ agrees*" in printed(content, 100)
-    (remark,) = row["remarks"]
+    (remark,) = row.remarks
     assert "shown not to be the truth: off by 0.0004 ± 1e-07 m, order 2" in remark
     assert f"* beta only: {remark}" in [line.replace(" (dt 1e-3)", "") for line in closing_lines(content)]
-    assert content["runs"][content["rows"].index(row)]["judgements"][0]["remarks"] is not None
+    assert content.runs_of(2)[0].judgements[0].remarks
 
 
 def test_who_is_silent_or_shares_equations_is_marked(outcome: Outcome) -> None:
     """A run without forces is incomplete by name; one on the truth's own equations is never the closest to it."""
     content = outcome_content(outcome)
-    row = content["rows"][3]
-    assert (row["verdict"], row["missing"]) == ("incomplete", ["F2", "N"])
-    assert row["reason"] == "agrees, but does not report F2, N"
+    row = content.rows[3]
+    assert (row.verdict, row.missing) == ("incomplete", ["F2", "N"])
+    assert row.reason == "agrees, but does not report F2, N"
     assert detail(row) == "does not report F2, N"
-    assert row["remarks"] == ["rests on the same equations as the truth itself (alike)"]
+    assert row.remarks == ["rests on the same equations as the truth itself (alike)"]
     assert "◐ incomplete*" in printed(content, 100)
     assert counted(content) == "4 settings: ✓ 1 agrees, ◐ 1 incomplete, ✗ 2 differs; as expected"
-    said = three_sentences({"comparisons": [content], "tradeoffs": [], "stability": []})[0]
+    said = three_sentences([content], {})[0]
     assert said.startswith("Of 4 settings in one comparison, 1 agrees with the truth everywhere")
 
 
@@ -157,8 +159,7 @@ def test_the_page_says_all_of_it(outcome: Outcome, made: tuple[Outcome, Store], 
 
 def test_closest_is_nobody_who_rests_on_the_truth(made: tuple[Outcome, Store]) -> None:
     """A row that shares the truth's equations is not named as the closest, however small its error is."""
-    content = copy.deepcopy(outcome_content(made[0]))
-    given = {"comparisons": [content], "tradeoffs": [], "stability": []}
-    assert "closest is alpha fine matched" in three_sentences(given)[0]
-    content["rows"][0]["shared"] = "rests on the same equations"
-    assert "closest is alpha fine default" in three_sentences(given)[0]
+    content = outcome_content(made[0])
+    assert "closest is alpha fine matched" in three_sentences([content], {})[0]
+    content.rows[0] = dataclasses.replace(content.rows[0], shared="rests on the same equations")
+    assert "closest is alpha fine default" in three_sentences([content], {})[0]

@@ -2,8 +2,8 @@
 
 from __future__ import annotations
 
-import copy
 import json
+from dataclasses import fields, is_dataclass, replace
 from pathlib import Path
 from typing import Any, ClassVar
 
@@ -14,7 +14,7 @@ from proofroll.core.errors import ProofrollError
 from proofroll.report.growing_report import Report, begun
 from proofroll.report.html import page
 from proofroll.report.stability_part import StabilityPart
-from proofroll.report.study_parts import absent, all_parts, attempt, entry, part_kinds, parts_of
+from proofroll.report.study_parts import PartEntry, absent, all_parts, attempt, part_kinds, parts_of
 from proofroll.report.summary import three_sentences
 from proofroll.running.store import Store
 from proofroll.studies.outcome import Outcome
@@ -32,7 +32,7 @@ def report(made: tuple[Outcome, Store]) -> Report:
     whole = begun([made[0]], made[1], COMMAND)
     for part in further():
         whole.parts.append(part)
-        whole._put(part, entry(part))
+        whole._put(part, part.entry())
     return whole
 
 
@@ -80,7 +80,7 @@ def test_the_diagram_is_inline_and_keeps_to_itself(report: Report) -> None:
 
 def test_exactly_three_sentences_from_the_data(report: Report) -> None:
     """What agrees best, what is silent, what to use; other data give other sentences, none at all still give three."""
-    found = report.content["findings"]["sentences"]
+    found = report.content.findings.sentences
     assert len(found) == 3
     assert found[0].startswith(
         "Of 4 settings in one comparison, 1 agrees with the truth everywhere, 1 without reporting all"
@@ -89,17 +89,15 @@ def test_exactly_three_sentences_from_the_data(report: Report) -> None:
     assert found[1].startswith("1 differs from the truth and runs to the end without a word, worst alpha fine default")
     assert found[1].endswith("1 of 2 boundaries of stability and accuracy are passed without a word.")
     assert found[2].startswith("For z to 1e-4 m use good only tuned at dt 1e-3 s")
-    changed = copy.deepcopy(report.content)
-    changed["tradeoffs"][0]["study"] = None
-    assert "use alpha fine default" in three_sentences(changed)[2]
-    nothing = three_sentences({"comparisons": [], "tradeoffs": [], "stability": []})
+    assert "use alpha fine default" in three_sentences(report.content.comparisons, {})[2]
+    nothing = three_sentences([], {})
     assert len(nothing) == 3
     assert all(sentence.endswith(".") for sentence in nothing)
 
 
 def test_advice_names_the_cheapest_the_runner_up_and_the_first_failure(report: Report, parse: Any) -> None:
     """At a millimetre the cheap one fails, with its reason; costs measured once say so."""
-    answers = {answer["tolerance"]: answer for answer in report.content["tradeoffs"][0]["advice"]}
+    answers = {answer["tolerance"]: answer for answer in report.content.entries["tradeoffs"][0].advice}
     answer = answers[1e-3]
     assert answer["choice"]["engine"] == "good"
     assert answer["first_failure"]["engine"] == "rough"
@@ -114,17 +112,17 @@ def poisoned(value: Any) -> Any:
     """The content with poison at the end of every string."""
     if isinstance(value, dict):
         return {key: poisoned(item) for key, item in value.items()}
-    if isinstance(value, list):
+    if is_dataclass(value) and not isinstance(value, type):
+        return replace(value, **{item.name: poisoned(getattr(value, item.name)) for item in fields(value)})
+    if isinstance(value, (list, tuple)):
         return [poisoned(item) for item in value]
     return value + POISON if isinstance(value, str) else value
 
 
 def test_nothing_in_a_further_study_becomes_markup(report: Report, parse: Any) -> None:
     """Poison in every string of the trade-off and of the map is text on the page."""
-    bad = {**report.content, "tradeoffs": poisoned(report.content["tradeoffs"])}
-    bad["stability"] = poisoned(report.content["stability"])
-    missing = absent(report.parts[0], f"broken {POISON}")
-    bad["figures"] = [missing]
+    missing = [absent(report.parts[0], f"broken {POISON}")]
+    bad = replace(report.content, entries={**poisoned(report.content.entries), "figures": missing})
     elements = parse(page(bad, report.curves))
     assert elements.text.count("alert('poison')") > 40
     for tag, attributes in elements.tags:
@@ -175,9 +173,9 @@ class Broken:
         """Fails."""
         raise self.error
 
-    def content(self) -> dict[str, Any]:
+    def entry(self) -> PartEntry:
         """Of what was made."""
-        return {}
+        return PartEntry(**self.head)
 
     def pictures(self, prefix: str) -> dict[str, str]:
         """None."""
@@ -196,10 +194,10 @@ def test_a_part_that_fails_leaves_a_sentence(
     assert "It has not been made yet; proofroll tradeoff it makes it." in text
     said = whole.make(part, part.make)
     whole.write(tmp_path)
-    assert str(error) in said["missing"]
-    assert "Traceback" not in said["missing"]
+    assert str(error) in said.missing
+    assert "Traceback" not in said.missing
     text = parse((tmp_path / "report.html").read_text(encoding="utf-8")).text
-    assert said["missing"] in text
+    assert said.missing in text
     assert "Closest to the truth is alpha fine matched" in text
 
 
@@ -247,6 +245,6 @@ def test_an_attempt_survives_what_nobody_foresaw() -> None:
     part = Broken(RuntimeError("first line\nsecond"))
     said = attempt(part, part.make)
     assert said is not None
-    assert said["missing"] == (
+    assert said.missing == (
         "an error of proofroll's own, RuntimeError: first line second; proofroll tradeoff it makes it."
     )

@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING, Any, ClassVar
 from blajer_2006 import statement_tables
 from blajer_2006.judging import count
 from blajer_2006.reading import STUDY, load_figures
+from proofroll.report.study_parts import PartEntry
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -42,9 +43,9 @@ class FiguresPart:
         return cls(load_figures(str(path)))
 
     @staticmethod
-    def line(entry: dict[str, Any]) -> str:
+    def line(entry: PartEntry) -> str:
         """How many statements hold."""
-        return count(entry["study"]["statements"])
+        return count(entry.study["statements"])
 
     @property
     def head(self) -> dict[str, str]:
@@ -68,7 +69,7 @@ class FiguresPart:
                 load_regimes(name).briefly(), runner.jobs, lambda _: tell("runs of the truth", 0)
             )
 
-    def content(self) -> dict[str, Any]:
+    def entry(self) -> PartEntry:
         """Captions, runs and statements."""
         from blajer_2006.writing import figures_content
 
@@ -76,7 +77,7 @@ class FiguresPart:
         content = figures_content(self.study, self.maps)
         wrong = [item for item in content["statements"] if item["holds"] is False]
         said = [f"{item['says']} ({', '.join(item['runs'])}): {item['found']}, not {item['stated']}" for item in wrong]
-        return {"study": content, "contradictions": said, "lost": content["lost"]}
+        return PartEntry(**self.head, study=content, contradictions=said, lost=content["lost"])
 
     def pictures(self, prefix: str) -> dict[str, str]:
         """One for each figure."""

@@ -28,6 +28,7 @@ from proofroll.cli.options import (
 
 if TYPE_CHECKING:
     from proofroll.core.comparison import Comparison
+    from proofroll.report.comparison_records import ReportedComparison
     from proofroll.running.runner import Runner
     from proofroll.studies.outcome import Outcome
 
@@ -104,7 +105,7 @@ def exit_code(outcomes: list[Outcome]) -> int:
     return CONTRADICTED if any(outcome.contradictions for outcome in outcomes) else OK
 
 
-def print_outcome(content: dict[str, Any]) -> None:
+def print_outcome(content: ReportedComparison) -> None:
     """A comparison on the terminal: the table of verdicts, and what came of it in words."""
     from proofroll.report.terminal import closing_lines, console, verdict_table
 

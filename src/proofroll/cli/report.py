@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import shlex
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Any
+from typing import TYPE_CHECKING, Annotated
 
 import typer
 
@@ -27,6 +27,7 @@ from proofroll.cli.options import (
 
 if TYPE_CHECKING:
     from proofroll.report.growing_report import Report
+    from proofroll.report.report_content import ReportContent
     from proofroll.report.study_parts import Part
     from proofroll.running.runner import Runner
     from proofroll.studies.outcome import Outcome
@@ -66,8 +67,8 @@ def report(
     if loaded:
         stage = stages.next("comparisons")
         if len(loaded) > 1:
-            first = begun(outcomes_of(loaded[:1], engine or [], runner, stage), runner.store, command)
-            first.content["awaited"] = [item.title for item in loaded[1:]]
+            awaited = [item.title for item in loaded[1:]]
+            first = begun(outcomes_of(loaded[:1], engine or [], runner, stage), runner.store, command, awaited)
             first.expect(parts, out, fresh=fresh)
             first.write(out)
             complain(f"{stage}the first is in {out / 'report.html'}")
@@ -114,25 +115,23 @@ def _make(made: Report, part: Part, runner: Runner, out: Path, stage: str) -> No
     """Makes one further study with a progress bar; a sentence on standard error says if that failed."""
     with progress_bar(f"{stage}{part.words}") as advance:
         said = made.make(part, lambda: part.make(runner, out, lambda text, count: advance(f"{stage}{text}", count)))
-    if said["missing"]:
-        complain(f"{part.head['title']}: {said['missing']}")
+    if said.missing:
+        complain(f"{part.head['title']}: {said.missing}")
 
 
-def _exit_code(content: dict[str, Any], compared: int) -> int:
+def _exit_code(content: ReportContent, compared: int) -> int:
     """As for the comparisons; a further study that failed counts as a lost engine, a false statement as a verdict."""
-    from proofroll.report.study_parts import further
-
-    entries = further(content)
-    if compared == ENGINE or any(entry["missing"] or entry["lost"] for entry in entries):
+    entries = content.further
+    if compared == ENGINE or any(entry.missing or entry.lost for entry in entries):
         return ENGINE
-    return CONTRADICTED if compared or any(entry["contradictions"] for entry in entries) else OK
+    return CONTRADICTED if compared or any(entry.contradictions for entry in entries) else OK
 
 
-def _print(content: dict[str, Any], out: Path) -> None:
+def _print(content: ReportContent, out: Path) -> None:
     """The verdicts, what came of the further studies, what to look at first, and where the report is."""
     from proofroll.report.terminal import console, first_lines, part_lines
 
-    for item in content["comparisons"]:
+    for item in content.comparisons:
         print_outcome(item)
     terminal = console()
     for line in [*part_lines(content), *first_lines(content)]:

@@ -1,60 +1,61 @@
-"""The content of a report as plain data; the HTML page and the terminal show nothing that is not in it."""
+"""The records of a comparison (:mod:`proofroll.report.comparison_records`), made from what it found."""
 
 from __future__ import annotations
 
 import dataclasses
-import platform
 from typing import Any
 
-import proofroll
 from proofroll.core.plugins import parse_engine
 from proofroll.core.verdict import Judgement, Verdict
-from proofroll.files.json_data import plain
 from proofroll.files.scene_file import load_scene
+from proofroll.report.comparison_records import (
+    CauseAt,
+    ReportedComparison,
+    ReportedRow,
+    ReportedRun,
+    ShownBand,
+    ShownObservable,
+    WorstJudgement,
+)
+from proofroll.report.evidence import Claims, Cost
 from proofroll.running.case import Status
 from proofroll.running.environments import shown_name
-from proofroll.running.timing import machine
 from proofroll.studies.hosts import hosts
-from proofroll.studies.outcome import Outcome, Run
+from proofroll.studies.outcome import SEVERITY, Outcome, Run
 from proofroll.studies.planning import point_name
 
 
-def outcome_content(outcome: Outcome) -> dict[str, Any]:
-    """A comparison's findings.
-
-    ``rows`` holds a summary for each engine with settings over all points of the parameters; ``runs`` everything
-    about each single run.
-    """
+def outcome_content(outcome: Outcome) -> ReportedComparison:
+    """A comparison's findings."""
     comparison = outcome.comparison
-    numbers = {key: number for number, key in enumerate(by_row(outcome))}
-    content = {
-        "name": comparison.name,
-        "title": comparison.title,
-        "question": comparison.question,
-        "scene": comparison.scene,
-        "observables": {
-            name: {"unit": item.unit, "symbol": item.shown, "role": item.role, "headline": item.headline}
+    rows = by_row(outcome)
+    numbers = {key: number for number, key in enumerate(rows)}
+    return ReportedComparison(
+        name=comparison.name,
+        title=comparison.title,
+        question=comparison.question,
+        scene=comparison.scene,
+        observables={
+            name: ShownObservable(item.unit, item.shown, item.role, item.headline)
             for name, item in load_scene(comparison.scene).observables.items()
         },
-        "until": comparison.until,
-        "every": comparison.every,
-        "vary": comparison.vary,
-        "points": comparison.points,
-        "left_out": comparison.left_out,
-        "as_expected": not outcome.contradictions,
-        "contradictions": outcome.contradictions,
-        "tolerances": {
-            name: {
-                "because": band.because,
-                "bounds": {key: _tolerance(bound.value, bound.relative) for key, bound in band.bounds.items()},
-            }
+        until=comparison.until,
+        every=comparison.every,
+        vary=comparison.vary,
+        points=comparison.points,
+        left_out=comparison.left_out,
+        as_expected=not outcome.contradictions,
+        contradictions=outcome.contradictions,
+        tolerances={
+            name: ShownBand(
+                band.because, {key: _tolerance(bound.value, bound.relative) for key, bound in band.bounds.items()}
+            )
             for name, band in comparison.bands.items()
         },
-        "rows": [_row(runs) for runs in by_row(outcome).values()],
-        "runs": [{"row": numbers[id(run.row)], **_run(run)} for run in outcome.runs],
-        "hosts": hosts(run.result for run in outcome.runs),
-    }
-    return dict(plain(content))
+        rows=[_row(runs) for runs in rows.values()],
+        runs=[_run(run, numbers[id(run.row)]) for run in outcome.runs],
+        hosts=hosts(run.result for run in outcome.runs),
+    )
 
 
 def by_row(outcome: Outcome) -> dict[int, list[Run]]:
@@ -65,53 +66,43 @@ def by_row(outcome: Outcome) -> dict[int, list[Run]]:
     return rows
 
 
-def environment(command: str, versions: dict[str, str]) -> dict[str, Any]:
-    """Where and with what the report was made."""
-    facts = machine()
-    return {
-        "command": command,
-        "machine": f"{facts['system']}, {facts['processor']}",
-        "versions": {"proofroll": proofroll.__version__, "python": platform.python_version(), **versions},
-    }
-
-
 def _tolerance(value: float, relative: bool) -> str:
     return f"{100 * value:g} % of its scale" if relative else f"{value:g}"
 
 
-def _row(runs: list[Run]) -> dict[str, Any]:
+def _row(runs: list[Run]) -> ReportedRow:
     """Summary over the points of the parameters: the worst of everything."""
     first = runs[0]
     # A point at which the question is ill-posed, or has no answer, says nothing about an engine.
     judged = [run for run in runs if run.verdict not in {Verdict.ILL_POSED, Verdict.NOT_JUDGED}] or runs
     names = list(dict.fromkeys(judgement.observable for run in judged for judgement in run.judgements))
     timings = [run.result.seconds_per_second for run in runs if run.result.seconds_per_second is not None]
-    order = list(Verdict)
-    return {
-        "engine": first.row.engine,
+    reason, limit = _why(judged)
+    return ReportedRow(
         **_settings(first),
-        "verdict": max((run.verdict for run in judged), key=order.index),
-        "verdicts": {verdict.value: sum(run.verdict == verdict for run in runs) for verdict in Verdict},
-        **_why(judged),
-        "shared": next((run.shared for run in runs if run.shared), ""),
-        "missing": sorted({name for run in runs for name in run.missing}),
-        "remarks": _remarks(runs),
-        "diagnosis": _diagnosis(runs),
-        "expected": first.row.expect,
-        "expected_for": first.row.expect_for,
-        "because": first.row.because,
-        "tolerance": first.row.tolerance,
-        "as_expected": not any(run.contradictions for run in runs),
-        "observables": {name: _worst(judged, name) for name in names},
-        "seconds_per_second": max(timings, default=None),
-        "message": next((run.result.message for run in runs if run.result.status != Status.DONE), ""),
-    }
+        verdict=max((run.verdict for run in judged), key=SEVERITY.index),
+        verdicts={verdict.value: sum(run.verdict == verdict for run in runs) for verdict in Verdict},
+        reason=reason,
+        limit=limit,
+        shared=next((run.shared for run in runs if run.shared), ""),
+        missing=sorted({name for run in runs for name in run.missing}),
+        remarks=_remarks(runs),
+        diagnosis=_diagnosis(runs),
+        expected=first.row.expect,
+        expected_for=first.row.expect_for,
+        because=first.row.because,
+        tolerance=first.row.tolerance,
+        claims=Claims.of(first.row),
+        as_expected=not any(run.contradictions for run in runs),
+        observables={name: _worst(judged, name) for name in names},
+        seconds_per_second=max(timings, default=None),
+        message=next((run.result.message for run in runs if run.result.status != Status.DONE), ""),
+    )
 
 
-def _why(runs: list[Run]) -> dict[str, str]:
+def _why(runs: list[Run]) -> tuple[str, str]:
     """Why the worst verdict: ``reason``, empty where everything agrees, and what the ladder says, ``limit``."""
-    order = list(Verdict)
-    worst = max((run.verdict for run in runs), key=order.index)
+    worst = max((run.verdict for run in runs), key=SEVERITY.index)
     guilty: list[tuple[Run, Judgement | None]] = []
     for run in runs:
         if run.verdict == worst:
@@ -120,12 +111,12 @@ def _why(runs: list[Run]) -> dict[str, str]:
     where = f" at {point_name(run.parameters)}" if run.parameters else ""
     limit = judgement.limit.value if judgement else ""
     if worst == Verdict.AGREES:
-        return {"reason": "", "limit": limit}
+        return "", limit
     if worst == Verdict.INCOMPLETE:
-        return {"reason": f"agrees, but does not report {', '.join(run.missing)}", "limit": limit}
+        return f"agrees, but does not report {', '.join(run.missing)}", limit
     if judgement is None or worst == Verdict.FAILED:
-        return {"reason": f"{run.result.status}{where}: {run.result.message}", "limit": ""}
-    return {"reason": f"{judgement.observable}{where}: {judgement.reason}", "limit": limit}
+        return f"{run.result.status}{where}: {run.result.message}", ""
+    return f"{judgement.observable}{where}: {judgement.reason}", limit
 
 
 def _remarks(runs: list[Run]) -> list[str]:
@@ -139,41 +130,32 @@ def _remarks(runs: list[Run]) -> list[str]:
     return found
 
 
-def _diagnosis(runs: list[Run]) -> list[dict[str, Any]]:
+def _diagnosis(runs: list[Run]) -> list[CauseAt]:
     """The causes that were proven at some point of the parameters, each told once, with the points."""
-    found: dict[str, dict[str, Any]] = {}
+    found: dict[str, CauseAt] = {}
     for run in runs:
         for item in run.diagnosis:
-            told = found.setdefault(item.cause.id, {**item.as_dict(), "points": []})
-            told["points"].append(point_name(run.parameters))
+            found.setdefault(item.cause.id, CauseAt(item, [])).points.append(point_name(run.parameters))
     return list(found.values())
 
 
 def _furthest(judged: list[tuple[Run, Judgement | None]]) -> tuple[Run, Judgement | None]:
     """The worst verdict, among equals the one furthest beyond its tolerance."""
-    order = list(Verdict)
 
     def badness(pair: tuple[Run, Judgement | None]) -> tuple[int, float]:
         item = pair[1]
-        return (order.index(item.verdict), item.error / item.tolerance) if item else (-1, 0.0)
+        return (SEVERITY.index(item.verdict), item.error / item.tolerance) if item else (-1, 0.0)
 
     return max(judged, key=badness)
 
 
-def _judgement_of(run: Run, name: str) -> Judgement | None:
-    return next((judgement for judgement in run.judgements if judgement.observable == name), None)
-
-
-def _worst(runs: list[Run], name: str) -> dict[str, Any]:
-    """The judgement with the worst verdict, among equals the one furthest beyond its tolerance, and its point.
-
-    Its error need not be the largest of all points, for tolerances may differ: that is ``largest``.
-    """
-    judged = [(run, _judgement_of(run, name)) for run in runs]
+def _worst(runs: list[Run], name: str) -> WorstJudgement:
+    judged = [(run, next((item for item in run.judgements if item.observable == name), None)) for run in runs]
     where, worst = _furthest(judged)
     assert worst is not None  # some run has it, or the name would not be asked for
     largest = max(judgement.error for _, judgement in judged if judgement is not None)
-    return {**dataclasses.asdict(worst), "point": point_name(where.parameters), "largest": largest}
+    known = {item.name: getattr(worst, item.name) for item in dataclasses.fields(worst)}
+    return WorstJudgement(**known, point=point_name(where.parameters), largest=largest)
 
 
 def _setting(run: Run, preset: str | None, resolution: str | None) -> str:
@@ -185,9 +167,11 @@ def _setting(run: Run, preset: str | None, resolution: str | None) -> str:
 
 
 def _settings(run: Run) -> dict[str, Any]:
+    """The fields of :class:`Setting`."""
     settings = run.facts.settings if run.facts else {}
     resolution = run.facts.resolution if run.facts else None
     return {
+        "engine": run.row.engine,
         "name": shown_name(run.facts.name if run.facts else run.row.engine.partition("[")[0]),
         "formulation": settings.get("formulation"),
         "preset": settings.get("preset"),
@@ -199,26 +183,29 @@ def _settings(run: Run) -> dict[str, Any]:
     }
 
 
-def _run(run: Run) -> dict[str, Any]:
-    return {
-        "engine": run.row.engine,
+def _run(run: Run, row: int) -> ReportedRun:
+    reason, limit = _why([run])
+    return ReportedRun(
+        row=row,
         **_settings(run),
-        "settings": run.facts.settings if run.facts else {},
-        "point": point_name(run.parameters),
-        "parameters": run.parameters,
-        "status": run.result.status,
-        "message": run.result.message,
-        "verdict": run.verdict,
-        **_why([run]),
-        "contradictions": run.contradictions,
-        "missing": run.missing,
-        "shared": run.shared,
-        "diagnosis": [item.as_dict() for item in run.diagnosis],
-        "judgements": [dataclasses.asdict(judgement) for judgement in run.judgements],
-        "certificate": run.result.certificate,
-        "seconds_per_second": run.result.seconds_per_second,
-        "timings": run.result.timings,
-        "versions": run.result.versions,
-        "trajectory": run.result.trajectory,
-        "host": run.result.host,
-    }
+        settings=run.facts.settings if run.facts else {},
+        point=point_name(run.parameters),
+        parameters=run.parameters,
+        status=run.result.status,
+        message=run.result.message,
+        verdict=run.verdict,
+        reason=reason,
+        limit=limit,
+        contradictions=run.contradictions,
+        missing=run.missing,
+        shared=run.shared,
+        diagnosis=run.diagnosis,
+        judgements=run.judgements,
+        certificate=run.result.certificate,
+        seconds_per_second=run.result.seconds_per_second,
+        timings=run.result.timings,
+        cost=Cost.of(run.result.timings),
+        versions=run.result.versions,
+        trajectory=run.result.trajectory,
+        host=run.result.host,
+    )

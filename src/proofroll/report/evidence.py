@@ -2,39 +2,49 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, Any
+from collections.abc import Sequence
+from dataclasses import dataclass
 
+from proofroll.core.comparison import ExceptAt, Row, Tolerance
 from proofroll.running.timing import Timing
 
-if TYPE_CHECKING:
-    from collections.abc import Sequence
 
-    from proofroll.core.comparison import Row, Tolerance
+@dataclass(frozen=True)
+class Cost:
+    """Wall seconds per simulated second over so many ``runs``; one run has no interval."""
+
+    median: float
+    low: float | None
+    high: float | None
+    confidence: float | None
+    runs: int
+
+    @classmethod
+    def of(cls, timings: Sequence[float]) -> Cost | None:
+        """The cost of runs, or None of none."""
+        if not timings:
+            return None
+        found = Timing(tuple(timings)).interval
+        if not found.confidence:
+            return cls(found.value, None, None, None, len(timings))
+        return cls(found.value, found.low, found.high, found.confidence, len(timings))
 
 
-def cost(timings: Sequence[float]) -> dict[str, Any] | None:
-    """Wall seconds per simulated second: ``median``, ``low`` and ``high``, their ``confidence``, and ``runs``.
-
-    One run has no interval: ``low``, ``high`` and ``confidence`` are None.
-    """
-    if not timings:
-        return None
-    interval = Timing(tuple(timings)).interval
-    ends: dict[str, Any] = {"low": interval.low, "high": interval.high, "confidence": interval.confidence}
-    if not interval.confidence:
-        ends = dict.fromkeys(ends)
-    return {"median": interval.value, **ends, "runs": len(timings)}
-
-
-def claims(row: Row) -> dict[str, Any]:
+@dataclass(frozen=True)
+class Claims:
     """What is expected of a row besides its verdict: bounds of its own, orders, limits, and other points' verdicts."""
-    return {
-        "bound": {name: _text(bound) for name, bound in row.bound.items()},
-        "order": {name: list(ends) for name, ends in row.order.items()},
-        "limit": {name: _text(bound) for name, bound in row.limit.items()},
-        "except_at": [{"where": item.where, "expect": list(item.expect)} for item in row.except_at],
-        "only": row.only,
-    }
+
+    bound: dict[str, str]
+    order: dict[str, tuple[float, float]]
+    limit: dict[str, str]
+    except_at: list[ExceptAt]
+    only: dict[str, list[float]]
+
+    @classmethod
+    def of(cls, row: Row) -> Claims:
+        """Those of a row of a comparison file."""
+        bound, limit = ({name: _text(item) for name, item in found.items()} for found in (row.bound, row.limit))
+        return cls(bound, row.order, limit, row.except_at, row.only)
 
 
 def _text(bound: Tolerance) -> str:

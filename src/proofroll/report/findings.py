@@ -2,35 +2,47 @@
 
 from __future__ import annotations
 
-from typing import Any
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, Any
 
-from proofroll.report.labels import headlines, names, number, symbol, unit, with_caveat
-from proofroll.report.scores import Score, cheapest, recommendation, scores
+from proofroll.report.labels import names, number, symbol, unit, with_caveat
+from proofroll.report.scores import EVERYDAY, Recommendation, Score, cheapest, recommendation, scores
 
-# The accuracy for which the first paragraph names a setting: a line in a figure.
-EVERYDAY = 1e-3
+if TYPE_CHECKING:
+    from proofroll.report.comparison_records import ReportedComparison
+    from proofroll.report.kinds import ReportKind
 
 
-def findings(content: dict[str, Any]) -> dict[str, Any]:
-    """The answer in one paragraph, three sentences, and what to use at each accuracy."""
+@dataclass(frozen=True)
+class Findings:
+    """The answer in one paragraph, sentences, and what to use at each accuracy."""
+
+    answer: str
+    sentences: list[str]
+    recommendation: list[Recommendation]
+
+
+def findings(content: ReportedComparison, truths: Sequence[Any], kind: type[ReportKind] | None) -> Findings:
+    """What a comparison says; its kind of scene adds a sentence about its truths."""
     found = scores(content)
-    return {
-        "answer": _answer(content, found),
-        "sentences": [
+    return Findings(
+        _answer(content, found),
+        [
             # Who rests on the truth's own equations is close to it whatever they are.
-            _closest([score for score in found if not content["rows"][score.index]["shared"]]),
+            _closest([score for score in found if not content.rows[score.index].shared]),
             _obvious(content, found),
             *_order(content),
-            *_ill_posed(content),
+            *(kind.sentences(truths) if kind is not None else ()),
             _surprises(content),
         ],
-        "recommendation": recommendation(found),
-    }
+        recommendation(found),
+    )
 
 
-def _answer(content: dict[str, Any], found: list[Score]) -> str:
+def _answer(content: ReportedComparison, found: list[Score]) -> str:
     """What agrees, what does not, whether that was expected, and what to use for everyday accuracy."""
-    rows = content["rows"]
+    rows = content.rows
     said = {
         "agrees": ("agrees", "agree", "with the truth in every observable and every case"),
         "unconfirmed": ("agrees", "agree", "at this step with a limit that is not confirmed"),
@@ -44,18 +56,16 @@ def _answer(content: dict[str, Any], found: list[Score]) -> str:
     }
     parts = []
     for verdict, (one, many, rest) in said.items():
-        count = sum(row["verdict"] == verdict for row in rows)
+        count = sum(row.verdict == verdict for row in rows)
         if count:
             parts.append(f"{count} {one if count == 1 else many} {rest}")
-    unexpected = len(content["contradictions"])
-    expected = "All of this was expected." if content["as_expected"] else f"Not expected: {unexpected} findings."
+    unexpected = len(content.contradictions)
+    expected = "All of this was expected." if content.as_expected else f"Not expected: {unexpected} findings."
     text = f"Of {len(rows)} engine settings, {_joined(parts)}. {expected}"
     best = cheapest(found, "worst", EVERYDAY)
     if best:
-        cost = number(best["seconds_per_second"])
-        text += (
-            f" For motion and forces to {100 * EVERYDAY:g} %, the cheapest is {best['name']}: {cost} s of computing "
-        )
+        cost = number(best.seconds_per_second)
+        text += f" For motion and forces to {100 * EVERYDAY:g} %, the cheapest is {best.name}: {cost} s of computing "
         text += "per simulated second."
     return text
 
@@ -78,9 +88,9 @@ def _closest(found: list[Score]) -> str:
     )
 
 
-def _obvious(content: dict[str, Any], found: list[Score]) -> str:
+def _obvious(content: ReportedComparison, found: list[Score]) -> str:
     """What a user pays for the obvious model: the default preset against the best of the same engine."""
-    rows = content["rows"]
+    rows = content.rows
     worst: tuple[float, Score, Score] | None = None
     lost: list[str] = []
     for score in found:
@@ -88,11 +98,9 @@ def _obvious(content: dict[str, Any], found: list[Score]) -> str:
         others = [
             other
             for other in found
-            if rows[other.index]["name"] == row["name"]
-            and rows[other.index]["preset"] != "default"
-            and other.motion is not None
+            if rows[other.index].name == row.name and rows[other.index].preset != "default" and other.motion is not None
         ]
-        if row["preset"] != "default" or not others:
+        if row.preset != "default" or not others:
             continue
         best = min(others, key=lambda other: other.motion or 0.0)
         if score.motion is None:
@@ -103,69 +111,54 @@ def _obvious(content: dict[str, Any], found: list[Score]) -> str:
     if worst is None:
         return "What the obvious model costs cannot be said: no default setting stands beside another one." + failed
     factor, score, best = worst
-    blamed = with_caveat(score.name, rows[score.index])
+    blamed = with_caveat(score.name, rows[score.index].caveat)
     return (
         f"The obvious model costs most with {blamed}: {_off(content, score.index)}, which relative to the range is "
         f"{number(factor, 1)} times the error of {best.name}.{failed}"
     )
 
 
-def _off(content: dict[str, Any], index: int) -> str:
+def _off(content: ReportedComparison, index: int) -> str:
     """A row's largest error of a coordinate, in its unit, where it can be judged."""
-    judged = [judgement for run in content["runs"] if run["row"] == index for judgement in run["judgements"]]
-    motion = headlines(content, "motion")
-    errors = [j for j in judged if j["observable"] in motion and j["verdict"] != "ill-posed"]
-    worst = max(errors, key=lambda judgement: judgement["error"] / judgement["scale"])
-    return f"its {symbol(worst['observable'])} is off by {number(worst['error'])} {unit(worst['unit'])}".rstrip()
+    judged = [judgement for run in content.runs_of(index) for judgement in run.judgements]
+    motion = content.headlines("motion")
+    errors = [j for j in judged if j.observable in motion and j.verdict != "ill-posed"]
+    worst = max(errors, key=lambda judgement: judgement.error / judgement.scale)
+    return f"its {symbol(worst.observable)} is off by {number(worst.error)} {unit(worst.unit)}".rstrip()
 
 
-def _order(content: dict[str, Any]) -> list[str]:
+def _order(content: ReportedComparison) -> list[str]:
     """Who slips and sticks in another order than the truth; nothing where no order was judged."""
     judged = [
         (run, judgement)
-        for run in content["runs"]
-        for judgement in run["judgements"]
-        if judgement["observable"] == "event_order" and judgement["verdict"] != "ill-posed"
+        for run in content.runs
+        for judgement in run.judgements
+        if judgement.observable == "event_order" and judgement.verdict != "ill-posed"
     ]
     if not judged:
         return []
     wrong: dict[int, int] = {}
     for run, judgement in judged:
-        if judgement["verdict"] not in {"agrees", "unconfirmed"}:
-            wrong[run["row"]] = wrong.get(run["row"], 0) + 1
+        if judgement.verdict not in {"agrees", "unconfirmed"}:
+            wrong[run.row] = wrong.get(run.row, 0) + 1
     if not wrong:
         return ["Every setting slips and sticks in the truth's order, wherever that is well posed."]
-    shown = names(content["rows"])
-    cases = {row: sum(run["row"] == row for run, _ in judged) for row in wrong}
+    shown = names(content.rows)
+    cases = {row: sum(run.row == row for run, _ in judged) for row in wrong}
     said = _joined([f"{shown[row]} ({count} of {cases[row]} cases)" for row, count in wrong.items()])
     return [f"Events missing, added or of another kind than the truth's: {said}."]
 
 
-def _ill_posed(content: dict[str, Any]) -> list[str]:
-    """Where the time of the first slip hangs on less than the parameters are known to."""
-    onsets = [(truth["point"], truth["onset"]) for truth in content["truths"] if "onset" in truth]
-    found = [(point, onset) for point, onset in onsets if onset["verdict"] == "ill-posed"]
-    if not found:
-        return []
-    known = f"{100 * found[0][1]['uncertainty']:.3g} %"
-    where = "; ".join(point for point, _ in found)
-    return [
-        f"In {len(found)} of {len(onsets)} cases the first slip is ill-posed ({where}): a change of the friction or "
-        f"the rolling resistance by {known} makes it, removes it or moves it to another rise of the needed friction. "
-        "No setting is judged there."
-    ]
-
-
-def _surprises(content: dict[str, Any]) -> str:
+def _surprises(content: ReportedComparison) -> str:
     """What contradicts the comparison's expectation."""
-    found = content["contradictions"]
+    found = content.contradictions
     if found:
         more = f" (and {len(found) - 1} more, listed below)" if len(found) > 1 else ""
         return f"Not expected: {found[0]}{more}."
-    known = [row for row in content["rows"] if row["verdict"] not in {"agrees"}]
+    known = [row for row in content.rows if row.verdict not in {"agrees"}]
     if not known:
         return "Nothing contradicts what the comparison expects, and nothing disagrees with the truth."
     return (
         f"Nothing contradicts what the comparison expects: where a setting does not agree ({len(known)} of "
-        f"{len(content['rows'])}), the comparison says why."
+        f"{len(content.rows)}), the comparison says why."
     )

@@ -4,20 +4,20 @@ from __future__ import annotations
 
 import json
 from collections.abc import Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from functools import partial
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 from proofroll.core.errors import ProofrollError
 from proofroll.files.json_data import plain
 from proofroll.files.scene_file import load_scene
 from proofroll.report.html import page
 from proofroll.report.kinds import kind_of
-from proofroll.report.plots import point_curves
-from proofroll.report.replay import joined, replay_content
-from proofroll.report.report_content import report_content
-from proofroll.report.study_parts import Part, absent, attempt, entry
+from proofroll.report.plots import PointCurves, point_curves
+from proofroll.report.replay import Replay, joined, replay_content
+from proofroll.report.report_content import ReportContent, Sentences, report_content
+from proofroll.report.study_parts import Part, PartEntry, absent, attempt
 from proofroll.report.summary import three_sentences
 from proofroll.running.store import Store, write_text
 
@@ -32,17 +32,17 @@ class Report:
     """What the files are written from.
 
     Attributes:
-        content: plain data, as :func:`proofroll.report.report_content.report_content` has it.
+        content: what it says, with the further studies that there are so far.
         curves: of each comparison, for the figures.
         pictures: markup by name.
         replay: of the comparisons, as their kind of element gives it.
         parts: the further studies, in the order of the content's lists.
     """
 
-    content: dict[str, Any]
-    curves: list[list[dict[str, Any]]]
+    content: ReportContent
+    curves: list[list[PointCurves]]
     pictures: dict[str, str]
-    replay: dict[str, Any]
+    replay: Replay | None
     parts: list[Part] = field(default_factory=list)
 
     def expect(self, parts: Sequence[Part], out: Path, *, fresh: bool = False) -> list[Part]:
@@ -66,12 +66,12 @@ class Report:
             self._put(part, said)
         return missing
 
-    def make(self, part: Part, how: Callable[[], None]) -> dict[str, Any]:
+    def make(self, part: Part, how: Callable[[], None]) -> PartEntry:
         """Makes a further study; whatever happens to it, its entry says."""
 
-        def made() -> dict[str, Any]:
+        def made() -> PartEntry:
             how()
-            return entry(part)
+            return part.entry()
 
         said = attempt(part, made)
         assert said is not None  # it was made, or the entry says why not
@@ -84,35 +84,45 @@ class Report:
         Raises:
             ProofrollError: the folder cannot be written.
         """
-        write_text(out / "report.json", json.dumps(self.content, indent=1, allow_nan=False) + "\n")
+        write_text(out / "report.json", json.dumps(plain(self.content), indent=1, allow_nan=False) + "\n")
         write_text(out / "report.html", page(self.content, self.curves, self.pictures, self.replay))
 
-    def _put(self, part: Part, said: dict[str, Any]) -> None:
+    def _put(self, part: Part, said: PartEntry) -> None:
         """Gives a part its place in the content, and its pictures theirs."""
+        content = self.content
         alike = [other for other in self.parts if other.key == part.key]
-        entries, index = self.content[part.key], next(i for i, other in enumerate(alike) if other is part)
-        entries[index : index + 1] = [plain(said)]
-        self.content["findings"] = {"sentences": three_sentences(self.content)}
-        self.content["environment"]["versions"] |= _versions(said["study"])
-        if said["study"] is not None:
+        entries, index = list(content.entries[part.key]), next(i for i, other in enumerate(alike) if other is part)
+        entries[index : index + 1] = [said]
+        known = {**content.entries, part.key: entries}
+        # Of a kept study the versions are those of now.
+        versions = content.environment.versions | dict((said.study or {}).get("versions", {}))
+        self.content = replace(
+            content,
+            entries=known,
+            findings=Sentences(three_sentences(content.comparisons, known)),
+            environment=replace(content.environment, versions=versions),
+        )
+        if said.study is not None:
             prefix = f"{part.key}{index}-"
             self.pictures |= _drawn(prefix, lambda: part.pictures(prefix))
 
 
-def begun(outcomes: list[Outcome], store: Store, command: str) -> Report:
+def begun(outcomes: list[Outcome], store: Store, command: str, awaited: Sequence[str] = ()) -> Report:
     """A report of comparisons, to which further studies can be added.
 
     Args:
         outcomes: what was compared.
         store: where the trajectories are: a folder in that of the report.
         command: that makes the report again.
+        awaited: titles of comparisons that are still being run.
     """
     replay = _replay(outcomes, store)
-    content = report_content(outcomes, store, command) | {"replay": _described(replay)}
+    described = [case.described for case in replay.cases] if replay else []
+    content = replace(report_content(outcomes, store, command), replay=described, awaited=list(awaited))
     return Report(content, [point_curves(outcome, store) for outcome in outcomes], {}, replay)
 
 
-def write_report(outcomes: list[Outcome], store: Store, out: Path, command: str) -> dict[str, Any]:
+def write_report(outcomes: list[Outcome], store: Store, out: Path, command: str) -> ReportContent:
     """Writes ``report.html`` and ``report.json`` of comparisons alone.
 
     Args:
@@ -122,7 +132,7 @@ def write_report(outcomes: list[Outcome], store: Store, out: Path, command: str)
         command: that makes the report again.
 
     Returns:
-        the content of both files as plain data, as :func:`report_content` has it.
+        the content of both files.
 
     Raises:
         ProofrollError: the folder cannot be written.
@@ -132,7 +142,7 @@ def write_report(outcomes: list[Outcome], store: Store, out: Path, command: str)
     return report.content
 
 
-def _replay(outcomes: list[Outcome], store: Store) -> dict[str, Any]:
+def _replay(outcomes: list[Outcome], store: Store) -> Replay | None:
     """The replay of the comparisons, one kind of scenes after the other."""
     kinds = {id(item): kind_of(load_scene(item.comparison.scene)) for item in outcomes}
     found = dict.fromkeys(kind for kind in kinds.values() if kind is not None)
@@ -141,13 +151,8 @@ def _replay(outcomes: list[Outcome], store: Store) -> dict[str, Any]:
     )
 
 
-def _described(replay: dict[str, Any]) -> list[dict[str, Any]]:
-    """The cases without their numbers, for ``report.json``; these follow from the trajectories that it names."""
-    return [{key: value for key, value in case.items() if key != "arrays"} for case in replay["cases"]]
-
-
-def _kept(part: Part, out: Path) -> dict[str, Any] | None:
-    return entry(part) if part.keeps(out) else None
+def _kept(part: Part, out: Path) -> PartEntry | None:
+    return part.entry() if part.keeps(out) else None
 
 
 def _drawn(prefix: str, draw: Callable[[], dict[str, str]]) -> dict[str, str]:
@@ -156,10 +161,3 @@ def _drawn(prefix: str, draw: Callable[[], dict[str, str]]) -> dict[str, str]:
         return {f"{prefix}{name}": markup for name, markup in draw().items()}
     except ProofrollError as error:
         return {f"{prefix}problem": str(error)}
-
-
-def _versions(study: Any) -> dict[str, str]:
-    """The versions that a study knows of; of a kept one they are those of now."""
-    if not study:
-        return {}
-    return dict(study.get("versions", {}))

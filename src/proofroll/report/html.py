@@ -7,17 +7,18 @@ import inspect
 import json
 import re
 import shlex
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from pathlib import Path
 from types import MappingProxyType
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 from proofroll.core.errors import InputError
+from proofroll.files.json_data import plain
 from proofroll.files.scene_file import load_scene
 from proofroll.report import labels, study_tables, tables
 from proofroll.report.compression import packed
 from proofroll.report.kinds import ReportKind, kind_of, report_kinds
-from proofroll.report.study_parts import Part, further, part_kinds
+from proofroll.report.study_parts import Part, part_kinds
 from proofroll.report.styles import OUTLINES, styles
 from proofroll.report.tradeoff_tables import name_of
 from proofroll.studies.hosts import said_of
@@ -26,14 +27,19 @@ if TYPE_CHECKING:
     import jinja2
     import markupsafe
 
+    from proofroll.report.comparison_records import ReportedComparison, ReportedRun
+    from proofroll.report.plots import PointCurves
+    from proofroll.report.replay import Replay
+    from proofroll.report.report_content import ReportContent
+
 _EXPONENT = re.compile(r"\d[\d.]*e-\d+")
 
 
 def page(
-    content: dict[str, Any],
-    curves: list[list[dict[str, Any]]],
+    content: ReportContent,
+    curves: Sequence[Sequence[PointCurves]],
     pictures: Mapping[str, str] = MappingProxyType({}),
-    replay: dict[str, Any] | None = None,
+    replay: Replay | None = None,
 ) -> str:
     """The HTML page.
 
@@ -44,8 +50,8 @@ def page(
         replay: as the comparisons' kind of element gives it; None: the page has none.
     """
     drawn = {
-        "rows": [_drawn_rows(comparison) for comparison in content["comparisons"]],
-        "points": [_marked(*pair) for pair in zip(content["comparisons"], curves, strict=True)],
+        "rows": [_drawn_rows(comparison) for comparison in content.comparisons],
+        "points": [_marked(*pair) for pair in zip(content.comparisons, curves, strict=True)],
     }
     text = (
         templates()
@@ -54,26 +60,26 @@ def page(
             content=content,
             curves=curves,
             pictures=pictures,
-            styles=[styles(comparison["rows"]) for comparison in content["comparisons"]],
-            replay=replay or {"cases": []},
+            styles=[styles(comparison.rows) for comparison in content.comparisons],
+            replay=replay,
             replay_scripts=[kind.replay_script for kind in report_kinds() if kind.replay_script],
-            data=packed(json.dumps(drawn, allow_nan=False, separators=(",", ":"))),
+            data=packed(json.dumps(plain(drawn), allow_nan=False, separators=(",", ":"))),
             plotly=_plotly(),
         )
     )
     return text.encode("utf-8", "replace").decode("utf-8")  # a lone surrogate from an engine's message
 
 
-def _marked(comparison: dict[str, Any], curves: list[dict[str, Any]]) -> list[dict[str, Any]]:
+def _marked(comparison: ReportedComparison, curves: Sequence[PointCurves]) -> Sequence[PointCurves]:
     """The curves with what the scene's kind of element marks on them."""
     kind = _kind(comparison)
     return curves if kind is None else kind.mark(comparison, curves)
 
 
-def _kind(comparison: dict[str, Any]) -> type[ReportKind] | None:
+def _kind(comparison: ReportedComparison) -> type[ReportKind] | None:
     """What shows more of a comparison's scene; None: nothing, or the data are of a scene that is not here."""
     try:
-        return kind_of(load_scene(comparison["scene"]))
+        return kind_of(load_scene(comparison.scene))
     except InputError:
         return None
 
@@ -86,9 +92,9 @@ def _plotly() -> str:
     return packed(plotly.offline.get_plotlyjs())
 
 
-def _drawn_rows(comparison: dict[str, Any]) -> list[dict[str, Any]]:
-    rows = comparison["rows"]
-    return [{"name": name, **style} for name, style in zip(labels.names(rows), styles(rows), strict=True)]
+def _drawn_rows(comparison: ReportedComparison) -> list[dict[str, object]]:
+    rows = comparison.rows
+    return [{"name": name, **vars(style)} for name, style in zip(labels.names(rows), styles(rows), strict=True)]
 
 
 def templates() -> jinja2.Environment:
@@ -113,6 +119,7 @@ def templates() -> jinja2.Environment:
         "settings": labels.settings_text,
         "name_of": name_of,
         "unbroken": _unbroken,
+        "plain": plain,
     }
     made.globals |= {
         "tables": tables,
@@ -123,7 +130,6 @@ def templates() -> jinja2.Environment:
         "meanings": labels.MEANINGS,
         "outlines": OUTLINES,
         "again": _again,
-        "further": further,
         "said_of": said_of,
         "part_kinds": part_kinds(),
         "kind_of": _kind,
@@ -140,9 +146,9 @@ def _unbroken(text: str) -> markupsafe.Markup:
     return markupsafe.Markup(_EXPONENT.sub(r'<span class="whole">\g<0></span>', str(markupsafe.escape(text))))
 
 
-def _again(comparison: dict[str, Any], run: dict[str, Any]) -> str:
+def _again(comparison: ReportedComparison, run: ReportedRun) -> str:
     """The command that makes one run again."""
-    words = ["proofroll", "run", comparison["scene"], "--engine", run["engine"]]
-    for name, value in run["parameters"].items():
+    words = ["proofroll", "run", comparison.scene, "--engine", run.engine]
+    for name, value in run.parameters.items():
         words += ["--set", f"{name}={value:g}" if isinstance(value, float) else f"{name}={value}"]
-    return shlex.join([*words, "--until", f"{comparison['until']:g}", "--every", f"{comparison['every']:g}"])
+    return shlex.join([*words, "--until", f"{comparison.until:g}", "--every", f"{comparison.every:g}"])

@@ -12,7 +12,11 @@ if TYPE_CHECKING:
 
     from proofroll.core.observable import Observable
     from proofroll.core.scene import Scene
+    from proofroll.report.comparison_records import ReportedComparison
+    from proofroll.report.pen import Picture
+    from proofroll.report.plots import PointCurves
     from proofroll.report.replay import ReplayKind
+    from proofroll.report.report_content import ReportedTruth
     from proofroll.running.store import Store
     from proofroll.studies.outcome import Run
 
@@ -41,22 +45,19 @@ class ReportKind(Protocol):
         """Whether it knows the scene's elements."""
 
     @staticmethod
-    def drawings(scenes: Sequence[Scene]) -> tuple[list[dict[str, Any]], str]:
-        """Drawings of a comparison's scene for all its cases; and why there are none, if so.
-
-        Each is of the form that :meth:`proofroll.report.pen.Drawing.content` gives, with a ``label``: what it shows.
-        """
+    def drawings(scenes: Sequence[Scene]) -> tuple[list[Picture], str]:
+        """Drawings of a comparison's scene for all its cases; and why there are none, if so."""
 
     @staticmethod
-    def truth_facts(scene: Scene, dataset: xr.Dataset) -> dict[str, Any]:
-        """What is told of a truth besides its route and error bars."""
+    def truth_facts(scene: Scene, dataset: xr.Dataset) -> Any:
+        """What is told of a truth besides its route and error bars: a record, or None."""
 
     @staticmethod
-    def run_facts(truths: Sequence[Mapping[str, Any]], runs: Sequence[Run], store: Store) -> list[dict[str, Any]]:
-        """What is told of each run of a comparison besides its verdicts.
+    def run_facts(truths: Sequence[ReportedTruth], runs: Sequence[Run], store: Store) -> Sequence[Any]:
+        """What is told of each run of a comparison besides its verdicts: a record, or None.
 
         Args:
-            truths: entries of the truth at each point, with their :meth:`truth_facts`.
+            truths: at each point, with their :meth:`truth_facts`.
             runs: of the comparison.
             store: where the trajectories are.
         """
@@ -66,7 +67,11 @@ class ReportKind(Protocol):
         """What is drawn over time besides the scene's own observables, and judged within one of them."""
 
     @staticmethod
-    def mark(content: dict[str, Any], curves: list[dict[str, Any]]) -> list[dict[str, Any]]:
+    def sentences(truths: Sequence[ReportedTruth]) -> Sequence[str]:
+        """What the truths of a comparison say of it."""
+
+    @staticmethod
+    def mark(content: ReportedComparison, curves: Sequence[PointCurves]) -> Sequence[PointCurves]:
         """The curves of a comparison with its marks."""
 
     @staticmethod

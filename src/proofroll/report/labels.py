@@ -2,9 +2,14 @@
 
 from __future__ import annotations
 
+import math
 import unicodedata
-from collections.abc import Mapping, Sequence
-from typing import Any
+from collections.abc import Sequence
+from typing import TYPE_CHECKING, Any
+
+if TYPE_CHECKING:
+    from proofroll.core.verdict import Judgement
+    from proofroll.report.comparison_records import ReportedRow, ReportedRun, Setting
 
 SYMBOLS = {
     "agrees": "✓",
@@ -30,31 +35,31 @@ MEANINGS = {
 }
 
 
-def verdict_text(row: dict[str, Any]) -> str:
+def verdict_text(row: ReportedRow) -> str:
     """The verdict of a row; where its cases have several, how many have which: ``failed 1/11 ✗2 ✓8``."""
-    counts = {word: row["verdicts"][word] for word in SYMBOLS if row["verdicts"].get(word)}
-    if counts.keys() <= {row["verdict"]}:
-        return str(row["verdict"])
-    others = [f"{SYMBOLS[word]}{count}" for word, count in reversed(counts.items()) if word != row["verdict"]]
-    return " ".join([row["verdict"], f"{counts[row['verdict']]}/{sum(counts.values())}", *others])
+    counts = {word: row.verdicts[word] for word in SYMBOLS if row.verdicts.get(word)}
+    if counts.keys() <= {row.verdict}:
+        return str(row.verdict)
+    others = [f"{SYMBOLS[word]}{count}" for word, count in reversed(counts.items()) if word != row.verdict]
+    return " ".join([row.verdict, f"{counts[row.verdict]}/{sum(counts.values())}", *others])
 
 
-def detail(entry: dict[str, Any]) -> str:
+def detail(entry: ReportedRow | ReportedRun | Judgement) -> str:
     """What a verdict leaves open, in few words; of a row, a run or a judgement."""
-    match entry["verdict"]:
+    match entry.verdict:
         case "differs":
-            return {"no ladder": "one step only"}.get(entry["limit"], str(entry["limit"]))
+            return {"no ladder": "one step only"}.get(entry.limit, str(entry.limit))
         case "unconfirmed":
             return "limit not confirmed"
         case "incomplete":
-            return f"does not report {', '.join(symbol(name) for name in entry.get('missing', ()))}"
+            return f"does not report {', '.join(symbol(name) for name in getattr(entry, 'missing', ()))}"
         case _:
             return ""
 
 
 def number(value: float | None, digits: int = 2, none: str = "–") -> str:
-    """A number in few characters, e.g. ``3.4e-7``; ``none`` where there is none."""
-    if value is None:
+    """A number in few characters, e.g. ``3.4e-7``; ``none`` where there is none, or none that is finite."""
+    if value is None or not math.isfinite(value):
         return none
     if 0 < abs(value) < 0.01:  # one form for all small numbers: 5.4e-4 below 3.0e-5 is read at a glance
         mantissa, _, power = f"{value:.{digits - 1}e}".partition("e")
@@ -64,7 +69,7 @@ def number(value: float | None, digits: int = 2, none: str = "–") -> str:
 
 
 def error(value: float | None, digits: int = 2) -> str:
-    """An error; JSON has no infinity, so None stands for one that is not finite."""
+    """An error; infinite where there is none that is finite."""
     return number(value, digits, none="∞")
 
 
@@ -82,40 +87,40 @@ def symbol(name: str) -> str:
         return name.replace("_", " ")
 
 
-def step(row: dict[str, Any]) -> str:
+def step(row: Setting) -> str:
     """The setting that trades speed for accuracy, e.g. ``dt 1e-3``."""
-    value = row["resolution_value"]
-    if not row["resolution"]:
+    value = row.resolution_value
+    if not row.resolution:
         return ""
-    return f"{row['resolution']} {number(value) if isinstance(value, (int, float)) else value}"
+    return f"{row.resolution} {number(value) if isinstance(value, (int, float)) else value}"
 
 
-def setting(row: dict[str, Any]) -> str:
+def setting(row: Setting) -> str:
     """Formulation and preset of a row, or what the comparison file calls it."""
-    return " ".join(str(part) for part in (row["formulation"], row["setting"]) if part) or str(row["engine"])
+    return " ".join(str(part) for part in (row.formulation, row.setting) if part) or str(row.engine)
 
 
-def names(rows: list[dict[str, Any]]) -> list[str]:
+def names(rows: Sequence[Setting]) -> list[str]:
     """A short name for each row, unlike that of any other row: the comparison file's text where need be."""
     short = []
     for row in rows:
-        words = [row["name"], row["formulation"], row["setting"]]
+        words = [row.name, row.formulation, row.setting]
         short.append(" ".join([*(str(word) for word in words if word), *([f"({step(row)})"] if step(row) else [])]))
-    return [name if short.count(name) == 1 else str(row["engine"]) for name, row in zip(short, rows, strict=True)]
+    return [name if short.count(name) == 1 else str(row.engine) for name, row in zip(short, rows, strict=True)]
 
 
-def with_caveat(name: str, row: Mapping[str, Any]) -> str:
+def with_caveat(name: str, caveat: str) -> str:
     """A name, and in brackets what of it is not the engine's own."""
-    return f"{name} ({row['caveat']})" if row.get("caveat") else name
+    return f"{name} ({caveat})" if caveat else name
 
 
-def caveat_lines(rows: Sequence[Mapping[str, Any]]) -> list[str]:
+def caveat_lines(rows: Sequence[Setting]) -> list[str]:
     """What of some settings is not the engine's own: one sentence for each caveat, with the settings that have it."""
     found: dict[str, list[str]] = {}
     for row in rows:
-        if row.get("caveat"):
-            where = " ".join(str(part) for part in (row["formulation"], row["setting"]) if part)
-            found.setdefault(f"{row['caveat']}: {row['name']}", []).append(where)
+        if row.caveat:
+            where = " ".join(str(part) for part in (row.formulation, row.setting) if part)
+            found.setdefault(f"{row.caveat}: {row.name}", []).append(where)
     return [f"{said[0].upper()}{said[1:]} {', '.join(dict.fromkeys(where))}." for said, where in found.items()]
 
 
@@ -127,8 +132,3 @@ def settings_text(settings: dict[str, Any]) -> str:
 def values(found: list[float | None]) -> str:
     """One number, or the components of a vector."""
     return ", ".join(number(value, 8, none="not finite") for value in found)
-
-
-def headlines(content: dict[str, Any], role: str) -> list[str]:
-    """Names of the observables of a comparison that summaries show, of a role (:class:`Role`)."""
-    return [name for name, item in content["observables"].items() if item["role"] == role and item["headline"]]

@@ -227,7 +227,7 @@ def rung_table(content: dict[str, Any]) -> Table:
         table.add_row(
             rung["level"],
             Text(_label(rung)),
-            Text(step(rung)),
+            Text(step(rung["resolution"], rung["resolution_value"])),
             number(rung["error"]),
             number(speed["value"] if speed else None),
             f"{speed['low']:.2g} … {speed['high']:.2g}" if speed else "",

@@ -7,6 +7,7 @@ from typing import Any
 
 from proofroll.core.comparison import Tolerance
 from proofroll.core.engine_abilities import Level
+from proofroll.report.comparison_records import ReportedComparison
 from proofroll.report.labels import SYMBOLS, caveat_lines, number, verdict_text
 from proofroll.report.terminal import columns, step
 from proofroll.report.tradeoff_tables import name_of, step_of
@@ -14,24 +15,24 @@ from proofroll.studies.recommend import recommend
 from proofroll.studies.wish import Wish
 
 
-def verdict_table(content: dict[str, Any]) -> str:
+def verdict_table(content: ReportedComparison) -> str:
     """One line per engine with settings: the worst verdict and the largest errors over all points of the parameters."""
     names = columns(content)
     head = ["engine", "formulation", "setting", "step", "verdict", *(f"{n} [{unit}]" for n, unit in names), "s/s"]
     lines = ["| " + " | ".join(head) + " |", "|" + "---|" * len(head)]
-    for row in content["rows"]:
-        errors = [row["observables"][name]["largest"] if name in row["observables"] else None for name, _ in names]
-        cells = [row["name"], row["formulation"] or "", row["setting"], step(row)]
-        cells.append(f"{SYMBOLS[row['verdict']]} {verdict_text(row)}")
+    for row in content.rows:
+        errors = [row.observables[name].largest if name in row.observables else None for name, _ in names]
+        cells = [row.name, row.formulation or "", row.setting, step(row.resolution, row.resolution_value)]
+        cells.append(f"{SYMBOLS[row.verdict]} {verdict_text(row)}")
         cells += [number(error) for error in errors]
-        cells.append(number(row["seconds_per_second"]))
+        cells.append(number(row.seconds_per_second))
         lines.append("| " + " | ".join(cells) + " |")
     return "\n".join(lines) + "\n"
 
 
-def caveat_list(content: dict[str, Any]) -> str:
+def caveat_list(content: ReportedComparison) -> str:
     """What of some settings is not the engine's own, a line each."""
-    return "".join(f"- {line}\n" for line in caveat_lines(content["rows"]))
+    return "".join(f"- {line}\n" for line in caveat_lines(content.rows))
 
 
 # Among what the cheapest is named: everything that is an engine's model, contact models, and the scene's own equations.

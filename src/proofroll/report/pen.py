@@ -5,7 +5,6 @@ from __future__ import annotations
 import math
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass, field
-from typing import Any
 
 import numpy as np
 import numpy.typing as npt
@@ -46,36 +45,85 @@ class View:
         return np.asarray(np.asarray(direction, dtype=np.float64) @ _unit(self.viewer))
 
 
+@dataclass(frozen=True)
+class Polyline:
+    """A line through places of the picture, closed or not."""
+
+    points: list[list[float]]
+    closed: bool
+    look: str
+
+
+@dataclass(frozen=True)
+class Disc:
+    """A circle of the picture."""
+
+    centre: list[float]
+    radius: float
+    look: str
+
+
+@dataclass(frozen=True)
+class Letters:
+    """Letters or an index (``sub``)."""
+
+    text: str
+    sub: bool
+
+
+@dataclass(frozen=True)
+class Lettering:
+    """Letters around a place of the picture."""
+
+    x: float
+    y: float
+    parts: list[Letters]
+    look: str
+
+
+@dataclass(frozen=True)
+class Picture:
+    """Marks in the order in which they are drawn; ``box``: x, y, width and height that hold them [px]."""
+
+    box: list[float]
+    marks: list[Polyline | Disc | Lettering]
+    label: str
+
+
 @dataclass
 class Drawing:
-    """Marks in the order in which they are drawn.
+    """What a picture is made of.
 
-    A mark is a line through ``points``, ``closed`` or not; a circle with ``centre`` and ``radius``; or a text with
-    ``x``, ``y`` and ``parts``, each with ``text`` and ``sub``, whether it is an index. ``look`` names how it looks:
-    ``line``, ``thin``, ``hidden``, ``axis``, ``wall``, ``ball``, ``ghost``, ``faint``, ``motion``, ``force``,
-    ``frame``, the same with ``-head`` for the filled heads of arrows, and ``letter``, ``motion-letter``, ….
+    ``look`` of a mark names how it looks: ``line``, ``thin``, ``hidden``, ``axis``, ``wall``, ``ball``, ``ghost``,
+    ``faint``, ``motion``, ``force``, ``frame``, the same with ``-head`` for the filled heads of arrows, and ``letter``,
+    ``motion-letter``, ….
     """
 
-    marks: list[dict[str, Any]] = field(default_factory=list)
+    marks: list[Polyline | Disc | Lettering] = field(default_factory=list)
     _bounds: list[FloatArray] = field(default_factory=list)
 
-    def content(self) -> dict[str, Any]:
-        """As plain data: ``box``, the x, y, width and height that hold everything [px], and ``marks``."""
+    @property
+    def box(self) -> list[float]:
+        """The x, y, width and height that hold everything so far [px]."""
         places = np.concatenate(self._bounds)
         low, high = np.floor(places.min(axis=0)) - _MARGIN, np.ceil(places.max(axis=0)) + _MARGIN
-        return {"box": [*low.tolist(), *(high - low).tolist()], "marks": self.marks}
+        return [*low.tolist(), *(high - low).tolist()]
+
+    def picture(self, label: str) -> Picture:
+        """All of it; ``label``: what it shows."""
+        return Picture(self.box, self.marks, label)
 
     def path(self, points: npt.ArrayLike, look: str, closed: bool = False) -> None:
         """A line through places of the picture, shape (n, 2)."""
         places = np.asarray(points, dtype=np.float64)
         self._bounds.append(places)
-        self.marks.append({"points": np.round(places, 1).tolist(), "closed": closed, "look": look})
+        self.marks.append(Polyline(np.round(places, 1).tolist(), closed, look))
 
     def disc(self, centre: Sequence[float], radius: float, look: str) -> None:
         """A circle of the picture; a ball looks so from everywhere."""
         (x, y), r = centre, radius
         self._bounds.append(np.array([[x - r, y - r], [x + r, y + r]]))
-        self.marks.append({"centre": [round(x, 1), round(y, 1)], "radius": round(r, 1), "look": look})
+        self.marks.append(Disc([round(x, 1), round(y, 1)], round(r, 1), look))
 
     def arrow(self, points: npt.ArrayLike, look: str) -> None:
         """A line through places of the picture, straight or curved, with a head at its end; shape (n, 2)."""
@@ -94,19 +142,18 @@ class Drawing:
         ``_`` begins an index of one character: ``V_0``, ``c = b − a``.
         """
         x, y = (np.asarray(place, dtype=np.float64) + beside).tolist()
-        parts: list[dict[str, Any]] = []
+        parts: list[Letters] = []
         for number, piece in enumerate(symbol.split("_")):
             if number:
-                parts.append({"text": piece[:1], "sub": True})
+                parts.append(Letters(piece[:1], True))
             rest = piece[1:] if number else piece
             if rest:
-                parts.append({"text": rest, "sub": False})
+                parts.append(Letters(rest, False))
         # Letters are about so wide and high; where they are a little more, the margin holds them.
-        width = _LETTER * sum(len(part["text"]) for part in parts)
+        width = _LETTER * sum(len(part.text) for part in parts)
         left = x - width / 2
         self._bounds.append(np.array([[left, y - 1.5 * _LETTER], [left + width, y + 0.5 * _LETTER]]))
-        place_of = {"x": round(x, 1), "y": round(y, 1)}
-        self.marks.append({**place_of, "parts": parts, "look": look})
+        self.marks.append(Lettering(round(x, 1), round(y, 1), parts, look))
 
 
 def beyond(ends: npt.ArrayLike, by: float = 11.0) -> FloatArray:

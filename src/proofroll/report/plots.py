@@ -3,7 +3,8 @@
 from __future__ import annotations
 
 import math
-from typing import TYPE_CHECKING, Any
+from dataclasses import dataclass, field
+from typing import TYPE_CHECKING
 
 import numpy as np
 import numpy.typing
@@ -11,6 +12,7 @@ import numpy.typing
 from proofroll.core.arrays import FloatArray
 from proofroll.core.dataset import scales
 from proofroll.core.observable import Observable, Role
+from proofroll.files.json_data import OPTIONAL
 from proofroll.files.netcdf import read, read_some
 from proofroll.files.scene_file import load_scene
 from proofroll.report.kinds import kind_of
@@ -34,14 +36,69 @@ CURVE_DIGITS, DIFFERENCE_DIGITS = 6, 3
 _DRAWN = (Role.MOTION, Role.REACTION)
 
 
-def point_curves(outcome: Outcome, store: Store) -> list[dict[str, Any]]:
-    """The curves of a comparison, one entry for each point of the parameters.
+@dataclass(frozen=True)
+class EngineCurve:
+    """The difference of one engine from the truth.
 
-    Each entry has ``point``, ``time`` [s] and ``observables``: name, unit, the truth's error bar and values, and for
-    each engine the number of its row and its *difference* from the truth. Where it was judged, ``tolerance``; where
-    the judgement has a limit of small steps, ``limit``: its distance from the truth, the uncertainty of that, and the
-    observed order or None.
+    Attributes:
+        row: number of its row.
+        difference: from the truth, None where it is not finite.
+        tolerance: where it was judged.
+        limit: of small steps, where the judgement has one: its distance from the truth, the uncertainty of that, and
+            the observed order or None.
+        at: numbers of the samples, where not all are drawn.
     """
+
+    row: int
+    difference: list[float | None]
+    tolerance: float | None = field(metadata=OPTIONAL)
+    limit: list[float | None] | None = field(metadata=OPTIONAL)
+    at: list[int] | None = field(metadata=OPTIONAL)
+
+
+@dataclass(frozen=True)
+class Mark:
+    """An event of a row (-1: of the truth) on a curve; its time is None where it has none."""
+
+    row: int
+    time: float | None
+
+
+@dataclass(frozen=True)
+class Bound:
+    """A value that a curve must not pass."""
+
+    name: str
+    value: float
+
+
+@dataclass(frozen=True)
+class ObservableCurves:
+    """The truth of an observable with its error bar, and what each engine adds to it."""
+
+    name: str
+    symbol: str
+    meaning: str
+    unit: str
+    scale: float
+    error_bar: float
+    truth: list[float | None]
+    engines: list[EngineCurve]
+    marks: list[Mark] | None = field(default=None, metadata=OPTIONAL)
+    bounds: list[Bound] | None = field(default=None, metadata=OPTIONAL)
+
+
+@dataclass(frozen=True)
+class PointCurves:
+    """The curves at one point of the parameters; ``time`` [s]."""
+
+    point: str
+    time: list[float | None]
+    observables: list[ObservableCurves]
+
+
+def point_curves(outcome: Outcome, store: Store) -> list[PointCurves]:
+    """The curves of a comparison, one entry for each point of the parameters."""
     entries = []
     for name, case in outcome.truths.items():
         path = store.trajectory(case)
@@ -56,13 +113,11 @@ def point_curves(outcome: Outcome, store: Store) -> list[dict[str, Any]]:
         drawn = {key: item for key, item in known.items() if item.role in _DRAWN and _curve(truth, key)}
         engines = _engines(outcome, store, name, list(drawn))
         entries.append(
-            {
-                "point": name,
-                "time": rounded(truth["time"].to_numpy(), CURVE_DIGITS),
-                "observables": [
-                    _observable(item, key, truth, engines, sizes.get(key, 1.0)) for key, item in drawn.items()
-                ],
-            }
+            PointCurves(
+                name,
+                rounded(truth["time"].to_numpy(), CURVE_DIGITS),
+                [_observable(item, key, truth, engines, sizes.get(key, 1.0)) for key, item in drawn.items()],
+            )
         )
     return entries
 
@@ -113,7 +168,7 @@ def _has_trajectory(run: Run, store: Store) -> bool:
 
 def _observable(
     item: Observable, name: str, truth: xr.Dataset, engines: list[tuple[int, Run, Curves]], scale: float
-) -> dict[str, Any]:
+) -> ObservableCurves:
     first = 1 if item.role == Role.REACTION else 0
     true = truth[name].to_numpy()
     curves = []
@@ -126,30 +181,27 @@ def _observable(
         with np.errstate(invalid="ignore", over="ignore"):
             difference = values - true
         at = kept([values, np.abs(difference)])
-        curve: dict[str, Any] = {"row": row, "difference": rounded(difference[at], DIFFERENCE_DIGITS)}
-        curve |= _bars(run, name)
-        if at.size < true.size:
-            curve["at"] = at.tolist()
-        curves.append(curve)
-    return {
-        "name": name,
-        "symbol": symbol(name),
-        "meaning": truth[name].attrs.get("long_name", name),
-        "unit": unit(truth[name].attrs["units"]),
-        "scale": float(f"{scale:.3g}"),
-        "error_bar": float(f"{truth[name].attrs.get('error_bar', 0.0):.3g}"),
-        "truth": rounded(true, CURVE_DIGITS),
-        "engines": curves,
-    }
+        shown = at.tolist() if at.size < true.size else None
+        curves.append(EngineCurve(row, rounded(difference[at], DIFFERENCE_DIGITS), *_bars(run, name), shown))
+    return ObservableCurves(
+        name=name,
+        symbol=symbol(name),
+        meaning=truth[name].attrs.get("long_name", name),
+        unit=unit(truth[name].attrs["units"]),
+        scale=float(f"{scale:.3g}"),
+        error_bar=float(f"{truth[name].attrs.get('error_bar', 0.0):.3g}"),
+        truth=rounded(true, CURVE_DIGITS),
+        engines=curves,
+    )
 
 
-def _bars(run: Run, name: str) -> dict[str, Any]:
-    """What the judgement of a curve says besides its error, in the observable's unit."""
+def _bars(run: Run, name: str) -> tuple[float | None, list[float | None] | None]:
+    """Tolerance and limit of the judgement of a curve, in the observable's unit."""
     judged = next((judgement for judgement in run.judgements if judgement.observable == name), None)
     if judged is None:
-        return {}
-    found: dict[str, Any] = {"tolerance": float(f"{judged.tolerance:.4g}")}
-    if judged.limit_error is not None and judged.limit_error_bar is not None:
-        limit = np.array([judged.limit_error, judged.limit_error_bar, judged.order or np.nan])
-        found["limit"] = rounded(limit, DIFFERENCE_DIGITS)
-    return found
+        return None, None
+    tolerance = float(f"{judged.tolerance:.4g}")
+    if judged.limit_error is None or judged.limit_error_bar is None:
+        return tolerance, None
+    limit = np.array([judged.limit_error, judged.limit_error_bar, judged.order or np.nan])
+    return tolerance, rounded(limit, DIFFERENCE_DIGITS)

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import Any, NamedTuple
 
@@ -11,7 +11,7 @@ import numpy as np
 
 from proofroll.core.arrays import FloatArray
 from proofroll.core.scene import Scene
-from proofroll.files.json_data import plain
+from proofroll.files.json_data import MERGED, OPTIONAL
 from proofroll.files.netcdf import read_some
 from proofroll.files.scene_file import load_scene
 from proofroll.report.comparison_content import by_row, outcome_content
@@ -74,11 +74,15 @@ class Replayed:
         scene: with the parameters of the case.
         file: the truth's trajectory.
         ghosts: what stands beside it.
+        group: of cases to which it belongs.
+        label: what it is called in its group.
     """
 
     scene: Scene
     file: Path
     ghosts: list[Ghost]
+    group: str
+    label: str
 
 
 @dataclass
@@ -126,8 +130,58 @@ class ReplayKind(NamedTuple):
     draw: Drawer
 
 
-def replay_content(outcomes: list[Outcome], store: Store, kind: ReplayKind) -> dict[str, Any]:
-    """Everything that the replay draws, as plain data.
+@dataclass(frozen=True)
+class ReplayedRun:
+    """One motion of a case: whether it is ``shown`` at first, how many frames it has, and why it ended early."""
+
+    name: str
+    colour: int
+    shown: bool
+    frames: int
+    message: str
+    trajectory: str
+    settings: Mapping[str, Any] | None = field(default=None, metadata=OPTIONAL)
+
+
+@dataclass(frozen=True)
+class ReplayCase:
+    """A truth and its ghosts in words; ``own``: what is drawn of them, ``arrays``: see :class:`PackedNumbers`."""
+
+    group: str
+    label: str
+    kind: str
+    scene: str
+    own: Mapping[str, Any] = field(metadata=MERGED)
+    runs: list[ReplayedRun]
+    arrays: list[tuple[str, int, int, int, float]] | None = field(default=None, metadata=OPTIONAL)
+
+    @property
+    def described(self) -> ReplayCase:
+        """Without its numbers, which follow from the trajectories that it names."""
+        return replace(self, arrays=None)
+
+
+@dataclass(frozen=True)
+class Replay:
+    """Everything that the replay draws.
+
+    Attributes:
+        library: that draws it, from :func:`proofroll.report.replay_library.three`.
+        start: number of the case to begin with.
+        cases: in words.
+        packed: the numbers of each case.
+        speeds: how fast a person can let it run.
+    """
+
+    library: dict[str, str] | None
+    start: int
+    cases: list[ReplayCase]
+    packed: list[str]
+    speeds: tuple[float, ...] = SPEEDS
+
+
+def replay_content(outcomes: list[Outcome], store: Store, kind: ReplayKind) -> Replay:
+    """Everything that the replay draws.
 
     There is one case for each truth of the comparisons. Its ghosts are what the engines make of it with ``default``
     settings, and of each engine the other setting whose bodies are furthest from the true ones, if that is seen. At
@@ -137,10 +191,6 @@ def replay_content(outcomes: list[Outcome], store: Store, kind: ReplayKind) -> d
         outcomes: comparisons of scenes of one kind.
         store: with their trajectories.
         kind: of these scenes.
-
-    Returns:
-        ``library``: from :func:`proofroll.report.replay_library.three`; ``speeds``; ``start``: number of the case to
-        begin with; ``cases``; ``packed``: the numbers of each case.
     """
     found: dict[str, tuple[Case, list[tuple[Outcome, str]]]] = {}
     for outcome in outcomes:
@@ -160,24 +210,22 @@ def replay_content(outcomes: list[Outcome], store: Store, kind: ReplayKind) -> d
         ghosts = _chosen(ghosts, kind.seen(scene))
         # The comparison that has most to show at this point names the case.
         title = max(shared, key=lambda pair: len(_runs(pair[0], pair[1], store)))[0].comparison.title
-        said = {"group": title, "label": point_name(case.parameters) or scene.title}
-        content, packed_numbers = case_content(
-            Replayed(scene, store.trajectory(case), ghosts), kind, lambda file: f"{store.folder.name}/{file.name}"
-        )
-        cases.append(said | content)
+        replayed = Replayed(scene, store.trajectory(case), ghosts, title, point_name(case.parameters) or scene.title)
+        content, packed_numbers = case_content(replayed, kind, lambda file: f"{store.folder.name}/{file.name}")
+        cases.append(content)
         numbers.append(packed_numbers)
     plainest = [load_scene(case.scene, asks=case.asks).digest == case.scene_digest for case, _ in found.values()]
     start = plainest.index(True) if any(plainest) else 0
-    return {"library": three(), "speeds": SPEEDS, "start": start, "cases": cases, "packed": numbers}
+    return Replay(three(), start, cases, numbers)
 
 
-def joined(parts: list[dict[str, Any]]) -> dict[str, Any]:
-    """The replays of several kinds of scenes as one; the first begins."""
-    parts = [part for part in parts if part["cases"]]
+def joined(parts: list[Replay]) -> Replay | None:
+    """The replays of several kinds of scenes as one; the first begins. None where there is nothing to draw."""
+    parts = [part for part in parts if part.cases]
     if not parts:
-        return {"cases": []}
-    cases, numbers = [[item for part in parts for item in part[key]] for key in ("cases", "packed")]
-    return parts[0] | {"cases": cases, "packed": numbers}
+        return None
+    cases, numbers = [case for part in parts for case in part.cases], [item for part in parts for item in part.packed]
+    return replace(parts[0], cases=cases, packed=numbers)
 
 
 def frame_times(until: float, fastest: float) -> FloatArray:
@@ -192,7 +240,7 @@ def frame_times(until: float, fastest: float) -> FloatArray:
     return np.linspace(0.0, until, 1 + int(np.ceil(max(min(wanted, MOST_FRAMES), turned / WIDEST_TURN))))
 
 
-def case_content(replayed: Replayed, kind: ReplayKind, named: Callable[[Path], str]) -> tuple[dict[str, Any], str]:
+def case_content(replayed: Replayed, kind: ReplayKind, named: Callable[[Path], str]) -> tuple[ReplayCase, str]:
     """A truth and its ghosts in words, with what is drawn of them; and the numbers, packed.
 
     Args:
@@ -204,23 +252,22 @@ def case_content(replayed: Replayed, kind: ReplayKind, named: Callable[[Path], s
     first = {ghost.engine: ghost for ghost in reversed(replayed.ghosts)}  # the one furthest off comes first
     until, whole = own["until"], own["frames"]
     runs = [
-        {"name": "truth", "colour": -1, "shown": True, "frames": whole, "message": ""}
-        | {"trajectory": named(replayed.file)},
+        ReplayedRun("truth", -1, True, whole, "", named(replayed.file)),
         *(
-            {
-                "name": ghost.name,
-                "colour": ghost.colour,
-                "shown": first[ghost.engine] is ghost,
-                "frames": count,
-                "message": ghost.ending(until * (count - 1) / max(1, whole - 1)) if count < whole else "",
-                "trajectory": named(ghost.file),
-                "settings": plain(dict(ghost.settings)),
-            }
+            ReplayedRun(
+                name=ghost.name,
+                colour=ghost.colour,
+                shown=first[ghost.engine] is ghost,
+                frames=count,
+                message=ghost.ending(until * (count - 1) / max(1, whole - 1)) if count < whole else "",
+                trajectory=named(ghost.file),
+                settings=ghost.settings,
+            )
             for ghost, count in zip(replayed.ghosts, frames, strict=True)
         ),
     ]
-    said = {"kind": kind.name, "scene": replayed.scene.title}
-    return said | own | {"runs": runs, "arrays": drawn.arrays}, packed(bytes(drawn.content))
+    case = ReplayCase(replayed.group, replayed.label, kind.name, replayed.scene.title, own, runs, drawn.arrays)
+    return case, packed(bytes(drawn.content))
 
 
 def distance(path: FloatArray, true: FloatArray) -> float:
@@ -241,8 +288,8 @@ def _runs(outcome: Outcome, point: str, store: Store) -> list[tuple[int, Run]]:
 
 def _looks(outcome: Outcome) -> list[tuple[str, int]]:
     """Name and colour of each row, as in the comparison's figures."""
-    rows = outcome_content(outcome)["rows"]
-    return [(name, style["colour"]) for name, style in zip(names(rows), styles(rows), strict=True)]
+    rows = outcome_content(outcome).rows
+    return [(name, style.colour) for name, style in zip(names(rows), styles(rows), strict=True)]
 
 
 def _ghosts(runs: list[tuple[int, Run]], looks: list[tuple[str, int]], true: FloatArray, store: Store) -> list[Ghost]:

@@ -14,7 +14,7 @@ from proofroll.files.netcdf import write
 from proofroll.files.scene_file import load_scene
 from proofroll.report.kinds import kind_of, report_kinds
 from proofroll.report.labels import settings_text
-from proofroll.report.replay import SPEEDS, Ghost, Replayed, case_content, distance
+from proofroll.report.replay import Ghost, Replay, Replayed, case_content, distance
 from proofroll.report.replay_library import three
 from proofroll.studies.planning import point_name
 
@@ -41,21 +41,20 @@ def replay_page(path: Path, run: xr.Dataset) -> str:
     kind = kind_of(scene)
     if kind is None or not kind.replay_script:
         raise InputError("run", str(path), f"nothing that is installed draws the scene {scene.title}")
+    usual = load_scene(str(run.attrs["scene"])).parameters
+    label = point_name({name: value for name, value in scene.parameters.items() if value != usual[name]})
     with tempfile.TemporaryDirectory() as folder:
         file = Path(folder) / "truth.nc"
         true = truth(scene, run["time"].to_numpy())
         write(true, file)
-        content, numbers = case_content(Replayed(scene, file, _ghosts(path, run, true)), kind.replay(), lambda _: "")
-    usual = load_scene(str(run.attrs["scene"])).parameters
-    label = point_name({name: value for name, value in scene.parameters.items() if value != usual[name]})
-    case = {"group": scene.title, "label": label or scene.title} | content
-    replay = {"library": three(), "speeds": SPEEDS, "start": 0, "cases": [case], "packed": [numbers]}
+        replayed = Replayed(scene, file, _ghosts(path, run, true), scene.title, label or scene.title)
+        case, numbers = case_content(replayed, kind.replay(), lambda _: "")
     return (
         templates()
         .get_template("run_replay.html")
         .render(
             scene=scene,
-            replay=replay,
+            replay=Replay(three(), 0, [case], [numbers]),
             said=_said(run),
             replay_scripts=[other.replay_script for other in report_kinds() if other.replay_script],
         )

@@ -3,30 +3,54 @@
 from __future__ import annotations
 
 import math
-from typing import TYPE_CHECKING, Any
+from dataclasses import dataclass
+from typing import TYPE_CHECKING
 
 from proofroll.files.scene_file import load_scene, read_scene_file
 from proofroll.report.kinds import kind_of
 from proofroll.report.labels import symbol, unit
 
 if TYPE_CHECKING:
-    from collections.abc import Sequence
+    from collections.abc import Mapping, Sequence
+
+    from proofroll.files.scene_parameters import Parameter
+    from proofroll.report.pen import Picture
 
 # Values of one parameter that are listed one by one.
 _LISTED = 5
 
 
-def scene_sheet(scene: str, points: Sequence[dict[str, float]]) -> dict[str, Any]:
+@dataclass(frozen=True)
+class ShownParameter:
+    """A parameter as a person reads it; ``varied``: whether it has several values."""
+
+    name: str
+    symbol: str
+    values: str
+    unit: str
+    meaning: str
+    source: str
+    varied: bool
+
+
+@dataclass(frozen=True)
+class SceneSheet:
+    """The scene as it is compared; ``undrawn``: why there is no drawing; ``caption``: of the drawings, as markup."""
+
+    title: str
+    source: str
+    parameters: list[ShownParameter]
+    drawings: list[Picture]
+    undrawn: str
+    caption: str
+
+
+def scene_sheet(scene: str, points: Sequence[dict[str, float]]) -> SceneSheet:
     """The scene as it is compared.
 
     Args:
         scene: name of the scene, or its folder.
         points: values of the parameters that differ from the scene's own, one entry for each case.
-
-    Returns:
-        ``title``, ``source``; ``parameters``: for each ``symbol``, ``values``, ``unit``, ``meaning``, ``source``,
-        ``varied``; ``drawings``: as the kind of scene draws them, empty with the reason in ``undrawn``; ``caption``:
-        of the drawings, as markup.
     """
     file = read_scene_file(scene)
     drawn = [load_scene(scene, **point) for point in points] or [load_scene(scene)]
@@ -38,24 +62,17 @@ def scene_sheet(scene: str, points: Sequence[dict[str, float]]) -> dict[str, Any
         default = _own(parameter.value, file.parameters)
         values = list(dict.fromkeys(default if value is None else _written(value) for value in set_to)) or [default]
         parameters.append(
-            {
-                "name": name,
-                "symbol": _letter(parameter.symbol) or symbol(name),
-                "values": _listed(values),
-                "unit": unit(parameter.unit),
-                "meaning": parameter.meaning,
-                "source": parameter.source,
-                "varied": len(values) > 1,
-            }
+            ShownParameter(
+                name,
+                _letter(parameter.symbol) or symbol(name),
+                _listed(values),
+                unit(parameter.unit),
+                parameter.meaning,
+                parameter.source,
+                len(values) > 1,
+            )
         )
-    return {
-        "title": file.title,
-        "source": file.source,
-        "parameters": parameters,
-        "drawings": drawings,
-        "undrawn": undrawn,
-        "caption": kind.caption if kind else "",
-    }
+    return SceneSheet(file.title, file.source, parameters, drawings, undrawn, kind.caption if kind else "")
 
 
 def _letter(text: str) -> str:
@@ -65,7 +82,7 @@ def _letter(text: str) -> str:
     return symbol(head) + bracket + tail + rest
 
 
-def _own(value: float | str, parameters: dict[str, Any]) -> str:
+def _own(value: float | str, parameters: Mapping[str, Parameter]) -> str:
     """A default, or the symbol of the parameter whose value it is."""
     if isinstance(value, str):
         return f"= {_letter(parameters[value].symbol) or value}"

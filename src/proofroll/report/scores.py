@@ -2,12 +2,19 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
-from typing import Any
+import math
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+from typing import TYPE_CHECKING
 
-from proofroll.report.labels import headlines, names
+from proofroll.report.labels import names
+
+if TYPE_CHECKING:
+    from proofroll.report.comparison_records import ReportedComparison, ReportedRun
 
 DECADES = range(1, 14)
+# The error of motion and forces, relative to their sizes, for which the first paragraphs name a setting.
+EVERYDAY = 1e-3
 
 
 @dataclass(frozen=True)
@@ -35,77 +42,87 @@ class Score:
         return None if self.motion is None or self.forces is None else max(self.motion, self.forces)
 
 
-def scores(content: dict[str, Any]) -> list[Score]:
+def scores(content: ReportedComparison) -> list[Score]:
     """One score per row of the comparison."""
     judged = _judged(content)
     coordinates, forces_of = (
-        [name for name in headlines(content, role) if name in judged] for role in ("motion", "reaction")
+        [name for name in content.headlines(role) if name in judged] for role in ("motion", "reaction")
     )
-    points = {run["point"] for run in content["runs"]}
+    points = {run.point for run in content.runs}
     found = []
-    for index, (name, row) in enumerate(zip(names(content["rows"]), content["rows"], strict=True)):
-        runs = [run for run in content["runs"] if run["row"] == index]
-        everywhere = {run["point"] for run in runs} == points
+    for index, (name, row) in enumerate(zip(names(content.rows), content.rows, strict=True)):
+        runs = content.runs_of(index)
+        everywhere = {run.point for run in runs} == points
         motion, forces = (_relative(runs, group) if everywhere else None for group in (coordinates, forces_of))
-        found.append(Score(index, name, motion, forces, row["seconds_per_second"]))
+        found.append(Score(index, name, motion, forces, row.seconds_per_second))
     return found
 
 
-def recommendation(found: list[Score]) -> list[dict[str, Any]]:
+@dataclass(frozen=True)
+class CheapestRow:
+    """The cheapest row within a bound: its number, name, error and cost."""
+
+    row: int
+    name: str
+    error: float
+    seconds_per_second: float
+
+
+@dataclass(frozen=True)
+class Recommendation:
+    """What to use for motion, and for motion and forces, from the loosest bound ``within`` to the tightest one."""
+
+    within: float
+    down_to: float
+    motion: CheapestRow | None
+    motion_and_forces: CheapestRow | None
+
+
+def recommendation(found: list[Score]) -> list[Recommendation]:
     """For each decade of relative error the cheapest row that stays within it at every point.
 
-    Decades with the same answer are one entry: ``within`` is the loosest, ``down_to`` the tightest of them.
+    Decades with the same answer are one entry.
     """
-    entries: list[dict[str, Any]] = []
+    entries: list[Recommendation] = []
     for decade in DECADES:
-        entry = {
-            "motion": cheapest(found, "motion", 10.0**-decade),
-            "motion_and_forces": cheapest(found, "worst", 10.0**-decade),
-        }
-        if not any(entry.values()):
+        bound = 10.0**-decade
+        best = (cheapest(found, "motion", bound), cheapest(found, "worst", bound))
+        if best == (None, None):
             break
-        if entries and all(entries[-1][key] == entry[key] for key in entry):
-            entries[-1]["down_to"] = 10.0**-decade
+        if entries and (entries[-1].motion, entries[-1].motion_and_forces) == best:
+            entries[-1] = replace(entries[-1], down_to=bound)
         else:
-            entries.append({"within": 10.0**-decade, "down_to": 10.0**-decade, **entry})
+            entries.append(Recommendation(bound, bound, *best))
     return entries
 
 
-def cheapest(found: list[Score], key: str, bound: float) -> dict[str, Any] | None:
+def cheapest(found: list[Score], key: str, bound: float) -> CheapestRow | None:
     """The cheapest timed row whose ``key`` (``motion``, ``forces`` or ``worst``) is within the bound, or None."""
-    good = [score for score in found if score.seconds is not None and _at_most(getattr(score, key), bound)]
-    if not good:
-        return None
-    best = min(good, key=lambda score: score.seconds or 0.0)
-    return {
-        "row": best.index,
-        "name": best.name,
-        "error": getattr(best, key),
-        "seconds_per_second": best.seconds,
-    }
+    good = [
+        CheapestRow(score.index, score.name, error, score.seconds)
+        for score in found
+        if score.seconds is not None and (error := getattr(score, key)) is not None and error <= bound
+    ]
+    return min(good, key=lambda row: row.seconds_per_second, default=None)
 
 
-def _at_most(value: float | None, bound: float) -> bool:
-    return value is not None and value <= bound
+def _judged(content: ReportedComparison) -> list[str]:
+    return list(dict.fromkeys(name for row in content.rows for name in row.observables))
 
 
-def _judged(content: dict[str, Any]) -> list[str]:
-    return list(dict.fromkeys(name for row in content["rows"] for name in row["observables"]))
-
-
-def _relative(runs: list[dict[str, Any]], group: Any) -> float | None:
+def _relative(runs: list[ReportedRun], group: Sequence[str]) -> float | None:
     """Largest error with the truth's error bar, over its scale; None where something is missing.
 
     What cannot be judged, because the question is ill-posed, is left out.
     """
     sizes: list[float] = []
     for run in runs:
-        chosen = [judgement for judgement in run["judgements"] if judgement["observable"] in group]
-        if run["status"] != "done" or not chosen:
+        chosen = [judgement for judgement in run.judgements if judgement.observable in group]
+        if run.status != "done" or not chosen:
             return None
-        chosen = [judgement for judgement in chosen if judgement["verdict"] != "ill-posed"]
-        if any(judgement["error"] is None for judgement in chosen):
+        chosen = [judgement for judgement in chosen if judgement.verdict != "ill-posed"]
+        if any(not math.isfinite(judgement.error) for judgement in chosen):
             return None
         # What the truth does not know it cannot vouch for.
-        sizes += [(judgement["error"] + judgement["truth_error_bar"]) / judgement["scale"] for judgement in chosen]
+        sizes += [(judgement.error + judgement.truth_error_bar) / judgement.scale for judgement in chosen]
     return max(sizes, default=None)

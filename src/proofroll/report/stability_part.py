@@ -9,13 +9,33 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any, ClassVar
 
 from proofroll.report import heat_map
-from proofroll.report.study_parts import held
+from proofroll.report.study_parts import PartEntry, held
 from proofroll.studies.stability_claims import STUDY, Claim, StabilityFile, file_for
 
 if TYPE_CHECKING:
     from proofroll.report.study_parts import Tell
     from proofroll.running.runner import Runner
     from proofroll.studies.axes import Axis
+
+
+@dataclass(frozen=True)
+class JudgedBoundary:
+    """A claim in one sentence, what speaks ``against`` it, or why it is ``untested``; ``holds``: None of the latter."""
+
+    says: str
+    because: str
+    against: list[str]
+    untested: str
+    holds: bool | None
+
+
+@dataclass(frozen=True, kw_only=True)
+class StabilityEntry(PartEntry):
+    """A map, the worst of what nobody is told, what was claimed, and the axes that were left out."""
+
+    silent: list[str]
+    claims: list[JudgedBoundary]
+    left_out: list[str]
 
 
 @dataclass
@@ -39,10 +59,10 @@ class StabilityPart:
         return cls(file_for(str(path)), tuple(engines))
 
     @staticmethod
-    def line(entry: dict[str, Any]) -> str:
+    def line(entry: StabilityEntry) -> str:
         """How many boundaries are silent, and what holds of what was claimed."""
-        study = entry["study"]
-        return f"{study['silent']} of {study['boundaries']} boundaries are silent{held(entry['claims'])}"
+        study = entry.study
+        return f"{study['silent']} of {study['boundaries']} boundaries are silent{held(entry.claims)}"
 
     @property
     def on_request(self) -> bool:
@@ -89,8 +109,8 @@ class StabilityPart:
         """Those on which something should happen."""
         return [axis for axis in self.asked.axes if not axis.scale_free]
 
-    def content(self) -> dict[str, Any]:
-        """The map, the worst of what nobody is told, and what was claimed."""
+    def entry(self) -> StabilityEntry:
+        """See the protocol."""
         from proofroll.report.stability_tables import silent_lines
 
         study = self.study
@@ -101,27 +121,21 @@ class StabilityPart:
             against = claim.contradictions(study["points"])
             contradictions += against
             untested = "" if against else claim.untested(study["points"])
-            claims.append(
-                {
-                    "says": _says(claim, study["step_symbols"]),
-                    "because": claim.because,
-                    "against": against,
-                    "untested": untested,
-                    "holds": None if untested else not against,
-                }
-            )
+            holds = None if untested else not against
+            claims.append(JudgedBoundary(_says(claim, study["step_symbols"]), claim.because, against, untested, holds))
         points = [
             point | {"reproducer": f"{self.folder}/{Path(point['reproducer']).name}" if point["reproducer"] else None}
             for point in study["points"]
         ]
-        return {
-            "study": {**study, "points": points},
-            "silent": list(silent_lines(study)),
-            "claims": claims,
-            "left_out": [axis.name for axis in self.asked.axes if axis.name not in mapped],
-            "contradictions": contradictions,
-            "lost": [] if study["points"] else [f"{name}: {reason}" for name, reason in study["absent"].items()],
-        }
+        return StabilityEntry(
+            **self.head,
+            study={**study, "points": points},
+            silent=list(silent_lines(study)),
+            claims=claims,
+            left_out=[axis.name for axis in self.asked.axes if axis.name not in mapped],
+            contradictions=contradictions,
+            lost=[] if study["points"] else [f"{name}: {reason}" for name, reason in study["absent"].items()],
+        )
 
     def pictures(self, prefix: str) -> dict[str, str]:  # noqa: ARG002 -- the protocol's
         """None: the maps are tables."""

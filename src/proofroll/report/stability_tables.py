@@ -120,5 +120,5 @@ def silent_lines(study: Mapping[str, Any]) -> Iterator[str]:
             step = f"at every {point['resolution']} down to {number(point['finest'])}"
         else:
             step = f"just beyond {point['resolution']} {number(side['largest'])}"
-        where = f"{with_caveat(label(point), point)} at {point['axis']} = {number(point['value'])}"
+        where = f"{with_caveat(label(point), point.get('caveat', ''))} at {point['axis']} = {number(point['value'])}"
         yield f"{where}: {point['failure']} {step}{wrong}"

@@ -6,6 +6,7 @@ Kinds of parts are plug-ins, our own too: entry points of the group ``proofroll.
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass
 from functools import cache
 from importlib.metadata import entry_points
 from pathlib import Path
@@ -20,6 +21,29 @@ if TYPE_CHECKING:
 
 GROUP = "proofroll.report_parts"
 Tell = Callable[[str, int], None]
+
+
+@dataclass(frozen=True, kw_only=True)
+class PartEntry:
+    """What a report lists of a part.
+
+    Attributes:
+        name, title, question, scene, command: as its ``head`` has them.
+        missing: why there is nothing, and what makes it; empty if there is something.
+        study: what was found, as its file has it, or None.
+        contradictions: sentences about what was claimed and is not so.
+        lost: sentences about engines without which it is not whole.
+    """
+
+    name: str
+    title: str
+    question: str
+    scene: str
+    command: str
+    missing: str = ""
+    study: Any = None
+    contradictions: Sequence[str] = ()
+    lost: Sequence[str] = ()
 
 
 class Part(Protocol):
@@ -55,7 +79,7 @@ class Part(Protocol):
         """
 
     @staticmethod
-    def line(entry: dict[str, Any]) -> str:
+    def line(entry: Any) -> str:
         """What came of it, without its name and a full stop, for the terminal."""
 
     @property
@@ -72,8 +96,8 @@ class Part(Protocol):
     def make(self, runner: Runner, out: Path, tell: Tell) -> None:
         """Makes it, with the least effort that says something."""
 
-    def content(self) -> dict[str, Any]:
-        """What is known, as plain data; only after it was made or taken."""
+    def entry(self) -> PartEntry:
+        """What is known, with whatever its template needs besides; only after it was made or taken."""
 
     def pictures(self, prefix: str) -> dict[str, str]:
         """Its pictures as markup, by name; every id in them begins with ``prefix``."""
@@ -83,11 +107,6 @@ class Part(Protocol):
 def part_kinds() -> tuple[type[Part], ...]:
     """All that some installed package announces, in the order of a report."""
     return tuple(sorted((point.load() for point in entry_points(group=GROUP)), key=lambda kind: kind.order))
-
-
-def further(content: Mapping[str, Any]) -> list[dict[str, Any]]:
-    """The entries of all parts that a report's content lists, in its order."""
-    return [item for kind in part_kinds() for item in content[kind.key]]
 
 
 def parts_of(names: Sequence[str], engines: Sequence[str]) -> tuple[list[str], list[Part]]:
@@ -126,7 +145,7 @@ def all_parts(engines: Sequence[str], out: Path) -> list[Part]:
     return [part for part in found if not part.on_request or part.keeps(out)]
 
 
-def attempt(part: Part, action: Callable[[], dict[str, Any] | None]) -> dict[str, Any] | None:
+def attempt(part: Part, action: Callable[[], PartEntry | None]) -> PartEntry | None:
     """What an action on a part gives; whatever happens in it, a report goes on: the entry then says what.
 
     Args:
@@ -142,21 +161,16 @@ def attempt(part: Part, action: Callable[[], dict[str, Any] | None]) -> dict[str
         return absent(part, f"an error of proofroll's own, {said}")
 
 
-def entry(part: Part) -> dict[str, Any]:
-    """What the content lists of a part that was made."""
-    return {**part.head, "missing": "", "study": None, **part.content()}
-
-
-def absent(part: Part, reason: str) -> dict[str, Any]:
+def absent(part: Part, reason: str) -> PartEntry:
     """What the content lists of a part that there is not; one sentence says why, and how to get it."""
     missing = f"{' '.join(reason.split()).rstrip('.')}; {part.head['command']} makes it."
-    return {**part.head, "missing": missing, "study": None, "contradictions": [], "lost": []}
+    return PartEntry(**part.head, missing=missing)
 
 
-def held(claims: Sequence[Mapping[str, Any]]) -> str:
+def held(claims: Sequence[Any]) -> str:
     """How many claims hold, of those that are decided, and how many are not; nothing where nothing is claimed."""
     if not claims:
         return ""
-    verdicts = [claim["holds"] for claim in claims]
+    verdicts = [claim.holds for claim in claims]
     undecided = f", {verdicts.count(None)} undecided" if None in verdicts else ""
     return f"; {verdicts.count(True)} of {len(verdicts) - verdicts.count(None)} claims hold{undecided}"

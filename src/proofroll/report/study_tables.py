@@ -3,16 +3,19 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 from proofroll.report.labels import error, number, symbol, unit
 from proofroll.report.tradeoff_tables import cost_of, name_of, step_of
 
+if TYPE_CHECKING:
+    from proofroll.report.tradeoff_part import TradeoffEntry
 
-def advice(entry: Mapping[str, Any]) -> list[dict[str, Any]]:
+
+def advice(entry: TradeoffEntry) -> list[dict[str, Any]]:
     """What to use: one line for each tolerance, grouped by the quantity."""
     groups: dict[str, dict[str, Any]] = {}
-    for answer in entry["advice"]:
+    for answer in entry.advice:
         of = unit(answer["unit"])
         group = groups.setdefault(answer["quantity"], {"symbol": symbol(answer["quantity"]), "said": "", "lines": []})
         relative = answer["relative"]
@@ -32,24 +35,24 @@ def advice(entry: Mapping[str, Any]) -> list[dict[str, Any]]:
     return list(groups.values())
 
 
-def front(entry: Mapping[str, Any], key: str = "pareto_engines") -> list[dict[str, Any]]:
+def front(entry: TradeoffEntry, key: str = "pareto_engines") -> list[dict[str, Any]]:
     """The points that nothing beats for the study's own quantity: cost, and the error of every shown quantity."""
-    study = entry["study"]
+    study = entry.study
     by_id = {point["id"]: point for point in study["points"]}
     return [
         {
             "name": name_of(point),
             "step": step_of(point),
             "cost": cost_of(point),
-            "errors": [error(point["error"].get(name)) if name in point["error"] else "–" for name in entry["shown"]],
+            "errors": [error(point["error"].get(name)) if name in point["error"] else "–" for name in entry.shown],
         }
         for point in (by_id[number] for number in study[key].get(study["quantity"], []))
     ]
 
 
-def budgets(entry: Mapping[str, Any], quantity: str) -> list[dict[str, Any]]:
+def budgets(entry: TradeoffEntry, quantity: str) -> list[dict[str, Any]]:
     """What the error of a quantity consists of along each curve."""
-    study = entry["study"]
+    study = entry.study
     first = {point["curve"]: point for point in study["points"]}
     return [
         {
@@ -68,12 +71,12 @@ def budgets(entry: Mapping[str, Any], quantity: str) -> list[dict[str, Any]]:
     ]
 
 
-def quantities(entry: Mapping[str, Any]) -> list[dict[str, str]]:
+def quantities(entry: TradeoffEntry) -> list[dict[str, str]]:
     """The shown quantities with symbol and unit."""
-    known = entry["study"]["quantities"]
+    known = entry.study["quantities"]
     return [
         {"name": name, "symbol": symbol(name), "unit": unit(known.get(name, {}).get("unit", ""))}
-        for name in entry["shown"]
+        for name in entry.shown
     ]
 
 

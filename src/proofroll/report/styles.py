@@ -2,7 +2,12 @@
 
 from __future__ import annotations
 
-from typing import Any
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import TYPE_CHECKING
+
+if TYPE_CHECKING:
+    from proofroll.report.comparison_records import ReportedRow
 
 DASHES = ("solid", "dash", "dot", "dashdot", "longdash", "longdashdot")
 COLOURS = 8
@@ -23,27 +28,34 @@ OUTLINES = {
 }
 
 
-def styles(rows: list[dict[str, Any]]) -> list[dict[str, Any]]:
-    """For each row: colour by engine, dashes by formulation, width by preset, and a symbol by its place in the engine.
+@dataclass(frozen=True)
+class Style:
+    """Number of the colour, plotly's names of dashes and symbol, width of the line [px], and opacity."""
 
-    Args:
-        rows: of the report's content.
-    """
-    engines = list(dict.fromkeys(row["name"] for row in rows))
-    formulations = {name: list(dict.fromkeys(r["formulation"] for r in rows if r["name"] == name)) for name in engines}
+    colour: int
+    dash: str
+    width: float
+    symbol: str
+    opacity: float
+
+
+def styles(rows: Sequence[ReportedRow]) -> list[Style]:
+    """For each row: colour by engine, dashes by formulation, width by preset, symbol by its place in the engine."""
+    engines = list(dict.fromkeys(row.name for row in rows))
+    formulations = {name: list(dict.fromkeys(r.formulation for r in rows if r.name == name)) for name in engines}
     widths = {"default": 1.1, "tuned": 2.4}
     names = list(OUTLINES)
     seen: dict[str, int] = {}
     found = []
     for row in rows:
-        place = seen[row["name"]] = seen.get(row["name"], -1) + 1
+        place = seen[row.name] = seen.get(row.name, -1) + 1
         found.append(
-            {
-                "colour": engines.index(row["name"]) % COLOURS,
-                "dash": DASHES[formulations[row["name"]].index(row["formulation"]) % len(DASHES)],
-                "width": widths.get(row["preset"], 1.7),
-                "symbol": names[place % len(names)] + ("-open" if place // len(names) % 2 else ""),
-                "opacity": 0.5 if row["verdict"] in {"differs", "failed"} else 1,  # not to hide those that agree
-            }
+            Style(
+                colour=engines.index(row.name) % COLOURS,
+                dash=DASHES[formulations[row.name].index(row.formulation) % len(DASHES)],
+                width=widths.get(row.preset or "", 1.7),
+                symbol=names[place % len(names)] + ("-open" if place // len(names) % 2 else ""),
+                opacity=0.5 if row.verdict in {"differs", "failed"} else 1,  # not to hide those that agree
+            )
         )
     return found

@@ -2,31 +2,36 @@
 
 from __future__ import annotations
 
+import math
 from collections import Counter
-from typing import Any
+from collections.abc import Mapping, Sequence
+from typing import TYPE_CHECKING, Any
 
-from proofroll.report.labels import headlines, names, number, symbol, unit, with_caveat
-from proofroll.report.scores import cheapest, scores
+from proofroll.report.labels import names, number, symbol, unit, with_caveat
+from proofroll.report.scores import EVERYDAY, cheapest, scores
 from proofroll.report.tradeoff_tables import name_of, step_of
 
-# The error of motion and forces, relative to their sizes, for which a setting is named where no trade-off was made.
-EVERYDAY = 1e-3
+if TYPE_CHECKING:
+    from proofroll.report.comparison_records import ReportedComparison
+    from proofroll.report.study_parts import PartEntry
 
 
-def three_sentences(content: dict[str, Any]) -> list[str]:
+def three_sentences(comparisons: Sequence[ReportedComparison], entries: Mapping[str, Sequence[PartEntry]]) -> list[str]:
     """What agrees best, what does not and says nothing of it, and what to use.
 
     Args:
-        content: of the report: ``comparisons``, ``tradeoffs`` and ``stability``.
+        comparisons: of the report.
+        entries: of its further studies by the key of their kind, of which ``tradeoffs`` and ``stability`` count.
     """
-    return [_agrees(content["comparisons"]), _silent(content), _use(content)]
+    maps = [entry.study for entry in entries.get("stability", ()) if entry.study is not None]
+    return [_agrees(comparisons), _silent(comparisons, maps), _use(comparisons, entries.get("tradeoffs", ()))]
 
 
-def _agrees(comparisons: list[dict[str, Any]]) -> str:
+def _agrees(comparisons: Sequence[ReportedComparison]) -> str:
     if not comparisons:
         return "Nothing was compared with the truth in this report."
-    rows = [row for comparison in comparisons for row in comparison["rows"]]
-    counts = Counter(row["verdict"] for row in rows)
+    rows = [row for comparison in comparisons for row in comparison.rows]
+    counts = Counter(row.verdict.value for row in rows)
     agree = "agrees" if counts["agrees"] == 1 else "agree"
     said = f"Of {len(rows)} settings in {_comparisons(len(comparisons))}, "
     said += f"{counts['agrees']} {agree} with the truth everywhere"
@@ -38,9 +43,9 @@ def _agrees(comparisons: list[dict[str, Any]]) -> str:
     parts = [f"{counts[verdict]} {words}" for verdict, words in rest.items() if counts[verdict]]
     if parts:
         said += f", {' and '.join(parts)}"
-    first_rows = comparisons[0]["rows"]
+    first_rows = comparisons[0].rows
     # Who rests on the truth's own equations is close to it whatever they are.
-    others = [score for score in scores(comparisons[0]) if not first_rows[score.index]["shared"]]
+    others = [score for score in scores(comparisons[0]) if not first_rows[score.index].shared]
     complete = [score for score in others if score.worst is not None]
     if not complete:
         return f"{said}; none gave motion and forces in every case of the first comparison."
@@ -56,15 +61,14 @@ def _comparisons(count: int) -> str:
     return "one comparison" if count == 1 else f"{count} comparisons"
 
 
-def _silent(content: dict[str, Any]) -> str:
+def _silent(comparisons: Sequence[ReportedComparison], maps: Sequence[Mapping[str, Any]]) -> str:
     """What is wrong at every step and says nothing, and how many boundaries of stability are passed in silence."""
-    found = [item for comparison in content["comparisons"] for item in _wrong(comparison)]
-    maps = [entry["study"] for entry in content["stability"] if entry["study"] is not None]
+    found = [item for comparison in comparisons for item in _wrong(comparison)]
     silent, boundaries = (sum(int(study[key]) for study in maps) for key in ("silent", "boundaries"))
     passed = f"{silent} of {boundaries} boundaries of stability and accuracy are passed without a word"
     if not found:
         nothing = "No setting that ran to its end differs from the truth"
-        if not content["comparisons"]:
+        if not comparisons:
             return f"{passed}." if maps else "Nothing that was run could be silently wrong: nothing was compared."
         return f"{nothing}; {passed}." if maps else f"{nothing}."
     _, name, text = max(found)
@@ -73,41 +77,41 @@ def _silent(content: dict[str, Any]) -> str:
     return f"{said}; {passed}." if maps else f"{said}."
 
 
-def _wrong(comparison: dict[str, Any]) -> list[tuple[float, str, str]]:
+def _wrong(comparison: ReportedComparison) -> list[tuple[float, str, str]]:
     """For each row that differs though each of its runs ended as done: relative error, name, and what is off."""
     found = []
-    for index, (name, row) in enumerate(zip(names(comparison["rows"]), comparison["rows"], strict=True)):
-        runs = [run for run in comparison["runs"] if run["row"] == index]
-        if row["verdict"] != "differs" or any(run["status"] != "done" for run in runs):
+    for index, (name, row) in enumerate(zip(names(comparison.rows), comparison.rows, strict=True)):
+        runs = comparison.runs_of(index)
+        if row.verdict != "differs" or any(run.status != "done" for run in runs):
             continue
         judged = [
-            (judgement["error"] / judgement["scale"], judgement)
+            (judgement.error / judgement.scale, judgement)
             for run in runs
-            for judgement in run["judgements"]
-            if judgement["observable"] in headlines(comparison, "motion")
-            and judgement["verdict"] != "ill-posed"
-            and judgement["error"] is not None
+            for judgement in run.judgements
+            if judgement.observable in comparison.headlines("motion")
+            and judgement.verdict != "ill-posed"
+            and math.isfinite(judgement.error)
         ]
         relative, worst = max(judged, key=lambda pair: pair[0], default=(0.0, None))
         text = "a reaction or an event is wrong"
         if worst is not None:
-            size = f"{number(worst['error'])} {unit(worst['unit'])}".strip()
-            text = f"its {symbol(worst['observable'])} is off by {size}"
-        found.append((relative, with_caveat(name, row), text))
+            size = f"{number(worst.error)} {unit(worst.unit)}".strip()
+            text = f"its {symbol(worst.observable)} is off by {size}"
+        found.append((relative, with_caveat(name, row.caveat), text))
     return found
 
 
-def _use(content: dict[str, Any]) -> str:
+def _use(comparisons: Sequence[ReportedComparison], tradeoffs: Sequence[Any]) -> str:
     """The cheapest that holds the usual tolerance, from the trade-off; else from the first comparison's timings."""
-    for entry in content["tradeoffs"]:
-        if entry["study"] is None:
+    for entry in tradeoffs:
+        if entry.study is None:
             continue
-        answers = [answer for answer in entry["advice"] if answer["choice"] is not None]
-        answer = min(answers, key=lambda item: _from_everyday(item, entry["study"]), default=None)
+        answers = [answer for answer in entry.advice if answer["choice"] is not None]
+        answer = min(answers, key=lambda item: _from_everyday(item, entry.study), default=None)
         if answer is not None:
             choice, least = answer["choice"], answer["least_model"]
             wanted = f"{symbol(answer['quantity'])} to {number(answer['tolerance'])} {unit(answer['unit'])}".strip()
-            said = f"For {wanted} use {with_caveat(name_of(choice), choice)}" + (
+            said = f"For {wanted} use {with_caveat(name_of(choice), choice.get('caveat', ''))}" + (
                 f" at {step_of(choice)}" if step_of(choice) else ""
             )
             said += f", at {number(choice['seconds_per_second'])} s of computing per simulated second"
@@ -117,12 +121,12 @@ def _use(content: dict[str, Any]) -> str:
                     f"{number(least['seconds_per_second'])} s ({name_of(least)})"
                 )
             return f"{said}."
-    for comparison in content["comparisons"]:
+    for comparison in comparisons:
         best = cheapest(scores(comparison), "worst", EVERYDAY)
         if best:
             return (
-                f"For motion and forces to {100 * EVERYDAY:g} % use {best['name']}, at "
-                f"{number(best['seconds_per_second'])} s of computing per simulated second."
+                f"For motion and forces to {100 * EVERYDAY:g} % use {best.name}, at "
+                f"{number(best.seconds_per_second)} s of computing per simulated second."
             )
     return f"Nothing that was timed holds motion and forces to {100 * EVERYDAY:g} %, so nothing can be recommended."
 

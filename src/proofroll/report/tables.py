@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
-from typing import Any
+import math
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, Any
 
 from proofroll.core.certificate import Standing, not_reported
 from proofroll.report.labels import (
@@ -18,138 +20,175 @@ from proofroll.report.labels import (
     verdict_text,
 )
 
+if TYPE_CHECKING:
+    from collections.abc import Iterable, Mapping, Sequence
+
+    from proofroll.core.verdict import Judgement, Verdict
+    from proofroll.report.comparison_records import ReportedComparison, ReportedRow, ReportedRun, ShownBand
+    from proofroll.report.evidence import Claims, Cost
+
+
+@dataclass(frozen=True)
+class Column:
+    """A judged observable: its name, its symbol and its unit as they are shown."""
+
+    name: str
+    symbol: str
+    unit: str
+
+
+@dataclass(frozen=True)
+class Cell:
+    """One number of a matrix, with a link to its evidence and all about it as a title."""
+
+    verdict: Verdict
+    symbol: str
+    text: str
+    href: str
+    title: str
+
+
+@dataclass(frozen=True)
+class MatrixLine:
+    """One row of a matrix; ``cells`` in the order of the columns, None where an engine does not say."""
+
+    engine: str
+    name: str
+    setting: str
+    step: str
+    verdict: Verdict
+    symbol: str
+    verdict_text: str
+    detail: str
+    href: str
+    message: str
+    as_expected: bool
+    seconds: float | None
+    cost: str
+    cells: list[Cell | None]
+
+
+@dataclass(frozen=True)
+class Matrix:
+    """Rows by engine."""
+
+    columns: list[Column]
+    groups: dict[str, list[MatrixLine]]
+
 
 def anchor(comparison: int, row: int, point: int) -> str:
     """Id of the evidence of one row at one point."""
     return f"c{comparison}-r{row}-p{point}"
 
 
-def observables(content: dict[str, Any]) -> list[dict[str, str]]:
+def observables(content: ReportedComparison) -> list[Column]:
     """The judged observables in the order of the first row that has them all."""
     units: dict[str, str] = {}
-    for row in sorted(content["rows"], key=lambda row: -len(row["observables"])):
-        for name, judgement in row["observables"].items():
-            units.setdefault(name, judgement["unit"])
-    return [{"name": name, "symbol": symbol(name), "unit": unit(text)} for name, text in units.items()]
+    for row in sorted(content.rows, key=lambda row: -len(row.observables)):
+        for name, judgement in row.observables.items():
+            units.setdefault(name, judgement.unit)
+    return [Column(name, symbol(name), unit(text)) for name, text in units.items()]
 
 
-def overview(content: dict[str, Any], comparison: int) -> dict[str, Any]:
+def overview(content: ReportedComparison, comparison: int) -> Matrix:
     """The verdict matrix: the worst of every row over all points."""
-    points = list(dict.fromkeys(run["point"] for run in content["runs"]))
-    lines = []
-    for index, row in enumerate(content["rows"]):
-        runs = [run for run in content["runs"] if run["row"] == index]
-        worst = next((run for run in runs if run["verdict"] == row["verdict"]), runs[0])
-        lines.append(
-            {
-                **_head(row),
-                "verdict": row["verdict"],
-                "verdict_text": verdict_text(row),
-                "detail": detail(row),
-                "href": anchor(comparison, index, points.index(worst["point"])),
-                "message": row["message"],
-                "as_expected": row["as_expected"],
-                "seconds": row["seconds_per_second"],
-                "cost": next((cost_title(run["cost"]) for run in runs if _slowest(run, row)), ""),
-                "judged": {
-                    name: _cell(judgement, anchor(comparison, index, points.index(judgement["point"])))
-                    for name, judgement in row["observables"].items()
-                },
-            }
-        )
-    return _matrix(content, lines)
+    points = list(dict.fromkeys(run.point for run in content.runs))
+    columns, lines = observables(content), []
+    for index, row in enumerate(content.rows):
+        runs = content.runs_of(index)
+        worst = next((run for run in runs if run.verdict == row.verdict), runs[0])
+        slowest = (run.cost for run in runs if run.cost and run.seconds_per_second == row.seconds_per_second)
+        judged = {
+            name: _cell(item, anchor(comparison, index, points.index(item.point)), item.point)
+            for name, item in row.observables.items()
+        }
+        href = anchor(comparison, index, points.index(worst.point))
+        shown = (verdict_text(row), href, row.message, row.as_expected, next(slowest, None))
+        lines.append(_line(row, columns, judged, *shown))
+    return _matrix(columns, lines)
 
 
-def counted(content: dict[str, Any]) -> str:
+def counted(content: ReportedComparison) -> str:
     """How many settings have which verdict, in one line."""
-    verdicts = [row["verdict"] for row in content["rows"]]
+    verdicts = [row.verdict.value for row in content.rows]
     said = ", ".join(f"{sign} {verdicts.count(word)} {word}" for word, sign in SYMBOLS.items() if word in verdicts)
-    return f"{len(verdicts)} settings: {said}; " + ("as expected" if content["as_expected"] else "not as expected")
+    return f"{len(verdicts)} settings: {said}; " + ("as expected" if content.as_expected else "not as expected")
 
 
-def at_point(content: dict[str, Any], comparison: int, point: int, name: str) -> dict[str, Any]:
+def at_point(content: ReportedComparison, comparison: int, point: int, name: str) -> Matrix:
     """The verdict matrix of one point of the parameters."""
-    lines = []
-    for run in content["runs"]:
-        if run["point"] != name:
-            continue
-        href = anchor(comparison, run["row"], point)
-        lines.append(
-            {
-                **_head(run),
-                "verdict": run["verdict"],
-                "verdict_text": run["verdict"],
-                "detail": detail(run),
-                "href": href,
-                "message": run["message"] if run["status"] != "done" else "",
-                "as_expected": not run["contradictions"],
-                "seconds": run["seconds_per_second"],
-                "cost": cost_title(run["cost"]) if run.get("cost") else "",
-                "judged": {judgement["observable"]: _cell(judgement, href) for judgement in run["judgements"]},
-            }
-        )
-    return _matrix(content, lines)
+    columns, lines = observables(content), []
+    for run in content.runs:
+        if run.point == name:
+            href = anchor(comparison, run.row, point)
+            judged = {judgement.observable: _cell(judgement, href) for judgement in run.judgements}
+            message = run.message if run.status != "done" else ""
+            lines.append(_line(run, columns, judged, run.verdict, href, message, not run.contradictions, run.cost))
+    return _matrix(columns, lines)
 
 
-def expectations(content: dict[str, Any]) -> list[dict[str, Any]]:
-    """What is expected, settings with the same expectation together; ``further``: claims besides the verdict."""
-    groups: dict[tuple[Any, ...], list[str]] = {}
-    for name, row in zip(names(content["rows"]), content["rows"], strict=True):
-        text = " or ".join(row["expected"])
-        for observable, verdicts in row["expected_for"].items():
+@dataclass(frozen=True)
+class Expectation:
+    """Settings of which the same is expected; ``further``: claims besides the verdict."""
+
+    names: list[str]
+    tolerance: str
+    expected: str
+    because: str
+    further: tuple[str, ...]
+
+
+def expectations(rows: Sequence[ReportedRow]) -> list[Expectation]:
+    """What is expected, settings with the same expectation together."""
+    groups: dict[tuple[str, str, str, tuple[str, ...]], list[str]] = {}
+    for name, row in zip(names(rows), rows, strict=True):
+        text = " or ".join(row.expected)
+        for observable, verdicts in row.expected_for.items():
             text += f"; {symbol(observable)}: {' or '.join(verdicts)}"
-        further = tuple(_further(row.get("claims", {})))
-        groups.setdefault((row["tolerance"], text, row["because"], further), []).append(name)
-    return [
-        {"names": found, "tolerance": tolerance, "expected": text, "because": because, "further": further}
-        for (tolerance, text, because, further), found in groups.items()
-    ]
+        groups.setdefault((row.tolerance, text, row.because, tuple(_further(row.claims))), []).append(name)
+    return [Expectation(found, *said) for said, found in groups.items()]
 
 
-def _further(claims: dict[str, Any]) -> list[str]:
+def _further(claims: Claims) -> list[str]:
     """A row's claims besides its verdict, as sentences without a full stop."""
-    said = [f"{symbol(name)} within {unit(bound)}" for name, bound in claims.get("bound", {}).items()]
-    said += [f"order of {symbol(name)} {low:g} to {high:g}" for name, (low, high) in claims.get("order", {}).items()]
-    said += [f"limit of {symbol(name)} within {unit(bound)}" for name, bound in claims.get("limit", {}).items()]
-    for item in claims.get("except_at", []):
-        said.append(f"{' or '.join(item['expect'])} at {_where(item['where'])}")
-    if claims.get("only"):
-        said.append(f"run only at {_where(claims['only'])}")
-    return said
+    said = [f"{symbol(name)} within {unit(bound)}" for name, bound in claims.bound.items()]
+    said += [f"order of {symbol(name)} {low:g} to {high:g}" for name, (low, high) in claims.order.items()]
+    said += [f"limit of {symbol(name)} within {unit(bound)}" for name, bound in claims.limit.items()]
+    said += [f"{' or '.join(item.expect)} at {_where(item.where)}" for item in claims.except_at]
+    return [*said, f"run only at {_where(claims.only)}"] if claims.only else said
 
 
-def _where(values: dict[str, list[float]]) -> str:
+def _where(values: Mapping[str, Sequence[float]]) -> str:
     """Values of parameters: ``speed=2, mu_static=0.35 or 0.4``."""
     return ", ".join(f"{name}={' or '.join(number(v, 6) for v in found)}" for name, found in values.items())
 
 
-def costs(content: dict[str, Any]) -> list[dict[str, Any]]:
-    """For each timed row its fastest and its slowest case, with intervals."""
+def costs(content: ReportedComparison) -> list[tuple[str, ReportedRun, ReportedRun]]:
+    """For each timed row its name, its slowest and its fastest case."""
     lines = []
-    for index, name in enumerate(names(content["rows"])):
-        timed = [run for run in content["runs"] if run["row"] == index and run.get("cost")]
+    for index, name in enumerate(names(content.rows)):
+        timed = sorted((run.cost.median, at, run) for at, run in enumerate(content.runs_of(index)) if run.cost)
         if timed:
-            timed.sort(key=lambda run: run["cost"]["median"])
-            lines.append({"name": name, "fastest": timed[0], "slowest": timed[-1], "cases": len(timed)})
+            lines.append((name, timed[-1][-1], timed[0][-1]))
     return lines
 
 
-def cost_interval(cost: dict[str, Any] | None) -> str:
+def cost_interval(cost: Cost | None) -> str:
     """The interval of a cost: ``0.011 to 0.013``; a dash where it was measured once or never."""
-    return "–" if not cost or cost["low"] is None else f"{number(cost['low'])} to {number(cost['high'])}"
+    return "–" if not cost or cost.low is None else f"{number(cost.low)} to {number(cost.high)}"
 
 
-def cost_title(cost: dict[str, Any] | None) -> str:
+def cost_title(cost: Cost | None) -> str:
     """What a cost is, in a sentence."""
     if not cost:
         return "not timed"
-    if cost["low"] is None:
+    if cost.confidence is None:
         return "one clean run, so no interval is known"
-    known = f"{100 * cost['confidence']:.3g} %"
-    return f"median of {cost['runs']} clean runs; {cost_interval(cost)} s/s holds it with {known}"
+    known = f"{100 * cost.confidence:.3g} %"
+    return f"median of {cost.runs} clean runs; {cost_interval(cost)} s/s holds it with {known}"
 
 
-def reasons(certificate: list[dict[str, Any]]) -> dict[str, list[str]]:
+def reasons(certificate: Iterable[Mapping[str, Any]]) -> dict[str, list[str]]:
     """Why some quantities of a certificate may differ by more than round-off: reason -> quantities."""
     found: dict[str, list[str]] = {}
     for line in certificate:
@@ -158,11 +197,11 @@ def reasons(certificate: list[dict[str, Any]]) -> dict[str, list[str]]:
     return found
 
 
-def bounds(content: dict[str, Any], band: dict[str, Any]) -> list[str]:
+def bounds(content: ReportedComparison, band: ShownBand) -> list[str]:
     """The tolerances of a band, with symbols and units."""
-    units = {column["name"]: column["unit"] for column in observables(content)}
+    units = {column.name: column.unit for column in observables(content)}
     found = []
-    for name, bound in band["bounds"].items():
+    for name, bound in band.bounds.items():
         try:
             text = f"{number(float(bound))} {units.get(name, '')}"
         except ValueError:
@@ -171,77 +210,90 @@ def bounds(content: dict[str, Any], band: dict[str, Any]) -> list[str]:
     return found
 
 
-def belief(content: dict[str, Any]) -> list[dict[str, Any]]:
+@dataclass(frozen=True)
+class Belief:
+    """Of the certificates of a row: how many lines hold, of how many, and the largest difference of round-off.
+
+    ``soft`` and ``silent`` are quantities that may differ, with a reason, and that are not reported.
+    """
+
+    name: str
+    held: int
+    total: int
+    difference: float | None
+    soft: list[str]
+    silent: list[str]
+    audit: Judgement | None
+
+
+def belief(content: ReportedComparison) -> list[Belief]:
     """Why to believe it: for each row its certificates and its force audit, the worst over all points."""
     lines = []
-    for index, name in enumerate(names(content["rows"])):
-        runs = [run for run in content["runs"] if run["row"] == index]
-        lines_of_all = [line for run in runs for line in run["certificate"]]
+    for index, (name, row) in enumerate(zip(names(content.rows), content.rows, strict=True)):
+        lines_of_all = [line for run in content.runs_of(index) for line in run.certificate]
         certificate = [line for line in lines_of_all if line["standing"] != Standing.NOT_REPORTED]
         exact = [line["difference"] for line in certificate if not line["because"] and line["difference"] is not None]
-        soft = list(dict.fromkeys(line["quantity"] for line in certificate if line["because"]))
-        audit = content["rows"][index]["observables"].get("force_audit")
         lines.append(
-            {
-                "name": name,
-                "held": sum(bool(line["holds"]) for line in certificate),
-                "total": len(certificate),
-                "difference": max(exact, default=None),
-                "soft": soft,
-                "silent": list(dict.fromkeys(not_reported(lines_of_all))),
-                "audit": audit,
-            }
+            Belief(
+                name,
+                sum(bool(line["holds"]) for line in certificate),
+                len(certificate),
+                max(filter(math.isfinite, exact), default=None),
+                list(dict.fromkeys(line["quantity"] for line in certificate if line["because"])),
+                list(dict.fromkeys(not_reported(lines_of_all))),
+                row.observables.get("force_audit"),
+            )
         )
     return lines
 
 
-def _slowest(run: dict[str, Any], row: dict[str, Any]) -> bool:
-    return bool(run.get("cost")) and run["seconds_per_second"] == row["seconds_per_second"]
-
-
-def _head(row: dict[str, Any]) -> dict[str, Any]:
-    return {"engine": row["engine"], "name": row["name"], "setting": setting(row), "step": step(row)}
-
-
-def causes(content: dict[str, Any]) -> list[tuple[str, str, str]]:
+def causes(content: ReportedComparison) -> list[tuple[str, str, str]]:
     """Name of each row with a proven cause of its difference, the cause, and what to do."""
-    shown = zip(names(content["rows"]), content["rows"], strict=True)
-    return [(name, cause["sentence"], cause["remedy"]) for name, row in shown for cause in row["diagnosis"]]
+    shown = zip(names(content.rows), content.rows, strict=True)
+    return [(name, told.cause.sentence, told.cause.cause.remedy) for name, row in shown for told in row.diagnosis]
 
 
-def remarks(content: dict[str, Any]) -> list[tuple[str, str]]:
+def remarks(content: ReportedComparison) -> list[tuple[str, str]]:
     """What was remarked of each row, with its name."""
-    shown = names(content["rows"])
-    return [(name, text) for name, row in zip(shown, content["rows"], strict=True) for text in row["remarks"]]
+    return [(name, text) for name, row in zip(names(content.rows), content.rows, strict=True) for text in row.remarks]
 
 
-def _limit(judgement: dict[str, Any]) -> str:
+def _limit(judgement: Judgement) -> str:
     """What the ladder of steps says, with its numbers; nothing where there is none."""
-    if judgement["limit_error_bar"] is None:
+    if judgement.limit_error_bar is None:
         return ""
-    off = f"{error(judgement['limit_error'])} ± {error(judgement['limit_error_bar'], 1)}"
-    return f"; {judgement['limit']}: off by {off}, order {number(judgement['order'])}"
+    off = f"{error(judgement.limit_error)} ± {error(judgement.limit_error_bar, 1)}"
+    return f"; {judgement.limit}: off by {off}, order {number(judgement.order)}"
 
 
-def _cell(judgement: dict[str, Any], href: str) -> dict[str, Any]:
-    where = f" at {judgement['point']}" if judgement.get("point") else ""
-    text = unit(judgement["unit"])
-    return {
-        "verdict": judgement["verdict"],
-        "symbol": SYMBOLS[judgement["verdict"]],
-        "text": error(judgement["error"]),
-        "href": href,
-        "title": f"{symbol(judgement['observable'])} {judgement['verdict']}: error {error(judgement['error'])} ± "
-        f"{number(judgement['truth_error_bar'], 1)} {text}, tolerance {number(judgement['tolerance'])}{where}"
-        f"{_limit(judgement)}",
-    }
+def _cell(judgement: Judgement, href: str, point: str = "") -> Cell:
+    where = f" at {point}" if point else ""
+    title = (
+        f"{symbol(judgement.observable)} {judgement.verdict}: error {error(judgement.error)} ± "
+        f"{number(judgement.truth_error_bar, 1)} {unit(judgement.unit)}, tolerance {number(judgement.tolerance)}{where}"
+        f"{_limit(judgement)}"
+    )
+    return Cell(judgement.verdict, SYMBOLS[judgement.verdict], error(judgement.error), href, title)
 
 
-def _matrix(content: dict[str, Any], lines: list[dict[str, Any]]) -> dict[str, Any]:
-    """Lines grouped by engine, cells in the order of the columns; None where an engine does not say."""
-    columns = observables(content)
-    groups: dict[str, list[dict[str, Any]]] = {}
+def _line(
+    of: ReportedRow | ReportedRun,
+    columns: list[Column],
+    judged: Mapping[str, Cell],
+    text: str,
+    href: str,
+    message: str,
+    as_expected: bool,
+    cost: Cost | None,
+) -> MatrixLine:
+    cells = [judged.get(column.name) for column in columns]
+    said = (text, detail(of), href, message, as_expected, of.seconds_per_second, cost_title(cost) if cost else "")
+    return MatrixLine(of.engine, of.name, setting(of), step(of), of.verdict, SYMBOLS[of.verdict], *said, cells)
+
+
+def _matrix(columns: list[Column], lines: list[MatrixLine]) -> Matrix:
+    """The lines grouped by engine."""
+    groups: dict[str, list[MatrixLine]] = {}
     for line in lines:
-        cells = [line["judged"].get(column["name"]) for column in columns]
-        groups.setdefault(line["name"], []).append({**line, "symbol": SYMBOLS[line["verdict"]], "cells": cells})
-    return {"columns": columns, "groups": groups}
+        groups.setdefault(line.name, []).append(line)
+    return Matrix(columns, groups)

@@ -2,17 +2,22 @@
 
 from __future__ import annotations
 
+import math
 import os
-from typing import Any
+from typing import TYPE_CHECKING
 
 from rich.table import Table
 from rich.text import Text
 
 from proofroll.core.verdict import Verdict
-from proofroll.report.labels import SYMBOLS, caveat_lines, headlines, names, number, verdict_text
+from proofroll.report.labels import SYMBOLS, caveat_lines, names, number, verdict_text
 from proofroll.report.screen import Screen
-from proofroll.report.study_parts import further, part_kinds
+from proofroll.report.study_parts import part_kinds
 from proofroll.studies.hosts import said_of
+
+if TYPE_CHECKING:
+    from proofroll.report.comparison_records import ReportedComparison, WorstJudgement
+    from proofroll.report.report_content import ReportContent
 
 WIDTH = 100
 _WORD, _NUMBER = 14, 7  # characters of the longest word and of a number
@@ -39,10 +44,10 @@ def console() -> Screen:
     return out
 
 
-def verdict_table(content: dict[str, Any]) -> Table:
+def verdict_table(content: ReportedComparison) -> Table:
     """One line per engine with settings: the worst over all points of the parameters."""
     names = columns(content)
-    table = Table(title=Text(content["title"]), title_justify="left", box=None, padding=(0, 1, 0, 0))
+    table = Table(title=Text(content.title), title_justify="left", box=None, padding=(0, 1, 0, 0))
     # Where the window is narrow these break between words, and nothing is cut.
     table.add_column("engine formulation setting", min_width=_WORD, overflow="fold")
     table.add_column("step", no_wrap=True)
@@ -52,82 +57,88 @@ def verdict_table(content: dict[str, Any]) -> Table:
     table.add_column("order", justify="right", no_wrap=True)
     table.add_column("s/s", justify="right", no_wrap=True)
     table.add_column("", no_wrap=True)
-    for row in content["rows"]:
-        verdict = row["verdict"]
-        observables = row["observables"]
+    for row in content.rows:
+        verdict = row.verdict
+        observables = row.observables
         shown = [observables[name] for name, _ in names if name in observables]
-        worst: dict[str, Any] = max(shown, key=lambda item: float(item["error"] or 0) / item["tolerance"], default={})
+        worst = max(shown, key=_beyond, default=None)
         table.add_row(
-            Text(" ".join(filter(None, (row["name"], row["formulation"], row["setting"])))),
-            step(row),
-            Text(f"{SYMBOLS[verdict]} {verdict_text(row)}{'*' if row['remarks'] else ''}", style=_STYLES[verdict]),
-            *(number(observables[name]["error"] if name in observables else None) for name, _ in names),
-            number(worst.get("order")),
-            number(row["seconds_per_second"]),
-            Text("") if row["as_expected"] else Text("!!", style="bold red"),
+            Text(" ".join(filter(None, (row.name, row.formulation, row.setting)))),
+            step(row.resolution, row.resolution_value),
+            Text(f"{SYMBOLS[verdict]} {verdict_text(row)}{'*' if row.remarks else ''}", style=_STYLES[verdict]),
+            *(number(observables[name].error if name in observables else None) for name, _ in names),
+            number(worst.order if worst else None),
+            number(row.seconds_per_second),
+            Text("") if row.as_expected else Text("!!", style="bold red"),
         )
     return table
 
 
-def step(row: dict[str, Any]) -> str:
-    """The resolution in few characters: ``1e-3 s``, or ``tol 2e-14``."""
-    if not row["resolution"]:
+def _beyond(item: WorstJudgement) -> float:
+    """How often an error holds its tolerance; what is not finite is shown as such, and not the first to be read."""
+    return item.error / item.tolerance if math.isfinite(item.error) else 0.0
+
+
+def step(resolution: str | None, value: float | None) -> str:
+    """A resolution in few characters: ``1e-3 s``, or ``tol 2e-14``; nothing where there is none."""
+    if not resolution:
         return ""
-    mantissa, _, exponent = f"{row['resolution_value']:.0e}".partition("e")
+    mantissa, _, exponent = f"{value:.0e}".partition("e")
     text = f"{mantissa}e{int(exponent)}"
-    return f"{text} s" if row["resolution"] == "dt" else f"tol {text}"
+    return f"{text} s" if resolution == "dt" else f"tol {text}"
 
 
-def columns(content: dict[str, Any]) -> list[tuple[str, str]]:
+def columns(content: ReportedComparison) -> list[tuple[str, str]]:
     """The observables that fit on the terminal: what moves, and the first reaction."""
     units: dict[str, str] = {}
-    for row in content["rows"]:
-        for name, judgement in row["observables"].items():
-            units[name] = judgement["unit"]
-    shown = [name for name in headlines(content, "motion") if name in units]
-    shown += [name for name in headlines(content, "reaction") if name in units][:1]
+    for row in content.rows:
+        for name, judgement in row.observables.items():
+            units[name] = judgement.unit
+    shown = [name for name in content.headlines("motion") if name in units]
+    shown += [name for name in content.headlines("reaction") if name in units][:1]
     return [(name, units[name]) for name in shown]
 
 
-def closing_lines(content: dict[str, Any]) -> list[str]:
+def closing_lines(content: ReportedComparison) -> list[str]:
     """What to look at first, in words."""
-    rows = content["rows"]
-    counts = {verdict: sum(row["verdict"] == verdict for row in rows) for verdict in SYMBOLS}
+    rows = content.rows
+    counts = {verdict: sum(row.verdict == verdict for row in rows) for verdict in SYMBOLS}
     said = ", ".join(f"{count} {verdict}" for verdict, count in counts.items() if count)
-    lines = [f"{len(rows)} engine settings, {len(content['runs'])} runs in all: {said}."]
+    lines = [f"{len(rows)} engine settings, {len(content.runs)} runs in all: {said}."]
     shown = list(zip(names(rows), rows, strict=True))
     for name, row in shown:
-        lines += [f"{SYMBOLS[row['verdict']]} {name}: {row['reason']}"] if row["reason"] else []
-        lines += [f"  {cause['sentence']}" for cause in row["diagnosis"]]
-    lines += [f"* {name}: {remark}" for name, row in shown for remark in row["remarks"]]
-    if content["contradictions"]:
+        lines += [f"{SYMBOLS[row.verdict]} {name}: {row.reason}"] if row.reason else []
+        lines += [f"  {told.cause.sentence}" for told in row.diagnosis]
+    lines += [f"* {name}: {remark}" for name, row in shown for remark in row.remarks]
+    if content.contradictions:
         lines.append(
-            f"{len(content['contradictions'])} findings contradict what {content['name']} expects (!! above); first:"
+            f"{len(content.contradictions)} findings contradict what {content.name} expects (!! above); first:"
         )
-        lines += [f"  {sentence}" for sentence in content["contradictions"][:5]]
-    elif any(len(row["expected"]) < len(Verdict) for row in rows):  # else nothing is claimed
+        lines += [f"  {sentence}" for sentence in content.contradictions[:5]]
+    elif any(len(row.expected) < len(Verdict) for row in rows):  # else nothing is claimed
         lines.append("Every verdict is as the comparison file expects.")
-    return [*lines, *caveat_lines(content["rows"]), *said_of(content.get("hosts", {}))]
+    return [*lines, *caveat_lines(content.rows), *said_of(content.hosts)]
 
 
-def part_lines(content: dict[str, Any]) -> list[str]:
+def part_lines(content: ReportContent) -> list[str]:
     """One line for each further study of a report."""
-    pairs = [(kind, entry) for kind in part_kinds() for entry in content[kind.key] if entry["study"] is not None]
-    return [f"{entry['name']}: {kind.line(entry)}." for kind, entry in pairs]
+    pairs = [(kind, entry) for kind in part_kinds() for entry in content.entries[kind.key] if entry.study is not None]
+    return [f"{entry.name}: {kind.line(entry)}." for kind, entry in pairs]
 
 
-def first_lines(content: dict[str, Any]) -> list[str]:
+def first_lines(content: ReportContent) -> list[str]:
     """What to look at first, in at most three lines."""
-    entries = further(content)
-    unexpected = [line for item in (*content["comparisons"], *entries) for line in item["contradictions"]]
-    missing = [entry for entry in entries if entry["missing"]]
+    entries = content.further
+    unexpected = [line for comparison in content.comparisons for line in comparison.contradictions]
+    unexpected += [line for entry in entries for line in entry.contradictions]
+    missing = [entry for entry in entries if entry.missing]
     lines = []
     if unexpected:
         lines.append(_cut(f"Look first at what was not expected ({len(unexpected)}): {unexpected[0]}"))
     if missing:
-        lines.append(_cut(f"Missing ({len(missing)}): {missing[0]['title']}: {missing[0]['missing']}"))
+        lines.append(_cut(f"Missing ({len(missing)}): {missing[0].title}: {missing[0].missing}"))
     if not unexpected:
-        lines.append(_cut(f"Look first at what is silent: {content['findings']['sentences'][1]}"))
+        lines.append(_cut(f"Look first at what is silent: {content.findings.sentences[1]}"))
     return lines
 
 

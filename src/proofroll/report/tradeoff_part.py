@@ -8,12 +8,22 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, ClassVar
 
-from proofroll.report.study_parts import held
+from proofroll.report.study_parts import PartEntry, held
+from proofroll.studies.claimed import ClaimJudgement
 from proofroll.studies.claims import STUDY, TradeoffClaims, load_claims
 
 if TYPE_CHECKING:
     from proofroll.report.study_parts import Tell
     from proofroll.running.runner import Runner
+
+
+@dataclass(frozen=True, kw_only=True)
+class TradeoffEntry(PartEntry):
+    """A study with the quantities that are shown, what to use, and what was claimed."""
+
+    shown: list[str]
+    advice: list[dict[str, Any]]
+    claims: list[ClaimJudgement]
 
 
 @dataclass
@@ -37,9 +47,9 @@ class TradeoffPart:
         return cls(load_claims(path), tuple(engines))
 
     @staticmethod
-    def line(entry: dict[str, Any]) -> str:
+    def line(entry: TradeoffEntry) -> str:
         """How much was measured, and what holds of what was claimed."""
-        return f"{len(entry['study']['points'])} points{held(entry['claims'])}"
+        return f"{len(entry.study['points'])} points{held(entry.claims)}"
 
     @property
     def head(self) -> dict[str, str]:
@@ -71,22 +81,21 @@ class TradeoffPart:
             progress=lambda text: tell(text, 1),
         )  # fmt: skip
 
-    def content(self) -> dict[str, Any]:
-        """The study, what to use, and what was claimed."""
+    def entry(self) -> TradeoffEntry:
+        """See the protocol."""
         from proofroll.report.advice import advice
         from proofroll.report.tradeoff_tables import default_quantities
 
         study = self.study
         assert study is not None  # it was made
-        claims = [] if self.engines else self.asked.judged(study)
-        return {
-            "study": study,
-            "shown": default_quantities(study),
-            "advice": advice(study, self.asked),
-            "claims": [claim._asdict() for claim in claims],
-            "contradictions": [] if self.engines else self.asked.contradictions(study),
-            "lost": [],
-        }
+        return TradeoffEntry(
+            **self.head,
+            study=study,
+            shown=default_quantities(study),
+            advice=advice(study, self.asked),
+            claims=[] if self.engines else self.asked.judged(study),
+            contradictions=[] if self.engines else self.asked.contradictions(study),
+        )
 
     def pictures(self, prefix: str) -> dict[str, str]:
         """The work-precision diagram."""

@@ -9,7 +9,7 @@ from __future__ import annotations
 import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
-from typing import Any, NamedTuple
+from typing import Any
 
 from proofroll.core.comparison import Tolerance
 from proofroll.core.engine_abilities import Level
@@ -20,7 +20,8 @@ from proofroll.studies.wish import Wish
 _Study = Mapping[str, Any]
 
 
-class ClaimJudgement(NamedTuple):
+@dataclass(frozen=True)
+class ClaimJudgement:
     """What a study says of a claim.
 
     Attributes:

@@ -310,9 +310,9 @@ def test_a_point_where_the_truth_refuses(tmp_path: Path) -> None:
         assert run.result.message == "there is no truth here: the ball is back on the wall"
         assert run.result.trajectory is not None
     content = outcome_content(outcome)
-    assert [row["verdict"] for row in content["rows"]] == ["agrees", "agrees"]
-    assert [row["verdicts"]["not-judged"] for row in content["rows"]] == [1, 1]
-    assert content["runs"][1]["reason"].startswith("no truth at speed=4: there is no truth here: the ball")
+    assert [row.verdict for row in content.rows] == ["agrees", "agrees"]
+    assert [row.verdicts["not-judged"] for row in content.rows] == [1, 1]
+    assert content.runs[1].reason.startswith("no truth at speed=4: there is no truth here: the ball")
 
 
 @pytest.mark.parametrize("status", [Status.CRASHED, Status.TIMEOUT])

@@ -13,7 +13,11 @@ if TYPE_CHECKING:
     import xarray as xr
 
     from proofroll.core.observable import Observable
+    from proofroll.report.comparison_records import ReportedComparison
+    from proofroll.report.pen import Picture
+    from proofroll.report.plots import PointCurves
     from proofroll.report.replay import ReplayKind
+    from proofroll.report.report_content import ReportedTruth
     from proofroll.running.store import Store
     from proofroll.studies.outcome import Run
 
@@ -35,24 +39,22 @@ class BallReport:
         return len(scene.elements) == 1 and isinstance(scene.elements[0], BallOnSurface)
 
     @staticmethod
-    def drawings(scenes: Sequence[Scene]) -> tuple[list[dict[str, Any]], str]:
+    def drawings(scenes: Sequence[Scene]) -> tuple[list[Picture], str]:
         """One for all cases: with rolling resistance where any has it."""
         from proofroll.elements.ball_on_surface.report.drawings import overview
 
         shown = max((rolling_ball(scene) for scene in scenes), key=lambda body: body.contact.rolling_resistance)
         labels = ("as a whole", "where the ball touches the wall")
-        found = [
-            item.content() | {"label": label} for item, label in zip(overview(shown.wall, shown), labels, strict=False)
-        ]
+        found = [item.picture(label) for item, label in zip(overview(shown.wall, shown), labels, strict=False)]
         return found, "" if found else f"There is no drawing for a wall of the kind {type(shown.wall).__name__}."
 
     @staticmethod
-    def truth_facts(scene: Scene, dataset: xr.Dataset) -> dict[str, Any]:
+    def truth_facts(scene: Scene, dataset: xr.Dataset) -> onsets.TrueSlips | None:
         """Its slips."""
         return onsets.truth_facts(dataset, scene)
 
     @staticmethod
-    def run_facts(truths: Sequence[Mapping[str, Any]], runs: Sequence[Run], store: Store) -> list[dict[str, Any]]:
+    def run_facts(truths: Sequence[ReportedTruth], runs: Sequence[Run], store: Store) -> list[onsets.RunSlips]:
         """Their slips."""
         return onsets.run_facts(truths, runs, store)
 
@@ -62,7 +64,12 @@ class BallReport:
         return ()
 
     @staticmethod
-    def mark(content: dict[str, Any], curves: list[dict[str, Any]]) -> list[dict[str, Any]]:
+    def sentences(truths: Sequence[ReportedTruth]) -> Sequence[str]:
+        """Where the first slip is ill-posed."""
+        return onsets.ill_posed(truths)
+
+    @staticmethod
+    def mark(content: ReportedComparison, curves: Sequence[PointCurves]) -> Sequence[PointCurves]:
         """First slips on the curve of needed friction."""
         return onsets.mark(content, curves)
 

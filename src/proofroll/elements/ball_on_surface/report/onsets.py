@@ -2,25 +2,29 @@
 
 from __future__ import annotations
 
-import dataclasses
 import json
-from typing import TYPE_CHECKING, Any
+import math
+from dataclasses import dataclass, field, replace
+from typing import TYPE_CHECKING
 
 from proofroll.core.events import Event, events_of
 from proofroll.elements.ball_on_surface.element import rolling_ball
 from proofroll.elements.ball_on_surface.onset_study import onset_verdict as judged_onset
-from proofroll.files.json_data import plain
+from proofroll.files.json_data import OPTIONAL
 from proofroll.files.netcdf import read_some
+from proofroll.report.plots import Bound, Mark, PointCurves
 from proofroll.studies.planning import point_name
 from proofroll.truth.onset import Onset
 
 if TYPE_CHECKING:
-    from collections.abc import Mapping, Sequence
+    from collections.abc import Sequence
     from pathlib import Path
 
     import xarray as xr
 
     from proofroll.core.scene import Scene
+    from proofroll.report.comparison_records import ReportedComparison
+    from proofroll.report.report_content import ReportedTruth
     from proofroll.running.store import Store
     from proofroll.studies.outcome import Run
 
@@ -28,68 +32,92 @@ if TYPE_CHECKING:
 CURVE = "needed_friction"
 
 
-def truth_facts(dataset: xr.Dataset, scene: Scene) -> dict[str, Any]:
-    """What the report says of the truth's slips; nothing where friction has no bound."""
+@dataclass(frozen=True)
+class TrueSlips:
+    """What the report says of the truth's slips: the bounds of friction, the first slip and all events."""
+
+    mu_static: float | None
+    mu_kinetic: float | None
+    onset: Onset
+    events: list[Event]
+
+
+@dataclass(frozen=True)
+class RunSlips:
+    """The events of a run, and where friction is bounded what its first slip is to the truth's."""
+
+    events: list[Event]
+    onset_verdict: str | None = field(default=None, metadata=OPTIONAL)
+
+
+def truth_facts(dataset: xr.Dataset, scene: Scene) -> TrueSlips | None:
+    """The truth's slips; None where friction has no bound."""
     if "onset" not in dataset.attrs:
-        return {}
+        return None
     contact = rolling_ball(scene).contact
-    return {
-        "mu_static": contact.mu_static,
-        "mu_kinetic": contact.mu_kinetic,
-        "onset": json.loads(dataset.attrs["onset"]),
-        "events": [dataclasses.asdict(event) for event in events_of(dataset)],
-    }
+    onset = Onset(**json.loads(dataset.attrs["onset"]))
+    return TrueSlips(contact.mu_static, contact.mu_kinetic, onset, events_of(dataset))
 
 
-def run_facts(truths: Sequence[Mapping[str, Any]], runs: Sequence[Run], store: Store) -> list[dict[str, Any]]:
-    """The ``events`` of each run, and where friction is bounded the ``onset_verdict``.
+def run_facts(truths: Sequence[ReportedTruth], runs: Sequence[Run], store: Store) -> list[RunSlips]:
+    """The slips of each run.
 
     Args:
         truths: of a comparison, with their :func:`truth_facts`.
         runs: of the comparison.
         store: where the trajectories are.
     """
-    known = {truth["point"]: Onset(**truth["onset"]) for truth in truths if "onset" in truth}
+    known = {truth.point: truth.own.onset for truth in truths if truth.own is not None}
     return [_run_facts(known.get(point_name(run.parameters)), run, store) for run in runs]
 
 
-def _run_facts(truth: Onset | None, run: Run, store: Store) -> dict[str, Any]:
+def _run_facts(truth: Onset | None, run: Run, store: Store) -> RunSlips:
     if truth is None:
-        return {"events": []}
+        return RunSlips([])
     events = []
     if run.case is not None and run.result.trajectory is not None and store.trajectory(run.case).is_file():
         events = _events(store.trajectory(run.case))
     first = next((event for event in events if event.kind == "slip"), None)
-    told = [plain(dataclasses.asdict(event)) for event in events]
-    return {"events": told, "onset_verdict": judged_onset(truth, run.result, first)}
+    return RunSlips(events, judged_onset(truth, run.result, first))
 
 
-def mark(content: dict[str, Any], curves: list[dict[str, Any]]) -> list[dict[str, Any]]:
+def ill_posed(truths: Sequence[ReportedTruth]) -> list[str]:
+    """Where the time of the first slip hangs on less than the parameters are known to."""
+    onsets = [(truth.point, truth.own.onset) for truth in truths if truth.own is not None]
+    found = [(point, onset) for point, onset in onsets if onset.verdict == "ill-posed"]
+    if not found:
+        return []
+    known = f"{100 * found[0][1].uncertainty:.3g} %"
+    where = "; ".join(point for point, _ in found)
+    return [
+        f"In {len(found)} of {len(onsets)} cases the first slip is ill-posed ({where}): a change of the friction or "
+        f"the rolling resistance by {known} makes it, removes it or moves it to another rise of the needed friction. "
+        "No setting is judged there."
+    ]
+
+
+def mark(content: ReportedComparison, curves: Sequence[PointCurves]) -> list[PointCurves]:
     """The curves of a comparison with the bounds of friction and every first slip on that of needed friction."""
-    marked = []
-    for entry in curves:
-        truth = next((t for t in content["truths"] if t["point"] == entry["point"] and "onset" in t), None)
-        observables = entry["observables"]
-        if truth is not None:
-            runs = [(-1, truth)] + [(run["row"], run) for run in content["runs"] if run["point"] == entry["point"]]
-            firsts = [(row, first_slip(item["events"])) for row, item in runs]
-            bounds = {"static": truth["mu_static"], "kinetic": truth["mu_kinetic"]}
-            added = {
-                "marks": [{"row": row, "time": first["time"]} for row, first in firsts if first is not None],
-                "bounds": [
-                    {"name": f"μ {name}", "value": value}
-                    for name, value in bounds.items()
-                    if value is not None and (name == "static" or value != bounds["static"])
-                ],
-            }
-            observables = [{**item, **added} if item["name"] == CURVE else item for item in observables]
-        marked.append({**entry, "observables": observables})
-    return marked
+    truths = content.evidence.truths if content.evidence else []
+    slips = {truth.point: truth.own for truth in truths if truth.own is not None}
+    return [_marked(content, entry, slips[entry.point]) if entry.point in slips else entry for entry in curves]
 
 
-def first_slip(events: list[dict[str, Any]]) -> dict[str, Any] | None:
+def _marked(content: ReportedComparison, curves: PointCurves, truth: TrueSlips) -> PointCurves:
+    runs = [(-1, truth), *((run.row, run.own) for run in content.runs if run.point == curves.point)]
+    firsts = [(row, first_slip(slips.events)) for row, slips in runs]
+    marks = [Mark(row, first.time) for row, first in firsts if first is not None]
+    named = {"static": truth.mu_static, "kinetic": truth.mu_kinetic if truth.mu_kinetic != truth.mu_static else None}
+    bounds = [Bound(f"μ {name}", value) for name, value in named.items() if value is not None]
+    observables = [
+        replace(item, marks=marks, bounds=bounds) if item.name == CURVE else item for item in curves.observables
+    ]
+    return replace(curves, observables=observables)
+
+
+def first_slip(events: Sequence[Event]) -> Event | None:
     """The first slip that has a time."""
-    return next((event for event in events if event["kind"] == "slip" and event["time"] is not None), None)
+    return next((event for event in events if event.kind == "slip" and math.isfinite(event.time)), None)
 
 
 def _events(path: Path) -> list[Event]:

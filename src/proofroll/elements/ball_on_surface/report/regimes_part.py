@@ -8,6 +8,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any, ClassVar
 
 from proofroll.elements.ball_on_surface.regimes_study import STUDY, RegimesStudy, load_regimes, regime_maps
+from proofroll.report.study_parts import PartEntry
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -36,9 +37,9 @@ class RegimesPart:
         return cls(load_regimes(str(path)))
 
     @staticmethod
-    def line(entry: dict[str, Any]) -> str:
+    def line(entry: PartEntry) -> str:
         """How many runs became what."""
-        maps = entry["study"]["maps"]
+        maps = entry.study["maps"]
         total = {word: sum(item["counts"][word] for item in maps) for word in maps[0]["counts"]}
         return ", ".join(f"{count} {word}" for word, count in total.items())
 
@@ -59,13 +60,13 @@ class RegimesPart:
         """The maps, briefly."""
         self.maps = regime_maps(self.asked.briefly(), runner.jobs, lambda _: tell("runs of the truth", 0))
 
-    def content(self) -> dict[str, Any]:
+    def entry(self) -> PartEntry:
         """Counts and analytic boundaries."""
         from proofroll.elements.ball_on_surface.report.regime_map import counts
 
         maps = counts(self.maps)
         left_out = self.asked.runs - sum(item["runs"] for item in maps)
-        return {"study": {"maps": maps, "left_out": left_out}, "contradictions": [], "lost": []}
+        return PartEntry(**self.head, study={"maps": maps, "left_out": left_out})
 
     def pictures(self, prefix: str) -> dict[str, str]:
         """All maps side by side."""

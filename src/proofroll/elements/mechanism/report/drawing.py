@@ -115,7 +115,7 @@ def _gravity(picture: Drawing, at: View, element: MechanismElement) -> None:
     gravity = np.array(element.mechanism.gravity)
     if not np.any(gravity):
         return
-    x, y, width, _ = picture.content()["box"]
+    x, y, width, _ = picture.box
     along = at(gravity / np.linalg.norm(gravity)) / at.scale
     place = np.array([x + width + 14.0, y + 10.0])
     ends = np.stack([place, place + _GRAVITY * along])

@@ -12,7 +12,11 @@ if TYPE_CHECKING:
     import xarray as xr
 
     from proofroll.core.observable import Observable
+    from proofroll.report.comparison_records import ReportedComparison
+    from proofroll.report.pen import Picture
+    from proofroll.report.plots import PointCurves
     from proofroll.report.replay import ReplayKind
+    from proofroll.report.report_content import ReportedTruth
     from proofroll.running.store import Store
     from proofroll.studies.outcome import Run
 
@@ -35,23 +39,22 @@ class MechanismReport:
         return len(scene.elements) == 1 and isinstance(scene.elements[0], MechanismElement)
 
     @staticmethod
-    def drawings(scenes: Sequence[Scene]) -> tuple[list[dict[str, Any]], str]:
+    def drawings(scenes: Sequence[Scene]) -> tuple[list[Picture], str]:
         """The first case at its start."""
         from proofroll.elements.mechanism.report.drawing import drawn
 
         element = scenes[0].elements[0]
         assert isinstance(element, MechanismElement)  # it covers no other
-        return [drawn(element).content() | {"label": "at the start"}], ""
+        return [drawn(element).picture("at the start")], ""
 
     @staticmethod
-    def truth_facts(scene: Scene, dataset: xr.Dataset) -> dict[str, Any]:  # noqa: ARG004 -- the protocol's
+    def truth_facts(scene: Scene, dataset: xr.Dataset) -> None:
         """Nothing besides its route and error bars."""
-        return {}
 
     @staticmethod
-    def run_facts(truths: Sequence[Mapping[str, Any]], runs: Sequence[Run], store: Store) -> list[dict[str, Any]]:  # noqa: ARG004 -- the protocol's
+    def run_facts(truths: Sequence[ReportedTruth], runs: Sequence[Run], store: Store) -> list[None]:  # noqa: ARG004 -- the protocol's
         """Nothing."""
-        return [{} for _ in runs]
+        return [None] * len(runs)
 
     @staticmethod
     def curves(scene: Scene, truth: xr.Dataset) -> Sequence[Observable]:
@@ -63,7 +66,12 @@ class MechanismReport:
         return reactions(element, truth)
 
     @staticmethod
-    def mark(content: dict[str, Any], curves: list[dict[str, Any]]) -> list[dict[str, Any]]:  # noqa: ARG004 -- the protocol's
+    def sentences(truths: Sequence[ReportedTruth]) -> Sequence[str]:  # noqa: ARG004 -- the protocol's
+        """None."""
+        return ()
+
+    @staticmethod
+    def mark(content: ReportedComparison, curves: Sequence[PointCurves]) -> Sequence[PointCurves]:  # noqa: ARG004 -- the protocol's
         """The curves as they are."""
         return curves
 

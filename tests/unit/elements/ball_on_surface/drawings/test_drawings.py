@@ -10,6 +10,7 @@ import pytest
 from proofroll.elements.ball_on_surface.element import rolling_ball
 from proofroll.elements.ball_on_surface.report.drawings import Drawing, overview
 from proofroll.elements.ball_on_surface.report.drawings.surfaces import overview as by_kind
+from proofroll.files.json_data import plain
 from proofroll.files.scene_file import load_scene
 from proofroll.report.pen import View, circle, turn
 
@@ -17,7 +18,7 @@ from proofroll.report.pen import View, circle, turn
 def drawn(scene: str, **parameters: float) -> list[dict[str, Any]]:
     """The drawings of a scene as plain data."""
     body = rolling_ball(load_scene(scene, **parameters))
-    return [item.content() for item in overview(body.wall, body)]
+    return [plain(item.picture("")) for item in overview(body.wall, body)]
 
 
 def letters(drawing: dict[str, Any]) -> list[str]:
@@ -112,7 +113,7 @@ def test_indices_are_told_from_letters() -> None:
     """What follows a low line is an index, one character long."""
     drawing = Drawing()
     drawing.text((1.0, 2.0), "F_2 = 0")
-    assert drawing.content()["marks"][0]["parts"] == [
+    assert plain(drawing.marks)[0]["parts"] == [
         {"text": "F", "sub": False}, {"text": "2", "sub": True}, {"text": " = 0", "sub": False},
     ]  # fmt: skip
 
