@@ -24,11 +24,11 @@ def listed(context: typer.Context, as_json: Json = False) -> None:
     if context.invoked_subcommand is not None:
         return
     from proofroll.core.plugins import engine_names
-    from proofroll.running.environments import remembered
+    from proofroll.running.environments import remembered, root
 
-    names = [*engine_names(), *(f"{item.name}@{item.label}" for item in remembered())]
+    others = {f"{item.name}@{item.label}": f"in Python {item.interpreter} of its own" for item in remembered()}
     with ThreadPoolExecutor() as pool:
-        found = list(pool.map(_described, names))
+        found = list(pool.map(_described, [*engine_names(), *others]))
     if as_json:
         write_json(found)
         return
@@ -36,21 +36,24 @@ def listed(context: typer.Context, as_json: Json = False) -> None:
 
     from proofroll.report.terminal import console
 
-    table = Table(box=None, pad_edge=False)
-    for column in ("engine", "version", "formulations (settings)", "provides"):
-        table.add_column(column)
+    installed, provided = Table(box=None, pad_edge=False), Table(box=None, pad_edge=False)
+    for table, columns in ((installed, ("engine", "version", "formulations (presets)")), (provided, ("", "provides"))):
+        for column in columns:
+            table.add_column(column)
     for item in found:
+        name = item["name"]
         if item["status"] != "installed":
-            table.add_row(item["name"], item["status"], item["message"], "")
-            continue
-        formulations = "\n".join(f"{name} ({', '.join(presets)})" for name, presets in item["presets"].items())
-        if "@" in item["name"]:
-            table.add_row(item["name"], item["version"], item["interpreter"], "")
-            continue
-        table.add_row(
-            item["name"], item["version"], formulations, "\n".join(sorted(set().union(*item["provides"].values())))
-        )
-    console().print(table)
+            installed.add_row(name, item["status"], item["message"].removeprefix(f"{name}: "))
+        elif name in others:
+            installed.add_row(name, item["version"], others[name])
+        else:
+            formulations = "\n".join(f"{key} ({', '.join(presets)})" for key, presets in item["presets"].items())
+            installed.add_row(name, item["version"].replace(", ", "\n"), formulations)
+            provided.add_row(name, "; ".join(sorted(set().union(*item["provides"].values()))))
+    console().print(installed)
+    console().print(provided)
+    if others:
+        sys.stdout.write(f"Engines with @ are folders NAME/LABEL of {root()}\n")
 
 
 @engines.command()

@@ -112,7 +112,7 @@ def _keep(content: dict[str, Any], page: str, out: Path) -> None:
 
 def _place(engine: str, text: str) -> str:
     """The engine ``NAME`` or ``NAME@PLACE`` that a person means by a version, a label or a path; made if need be."""
-    from proofroll.core.plugins import engine_names, release
+    from proofroll.core.plugins import engine_names
     from proofroll.running import environments
     from proofroll.running.asking import describe
 
@@ -122,7 +122,7 @@ def _place(engine: str, text: str) -> str:
         raise InputError("version", text, f"no environment of {engine} has this label; see proofroll engines")
     if engine in engine_names():
         with contextlib.suppress(ProofrollError):  # it is not installed here
-            if release(describe(engine).version) == release(text):
+            if f"{describe(engine).version}.".startswith(f"{text}."):  # 1.13 means 1.13.6 if that is what is here
                 return engine
     return _made(engine, text)
 

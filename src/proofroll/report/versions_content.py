@@ -107,7 +107,7 @@ def short(setting: str) -> str:
 
 def lines(content: Mapping[str, Any], most: int | None = _MOST) -> Iterator[str]:
     """What changed, in sentences; ``!!`` before those that decide the exit code."""
-    yield from _some([f"!! {sentence}" for sentence in content["changed"]], most)
+    yield from _some([f"!! {sentence}" for sentence in _changes(content)], most)
     orders = [
         f"{row['comparison']}: {short(row['setting'])}: observed order of {order['quantity']} "
         f"{order['old']:.2f} → {order['new']:.2f}"
@@ -115,17 +115,29 @@ def lines(content: Mapping[str, Any], most: int | None = _MOST) -> Iterator[str]
         for order in row["orders"][:1]
     ]
     yield from _some(orders, most)
-    defaults = [
-        f"default {item['name']}: {_value(item['old'])} → {_value(item['new'])}" for item in content["defaults"]
-    ]
-    yield from _some(defaults, most)
+    came, went = ([item for item in content["defaults"] if item[side] is None] for side in ("old", "new"))
+    stayed = [item for item in content["defaults"] if item not in came and item not in went]
+    yield from _some([f"default {item['name']}: {item['old']} → {item['new']}" for item in stayed], most)
+    if came or went:
+        yield f"{len(came)} options are new and {len(went)} are gone, renamed ones among them."
     yield from (f"?? {sentence}" for sentence in content["lost"])
     yield from said_of(content["hosts"])
     yield answer(content)
 
 
-def _value(value: Any) -> str:
-    return "none" if value is None else str(value)
+def _changes(content: Mapping[str, Any]) -> list[str]:
+    """What changed of verdicts, each said once with the points at which it did."""
+    if content["robot"] is not None:
+        return list(content["changed"])
+    points: dict[tuple[str, str, str], list[str]] = {}
+    for case in content["cases"]:
+        for sentence in case["changed"]:
+            points.setdefault((case["comparison"], short(case["setting"]), sentence), []).append(case["point"])
+    return [
+        f"{comparison}: {setting}: {what}"
+        + (f", at {len(at)} points" if len(at) > 1 else f", at {at[0]}" * bool(at[0]))
+        for (comparison, setting, what), at in points.items()
+    ]
 
 
 def _some(sentences: list[str], most: int | None) -> Iterator[str]:

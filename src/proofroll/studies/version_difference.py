@@ -107,7 +107,7 @@ class CaseDifference:
         old, new: how it went.
         numbers: how far they are apart; None where one has no trajectory.
         orders: observed orders that changed.
-        changed: sentences about verdicts that did.
+        changed: what did of verdicts, ``refused (why) → agrees``.
     """
 
     comparison: str
@@ -125,8 +125,6 @@ def case_difference(
     item: Plan, before: Run, after: Run, results: Mapping[str, Result], runner: Runner
 ) -> CaseDifference:
     """One case in both versions."""
-    setting, point = setting_of(before), point_name(before.parameters)
-    where = f"{item.comparison.name}: {setting}" + (f" at {point}" if point else "")
     verdicts = [
         (one.observable, one.verdict, other.verdict)
         for one in before.judgements
@@ -135,10 +133,10 @@ def case_difference(
     ]
     changed = []
     if before.result.status != after.result.status:
-        changed.append(f"{where}: {_ending(before)} → {_ending(after)}")
+        changed.append(f"{_ending(before)} → {_ending(after)}")
     elif before.verdict != after.verdict or verdicts:
         which = ", ".join(f"{name} {one} → {other}" for name, one, other in verdicts)
-        changed.append(f"{where}: {which or f'{before.verdict} → {after.verdict}'}")
+        changed.append(which or f"{before.verdict} → {after.verdict}")
     orders = [
         OrderChange(one.observable, one.order, other.order)
         for one in before.judgements
@@ -149,8 +147,8 @@ def case_difference(
     return CaseDifference(
         comparison=item.comparison.name,
         scene=item.comparison.scene,
-        setting=setting,
-        point=point,
+        setting=setting_of(before),
+        point=point_name(before.parameters),
         old=RunInVersion.of(before),
         new=RunInVersion.of(after),
         numbers=_numbers(item, before, after, results, runner),

@@ -101,14 +101,18 @@ def compared(
         "defaults": _defaults(*told),
         "hosts": hosts(run.result for _, *pair in found for run in pair),
         "robot": None,
-        "changed": [sentence for case in differences for sentence in case.changed],
+        "changed": [f"{_where(case)}: {what}" for case in differences for what in case.changed],
         "lost": [
-            f"{name} {case.setting} at {case.point or 'its only point'}: {side.message}"
+            f"{name} {_where(case)}: {side.message}"
             for case in differences
             for name, side in (("old", case.old), ("new", case.new))
             if side.status == Status.MISSING
         ],
     }
+
+
+def _where(case: CaseDifference) -> str:
+    return f"{case.comparison}: {case.setting}" + (f" at {case.point}" if case.point else "")
 
 
 def _side(name: str, told: EngineDescription) -> dict[str, Any]:

@@ -42,6 +42,7 @@ def simulation_settings(settings: ExudynSettings, *, dependent: bool = False, im
         time.minimumStepSize = settings.dt / 2 ** (settings.halvings + (_FOR_IMPACTS if impacts else 0))
     time.newton.relativeTolerance = settings.newton_tolerance
     time.newton.absoluteTolerance = settings.newton_tolerance / 100
+    time.newton.useModifiedNewton = True  # in 1.11 it is off by default, and every difference from 1.13 comes from that
     time.newton.modifiedNewtonJacUpdatePerStep = settings.jacobian == "step"
     alpha = time.generalizedAlpha
     if settings.spectral_radius is not None:
