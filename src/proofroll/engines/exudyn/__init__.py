@@ -22,7 +22,7 @@ from proofroll.core.events import Event
 from proofroll.core.scene import Scene
 from proofroll.elements.ball_on_surface.element import rolling_ball
 from proofroll.elements.ball_on_surface.model import ALL_OF_A_BALL, ROLLS, BallCapability, RollingBall
-from proofroll.elements.mechanism.sampling import MechanismBuilt
+from proofroll.elements.mechanism.sampling import MechanismBuilt, mechanism_of
 from proofroll.engines.exudyn import redundant, tree
 from proofroll.engines.exudyn.carrier import Carrier
 from proofroll.engines.exudyn.contact import PenaltyContact
@@ -158,10 +158,11 @@ class Exudyn:
     @classmethod
     def reproducer(cls, scene: Scene, settings: ExudynSettings) -> str:
         """See :class:`proofroll.core.engine_abilities.Reproduces`."""
-        from proofroll.engines.exudyn.reproducer import source
+        from proofroll.engines.exudyn.reproducer import mechanism, source
 
         if settings.formulation in OF_MECHANISMS:
-            raise Refused("mechanisms have no program with Exudyn alone")
+            model = OF_MECHANISMS[settings.formulation](scene, settings)
+            return mechanism.source(model, mechanism_of(scene), settings)
         body = rolling_ball(scene)
         return source(MODELS[settings.formulation](body, settings), body, settings)
 

@@ -71,6 +71,15 @@ class Redundant:
         """Exudyn's own system, and its numbers of the bodies."""
         return self._system, self._bodies
 
+    @property
+    def system(self) -> Any:
+        """Exudyn's own system."""
+        return self._system
+
+    def marker(self, body: str, position: Any) -> Any:
+        """A marker at a place in a body's frame."""
+        return self._connections.marker(body, position, np.eye(3))
+
     def _add_bodies(self) -> None:
         system, motion = self._system, Tree(self._mechanism).at(*self._mechanism.start())
         for number, body in enumerate(self._mechanism.bodies):

@@ -47,10 +47,10 @@ class KinematicTree:
             for joint in mechanism.joints
         }
         self._tree = self._system.AddObject(self._kinematic_tree())
-        ground = self._system.CreateGround()
+        self._ground = self._system.CreateGround()
         for spring in mechanism.springs:
             ends = ((spring.body_a, spring.position_a), (spring.body_b, spring.position_b))
-            markers = [self._marker(ground, body, np.array(position)) for body, position in ends]
+            markers = [self.marker(body, np.array(position)) for body, position in ends]
             self._system.AddObject(
                 items.ObjectConnectorSpringDamper(
                     markerNumbers=markers,
@@ -108,9 +108,15 @@ class KinematicTree:
         R, p = self._frames[body]
         return [float(x) for x in p + R @ position]
 
-    def _marker(self, ground: Any, body: str, position: Array) -> Any:
+    @property
+    def system(self) -> Any:
+        """Exudyn's own system."""
+        return self._system
+
+    def marker(self, body: str, position: Any) -> Any:
+        """A marker at a place in a body's frame."""
         if body == WORLD:
-            return self._system.AddMarker(items.MarkerBodyRigid(bodyNumber=ground, localPosition=position.tolist()))
+            return self._system.AddMarker(items.MarkerBodyRigid(bodyNumber=self._ground, localPosition=list(position)))
         return self._system.AddMarker(
             items.MarkerKinematicTreeRigid(
                 objectNumber=self._tree, linkNumber=self._link[body], localPosition=self._in_link(body, position)

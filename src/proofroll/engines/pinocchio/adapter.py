@@ -120,10 +120,10 @@ class Pinocchio:
     @classmethod
     def reproducer(cls, scene: Scene, settings: PinocchioSettings) -> str:
         """See :class:`proofroll.core.engine_abilities.Reproduces`."""
-        from proofroll.engines.pinocchio.reproducer import source
+        from proofroll.engines.pinocchio.reproducer import mechanism, source
 
         if settings.formulation in OF_MECHANISMS:
-            raise Refused("the integrator around Pinocchio's terms is proofroll's")
+            return mechanism.source(MechanismRun.build(scene, settings), settings)
         return source(rolling_ball(scene), _decided(scene, settings))
 
     def advance(self, t: float) -> None:

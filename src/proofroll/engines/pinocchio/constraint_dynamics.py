@@ -28,7 +28,12 @@ _ACCURACY = 1e-14
 
 
 class ConstraintDynamics:
-    """Accelerations and reactions of a tree with Pinocchio's rigid constraints."""
+    """Accelerations and reactions of a tree with Pinocchio's rigid constraints.
+
+    Attributes:
+        constraints: Pinocchio's.
+        proximal: accuracy, μ and most iterations of its method.
+    """
 
     provides: ClassVar[frozenset[str]] = frozenset(PROVIDES - ALL_LOOPS | _POINTS)
     lacking: ClassVar[Mapping[str, str]] = {**LACKING, **dict.fromkeys(ALL_LOOPS - _POINTS, _NO_ROWS)}
@@ -36,8 +41,9 @@ class ConstraintDynamics:
     def __init__(self, tree: JointTree, rows: LoopRows, settings: PinocchioSettings) -> None:  # noqa: ARG002 -- as others
         self._tree, self._model = tree, tree.model
         assert settings.proximal is not None  # see the settings
-        self._proximal = pin.ProximalSettings(_ACCURACY, settings.proximal, _ITERATIONS)
-        self._constraints, self._loops = pin.StdVec_RigidConstraintModel(), []
+        self.proximal = _ACCURACY, settings.proximal, _ITERATIONS
+        self._proximal = pin.ProximalSettings(*self.proximal)
+        self.constraints, self._loops = pin.StdVec_RigidConstraintModel(), []
         for number, (loop, (a, b)) in enumerate(zip(tree.mechanism.loops, tree.loops, strict=True)):
             for along in held_points(tree.mechanism, loop):
                 ends: list[Any] = []
@@ -45,7 +51,7 @@ class ConstraintDynamics:
                     on = self._model.frames[frame]
                     ends += [on.parentJoint, on.placement * pin.SE3(np.eye(3), np.array([0.0, 0.0, along]))]
                 kind = pin.ContactType.CONTACT_3D
-                self._constraints.append(pin.RigidConstraintModel(kind, self._model, *ends, pin.LOCAL))
+                self.constraints.append(pin.RigidConstraintModel(kind, self._model, *ends, pin.LOCAL))
                 self._loops.append(number)
         self._results = self._new_results()
         self._ready: Any = None  # the data that the results belong to
@@ -58,7 +64,7 @@ class ConstraintDynamics:
 
     def _new_results(self) -> Any:
         results = pin.StdVec_RigidConstraintData()
-        for constraint in self._constraints:
+        for constraint in self.constraints:
             results.append(constraint.createData())
         return results
 
@@ -73,9 +79,9 @@ class ConstraintDynamics:
             with_pulls = pin.rnea(model, data, q, rest, rest, tree.pulls(data)).copy()
             tau = tau + pin.rnea(model, data, q, rest, rest) - with_pulls
         if self._ready is not data:
-            pin.initConstraintDynamics(model, data, self._constraints, self._results)
+            pin.initConstraintDynamics(model, data, self.constraints, self._results)
             self._ready = data
-        found: Array = pin.constraintDynamics(model, data, q, v, tau, self._constraints, self._results, self._proximal)
+        found: Array = pin.constraintDynamics(model, data, q, v, tau, self.constraints, self._results, self._proximal)
         return found
 
     def reactions(self, data: Any, q: Array, v: Array) -> tuple[Array, Any]:
@@ -107,5 +113,5 @@ class ConstraintDynamics:
             return np.zeros((0, self._model.nv))
         self.acceleration(data, q, v)
         pin.computeJointJacobians(self._model, data, q)
-        J = pin.getConstraintsJacobian(self._model, data, self._constraints, self._results)
+        J = pin.getConstraintsJacobian(self._model, data, self.constraints, self._results)
         return np.reshape(J, (-1, self._model.nv))

@@ -35,6 +35,7 @@ class JointTree:
         q0, v0: configuration and velocity at time 0.
         joint: Pinocchio's joint of each of the mechanism's joints; that of the carrying joint where it is fixed.
         body, at_joint: Pinocchio's frames of the bodies, and of the joints on their children.
+        loops, springs: the frames at their two ends, after each spring itself.
     """
 
     def __init__(self, mechanism: Mechanism) -> None:
@@ -69,7 +70,7 @@ class JointTree:
             )
             for loop in mechanism.loops
         ]
-        self._springs = [
+        self.springs = [
             (
                 spring,
                 self._attached(carried, f"{spring.name} a", spring.body_a, spring.position_a, np.eye(3)),
@@ -104,7 +105,7 @@ class JointTree:
         self._damping = np.array([joint.damping for joint in by_velocity])
         sprung = zip(joints, self.mechanism.q_slices, self.mechanism.v_slices, strict=True)
         self._sprung = [(joint.stiffness, joint.rest, at_q, at_v) for joint, at_q, at_v in sprung if joint.stiffness]
-        self.has_springs = bool(self._springs)
+        self.has_springs = bool(self.springs)
         self._constant = not self._sprung and not self._damping.any()
 
     def drives(self, q: Array, v: Array) -> Array:
@@ -119,7 +120,7 @@ class JointTree:
     def pulls(self, data: Any) -> Any:
         """Forces of springs on Pinocchio's joints, in their axes; positions and velocities are in ``data``."""
         forces = self.no_forces()
-        for spring, a, b in self._springs:
+        for spring, a, b in self.springs:
             between = data.oMf[b].translation - data.oMf[a].translation
             length = float(np.sqrt(between @ between))
             along = between / length

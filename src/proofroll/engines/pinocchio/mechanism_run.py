@@ -33,7 +33,7 @@ class MechanismRun:
         self._nq = self._model.nq
         rows = LoopRows(self.tree)
         self.dynamics: NullSpace | ConstraintDynamics = kind(self.tree, rows, settings)
-        self._rows = rows
+        self._rows, self.rank = rows, rows.rank
         self._turns = self._nq != self._model.nv  # configurations hold quaternions
         self._eliminates = settings.projection and bool(rows.rank)
         start = np.concatenate([self.tree.q0, self.tree.v0])

@@ -1,4 +1,4 @@
-"""Writes the program that shows what Exudyn does with a ball on a wall, without proofroll."""
+"""Writes the program that shows what Exudyn does without proofroll; of mechanisms see :mod:`mechanism`."""
 
 from __future__ import annotations
 
@@ -19,12 +19,14 @@ from proofroll.engines.exudyn.reproducer.text import (
     BALL,
     BALL_STATE,
     CARRIER,
+    CONSISTENT,
     CONTACT,
     GENERIC,
     GENERIC_STATE,
     RESISTANCE,
     ROLLING_DISC,
-    SOLVER,
+    RUN,
+    SETTINGS,
 )
 from proofroll.engines.exudyn.rolling_disc import RollingDisc
 from proofroll.engines.exudyn.settings import ExudynSettings
@@ -73,7 +75,9 @@ def source(model: Any, body: RollingBall, settings: ExudynSettings) -> str:
         + "\nexu.config.printToConsole = False\nmbs = exu.SystemContainer().AddSystem()\n"
         + ("" if generic else BALL + (RESISTANCE if resists else ""))
         + parts[type(model)]
-        + SOLVER
+        + SETTINGS
+        + CONSISTENT
+        + RUN
         + (GENERIC_STATE if generic else BALL_STATE)
     )
 

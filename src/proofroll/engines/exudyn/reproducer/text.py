@@ -154,7 +154,7 @@ mbs.AddObject(items.CoordinateVectorConstraint(
 
 GENERIC_STATE = """
 
-def state_of_ball():
+def seen():
     \"\"\"Centre, velocity and angular velocity in the world.\"\"\"
     q, rates = mbs.systemData.GetODE2Coordinates(), mbs.systemData.GetODE2Coordinates_t()
     p = np.array(POSITION)
@@ -171,7 +171,7 @@ def state_of_ball():
 """
 
 
-SOLVER = """
+SETTINGS = """
 mbs.Assemble()
 
 settings = exu.SimulationSettings()
@@ -189,10 +189,12 @@ integration.newton.absoluteTolerance = NEWTON_TOLERANCE / 100
 integration.newton.modifiedNewtonJacUpdatePerStep = NEW_JACOBIAN
 alpha = integration.generalizedAlpha
 alpha.useNewmark = alpha.useIndex2Constraints = TRAPEZOIDAL
-if not TRAPEZOIDAL:
+if SPECTRAL_RADIUS is not None:
     alpha.spectralRadius = SPECTRAL_RADIUS
 solver = exu.MainSolverImplicitSecondOrder()
-if ACCELERATIONS:
+"""
+
+CONSISTENT = """if ACCELERATIONS:
     # Consistent with constraints that turn with the ball, of which Exudyn cannot know.
     alpha.computeInitialAccelerations = False
     mbs.systemData.SetODE2Coordinates_tt(ACCELERATIONS, exu.ConfigurationType.Initial)
@@ -200,10 +202,12 @@ if not solver.InitializeSolver(mbs, settings):
     raise SystemExit("Exudyn does not accept the model")
 if ACCELERATIONS:
     mbs.systemData.SetAECoordinates(MULTIPLIERS, exu.ConfigurationType.Current)
+"""
 
+RUN = """
 
 def run(times):
-    \"\"\"Centre, velocity and angular velocity of the ball in the world at each time.\"\"\"
+    \"\"\"What is followed, at each time.\"\"\"
     now = 0.0
     for t in times:
         steps = round((t - now) / STEP_SIZE)
@@ -220,13 +224,13 @@ def run(times):
                 words = " ".join(str(solver.GetErrorString()).split()) or "it gives no reason"
                 raise RuntimeError(f"at {solver.it.currentTime:g} s: {words}")
             now = t
-        yield state_of_ball()
+        yield seen()
 """
 
 
 BALL_STATE = """
 
-def state_of_ball():
+def seen():
     \"\"\"Centre, velocity and angular velocity in the world.\"\"\"
     kinds = (exu.OutputVariableType.Position, exu.OutputVariableType.Velocity, exu.OutputVariableType.AngularVelocity)
     return tuple(np.array(mbs.GetNodeOutput(node, kind)) for kind in kinds)

@@ -1,0 +1,122 @@
+"""A program that runs a mechanism in Exudyn alone: all items of its system, as Exudyn itself lists them."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+
+from proofroll.elements.mechanism import Mechanism
+from proofroll.engines.exudyn.native import exu
+from proofroll.engines.exudyn.reproducer.text import RUN, SETTINGS
+from proofroll.engines.exudyn.settings import EXPLICIT, ExudynSettings
+
+_SYSTEM = """
+exu.config.printToConsole = False
+mbs = exu.SystemContainer().AddSystem()
+for add, items in ((mbs.AddNode, NODES), (mbs.AddObject, OBJECTS), (mbs.AddMarker, MARKERS), (mbs.AddLoad, LOADS)):
+    for item in items:
+        add(item)
+"""
+_EXPLICIT = """integration.solverType = exu.DynamicSolverType.{kind}
+solver = exu.MainSolverExplicit()
+"""
+_DEPENDENT = """settings.linearSolver.solverType = exu.LinearSolverType.EigenDense
+settings.linearSolver.ignoreSingularJacobian = True
+"""
+_START = """if not solver.InitializeSolver(mbs, settings):
+    raise SystemExit("Exudyn does not accept the model")
+"""
+_STATE = '''
+
+def told(number, kind):
+    """What Exudyn says of an object; 0 where it has no such quantity."""
+    output, item = getattr(exu.OutputVariableType, kind), OBJECTS[number]
+    if item["objectType"] == "RigidBody":
+        return mbs.GetObjectOutputBody(number, output, [0, 0, 0])
+    return mbs.GetObjectOutput(number, output)
+
+
+def seen():
+    """Places [m], energy [J] and how far joints and loops are open [m]."""
+    where = exu.OutputVariableType.Position, exu.ConfigurationType.Current
+    energy, opened = 0.0, 0.0
+    for number, item in enumerate(OBJECTS):
+        kind = item["objectType"]
+        if kind == "RigidBody":
+            weight = item["mass"] * np.array(GRAVITY)
+            energy += told(number, "KineticEnergy") - weight @ told(number, "Position")
+        elif kind.startswith("Connector"):
+            energy += told(number, "PotentialEnergy")
+        elif kind.startswith("Joint"):
+            held = np.array(item.get("constrainedAxes", [1, 1, 1])[:3])
+            apart = told(number, "Displacement" if kind == "JointSpherical" else "DisplacementLocal")
+            opened = max(opened, np.abs(held * apart).max())
+        elif kind == "KinematicTree":
+            q, v = mbs.systemData.GetODE2Coordinates(), mbs.systemData.GetODE2Coordinates_t()
+            solver.ComputeMassMatrix(mbs, 1.0)
+            energy += v @ solver.GetSystemMassMatrix() @ v / 2
+            energy += np.array(item["jointPControlVector"]) @ (q - item["jointPositionOffsetVector"]) ** 2 / 2
+            heights = [mbs.GetMarkerOutput(marker, *where) @ GRAVITY for marker in CENTRES]
+            energy -= float(np.dot(item["linkMasses"], heights))
+    return [mbs.GetMarkerOutput(marker, *where) for marker in PLACES], float(energy), float(opened)
+'''
+
+
+def source(model: Any, mechanism: Mechanism, settings: ExudynSettings) -> str:
+    """The program's part that runs the model.
+
+    Args:
+        model: of the formulation, at time 0; markers are added to its system.
+        mechanism: that it is.
+        settings: of the adapter.
+    """
+    followed = [(point.body, point.position) for point in mechanism.points]
+    followed = followed or [(body.name, (0.0, 0.0, 0.0)) for body in mechanism.bodies]
+    com = {body.name: body.com for body in mechanism.bodies}
+    system = model.system
+    places = [int(model.marker(body, position)) for body, position in followed]
+    centres = [int(model.marker(joint.child, com[joint.child])) for joint in mechanism.joints]
+    text = ["import exudyn as exu\nimport numpy as np\n\n# The system as Exudyn lists it.\n"]
+    data = system.systemData
+    for name in ("Node", "Object", "Marker", "Load"):
+        count, get = getattr(data, f"NumberOf{name}s")(), getattr(system, f"Get{name}")
+        lines = "".join(f"    {_literal(_essential(get(number)))},\n" for number in range(count))
+        text.append(f"{name.upper()}S = [\n{lines}]\n")
+    text.append(f"GRAVITY = {list(mechanism.gravity)!r}\n# Markers of what is followed, and of the centres of mass.\n")
+    text.append(f"PLACES = {places!r}\nCENTRES = {centres!r}\n")
+    radius = settings.spectral_radius
+    text.append(f"STEP_SIZE = {settings.dt!r}\nHALVINGS = 0\nNEWTON_TOLERANCE = {settings.newton_tolerance!r}\n")
+    text.append(f"NEW_JACOBIAN = {settings.jacobian == 'step'}\nSPECTRAL_RADIUS = {radius!r}\n")
+    text.append(f"TRAPEZOIDAL = {settings.integrator == 'trapezoidal_index2'}\n" + _SYSTEM + SETTINGS)
+    if settings.integrator in EXPLICIT:
+        text.append(_EXPLICIT.format(kind=settings.integrator.upper()))
+    if model.integration.options.linearSolver.ignoreSingularJacobian:
+        text.append(_DEPENDENT)
+    return "".join([*text, _START, RUN, _STATE])
+
+
+def _essential(item: dict[str, Any]) -> dict[str, Any]:
+    """What Exudyn lists of an item, without drawing, name, functions (there are none) and what it lists twice."""
+    twice = {"jointHTs", "referenceHT", "referenceRotation"} | ({"localPosition"} if "localHT" in item else set())
+    return {
+        key: value
+        for key, value in item.items()
+        if not (key.startswith("V") or key in twice or key == "name" or "UserFunction" in key)
+    }
+
+
+def _literal(value: Any) -> str:
+    """A value of Exudyn's as Python writes it."""
+    if isinstance(value, dict):
+        return "{" + ", ".join(f"{key!r}: {_literal(item)}" for key, item in value.items()) + "}"
+    if isinstance(value, np.ndarray):
+        return repr(value.tolist())
+    if hasattr(value, "GetIndex"):
+        return repr(value.GetIndex())
+    if isinstance(value, exu.JointType):
+        return f"exu.JointType.{value.name}"
+    if isinstance(value, (bool, int, float, str)):
+        return repr(value)
+    inner, name = ", ".join(_literal(value[number]) for number in range(len(value))), type(value).__name__
+    return f"exu.{name}([{inner}])" if name.endswith("DList") else f"[{inner}]"
