@@ -161,20 +161,14 @@ class Mujoco:
         if body.flies:
             check_restitution(settings)
         forget_callbacks()
-        spec = read_spec(scene, body, settings.formulation)
-        write_physics(spec, body, settings)
-        _FORMULATIONS[settings.formulation].write(spec, body)
-        return cls(compiled(spec), body, settings)
+        return cls(compiled(_spec(scene, body, settings)), body, settings)
 
     @classmethod
     def model_file(cls, scene: Scene, settings: MujocoSettings) -> str:
         """MJCF, whose keyframe ``start`` is time 0; see :class:`proofroll.core.engine_abilities.WritesModels`."""
         if settings.formulation == "joints":
             return MujocoMechanism.model_file(scene, settings)
-        engine, body = cls._build_ball(scene, settings), rolling_ball(scene)
-        spec = read_spec(scene, body, settings.formulation)
-        write_physics(spec, body, settings)
-        _FORMULATIONS[settings.formulation].write(spec, body)
+        engine, spec = cls._build_ball(scene, settings), _spec(scene, rolling_ball(scene), settings)
         for key in list(spec.keys):
             spec.delete(key)
         data = engine._data
@@ -192,13 +186,9 @@ class Mujoco:
             from proofroll.engines.mujoco.reproducer import mechanism
 
             return mechanism.source(MujocoMechanism.model_file(scene, settings), mechanism_of(scene))
-        body = rolling_ball(scene)
-        built = cls._build_ball(scene, settings)
-        spec = read_spec(scene, body, settings.formulation)
-        write_physics(spec, body, settings)
-        _FORMULATIONS[settings.formulation].write(spec, body)
+        built, spec = cls._build_ball(scene, settings), _spec(scene, rolling_ball(scene), settings)
         compiled(spec)
-        return source(spec.to_xml(), built._model, built._data, body, settings)
+        return source(spec.to_xml(), built._model, built._data, built._body, settings)
 
     def advance(self, t: float) -> None:
         """See :class:`proofroll.core.engine.Engine`."""
@@ -300,3 +290,11 @@ class Mujoco:
             for _ in range(EVALUATIONS if self._body.contact.rolling_resistance else 1):
                 self._formulation.evaluate(self._scratch)
         return self._scratch
+
+
+def _spec(scene: Scene, body: RollingBall, settings: MujocoSettings) -> Any:
+    """The model with all its numbers, before it is compiled."""
+    spec = read_spec(scene, body, settings.formulation)
+    write_physics(spec, body, settings)
+    _FORMULATIONS[settings.formulation].write(spec, body)
+    return spec

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Annotated, Literal
 
 import mujoco
@@ -246,7 +246,7 @@ def _check_friction_damping(settings: MujocoSettings) -> None:
         raise InputError("mujoco: friction_damping", value, "curvature=true sets what the slip needs; leave it out")
 
 
-def _obvious(formulation: Literal["free", "facets"]) -> MujocoSettings:
+def _obvious(formulation: Literal["chart", "free", "facets"]) -> MujocoSettings:
     """A model whose author writes no option."""
     return MujocoSettings(
         formulation,
@@ -264,16 +264,7 @@ def _obvious(formulation: Literal["free", "facets"]) -> MujocoSettings:
 PRESETS: Mapping[str, Mapping[str, MujocoSettings]] = {
     "chart": {
         # The coordinates and the integrator are the formulation; only the contact is left as MuJoCo has it.
-        "default": MujocoSettings(
-            "chart",
-            "default",
-            dt=DEFAULT_STEP,
-            cone="pyramidal",
-            time_constant=None,
-            impedance=None,
-            friction=DEFAULT_FRICTION,
-            start="touching",
-        ),
+        "default": replace(_obvious("chart"), integrator="RK4"),
         # In these coordinates J̇v vanishes, so documented options are also the best known ones while the ball rolls.
         "matched": MujocoSettings("chart", "matched"),
         # Only a slip leaves something to be edited.
