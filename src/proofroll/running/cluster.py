@@ -11,7 +11,6 @@ import dataclasses
 import logging
 import os
 import re
-import signal
 import threading
 import time
 import uuid
@@ -29,6 +28,7 @@ from proofroll.files.scene_file import scene_folder
 from proofroll.files.scene_sources import source_of
 from proofroll.running import cluster_task
 from proofroll.running.case import Case, Result, Status
+from proofroll.running.ending import interrupt_held
 from proofroll.running.memory import VARIABLE, memory_limit
 from proofroll.running.process import WorkerDied
 
@@ -40,7 +40,9 @@ _TOGETHER = 64
 # How often the threads of a cluster are counted, for workers come and go [s].
 _COUNTED = 2.0
 # How long a scheduler may take to answer [s].
-_PATIENCE = 10.0
+_PATIENCE = 30.0
+# How long one of our own may take, on a machine that has much else to do [s].
+_STARTS = 300.0
 
 Item = TypeVar("Item")
 Found = TypeVar("Found")
@@ -244,16 +246,15 @@ def _connected(address: str) -> tuple[Any, Any]:
         raise Missing(f"--scheduler needs Dask ({error.name} is missing): pip install 'proofroll[cluster]'") from None
     for name in [name for name in logging.root.manager.loggerDict if name.partition(".")[0] == "distributed"]:
         logging.getLogger(name).disabled = True  # what matters of it is said in our own line
-    # Threads and processes that begin here inherit it: Ctrl-C is this command's affair, which then ends them. The
-    # tracker of multiprocessing unblocks it where it begins, so it must be there already.
+    # The tracker of multiprocessing unblocks the signal where it begins, so it must be there already.
     resource_tracker.ensure_running()
-    signal.pthread_sigmask(signal.SIG_BLOCK, {signal.SIGINT})
     try:
-        own = None
-        if local:
-            count = int(local[1] or os.cpu_count() or 1)
-            if not count:
-                raise InputError("--scheduler", address, "give at least one worker: local:1")
+        if not local:
+            return Client(address, timeout=_PATIENCE, set_as_default=False), None
+        count = int(local[1] or os.cpu_count() or 1)
+        if not count:
+            raise InputError("--scheduler", address, "give at least one worker: local:1")
+        with interrupt_held():
             own = LocalCluster(
                 n_workers=count,
                 threads_per_worker=1,
@@ -261,12 +262,10 @@ def _connected(address: str) -> tuple[Any, Any]:
                 memory_limit=None,
                 silence_logs=logging.CRITICAL + 1,
             )
-        return Client(own or address, timeout=_PATIENCE, set_as_default=False), own
+            return Client(own, timeout=_STARTS, set_as_default=False), own
     except (OSError, ValueError) as error:
         text = " ".join(str(error).split())[:120]
         raise InputError("--scheduler", address, f"no Dask scheduler answers there ({text})") from None
-    finally:
-        signal.pthread_sigmask(signal.SIG_UNBLOCK, {signal.SIGINT})
 
 
 def _end(client: Any, own: Any, command: str) -> None:

@@ -1,4 +1,4 @@
-"""A process that ends with the one that started it, however that one ends."""
+"""A process that ends with the one that started it, however that one ends, and only then by Ctrl-C."""
 
 from __future__ import annotations
 
@@ -9,11 +9,33 @@ import os
 import signal
 import threading
 import time
+from collections.abc import Iterator
 
 from proofroll.running.memory import descendants
 
 # How often a process looks for its parent [s]; a look costs some microseconds.
 _TICK = 0.25
+
+
+@contextlib.contextmanager
+def interrupt_held() -> Iterator[None]:
+    """Ctrl-C waits until this is left, and processes that begin here never see it: who began them ends them.
+
+    The mask is for what begins here. It does not keep another thread from taking the signal, for which Python then
+    interrupts the main thread; so that waits, too.
+    """
+    waiting: list[int] = []
+    main = threading.current_thread() is threading.main_thread()
+    before = signal.signal(signal.SIGINT, lambda number, _: waiting.append(number)) if main else None
+    signal.pthread_sigmask(signal.SIG_BLOCK, {signal.SIGINT})
+    try:
+        yield
+    finally:
+        signal.pthread_sigmask(signal.SIG_UNBLOCK, {signal.SIGINT})
+        if main:
+            signal.signal(signal.SIGINT, before)
+    if waiting:
+        signal.raise_signal(signal.SIGINT)
 
 
 def end_with(parent: int) -> None:

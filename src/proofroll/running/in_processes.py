@@ -2,13 +2,12 @@
 
 from __future__ import annotations
 
-import signal
 from collections.abc import Callable, Iterator, Sequence
 from concurrent.futures import ProcessPoolExecutor
 from multiprocessing import active_children, get_context
 from typing import TypeVar
 
-from proofroll.running.ending import end_with_pool
+from proofroll.running.ending import end_with_pool, interrupt_held
 
 Item = TypeVar("Item")
 Found = TypeVar("Found")
@@ -27,13 +26,10 @@ def in_processes(function: Callable[[Item], Found], items: Sequence[Item], worke
         return
     # Not forked: a parent that shows progress has threads, and a fork copies their locks as they are.
     with ProcessPoolExecutor(workers, get_context("spawn"), initializer=end_with_pool) as pool:
-        signal.pthread_sigmask(signal.SIG_BLOCK, {signal.SIGINT})  # inherited: Ctrl-C is the parent's affair
         try:
             # Not map, which cancels the rest when interrupted: a pool whose processes are then ended complains.
-            found = [pool.submit(function, item) for item in items]
-        finally:
-            signal.pthread_sigmask(signal.SIG_UNBLOCK, {signal.SIGINT})
-        try:
+            with interrupt_held():
+                found = [pool.submit(function, item) for item in items]
             for one in found:
                 yield one.result()
         except BaseException:

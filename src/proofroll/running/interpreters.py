@@ -29,7 +29,7 @@ except Exception:
     found = None
 print(json.dumps([list(sys.version_info[:3]), found]))
 """
-_PROBE_SECONDS = 20.0
+_PROBE_SECONDS = 120.0
 OLDEST = (3, 11)
 
 

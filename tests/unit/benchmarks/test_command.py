@@ -1,4 +1,4 @@
-"""``proofroll bench`` as a user meets it. Speed itself is not asserted: both exit codes of a finished bench will do."""
+"""``proofroll bench`` as a user meets it. No exit code hangs on speed."""
 
 from __future__ import annotations
 
@@ -46,7 +46,7 @@ def test_adapters_json(proofroll: Proofroll, tmp_path: Path) -> None:
     """``--json`` has a ratio with its interval for the engine that was asked for, and says of each row what it is."""
     kept = tmp_path / "bench.json"
     code, out, err = proofroll("adapters", "--engine", "projection", *QUICK, "--json", "--out", str(kept))
-    assert code in (0, 1), err
+    assert code == 0, err
     assert kept.read_text(encoding="utf-8") == out
     found = json.loads(out)
     assert set(found) == {"goal", "scene", "mechanisms", "every", "machine", "engines"}
@@ -54,7 +54,6 @@ def test_adapters_json(proofroll: Proofroll, tmp_path: Path) -> None:
     engine = found["engines"]["projection"]
     assert set(engine["ratio"]) == INTERVAL
     assert engine["ratio"]["value"] > 0
-    assert code == (0 if engine["within_goal"] else 1)
     assert {row["formulation"] for row in engine["rows"]} == {"euler", "rotating_frame", "dependent"}
     for row in engine["rows"]:
         if "slips" in row["variant"]:
@@ -91,7 +90,7 @@ def test_study(proofroll: Proofroll, capfd: pytest.CaptureFixture[str]) -> None:
     For a person the same is tables within 100 columns.
     """
     code, out, err = proofroll("study", "--engine", "tiny", "--seconds", "0.05", "--json")
-    assert code in (0, 1), err
+    assert code == 0, err
     found = json.loads(out)
     assert set(found) == {
         "goal", "jobs", "load_before", "wall_seconds", "outside", "within_goal", "shares", "processor", "cases",
@@ -110,13 +109,13 @@ def test_study(proofroll: Proofroll, capfd: pytest.CaptureFixture[str]) -> None:
 
 
 @pytest.mark.parametrize("met", [True, False])
-def test_reference_exits_as_its_goals_are_met(proofroll: Proofroll, monkeypatch: pytest.MonkeyPatch, met: bool) -> None:
-    """A goal that is not met is exit code 1, as in the other benchmarks; the document is printed all the same."""
+def test_a_goal_that_is_not_met_fails_nothing(proofroll: Proofroll, monkeypatch: pytest.MonkeyPatch, met: bool) -> None:
+    """Whether a benchmark met its goal stands in the document; the exit code does not hang on the machine."""
     ratio = {"value": 2.0, "low": 1.0, "high": 3.0, "goal": 2.0, "slow": "a", "fast": "b", "met": True}
     content = {"ratios": {"one": ratio, "other": {**ratio, "met": met}}, "onsets_per_second": ratio}
     monkeypatch.setattr("proofroll_benchmarks.reference.reference", lambda *_: content)
     code, out, _ = proofroll("reference", "--json")
-    assert code == (0 if met else 1)
+    assert code == 0
     assert json.loads(out) == content
 
 

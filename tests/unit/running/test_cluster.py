@@ -26,6 +26,7 @@ from proofroll.elements.ball_on_surface.regimes_study import regime_map
 from proofroll.files.data_folders import data_folder
 from proofroll.files.netcdf import read
 from proofroll.files.scene_file import load_scene
+from proofroll.running import cluster
 from proofroll.running.case import Case, EngineFacts, Status
 from proofroll.running.cluster import Cluster
 from proofroll.running.runner import Runner
@@ -240,8 +241,9 @@ def test_a_scheduler_that_ends(dask: DaskCluster, tmp_path: Path, room: Path) ->
     assert at_home(store).run([rest])[rest.key].status is Status.DONE
 
 
-def test_an_address_that_is_none() -> None:
+def test_an_address_that_is_none(monkeypatch: pytest.MonkeyPatch) -> None:
     """What is no address, and where nothing answers, is one line."""
+    monkeypatch.setattr(cluster, "_PATIENCE", 1.0)
     with pytest.raises(InputError, match="give the address of a Dask scheduler"):
         Cluster("nowhere")
     with pytest.raises(InputError, match="no Dask scheduler answers there"):

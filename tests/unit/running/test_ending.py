@@ -2,13 +2,16 @@
 
 from __future__ import annotations
 
+import signal
 import subprocess
 import sys
+import threading
 import time
 from pathlib import Path
 
 import pytest
 
+from proofroll.running.ending import interrupt_held
 from proofroll.running.memory import descendants
 from proofroll_drill.processes import alive, wait_until
 
@@ -55,6 +58,30 @@ subprocess.run([sys.executable, *sys.argv[1:], str(life)], pass_fds=[life], star
 PARENT = "import subprocess, sys; subprocess.run([sys.executable, *sys.argv[1:]])"
 
 
+def test_an_interrupt_waits_until_processes_have_begun() -> None:
+    """Ctrl-C that another thread takes does not break the start of a process in two; it comes right after."""
+    begins, began = threading.Event(), []
+
+    def take() -> None:
+        begins.wait()
+        signal.raise_signal(signal.SIGINT)
+
+    taker = threading.Thread(target=take)
+    taker.start()  # before anything is held, as a thread that shows progress
+
+    def begin() -> None:
+        with interrupt_held():
+            begins.set()
+            taker.join()
+            began.append(signal.SIGINT in signal.pthread_sigmask(signal.SIG_BLOCK, ()))
+
+    with pytest.raises(KeyboardInterrupt):
+        begin()
+    assert began == [True]
+    assert signal.getsignal(signal.SIGINT) is signal.default_int_handler
+    assert signal.SIGINT not in signal.pthread_sigmask(signal.SIG_BLOCK, ())
+
+
 @pytest.mark.parametrize(
     ("code", "before"),
     [(POOL, []), (CHILD, ["-c", PARENT]), (PIPED, ["-c", HOLDER])],
@@ -66,7 +93,7 @@ def test_nothing_outlives_a_parent_that_is_killed(tmp_path: Path, code: str, bef
     script.write_text(code)
     parent = subprocess.Popen([sys.executable, *before, str(script), str(begun)], stderr=subprocess.DEVNULL)
     try:
-        assert wait_until(begun.exists, 60)
+        assert wait_until(begun.exists, 300)
         time.sleep(0.6)
         below = descendants(parent.pid)
         assert len(below) >= 2
@@ -74,4 +101,4 @@ def test_nothing_outlives_a_parent_that_is_killed(tmp_path: Path, code: str, bef
     finally:
         parent.kill()
         parent.wait()
-    assert wait_until(lambda: not any(map(alive, below)), 20)
+    assert wait_until(lambda: not any(map(alive, below)), 300)

@@ -64,13 +64,13 @@ def test_a_worker_ends_with_its_parent(
     parent = subprocess.Popen([sys.executable, "-c", PARENT, case, str(tmp_path / "run.nc")])
     worker = 0
     try:
-        said = read_until(pipe, bool, 60)
+        said = read_until(pipe, bool, 300)
         assert said, "the worker did not come to its case"
         worker = int(said)
         assert read_until(pipe, lambda found: found == b"", 1.0) is None, "the worker ended while its parent lived"
         parent.kill()
         parent.wait()
-        assert read_until(pipe, lambda found: found == b"", 20) == b"", "the worker lives on without its parent"
+        assert read_until(pipe, lambda found: found == b"", 300) == b"", "the worker lives on without its parent"
         worker = 0
     finally:
         os.close(pipe)
