@@ -6,6 +6,8 @@ import dataclasses
 import sys
 from pathlib import Path
 
+from markdown_tables import caveat_list, verdict_table
+
 from proofroll.core.comparison import Comparison
 from proofroll.files.comparison_file import load_comparison
 from proofroll.files.data_folders import data_folder
@@ -16,7 +18,6 @@ from proofroll.report.comparison_content import outcome_content
 from proofroll.report.comparison_records import ReportedComparison
 from proofroll.report.html import templates
 from proofroll.report.labels import number
-from proofroll.report.markdown import caveat_list, verdict_table
 from proofroll.report.scene_sheet import scene_sheet
 from proofroll.running.runner import Runner
 from proofroll.running.store import Store

@@ -12,6 +12,7 @@ import matplotlib as mpl
 import matplotlib.pyplot as plt
 import numpy as np
 from made_from import facts, restamped, stamp
+from markdown_tables import caveat_list, cheapest_table, verdict_table
 from screenshot import screenshot
 
 from proofroll.elements.ball_on_surface.regimes_study import load_regimes, regime_maps
@@ -20,7 +21,6 @@ from proofroll.files.comparison_file import load_comparison
 from proofroll.files.netcdf import read
 from proofroll.report.comparison_content import outcome_content
 from proofroll.report.growing_report import write_report
-from proofroll.report.markdown import caveat_list, cheapest_table, verdict_table
 from proofroll.report.work_precision import draw as draw_work_precision
 from proofroll.running.runner import Runner
 from proofroll.running.store import Store

@@ -159,8 +159,8 @@ def complaint(text: str, settings: list[EngineFacts], now: str) -> str:
     if len(lines) != len(comparison.rows):
         return f"{STALE}: {len(lines)} lines for {len(comparison.rows)} rows"
     for row, found, cells in zip(comparison.rows, settings, lines, strict=True):
-        value = {"resolution": found.resolution, "resolution_value": found.settings.get(str(found.resolution))}
-        expected = [found.name, str(found.settings.get("formulation")), str(found.settings["preset"]), step(value)]
+        shown = step(found.resolution, found.settings.get(str(found.resolution)))
+        expected = [found.name, str(found.settings.get("formulation")), str(found.settings["preset"]), shown]
         if cells[:4] != expected:
             return f"{STALE}: it has {cells[:4]}, the comparison {expected}"
         allowed = {*row.expect, *(verdict for exception in row.except_at for verdict in exception.expect)}

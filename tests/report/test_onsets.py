@@ -24,7 +24,6 @@ from proofroll.report.comparison_records import ReportedRun
 from proofroll.report.growing_report import write_report
 from proofroll.report.html import page
 from proofroll.report.labels import MEANINGS, SYMBOLS
-from proofroll.report.markdown import verdict_table as markdown_table
 from proofroll.report.plots import Bound, point_curves
 from proofroll.report.report_content import ReportContent, ReportedTruth, report_content
 from proofroll.report.scores import scores
@@ -186,7 +185,7 @@ def test_page_shows_ill_posed_points_without_colour(content: ReportContent, slip
 
 
 def test_every_verdict_can_be_said(content: ReportContent) -> None:
-    """Signs, meanings, terminal and Markdown know every verdict."""
+    """Signs, meanings and terminal know every verdict."""
     assert set(SYMBOLS) == set(MEANINGS) == {verdict.value for verdict in Verdict}
     assert len(set(SYMBOLS.values())) == len(SYMBOLS)
     first, *others = content.comparisons[0].rows
@@ -197,7 +196,6 @@ def test_every_verdict_can_be_said(content: ReportContent) -> None:
         out.print(verdict_table(changed))
     assert "? ill-posed" in capture.get()
     assert "1 ill-posed" in closing_lines(changed)[0]
-    assert "? ill-posed" in markdown_table(changed)
 
 
 def test_findings_and_scores_leave_ill_posed_points_out(content: ReportContent) -> None:

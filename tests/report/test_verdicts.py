@@ -17,7 +17,6 @@ from proofroll.report.comparison_content import outcome_content
 from proofroll.report.comparison_records import ReportedComparison
 from proofroll.report.html import page
 from proofroll.report.labels import SYMBOLS, detail, verdict_text
-from proofroll.report.markdown import verdict_table as markdown_table
 from proofroll.report.plots import point_curves
 from proofroll.report.report_content import report_content
 from proofroll.report.summary import three_sentences
@@ -75,7 +74,7 @@ def printed(content: ReportedComparison, width: int) -> str:
 
 
 def test_one_refused_case_of_eleven_shows_the_ten(made: tuple[Outcome, Store]) -> None:
-    """A row that failed at one point says how the other ten ended, on the terminal, in Markdown and in the matrix."""
+    """A row that failed at one point says how the other ten ended, on the terminal and in the matrix."""
     run = made[0].runs[0]
     points = [{"speed": 3.0 + number} for number in range(11)]
     runs = [dataclasses.replace(answered(run), parameters=point) for point in points]
@@ -87,7 +86,6 @@ def test_one_refused_case_of_eleven_shows_the_ten(made: tuple[Outcome, Store]) -
     assert verdict_text(row) == "failed 1/11 ✗1 ✓9"
     assert row.reason == "refused at speed=6: one coefficient only"
     assert "failed 1/11 ✗1 ✓9" in printed(content, 100)
-    assert "failed 1/11 ✗1 ✓9" in markdown_table(content)
     table = overview(content, 0)
     first = next(iter(table.groups.values()))[0]
     cells = {column.name: cell.verdict for column, cell in zip(table.columns, first.cells, strict=True) if cell}

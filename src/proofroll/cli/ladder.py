@@ -40,7 +40,7 @@ def ladder(
     as_json: Json = False,
 ) -> None:
     """Run one quantity up the ladder of models, and switch each optional term on and off."""
-    from proofroll.report.ladder import ladder_content, rung_table, term_table
+    from proofroll.report.ladder import ladder_content
     from proofroll.studies.ladder import Ladder
 
     study = Ladder(
@@ -59,6 +59,7 @@ def ladder(
     if as_json:
         write_json(content)
     else:
+        from proofroll.report.ladder_tables import rung_table, term_table
         from proofroll.report.terminal import console
 
         terminal = console()
@@ -66,8 +67,8 @@ def ladder(
         terminal.print()
         terminal.print(term_table(content))
         terminal.print()
-        for sentence in content["findings"]:
+        for sentence in content.findings:
             terminal.print(sentence, markup=False)
     lost = {"crashed", "timeout", "missing"}
-    statuses = {rung["status"] for rung in content["rungs"]}
-    raise typer.Exit(ENGINE if content["absent"] or statuses & lost else OK)
+    statuses = {rung.ran.status for rung in content.rungs}
+    raise typer.Exit(ENGINE if content.absent or statuses & lost else OK)
