@@ -24,6 +24,7 @@ from proofroll.core.scene import Scene
 from proofroll.files.scene_file import load_scene
 from proofroll.running import stopwatch
 from proofroll.running.case import Case, EngineFacts
+from proofroll.studies import tradeoff
 
 PLUGINS = Path(__file__).parent / "plugins"
 _METADATA = "Metadata-Version: 2.1\nName: throwaway\nVersion: 1.0\nRequires-Dist: no-such-library>=2\n"
@@ -40,6 +41,8 @@ settings.load_profile("repeatable")
 
 # Each measurement of speed is a real one, but short [s]: no test asks how exact it is.
 stopwatch.SECONDS = 0.002
+# The finest steps of a curve take as long as all others together; tests/unit/studies/test_sweep.py has them.
+tradeoff.FINER = ()
 
 # Tests of Ctrl-C mean nothing where SIGINT was ignored when pytest began (nohup, a shell's "&"); children inherit that.
 if signal.getsignal(signal.SIGINT) is signal.SIG_IGN:

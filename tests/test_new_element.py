@@ -75,30 +75,34 @@ parameters = {{ stiffness = {{}} }}
 """
 
 
-@pytest.fixture
-def springs(
-    tmp_path: Path,
-    monkeypatch: pytest.MonkeyPatch,
-) -> Iterator[Path]:
-    """A folder with a scene of the new kind; kind, truth and engine are announced as an installed package would."""
-    site = tmp_path / "site2"
-    info = site / "springs-1.0.dist-info"
+@pytest.fixture(scope="module")
+def home(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """A folder with a scene of the new kind and files about it, and what an installed package would announce."""
+    folder = tmp_path_factory.mktemp("springs")
+    info = folder / "site" / "springs-1.0.dist-info"
     info.mkdir(parents=True)
     (info / "METADATA").write_text("Metadata-Version: 2.1\nName: springs\nVersion: 1.0\n")
     groups = {"elements": "spring = spring:SpringKind", "truths": "spring = spring:SpringTruth"}
     groups["engines"] = "sprung = spring:Sprung"
     (info / "entry_points.txt").write_text("".join(f"[proofroll.{k}]\n{v}\n" for k, v in groups.items()))
-    monkeypatch.setenv("PYTHONPATH", os.pathsep.join([str(site), str(PLUGINS), os.environ.get("PYTHONPATH", "")]))
-    monkeypatch.syspath_prepend(str(site))
+    scene = folder / "swing"
+    scene.mkdir()
+    (scene / "scene.toml").write_text(SCENE)
+    (folder / "springs.toml").write_text(COMPARISON.format(scene=str(scene)))
+    (folder / "hard.toml").write_text(STABILITY.format(scene=str(scene)))
+    return folder
+
+
+@pytest.fixture
+def springs(home: Path, monkeypatch: pytest.MonkeyPatch) -> Iterator[Path]:
+    """The scene; kind, truth and engine are installed, and the working folder is its home."""
+    site = str(home / "site")
+    monkeypatch.setenv("PYTHONPATH", os.pathsep.join([site, str(PLUGINS), os.environ.get("PYTHONPATH", "")]))
+    monkeypatch.syspath_prepend(site)
     plugins.load_element_kinds.cache_clear()
     truth.load_truths.cache_clear()
-    folder = tmp_path / "swing"
-    folder.mkdir()
-    (folder / "scene.toml").write_text(SCENE)
-    (tmp_path / "springs.toml").write_text(COMPARISON.format(scene=str(folder)))
-    (tmp_path / "hard.toml").write_text(STABILITY.format(scene=str(folder)))
-    monkeypatch.chdir(tmp_path)
-    yield folder
+    monkeypatch.chdir(home)
+    yield home / "swing"
     plugins.load_element_kinds.cache_clear()
     truth.load_truths.cache_clear()
 
@@ -153,11 +157,11 @@ def test_ladder(command_line: Proofroll, springs: Path) -> None:
 
 
 @pytest.mark.usefixtures("springs")
-def test_report(command_line: Proofroll, tmp_path: Path) -> None:
-    """Report writes a page about it."""
-    code, _, err = command_line("report", "springs.toml", "--out", str(tmp_path / "out"))
+def test_report(command_line: Proofroll) -> None:
+    """Report writes a page about it, of results that are stored."""
+    code, _, err = command_line("report", "springs.toml")
     assert code == 0, err
-    assert "A mass on a spring" in (tmp_path / "out" / "report.html").read_text(encoding="utf-8")
+    assert "A mass on a spring" in Path("out", "report.html").read_text(encoding="utf-8")
 
 
 @pytest.mark.usefixtures("springs")

@@ -92,20 +92,28 @@ def _look_again() -> None:
     plugins.load_element_kinds.cache_clear()
 
 
+@pytest.fixture(scope="module")
+def site(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """Where the surfaces are announced as an installed package would."""
+    site = tmp_path_factory.mktemp("site")
+    info = site / "troughs-1.0.dist-info"
+    info.mkdir()
+    (info / "METADATA").write_text("Metadata-Version: 2.1\nName: troughs\nVersion: 1.0\n")
+    (info / "entry_points.txt").write_text("[proofroll.surfaces]\ntrough = trough:Trough\ndish = dish:Dish\n")
+    return site
+
+
 @pytest.fixture
 def trough(
     proofroll: Proofroll,  # noqa: ARG001 -- it announces its engines first
+    site: Path,
     tmp_path: Path,
     monkeypatch: pytest.MonkeyPatch,
 ) -> Iterator[Path]:
-    """The folder of a scene with a trough, which is announced as an installed package would."""
-    info = tmp_path / "site3" / "troughs-1.0.dist-info"
-    info.mkdir(parents=True)
-    (info / "METADATA").write_text("Metadata-Version: 2.1\nName: troughs\nVersion: 1.0\n")
-    (info / "entry_points.txt").write_text("[proofroll.surfaces]\ntrough = trough:Trough\ndish = dish:Dish\n")
-    places = [str(info.parent), str(PLUGINS), os.environ.get("PYTHONPATH", "")]
+    """The folder of a scene with a trough."""
+    places = [str(site), str(PLUGINS), os.environ.get("PYTHONPATH", "")]
     monkeypatch.setenv("PYTHONPATH", os.pathsep.join(places))
-    monkeypatch.syspath_prepend(str(info.parent))
+    monkeypatch.syspath_prepend(str(site))
     _look_again()
     folder = tmp_path / "rolling"
     folder.mkdir()

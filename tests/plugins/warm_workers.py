@@ -1,7 +1,8 @@
 """Worker processes that all tests of a pytest process share: to start one costs more than most of what it is asked.
 
 A worker is lent again where everything is as it was when it started: the engine that it has loaded, the memory that it
-may have, the folder and the environment. Tests of the processes themselves are marked ``own_workers`` and share none.
+may have, and the environment; to the folder of a test it goes by itself. Tests of the processes themselves are marked
+``own_workers`` and share none.
 """
 
 from __future__ import annotations
@@ -10,6 +11,7 @@ import os
 import threading
 from collections.abc import Iterator
 from contextlib import contextmanager
+from pathlib import Path
 from weakref import WeakKeyDictionary
 
 import pytest
@@ -22,7 +24,15 @@ _MOST = 8
 # What every test has otherwise, and no worker reads.
 _PASSING = {"PYTEST_CURRENT_TEST", "COLUMNS"}
 
+# A worker in another interpreter, or one that is no Python at all, stays in the folder in which it began.
+_FOLLOW = Path(__file__).with_name("follow.py")
+
 _Place = tuple[str, float | None, str, frozenset[tuple[str, str]]]
+
+
+def _follow(worker: Worker) -> None:
+    arguments = {"path_name": str(_FOLLOW), "init_globals": {"folder": os.getcwd()}}
+    worker.ask({"do": "call", "function": "runpy:run_path", "arguments": arguments}, 60)
 
 
 class WarmWorkers:
@@ -40,8 +50,10 @@ class WarmWorkers:
 
         def warm(workers: Workers, engine: str) -> Worker:
             environment = frozenset(item for item in os.environ.items() if item[0] not in _PASSING)
-            place = (engine, workers._memory, os.getcwd(), environment)
+            place = (engine, workers._memory, os.getcwd() if "@" in engine else "", environment)
             found = None if engine in dict(workers._idle) else self._take(place)
+            if found and "@" not in engine:
+                _follow(found)
             worker = found or take(workers, engine)
             self._began.setdefault(worker, place)
             return worker

@@ -4,10 +4,11 @@ from __future__ import annotations
 
 import dataclasses
 import re
+import sys
 from collections.abc import Collection, Mapping
 from contextlib import suppress
 from functools import cache
-from importlib.metadata import EntryPoint, PackageNotFoundError, entry_points, version
+from importlib.metadata import EntryPoint, EntryPoints, PackageNotFoundError, entry_points, version
 from importlib.util import find_spec
 from typing import Any
 
@@ -21,7 +22,13 @@ ELEMENTS = "proofroll.elements"
 
 def engine_names() -> list[str]:
     """Names of all engines that some installed package announces, sorted."""
-    return sorted({point.name for point in entry_points(group=GROUP)})
+    return sorted(_announced(tuple(sys.path)).names)
+
+
+@cache
+def _announced(_path: tuple[str, ...]) -> EntryPoints:
+    """Looked up once for each ``sys.path``: every file of every installed package is read for it."""
+    return entry_points(group=GROUP)
 
 
 def plain_name(name: str) -> str:
@@ -116,7 +123,7 @@ def require_engine(name: str) -> None:
 
 
 def _entry_point(name: str) -> EntryPoint:
-    for point in entry_points(group=GROUP):
+    for point in _announced(tuple(sys.path)):
         if point.name == name:
             return point
     raise InputError("engine", name, f"there is no such engine; choose one of {', '.join([*engine_names(), 'truth'])}")
