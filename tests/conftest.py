@@ -55,8 +55,9 @@ class _TogetherWhatShares(LoadScopeScheduling):
     def _split_scope(self, nodeid: str) -> str:
         path = nodeid.partition("::")[0]
         folder = path.split("/")[1]
-        # A browser and pages are shared by a whole folder; the many tests of two others share nothing dear.
-        return {"report": folder, "agreement": nodeid, "conformance": nodeid}.get(folder, path)
+        # A browser and pages are shared by a whole folder, truths by the rows of a comparison; the many checks of
+        # conformance share nothing dear.
+        return {"report": folder, "agreement": nodeid.partition("-")[0], "conformance": nodeid}.get(folder, path)
 
 
 @pytest.hookimpl(optionalhook=True)
