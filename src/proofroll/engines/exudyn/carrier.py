@@ -39,11 +39,12 @@ class Carrier:
         rates = {kind: np.zeros(3) for kind in ("rotation", "translation")}
         for generator, rate in zip(local.generators, body.udot0, strict=True):
             rates[generator.kind] += rate * np.asarray(generator.axis)
-        self.node, self.carrier = add_body(self.system, 0.0, 0.0, np.zeros(3), rates["translation"], rates["rotation"])
-        axes, constrained = _joint_axes(local.generators)
-        ends, transform = (self.ground, self.carrier), exu.HT(rotation=axes)
+        self.velocity, self.spin = rates["translation"], rates["rotation"]
+        self.node, self.carrier = add_body(self.system, 0.0, 0.0, np.zeros(3), self.velocity, self.spin)
+        self.axes, self.constrained = _joint_axes(local.generators)
+        ends, transform = (self.ground, self.carrier), exu.HT(rotation=self.axes)
         guide = [add_marker(items.MarkerBodyRigid(bodyNumber=end, localHT=transform)) for end in ends]
-        add_object(items.GenericJoint(markerNumbers=guide, constrainedAxes=constrained))
+        add_object(items.GenericJoint(markerNumbers=guide, constrainedAxes=self.constrained))
         # The carrier is not turned at time 0, so the ball's centre in it is its place in the world.
         self.centre, self.normal = body.p0, body.surface.frame(body.u0)[:, 0]
         pivot = add_marker(items.MarkerBodyRigid(bodyNumber=self.carrier, localPosition=self.centre))
@@ -52,7 +53,7 @@ class Carrier:
         )
         self.rolling = self._constrain(body, local)
         self.system.Assemble()
-        start = consistent_start(self.system, settings, self._turning(body, rates["rotation"]))
+        start = consistent_start(self.system, settings, self._turning(body, self.spin))
         self.integration = Integration(self.system, settings, start)
 
     def _constrain(self, body: RollingBall, local: LocalGeometry) -> list[tuple[Any, float]]:
@@ -98,11 +99,6 @@ class Carrier:
 
     def numbers(self, body: RollingBall) -> list[str]:
         """Assignments for the program of :mod:`reproducer`: the carrier's start, its joint and the rolling."""
-        rates = {kind: np.zeros(3) for kind in ("rotation", "translation")}
-        generators = local_geometry(body.surface, body.u0).generators
-        for generator, rate in zip(generators, body.udot0, strict=True):
-            rates[generator.kind] += rate * np.asarray(generator.axis)
-        axes, constrained = _joint_axes(generators)
         frame = body.surface.frame(body.u0)
         local, rolling = local_geometry(body.surface, body.u0), []
         for (item, _), along, about, sign in zip(self.rolling, (1, 2), (2, 1), (1.0, -1.0), strict=True):
@@ -111,10 +107,10 @@ class Carrier:
             factor = float(self.system.GetObject(item)["factor1"])
             rolling.append((generator.kind.capitalize(), list(generator.axis), frame[:, about].tolist(), factor))
         return [
-            f"CARRIER_VELOCITY = {rates['translation'].tolist()!r}",
-            f"CARRIER_SPIN = {rates['rotation'].tolist()!r}",
-            f"JOINT_AXES = {axes.tolist()!r}",
-            f"JOINT_CONSTRAINED = {constrained!r}",
+            f"CARRIER_VELOCITY = {self.velocity.tolist()!r}",
+            f"CARRIER_SPIN = {self.spin.tolist()!r}",
+            f"JOINT_AXES = {self.axes.tolist()!r}",
+            f"JOINT_CONSTRAINED = {self.constrained!r}",
             f"ROLLING = {rolling!r}",
         ]
 

@@ -11,7 +11,7 @@ import numpy as np
 from scipy.spatial.transform import Rotation
 
 from proofroll.core.errors import Refused
-from proofroll.robots.model import WORLD, Array, Robot, RobotJoint
+from proofroll.robots.model import WORLD, Array, RobotJoint
 from proofroll.robots.protocol import AtState, Reading, Request, evaluate
 
 _FREE = (("prismatic", 0), ("prismatic", 1), ("prismatic", 2), ("revolute", 0), ("revolute", 1), ("revolute", 2))
@@ -73,7 +73,8 @@ class _Tree:
     """The tree in a system of its own, and where its coordinates are."""
 
     def __init__(self, request: Request) -> None:
-        exu: Any = importlib.import_module("exudyn")
+        exu: Any = importlib.import_module("exudyn")  # its stubs have other signatures than its classes
+        ii: Any = importlib.import_module("exudyn.itemInterface")
         self.request, self.robot = request, request.robot
         if any(joint.kind == "spherical" for joint in self.robot.moving):
             raise Refused("the tree of Exudyn has no spherical joint")
@@ -87,29 +88,16 @@ class _Tree:
         kinds, parents, turns, offsets, masses, coms, inertias = zip(*rows, strict=True)
         self.container = exu.SystemContainer()
         self.mbs = self.container.AddSystem()
-        n = len(rows)
-        zeros = [0.0] * n
-        self._make(n, [types[kind] for kind in kinds], parents, turns, offsets, masses, coms, inertias, zeros)
-
-    def _make(
-        self,
-        n: int,
-        kinds: Any,
-        parents: Any,
-        turns: Any,
-        offsets: Any,
-        masses: Any,
-        coms: Any,
-        inertias: Any,
-        zeros: Any,
-    ) -> None:
-        exu: Any = importlib.import_module("exudyn")  # its stubs have other signatures than its classes
-        ii: Any = importlib.import_module("exudyn.itemInterface")
-        node = self.mbs.AddNode(ii.NodeGenericODE2(referenceCoordinates=zeros, initialCoordinates=zeros,
-                                                   initialCoordinates_t=zeros, numberOfODE2Coordinates=n))  # fmt: skip
+        zeros = [0.0] * len(rows)
+        node = self.mbs.AddNode(
+            ii.NodeGenericODE2(
+                referenceCoordinates=zeros, initialCoordinates=zeros, initialCoordinates_t=zeros,
+                numberOfODE2Coordinates=len(rows),
+            )
+        )  # fmt: skip
         self.tree = self.mbs.AddObject(
             ii.ObjectKinematicTree(
-                nodeNumber=node, jointTypes=kinds, linkParents=list(parents),
+                nodeNumber=node, jointTypes=[types[kind] for kind in kinds], linkParents=list(parents),
                 jointTransformations=exu.Matrix3DList([np.array(turn) for turn in turns]),
                 jointOffsets=exu.Vector3DList([np.array(offset) for offset in offsets]),
                 linkInertiasCOM=exu.Matrix3DList([np.array(inertia) for inertia in inertias]),
@@ -137,7 +125,7 @@ class _Tree:
 
     def _rows(self, joint: RobotJoint) -> list[tuple[Any, ...]]:
         """Links of the tree for a joint: type, parent, rotation, offset, mass, centre of mass, inertia."""
-        robot, start = self.robot, robot_columns(self.robot)[joint.name]
+        robot, start = self.robot, self.robot.columns[joint.name].start
         group, A = robot.groups[joint.name], self.turn[joint.name]
         carried = (group.mass, A.T @ (group.com - joint.child_position), A.T @ group.inertia @ A)
         home, p, R = robot.welded[joint.parent]
@@ -220,8 +208,3 @@ class _Tree:
             com[joint.name] = A @ np.array(parameters["linkCOMs"][link]) + joint.child_position
             inertia[joint.name] = A @ np.array(parameters["linkInertiasCOM"][link]) @ A.T
         return mass, com, inertia
-
-
-def robot_columns(robot: Robot) -> dict[str, int]:
-    """First velocity of each joint."""
-    return {name: columns.start for name, columns in robot.columns.items()}

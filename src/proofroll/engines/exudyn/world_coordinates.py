@@ -133,14 +133,7 @@ def _rolling(body: RollingBall) -> Callable[..., FloatArray]:
     """Velocity of the ball at the contact, less that of the wall there [m/s]."""
     a, normal, wall_rate = body.ball.radius, body.surface.normal, body.wall_rate
 
-    def constraint(
-        system: Any,  # noqa: ARG001 -- Exudyn's signature, here and below
-        t: float,  # noqa: ARG001
-        item: int,  # noqa: ARG001
-        q: Any,
-        q_t: Any,
-        velocity_level: bool,  # noqa: ARG001
-    ) -> FloatArray:
+    def constraint(_system: Any, _t: float, _item: int, q: Any, q_t: Any, _velocity_level: bool) -> FloatArray:
         p, rates = np.array(q)[:3], np.array(q_t)
         e1 = normal(p)
         relative = rates[:3] + a * np.cross(rates[3:], e1)
@@ -153,14 +146,7 @@ def _along(body: RollingBall) -> Callable[..., FloatArray]:
     """The rows' derivatives by the velocities: 1, and -a [e1]×."""
     a, nearby = body.ball.radius, body.surface.nearby
 
-    def jacobian(
-        system: Any,  # noqa: ARG001
-        t: float,  # noqa: ARG001
-        item: int,  # noqa: ARG001
-        q: Any,
-        q_t: Any,  # noqa: ARG001
-        velocity_level: bool,  # noqa: ARG001
-    ) -> FloatArray:
+    def jacobian(_system: Any, _t: float, _item: int, q: Any, _q_t: Any, _velocity_level: bool) -> FloatArray:
         _, x, y, z = nearby(*np.array(q)[:3].tolist())
         return np.array(
             [[1, 0, 0, 0, a * z, -a * y], [0, 1, 0, -a * z, 0, a * x], [0, 0, 1, a * y, -a * x, 0]], dtype=np.float64
