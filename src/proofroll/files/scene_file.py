@@ -32,8 +32,8 @@ class SceneFile:
     Attributes:
         title: what the scene is, in one line.
         source: where it comes from.
-        parameters: what a user sets by name.
         gravity: the table that all kinds of elements share.
+        parameters: what a user sets by name.
         asks: what is wanted besides the motion, e.g. ``orientation``.
         reason: why the scene is there, for a person.
         duration: length of a run that shows what it is about [s].
@@ -42,8 +42,8 @@ class SceneFile:
 
     title: str
     source: str
-    parameters: dict[str, Parameter]
     gravity: dict[str, Any]
+    parameters: dict[str, Parameter] = field(default_factory=dict)
     asks: list[str] = field(default_factory=list)
     reason: str = ""
     duration: float | None = None

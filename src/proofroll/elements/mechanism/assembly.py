@@ -20,6 +20,7 @@ _ROUNDS = 50  # Newton's steps; from a fair guess it needs five
 _STILL = 1e-12  # least eigenvalue of a mass matrix with ones on its diagonal: below it, round-off decides
 _PART = 1e-6  # of the largest velocity in a motion: less is round-off
 _LARGEST = 0.5  # rad or m in one step: beyond it, the linearisation says nothing
+IMMOBILE = "it cannot move; free a joint or a loop"
 ADVICE = "correct q0, or give the joints that follow from the loops dependent = true and q0 as a guess"
 
 
@@ -35,6 +36,9 @@ def assembled(mechanism: Mechanism, dependent: Collection[str]) -> Mechanism:
     """
     if not dependent:
         return mechanism
+    if not mechanism.loops:
+        advice = "there is no loop that it could follow from; add one, or leave dependent out"
+        raise InputError(f"joints.{next(iter(dependent))}.dependent", True, advice)
     tree = Tree(mechanism)
     q, v = mechanism.start()
     free = np.concatenate([np.full(joint.nv, joint.name in dependent) for joint in mechanism.joints])
@@ -71,15 +75,23 @@ def _check_inertia(mechanism: Mechanism, M: Array) -> None:
 
 
 def check_start(mechanism: Mechanism) -> None:
-    """The loops close at the start, the velocities keep them closed, and the mechanism can move.
+    """The loops close at the start, the velocities keep them closed, springs have a direction, something can move.
 
     Raises:
         InputError: one of this is not so.
     """
+    if not mechanism.nv:
+        raise InputError("mechanism", f"{len(mechanism.joints)} joints", IMMOBILE)
     tree = Tree(mechanism)
     q, v = mechanism.start()
     motion = tree.at(q, v)
     rows = tree.loop_rows(motion)
+    for spring in mechanism.springs:
+        ends = ((spring.body_a, spring.position_a), (spring.body_b, spring.position_b))
+        a, b = (tree.point(motion, body, np.array(place))[0] for body, place in ends)
+        if np.linalg.norm(b - a) <= CLOSED:
+            advice = "its ends are at one place at the start, so that it has no direction; move one"
+            raise InputError(f"springs.{spring.name}", f"{spring.body_a} to {spring.body_b}", advice)
     for number, loop in enumerate(mechanism.loops):
         field, between = f"loops.{loop.name}", f"{loop.body_a} to {loop.body_b}"
         mine = rows.loop == number
@@ -102,4 +114,4 @@ def check_start(mechanism: Mechanism) -> None:
             raise InputError(field, between, advice)
     _check_inertia(mechanism, JointCoordinates(mechanism, 0).inertial(motion)[1])
     if analysed(mechanism).mobility == 0:
-        raise InputError("mechanism", f"{len(mechanism.joints)} joints", "it cannot move; free a joint or a loop")
+        raise InputError("mechanism", f"{len(mechanism.joints)} joints", IMMOBILE)
