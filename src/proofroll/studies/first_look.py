@@ -16,6 +16,7 @@ from proofroll.files.scene_file import load_scene, read_scene_file
 from proofroll.studies.axes import Axis, AxisTerm
 
 _UNTIL, _SAMPLES = 1.0, 50
+_STEP = 4e-3  # s: samples lie whole numbers of it apart, which a ladder of steps down to 1e-3 s divides
 _CLOSE = "close"
 _BECAUSE = "nobody has said what to expect of this scene"
 # Along an axis a parameter is taken to these parts of its default, where its bounds allow.
@@ -33,7 +34,8 @@ def compared(name: str, parameters: Mapping[str, Any]) -> Comparison:
         InputError: there is no such scene, a parameter makes no sense, or no installed engine can represent it.
     """
     file, scene = read_scene_file(name), load_scene(name, **parameters)
-    until = file.duration or _UNTIL
+    duration = file.duration or _UNTIL
+    every = _STEP * max(1, round(duration / _SAMPLES / _STEP))
     rows = [Row(engine, _CLOSE, list(Verdict), because=_BECAUSE) for engine in able(scene)]
     if not rows:
         raise InputError("scene", name, f"no installed engine has {', '.join(_lacking(scene))}")
@@ -42,8 +44,8 @@ def compared(name: str, parameters: Mapping[str, Any]) -> Comparison:
         title=file.title,
         question=f"Which engines agree with the truth? {file.reason}".strip(),
         scene=name,
-        until=until,
-        every=until / _SAMPLES,
+        until=every * max(1, int(duration / every + 1e-9)),
+        every=every,
         vary={key: [scene.parameters[key]] for key in parameters},
         bands={_CLOSE: Band("one per cent is what an eye sees of a motion: a first look", bounds(scene))},
         rows=rows,

@@ -195,16 +195,15 @@ BAD = {
         "mechanism = .*cannot move",
     ),
     "nothing but fixed joints": (
-        SLIDER_CRANK.split("[[bodies]]")[0] + ROD + joint("world", "extra", "fixed"),
+        SLIDER_CRANK.split("[[bodies]]", maxsplit=1)[0] + ROD + joint("world", "extra", "fixed"),
         "mechanism = '1 joints': it cannot move",
     ),
     "spring without a direction": (
-        SLIDER_CRANK
-        + '\n[[springs]]\nname = "s"\nbody_a = "world"\nbody_b = "crank"\nstiffness = 1\nlength = 1\n',
+        SLIDER_CRANK + '\n[[springs]]\nname = "s"\nbody_a = "world"\nbody_b = "crank"\nstiffness = 1\nlength = 1\n',
         "springs.s = 'world to crank': its ends are at one place",
     ),
     "dependent without a loop": (
-        SLIDER_CRANK.split("[[bodies]]")[0] + ROD + joint("world", "extra", more="dependent = true"),
+        SLIDER_CRANK.split("[[bodies]]", maxsplit=1)[0] + ROD + joint("world", "extra", more="dependent = true"),
         "joints.extra.dependent.*no loop that it could follow from",
     ),
     "division by zero": (SLIDER_CRANK.replace("= crank/2", "= crank/0"), "bodies.0.com.0 = .* divides by zero"),
