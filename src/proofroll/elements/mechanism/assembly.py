@@ -88,8 +88,8 @@ def check_start(mechanism: Mechanism) -> None:
     rows = tree.loop_rows(motion)
     for spring in mechanism.springs:
         ends = ((spring.body_a, spring.position_a), (spring.body_b, spring.position_b))
-        a, b = (tree.point(motion, body, np.array(place))[0] for body, place in ends)
-        if np.linalg.norm(b - a) <= CLOSED:
+        one, two = (tree.point(motion, body, np.array(place))[0] for body, place in ends)
+        if np.linalg.norm(two - one) <= CLOSED:
             advice = "its ends are at one place at the start, so that it has no direction; move one"
             raise InputError(f"springs.{spring.name}", f"{spring.body_a} to {spring.body_b}", advice)
     for number, loop in enumerate(mechanism.loops):
