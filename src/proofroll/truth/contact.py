@@ -12,7 +12,7 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 
-from proofroll.core.arrays import FloatArray
+from proofroll.core.arrays import FloatArray, cross
 from proofroll.elements.ball_on_surface.model import RollingBall
 from proofroll.truth.collocation import System
 
@@ -47,7 +47,7 @@ class ContactRates:
     def velocity(self, y: FloatArray) -> FloatArray:
         """v_WB [m/s], shape (n, 3): slip without the part that the spin makes."""
         e1 = self._body.surface.normal(y[:, :3])
-        return np.asarray(y[:, 6:] - self._body.ball.radius * np.cross(y[:, 3:6], e1))
+        return np.asarray(y[:, 6:] - self._body.ball.radius * cross(y[:, 3:6], e1))
 
     def force(self, y: FloatArray, sticking: bool) -> FloatArray:
         """R: force of the wall on the ball [N], shape (n, 3)."""

@@ -7,7 +7,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from proofroll.core.arrays import FloatArray
+from proofroll.core.arrays import FloatArray, cross
 from proofroll.core.errors import Diverged, Refused
 from proofroll.elements.ball_on_surface.events import EventKind
 from proofroll.elements.ball_on_surface.model import RollingBall
@@ -91,7 +91,7 @@ def airborne(
                 events.append(("bounce", time))
             continue
         v, w = route.impact(p, v, w, 0.0, 0.0)
-        slip = v + body.ball.radius * np.cross(w, e1)
+        slip = v + body.ball.radius * cross(w, e1)
         slip -= (slip @ e1) * e1
         events.append(("settle", time + 2 * e * approach / ((1 - e) * weight) if e else time))
         size = float(np.linalg.norm(slip))

@@ -8,7 +8,7 @@ from functools import partial
 
 import numpy as np
 
-from proofroll.core.arrays import FloatArray
+from proofroll.core.arrays import FloatArray, cross
 from proofroll.core.errors import Diverged
 from proofroll.elements.ball_on_surface.mechanics import always_pressed
 from proofroll.elements.ball_on_surface.model import RollingBall
@@ -54,7 +54,7 @@ class Implicit:
     def at(self, p_WB: FloatArray, v_WB: FloatArray, w_WB: FloatArray) -> FloatArray:
         """See :class:`Route`."""
         gap, e1 = float(self._body.surface.gap(p_WB)), self._body.surface.normal(p_WB)
-        slip = v_WB + self._body.ball.radius * np.cross(w_WB, e1)
+        slip = v_WB + self._body.ball.radius * cross(w_WB, e1)
         return np.concatenate([p_WB + gap * e1, w_WB, slip - (slip @ e1) * e1])
 
     def impact(
@@ -79,7 +79,7 @@ class Implicit:
     def nudged(self, state: FloatArray, v_WB: FloatArray) -> FloatArray:
         """See :class:`Route`."""
         e1 = self._body.surface.normal(state[:3])
-        w = (state[3:6] @ e1) * e1 - np.cross(e1, v_WB) / self._body.ball.radius
+        w = (state[3:6] @ e1) * e1 - cross(e1, v_WB) / self._body.ball.radius
         return np.concatenate([state[:3], w, np.zeros(3)])
 
     def stick(self, time: float, state: FloatArray, until: float) -> Leg[FloatArray]:
@@ -169,7 +169,7 @@ class Implicit:
         rates = self._contact.rates(state[None, :], sticking)[0]
         if sticking:
             v, e1 = self._contact.velocity(state[None, :])[0], self._body.surface.normal(state[:3])
-            v_rate = -self._body.ball.radius * np.cross(rates[3:6], e1)
+            v_rate = -self._body.ball.radius * cross(rates[3:6], e1)
         else:
             v, v_rate = state[6:], rates[6:]
         size = float(np.linalg.norm(v))

@@ -166,9 +166,9 @@ class DrillSettings:
 
     formulation: str = "well"
     preset: str = "matched"
-    rtol: float = 1e-10
-    resolution: ClassVar[str] = "rtol"
-    order: ClassVar[None] = None
+    dt: float = 5e-3
+    resolution: ClassVar[str] = "dt"
+    order: ClassVar[int] = 4
 
 
 class Drill:
@@ -197,7 +197,7 @@ class Drill:
         self._where, self._deed = DEEDS["well" if cured else settings.formulation]
         self._mark = folder / f"alive-{settings.formulation}"
         self._do("build")
-        self._inner = Projection.build(scene, Projection.settings(formulation="rotating_frame", rtol=settings.rtol))
+        self._inner = Projection.build(scene, Projection.settings(formulation="rotating_frame", integrator="rk4", dt=settings.dt))
         self._t = 0.0
 
     def _do(self, where: str) -> None:

@@ -9,7 +9,7 @@ from __future__ import annotations
 import numpy as np
 import numpy.typing as npt
 
-from proofroll.core.arrays import FloatArray
+from proofroll.core.arrays import FloatArray, cross
 from proofroll.elements.ball_on_surface.model import RollingBall
 from proofroll.elements.ball_on_surface.resting import setting_off, stands, stays
 from proofroll.elements.ball_on_surface.surfaces import Declared
@@ -19,14 +19,14 @@ _PULLS = 1e-9  # of the whole force: a smaller pull is round-off
 
 def slip_velocity(radius: float, e1: FloatArray, v_WB: FloatArray, w_WB: FloatArray) -> FloatArray:
     """Velocity of the ball's contact point in the world [m/s], shape (..., 3): v + ω × a e1."""
-    return np.asarray(v_WB + radius * np.cross(w_WB, e1))
+    return np.asarray(v_WB + radius * cross(w_WB, e1))
 
 
 def wall_velocity(body: RollingBall, p_WB: FloatArray, e1: FloatArray) -> FloatArray:
     """Velocity of the wall where the ball touches it [m/s], shape (..., 3): W × (p + a e1)."""
     if body.wall_rate is None:
         return np.zeros_like(p_WB)
-    return np.asarray(np.cross(body.wall_rate, p_WB + body.ball.radius * e1))
+    return np.asarray(cross(body.wall_rate, p_WB + body.ball.radius * e1))
 
 
 def resistance_moment(f: float, N: npt.ArrayLike, e1: FloatArray, v_WB: FloatArray) -> FloatArray:
@@ -37,7 +37,7 @@ def resistance_moment(f: float, N: npt.ArrayLike, e1: FloatArray, v_WB: FloatArr
     """
     speed = np.linalg.norm(v_WB, axis=-1, keepdims=True)
     direction = np.divide(v_WB, speed, out=np.zeros_like(v_WB), where=speed > 0)
-    return np.asarray(-f * np.asarray(N)[..., None] * np.cross(direction, e1))
+    return np.asarray(-f * np.asarray(N)[..., None] * cross(direction, e1))
 
 
 def energy(body: RollingBall, p_WB: FloatArray, v_WB: FloatArray, w_WB: FloatArray) -> FloatArray:
@@ -116,7 +116,7 @@ def initial_angular_acceleration(body: RollingBall) -> FloatArray:
         return np.zeros(3)
     _, force = initial_response(body)
     e1 = body.surface.normal(body.p0)
-    moment = body.ball.radius * np.cross(e1, force)
+    moment = body.ball.radius * cross(e1, force)
     moment += resistance_moment(body.contact.rolling_resistance, -force @ e1, e1, _way(body))
     return np.asarray(moment / body.ball.inertia)
 
@@ -159,8 +159,8 @@ def newton_euler(
     matrix[3:6, 6:] = -a * cross_e1 - resistance
     matrix[6:, :3] = np.eye(3)
     matrix[6:, 3:6] = -a * cross_e1
-    right = np.concatenate([m * body.gravity, np.zeros(3), -a * np.cross(w_WB, e1_rate)])
+    right = np.concatenate([m * body.gravity, np.zeros(3), -a * cross(w_WB, e1_rate)])
     if body.wall_rate is not None:  # v + a ω × e1 is the wall's velocity W × (p + a e1), whose rate this is
-        right[6:] += np.cross(body.wall_rate, v_WB + a * e1_rate)
+        right[6:] += cross(body.wall_rate, v_WB + a * e1_rate)
     solution = np.linalg.solve(matrix, right)
     return solution[:3], solution[3:6], solution[6:]

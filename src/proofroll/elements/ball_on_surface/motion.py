@@ -6,7 +6,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from proofroll.core.arrays import FloatArray
+from proofroll.core.arrays import FloatArray, cross
 from proofroll.elements.ball_on_surface.model import RollingBall
 
 
@@ -62,5 +62,5 @@ def world_motion(
 
     v_WB = along(velocity)
     # slip = v + a ω × e1, so the tangential part of ω is e1 × (slip - v) / a
-    w_WB = spin[:, None] * e1 + np.cross(e1, along(slip) - v_WB) / body.ball.radius
+    w_WB = spin[:, None] * e1 + cross(e1, along(slip) - v_WB) / body.ball.radius
     return BallMotion(body.surface.position(u), v_WB, w_WB, along(friction) - press[:, None] * e1, route)

@@ -10,7 +10,7 @@ import math
 
 import numpy as np
 
-from proofroll.core.arrays import FloatArray
+from proofroll.core.arrays import FloatArray, cross
 from proofroll.elements.ball_on_surface.mechanics import wall_velocity
 from proofroll.elements.ball_on_surface.model import RollingBall
 
@@ -45,8 +45,8 @@ def reduced_rates(body: RollingBall, state: FloatArray) -> tuple[FloatArray, Flo
     w2 = w3 = 0.0
     if body.wall_rate is not None:
         e1, e1_rate = frame[:, 0], frame[:, 1:] @ (r2, r3)
-        _, w2, w3 = (np.cross(body.wall_rate, body.surface.position(u) + a * e1) @ frame).tolist()
-        _, gain2, gain3 = (np.cross(body.wall_rate, frame[:, 1:] @ (v2, v3) + a * e1_rate) @ frame).tolist()
+        _, w2, w3 = (cross(body.wall_rate, body.surface.position(u) + a * e1) @ frame).tolist()
+        _, gain2, gain3 = (cross(body.wall_rate, frame[:, 1:] @ (v2, v3) + a * e1_rate) @ frame).tolist()
         drive2, drive3 = drive2 + kappa * gain2, drive3 + kappa * gain3
     speed = math.hypot(v2, v3)
     if f and speed:  # e1 × M = -f N v/V; at rest the moment is zero, as in resistance_moment
@@ -67,5 +67,5 @@ def placed(body: RollingBall, states: FloatArray, v_WB: FloatArray) -> tuple[Flo
     """p_WB [m], v_WB [m/s] and w_WB [rad/s] of states (u, u̇, ω1), shape (n, 5), with ``v_WB``; each shape (n, 3)."""
     e1 = body.surface.frame(states[:, :2])[..., 0]
     p_WB = body.surface.position(states[:, :2])
-    w_WB = states[:, 4:] * e1 - np.cross(e1, v_WB - wall_velocity(body, p_WB, e1)) / body.ball.radius
+    w_WB = states[:, 4:] * e1 - cross(e1, v_WB - wall_velocity(body, p_WB, e1)) / body.ball.radius
     return p_WB, v_WB, w_WB

@@ -14,12 +14,13 @@ from typing import Any
 
 import numpy as np
 
+from proofroll.core.arrays import cross
 from proofroll.core.errors import Diverged, Refused
 from proofroll.elements.mechanism.analysis import analysed, reactions
 from proofroll.elements.mechanism.kinematics import BodyMotion, Rows, Tree
 from proofroll.elements.mechanism.model import Mechanism
 from proofroll.elements.mechanism.record import Record, gathered
-from proofroll.elements.mechanism.rotations import Array, cross, crosses, skews, to_quaternion
+from proofroll.elements.mechanism.rotations import Array, skews, to_quaternion
 from proofroll.elements.mechanism.stepping import integrated
 
 _NEAR = 1e-7  # m, 1: how far coordinates are moved to see how accelerations hang on them
@@ -218,10 +219,10 @@ class JointCoordinates:
     def _wrenches(self, acceleration: Array, arm: Array, inertia: Array, w: Array) -> Array:
         """Force and moment about the centre of mass that move each body so, beyond gravity, (bodies, 6)."""
         alpha = acceleration[:, 3:]
-        at_com = acceleration[:, :3] + crosses(alpha, arm) + crosses(w, crosses(w, arm))
+        at_com = acceleration[:, :3] + cross(alpha, arm) + cross(w, cross(w, arm))
         force = self._mass[:, None] * (at_com - self._gravity)
         spin = np.einsum("nij,nj->ni", inertia, w)
-        return np.concatenate([force, np.einsum("nij,nj->ni", inertia, alpha) + crosses(w, spin)], axis=1)
+        return np.concatenate([force, np.einsum("nij,nj->ni", inertia, alpha) + cross(w, spin)], axis=1)
 
     def _needed(self, found: Solution) -> Array:
         """Wrenches about the world's origin that joints and loops bring to the bodies; the last is the world's."""
@@ -233,7 +234,7 @@ class JointCoordinates:
         wrenches = self._wrenches(acceleration, arm, inertia, motion.w_WB[:n])
         needed = np.zeros((n + 1, 6))
         needed[:n] = wrenches
-        needed[:n, 3:] += crosses(motion.p_WB[:n] + arm, wrenches[:, :3])
+        needed[:n, 3:] += cross(motion.p_WB[:n] + arm, wrenches[:, :3])
         for end, position, force in self._spring_forces(motion):
             at = self.tree.point(motion, end, position)[0]
             needed[self.mechanism.body_index[end]] -= np.concatenate([force, cross(at, force)])
@@ -255,7 +256,7 @@ class JointCoordinates:
         n = len(self._mass)
         R, w = motion.R_WB[:n], motion.w_WB[:n]
         arm = np.einsum("nij,nj->ni", R, self._com)
-        v_com = motion.v_WB[:n] + crosses(w, arm)
+        v_com = motion.v_WB[:n] + cross(w, arm)
         spin = np.einsum("nji,nj->ni", R, w)
         energy = 0.5 * self._mass @ (v_com**2).sum(axis=1) + 0.5 * np.einsum("ni,nij,nj", spin, self._inertia, spin)
         energy -= self._mass @ ((motion.p_WB[:n] + arm) @ self._gravity)

@@ -8,7 +8,7 @@ from functools import cached_property
 
 import numpy as np
 
-from proofroll.core.arrays import FloatArray
+from proofroll.core.arrays import FloatArray, cross
 from proofroll.elements.mechanism.joint import FACTS
 from proofroll.elements.mechanism.model import Mechanism
 
@@ -54,7 +54,7 @@ class Placed:
         if index < 0:
             return np.zeros((len(self.time), 3))
         arm = self.R_WB[:, index] @ np.asarray(position, dtype=np.float64)
-        return np.asarray(self.v_WB[:, index] + np.cross(self.w_WB[:, index], arm))
+        return np.asarray(self.v_WB[:, index] + cross(self.w_WB[:, index], arm))
 
     def spin(self, body: str) -> FloatArray:
         """Angular velocity of a body or of the world [rad/s], shape (time, 3)."""
@@ -84,7 +84,7 @@ class Placed:
                 on_child, on_parent = (joint.child, joint.child_position), (joint.parent, joint.position)
                 apart = self.point(*on_child) - self.point(*on_parent)
                 arm = self.point(*on_child) - self.point(joint.parent, (0.0, 0.0, 0.0))
-                carried = self.velocity(joint.parent, (0.0, 0.0, 0.0)) + np.cross(self.spin(joint.parent), arm)
+                carried = self.velocity(joint.parent, (0.0, 0.0, 0.0)) + cross(self.spin(joint.parent), arm)
                 rate = np.sum((self.velocity(*on_child) - carried) * axis, -1)
                 found[joint.name] = np.sum(apart * axis, -1), rate
         return found

@@ -24,11 +24,6 @@ def skew(a: Any) -> Array:
     return np.array([[0.0, -z, y], [z, 0.0, -x], [-y, x, 0.0]])
 
 
-def crosses(a: Array, b: Array) -> Array:
-    """Cross products of two lists of vectors, (n, 3)."""
-    return cross(a.T, b.T).T
-
-
 def skews(a: Array) -> Array:
     """:func:`skew` of each vector of a list, (n, 3, 3)."""
     matrices = np.zeros((len(a), 3, 3))

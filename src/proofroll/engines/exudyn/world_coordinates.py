@@ -14,7 +14,7 @@ from typing import Any
 
 import numpy as np
 
-from proofroll.core.arrays import FloatArray
+from proofroll.core.arrays import FloatArray, cross
 from proofroll.core.engine import Built, Sample
 from proofroll.core.errors import Refused
 from proofroll.core.events import Event
@@ -63,9 +63,9 @@ class WorldCoordinates:
         self.system.Assemble()
         # The derivative of the rows without p̈ and ω̇, of which Exudyn cannot know.
         a, e1_rate = body.ball.radius, body.surface.normal_gradient(body.p0) @ body.v0
-        turning = -a * np.cross(body.w0, e1_rate)
+        turning = -a * cross(body.w0, e1_rate)
         if body.wall_rate is not None:
-            turning += np.cross(body.wall_rate, body.v0 + a * e1_rate)
+            turning += cross(body.wall_rate, body.v0 + a * e1_rate)
         start = consistent_start(self.system, settings, {self._rolling: turning})
         # Of a ball that turns: the rows are a times a matrix of which two singular values are 1, and one is 0.
         _, jacobian, _ = initial_matrices(self.system, settings)
@@ -136,8 +136,8 @@ def _rolling(body: RollingBall) -> Callable[..., FloatArray]:
     def constraint(_system: Any, _t: float, _item: int, q: Any, q_t: Any, _velocity_level: bool) -> FloatArray:
         p, rates = np.array(q)[:3], np.array(q_t)
         e1 = normal(p)
-        relative = rates[:3] + a * np.cross(rates[3:], e1)
-        return relative if wall_rate is None else relative - np.cross(wall_rate, p + a * e1)
+        relative = rates[:3] + a * cross(rates[3:], e1)
+        return relative if wall_rate is None else relative - cross(wall_rate, p + a * e1)
 
     return constraint
 

@@ -9,10 +9,10 @@ from typing import Any
 import mujoco
 import numpy as np
 
-from proofroll.core.arrays import FloatArray
+from proofroll.core.arrays import FloatArray, cross
 from proofroll.core.errors import Diverged, Refused
 from proofroll.elements.ball_on_surface.model import RollingBall
-from proofroll.engines.mujoco.contact import Resistance, cross, foreseen_normal_force
+from proofroll.engines.mujoco.contact import Resistance, foreseen_normal_force
 from proofroll.engines.mujoco.friction import BoundedFriction, corrects
 from proofroll.engines.mujoco.model import pose, quaternion_of, tangent_plane
 from proofroll.engines.mujoco.settings import MujocoSettings, normal_lead, own_share, velocity_lag
@@ -153,15 +153,15 @@ class Free:
         gradient = self._surface.normal_gradient(data.qpos[:3])
         e1_rate = gradient @ rates[:3]
         w = data.xmat[self._ball].reshape(3, 3) @ rates[3:]
-        rows = contact.frame.reshape(3, 3) @ np.array(cross(w.tolist(), e1_rate.tolist())) * -self._radius
+        rows = contact.frame.reshape(3, 3) @ cross(w, e1_rate) * -self._radius
         v = rates[:3] + self._lead * trend[:3]
         rows[0] = v @ gradient @ v
         first = contact.efc_address
         if self._wall_rate is not None:
             # Damping and rate are meant for the velocity relative to the wall's, W × (p + a e1).
             e1 = -contact.frame[:3] if contact.geom[1] == self._geom else contact.frame[:3]
-            velocity = np.cross(self._wall_rate, data.qpos[:3] + self._radius * e1)
-            gained = np.cross(self._wall_rate, rates[:3] + self._radius * e1_rate)
+            velocity = cross(self._wall_rate, data.qpos[:3] + self._radius * e1)
+            gained = cross(self._wall_rate, rates[:3] + self._radius * e1_rate)
             tangents = contact.frame.reshape(3, 3)[1:]
             rows[1:] += tangents @ gained
             data.efc_aref[first + 1 : first + 3] += data.efc_KBIP[first + 1, 1] * (tangents @ velocity)

@@ -8,6 +8,7 @@ from typing import Any
 import mujoco
 import numpy as np
 
+from proofroll.core.arrays import cross
 from proofroll.core.engine import Sample, whole_steps
 from proofroll.core.errors import InputError, Refused
 from proofroll.elements.mechanism import Joint, Mechanism
@@ -89,7 +90,7 @@ class MujocoMechanism:
             arm = R @ joint.child_position
             place = np.array(joint.position) + joint.parent_frame @ origin - arm
             q = np.concatenate([place, to_quaternion(R)])
-            v = np.concatenate([R @ v[:3] - np.cross(R @ v[3:], arm), v[3:]])
+            v = np.concatenate([R @ v[:3] - cross(R @ v[3:], arm), v[3:]])
         elif joint.kind == "free":
             v = np.concatenate([placed(joint.kind, q)[1] @ v[:3], v[3:]])
         self._data.qpos[parts[0].qposadr[0] :][: len(q)] = q
@@ -153,7 +154,7 @@ class MujocoMechanism:
                     continue
                 on_b = -data.efc_force[rows[equality] : rows[equality] + 3]  # it acts on the first site's body
                 force[count + number] += on_b
-                torque[count + number] += np.cross(data.site(f"loop{number}b{point}").xpos - origin, on_b)
+                torque[count + number] += cross(data.site(f"loop{number}b{point}").xpos - origin, on_b)
         return force, torque
 
     def built(self) -> MechanismBuilt:

@@ -13,7 +13,7 @@ from typing import Any, NamedTuple
 import numpy as np
 import pinocchio as pin
 
-from proofroll.core.arrays import FloatArray
+from proofroll.core.arrays import FloatArray, cross
 from proofroll.core.engine import whole_steps
 from proofroll.core.errors import Diverged, Refused
 from proofroll.core.events import Event
@@ -158,7 +158,7 @@ class ContactSteps:
             x1, y1, z1, x2, y2, z2, x3, y3, z3 = triad
             ahead = (0.5 if self.leapfrog else 1.0) * self.dt
             there = np.array(place) + ahead * np.array(along) + self._radius * np.array((x1, y1, z1))
-            carried = np.cross(self._wall_rate, there)
+            carried = cross(self._wall_rate, there)
             shift2 -= float(carried @ (x2, y2, z2))
             shift3 += float(carried @ (x3, y3, z3))
         shift = np.array((shift2, shift3, shift1))

@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 import pinocchio as pin
 
-from proofroll.core.arrays import FloatArray
+from proofroll.core.arrays import FloatArray, cross
 from proofroll.elements.ball_on_surface.model import RollingBall
 from proofroll.engines.pinocchio.mechanism import BallWithRows, SlidingContact
 from proofroll.engines.pinocchio.rows import BallTerms, ball_terms, own_bias, resistance, rolling_rows
@@ -61,7 +61,7 @@ class FreeFlyer(BallWithRows):
 
     def _carrying(self, W: FloatArray, v: Sequence[float], e1_rate: Sequence[float]) -> FloatArray:
         """Rate of the wall's velocity W × (p + a e1) at the contact, which goes along with the ball [m/s²]."""
-        return np.cross(W, np.asarray(v) + self._radius * np.asarray(e1_rate))
+        return cross(W, np.asarray(v) + self._radius * np.asarray(e1_rate))
 
     def project(self, data: Any, q: FloatArray, v: FloatArray) -> tuple[FloatArray, FloatArray]:
         """See :class:`~proofroll.engines.pinocchio.mechanism.BallWithRows`.
@@ -71,7 +71,7 @@ class FreeFlyer(BallWithRows):
         if self._wall_rate is None:
             return super().project(data, q, v)
         turned = pin.Quaternion(q[3:]).toRotationMatrix().T if self._orientation else np.eye(3)
-        carried = np.concatenate([turned @ np.cross(self._wall_rate, q[:3]), turned @ self._wall_rate])
+        carried = np.concatenate([turned @ cross(self._wall_rate, q[:3]), turned @ self._wall_rate])
         q, rest = super().project(data, q, v - carried)
         return q, rest + carried
 

@@ -14,8 +14,9 @@ import pinocchio as pin
 from numpy.typing import NDArray
 from scipy.linalg.lapack import dpotrf, dtrtri
 
+from proofroll.core.arrays import cross
 from proofroll.elements.mechanism.joint import FACTS
-from proofroll.elements.mechanism.rotations import Array, crosses
+from proofroll.elements.mechanism.rotations import Array
 from proofroll.elements.mechanism.sampling import independent
 from proofroll.engines.pinocchio.joint_tree import JointTree
 
@@ -77,14 +78,14 @@ class LoopRows:
         J, a, d, w_a, w_b = J_b - J_a, a_b - a_a, p_b - p_a, v_a[:, 3:], v_b[:, 3:]
         i, turning = self._point, self._turning
         n = np.where(turning, A[i, :, self._axis], self._fixed)
-        r, n_rate = turning * crosses(d[i], n), turning * crosses(w_a[i], n)
+        r, n_rate = turning * cross(d[i], n), turning * cross(w_a[i], n)
         C = _times(n, J[i, :3]) - _times(r, J_a[i, 3:])
         drift = _dot(n, a[i, :3]) - _dot(r, a_a[i, 3:]) + 2 * _dot(n_rate, (v_b - v_a)[i, :3])
-        drift += _dot(crosses(w_a[i], n_rate), d[i])
+        drift += _dot(cross(w_a[i], n_rate), d[i])
         j = self._angle
         x, y = A[j, :, self._x], B[j, :, self._y]
-        t, x_rate, y_rate = crosses(y, x), crosses(w_a[j], x), crosses(w_b[j], y)
-        turn = _dot(t, a[j, 3:]) + _dot(crosses(w_a[j], x_rate), y) + _dot(x, crosses(w_b[j], y_rate))
+        t, x_rate, y_rate = cross(y, x), cross(w_a[j], x), cross(w_b[j], y)
+        turn = _dot(t, a[j, 3:]) + _dot(cross(w_a[j], x_rate), y) + _dot(x, cross(w_b[j], y_rate))
         return RowsAtState(
             np.concatenate([_dot(n, d[i]), _dot(x, y)]),
             np.concatenate([C, _times(t, J[j, 3:])]),

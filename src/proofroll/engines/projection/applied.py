@@ -7,9 +7,10 @@ from typing import NamedTuple
 
 import numpy as np
 
+from proofroll.core.arrays import cross
 from proofroll.elements.mechanism import Joint, Mechanism
 from proofroll.elements.mechanism.rotations import Array
-from proofroll.engines.projection.connections import Bodies, Ends, ProjectedConnections, cross, turned
+from proofroll.engines.projection.connections import Bodies, Ends, ProjectedConnections, turned
 
 _TURN = 2 * math.pi
 
@@ -56,12 +57,12 @@ class Applied:
             length = math.sqrt(between @ between)
             pull = spring.stiffness * (length - spring.length)
             if spring.damping:
-                rate = bodies.v[b] + np.cross(bodies.w[b], arms[1]) - bodies.v[a] - np.cross(bodies.w[a], arms[0])
+                rate = bodies.v[b] + cross(bodies.w[b], arms[1]) - bodies.v[a] - cross(bodies.w[a], arms[0])
                 pull += spring.damping * (between @ rate) / length
             force = pull / length * between
             for i, arm, there in ((a, arms[0], force), (b, arms[1], -force)):
                 forces[i, :3] += there
-                forces[i, 3:] += np.cross(arm, there) @ bodies.R[i]
+                forces[i, 3:] += cross(arm, there) @ bodies.R[i]
         found = forces[:-1].ravel()
         if self._laws or self._balls:
             force, torque = self.of_joints(bodies, ends)
@@ -80,7 +81,7 @@ class Applied:
             direction = ends.B[c, :, 0] if law.axis == "x" else ends.A[c, :, 2]
             if law.axis == "slide":
                 w_a = bodies.w[self._connections.a[c]]
-                rate = direction @ (ends.d_rate[c] - np.cross(w_a, ends.d[c]))
+                rate = direction @ (ends.d_rate[c] - cross(w_a, ends.d[c]))
             else:
                 rate = direction @ w[c]
             size = law.drive - law.damping * rate

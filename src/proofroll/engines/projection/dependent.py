@@ -15,8 +15,8 @@ from __future__ import annotations
 from typing import NamedTuple
 
 import numpy as np
-from scipy.linalg.lapack import dgesdd
 
+from proofroll.core.arrays import cross
 from proofroll.elements.mechanism import Mechanism, Tree
 from proofroll.elements.mechanism.rotations import Array, to_quaternion
 from proofroll.elements.mechanism.sampling import independent
@@ -69,7 +69,7 @@ class DependentCoordinates:
         R, w = motion.R_WB[: self._count], motion.w_WB[: self._count]
         arm = np.einsum("nij,nj->ni", R, self.com)
         quaternions = np.array([to_quaternion(rotation) for rotation in R])
-        v = motion.v_WB[: self._count] + np.cross(w, arm)
+        v = motion.v_WB[: self._count] + cross(w, arm)
         r = motion.p_WB[: self._count] + arm
         return np.concatenate([r.ravel(), quaternions.ravel(), v.ravel(), np.einsum("nji,nj->ni", R, w).ravel()])
 
@@ -109,6 +109,8 @@ class DependentCoordinates:
 
     def _split(self, C: Array, rank: int) -> tuple[Array, Array]:
         """Unit vectors of the constrained subspace, (rank, 6 bodies), and what takes values of rows to them."""
+        from scipy.linalg.lapack import dgesdd  # here: whoever runs a ball need not wait for it
+
         U, S, Vt, failed = dgesdd(C @ self._root, full_matrices=0)
         if failed:
             raise np.linalg.LinAlgError("the singular values were not found")

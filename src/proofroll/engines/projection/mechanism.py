@@ -7,6 +7,7 @@ from typing import Any
 
 import numpy as np
 
+from proofroll.core.arrays import cross
 from proofroll.core.engine import Sample
 from proofroll.core.errors import Diverged, Refused
 from proofroll.core.integrators import INTEGRATORS
@@ -76,7 +77,7 @@ class ProjectionMechanism:
         q = equations.parts(x)[1]
         return Sample(
             p_WB=bodies.r[:count] - arm,
-            v_WB=bodies.v[:count] - np.cross(w, arm),
+            v_WB=bodies.v[:count] - cross(w, arm),
             w_WB=w.copy(),
             q_WB=q / np.linalg.norm(q, axis=1, keepdims=True),
             joint_force=force,
@@ -108,6 +109,6 @@ class ProjectionMechanism:
             rows=len(answer.rows.C),
             rank=rank,
             mobility=6 * count - rank,
-            acceleration=of_com[:, :3] - np.cross(turning, arm) - np.cross(w, np.cross(w, arm)),
+            acceleration=of_com[:, :3] - cross(turning, arm) - cross(w, cross(w, arm)),
             angular_acceleration=turning,
         )

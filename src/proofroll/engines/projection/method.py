@@ -18,7 +18,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from proofroll.core.arrays import FloatArray
+from proofroll.core.arrays import FloatArray, cross
 from proofroll.elements.ball_on_surface.model import RollingBall
 from proofroll.engines.projection.geometry import Geometry, Local, Uniform
 from proofroll.engines.projection.orientation import EulerAngles, Orientation, RotatingFrame
@@ -114,8 +114,8 @@ class ProjectedBall:
     ) -> FloatArray:
         """Of a wall that turns at W: W × (p + a e1) and its rate W × (ṗ + a ė1), less what the turning axes make."""
         contact = self._surface.position(q[:2]) @ frame + [self._radius, 0.0, 0.0]
-        velocity = np.cross(W, contact)
-        return np.stack([velocity, np.cross(W, v[:3] + self._radius * turning[:, 0]) - turning @ velocity])
+        velocity = cross(W, contact)
+        return np.stack([velocity, cross(W, v[:3] + self._radius * turning[:, 0]) - turning @ velocity])
 
     def speed(self, x: FloatArray) -> float:
         """Of the centre [m/s]."""

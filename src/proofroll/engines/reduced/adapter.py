@@ -8,7 +8,7 @@ from typing import ClassVar, Self
 import numpy as np
 
 import proofroll
-from proofroll.core.arrays import FloatArray
+from proofroll.core.arrays import FloatArray, cross
 from proofroll.core.engine import Built, Sample
 from proofroll.core.engine_abilities import Level, Term
 from proofroll.core.scene import Scene
@@ -108,7 +108,7 @@ class Reduced:
         e1 = surface.normal(p)
         e1_rate, v0 = surface.normal_gradient(p) @ v, v
         if (W := self._body.wall_rate) is not None:  # the ball rolls on what the wall does not carry along
-            v = v - np.cross(W, p + self._body.ball.radius * e1)
-            acceleration = acceleration - np.cross(W, v0 + self._body.ball.radius * e1_rate)
-        swung = np.cross(e1_rate, v) + np.cross(e1, acceleration)
+            v = v - cross(W, p + self._body.ball.radius * e1)
+            acceleration = acceleration - cross(W, v0 + self._body.ball.radius * e1_rate)
+        swung = cross(e1_rate, v) + cross(e1, acceleration)
         return np.asarray(spin_rate * e1 + (w @ e1) * e1_rate - swung / self._body.ball.radius)

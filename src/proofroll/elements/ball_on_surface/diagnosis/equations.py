@@ -15,7 +15,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 from scipy.interpolate import make_interp_spline
 
-from proofroll.core.arrays import FloatArray
+from proofroll.core.arrays import FloatArray, cross
 from proofroll.core.events import events_of
 from proofroll.elements.ball_on_surface.mechanics import resistance_moment, slip_velocity
 from proofroll.elements.ball_on_surface.model import RollingBall
@@ -138,12 +138,12 @@ def response(
         else:
             friction = -body.contact.mu_kinetic * N * slip / size if size else np.zeros(3)
         force = friction - N * e1
-        return (force + applied) / m, (a * np.cross(e1, force) + resisting(N) + turning) / J, force
+        return (force + applied) / m, (a * cross(e1, force) + resisting(N) + turning) / J, force
     cross_e1 = np.array([[0, -e1[2], e1[1]], [e1[2], 0, -e1[0]], [-e1[1], e1[0], 0]])
     matrix, right = np.zeros((9, 9)), np.zeros(9)
     matrix[:3, :3], matrix[:3, 6:] = m * np.eye(3), -np.eye(3)
     matrix[3:6, 3:6], matrix[3:6, 6:] = J * np.eye(3), -a * cross_e1 + np.outer(resisting(1.0), e1)
     matrix[6:, :3], matrix[6:, 3:6] = np.eye(3), -a * cross_e1
-    right[:3], right[3:6], right[6:] = applied, turning, -a * np.cross(w, bend)
+    right[:3], right[3:6], right[6:] = applied, turning, -a * cross(w, bend)
     found = np.asarray(np.linalg.solve(matrix, right), dtype=np.float64)
     return found[:3], found[3:6], found[6:]

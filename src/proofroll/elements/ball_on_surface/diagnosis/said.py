@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Any, ClassVar
 import numpy as np
 from scipy.spatial.transform import Rotation
 
-from proofroll.core.arrays import FloatArray
+from proofroll.core.arrays import FloatArray, cross
 from proofroll.core.diagnosis import Cause, Evidence, apart, worth
 from proofroll.core.diagnosis.at_start import AtStart
 from proofroll.core.diagnosis.clocks import said_delay
@@ -115,7 +115,7 @@ class AtTheContact:
         spin = np.sum(w * e1, axis=-1, keepdims=True) * e1
         for name, says, changed in (
             ("p_WB", "p_WB is the contact point, not the centre", p + a * e1),
-            ("v_WB", "v_WB is the velocity of the contact point, not of the centre", v + a * np.cross(w, e1)),
+            ("v_WB", "v_WB is the velocity of the contact point, not of the centre", v + a * cross(w, e1)),
             ("w_WB", "w_WB lacks the spin about the surface's normal", w - spin),
             ("w_WB", "w_WB is the spin about the surface's normal alone", spin),
             ("w_WB", "w_WB has the spin about the surface's normal with the wrong sign", w - 2 * spin),

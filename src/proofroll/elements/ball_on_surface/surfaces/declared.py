@@ -10,7 +10,7 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 
-from proofroll.core.arrays import FloatArray
+from proofroll.core.arrays import FloatArray, cross
 from proofroll.core.errors import InputError
 from proofroll.elements.ball_on_surface.surfaces.formula import differentiated
 from proofroll.elements.ball_on_surface.surfaces.nearest import distance_by_nearest
@@ -137,10 +137,10 @@ class Declared:
             columns = _triad(*parts[1::6], *parts[2::6])
             return np.array(columns).reshape(3, 3).T
         tangents = self.tangents(u)
-        across = np.cross(tangents[..., 0], tangents[..., 1])
+        across = cross(tangents[..., 0], tangents[..., 1])
         e1 = across / np.linalg.norm(across, axis=-1, keepdims=True)
         e2 = tangents[..., 0] / np.linalg.norm(tangents[..., 0], axis=-1, keepdims=True)
-        return np.stack([e1, e2, np.cross(e1, e2)], axis=-1)
+        return np.stack([e1, e2, cross(e1, e2)], axis=-1)
 
     def locate(self, p_WB: npt.ArrayLike) -> FloatArray:
         """See :class:`Surface`: Newton's method for the nearest point, from the nearest of many."""

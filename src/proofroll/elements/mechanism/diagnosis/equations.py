@@ -15,7 +15,7 @@ import numpy as np
 from scipy.interpolate import make_interp_spline
 from scipy.spatial.transform import Rotation
 
-from proofroll.core.arrays import FloatArray
+from proofroll.core.arrays import FloatArray, cross
 from proofroll.core.diagnosis import Evidence
 from proofroll.elements.mechanism.kinematics import BodyMotion, Tree
 from proofroll.elements.mechanism.model import Mechanism
@@ -169,8 +169,8 @@ class Change:
         J = motion.J[:n].copy()
         J[:, :3] -= skews(arm) @ J[:, 3:]
         alpha = state.acceleration[:, 3:]
-        at_com = state.acceleration[:, :3] + np.cross(alpha, arm) + np.cross(w, np.cross(w, arm))
-        spin = np.cross(w, np.einsum("nij,nj->ni", inertia, w)) * self.gyroscopic
+        at_com = state.acceleration[:, :3] + cross(alpha, arm) + cross(w, cross(w, arm))
+        spin = cross(w, np.einsum("nij,nj->ni", inertia, w)) * self.gyroscopic
         force, moment = mass[:, None] * at_com, np.einsum("nij,nj->ni", inertia, alpha)
         terms = [np.einsum("nij,ni->j", J[:, :3], force)]
         terms += [np.einsum("nij,ni->j", J[:, 3:], item) for item in (moment, spin)]
