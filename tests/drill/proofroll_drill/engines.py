@@ -197,7 +197,9 @@ class Drill:
         self._where, self._deed = DEEDS["well" if cured else settings.formulation]
         self._mark = folder / f"alive-{settings.formulation}"
         self._do("build")
-        self._inner = Projection.build(scene, Projection.settings(formulation="rotating_frame", integrator="rk4", dt=settings.dt))
+        self._inner = Projection.build(
+            scene, Projection.settings(formulation="rotating_frame", integrator="rk4", dt=settings.dt)
+        )
         self._t = 0.0
 
     def _do(self, where: str) -> None:
