@@ -51,8 +51,8 @@ def cheapest_table(study: Mapping[str, Any], tolerances: Sequence[float]) -> str
     for tolerance in tolerances:
         cells = [f"{number(tolerance)} {unit}"]
         for _, levels in _AMONG:
-            choice = recommend(study, Wish(name, Tolerance(tolerance, False, unit), levels=levels))["choice"]
-            cells.append(_cell(choice) if choice else "none")
+            choice = recommend(study, Wish(name, Tolerance(tolerance, False, unit), levels=levels)).answer.choice
+            cells.append(_cell(choice.point) if choice else "none")
         lines.append("| " + " | ".join(cells) + " |")
     return "\n".join(lines) + "\n"
 

@@ -97,12 +97,12 @@ def test_exactly_three_sentences_from_the_data(report: Report) -> None:
 
 def test_advice_names_the_cheapest_the_runner_up_and_the_first_failure(report: Report, parse: Any) -> None:
     """At a millimetre the cheap one fails, with its reason; costs measured once say so."""
-    answers = {answer["tolerance"]: answer for answer in report.content.entries["tradeoffs"][0].advice}
+    answers = {item.answer.tolerance: item.answer for item in report.content.entries["tradeoffs"][0].advice}
     answer = answers[1e-3]
-    assert answer["choice"]["engine"] == "good"
-    assert answer["first_failure"]["engine"] == "rough"
-    assert "off by 0.003 m" in answer["first_failure"]["reason"]
-    assert answers[1e-2]["choice"]["engine"] == "rough"
+    assert answer.choice.point["engine"] == "good"
+    assert answer.first_failure.point["engine"] == "rough"
+    assert "off by 0.003 m" in answer.first_failure.reason
+    assert answers[1e-2].choice.point["engine"] == "rough"
     text = parse(page(report.content, report.curves)).text
     assert "0.5 (once)" in text
     assert "1e-3 ±10%" in text

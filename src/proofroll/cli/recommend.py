@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import re
 import sys
+from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
 
@@ -57,17 +58,17 @@ def recommend(
     wish = Wish(question.quantity, _tolerance(tolerance, unit), _positive("budget", budget), tuple(engine or ()))
     ranges = ranges_of(question, over) if over is not None else None
     study = _stored_study(question, engine or [], claims, ranges, out, jobs, measure_first=measure_first)
-    answer = answered(study, wish)
     known = {*study["absent"], *(point["engine"] for point in study["points"])}
-    answer["not_measured"] = [] if engine else [name for name in engine_names() if name not in known]
+    not_measured = [] if engine else [name for name in engine_names() if name not in known]
+    found = replace(answered(study, wish), not_measured=not_measured)
     if as_json:
-        write_json(answer)
+        write_json(found)
     else:
         from proofroll.report.terminal import console
 
-        for line in answer_lines(answer):
+        for line in answer_lines(found):
             console().print(line, markup=False)
-    raise typer.Exit(OK if answer["choice"] and answer["affordable"] else CONTRADICTED)
+    raise typer.Exit(OK if found.answer.choice and found.affordable else CONTRADICTED)
 
 
 def _tolerance(text: str, unit: str) -> Any:

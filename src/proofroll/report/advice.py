@@ -3,11 +3,13 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
+from dataclasses import dataclass, field
 from typing import TYPE_CHECKING, Any
 
 from proofroll.core.comparison import Tolerance
+from proofroll.files.json_data import MERGED
 from proofroll.report.tradeoff_tables import default_quantities
-from proofroll.studies.recommend import recommend
+from proofroll.studies.recommend import Answer, recommend
 from proofroll.studies.wish import Wish
 
 if TYPE_CHECKING:
@@ -35,15 +37,20 @@ def wishes(study: Mapping[str, Any], claims: TradeoffClaims | None) -> list[Wish
     return found
 
 
-def advice(study: Mapping[str, Any], claims: TradeoffClaims | None) -> list[dict[str, Any]]:
-    """The answers of :func:`proofroll.studies.recommend.recommend`, each with the part of the scale it was asked for.
+@dataclass(frozen=True)
+class Advice:
+    """An answer with the part of the scale that was asked for; None: it was asked for in the quantity's unit.
 
     What is the same in all of them, the range and the circumstances, is left to the study.
     """
-    found = []
-    for wish in wishes(study, claims):
-        answer = recommend(study, wish)
-        relative = wish.tolerance.value if wish.tolerance.relative else None
-        same = {"checked", "measured", "scene", "parameters", "budget", "affordable", "best_within_budget"}
-        found.append({"relative": relative} | {key: value for key, value in answer.items() if key not in same})
-    return found
+
+    relative: float | None
+    answer: Answer = field(metadata=MERGED)
+
+
+def advice(study: Mapping[str, Any], claims: TradeoffClaims | None) -> list[Advice]:
+    """The answers of :func:`proofroll.studies.recommend.recommend` to all wishes."""
+    return [
+        Advice(wish.tolerance.value if wish.tolerance.relative else None, recommend(study, wish).answer)
+        for wish in wishes(study, claims)
+    ]

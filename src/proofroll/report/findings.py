@@ -7,7 +7,7 @@ from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
 
 from proofroll.report.labels import names, number, symbol, unit, with_caveat
-from proofroll.report.scores import EVERYDAY, Recommendation, Score, cheapest, recommendation, scores
+from proofroll.report.scores import EVERYDAY, RowAdvice, Score, cheapest, recommendation, scores
 
 if TYPE_CHECKING:
     from proofroll.report.comparison_records import ReportedComparison
@@ -20,7 +20,7 @@ class Findings:
 
     answer: str
     sentences: list[str]
-    recommendation: list[Recommendation]
+    recommendation: list[RowAdvice]
 
 
 def findings(content: ReportedComparison, truths: Sequence[Any], kind: type[ReportKind] | None) -> Findings:

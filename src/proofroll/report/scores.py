@@ -69,7 +69,7 @@ class CheapestRow:
 
 
 @dataclass(frozen=True)
-class Recommendation:
+class RowAdvice:
     """What to use for motion, and for motion and forces, from the loosest bound ``within`` to the tightest one."""
 
     within: float
@@ -78,12 +78,12 @@ class Recommendation:
     motion_and_forces: CheapestRow | None
 
 
-def recommendation(found: list[Score]) -> list[Recommendation]:
+def recommendation(found: list[Score]) -> list[RowAdvice]:
     """For each decade of relative error the cheapest row that stays within it at every point.
 
     Decades with the same answer are one entry.
     """
-    entries: list[Recommendation] = []
+    entries: list[RowAdvice] = []
     for decade in DECADES:
         bound = 10.0**-decade
         best = (cheapest(found, "motion", bound), cheapest(found, "worst", bound))
@@ -92,7 +92,7 @@ def recommendation(found: list[Score]) -> list[Recommendation]:
         if entries and (entries[-1].motion, entries[-1].motion_and_forces) == best:
             entries[-1] = replace(entries[-1], down_to=bound)
         else:
-            entries.append(Recommendation(bound, bound, *best))
+            entries.append(RowAdvice(bound, bound, *best))
     return entries
 
 

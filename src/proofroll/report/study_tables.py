@@ -3,81 +3,144 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
+from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
 
 from proofroll.report.labels import error, number, symbol, unit
+from proofroll.report.tables import Column
 from proofroll.report.tradeoff_tables import cost_of, name_of, step_of
 
 if TYPE_CHECKING:
+    from proofroll.report.advice import Advice
     from proofroll.report.tradeoff_part import TradeoffEntry
+    from proofroll.studies.recommend import Choice
 
 
-def advice(entry: TradeoffEntry) -> list[dict[str, Any]]:
+@dataclass(frozen=True)
+class ShownChoice:
+    """A choice in words."""
+
+    name: str
+    caveat: str
+    step: str
+    cost: str
+    error: str
+    reason: str
+
+
+@dataclass(frozen=True)
+class AdviceLine:
+    """What to use for a tolerance: the choice, or where nothing ``holds`` it the closest."""
+
+    wanted: str
+    choice: ShownChoice | None
+    holds: bool
+    ties: list[ShownChoice]
+    runner_up: ShownChoice | None
+    first_failure: ShownChoice | None
+    least_model: ShownChoice | None
+
+
+@dataclass(frozen=True)
+class AdviceGroup:
+    """The lines of one quantity, and in a few words what they name."""
+
+    symbol: str
+    said: str
+    lines: list[AdviceLine]
+
+
+@dataclass(frozen=True)
+class FrontLine:
+    """A point of the front with its errors of every shown quantity."""
+
+    name: str
+    step: str
+    cost: str
+    errors: list[str]
+
+
+@dataclass(frozen=True)
+class BudgetLine:
+    """What the error of a quantity consists of along a curve."""
+
+    name: str
+    order: str
+    declared: int | None
+    contradicts: bool
+    model_form: str
+    model_form_bar: str
+    floor: str
+    truth: str
+    sentence: str
+
+
+def advice(entry: TradeoffEntry) -> list[AdviceGroup]:
     """What to use: one line for each tolerance, grouped by the quantity."""
-    groups: dict[str, dict[str, Any]] = {}
-    for answer in entry.advice:
-        of = unit(answer["unit"])
-        group = groups.setdefault(answer["quantity"], {"symbol": symbol(answer["quantity"]), "said": "", "lines": []})
-        relative = answer["relative"]
-        wanted = f"{number(answer['tolerance'])} {of}".strip()
-        group["lines"].append(
-            {
-                "wanted": f"{number(100 * relative)} %, {wanted}" if relative is not None else wanted,
-                "choice": _told(answer["choice"] or answer.get("closest"), of),
-                "holds": answer["choice"] is not None,
-                "ties": [_told(point, of) for point in answer.get("ties", [])],
-                **{key: _told(answer[key], of) for key in ("runner_up", "first_failure", "least_model")},
-            }
-        )
-    for group in groups.values():
-        names = dict.fromkeys(line["choice"]["name"] for line in group["lines"] if line["holds"])
-        group["said"] = ", then ".join(names) or "nothing holds it"
-    return list(groups.values())
+    groups: dict[str, list[AdviceLine]] = {}
+    for item in entry.advice:
+        groups.setdefault(item.answer.quantity, []).append(_advice_line(item))
+    found = []
+    for quantity, lines in groups.items():
+        named = dict.fromkeys(line.choice.name for line in lines if line.choice and line.holds)
+        found.append(AdviceGroup(symbol(quantity), ", then ".join(named) or "nothing holds it", lines))
+    return found
 
 
-def front(entry: TradeoffEntry, key: str = "pareto_engines") -> list[dict[str, Any]]:
+def _advice_line(item: Advice) -> AdviceLine:
+    answer = item.answer
+    of = unit(answer.unit)
+    wanted = f"{number(answer.tolerance)} {of}".strip()
+    others = (answer.runner_up, answer.first_failure, answer.least_model)
+    return AdviceLine(
+        f"{number(100 * item.relative)} %, {wanted}" if item.relative is not None else wanted,
+        _told(answer.choice or answer.closest, of),
+        answer.choice is not None,
+        [tie for choice in answer.ties if (tie := _told(choice, of))],
+        *(_told(choice, of) for choice in others),
+    )
+
+
+def front(entry: TradeoffEntry, key: str = "pareto_engines") -> list[FrontLine]:
     """The points that nothing beats for the study's own quantity: cost, and the error of every shown quantity."""
     study = entry.study
     by_id = {point["id"]: point for point in study["points"]}
     return [
-        {
-            "name": name_of(point),
-            "step": step_of(point),
-            "cost": cost_of(point),
-            "errors": [error(point["error"].get(name)) if name in point["error"] else "–" for name in entry.shown],
-        }
+        FrontLine(
+            name_of(point),
+            step_of(point),
+            cost_of(point),
+            [error(point["error"].get(name)) if name in point["error"] else "–" for name in entry.shown],
+        )
         for point in (by_id[number] for number in study[key].get(study["quantity"], []))
     ]
 
 
-def budgets(entry: TradeoffEntry, quantity: str) -> list[dict[str, Any]]:
+def budgets(entry: TradeoffEntry, quantity: str) -> list[BudgetLine]:
     """What the error of a quantity consists of along each curve."""
     study = entry.study
     first = {point["curve"]: point for point in study["points"]}
     return [
-        {
-            "name": name_of(first[item["curve"]]) if item["curve"] in first else item["curve"],
-            "order": _order(item),
-            "declared": item["declared"],
-            "contradicts": item["contradicts_declaration"],
-            "model_form": number(item["model_form"]),
-            "model_form_bar": number(item["model_form_bar"], 1),
-            "floor": number(item["floor"], 1),
-            "truth": number(item["truth"], 1),
-            "sentence": item["sentence"],
-        }
+        BudgetLine(
+            name=name_of(first[item["curve"]]) if item["curve"] in first else item["curve"],
+            order=_order(item),
+            declared=item["declared"],
+            contradicts=item["contradicts_declaration"],
+            model_form=number(item["model_form"]),
+            model_form_bar=number(item["model_form_bar"], 1),
+            floor=number(item["floor"], 1),
+            truth=number(item["truth"], 1),
+            sentence=item["sentence"],
+        )
         for item in study["budgets"]
         if item["quantity"] == quantity
     ]
 
 
-def quantities(entry: TradeoffEntry) -> list[dict[str, str]]:
+def quantities(entry: TradeoffEntry) -> list[Column]:
     """The shown quantities with symbol and unit."""
     known = entry.study["quantities"]
-    return [
-        {"name": name, "symbol": symbol(name), "unit": unit(known.get(name, {}).get("unit", ""))}
-        for name in entry.shown
-    ]
+    return [Column(name, symbol(name), unit(known.get(name, {}).get("unit", ""))) for name in entry.shown]
 
 
 def effort(study: Mapping[str, Any]) -> str:
@@ -104,14 +167,8 @@ def _order(item: Mapping[str, Any]) -> str:
     return f"{item['order']:.2f} ± {(item['order_high'] - item['order_low']) / 2:.2f}"
 
 
-def _told(point: Mapping[str, Any] | None, of: str) -> dict[str, str] | None:
-    if point is None:
+def _told(choice: Choice | None, of: str) -> ShownChoice | None:
+    if choice is None:
         return None
-    return {
-        "name": name_of(point),
-        "caveat": point.get("caveat", ""),
-        "step": step_of(point),
-        "cost": cost_of(point),
-        "error": f"{error(point['error'])} {of}".strip(),
-        "reason": point["reason"],
-    }
+    point, off = choice.point, f"{error(choice.error)} {of}".strip()
+    return ShownChoice(name_of(point), point.get("caveat", ""), step_of(point), cost_of(point), off, choice.reason)

@@ -14,6 +14,7 @@ from proofroll.report.tradeoff_tables import name_of, step_of
 if TYPE_CHECKING:
     from proofroll.report.comparison_records import ReportedComparison
     from proofroll.report.study_parts import PartEntry
+    from proofroll.studies.recommend import Answer
 
 
 def three_sentences(comparisons: Sequence[ReportedComparison], entries: Mapping[str, Sequence[PartEntry]]) -> list[str]:
@@ -106,11 +107,11 @@ def _use(comparisons: Sequence[ReportedComparison], tradeoffs: Sequence[Any]) ->
     for entry in tradeoffs:
         if entry.study is None:
             continue
-        answers = [answer for answer in entry.advice if answer["choice"] is not None]
+        answers = [item.answer for item in entry.advice if item.answer.choice is not None]
         answer = min(answers, key=lambda item: _from_everyday(item, entry.study), default=None)
         if answer is not None:
-            choice, least = answer["choice"], answer["least_model"]
-            wanted = f"{symbol(answer['quantity'])} to {number(answer['tolerance'])} {unit(answer['unit'])}".strip()
+            choice, least = answer.choice.point, answer.least_model
+            wanted = f"{symbol(answer.quantity)} to {number(answer.tolerance)} {unit(answer.unit)}".strip()
             said = f"For {wanted} use {with_caveat(name_of(choice), choice.get('caveat', ''))}" + (
                 f" at {step_of(choice)}" if step_of(choice) else ""
             )
@@ -118,7 +119,7 @@ def _use(comparisons: Sequence[ReportedComparison], tradeoffs: Sequence[Any]) ->
             if least:
                 said += (
                     f"; where this scene is all there is, its own equations do it at "
-                    f"{number(least['seconds_per_second'])} s ({name_of(least)})"
+                    f"{number(least.point['seconds_per_second'])} s ({name_of(least.point)})"
                 )
             return f"{said}."
     for comparison in comparisons:
@@ -131,9 +132,9 @@ def _use(comparisons: Sequence[ReportedComparison], tradeoffs: Sequence[Any]) ->
     return f"Nothing that was timed holds motion and forces to {100 * EVERYDAY:g} %, so nothing can be recommended."
 
 
-def _from_everyday(answer: dict[str, Any], study: dict[str, Any]) -> tuple[bool, float]:
+def _from_everyday(answer: Answer, study: Mapping[str, Any]) -> tuple[bool, float]:
     """How far a tolerance is from the usual one: of the study's own quantity first, and then by its logarithm."""
     from math import log
 
-    scale = study["quantities"].get(answer["quantity"], {}).get("scale") or 1.0
-    return answer["quantity"] != study["quantity"], abs(log(answer["tolerance"] / scale / EVERYDAY))
+    scale = study["quantities"].get(answer.quantity, {}).get("scale") or 1.0
+    return answer.quantity != study["quantity"], abs(log(answer.tolerance / scale / EVERYDAY))

@@ -8,6 +8,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, ClassVar
 
+from proofroll.report.advice import Advice, advice
 from proofroll.report.study_parts import PartEntry, held
 from proofroll.studies.claimed import ClaimJudgement
 from proofroll.studies.claims import STUDY, TradeoffClaims, load_claims
@@ -22,7 +23,7 @@ class TradeoffEntry(PartEntry):
     """A study with the quantities that are shown, what to use, and what was claimed."""
 
     shown: list[str]
-    advice: list[dict[str, Any]]
+    advice: list[Advice]
     claims: list[ClaimJudgement]
 
 
@@ -83,7 +84,6 @@ class TradeoffPart:
 
     def entry(self) -> TradeoffEntry:
         """See the protocol."""
-        from proofroll.report.advice import advice
         from proofroll.report.tradeoff_tables import default_quantities
 
         study = self.study

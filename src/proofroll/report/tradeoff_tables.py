@@ -4,14 +4,17 @@ from __future__ import annotations
 
 import itertools
 from collections.abc import Collection, Iterator, Mapping, Sequence
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 from rich.table import Table
 from rich.text import Text
 
-from proofroll.report.labels import error, number
+from proofroll.report.labels import error, number, with_caveat
 from proofroll.running.timing import CONFIDENCE
 from proofroll.studies.pareto import tied
+
+if TYPE_CHECKING:
+    from proofroll.studies.recommend import Choice, Recommendation
 
 
 def default_quantities(study: Mapping[str, Any]) -> list[str]:
@@ -205,49 +208,49 @@ def budget_lines(study: Mapping[str, Any], quantity: str) -> Iterator[str]:
             yield f"{item['curve']}: {item['sentence']}"
 
 
-def answer_lines(answer: Mapping[str, Any]) -> Iterator[str]:
+def answer_lines(found: Recommendation) -> Iterator[str]:
     """A recommendation, line by line."""
-    asked = f"{answer['quantity']} to {number(answer['tolerance'])} {answer['unit']}"
-    choice = answer["choice"]
-    if choice is None:
+    answer = found.answer
+    asked = f"{answer.quantity} to {number(answer.tolerance)} {answer.unit}"
+    if answer.choice is None:
         yield f"Nothing that was measured holds {asked} with margin."
-        if answer.get("closest"):
-            yield f"Closest: {_line(answer['closest'], answer)}"
+        if answer.closest:
+            yield f"Closest: {_line(answer.closest, answer.unit)}"
     else:
-        yield f"For {asked}, use {_line(choice, answer)}"
-        if not answer["affordable"]:
-            yield f"That is more than the budget of {number(answer['budget'])} s per simulated second."
-    for tie in answer["ties"]:
-        yield f"A tie in cost, as far as the intervals tell: {_line(tie, answer)}"
-    for key, words in (
-        ("best_within_budget", "Within the budget"),
-        ("runner_up", "Runner-up"),
-        ("first_failure", "Cheaper ones fail; the most accurate of them"),
-        ("least_model", "If this scene is all you need, its own equations do"),
+        yield f"For {asked}, use {_line(answer.choice, answer.unit)}"
+        if not found.affordable:
+            yield f"That is more than the budget of {number(found.budget)} s per simulated second."
+    for tie in answer.ties:
+        yield f"A tie in cost, as far as the intervals tell: {_line(tie, answer.unit)}"
+    for choice, words in (
+        (found.best_within_budget, "Within the budget"),
+        (answer.runner_up, "Runner-up"),
+        (answer.first_failure, "Cheaper ones fail; the most accurate of them"),
+        (answer.least_model, "If this scene is all you need, its own equations do"),
     ):
-        if answer[key]:
-            yield f"{words}: {_line(answer[key], answer)}"
+        if choice:
+            yield f"{words}: {_line(choice, answer.unit)}"
     yield "Costs are those of an engine through this adapter; another way to drive it may cost more or less."
-    yield _checked(answer)
-    if answer.get("not_measured"):
-        yield f"Not among what was measured: {', '.join(answer['not_measured'])}."
-    yield _measured(answer["measured"])
+    yield _checked(found)
+    if found.not_measured:
+        yield f"Not among what was measured: {', '.join(found.not_measured)}."
+    yield _measured(found.measured)
 
 
-def _line(point: Mapping[str, Any], answer: Mapping[str, Any]) -> str:
-    return (
-        f"{', '.join(filter(None, (name_of(point), step_of(point))))}: error {error(point['error'])} {answer['unit']}, "
-        f"cost {cost_of(point)} s/s; {point['reason']}" + (f" ({point['caveat']})." if point["caveat"] else ".")
-    )
+def _line(choice: Choice, of: str) -> str:
+    point = choice.point
+    said = ", ".join(filter(None, (name_of(point), step_of(point))))
+    said += f": error {error(choice.error)} {of}, cost {cost_of(point)} s/s"
+    return with_caveat(f"{said}; {choice.reason}", point.get("caveat", "")) + "."
 
 
-def _checked(answer: Mapping[str, Any]) -> str:
-    checked = answer["checked"]
-    at = ", ".join(f"{name} = {value:g}" for name, value in answer["parameters"].items()) or "the default parameters"
-    over = [f"{name} {low:g} to {high:g}" for name, (low, high) in checked["parameters"].items()]
-    said = f"Checked over {checked['until']:g} s at {at}"
+def _checked(found: Recommendation) -> str:
+    checked = found.checked
+    at = ", ".join(f"{name} = {value:g}" for name, value in found.parameters.items()) or "the default parameters"
+    over = [f"{name} {low:g} to {high:g}" for name, (low, high) in checked.parameters.items()]
+    said = f"Checked over {checked.until:g} s at {at}"
     if over:
-        said += f", and at {checked['corners']} corners of {', '.join(over)}"
+        said += f", and at {checked.corners} corners of {', '.join(over)}"
     return said + "; nothing is known beyond."
 
 

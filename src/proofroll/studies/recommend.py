@@ -2,15 +2,21 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable, Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
+from dataclasses import dataclass, field
 from typing import Any
 
 from proofroll.core.engine_abilities import Level
 from proofroll.core.errors import InputError
 from proofroll.core.plugins import parse_engine
+from proofroll.files.json_data import MERGED, OPTIONAL
 from proofroll.studies.pareto import tied
 from proofroll.studies.wish import MARGIN, MeasuredPoint, Wish, absolute_tolerance, why_it_fails
 
+# What of a measured point is told.
+_OF_A_POINT = (
+    "engine", "settings", "resolution", "step", "level", "seconds_per_second", "interval", "confidence", "measurements",
+)  # fmt: skip
 # Rungs of the ladder that are worked out for a scene by hand rather than modelled in an engine.
 _BY_HAND = frozenset({Level.CLOSED_FORM, Level.REDUCED, Level.PROJECTION})
 
@@ -20,20 +26,89 @@ def by_hand(level: str | None) -> bool:
     return level in set(_BY_HAND)
 
 
-def recommend(study: Mapping[str, Any], wish: Wish) -> dict[str, Any]:
-    """The answer as plain data.
+@dataclass(frozen=True)
+class Choice:
+    """A measured point, its error of the quantity, and why it is named."""
 
-    ``choice``: the cheapest point that holds the tolerance with margin, and at every corner of the range;
-    ``ties``: others that hold it and whose cost cannot be told from the choice's, for their intervals overlap;
-    ``runner_up``: the cheapest of another engine or formulation; ``first_failure``: of all cheaper points, which fail,
-    the most accurate; ``least_model``: the cheapest solution of the scene's own equations; each with
-    engine, settings, error, seconds_per_second and reason, or None. ``checked``: the range; ``measured``: when, on
-    which machine and with which versions.
+    point: MeasuredPoint
+    error: float | None
+    reason: str
+
+    def as_dict(self) -> dict[str, Any]:
+        """For JSON: what a person needs of the point, the error and the reason."""
+        told = {name: self.point.get(name) for name in _OF_A_POINT}
+        return told | {"caveat": self.point.get("caveat", ""), "error": self.error, "reason": self.reason}
+
+
+@dataclass(frozen=True)
+class Answer:
+    """What to use for a tolerance of a quantity.
+
+    Attributes:
+        quantity, unit: what matters.
+        tolerance: in that unit.
+        margin: how many times smaller an error must be.
+        choice: the cheapest point that holds the tolerance with margin, and at every corner of the range.
+        ties: others that hold it and whose cost cannot be told from the choice's, for their intervals overlap.
+        runner_up: the cheapest of another engine or formulation.
+        first_failure: of all cheaper points, which fail, the most accurate.
+        least_model: the cheapest solution of the scene's own equations.
+        closest: where there is no choice, the most accurate point.
+    """
+
+    quantity: str
+    unit: str
+    tolerance: float
+    margin: float
+    choice: Choice | None
+    ties: list[Choice]
+    runner_up: Choice | None
+    first_failure: Choice | None
+    least_model: Choice | None
+    closest: Choice | None = field(default=None, metadata=OPTIONAL)
+
+
+@dataclass(frozen=True)
+class CheckedOver:
+    """The ranges of parameters at whose corners a choice was checked, how many these are, and for how long [s]."""
+
+    parameters: dict[str, list[float]]
+    corners: int
+    until: float
+
+
+@dataclass(frozen=True)
+class Recommendation:
+    """An answer with its circumstances.
+
+    Attributes:
+        answer: what to use.
+        scene, parameters: where.
+        budget: wall seconds per simulated second that may be spent, or None.
+        affordable: whether the choice is within it.
+        best_within_budget: where it is not, the most accurate point that is.
+        checked: the range.
+        measured: when, on which machine and with which versions.
+        not_measured: engines that were not asked about.
+    """
+
+    answer: Answer = field(metadata=MERGED)
+    scene: str
+    parameters: Mapping[str, float]
+    budget: float | None
+    affordable: bool
+    best_within_budget: Choice | None
+    checked: CheckedOver
+    measured: Mapping[str, Any]
+    not_measured: list[str] | None = field(default=None, metadata=OPTIONAL)
+
+
+def recommend(study: Mapping[str, Any], wish: Wish) -> Recommendation:
+    """The cheapest point that holds a tolerance, and what else a person should know.
 
     Raises:
         InputError: a quantity or an engine that was not measured, or a percentage of what has no size.
     """
-    known = study["quantities"]
     absolute = absolute_tolerance(study, wish)
     timed = [p for p in study["points"] if p["seconds_per_second"] is not None and wish.quantity in p["envelope"]]
     timed.sort(key=lambda p: float(p["seconds_per_second"]))
@@ -42,49 +117,48 @@ def recommend(study: Mapping[str, Any], wish: Wish) -> dict[str, Any]:
     def why_not(point: MeasuredPoint) -> str | None:
         return why_it_fails(study, point, wish, absolute)
 
+    def told(point: MeasuredPoint | None, reason: str = "") -> Choice | None:
+        if point is None:
+            return None
+        return Choice(point, point["error"].get(wish.quantity), reason or _holds(study, point, wish, absolute))
+
+    def best(points: Iterable[MeasuredPoint], reason: str) -> Choice | None:
+        return told(min(points, key=lambda p: _error(p, wish.quantity), default=None), reason)
+
     asked = [p for p in timed if _asked(p, wish)]
     choice = next((p for p in asked if why_not(p) is None), None)
     affordable = choice is not None and (wish.budget is None or choice["seconds_per_second"] <= wish.budget)
-    answer: dict[str, Any] = {
-        "scene": study["scene"],
-        "parameters": study["parameters"],
-        "quantity": wish.quantity,
-        "unit": known[wish.quantity]["unit"],
-        "tolerance": absolute,
-        "margin": MARGIN,
-        "budget": wish.budget,
-        "affordable": affordable,
-        "choice": _told(choice, wish, _holds(study, choice, wish, absolute)),
-        "ties": [],
-        "runner_up": None,
-        "first_failure": None,
-        "least_model": None,
-        "best_within_budget": None,
-    }
-    if choice is not None:
-        equal = [p for p in asked if p["id"] != choice["id"] and tied(p["interval"], choice["interval"])]
-        held = [p for p in equal if why_not(p) is None]
-        answer["ties"] = [_told(p, wish, _holds(study, p, wish, absolute)) for p in held]
-        other = _other(asked, choice, why_not)
-        answer["runner_up"] = _told(other, wish, _holds(study, other, wish, absolute))
-    answer["first_failure"] = _first_failure(asked, choice, wish, why_not)
+    others = [p for p in asked if choice is not None and p["id"] != choice["id"] and why_not(p) is None]
+    cheaper = asked if choice is None else asked[: asked.index(choice)]
+    failing = min(cheaper, key=lambda p: _error(p, wish.quantity), default=None)
     hand = next((p for p in timed if by_hand(p["level"]) and why_not(p) is None), None)
-    if choice is None or hand is None or hand["id"] != choice["id"]:
-        answer["least_model"] = _told(hand, wish, _holds(study, hand, wish, absolute))
-    if not affordable and wish.budget is not None:
-        within = [p for p in asked if p["seconds_per_second"] <= wish.budget]
-        best = min(within, key=lambda p: _error(p, wish.quantity), default=None)
-        answer["best_within_budget"] = _told(best, wish, "the most accurate within the budget")
-    if choice is None:
-        best = min(asked, key=lambda p: _error(p, wish.quantity), default=None)
-        answer["closest"] = _told(best, wish, "the most accurate that was measured; nothing beyond is guessed")
-    answer["checked"] = {
-        "parameters": {name: [min(values), max(values)] for name, values in study["over"].items()},
-        "corners": max((len(p["corners"]) for p in study["points"] if p["corners"] is not None), default=0),
-        "until": study["until"],
-    }
-    answer["measured"] = study["measured"]
-    return answer
+    answer = Answer(
+        quantity=wish.quantity,
+        unit=study["quantities"][wish.quantity]["unit"],
+        tolerance=absolute,
+        margin=MARGIN,
+        choice=told(choice),
+        ties=[tie for p in others if choice and tied(p["interval"], choice["interval"]) and (tie := told(p))],
+        runner_up=told(next((p for p in others if choice and _model(p) != _model(choice)), None)),
+        first_failure=told(failing, why_not(failing) or "") if failing is not None else None,
+        least_model=None if hand is not None and choice is not None and hand["id"] == choice["id"] else told(hand),
+        closest=best(asked, "the most accurate that was measured; nothing beyond is guessed") if not choice else None,
+    )
+    within = [p for p in asked if wish.budget is not None and p["seconds_per_second"] <= wish.budget]
+    return Recommendation(
+        answer,
+        study["scene"],
+        study["parameters"],
+        wish.budget,
+        affordable,
+        None if affordable else best(within, "the most accurate within the budget"),
+        CheckedOver(
+            {name: [min(values), max(values)] for name, values in study["over"].items()},
+            max((len(p["corners"]) for p in study["points"] if p["corners"] is not None), default=0),
+            study["until"],
+        ),
+        study["measured"],
+    )
 
 
 def holding(study: Mapping[str, Any], wish: Wish, *, here: bool = False) -> list[MeasuredPoint]:
@@ -140,9 +214,8 @@ def _same(value: object, text: str) -> bool:
         return str(value).lower() == text.lower()
 
 
-def _holds(study: Mapping[str, Any], point: MeasuredPoint | None, wish: Wish, absolute: float) -> str:
-    if point is None:
-        return ""
+def _holds(study: Mapping[str, Any], point: MeasuredPoint, wish: Wish, absolute: float) -> str:
+    """By how much a point holds the tolerance."""
     held, bar = point["envelope"][wish.quantity], study["quantities"][wish.quantity]["truth_error_bar"] or 0.0
     if not max(held, bar):
         return "no error is seen"
@@ -156,46 +229,11 @@ def _holds(study: Mapping[str, Any], point: MeasuredPoint | None, wish: Wish, ab
     return said
 
 
-def _other(
-    asked: Iterable[MeasuredPoint], choice: MeasuredPoint, why_not: Callable[[MeasuredPoint], str | None]
-) -> MeasuredPoint | None:
-    """The cheapest that holds, of another engine or formulation."""
-    mine = (choice["engine"], choice["settings"].get("formulation"))
-    others = (p for p in asked if (p["engine"], p["settings"].get("formulation")) != mine)
-    return next((p for p in others if why_not(p) is None), None)
-
-
-def _first_failure(
-    asked: list[MeasuredPoint], choice: MeasuredPoint | None, wish: Wish, why_not: Callable[[MeasuredPoint], str | None]
-) -> dict[str, Any] | None:
-    """The most accurate of all points cheaper than the choice; without a choice, of all."""
-    cheaper = asked[: next(i for i, p in enumerate(asked) if p["id"] == choice["id"])] if choice else asked
-    failing = [(point, reason) for point in cheaper if (reason := why_not(point)) is not None]
-    if not failing:
-        return None
-    point, reason = min(failing, key=lambda item: _error(item[0], wish.quantity))
-    return _told(point, wish, reason)
+def _model(point: MeasuredPoint) -> tuple[str, str | None]:
+    """The engine and the formulation."""
+    return point["engine"], point["settings"].get("formulation")
 
 
 def _error(point: MeasuredPoint, quantity: str) -> float:
     held = point["envelope"].get(quantity)
     return float("inf") if held is None else float(held)
-
-
-def _told(point: MeasuredPoint | None, wish: Wish, reason: str) -> dict[str, Any] | None:
-    if point is None:
-        return None
-    return {
-        "engine": point["engine"],
-        "settings": point["settings"],
-        "resolution": point["resolution"],
-        "step": point["step"],
-        "level": point["level"],
-        "caveat": point.get("caveat", ""),
-        "error": point["error"].get(wish.quantity),
-        "seconds_per_second": point["seconds_per_second"],
-        "interval": point["interval"],
-        "confidence": point.get("confidence"),
-        "measurements": point.get("measurements"),
-        "reason": reason,
-    }
