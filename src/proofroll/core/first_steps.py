@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 
 from proofroll.core.arrays import FloatArray
-from proofroll.core.certificate import Line
+from proofroll.core.certificate import Line, Standing, certify
 from proofroll.core.element import Element, FirstMotion
 from proofroll.core.engine import fixed_step
 from proofroll.core.engine_abilities import declared_order
@@ -97,10 +97,17 @@ def softness(engine: Any, scene: Scene) -> float:
     return max(found)
 
 
+def certificate(kind: Any, engine: Any, scene: Scene, settings: Any) -> list[Line]:
+    """What a freshly built engine says of itself; where it does not say its first acceleration, what its steps do."""
+    lines = certify(engine, scene)
+    silent = {line.quantity.split(".")[0] for line in lines if line.standing is Standing.NOT_REPORTED}
+    return [*lines, *(derivable(kind, scene, settings) if silent & set(DERIVED) else ())]
+
+
 def derivable(kind: Any, scene: Scene, settings: Any) -> list[Line]:
     """:func:`first_steps` as far as they tell anything at this step: those with a tolerance of at most :data:`MOST`.
 
-    For an engine that does not report its first acceleration. Empty where it fails: so will its run.
+    Empty where the engine fails: so will its run.
     """
     with contextlib.suppress(Diverged, Refused):
         return [line for line in first_steps(kind, scene, settings) if line.tolerance <= MOST]

@@ -5,11 +5,12 @@ from __future__ import annotations
 import json
 import platform
 import sys
-from collections.abc import Mapping
+from collections.abc import Iterable, Mapping
 from importlib import metadata
 from typing import Any
 
 import proofroll
+from proofroll.core.certificate import Line, Standing
 from proofroll.core.scene import Scene
 
 
@@ -19,12 +20,20 @@ def versions(engine: str, version: str) -> dict[str, str]:
     return {engine: version} | own | {name: metadata.version(name) for name in ("numpy", "scipy")}
 
 
-def manifest(engine: str, settings: Mapping[str, Any], scene: Scene, made_with: Mapping[str, str]) -> dict[str, str]:
+def manifest(
+    engine: str,
+    settings: Mapping[str, Any],
+    scene: Scene,
+    made_with: Mapping[str, str],
+    certificate: Iterable[Line] = (),
+) -> dict[str, str]:
     """Attributes of a trajectory: engine, settings, parameters [SI], versions, interpreter and machine.
 
-    Settings, parameters and versions are JSON.
+    Settings, parameters and versions are JSON; ``not_reported`` has what the engine does not say of its model, if that
+    is anything.
     """
-    return {
+    silent = ", ".join(line.quantity for line in certificate if line.standing is Standing.NOT_REPORTED)
+    return ({"not_reported": silent} if silent else {}) | {
         "engine": engine,
         "settings": json.dumps(dict(settings), sort_keys=True),
         "parameters": json.dumps(dict(scene.parameters)),

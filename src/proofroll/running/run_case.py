@@ -35,9 +35,9 @@ def run(case: dict[str, Any], out: str) -> dict[str, Any]:
 
 
 def _run(case: Case, out: Path, spent: Spent) -> Result:
-    from proofroll.core.certificate import Standing, certify, first_difference
+    from proofroll.core.certificate import first_difference
     from proofroll.core.engine import fixed_step
-    from proofroll.core.first_steps import DERIVED, derivable
+    from proofroll.core.first_steps import certificate
     from proofroll.core.several import build
     from proofroll.core.time_grid import time_grid
     from proofroll.files.netcdf import write
@@ -55,13 +55,10 @@ def _run(case: Case, out: Path, spent: Spent) -> Result:
     try:
         engine = build(kind, scene, settings)
         spent.on("building")
-        certificate = certify(engine, scene)
-        silent = {line.quantity.split(".")[0] for line in certificate if line.standing is Standing.NOT_REPORTED}
-        if silent & set(DERIVED):
-            certificate += derivable(kind, scene, settings)
-        difference = first_difference(certificate)
+        found = certificate(kind, engine, scene, settings)
+        difference = first_difference(found)
         spent.on("certificate")
-        lines = [line.as_dict() for line in certificate]
+        lines = [line.as_dict() for line in found]
         if difference is not None:
             return Result(Status.REFUSED, difference, certificate=lines, versions=versions)
         recording = record(engine, scene, times, off_grid(times, fixed_step(settings)))
@@ -84,7 +81,7 @@ def _run(case: Case, out: Path, spent: Spent) -> Result:
         trajectory=out.name,
     )
     said = {"status": result.status.value, "message": result.message, "wall_seconds": result.wall_seconds}
-    said |= manifest(case.engine.name, case.engine.settings, scene, versions)
+    said |= manifest(case.engine.name, case.engine.settings, scene, versions, found)
     write(recording.dataset.assign_attrs(said), out)
     spent.on("writing")
     return result

@@ -6,9 +6,10 @@ import dataclasses
 from typing import TYPE_CHECKING, Any
 
 from proofroll.core import several
-from proofroll.core.certificate import certify, first_difference
+from proofroll.core.certificate import first_difference
 from proofroll.core.engine import fixed_step
 from proofroll.core.errors import InputError, Refused
+from proofroll.core.first_steps import certificate
 from proofroll.core.plugins import load_engine, parse_engine, resolve_settings
 from proofroll.core.scene import Scene
 from proofroll.core.time_grid import EVERY, sampling_interval, time_grid
@@ -97,7 +98,8 @@ def simulate(
     kind, resolved = _resolved(scene, engine, settings)
     times = time_grid(until, sampling_interval(fixed_step(resolved)) if every is None else every)
     built = _build(scene, kind, resolved)
-    difference = first_difference(certify(built, scene))
+    lines = certificate(kind, built, scene, resolved)
+    difference = first_difference(lines)
     if difference is not None:
         raise Refused(difference)
     recording = record(built, scene, times, off_grid(times, fixed_step(resolved)))
@@ -105,7 +107,7 @@ def simulate(
         status="done" if recording.failure is None else "diverged",
         message=recording.message(until),
         wall_seconds=recording.wall_seconds,
-        **manifest(kind.name, dataclasses.asdict(resolved), scene, versions(kind.name, kind.version())),
+        **manifest(kind.name, dataclasses.asdict(resolved), scene, versions(kind.name, kind.version()), lines),
     )
 
 

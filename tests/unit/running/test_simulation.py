@@ -1,5 +1,6 @@
 from __future__ import annotations
 
+import dataclasses
 import json
 import math
 import pydoc
@@ -7,13 +8,17 @@ import re
 import subprocess
 import sys
 from collections.abc import Callable, Mapping
+from typing import Any
 
 import numpy as np
 import pytest
 from hostile import ENTRY_POINTS
+from tiny import Tiny
 
 import proofroll
+from proofroll.core.engine import Built, Sample
 from proofroll.core.errors import InputError, Missing, Refused
+from proofroll.core.scene import Scene
 from proofroll.files.data_folders import data_folder
 
 
@@ -66,6 +71,39 @@ def test_a_trajectory_says_how_it_was_made(engine: str) -> None:
     assert json.loads(found.attrs["parameters"]) == dict(scene.parameters) | {"mu_static": math.inf}
     assert json.loads(found.attrs["versions"]).keys() == {engine, "proofroll", "python", "numpy", "scipy"}
     assert "dt" in json.loads(found.attrs["settings"]) or engine == "truth"
+
+
+class Silent(Tiny):
+    """Says nothing of itself, and falls with half of gravity more."""
+
+    def __init__(self, scene: Scene, settings: Any) -> None:
+        super().__init__(scene, settings)
+        self.body = dataclasses.replace(self.body, gravity=self.fall * self.body.gravity)
+
+    fall = 1.5
+
+    def built(self) -> Built:
+        """Not even the first acceleration."""
+        return Built()
+
+    def sample(self) -> Sample:
+        """Without the force."""
+        return dataclasses.replace(super().sample(), force=None)
+
+
+class SilentAndSound(Silent):
+    """Says nothing of itself, and is right."""
+
+    fall = 1.0
+
+
+def test_silence_hides_nothing_here_either() -> None:
+    """What an engine does not say is derived from its first steps, as in a command, and named in the trajectory."""
+    scene = proofroll.load_scene("sphere_in_cylinder")
+    with pytest.raises(Refused, match=r"acceleration of the first steps is .* instead of"):
+        proofroll.simulate(scene, Silent, until=0.1, every=0.1)
+    silent = proofroll.simulate(scene, SilentAndSound, until=0.1, every=0.1).attrs["not_reported"]
+    assert silent.startswith("mass, inertia, gravity, ball radius")
 
 
 def test_help_shows_the_public_names() -> None:
