@@ -14,6 +14,8 @@ import pytest
 
 BROWSERS = ("chromium", "chromium-browser", "google-chrome")
 SCRIPT = Path(__file__).with_suffix(".js")  # ``reading``: what one can ask a page
+# A script for ``visiting``: figures and replay are drawn when they come into view, and with it nothing ever does.
+UNDRAWN = "window.IntersectionObserver = class { observe() {} unobserve() {} disconnect() {} };"
 WIDE = {"width": 1280, "height": 900}
 
 

@@ -8,18 +8,9 @@ from pathlib import Path
 from typing import Any
 
 import pytest
-from browsing import Visit
+from browsing import UNDRAWN, Visit
 
 Visiting = Callable[..., AbstractContextManager[Visit]]
-
-
-def test_page_asks_for_nothing_and_has_nothing_to_complain_of(report_page: Path, visit: Visiting) -> None:
-    """Read to its end, unfolded and with all figures drawn: one request, its own, and a silent console."""
-    with visit(report_page) as seen:
-        seen.unfold()
-        assert seen.draw() == []
-        assert seen.requested == [report_page.as_uri()]
-        assert seen.messages == []
 
 
 def test_requests_and_errors_would_be_seen(tmp_path: Path, visit: Visiting) -> None:
@@ -46,7 +37,10 @@ def test_every_section_says_something(report_page: Path, visit: Visiting) -> Non
 
 
 def test_figures_are_drawn_when_they_come_into_view(report_page: Path, visit: Visiting) -> None:
-    """None far below before, each after a reader has scrolled to it; one that is not there is missed."""
+    """None far below before, each after a reader has scrolled to it, one that is not there is missed.
+
+    Read to its end like that, the page has made one request, its own, and the console is silent.
+    """
     with visit(report_page) as seen:
         figures = seen.page.locator("figure[data-o]")
         assert figures.last.locator("svg").count() == 0, "not before it is needed"
@@ -54,13 +48,15 @@ def test_figures_are_drawn_when_they_come_into_view(report_page: Path, visit: Vi
         assert figures.count() == 12, "six quantities at two points"
         assert seen.draw() == []
         assert seen.page.locator("figure[data-o] .main-svg").count() >= figures.count()
+        assert seen.requested == [report_page.as_uri()]
+        assert seen.messages == []
         seen.page.evaluate("document.querySelector('main').insertAdjacentHTML('beforeend', '<figure>none</figure>')")
         assert seen.draw(patience=0.1) == ["none"]
 
 
 def test_links_lead_to_evidence_that_opens(report_page: Path, visit: Visiting) -> None:
     """Every link within the page ends at something one can see, however it was folded; a dead one is found."""
-    with visit(report_page) as seen:
+    with visit(report_page, before=UNDRAWN) as seen:
         assert seen.page.locator("a[href^='#']").count() > 50
         assert seen.page.evaluate("reading.lost()") == []
         seen.page.evaluate("document.querySelector('main').insertAdjacentHTML('beforeend', '<a href=\"#no\">x</a>')")
@@ -70,7 +66,7 @@ def test_links_lead_to_evidence_that_opens(report_page: Path, visit: Visiting) -
 
 def test_an_address_with_a_fragment_opens_its_evidence(report_page: Path, visit: Visiting) -> None:
     """A link from elsewhere into a folded part unfolds it, and what lies around it."""
-    with visit(report_page, "#c0-r1-p1") as seen:
+    with visit(report_page, "#c0-r1-p1", before=UNDRAWN) as seen:
         target = seen.page.locator("#c0-r1-p1")
         assert target.get_attribute("open") is not None
         assert target.locator("table").first.is_visible()
@@ -158,7 +154,7 @@ def test_first_slips_and_bounds_of_friction_are_drawn(drawn: Visit) -> None:
 
 def test_the_contents_follow_the_reader(report_page: Path, visit: Visiting) -> None:
     """Wherever a reader is, the contents are in sight and mark the section that is being read."""
-    with visit(report_page) as seen:
+    with visit(report_page, before=UNDRAWN) as seen:
         for name in ("findings", "replay", "verdicts"):
             seen.page.evaluate(f"document.getElementById('{name}').scrollIntoView()")
             seen.page.locator(f"nav a[aria-current][href='#{name}']").wait_for(state="attached")

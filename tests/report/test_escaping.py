@@ -53,7 +53,10 @@ def poisoned_page(everything: Any, poison: Poison, tmp_path_factory: pytest.Temp
 
 
 def test_nothing_that_others_write_runs(report_page: Path, poisoned_page: Path, visit: Visiting) -> None:
-    """Read to its end, unfolded, drawn, pointed at and clicked through: no script, element or handler of theirs."""
+    """Read to its end, unfolded, drawn, pointed at and clicked through: no script, element or handler of theirs.
+
+    The label at the pointer, which plotly writes with markup of its own, shows the poison as text.
+    """
     with visit(report_page) as clean:
         assert clean.draw(FIRST) == []
         scripts = clean.page.evaluate(HARM)[2]
@@ -62,6 +65,15 @@ def test_nothing_that_others_write_runs(report_page: Path, poisoned_page: Path, 
         assert seen.draw() == []
         for number in range(3):
             seen.page.locator(".legend button").nth(number).click()
+        seen.page.evaluate(
+            """() => {
+              const element = document.querySelector("figure[data-o] .canvas");
+              Plotly.Fx.hover(element, [{ curveNumber: 1, pointNumber: 9 }]);
+            }"""
+        )
+        label = seen.page.locator("figure[data-o] .hovertext").first
+        assert "</script></style></title></textarea><script>(window.poisoned" in label.text_content()
+        assert "&amp;&lt;%{y}{{7*7}}" in label.text_content()
         assert seen.page.evaluate(HARM) == [[], 0, scripts, 0]
         assert seen.requested == [poisoned_page.as_uri()]
         spoilt = "> attribute "  # numbers of a drawing that poison made none of: left out by the browser, which says so
@@ -101,22 +113,6 @@ def test_everything_that_others_write_is_shown_as_it_is_written(
     lost = [text for text in shown if " ".join(poison.dose(text).split()) not in bad]
     assert len(shown) > 20
     assert lost == []
-
-
-def test_labels_of_figures_show_names_as_they_are_written(poisoned_page: Path, visit: Visiting) -> None:
-    """The label at the pointer, which plotly writes with markup of its own, shows the poison as text."""
-    with visit(poisoned_page) as seen:
-        assert seen.draw(FIRST) == []
-        seen.page.evaluate(
-            """() => {
-              const element = document.querySelector("figure[data-o] .canvas");
-              Plotly.Fx.hover(element, [{ curveNumber: 1, pointNumber: 9 }]);
-            }"""
-        )
-        label = seen.page.locator("figure[data-o] .hovertext").first
-        assert "</script></style></title></textarea><script>(window.poisoned" in label.text_content()
-        assert "&amp;&lt;%{y}{{7*7}}" in label.text_content()
-        assert seen.page.evaluate(HARM)[:2] == [[], 0]
 
 
 def test_long_words_of_others_do_not_widen_a_phone(poisoned_page: Path, visit: Visiting) -> None:

@@ -31,7 +31,7 @@ def limits_page(everything: Any, tmp_path_factory: pytest.TempPathFactory) -> Pa
     return file
 
 
-@pytest.fixture
+@pytest.fixture(scope="module")
 def seen(limits_page: Path, visit: Visiting) -> Iterator[Visit]:
     """That page with its figures drawn."""
     with visit(limits_page) as visited:
@@ -71,6 +71,7 @@ def test_truth_and_tolerances_have_their_lines(seen: Visit, everything: Any) -> 
         (0, 2): True,
         (1,): False,
     }
+    seen.page.locator('.legend [data-row="1"]').first.click()
 
 
 def test_largest_distance_in_the_figure_is_the_judged_error(seen: Visit, everything: Any) -> None:
@@ -108,14 +109,15 @@ def test_keyboard_reads_and_zooms(seen: Visit) -> None:
 
 INK = f"getComputedStyle(document.querySelector('{FIGURE} .xtick text')).fill"
 SKETCH = "getComputedStyle(document.querySelector('.drawing .ball')).stroke"
+GROUND = "getComputedStyle(document.body).backgroundColor"
 
 
 def test_colours_follow_the_screen_while_it_is_open_and_paper_is_white(seen: Visit) -> None:
-    """Figures and drawings change with the scheme, a zoom stays; for print they are light whatever the scheme is."""
-    light = [seen.page.evaluate(INK), seen.page.evaluate(SKETCH)]
+    """Page, figures and drawings change with the scheme, a zoom stays; for print they are light in any scheme."""
+    light = [seen.page.evaluate(INK), seen.page.evaluate(SKETCH), seen.page.evaluate(GROUND)]
     seen.page.evaluate(f"Plotly.relayout(document.querySelector('{FIGURE}'), {{'xaxis.range': [0.25, 0.5]}})")
     seen.page.emulate_media(color_scheme="dark")
-    seen.wait(f"{INK} !== '{light[0]}' && {SKETCH} !== '{light[1]}'")
+    seen.wait(f"{INK} !== '{light[0]}' && {SKETCH} !== '{light[1]}' && {GROUND} !== '{light[2]}'")
     assert seen.page.evaluate(f"document.querySelector('{FIGURE}').layout.xaxis.range") == [0.25, 0.5]
     dark = seen.page.evaluate(INK)
     seen.page.evaluate("dispatchEvent(new Event('beforeprint'))")

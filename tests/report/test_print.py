@@ -30,15 +30,29 @@ WIDEN = """(more) => {
 }"""
 
 
+COLOURS = """() => [getComputedStyle(document.body).backgroundColor,
+  getComputedStyle(document.querySelector("figure[data-o] .xtick text")).fill]"""
+
+
 @pytest.fixture(scope="module")
-def printed(report_page: Path, visit: Visiting) -> PdfReader:
-    """The page as a PDF, printed as it opens, in the dark."""
+def on_paper(report_page: Path, visit: Visiting) -> tuple[PdfReader, list[list[str]]]:
+    """The page as a PDF, printed in the dark, and its colours before, on paper and afterwards."""
     with visit(report_page, color_scheme="dark") as seen:
+        assert seen.draw("figure[data-o='0'][data-p='0']") == []
+        colours = [seen.page.evaluate(COLOURS)]
+        seen.page.evaluate(f"addEventListener('beforeprint', () => {{ window.onPaper = ({COLOURS})(); }})")
         content = seen.page.pdf(
             format="A4", prefer_css_page_size=True, print_background=True, tagged=True, outline=True
         )
         assert seen.messages == []
-    return PdfReader(io.BytesIO(content))
+        colours += [seen.page.evaluate("onPaper"), seen.page.evaluate(COLOURS)]
+    return PdfReader(io.BytesIO(content)), colours
+
+
+@pytest.fixture(scope="module")
+def printed(on_paper: tuple[PdfReader, list[list[str]]]) -> PdfReader:
+    """The page as a PDF."""
+    return on_paper[0]
 
 
 def test_nothing_is_cut_off_at_the_edge_of_the_paper(report_page: Path, visit: Visiting) -> None:
@@ -88,16 +102,9 @@ def test_pdf_has_bookmarks_and_a_title(printed: PdfReader) -> None:
     assert printed.metadata.title == "proofroll: which engine can be trusted"
 
 
-def test_paper_is_white_in_the_dark(report_page: Path, visit: Visiting) -> None:
+def test_paper_is_white_in_the_dark(on_paper: tuple[PdfReader, list[list[str]]]) -> None:
     """Who reads on a dark screen prints dark on white, the figures too, and then has their dark screen back."""
-    colours = """() => [getComputedStyle(document.body).backgroundColor,
-      getComputedStyle(document.querySelector("figure[data-o] .xtick text")).fill]"""
-    with visit(report_page, color_scheme="dark") as seen:
-        assert seen.draw("figure[data-o='0'][data-p='0']") == []
-        before = seen.page.evaluate(colours)
-        seen.page.evaluate(f"addEventListener('beforeprint', () => {{ window.onPaper = ({colours})(); }})")
-        seen.page.pdf()
-        ground, ink = seen.page.evaluate("onPaper")
-        assert ground == "rgb(255, 255, 255)"
-        assert max(int(part) for part in re.findall(r"\d+", ink)) < 60
-        assert seen.page.evaluate(colours) == before
+    before, (ground, ink), after = on_paper[1]
+    assert ground == "rgb(255, 255, 255)"
+    assert max(int(part) for part in re.findall(r"\d+", ink)) < 60
+    assert after == before != [ground, ink]
