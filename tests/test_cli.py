@@ -13,6 +13,8 @@ from typing import Any
 
 import pytest
 
+from proofroll.cli.options import require_pages
+from proofroll.core.errors import Missing
 from proofroll.running.process import Worker
 
 RUN = ["run", "sphere_in_cylinder", "--engine", "oracle", "--until", "0.1", "--every", "0.05"]
@@ -556,3 +558,10 @@ def test_ladder(proofroll: Proofroll, tmp_path: Path) -> None:
     found = json.loads(out)
     assert set(found) >= {"rungs", "terms", "findings", "quantity", "unit", "truth", "machine"}
     assert found["absent"]["absent"]["status"] == "missing"
+
+
+def test_a_page_is_refused_before_the_work(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Where what draws pages is not installed, one line says so before anything is run."""
+    monkeypatch.setattr("importlib.util.find_spec", lambda name: None if name == "plotly" else name)
+    with pytest.raises(Missing, match=r"pages need plotly, .*: pip install 'proofroll\[report\]'"):
+        require_pages()

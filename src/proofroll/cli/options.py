@@ -14,7 +14,7 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from proofroll.core.errors import InputError
+from proofroll.core.errors import InputError, Missing
 
 if TYPE_CHECKING:
     from rich.console import Console
@@ -145,6 +145,19 @@ def json_text(content: object) -> str:
 def write_json(content: object) -> None:
     """One JSON document on standard output."""
     sys.stdout.write(json_text(content))
+
+
+def require_pages() -> None:
+    """Before the work rather than after it.
+
+    Raises:
+        Missing: what draws pages and pictures is not installed.
+    """
+    from importlib.util import find_spec
+
+    lacking = [name for name in ("jinja2", "matplotlib", "plotly", "tsdownsample") if find_spec(name) is None]
+    if lacking:
+        raise Missing(f"pages need {', '.join(lacking)}, not installed here: pip install 'proofroll[report]'")
 
 
 def complain(text: str) -> None:

@@ -8,7 +8,7 @@ from typing import Annotated
 
 import typer
 
-from proofroll.cli.options import require_writable, spinner
+from proofroll.cli.options import require_pages, require_writable, spinner
 from proofroll.core.errors import InputError
 
 
@@ -23,6 +23,7 @@ def plot(
 
     target = trajectory.with_suffix(".html") if out is None else out
     require_ending(target)
+    require_pages()
     require_writable(target)
     draw_run(read_run(trajectory), target)
     sys.stdout.write(f"The plot is in {target}.\n")
@@ -41,6 +42,7 @@ def replay(
     if target.suffix.lower() != ".html":
         raise InputError("--out", str(target), "a replay is a page: end the name of the file in .html")
     require_writable(target)
+    require_pages()
     run = read_run(trajectory)
     with spinner("the truth"):
         text = replay_page(trajectory, run)

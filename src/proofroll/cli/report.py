@@ -22,6 +22,7 @@ from proofroll.cli.options import (
     complain,
     new_runner,
     progress_bar,
+    require_pages,
     write_json,
 )
 
@@ -59,6 +60,7 @@ def report(
     loaded = [asked(name, {}) for name in names]
     if not studies:
         loaded = [item.briefly() for item in loaded]
+    require_pages()
     runner = new_runner(out, fresh, jobs, scheduler)
     keys = list(dict.fromkeys(part.key for part in parts))
     stages = _Stages(len(keys) + bool(loaded))

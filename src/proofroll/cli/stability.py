@@ -20,6 +20,7 @@ from proofroll.cli.options import (
     complain,
     new_runner,
     progress_bar,
+    require_pages,
     write_json,
 )
 
@@ -49,6 +50,7 @@ def stability(
     asked = file_for(scene)
     axes = chosen(asked.axes, axis or [])
     effort = QUICK if quick else Effort()
+    require_pages()
     runner = new_runner(out, fresh, jobs, scheduler)
     with progress_bar("stability", None) as advance:
         study, path = make_stability(asked, axes, runner, out, engines=engine or [], effort=effort, progress=advance)

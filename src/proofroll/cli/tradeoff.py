@@ -19,6 +19,7 @@ from proofroll.cli.options import (
     assignments,
     new_runner,
     progress_bar,
+    require_pages,
     write_json,
 )
 from proofroll.core.errors import InputError
@@ -70,6 +71,7 @@ def tradeoff(
     claims, question = question_of(scene, settings, quantity, until)
     require_observables(question, quantity or [])
     ranges = ranges_of(question, over) if over is not None else (claims.over if claims else {})
+    require_pages()
     study, path = measure(question, engine or [], ranges, claims, new_runner(out, fresh, jobs, scheduler), out)
     contradictions = study["claims"]["contradictions"]
     shown = [name for name in quantity or [] if name in study["quantities"]] or default_quantities(study)

@@ -24,6 +24,7 @@ from proofroll.cli.options import (
     complain,
     new_runner,
     progress_bar,
+    require_pages,
     spinner,
     write_json,
 )
@@ -62,6 +63,7 @@ def versions(
         from proofroll.studies.version_subjects import comparisons_about
 
         comparisons = comparisons_about(subject, engine)  # before minutes are spent on environments
+    require_pages()
     sides = _place(engine, old), _place(engine, new)
     if sides[0] == sides[1]:
         raise InputError("new", new, f"both are {sides[0]}; name two versions")

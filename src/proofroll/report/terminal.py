@@ -111,9 +111,9 @@ def closing_lines(content: ReportedComparison) -> list[str]:
         lines += [f"  {told.cause.sentence}" for told in row.diagnosis]
     lines += [f"* {name}: {remark}" for name, row in shown for remark in row.remarks]
     if content.contradictions:
-        lines.append(
-            f"{len(content.contradictions)} findings contradict what {content.name} expects (!! above); first:"
-        )
+        count = len(content.contradictions)
+        said = "1 finding contradicts" if count == 1 else f"{count} findings contradict"
+        lines.append(f"{said} what {content.name} expects (!! above){'; first' if count > 5 else ''}:")
         lines += [f"  {sentence}" for sentence in content.contradictions[:5]]
     elif any(len(row.expected) < len(Verdict) for row in rows):  # else nothing is claimed
         lines.append("Every verdict is as the comparison file expects.")

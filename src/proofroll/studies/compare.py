@@ -104,7 +104,8 @@ def _absent(run: Planned) -> Run:
 
 def _failed(run: Planned, facts: EngineFacts, result: Result) -> Run:
     expected = Verdict.FAILED in run.row.expected(run.parameters)
-    sentence = f"{run.row.engine} at {point_name(run.parameters)} {result.status}: {result.message}"
+    at = f" at {point_name(run.parameters)}" if run.parameters else ""
+    sentence = f"{run.row.engine}{at} {result.status}: {result.message}"
     scene = load_scene(run.ladder[1.0].scene, **run.parameters)
     causes = diagnosed(scene, result.certificate, step=_step(facts))
     said = [] if expected else [sentence]

@@ -24,6 +24,7 @@ from proofroll.cli.options import (
     new_cluster,
     new_runner,
     progress_bar,
+    require_pages,
     write_json,
 )
 
@@ -84,6 +85,7 @@ def regimes(
     from proofroll.running.store import Store, write_text
 
     loaded = load_regimes(study)
+    require_pages()
     Store(out)  # fails before the work rather than after it
     words = "runs of the truth"
     with progress_bar(words, total=loaded.runs) as advance:
