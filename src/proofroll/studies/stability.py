@@ -133,7 +133,19 @@ def stability(
         MapPoint(curve, place, _ladder(curve, place)) for curve in curves for place in places if place.scene is not None
     ]
     _search(scene, points, effort, runner, tell)
-    return StabilityMap(scene, list(axes), effort, places, points, absent)
+    refused = _refused(points)
+    points = [point for point in points if point.curve.engine not in refused]
+    return StabilityMap(scene, list(axes), effort, places, points, absent | refused)
+
+
+def _refused(points: Sequence[MapPoint]) -> dict[str, str]:
+    """Engines that refuse the scene everywhere and for the same reason, which is then no boundary; and the reason."""
+    said: dict[str, set[tuple[str, str]]] = {}
+    for point in points:
+        answers = {(str(result.status), result.message) for result in point.results.values()}
+        said.setdefault(point.curve.engine, set()).update(answers)
+    only = {engine: next(iter(answers)) for engine, answers in said.items() if len(answers) == 1}
+    return {engine: message for engine, (status, message) in only.items() if status == Status.REFUSED}
 
 
 def _matched(curves: Sequence[Curve]) -> list[Curve]:

@@ -8,6 +8,7 @@ import shutil
 import subprocess
 import sys
 from pathlib import Path
+from types import SimpleNamespace
 from typing import Any
 
 import pytest
@@ -17,11 +18,12 @@ from proofroll.files.json_data import plain
 from proofroll.files.scene_file import load_scene
 from proofroll.report.stability_map import LETTERS, legend, svg
 from proofroll.report.stability_tables import boundary_table, headline, silent_lines
+from proofroll.running.case import Status
 from proofroll.running.runner import Runner
 from proofroll.running.store import Store
 from proofroll.studies.axes import Axis, AxisTerm, chosen, thinned
 from proofroll.studies.failure import meanings
-from proofroll.studies.stability import stability
+from proofroll.studies.stability import _refused, stability
 from proofroll.studies.stability_claims import Claim, file_for
 from proofroll.studies.stability_content import content, dependence
 from proofroll.studies.stability_places import Effort, places_of
@@ -90,6 +92,20 @@ def test_a_closed_form_has_no_boundary(tmp_path: Path) -> None:
     assert content(found)["points"][0]["resolution"] == "rtol"
     (reason,) = found.absent.values()
     assert "neither step nor tolerance" in reason
+
+
+def test_what_refuses_the_scene_everywhere_has_no_boundary() -> None:
+    """A formulation without the scene's joints is told once with its reason; one that refuses in places stays."""
+    cannot, can = SimpleNamespace(engine="cannot"), SimpleNamespace(engine="can")
+    refused = SimpleNamespace(status=Status.REFUSED, message="needs universal joints")
+    done = SimpleNamespace(status=Status.DONE, message="")
+    points: Any = [
+        SimpleNamespace(curve=cannot, results={0: refused, 4: refused}),
+        SimpleNamespace(curve=cannot, results={0: refused}),
+        SimpleNamespace(curve=can, results={0: refused}),
+        SimpleNamespace(curve=can, results={0: done}),
+    ]
+    assert _refused(points) == {"cannot": "needs universal joints"}
 
 
 def test_a_map_resumes(tmp_path: Path) -> None:
