@@ -16,10 +16,10 @@ from poison import Poison
 
 import proofroll.report.html
 from proofroll.files.json_data import plain
-from proofroll.report.compression import packed
 from proofroll.report.growing_report import write_report
 from proofroll.report.html import page
 from proofroll.report.labels import number, symbol
+from proofroll.report.pages import packed
 from proofroll.report.plots import EngineCurve, kept, point_curves
 from proofroll.report.report_content import report_content
 from proofroll.report.scores import Score, recommendation
@@ -45,7 +45,7 @@ def test_plotly_is_there_once_and_comes_back_as_it_was(html: str, unpack: Any) -
     """The bundle is in the page once, compressed, and unpacked it is what its makers ship."""
     bundle = plotly.offline.get_plotlyjs()
     assert unpack(html, "plotly") == bundle
-    assert html.count(packed(bundle)) == 1
+    assert html.count(packed(bundle.encode())) == 1
     assert len(html) < 0.8 * len(bundle)
 
 

@@ -16,8 +16,8 @@ from proofroll.core.errors import InputError
 from proofroll.files.json_data import plain
 from proofroll.files.scene_file import load_scene
 from proofroll.report import labels, study_tables, tables
-from proofroll.report.compression import packed
 from proofroll.report.kinds import ReportKind, kind_of, report_kinds
+from proofroll.report.pages import environment, packed, rendered
 from proofroll.report.study_parts import Part, part_kinds
 from proofroll.report.styles import OUTLINES, styles
 from proofroll.report.tradeoff_tables import name_of
@@ -53,21 +53,18 @@ def page(
         "rows": [_drawn_rows(comparison) for comparison in content.comparisons],
         "points": [_marked(*pair) for pair in zip(content.comparisons, curves, strict=True)],
     }
-    text = (
-        templates()
-        .get_template("page.html")
-        .render(
-            content=content,
-            curves=curves,
-            pictures=pictures,
-            styles=[styles(comparison.rows) for comparison in content.comparisons],
-            replay=replay,
-            replay_scripts=[kind.replay_script for kind in report_kinds() if kind.replay_script],
-            data=packed(json.dumps(plain(drawn), allow_nan=False, separators=(",", ":"))),
-            plotly=_plotly(),
-        )
+    return rendered(
+        templates(),
+        "page.html",
+        content=content,
+        curves=curves,
+        pictures=pictures,
+        styles=[styles(comparison.rows) for comparison in content.comparisons],
+        replay=replay,
+        replay_scripts=[kind.replay_script for kind in report_kinds() if kind.replay_script],
+        data=packed(json.dumps(plain(drawn), allow_nan=False, separators=(",", ":")).encode()),
+        plotly=_plotly(),
     )
-    return text.encode("utf-8", "replace").decode("utf-8")  # a lone surrogate from an engine's message
 
 
 def _marked(comparison: ReportedComparison, curves: Sequence[PointCurves]) -> Sequence[PointCurves]:
@@ -89,7 +86,7 @@ def _plotly() -> str:
     """The program that draws, compressed."""
     import plotly.offline
 
-    return packed(plotly.offline.get_plotlyjs())
+    return packed(plotly.offline.get_plotlyjs().encode())
 
 
 def _drawn_rows(comparison: ReportedComparison) -> list[dict[str, object]]:
@@ -98,18 +95,9 @@ def _drawn_rows(comparison: ReportedComparison) -> list[dict[str, object]]:
 
 
 def templates() -> jinja2.Environment:
-    """The templates; everything that is put into them is escaped, save what they mark as ours."""
-    import jinja2
-
+    """The templates of the report, with the names that they use."""
     kinds: list[type[Part] | type[ReportKind]] = [*part_kinds(), *report_kinds()]
-    folders = [Path(inspect.getfile(kind)).parent / "templates" for kind in kinds]
-    made = jinja2.Environment(
-        loader=jinja2.FileSystemLoader([*dict.fromkeys([Path(__file__).parent / "templates", *folders])]),
-        autoescape=True,
-        undefined=jinja2.StrictUndefined,
-        trim_blocks=True,
-        lstrip_blocks=True,
-    )
+    made = environment(*(Path(inspect.getfile(kind)).parent / "templates" for kind in kinds))
     made.filters |= {
         "number": labels.number,
         "error": labels.error,

@@ -16,7 +16,8 @@ from proofroll.files.netcdf import read_some
 from proofroll.files.scene_file import load_scene
 from proofroll.report.comparison_content import by_row, outcome_content
 from proofroll.report.labels import names
-from proofroll.report.replay_library import packed, thinned, three
+from proofroll.report.pages import packed
+from proofroll.report.replay_library import thinned, three
 from proofroll.report.styles import styles
 from proofroll.running.case import Case, Status
 from proofroll.running.store import Store

@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-import base64
-import gzip
 import io
 import re
 import zipfile
@@ -13,6 +11,8 @@ from typing import Any
 
 import numpy as np
 import numpy.typing as npt
+
+from proofroll.report.pages import packed
 
 # trimesh is asked for its files, never imported. The script of its viewer begins with three.js as its makers built it:
 # their notice, then the program, which defines THREE, in one line; what comes after it is not wanted.
@@ -52,11 +52,6 @@ def three() -> dict[str, str] | None:
 
 def _bytes(found: Any, name: str) -> bytes:
     return bytes(found.locate_file(name).read_bytes())
-
-
-def packed(content: bytes) -> str:
-    """Bytes as text: gzip, then base64; a browser undoes both. The same bytes always give the same text."""
-    return base64.b64encode(gzip.compress(content, 9, mtime=0)).decode("ascii")
 
 
 def thinned(values: npt.NDArray[Any], step: float) -> bytes:

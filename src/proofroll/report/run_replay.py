@@ -36,6 +36,7 @@ def replay_page(path: Path, run: xr.Dataset) -> str:
         ProofrollError: the scene has no truth.
     """
     from proofroll.report.html import templates
+    from proofroll.report.pages import rendered
 
     scene = _scene(path, run)
     kind = kind_of(scene)
@@ -49,15 +50,13 @@ def replay_page(path: Path, run: xr.Dataset) -> str:
         write(true, file)
         replayed = Replayed(scene, file, _ghosts(path, run, true), scene.title, label or scene.title)
         case, numbers = case_content(replayed, kind.replay(), lambda _: "")
-    return (
-        templates()
-        .get_template("run_replay.html")
-        .render(
-            scene=scene,
-            replay=Replay(three(), 0, [case], [numbers]),
-            said=_said(run),
-            replay_scripts=[other.replay_script for other in report_kinds() if other.replay_script],
-        )
+    return rendered(
+        templates(),
+        "run_replay.html",
+        scene=scene,
+        replay=Replay(three(), 0, [case], [numbers]),
+        said=_said(run),
+        replay_scripts=[other.replay_script for other in report_kinds() if other.replay_script],
     )
 
 

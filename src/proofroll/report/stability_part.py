@@ -2,14 +2,13 @@
 
 from __future__ import annotations
 
-import shlex
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, ClassVar
 
 from proofroll.report import heat_map
-from proofroll.report.study_parts import PartEntry, held
+from proofroll.report.study_parts import PartEntry, head_of, held
 from proofroll.studies.stability_claims import STUDY, Claim, StabilityFile, file_for
 
 if TYPE_CHECKING:
@@ -72,14 +71,7 @@ class StabilityPart:
     @property
     def head(self) -> dict[str, str]:
         """What it is."""
-        asked = self.asked
-        command = f"proofroll stability {asked.scene}" + "".join(
-            f" --engine {shlex.quote(name)}" for name in self.engines
-        )
-        return {
-            "name": asked.name, "title": asked.title, "question": asked.question, "scene": asked.scene,
-            "command": command,
-        }  # fmt: skip
+        return head_of(self.asked, f"proofroll stability {self.asked.scene}", self.engines)
 
     def keeps(self, out: Path) -> bool:
         """The whole map, or else a quick one, of all axes if there is."""

@@ -5,6 +5,7 @@ Kinds of parts are plug-ins, our own too: entry points of the group ``proofroll.
 
 from __future__ import annotations
 
+import shlex
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from functools import cache
@@ -165,6 +166,14 @@ def absent(part: Part, reason: str) -> PartEntry:
     """What the content lists of a part that there is not; one sentence says why, and how to get it."""
     missing = f"{' '.join(reason.split()).rstrip('.')}; {part.head['command']} makes it."
     return PartEntry(**part.head, missing=missing)
+
+
+def head_of(asked: Any, command: str, engines: Sequence[str] = ()) -> dict[str, str]:
+    """The ``head`` of a part whose file has all of it, made by a command for some engines (none: for all)."""
+    words = "".join(f" --engine {shlex.quote(name)}" for name in engines)
+    return {name: getattr(asked, name) for name in ("name", "title", "question", "scene")} | {
+        "command": command + words
+    }
 
 
 def held(claims: Sequence[Any]) -> str:

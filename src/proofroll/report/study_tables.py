@@ -11,8 +11,7 @@ from proofroll.report.tables import Column
 from proofroll.report.tradeoff_tables import cost_of, name_of, step_of
 
 if TYPE_CHECKING:
-    from proofroll.report.advice import Advice
-    from proofroll.report.tradeoff_part import TradeoffEntry
+    from proofroll.report.tradeoff_part import Advice, TradeoffEntry
     from proofroll.studies.recommend import Choice
 
 

@@ -2,20 +2,38 @@
 
 from __future__ import annotations
 
-import shlex
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, ClassVar
 
-from proofroll.report.advice import Advice, advice
-from proofroll.report.study_parts import PartEntry, held
+from proofroll.core.comparison import Tolerance
+from proofroll.files.json_data import MERGED
+from proofroll.report.study_parts import PartEntry, head_of, held
+from proofroll.report.tradeoff_tables import default_quantities
 from proofroll.studies.claimed import ClaimJudgement
 from proofroll.studies.claims import STUDY, TradeoffClaims, load_claims
+from proofroll.studies.recommend import Answer, recommend
+from proofroll.studies.wish import Wish
 
 if TYPE_CHECKING:
     from proofroll.report.study_parts import Tell
     from proofroll.running.runner import Runner
+
+# Parts of its scale to which a quantity is wanted where nobody says otherwise: what an eye sees, an engineer needs, a
+# reference is made from, and what tells the orders of methods apart.
+PARTS = (1e-2, 1e-3, 1e-4, 1e-6)
+
+
+@dataclass(frozen=True)
+class Advice:
+    """An answer with the part of the scale that was asked for; None: it was asked for in the quantity's unit.
+
+    What is the same in all of them, the range and the circumstances, is left to the study.
+    """
+
+    relative: float | None
+    answer: Answer = field(metadata=MERGED)
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -55,14 +73,7 @@ class TradeoffPart:
     @property
     def head(self) -> dict[str, str]:
         """What it is."""
-        asked = self.asked
-        command = f"proofroll tradeoff {asked.scene}" + "".join(
-            f" --engine {shlex.quote(name)}" for name in self.engines
-        )
-        return {
-            "name": asked.name, "title": asked.title, "question": asked.question, "scene": asked.scene,
-            "command": command,
-        }  # fmt: skip
+        return head_of(self.asked, f"proofroll tradeoff {self.asked.scene}", self.engines)
 
     def keeps(self, out: Path) -> bool:
         """The whole study, or else a brief one."""
@@ -84,8 +95,6 @@ class TradeoffPart:
 
     def entry(self) -> TradeoffEntry:
         """See the protocol."""
-        from proofroll.report.tradeoff_tables import default_quantities
-
         study = self.study
         assert study is not None  # it was made
         return TradeoffEntry(
@@ -100,8 +109,32 @@ class TradeoffPart:
     def pictures(self, prefix: str) -> dict[str, str]:
         """The work-precision diagram."""
         from proofroll.report.svg import element
-        from proofroll.report.tradeoff_tables import default_quantities
         from proofroll.report.work_precision import svg
 
         assert self.study is not None  # it was made
         return {"diagram": element(svg(self.study, default_quantities(self.study)), prefix)}
+
+
+def wishes(study: Mapping[str, Any], claims: TradeoffClaims | None) -> list[Wish]:
+    """What a report asks of a trade-off.
+
+    Args:
+        study: as :func:`proofroll.studies.tradeoff_content.content` has it.
+        claims: their tolerances are those of the study's own quantity.
+    """
+    own = list({claim.tolerance.value: claim.tolerance for claim in claims.cheapest}.values()) if claims else []
+    found = []
+    for name in default_quantities(dict(study)):
+        if study["quantities"][name]["scale"] is None:
+            continue  # a part of nothing
+        parts = [Tolerance(part, True) for part in PARTS]
+        found += [Wish(name, tolerance) for tolerance in (own if own and name == study["quantity"] else parts)]
+    return found
+
+
+def advice(study: Mapping[str, Any], claims: TradeoffClaims | None) -> list[Advice]:
+    """The answers of :func:`proofroll.studies.recommend.recommend` to all wishes."""
+    return [
+        Advice(wish.tolerance.value if wish.tolerance.relative else None, recommend(study, wish).answer)
+        for wish in wishes(study, claims)
+    ]

@@ -9,6 +9,7 @@ from rich.table import Table
 from rich.text import Text
 
 from proofroll.report.labels import SYMBOLS, number
+from proofroll.report.pages import environment, rendered
 from proofroll.studies.hosts import said_of
 
 _MOST = 12  # sentences of a kind on the terminal; the JSON document has all
@@ -148,24 +149,16 @@ def _some(sentences: list[str], most: int | None) -> Iterator[str]:
 
 def page(content: Mapping[str, Any]) -> str:
     """The HTML page; everything from engines and files is escaped."""
-    import jinja2
-
-    templates = jinja2.Environment(
-        loader=jinja2.PackageLoader("proofroll.report"),
-        autoescape=True,
-        undefined=jinja2.StrictUndefined,
-        trim_blocks=True,
-        lstrip_blocks=True,
-    )
     cells = [
         (row, [short(row["setting"]), verdicts_text(row), numbers_text(row), order_text(row), speed_text(row)])
         for row in content["rows"]
     ]
-    text = templates.get_template("versions.html").render(
+    return rendered(
+        environment(),
+        "versions.html",
         content=content,
         heading=heading(content),
         answer=answer(content),
         rows=cells,
         sentences=list(lines(content, None)),
     )
-    return text.encode("utf-8", "replace").decode("utf-8")  # a lone surrogate from an engine's message

@@ -2,10 +2,12 @@
 
 from __future__ import annotations
 
+from pathlib import Path
 from typing import Any
 
 import numpy as np
 
+from proofroll.report.pages import environment, rendered
 from proofroll.robots.terminal import SHORT, amount, sentences
 
 # The robot is seen from the front, the left and above: directions to the right and up in the picture.
@@ -19,22 +21,10 @@ def page(content: dict[str, Any]) -> str:
     Args:
         content: from :func:`proofroll.robots.check.check`.
     """
-    import jinja2
-
-    templates = jinja2.Environment(
-        loader=jinja2.ChoiceLoader(
-            [jinja2.PackageLoader("proofroll.robots"), jinja2.PackageLoader("proofroll.report")]
-        ),
-        autoescape=True,
-        undefined=jinja2.StrictUndefined,
-        trim_blocks=True,
-        lstrip_blocks=True,
-    )
+    templates = environment(Path(__file__).parent / "templates")
     templates.filters["amount"] = amount
-    text = templates.get_template("check.html").render(
-        content=content, short=SHORT, skeleton=skeleton(content), sentences=lambda row: list(sentences(row))
-    )
-    return text.encode("utf-8", "replace").decode("utf-8")  # a lone surrogate from an engine's message
+    said = {"short": SHORT, "skeleton": skeleton(content), "sentences": lambda row: list(sentences(row))}
+    return rendered(templates, "check.html", content=content, **said)
 
 
 def skeleton(content: dict[str, Any]) -> dict[str, Any]:

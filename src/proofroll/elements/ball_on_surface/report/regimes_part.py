@@ -8,7 +8,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any, ClassVar
 
 from proofroll.elements.ball_on_surface.regimes_study import STUDY, RegimesStudy, load_regimes, regime_maps
-from proofroll.report.study_parts import PartEntry
+from proofroll.report.study_parts import PartEntry, head_of
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -46,11 +46,7 @@ class RegimesPart:
     @property
     def head(self) -> dict[str, str]:
         """What it is."""
-        asked = self.asked
-        return {
-            "name": asked.name, "title": asked.title, "question": asked.question, "scene": asked.scene,
-            "command": f"proofroll regimes {asked.name}",
-        }  # fmt: skip
+        return head_of(self.asked, f"proofroll regimes {self.asked.name}")
 
     def keeps(self, out: Path) -> bool:  # noqa: ARG002 -- the protocol's
         """Nothing is kept: a map is made anew by each report."""
