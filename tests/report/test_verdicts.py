@@ -119,6 +119,7 @@ def test_a_wrong_limit_within_tolerance_is_marked(outcome: Outcome) -> None:
     row = content.rows[2]
     assert row.verdict == "agrees"
     assert "✓ agrees*" in printed(content, 100)
+    assert "agrees*" in [line.verdict_text for lines in overview(content, 0).groups.values() for line in lines]
     (remark,) = row.remarks
     assert "shown not to be the truth: off by 0.0004 ± 1e-07 m, order 2" in remark
     assert f"* beta only: {remark}" in [line.replace(" (dt 1e-3)", "") for line in closing_lines(content)]

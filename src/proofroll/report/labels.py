@@ -36,12 +36,16 @@ MEANINGS = {
 
 
 def verdict_text(row: ReportedRow) -> str:
-    """The verdict of a row; where its cases have several, how many have which: ``failed 1/11 ✗2 ✓8``."""
+    """The verdict of a row; where its cases have several, how many have which: ``failed 1/11 ✗2 ✓8``.
+
+    A star leads to what is remarked under the table.
+    """
+    star = "*" if row.remarks else ""
     counts = {word: row.verdicts[word] for word in SYMBOLS if row.verdicts.get(word)}
     if counts.keys() <= {row.verdict}:
-        return str(row.verdict)
+        return f"{row.verdict}{star}"
     others = [f"{SYMBOLS[word]}{count}" for word, count in reversed(counts.items()) if word != row.verdict]
-    return " ".join([row.verdict, f"{counts[row.verdict]}/{sum(counts.values())}", *others])
+    return " ".join([row.verdict, f"{counts[row.verdict]}/{sum(counts.values())}", *others]) + star
 
 
 def detail(entry: ReportedRow | ReportedRun | Judgement) -> str:

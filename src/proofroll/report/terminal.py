@@ -65,7 +65,7 @@ def verdict_table(content: ReportedComparison) -> Table:
         table.add_row(
             Text(" ".join(filter(None, (row.name, row.formulation, row.setting)))),
             step(row.resolution, row.resolution_value),
-            Text(f"{SYMBOLS[verdict]} {verdict_text(row)}{'*' if row.remarks else ''}", style=_STYLES[verdict]),
+            Text(f"{SYMBOLS[verdict]} {verdict_text(row)}", style=_STYLES[verdict]),
             *(number(observables[name].error if name in observables else None) for name, _ in names),
             number(worst.order if worst else None),
             number(row.seconds_per_second),
