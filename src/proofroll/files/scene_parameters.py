@@ -65,6 +65,8 @@ def check_parameters(parameters: Mapping[str, Parameter], units: Iterable[str], 
             if other == name or other not in parameters:
                 known = choices(item for item in parameters if item != name)
                 advice = f"there is no such parameter to refer to; choose from {known}"
+                if other.removeprefix("$") in parameters:
+                    advice = "a parameter refers to another one by its name alone, without $, and never to itself"
                 raise InputError(f"{where}.{key}", other, advice)
             if parameters[other].unit != parameter.unit:
                 advice = f"its unit is {parameters[other].unit}, that of {name} is {parameter.unit}"

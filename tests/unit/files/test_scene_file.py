@@ -190,6 +190,12 @@ def test_a_scene_outside_models(edited: Callable[[str, str], str]) -> None:
         ('title = "', f'a = {"[" * 5000}\ntitle = "', ["nested more than 16 deep"]),
         ("[gravity]", f"[gravity.{'.'.join('d' * 5000)}]\n[gravity]", ["nested more than 16 deep"]),
         ("value = 0.517", f"value = {'9' * 5000}", ["broken"]),
+        (
+            'value = "mu_static"',
+            'value = "$mu_static"',
+            ["mu_kinetic.value = '$mu_static'", "by its name alone, without $"],
+        ),
+        ('mass = "$mass"', "mass = 5e-324", ["balls.0.inertia = 0.0", "above 0"]),
     ],
 )
 def test_broken_scene_files(edited: Callable[[str, str], str], old: str, new: str, words: list[str]) -> None:

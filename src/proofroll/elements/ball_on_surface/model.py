@@ -64,7 +64,7 @@ class Ball:
         Raises:
             OutOfBounds: a radius, mass or inertia that is not positive and finite.
         """
-        for name in ("radius", "mass", "inertia_ratio"):
+        for name in ("radius", "mass", "inertia_ratio", "inertia"):
             bounded(name, getattr(self, name), above=0)
 
     @property
