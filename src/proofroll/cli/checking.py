@@ -7,7 +7,6 @@ import sys
 from collections.abc import Mapping
 from importlib.metadata import entry_points
 from pathlib import Path
-from typing import Any
 
 from proofroll.cli.options import write_json
 from proofroll.core.errors import InputError, choices
@@ -32,15 +31,27 @@ def check_text(name: str, as_json: bool) -> None:
         write_json(found)
         return
     counts = ", ".join(
-        f"{count} {what.removesuffix('s') if count == 1 else what}" for what, count in found["counts"].items()
+        f"{count} {what.removesuffix('s') if count == 1 else what}" for what, count in found.counts.items()
     )
-    needs = f"; engines must provide: {', '.join(found['requires'])}" if found["requires"] else ""
-    about = f"{found['scene']}, " if found["kind"] != "scene" and found["scene"] else ""
-    sys.stdout.write(f"{found['name']} is sound: {found['kind']}, {about}{counts}{needs}\n")
+    needs = f"; engines must provide: {', '.join(found.requires)}" if found.requires else ""
+    about = f"{found.scene}, " if found.kind != "scene" and found.scene else ""
+    sys.stdout.write(f"{found.name} is sound: {found.kind}, {about}{counts}{needs}\n")
 
 
-def checked(name: str) -> dict[str, Any]:
-    """What a scene or file holds: kind, name, path, scene, counts of its parts, and what the scene requires.
+@dataclasses.dataclass(frozen=True)
+class SoundFile:
+    """What a scene or file holds: counts of its parts, and what a scene requires."""
+
+    kind: str
+    name: str
+    path: str
+    scene: str
+    counts: dict[str, int]
+    requires: list[str] = dataclasses.field(default_factory=list)
+
+
+def checked(name: str) -> SoundFile:
+    """What a scene or file holds.
 
     Args:
         name: of a scene, or path of its folder or ``scene.toml``; else name or path of a file of a study.
@@ -68,22 +79,16 @@ def checked(name: str) -> dict[str, Any]:
     return _scene(scene)
 
 
-def _scene(name: str) -> dict[str, Any]:
+def _scene(name: str) -> SoundFile:
     from proofroll.files.scene_file import load_scene, read_scene_file
 
     file, scene = read_scene_file(name), load_scene(name)
     tables = {f"[[{key}]]": len(value) for key, value in file.tables.items() if isinstance(value, list)}
-    return {
-        "kind": "scene",
-        "name": scene.name,
-        "path": str(scene.folder / "scene.toml"),
-        "scene": scene.name,
-        "counts": {"parameters": len(file.parameters)} | tables,
-        "requires": sorted(scene.requires),
-    }
+    counts = {"parameters": len(file.parameters)} | tables
+    return SoundFile("scene", scene.name, str(scene.folder / "scene.toml"), scene.name, counts, sorted(scene.requires))
 
 
-def _comparison(path: Path) -> dict[str, Any]:
+def _comparison(path: Path) -> SoundFile:
     from proofroll.files.comparison_file import load_comparison
     from proofroll.files.scene_file import load_scene
     from proofroll.studies.planning import row_facts
@@ -91,10 +96,10 @@ def _comparison(path: Path) -> dict[str, Any]:
     found = load_comparison(str(path))
     row_facts(found, list(enumerate(found.rows)), load_scene(found.scene).requires)
     counts = {"points": len(found.combinations()), "rows": len(found.rows), "tolerances": len(found.bands)}
-    return _content("comparison", path, found.scene, counts)
+    return SoundFile("comparison", path.stem, str(path), found.scene, counts)
 
 
-def _study(path: Path, study: str) -> dict[str, Any]:
+def _study(path: Path, study: str) -> SoundFile:
     readers = {point.name: point for point in entry_points(group=READERS)}
     if study not in readers:
         raise InputError(f"{path.name}: study", study, f"nothing reads such a file; choose from {choices(readers)}")
@@ -105,8 +110,4 @@ def _study(path: Path, study: str) -> dict[str, Any]:
         for key, value in parts.items()
         if isinstance(value, (list, tuple, Mapping)) and value
     }
-    return _content(study, path, getattr(found, "scene", ""), counts)
-
-
-def _content(kind: str, path: Path, scene: str, counts: Mapping[str, int]) -> dict[str, Any]:
-    return {"kind": kind, "name": path.stem, "path": str(path), "scene": scene, "counts": counts, "requires": []}
+    return SoundFile(study, path.stem, str(path), getattr(found, "scene", ""), counts)

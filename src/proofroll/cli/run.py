@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from pathlib import Path
 from typing import Annotated
 
@@ -83,18 +84,18 @@ def run(
             from proofroll.report.run_plot import draw_run
 
             draw_run(read(target), plot)
-            content["plot"] = str(plot)
+            content = replace(content, plot=str(plot))
         if out is not None and result.trajectory is not None:
             from proofroll.running.store import move
 
             move(target, out)
-            content["trajectory"] = str(out)
-    done = content["status"] == "done"
+            content = replace(content, trajectory=str(out))
+    done = content.status == "done"
     if not done:
-        complain(f"{content['engine']} {content['status']}: {content['message']}")
+        complain(f"{content.engine} {content.status}: {content.message}")
     if as_json:
         write_json(content)
-    elif done or content["final"]:
+    elif done or content.final:
         from proofroll.report.terminal import console
 
         for line in run_lines(content):

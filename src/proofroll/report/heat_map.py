@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
+from dataclasses import dataclass
 from typing import Any
 
 from proofroll.report.labels import number, unit
@@ -13,54 +14,82 @@ from proofroll.report.stability_tables import label
 _DEEP = 0.5
 
 
-def table(study: Mapping[str, Any], prefix: str) -> dict[str, Any]:
+@dataclass(frozen=True)
+class HeatAxis:
+    """An axis with the values that have a point."""
+
+    name: str
+    unit: str
+    meaning: str
+    values: list[float]
+
+
+@dataclass(frozen=True)
+class HeatCell:
+    """A point of the map: what stands in it, how dark it is, and all about it as a title."""
+
+    text: str
+    shade: float | None
+    deep: bool
+    never: bool
+    href: str
+    title: str
+
+
+@dataclass(frozen=True)
+class HeatLine:
+    """A setting: a cell for each value of each axis, None where there is no point."""
+
+    name: str
+    cells: list[HeatCell | None]
+
+
+@dataclass(frozen=True)
+class ListedPoint:
+    """A point with its id and the name of its setting."""
+
+    id: str
+    label: str
+    found: Mapping[str, Any]
+
+
+@dataclass(frozen=True)
+class HeatMap:
+    """The map by engine, the letters that occur in it, and the list of its points."""
+
+    axes: list[HeatAxis]
+    groups: dict[str, list[HeatLine]]
+    letters: dict[str, str]
+    points: list[ListedPoint]
+
+
+def table(study: Mapping[str, Any], prefix: str) -> HeatMap:
     """The map and the list of its points.
 
     Args:
         study: as :func:`proofroll.studies.stability_content.content` has it.
         prefix: of the points' ids.
-
-    Returns:
-        ``axes`` with ``name``, ``unit``, ``meaning`` and ``values``; ``groups``: engine -> lines with ``name`` and
-        ``cells``, None where there is no point; ``letters`` of what occurs; ``points``.
     """
-    axes = [
-        {
-            "name": axis["name"],
-            "unit": unit(axis["unit"]),
-            "meaning": axis["meaning"],
-            "values": list(dict.fromkeys(p["value"] for p in study["points"] if p["axis"] == axis["name"])),
-        }
+    valued = {
+        axis["name"]: list(dict.fromkeys(p["value"] for p in study["points"] if p["axis"] == axis["name"]))
         for axis in study["axes"]
-    ]
-    axes = [axis for axis in axes if axis["values"]]
-    columns = {(axis["name"], value): index for index, (axis, value) in enumerate(_columns(axes))}
-    lines: dict[str, dict[str, Any]] = {}
-    points = []
-    for index, point in enumerate(study["points"]):
-        name, settings = label(point), _rest(point)
-        line = lines.setdefault(
-            point["curve"], {"engine": point["engine"], "name": settings, "cells": [None] * len(columns)}
-        )
-        href = f"{prefix}{index}"
-        points.append({**point, "id": href, "label": name})
-        at = columns.get((point["axis"], point["value"]))
-        if at is not None:
-            line["cells"][at] = _cell(point, href)
-    groups: dict[str, list[dict[str, Any]]] = {}
-    for line in lines.values():
-        groups.setdefault(line["engine"], []).append(line)
-    seen = {point["failure"] for point in study["points"]}
-    return {
-        "axes": axes,
-        "groups": groups,
-        "letters": {letter: kind for kind, letter in LETTERS.items() if kind in seen},
-        "points": points,
     }
-
-
-def _columns(axes: list[dict[str, Any]]) -> list[tuple[dict[str, Any], float]]:
-    return [(axis, value) for axis in axes for value in axis["values"]]
+    axes = [
+        HeatAxis(axis["name"], unit(axis["unit"]), axis["meaning"], valued[axis["name"]])
+        for axis in study["axes"]
+        if valued[axis["name"]]
+    ]
+    columns = [(axis.name, value) for axis in axes for value in axis.values]
+    cells: dict[str, dict[tuple[str, float], HeatCell]] = {}
+    for index, point in enumerate(study["points"]):
+        cells.setdefault(point["curve"], {})[point["axis"], point["value"]] = _cell(point, f"{prefix}{index}")
+    groups: dict[str, list[HeatLine]] = {}
+    for point in {point["curve"]: point for point in study["points"]}.values():
+        line = HeatLine(_rest(point), [cells[point["curve"]].get(column) for column in columns])
+        groups.setdefault(point["engine"], []).append(line)
+    seen = {point["failure"] for point in study["points"]}
+    listed = [ListedPoint(f"{prefix}{index}", label(point), point) for index, point in enumerate(study["points"])]
+    return HeatMap(axes, groups, {letter: kind for kind, letter in LETTERS.items() if kind in seen}, listed)
 
 
 def _rest(point: Mapping[str, Any]) -> str:
@@ -76,7 +105,7 @@ def told(point: Mapping[str, Any]) -> str:
     return "silent" if point["silent"] else "says so"
 
 
-def _cell(point: Mapping[str, Any], href: str) -> dict[str, Any]:
+def _cell(point: Mapping[str, Any], href: str) -> HeatCell:
     text, shade = cell(point)
     words = [f"{label(point)} at {point['axis']} = {point['value']:g}"]
     if point["problem"]:
@@ -87,11 +116,11 @@ def _cell(point: Mapping[str, Any], href: str) -> dict[str, Any]:
         words.append(f"1 % up to {point['resolution']} {number(point['largest_accurate'])}")
     if point["failure"]:
         words.append(f"beyond: {point['failure']}, {told(point)}")
-    return {
-        "text": text,
-        "shade": None if shade is None else round(min(max(shade, 0.0), 1.0), 2),
-        "deep": shade is not None and shade > _DEEP,
-        "never": point["largest_accurate"] is None,
-        "href": href,
-        "title": "; ".join(words),
-    }
+    return HeatCell(
+        text=text,
+        shade=None if shade is None else round(min(max(shade, 0.0), 1.0), 2),
+        deep=shade is not None and shade > _DEEP,
+        never=point["largest_accurate"] is None,
+        href=href,
+        title="; ".join(words),
+    )

@@ -2,13 +2,13 @@
 
 from __future__ import annotations
 
-import dataclasses
-from collections.abc import Mapping
+from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import Any
 
-from proofroll.core.diagnosis.of_scene import diagnosed
-from proofroll.core.events import events_of
+from proofroll.core.diagnosis.of_scene import Diagnosis, diagnosed
+from proofroll.core.events import Event, events_of
+from proofroll.files.json_data import OPTIONAL
 from proofroll.files.netcdf import read
 from proofroll.files.scene_file import load_scene
 from proofroll.running.case import Case, Result
@@ -16,87 +16,113 @@ from proofroll.running.case import Case, Result
 _EVENTS = 8  # of so many the terminal tells; the JSON document has all
 
 
-def run_content(case: Case, result: Result, trajectory: Path) -> dict[str, Any]:
-    """A run as plain data.
+@dataclass(frozen=True)
+class RunContent:
+    """A run.
 
-    ``final`` is the state at the last sample, empty if there is none; ``absent`` says of variables without a value why.
+    Attributes:
+        final: variable -> value at the last sample; empty if there is none.
+        units: of these.
+        absent: variable without a value -> why.
+        smallest_N: of balls [N].
+        error_bars: of the truth, by variable.
+        trajectory, plot: files that were written.
     """
-    content: dict[str, Any] = {
-        "scene": case.scene,
-        "parameters": case.parameters,
-        "engine": case.engine.name,
-        "settings": case.engine.settings,
-        "status": result.status.value,
-        "message": result.message,
-        "until": case.until,
-        "final": {},
-        "units": {},
-        "absent": {},
-        "events": [],
-        "wall_seconds": result.wall_seconds,
-        "versions": result.versions,
-        "certificate": result.certificate,
-        "diagnosis": [],
-    }
+
+    scene: str
+    parameters: dict[str, float]
+    engine: str
+    settings: dict[str, Any]
+    status: str
+    message: str
+    until: float
+    wall_seconds: float
+    versions: dict[str, str]
+    certificate: list[dict[str, Any]]
+    diagnosis: list[Diagnosis]
+    final: dict[str, float] = field(default_factory=dict)
+    units: dict[str, str] = field(default_factory=dict)
+    absent: dict[str, str] = field(default_factory=dict)
+    events: list[Event] = field(default_factory=list)
+    smallest_N: float | None = field(default=None, metadata=OPTIONAL)
+    error_bars: dict[str, float] | None = field(default=None, metadata=OPTIONAL)
+    trajectory: str | None = field(default=None, metadata=OPTIONAL)
+    plot: str | None = field(default=None, metadata=OPTIONAL)
+
+
+def run_content(case: Case, result: Result, trajectory: Path) -> RunContent:
+    """What came of a case."""
+    causes = []
     if result.trajectory is None and result.certificate:
-        scene = load_scene(case.scene, asks=case.asks, **case.parameters)
-        content["diagnosis"] = [item.as_dict() for item in diagnosed(scene, result.certificate)]
+        causes = diagnosed(load_scene(case.scene, asks=case.asks, **case.parameters), result.certificate)
+    content = RunContent(
+        scene=case.scene,
+        parameters=case.parameters,
+        engine=case.engine.name,
+        settings=case.engine.settings,
+        status=result.status.value,
+        message=result.message,
+        until=case.until,
+        wall_seconds=result.wall_seconds,
+        versions=result.versions,
+        certificate=result.certificate,
+        diagnosis=causes,
+    )
     if result.trajectory is None:
         return content
     dataset = read(trajectory)
-    curves = {name: variable for name, variable in dataset.data_vars.items() if variable.dims == ("time",)}
-    content["final"] = {"time": float(dataset["time"][-1])} | {str(k): float(v[-1]) for k, v in curves.items()}
-    content["units"] = {"time": "s"} | {str(name): variable.attrs["units"] for name, variable in curves.items()}
-    content["absent"] = {str(k): str(v.attrs["absent"]) for k, v in curves.items() if "absent" in v.attrs}
-    if "smallest_N" in dataset.attrs:
-        content["smallest_N"] = float(dataset.attrs["smallest_N"])
-    content["events"] = [dataclasses.asdict(event) for event in events_of(dataset)]
-    bars = {str(k): float(v.attrs["error_bar"]) for k, v in curves.items() if "error_bar" in v.attrs}
-    if bars:
-        content["error_bars"] = bars
-    return content
+    curves = {str(name): variable for name, variable in dataset.data_vars.items() if variable.dims == ("time",)}
+    smallest = dataset.attrs.get("smallest_N")
+    return replace(
+        content,
+        final={"time": float(dataset["time"][-1])} | {name: float(curve[-1]) for name, curve in curves.items()},
+        units={"time": "s"} | {name: curve.attrs["units"] for name, curve in curves.items()},
+        absent={name: str(curve.attrs["absent"]) for name, curve in curves.items() if "absent" in curve.attrs},
+        events=events_of(dataset),
+        smallest_N=None if smallest is None else float(smallest),
+        error_bars={name: float(c.attrs["error_bar"]) for name, c in curves.items() if "error_bar" in c.attrs} or None,
+    )
 
 
-def _told(event: Mapping[str, Any]) -> str:
+def _told(event: Event) -> str:
     """One event with its bracket."""
-    kind, bar = event["kind"].replace("_", "-"), 0.5 * (event["time_high"] - event["time_low"])
-    return f"{kind} at {event['time']:.9g} ± {bar:.1g} s"
+    return f"{event.kind.replace('_', '-')} at {event.time:.9g} ± {0.5 * (event.time_high - event.time_low):.1g} s"
 
 
-def run_lines(content: dict[str, Any]) -> list[Any]:
+def run_lines(content: RunContent) -> list[Any]:
     """A run for a person, as things that rich prints."""
     from rich.table import Table
     from rich.text import Text
 
-    settings = ", ".join(f"{key}={value}" for key, value in content["settings"].items())
-    lines: list[Any] = [Text(f"{content['scene']} in {content['engine']}" + (f" ({settings})" if settings else ""))]
-    lines.append(Text(f"{content['status']}: {content['message']}"))
-    lines += [Text(f"  {cause['sentence']}") for cause in content["diagnosis"]]
-    if not content["final"]:
+    settings = ", ".join(f"{key}={value}" for key, value in content.settings.items())
+    lines: list[Any] = [Text(f"{content.scene} in {content.engine}" + (f" ({settings})" if settings else ""))]
+    lines.append(Text(f"{content.status}: {content.message}"))
+    lines += [Text(f"  {cause.sentence}") for cause in content.diagnosis]
+    if not content.final:
         return lines
-    bars = content.get("error_bars", {})
+    bars = content.error_bars or {}
     table = Table(box=None, pad_edge=False)
     table.add_column("at the end")
     table.add_column("value", justify="right")
     table.add_column("unit")
     if bars:
         table.add_column("error bar", justify="right")
-    shown = {name: value for name, value in content["final"].items() if name not in content["absent"]}
+    shown = {name: value for name, value in content.final.items() if name not in content.absent}
     for name, value in shown.items():
         bar = [f"{bars[name]:.1e}" if name in bars else ""] if bars else []
-        table.add_row(name, f"{value:.12g}", content["units"][name], *bar)
+        table.add_row(name, f"{value:.12g}", content.units[name], *bar)
     lines.append(table)
-    for reason in dict.fromkeys(content["absent"].values()):
-        without = [name for name, why in content["absent"].items() if why == reason]
+    for reason in dict.fromkeys(content.absent.values()):
+        without = [name for name, why in content.absent.items() if why == reason]
         lines.append(Text(f"{reason}: {', '.join(without)}"))
-    if "smallest_N" in content:
-        lines.append(Text(f"smallest normal force: {content['smallest_N']:.6g} N"))
-    if content["events"]:
-        said = ", ".join(_told(event) for event in content["events"][:_EVENTS])
-        more = len(content["events"]) - _EVENTS
+    if content.smallest_N is not None:
+        lines.append(Text(f"smallest normal force: {content.smallest_N:.6g} N"))
+    if content.events:
+        said = ", ".join(_told(event) for event in content.events[:_EVENTS])
+        more = len(content.events) - _EVENTS
         lines.append(Text(f"events: {said}{f' and {more} more' if more > 0 else ''}"))
-    lines.append(Text(f"{content['wall_seconds']:.3g} s of wall time"))
-    for key in ("trajectory", "plot"):
-        if key in content:
-            lines.append(Text(f"The {key} is in {content[key]}."))
+    lines.append(Text(f"{content.wall_seconds:.3g} s of wall time"))
+    for what, file in (("trajectory", content.trajectory), ("plot", content.plot)):
+        if file:
+            lines.append(Text(f"The {what} is in {file}."))
     return lines

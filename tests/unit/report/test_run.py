@@ -31,8 +31,8 @@ def test_a_variable_without_value_says_why(tmp_path: Path) -> None:
         shown.print(line)
     text = shown.file.getvalue()
 
-    assert content["absent"] == dict.fromkeys(held, "not determined by the equations")
-    assert np.isnan(content["final"]["force.a_joint_0.z"])
+    assert content.absent == dict.fromkeys(held, "not determined by the equations")
+    assert np.isnan(content.final["force.a_joint_0.z"])
     assert "nan" not in text
     assert text.count("not determined by the equations") == 1
     assert all(name in text for name in held)
