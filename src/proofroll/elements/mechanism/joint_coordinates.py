@@ -189,7 +189,6 @@ class JointCoordinates:
         n = len(mechanism.bodies)
         wrench = np.concatenate(reactions(self.tree, motion, rows, found.multipliers, self._needed(found)))
         largest = [np.abs(rows.residual).max(initial=0.0), np.abs(rows.C @ v).max(initial=0.0)]
-        points = [self.tree.point(motion, point.body, np.array(point.position))[0] for point in mechanism.points]
         return {
             "p_WB": motion.p_WB[:n],
             "v_WB": motion.v_WB[:n],
@@ -198,8 +197,6 @@ class JointCoordinates:
             "q": q,
             "v": v,
             "wrench": wrench,
-            "points": np.array(points).reshape(-1, 3),
-            "energy": self._energy(motion, q) + float(0.5 * v @ self._armature @ v),
             "residual": np.array(largest),
         }
 
@@ -251,19 +248,3 @@ class JointCoordinates:
             pull = spring.stiffness * (length - spring.length) + spring.damping * (along @ (v_b - v_a))
             found += [(body, position, s * pull * along) for (body, position), s in zip(ends, (1, -1), strict=True)]
         return found
-
-    def _energy(self, motion: BodyMotion, q: Array) -> float:
-        n = len(self._mass)
-        R, w = motion.R_WB[:n], motion.w_WB[:n]
-        arm = np.einsum("nij,nj->ni", R, self._com)
-        v_com = motion.v_WB[:n] + cross(w, arm)
-        spin = np.einsum("nji,nj->ni", R, w)
-        energy = 0.5 * self._mass @ (v_com**2).sum(axis=1) + 0.5 * np.einsum("ni,nij,nj", spin, self._inertia, spin)
-        energy -= self._mass @ ((motion.p_WB[:n] + arm) @ self._gravity)
-        for stiffness, rest, at_q, _ in self._springs:
-            energy += 0.5 * stiffness * ((q[at_q] - rest) ** 2).sum()
-        for spring in self.mechanism.springs:
-            ends = ((spring.body_a, spring.position_a), (spring.body_b, spring.position_b))
-            a, b = (self.tree.point(motion, body, np.array(position))[0] for body, position in ends)
-            energy += 0.5 * spring.stiffness * (np.linalg.norm(b - a) - spring.length) ** 2
-        return float(energy)

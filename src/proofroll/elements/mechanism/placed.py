@@ -9,7 +9,7 @@ from functools import cached_property
 import numpy as np
 
 from proofroll.core.arrays import FloatArray, cross
-from proofroll.elements.mechanism.joint import FACTS
+from proofroll.elements.mechanism.joint import FACTS, Joint
 from proofroll.elements.mechanism.model import Mechanism
 
 _TURN = 2 * np.pi
@@ -69,25 +69,26 @@ class Placed:
 
     def coordinates(self) -> dict[str, tuple[FloatArray, FloatArray]]:
         """Coordinate and rate of each joint with one coordinate [rad or m, and per s], angles counted in turns."""
-        found = {}
-        for joint in self.mechanism.joints:
-            if joint.nq != 1:
-                continue
-            parent, child = (self.mechanism.body_index[name] for name in (joint.parent, joint.child))
-            A, B = self.R_WB[:, parent] @ joint.parent_frame, self.R_WB[:, child] @ joint.child_frame
-            axis = A[..., 2]
-            if joint.kind == "revolute":
-                cosine, sine = np.sum(A[..., 0] * B[..., 0], -1), np.sum(A[..., 1] * B[..., 0], -1)
-                rate = np.sum((self.spin(joint.child) - self.spin(joint.parent)) * axis, -1)
-                found[joint.name] = _counted(self.time, np.arctan2(sine, cosine), rate, joint.q0[0]), rate
-            else:
-                on_child, on_parent = (joint.child, joint.child_position), (joint.parent, joint.position)
-                apart = self.point(*on_child) - self.point(*on_parent)
-                arm = self.point(*on_child) - self.point(joint.parent, (0.0, 0.0, 0.0))
-                carried = self.velocity(joint.parent, (0.0, 0.0, 0.0)) + cross(self.spin(joint.parent), arm)
-                rate = np.sum((self.velocity(*on_child) - carried) * axis, -1)
-                found[joint.name] = np.sum(apart * axis, -1), rate
-        return found
+        return {joint.name: self.along(joint)[0] for joint in self.mechanism.joints if joint.nq == 1}
+
+    def along(self, joint: Joint) -> list[tuple[FloatArray, FloatArray]]:
+        """The same of each coordinate of a revolute, prismatic or universal joint."""
+        parent, child = (self.mechanism.body_index[name] for name in (joint.parent, joint.child))
+        A, B = self.R_WB[:, parent] @ joint.parent_frame, self.R_WB[:, child] @ joint.child_frame
+        axis = A[..., 2]
+        if joint.kind == "prismatic":
+            on_child, on_parent = (joint.child, joint.child_position), (joint.parent, joint.position)
+            apart = self.point(*on_child) - self.point(*on_parent)
+            arm = self.point(*on_child) - self.point(joint.parent, (0.0, 0.0, 0.0))
+            carried = self.velocity(joint.parent, (0.0, 0.0, 0.0)) + cross(self.spin(joint.parent), arm)
+            return [(np.sum(apart * axis, -1), np.sum((self.velocity(*on_child) - carried) * axis, -1))]
+        turning = self.spin(joint.child) - self.spin(joint.parent)
+        cosine, sine = np.sum(A[..., 0] * B[..., 0], -1), np.sum(A[..., 1] * B[..., 0], -1)
+        found = [(np.arctan2(sine, cosine), np.sum(turning * axis, -1))]
+        if joint.kind == "universal":
+            cosine, sine = np.sum(axis * B[..., 2], -1), np.sum(axis * B[..., 1], -1)
+            found.append((np.arctan2(sine, cosine), np.sum(turning * B[..., 0], -1)))
+        return [(_counted(self.time, *turn, start), turn[1]) for turn, start in zip(found, joint.q0, strict=True)]
 
     def energy(self) -> FloatArray:
         """Kinetic energy, and potential energy of gravity and of all springs [J], shape (time,)."""
@@ -101,12 +102,10 @@ class Placed:
         for spring in self.mechanism.springs:
             ends = self.point(spring.body_a, spring.position_a) - self.point(spring.body_b, spring.position_b)
             total += 0.5 * spring.stiffness * (np.linalg.norm(ends, axis=-1) - spring.length) ** 2
-        coordinates = self.coordinates()
         for joint in self.mechanism.joints:
-            if joint.stiffness and joint.name in coordinates:
-                total += 0.5 * joint.stiffness * (coordinates[joint.name][0] - joint.rest) ** 2
-            if joint.armature and joint.name in coordinates:
-                total += 0.5 * joint.armature * coordinates[joint.name][1] ** 2
+            for q, rate in self.along(joint) if joint.stiffness or joint.armature else ():
+                total += 0.5 * joint.stiffness * (q - joint.rest) ** 2
+                total += 0.5 * joint.armature * rate**2
         return total
 
     def drift(self) -> FloatArray:

@@ -22,8 +22,6 @@ class Record:
         q, v: coordinates (times, nq) and velocities (times, nv) of the tree.
         wrench: force and moment on the child (joints) or on body_b (loops), at the joint, of all that the joint
             transmits: constraint, spring, damper and drive; N, N m, (times, joints + loops, 6).
-        points: of tracked points, (times, points, 3).
-        energy: kinetic and potential, J, (times).
         residual: largest violation of a constraint, m or 1, and of its rate, (times, 2).
     """
 
@@ -35,8 +33,6 @@ class Record:
     q: Array
     v: Array
     wrench: Array
-    points: Array
-    energy: Array
     residual: Array
 
 

@@ -15,7 +15,6 @@ import numpy as np
 from scipy.linalg import qr
 from scipy.spatial.transform import Rotation
 
-from proofroll.elements.mechanism.checks import WORLD
 from proofroll.elements.mechanism.joint import Joint
 from proofroll.elements.mechanism.model import Mechanism
 from proofroll.elements.mechanism.record import Record, gathered
@@ -138,7 +137,6 @@ class MaximalCoordinates:
         self.mechanism = mechanism
         self.lean = NumericEquations(MaximalEquations(mechanism, allow_planar=True, rolling=rolling))
         self._whole = NumericEquations(MaximalEquations(mechanism, allow_planar=False, rolling=rolling))
-        self._armature = np.array([joint.armature for joint in mechanism.joints for _ in range(joint.nv)])
         self._compiled: dict[bool, MaximalTaylor] = {}
 
     def taylor(self, long_double: bool = False) -> MaximalTaylor:
@@ -191,8 +189,6 @@ class MaximalCoordinates:
             "q": q,
             "v": v,
             "wrench": self._wrenches(found),
-            "points": np.array([self._point(views, p.body, p.position) for p in self.mechanism.points]).reshape(-1, 3),
-            "energy": self._energy(views, state[lean.nx + lean.nu :]) + float(0.5 * self._armature @ v**2),
             "residual": np.array([np.abs(found.residual).max(initial=0.0), np.abs(found.C @ u).max(initial=0.0)]),
         }
 
@@ -216,33 +212,6 @@ class MaximalCoordinates:
         for number, (force, moment) in enumerate(found.equations.laws):
             wrenches[number] += np.array([*force, *moment])
         return wrenches
-
-    def _point(self, views: list[BodyInScalars], body: str, position: Any) -> Array:
-        i = self.mechanism.body_index[body]
-        com = np.zeros(3) if body == WORLD else np.array(self.mechanism.bodies[i].com)
-        point: Array = np.array(views[i].r) + np.array(views[i].R) @ (np.array(position) - com)
-        return point
-
-    def _energy(self, views: list[BodyInScalars], angles: Array) -> float:
-        energy = 0.0
-        for view, body in zip(views, self.mechanism.bodies, strict=False):
-            v, spin = np.array(view.v, dtype=float), np.array(view.R).T @ np.array(view.w, dtype=float)
-            energy += float(0.5 * body.mass * (v @ v) + 0.5 * spin @ np.array(body.inertia) @ spin)
-            energy -= body.mass * float(np.dot(self.mechanism.gravity, view.r))
-        for spring in self.mechanism.springs:
-            a, b = (
-                self._point(views, name, at)
-                for name, at in ((spring.body_a, spring.position_a), (spring.body_b, spring.position_b))
-            )
-            energy += 0.5 * spring.stiffness * float(np.linalg.norm(b - a) - spring.length) ** 2
-        for (k, _), angle in zip(self.lean.equations.angles, angles, strict=True):
-            joint = self.mechanism.joints[k]
-            energy += 0.5 * joint.stiffness * float(angle - joint.rest) ** 2
-        for joint, connection in zip(self.mechanism.joints, self.lean.equations.connections, strict=False):
-            if joint.kind == "prismatic":
-                d, _, A, _ = _between(connection, views)
-                energy += 0.5 * joint.stiffness * float(A[:, 2] @ d - joint.rest) ** 2
-        return energy
 
     def _relative(self, views: list[BodyInScalars]) -> tuple[Array, Array]:
         """Coordinates (angles within half a turn) and velocities of the tree's joints, from the bodies' own."""

@@ -54,9 +54,8 @@ class MechanismTruth:
             field = _BARS.get(str(name)) or next((v for k, v in _PREFIXES.items() if str(name).startswith(k)), None)
             if field is None and str(name).rpartition(".")[0] in points:
                 field = "points"
-            bar = "p_WB" if field == "points" and not points else field
             size = float(np.nanmax(np.abs(variable.to_numpy()), initial=0.0))
-            variable.attrs["error_bar"] = float(found.bars[bar][-1]) if bar else 4 * np.finfo(float).eps * size
+            variable.attrs["error_bar"] = float(found.bars[field][-1]) if field else 4 * np.finfo(float).eps * size
         dataset.attrs["route"], *others = found.routes
         dataset.attrs["second_route"] = ", ".join(others)
         if found.checked_by is not None:

@@ -16,6 +16,7 @@ from proofroll.core.errors import Diverged, Missing, Refused
 from proofroll.elements.mechanism.analysis import analysed
 from proofroll.elements.mechanism.joint_coordinates import JointCoordinates
 from proofroll.elements.mechanism.model import Mechanism
+from proofroll.elements.mechanism.placed import Placed
 from proofroll.elements.mechanism.record import Record, gathered
 from proofroll.elements.mechanism.rotations import Array
 from proofroll.elements.mechanism.singular_poses import singular_poses
@@ -26,7 +27,7 @@ FACTOR = 3.0  # of safety: the routes' difference estimates the error, it does n
 CHAOS = 1e-9  # m, 1 (of quaternions): where two precisions differ by more, no number of digits is worth comparing
 BRANCH = 1e-3  # m, 1: chaos brings DOP853 this far only after it has parted the two precisions
 ROUND_OFF = 16 * float(np.finfo(float).eps)  # of a number that passed through some ten operations
-JUDGED = ("p_WB", "v_WB", "q_WB", "w_WB", "q", "v", "wrench", "points", "energy")
+JUDGED = ("p_WB", "v_WB", "q_WB", "w_WB", "q", "v", "wrench")
 
 
 @dataclass(frozen=True)
@@ -35,8 +36,8 @@ class TwoRouteMotion:
 
     Attributes:
         record: the motion; from the first time at which the question is ill-posed on, its bars say so.
-        bars: error bar of each field of the record at each time, the largest over bodies and components so far, in
-            the field's unit, (times).
+        bars: error bar of each field of the record, of ``points`` and of ``energy`` at each time, the largest over
+            bodies and components so far, in the field's unit, (times).
         differences: largest difference between the two routes, by field, up to the horizon.
         horizon: s; inf where it lies beyond the last time.
         determinate: which components of the wrenches are, (joints + loops, 6).
@@ -93,9 +94,9 @@ def find_truth(mechanism: Mechanism, times: Array, tolerance: float = 1e-15) -> 
     bars, differences = {}, {}
     late = np.flatnonzero(_apart(precise, two) > CHAOS)
     horizon = float(times[late[0]]) if len(late) else np.inf
-    for field in JUDGED:
-        values = getattr(masked, field)
-        others = [np.where(np.isnan(values), np.nan, getattr(record, field)) for record in (one, two, precise)]
+    rest = [_judged(mechanism, record) for record in (one, two, precise)]
+    for field, values in _judged(mechanism, masked).items():
+        others = [np.where(np.isnan(values), np.nan, other[field]) for other in rest]
         difference = np.maximum(_largest(others[0] - values), _largest(others[0] - others[2]))
         size = np.maximum.accumulate(_largest(values))
         bar = FACTOR * difference + _largest(others[1] - others[2]) + ROUND_OFF * size
@@ -105,6 +106,13 @@ def find_truth(mechanism: Mechanism, times: Array, tolerance: float = 1e-15) -> 
     if form is not None and form.motion is None:
         checked = (form.title, float(_largest(form.part(times) - form.same(best)).max()))
     return TwoRouteMotion(masked, bars, differences, horizon, found.determinate, routes, checked)
+
+
+def _judged(mechanism: Mechanism, record: Record) -> dict[str, Array]:
+    """What gets an error bar: fields of the record, and tracked points and energy, which follow from the poses."""
+    placed = Placed(mechanism, record.time, record.p_WB, record.v_WB, record.w_WB, record.q_WB)
+    found = {name: getattr(record, name) for name in JUDGED}
+    return found | {"points": placed.points, "energy": placed.energy()}
 
 
 def _singular(mechanism: Mechanism, until: float) -> str:

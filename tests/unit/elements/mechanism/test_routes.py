@@ -12,6 +12,7 @@ from proofroll.elements.mechanism import Body, Joint, Loop, Mechanism, Tree
 from proofroll.elements.mechanism.analysis import analysed
 from proofroll.elements.mechanism.assembly import check_start
 from proofroll.elements.mechanism.joint_coordinates import JointCoordinates
+from proofroll.elements.mechanism.placed import Placed
 from proofroll.elements.mechanism.rotations import to_rpy
 from proofroll.truth.mechanism.maximal_coordinates import MaximalCoordinates
 
@@ -32,8 +33,14 @@ def test_tracked_point_is_where_independent_programs_agree(scene, name):
     """Taylor series in maximal coordinates reach the agreed digits."""
     pytest.importorskip("heyoka")
     end, parameters, place, tolerance = AGREED[name]
-    record = MaximalCoordinates(scene(name, **parameters)).run_taylor(np.array([end]))
-    assert record.points[0, 0] == pytest.approx(place, abs=tolerance)
+    mechanism = scene(name, **parameters)
+    record = MaximalCoordinates(mechanism).run_taylor(np.array([end]))
+    assert placed(mechanism, record).points[0, 0] == pytest.approx(place, abs=tolerance)
+
+
+def placed(mechanism, record):
+    """Where everything is, by the poses that a route recorded."""
+    return Placed(mechanism, record.time, record.p_WB, record.v_WB, record.w_WB, record.q_WB)
 
 
 def apart(one, two, mask):
@@ -72,7 +79,8 @@ def test_both_routes_agree(scene, name):
     assert place < 1e-11
     assert attitude < 1e-11
     assert wrench < of_forces
-    assert np.abs(one.energy - two.energy).max() < 1e-11 * max(1.0, np.abs(one.energy).max())
+    energy = placed(mechanism, one).energy()
+    assert np.abs(energy - placed(mechanism, two).energy()).max() < 1e-11 * max(1.0, np.abs(energy).max())
 
 
 def test_maximal_coordinates_without_taylor_series(scene):
@@ -141,8 +149,19 @@ def test_springs_and_dampers_along_joints_act_alike():
     times = np.array([0.0, 0.2])
     one, two = JointCoordinates(mechanism).run(times), MaximalCoordinates(mechanism).run_dop853(times)
     assert max(apart(one, two, analysed(mechanism).determinate)) < 1e-10
-    assert one.energy == pytest.approx(two.energy, abs=1e-11)
-    assert one.energy[1] < one.energy[0]
+    energy = placed(mechanism, one).energy()
+    assert energy == pytest.approx(placed(mechanism, two).energy(), abs=1e-11)
+    assert energy[1] < energy[0]
+
+
+def test_energy_counts_the_springs_of_universal_joints():
+    """What moves without a damper keeps its energy, that of both springs of a universal joint included."""
+    body = Body("a", 1.0, (0.1, 0.2, -0.3), (0.1, 0.2, 0.25))
+    spring = {"stiffness": 3.0, "rest": 0.1}
+    joint = Joint("u", "universal", "world", "a", axis=(1, 0, 1), q0=(0.3, 0.2), v0=(1, -2), **spring)
+    mechanism = Mechanism(bodies=(body,), joints=(joint,))
+    energy = placed(mechanism, JointCoordinates(mechanism).run(np.linspace(0, 1, 11))).energy()
+    assert np.ptp(energy) < 1e-12
 
 
 def test_long_doubles_keep_more_digits(scene):
