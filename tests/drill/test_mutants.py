@@ -16,9 +16,11 @@ from proofroll.cli import app
 from proofroll.conformance import run_check
 from proofroll.core.diagnosis import CLOSES, Cause, Evidence, diagnose, hypotheses_of
 from proofroll.core.diagnosis.fitting import telling
+from proofroll.core.diagnosis.vectors import Reported
 from proofroll.core.plugins import load_element_kinds
 from proofroll.core.truth import truth
 from proofroll.files.scene_file import load_scene
+from proofroll.running.simulation import simulate
 from proofroll_drill.mutants import ball_models
 from proofroll_drill.mutants.drilling import ENOUGH
 
@@ -122,3 +124,19 @@ def test_a_cause_that_leaves_too_much_is_not_told() -> None:
     base = {"id": "x", "says": "it does x", "quantity": "N", "unit": "N", "before": 1.0, "remedy": "do y"}
     assert not Cause(**base, after=1.1 * CLOSES).proven
     assert Cause(**base, after=0.049).sentence == "it does x (N off by 1 N, by 0.05 N with that)"
+
+
+def test_a_jump_a_moment_later_is_no_other_clock() -> None:
+    """A force that is constant but for one jump fits any shift of time, which proves none."""
+    time = np.linspace(0.0, 1.0, 51)
+    true, said = (np.stack([np.where(time < jump, 1.0, 0.2)] * 3, axis=-1) for jump in (0.5, 0.54))
+    assert not [cause for cause in Reported("force", "the force", "N", said, true, time).causes(1e-3) if cause.proven]
+
+
+def test_a_ball_that_jumps_is_not_told_of_gravity() -> None:
+    """A soft contact that throws the ball off the wall again and again has neither gravity nor a pyramid to blame."""
+    scene = load_scene("slide_to_roll", speed=2.0, back_spin=400.0)
+    run = simulate(scene, "mujoco", until=0.5, every=0.01, formulation="free", preset="default")
+    true = truth(scene, run["time"].to_numpy())
+    assert np.any(run["N"] == 0)
+    assert diagnose(Evidence(scene.elements[0], [], run, true, 2e-3), hypotheses_of(scene.elements[0])) == []

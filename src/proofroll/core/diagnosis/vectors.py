@@ -27,6 +27,9 @@ _PERMUTATIONS = [
 ]
 # A unit is exact: a factor that nobody makes by mistake has to leave less, or few samples of anything would be alike.
 _EXACT = 1e-3
+# A step in an otherwise constant curve fits any shift: that a time is another shows where the curve changes, at this
+# many samples at least, each by this part of the largest difference.
+_SEEN, _FEW = 6, 1e-2
 _SIGN = "an engine may give what acts on the other body: look at whose vector it is"
 
 
@@ -158,7 +161,8 @@ class Reported:
         yield self.cause("clamped", says, shorter, f"find what limits {self.name} to {longest:.6g} {self.unit}", 1)
 
     def _late(self, step: float | None) -> Iterator[Cause]:
-        shift = late(self.time, self.said, self.true)
+        differs = np.max(np.abs(self.said - self.true).reshape(len(self.time), -1), axis=-1) > _FEW * self.before
+        shift = late(self.time, self.said, self.true) if np.count_nonzero(differs) >= _SEEN else None
         if shift is None:
             return
         delay, before, after = shift

@@ -113,6 +113,8 @@ class PyramidalCone:
         if max(np.ptp(np.unwrap(np.arctan2(of[:, 1], of[:, 0]))) for of in (slip, said)) < _TURNS:
             return
         before = apart(said, -most * slip / sizes)
+        if not before > _PYRAMID * float(np.max(np.abs(most))):
+            return
         after = np.inf
         for angle in np.arange(_ANGLES) * np.pi / 2 / _ANGLES:
             turn = np.array([[np.cos(angle), -np.sin(angle)], [np.sin(angle), np.cos(angle)]])
