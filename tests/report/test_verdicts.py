@@ -15,6 +15,7 @@ from proofroll.core.convergence import Limit, richardson
 from proofroll.core.verdict import judge
 from proofroll.report.comparison_content import outcome_content
 from proofroll.report.comparison_records import ReportedComparison
+from proofroll.report.findings import findings
 from proofroll.report.html import page
 from proofroll.report.labels import SYMBOLS, detail, verdict_text
 from proofroll.report.plots import point_curves
@@ -124,6 +125,22 @@ def test_a_wrong_limit_within_tolerance_is_marked(outcome: Outcome) -> None:
     assert "shown not to be the truth: off by 0.0004 ± 1e-07 m, order 2" in remark
     assert f"* beta only: {remark}" in [line.replace(" (dt 1e-3)", "") for line in closing_lines(content)]
     assert content.runs_of(2)[0].judgements[0].remarks
+
+
+def test_what_could_not_be_judged_is_not_said_to_be_as_expected(made: tuple[Outcome, Store]) -> None:
+    """Where a row expects to agree and there is no truth, nothing is contradicted, and nothing is confirmed either."""
+    rows = made[0].comparison.rows
+    runs = {rows.index(run.row): [answered(run)] for run in made[0].runs}
+    content = outcome_content(with_runs(made[0], runs))
+    assert closing_lines(content)[-1].startswith("Every verdict is as")
+    assert "All of this was expected." in findings(content, [], None).answer
+    assert counted(content).endswith("; as expected")
+    nothing = Result(Status.NO_TRUTH, "there is no truth here")
+    runs[0] = [dataclasses.replace(run, result=nothing, judgements=[]) for run in runs[0]]
+    content = outcome_content(with_runs(made[0], runs))
+    assert "Nothing contradicts the comparison file; 1 of its runs could not be judged." in closing_lines(content)
+    assert "Nothing of it was unexpected." in findings(content, [], None).answer
+    assert counted(content).endswith("; nothing is contradicted")
 
 
 def test_who_is_silent_or_shares_equations_is_marked(outcome: Outcome) -> None:

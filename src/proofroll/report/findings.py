@@ -6,7 +6,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
 
-from proofroll.report.labels import names, number, symbol, unit, with_caveat
+from proofroll.report.labels import names, number, symbol, unit, unjudged, with_caveat
 from proofroll.report.scores import EVERYDAY, RowAdvice, Score, cheapest, recommendation, scores
 
 if TYPE_CHECKING:
@@ -50,8 +50,8 @@ def _answer(content: ReportedComparison, found: list[Score]) -> str:
         "converges": ("needs", "need", "a finer step"),
         "ill-posed": ("is", "are", "beyond judgement somewhere, where the question is ill-posed"),
         "another-scene": ("is", "are", "of another kind than the scene, so not judged"),
-        "not-judged": ("is", "are", "not judged, for there is no truth, or none as exact as the tolerance"),
-        "differs": ("differs", "differ", "somewhere, with no limit of small steps at the truth"),
+        "not-judged": ("is", "are", "not judged, for there is no truth, or none exact enough for the tolerance"),
+        "differs": ("differs", "differ", "somewhere, with no limit of small steps shown to be the truth"),
         "failed": ("gives", "give", "no result somewhere"),
     }
     parts = []
@@ -60,7 +60,9 @@ def _answer(content: ReportedComparison, found: list[Score]) -> str:
         if count:
             parts.append(f"{count} {one if count == 1 else many} {rest}")
     unexpected = len(content.contradictions)
-    expected = "All of this was expected." if content.as_expected else f"Not expected: {unexpected} findings."
+    expected = f"Not expected: {unexpected} findings."
+    if content.as_expected:
+        expected = "Nothing of it was unexpected." if unjudged(content) else "All of this was expected."
     text = f"Of {len(rows)} engine settings, {_joined(parts)}. {expected}"
     best = cheapest(found, "worst", EVERYDAY)
     if best:

@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
     from proofroll.core.verdict import Judgement
-    from proofroll.report.comparison_records import ReportedRow, ReportedRun, Setting
+    from proofroll.report.comparison_records import ReportedComparison, ReportedRow, ReportedRun, Setting
 
 SYMBOLS = {
     "agrees": "✓",
@@ -33,6 +33,13 @@ MEANINGS = {
     "differs": "not within tolerance: another limit, no limit shown, or one step only; each says which",
     "failed": "there is no result; the row says why",
 }
+
+
+def unjudged(content: ReportedComparison) -> int:
+    """How many runs could not be judged, though their rows expect a verdict."""
+    from proofroll.studies.expectations import NOBODY
+
+    return sum(run.verdict in NOBODY and run.verdict not in content.rows[run.row].expected for run in content.runs)
 
 
 def verdict_text(row: ReportedRow) -> str:

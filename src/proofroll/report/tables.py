@@ -17,6 +17,7 @@ from proofroll.report.labels import (
     step,
     symbol,
     unit,
+    unjudged,
     verdict_text,
 )
 
@@ -112,7 +113,8 @@ def counted(content: ReportedComparison) -> str:
     """How many settings have which verdict, in one line."""
     verdicts = [row.verdict.value for row in content.rows]
     said = ", ".join(f"{sign} {verdicts.count(word)} {word}" for word, sign in SYMBOLS.items() if word in verdicts)
-    return f"{len(verdicts)} settings: {said}; " + ("as expected" if content.as_expected else "not as expected")
+    found = "nothing is contradicted" if unjudged(content) else "as expected"
+    return f"{len(verdicts)} settings: {said}; {found if content.as_expected else 'not as expected'}"
 
 
 def at_point(content: ReportedComparison, comparison: int, point: int, name: str) -> Matrix:

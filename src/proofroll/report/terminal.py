@@ -10,7 +10,7 @@ from rich.table import Table
 from rich.text import Text
 
 from proofroll.core.verdict import Verdict
-from proofroll.report.labels import SYMBOLS, caveat_lines, names, number, verdict_text
+from proofroll.report.labels import SYMBOLS, caveat_lines, names, number, unjudged, verdict_text
 from proofroll.report.screen import Screen
 from proofroll.report.study_parts import part_kinds
 from proofroll.studies.hosts import said_of
@@ -116,7 +116,12 @@ def closing_lines(content: ReportedComparison) -> list[str]:
         lines.append(f"{said} what {content.name} expects (!! above){'; first' if count > 5 else ''}:")
         lines += [f"  {sentence}" for sentence in content.contradictions[:5]]
     elif any(len(row.expected) < len(Verdict) for row in rows):  # else nothing is claimed
-        lines.append("Every verdict is as the comparison file expects.")
+        left = unjudged(content)
+        lines.append(
+            f"Nothing contradicts the comparison file; {left} of its runs could not be judged."
+            if left
+            else "Every verdict is as the comparison file expects."
+        )
     return [*lines, *caveat_lines(content.rows), *said_of(content.hosts)]
 
 
