@@ -110,7 +110,7 @@ def test_rolling(motion: dict[str, float], size: float, mass: float) -> None:
             assert np.max(np.abs(level - level[0])) < 1e-10 * np.max(np.abs(level - mass * G * dataset["z"].to_numpy()))
 
 
-@settings(max_examples=4)
+@settings(max_examples=3)
 @given(motion=CYLINDERS, size=SIZES)
 def test_rolling_in_euler_angles(motion: dict[str, float], size: float) -> None:
     """The same in Euler angles, which follow every turn of the ball: for a ball that does not turn too often."""
@@ -143,7 +143,7 @@ def test_bounded_friction(motion: dict[str, float], size: float, mu: float) -> N
 
 
 @pytest.mark.parametrize("mu", [math.inf, 0.3])
-@settings(max_examples=4)
+@settings(max_examples=2)
 @given(motion=CYLINDERS, power=st.integers(-20, 20), heavier=st.integers(-20, 20))
 def test_scale(mu: float, motion: dict[str, float], power: int, heavier: int) -> None:
     """A ball 4^n times as large and 2^k times as heavy does the same in 2^n times the time, to round-off.
@@ -168,7 +168,7 @@ def test_scale(mu: float, motion: dict[str, float], power: int, heavier: int) ->
             assert difference < 1e-11 * size_of(first, name), (engine, name)
 
 
-@settings(max_examples=10)
+@settings(max_examples=5)
 @given(
     tilt=st.sampled_from([0.0, 0.35, -0.35]),
     speed=decades(1e-3, 1e2),
