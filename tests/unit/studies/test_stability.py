@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import dataclasses
+import itertools
 import json
 import shutil
 import subprocess
@@ -32,7 +33,7 @@ from proofroll.studies.step_numbers import OSCILLATION, explanation, values
 
 SPEED = Axis("V0", "m/s", "initial speed", [2.0, 8.0], {"speed": AxisTerm()})
 ENGINE = "projection[formulation=rotating_frame,preset=default]"
-SHORT = Effort(periods=1.0, steps=2000)
+SHORT = Effort(periods=1.0, steps=700)
 
 
 def mapped(folder: Path, engines: list[str], axes: list[Axis], **more: Any) -> Any:
@@ -41,9 +42,23 @@ def mapped(folder: Path, engines: list[str], axes: list[Axis], **more: Any) -> A
 
 
 @pytest.fixture(scope="module")
-def small(tmp_path_factory: pytest.TempPathFactory) -> Any:
+def resumed(tmp_path_factory: pytest.TempPathFactory) -> tuple[Runner, int, Path]:
+    """A folder with a map that was interrupted, how many results it had, and who makes the rest."""
+    folder, calls = tmp_path_factory.mktemp("map"), itertools.count(1)
+
+    def interrupt(_text: str, _count: int) -> None:
+        if next(calls) == 8:
+            raise KeyboardInterrupt
+
+    with pytest.raises(KeyboardInterrupt):
+        mapped(folder, [ENGINE], [SPEED], progress=interrupt)
+    return Runner(Store(folder), jobs=1), len(list(folder.glob("*.json"))), folder
+
+
+@pytest.fixture(scope="module")
+def small(resumed: tuple[Runner, int, Path]) -> Any:
     """The map of one formulation along one axis."""
-    return mapped(tmp_path_factory.mktemp("map"), [ENGINE], [SPEED])
+    return stability("sphere_in_cylinder", [SPEED], resumed[0], engines=[ENGINE], effort=SHORT)
 
 
 def test_a_map(small: Any) -> None:
@@ -108,26 +123,14 @@ def test_what_refuses_the_scene_everywhere_has_no_boundary() -> None:
     assert _refused(points) == {"cannot": "needs universal joints"}
 
 
-def test_a_map_resumes(tmp_path: Path) -> None:
-    """A map that was interrupted takes up what it had, and finds the same."""
-    calls = 0
-
-    def interrupt(_text: str, _count: int) -> None:
-        nonlocal calls
-        calls += 1
-        if calls == 8:
-            raise KeyboardInterrupt
-
-    with pytest.raises(KeyboardInterrupt):
-        mapped(tmp_path, [ENGINE], [SPEED], progress=interrupt)
-    before = len(list(tmp_path.glob("*.json")))
-    runner = Runner(Store(tmp_path), jobs=1)
-    found = stability("sphere_in_cylinder", [SPEED], runner, engines=[ENGINE], effort=SHORT)
+def test_a_map_resumes(small: Any, resumed: tuple[Any, int, Path]) -> None:
+    """A map that was interrupted takes up what it had, and one that was finished runs nothing."""
+    runner, before, folder = resumed
     assert before >= 4
     assert runner.reused == before
-    again = Runner(Store(tmp_path), jobs=1)
-    assert content(stability("sphere_in_cylinder", [SPEED], again, engines=[ENGINE], effort=SHORT)) == content(found)
-    assert again.reused == found.runs + 2  # and the truth of both places
+    again = Runner(Store(folder), jobs=1)
+    assert content(stability("sphere_in_cylinder", [SPEED], again, engines=[ENGINE], effort=SHORT)) == content(small)
+    assert again.reused == small.runs + 2  # and the truth of both places
 
 
 def test_reports_of_a_map(small: Any) -> None:
