@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import gc
 import os
 import signal
 import sys
@@ -47,6 +48,16 @@ tradeoff.FINER = ()
 # Tests of Ctrl-C mean nothing where SIGINT was ignored when pytest began (nohup, a shell's "&"); children inherit that.
 if signal.getsignal(signal.SIGINT) is signal.SIG_IGN:
     signal.signal(signal.SIGINT, signal.default_int_handler)
+
+
+# Modules and tests leave nothing to collect: to look for it would take a quarter of the collection of tests.
+gc.disable()
+
+
+def pytest_collection_finish() -> None:
+    """From here on what tests leave is collected, and what was imported is not looked at again."""
+    gc.freeze()
+    gc.enable()
 
 
 class _TogetherWhatShares(LoadScopeScheduling):

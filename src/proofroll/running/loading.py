@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import gc
 from typing import Any
 
 from proofroll.core.errors import InputError, Missing, ProofrollError
@@ -49,6 +50,7 @@ def loaded(case: Case) -> tuple[Any, Any]:
         ProofrollError: the engine here is of another version than the one that was asked when the case was made.
     """
     kind = load(case.engine.name)
+    gc.enable()  # the process of a worker imports without
     version = kind.version()
     if version != case.engine.version:
         said = f"{case.engine.name} is version {version} here, and was {case.engine.version} when it was asked"
