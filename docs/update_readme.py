@@ -29,7 +29,7 @@ from proofroll.studies.compare import compare
 from proofroll.studies.outcome import Outcome
 from proofroll.studies.planning import point_name
 from proofroll.studies.tradeoff import tradeoff
-from proofroll.studies.tradeoff_content import content
+from proofroll.studies.tradeoff_content import tradeoff_document
 
 ROOT = Path(__file__).resolve().parents[1]
 TOLERANCES = (1e-2, 1e-3, 1e-4, 1e-6)
@@ -81,7 +81,7 @@ def measured(runner: Runner) -> dict[str, Any]:
     """The trade-off that the comparison file asks for."""
     claims = claims_for("sphere_in_cylinder")
     assert claims is not None  # the file is part of this repository
-    study = content(tradeoff(claims.swept, runner, over=claims.over))
+    study = tradeoff_document(tradeoff(claims.swept, runner, over=claims.over))
     for sentence in (*claims.contradictions(study), *claims.undecided(study)):
         sys.stderr.write(f"{sentence}\n")
     return study

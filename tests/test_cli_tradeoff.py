@@ -15,7 +15,7 @@ from proofroll.core.errors import ProofrollError
 from proofroll.report import labels
 from proofroll.report.tradeoff_tables import corner_table
 from proofroll.report.work_precision import svg
-from proofroll.studies import study_identity as installed
+from proofroll.studies import study_identity
 from proofroll.studies.curve import Question
 from proofroll.studies.study_store import keep
 from proofroll.studies.tradeoff import stored
@@ -30,14 +30,14 @@ def measured(tmp_path_factory: pytest.TempPathFactory) -> dict[str, Any]:
     from proofroll.running.runner import Runner
     from proofroll.running.store import Store
     from proofroll.studies.tradeoff import tradeoff
-    from proofroll.studies.tradeoff_content import content
+    from proofroll.studies.tradeoff_content import tradeoff_document
 
     question = Question("sphere_in_cylinder", {"rolling_resistance": 5e-4}, 0.5, "z")
     engines = [ENGINE, "mujoco[formulation=free,preset=default]"]
     found = tradeoff(
         question, Runner(Store(tmp_path_factory.mktemp("cases"))), engines=engines, over={"speed": [3, 5]}, rounds=2
     )
-    return content(found)
+    return tradeoff_document(found)
 
 
 @pytest.fixture
@@ -45,7 +45,7 @@ def folder(measured: dict[str, Any], tmp_path: Path) -> Path:
     """A folder with that study in it, as if it had just been made with this code on a machine without noise."""
     path = stored(tmp_path, Question("sphere_in_cylinder", {"rolling_resistance": 5e-4}, 0.5, "z"))
     path.parent.mkdir()
-    now = measured["measured"] | {"versions": installed.versions(), "code": installed.code()}
+    now = measured["measured"] | {"versions": study_identity.versions(), "code": study_identity.code()}
     points = []
     for point in measured["points"]:
         if point["seconds_per_second"] is not None:
@@ -198,7 +198,10 @@ def test_curves_of_another_version_are_not_answered_from(
 ) -> None:
     """Curves measured with another version of an engine, or on another machine, are named stale, and why."""
     (path,) = (folder / "tradeoff").iterdir()
-    old = measured["measured"] | {"versions": installed.versions() | {"mujoco": "1.0"}, "code": installed.code()}
+    old = measured["measured"] | {
+        "versions": study_identity.versions() | {"mujoco": "1.0"},
+        "code": study_identity.code(),
+    }
     keep(measured | {"measured": old}, path)
     code, _, err = proofroll(*asked(folder))
     assert code == 2

@@ -14,7 +14,7 @@ from proofroll.report.stability_part import StabilityPart
 from proofroll.report.tradeoff_part import TradeoffPart
 from proofroll.running.runner import Runner
 from proofroll.running.store import Store
-from proofroll.studies import study_identity as installed
+from proofroll.studies import study_identity
 from proofroll.studies.claims import claims_for
 from proofroll.studies.stability_claims import file_for
 
@@ -54,7 +54,7 @@ def tradeoff_study() -> dict[str, Any]:
         "quantity": "z", "quantities": quantities, "points": points, "dropped": [],
         "absent": {"lost": "lost is not installed here"}, "budgets": [budget],
         "pareto": {"z": [0, 2]}, "pareto_engines": {"z": [0, 1]}, "truth": {"seconds_per_second": 1.0, "route": ""},
-        "over": {}, "findings": ["3 runs: none refused."], "brief": True, "measured": installed.measured(),
+        "over": {}, "findings": ["3 runs: none refused."], "brief": True, "measured": study_identity.measured(),
     }  # fmt: skip
 
 
@@ -89,7 +89,7 @@ def stability_study() -> dict[str, Any]:
         "points": [base, other], "explanations": [explained], "findings": ["good depends on mass, as it should not"],
         "step_symbols": {}, "places": [], "absent": {},
         "effort": {"values": 3, "steps": 75_000, "matched": True, "longest": None},
-        "measured": installed.measured(),
+        "measured": study_identity.measured(),
     }  # fmt: skip
 
 

@@ -31,7 +31,7 @@ def replacing(path: Path) -> Iterator[Path]:
             temporary.unlink(missing_ok=True)
 
 
-def content(path: Path) -> bytes:
+def ordinary_content(path: Path) -> bytes:
     """What is in an ordinary file. A pipe, which would be waited for, or a device, which may have no end, is none.
 
     Raises:

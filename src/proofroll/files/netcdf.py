@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 import numpy.typing as npt
 
-from proofroll.files.atomic import content, replacing
+from proofroll.files.atomic import ordinary_content, replacing
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -71,7 +71,9 @@ def read(path: Path) -> xr.Dataset:
 
     # Times stay numbers of seconds, and no number stands for an absent one.
     try:
-        found = xr.load_dataset(io.BytesIO(content(path)), engine="scipy", decode_times=False, mask_and_scale=False)
+        found = xr.load_dataset(
+            io.BytesIO(ordinary_content(path)), engine="scipy", decode_times=False, mask_and_scale=False
+        )
     except TypeError:
         raise ValueError(f"{path} is no netCDF-3") from None
     return found.assign({name: item.astype(str) for name, item in found.variables.items() if item.dtype == object})
@@ -81,7 +83,7 @@ def read_some(path: Path, names: Sequence[str]) -> dict[str, npt.NDArray[Any]]:
     """Some variables of a trajectory, those that there are: a tenth of the time that :func:`read` takes."""
     from scipy.io import netcdf_file
 
-    with netcdf_file(io.BytesIO(content(path)), mmap=False) as file:
+    with netcdf_file(io.BytesIO(ordinary_content(path)), mmap=False) as file:
         found = {name: file.variables[name][...] for name in names if name in file.variables}
     return {
         name: values.astype(values.dtype.newbyteorder("="))

@@ -67,7 +67,7 @@ def table(study: Mapping[str, Any], prefix: str) -> HeatMap:
     """The map and the list of its points.
 
     Args:
-        study: as :func:`proofroll.studies.stability_content.content` has it.
+        study: as :func:`proofroll.studies.stability_content.stability_document` has it.
         prefix: of the points' ids.
     """
     valued = {

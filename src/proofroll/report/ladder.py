@@ -16,7 +16,7 @@ from proofroll.running.timing import Interval, machine, ratio
 from proofroll.studies.ladder import Ladder, absence, key_of
 from proofroll.studies.ladder_models import LadderModel, Rung, Switch
 from proofroll.studies.pareto import front
-from proofroll.studies.term_worth import Side, Worth, worth
+from proofroll.studies.term_worth import Side, Worth, worth_of_term
 
 
 @dataclass(frozen=True)
@@ -190,7 +190,7 @@ def _term(study: Ladder, switch: Switch) -> TermFound:
     if on.ran.error is not None and off.ran.error is not None:
         error_change = off.ran.error - on.ran.error
     endings = [f"{answer.result.status.value}, {answer.result.message}" for answer in (with_it, without)]
-    verdict, reason = worth(
+    verdict, reason = worth_of_term(
         Side(on.ran.error, endings[0]),
         Side(off.ran.error, endings[1]),
         change,

@@ -119,7 +119,7 @@ def wishes(study: Mapping[str, Any], claims: TradeoffClaims | None) -> list[Wish
     """What a report asks of a trade-off.
 
     Args:
-        study: as :func:`proofroll.studies.tradeoff_content.content` has it.
+        study: as :func:`proofroll.studies.tradeoff_content.tradeoff_document` has it.
         claims: their tolerances are those of the study's own quantity.
     """
     own = list({claim.tolerance.value: claim.tolerance for claim in claims.cheapest}.values()) if claims else []

@@ -15,7 +15,7 @@ from proofroll.core.plugins import plain_name
 from proofroll.running.case import Case, Result, Status
 from proofroll.running.manifest import manifest
 from proofroll.running.manifest import versions as made_with
-from proofroll.running.time_accounts import Spent
+from proofroll.running.time_accounts import TimeAccounts
 from proofroll.running.time_case import clean_runs
 
 
@@ -23,7 +23,7 @@ def run(case: dict[str, Any], out: str) -> dict[str, Any]:
     """Runs a case and writes its trajectory to ``out``; everything the case says comes back as a result."""
     from proofroll.files.netcdf import import_xarray
 
-    spent = Spent()
+    spent = TimeAccounts()
     import_xarray()
     try:
         answer = dataclasses.asdict(_run(Case.from_dict(case), Path(out), spent)) | {"interpreter": sys.executable}
@@ -34,7 +34,7 @@ def run(case: dict[str, Any], out: str) -> dict[str, Any]:
     return answer | {"spent": spent.seconds, "processor": spent.processor}
 
 
-def _run(case: Case, out: Path, spent: Spent) -> Result:
+def _run(case: Case, out: Path, spent: TimeAccounts) -> Result:
     from proofroll.core.certificate import first_difference
     from proofroll.core.engine import fixed_step
     from proofroll.core.first_steps import certificate

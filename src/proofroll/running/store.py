@@ -15,7 +15,7 @@ from collections.abc import Iterator
 from pathlib import Path
 
 from proofroll.core.errors import ProofrollError
-from proofroll.files.atomic import content, replacing
+from proofroll.files.atomic import ordinary_content, replacing
 from proofroll.running.case import LASTING, Case, Result
 
 
@@ -92,7 +92,7 @@ class Store:
         if result.trajectory is not None:
             path = written or self.trajectory(case)
             try:
-                checksum = hashlib.sha256(content(path)).hexdigest()
+                checksum = hashlib.sha256(ordinary_content(path)).hexdigest()
             except OSError as error:
                 raise ProofrollError(f"{path} cannot be read ({error.strerror or error})") from None
             result = dataclasses.replace(result, checksum=checksum)
@@ -122,13 +122,13 @@ class Store:
         """The stored result, or None if there is none or it is not what was stored."""
         try:
             with self._locked(fcntl.LOCK_SH):
-                record = json.loads(content(self.folder / f"{case.key}.json"))
+                record = json.loads(ordinary_content(self.folder / f"{case.key}.json"))
                 if record.pop("seal") != _seal(record) or Case.from_dict(record["case"]).key != case.key:
                     return None
                 result = Result.from_dict(record["result"])
                 if result.trajectory is None:
                     return result
-                checksum = hashlib.sha256(content(self.trajectory(case))).hexdigest()
+                checksum = hashlib.sha256(ordinary_content(self.trajectory(case))).hexdigest()
                 return result if checksum == result.checksum else None
         except (OSError, ValueError, KeyError, TypeError, AttributeError, RecursionError, MemoryError):
             return None  # absent, truncated, tampered with or no file of ours: the case is run again

@@ -5,7 +5,7 @@ from __future__ import annotations
 import time
 
 
-class Spent:
+class TimeAccounts:
     """Where the time of a case goes.
 
     Attributes:
@@ -18,7 +18,7 @@ class Spent:
     def __init__(self) -> None:
         self.seconds: dict[str, float] = {}
         now = time.process_time()
-        self.processor: dict[str, float] = {"process start": now - Spent._counted}
+        self.processor: dict[str, float] = {"process start": now - TimeAccounts._counted}
         self._since = time.perf_counter(), now
 
     def on(self, cause: str, **parts: tuple[float, float]) -> None:
@@ -32,4 +32,4 @@ class Spent:
             found[cause] = now[index] - self._since[index] - sum(found.values())
             for key, value in found.items():
                 account[key] = account.get(key, 0.0) + value
-        self._since, Spent._counted = now, now[1]
+        self._since, TimeAccounts._counted = now, now[1]

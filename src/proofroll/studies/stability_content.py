@@ -22,7 +22,7 @@ _PASSES: Mapping[str, Callable[[RunOutcome], bool]] = {
 }
 
 
-def content(found: StabilityMap) -> dict[str, Any]:
+def stability_document(found: StabilityMap) -> dict[str, Any]:
     """Everything, with counts on top."""
     points = [_point(point) for point in found.points]
     scene = load_scene(found.scene)

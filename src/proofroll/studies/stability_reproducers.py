@@ -46,7 +46,7 @@ def write_reproducers(
 
     Args:
         found: the map.
-        entries: its points as :func:`proofroll.studies.stability_content.content` has them.
+        entries: its points as :func:`proofroll.studies.stability_content.stability_document` has them.
         folder: where the programs go.
         workers: idle ones that may be asked.
     """

@@ -9,10 +9,10 @@ from collections.abc import Callable, Mapping, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from proofroll.files.atomic import content
+from proofroll.files.atomic import ordinary_content
 from proofroll.files.json_data import plain
 from proofroll.running.store import write_text
-from proofroll.studies import study_identity as installed
+from proofroll.studies import study_identity
 
 if TYPE_CHECKING:
     from proofroll.running.runner import Runner
@@ -30,10 +30,10 @@ def kept(path: Path) -> tuple[dict[str, Any] | None, list[str]]:
         the study, or None and why there is none: what has changed since, or nothing if there is no such file.
     """
     try:
-        study: dict[str, Any] = json.loads(content(path))
+        study: dict[str, Any] = json.loads(ordinary_content(path))
         if study["seal"] != _seal(study):
             return None, ["what is stored is not what had been put there"]
-        reasons = installed.changes(study["measured"])
+        reasons = study_identity.changes(study["measured"])
     except (
         OSError,
         ValueError,
@@ -94,10 +94,10 @@ def make_tradeoff(
     """
     from proofroll.running.timing import write_benchmarks
     from proofroll.studies.tradeoff import stored, tradeoff
-    from proofroll.studies.tradeoff_content import content
+    from proofroll.studies.tradeoff_content import tradeoff_document
 
     found = tradeoff(question, runner, engines=engines, over=over, brief=brief, progress=progress)
-    measured = content(found)
+    measured = tradeoff_document(found)
     judged = claims if not engines else None
     study = {
         **measured,
@@ -146,11 +146,11 @@ def make_stability(
         ProofrollError: the folder cannot be written.
     """
     from proofroll.studies.stability import stability
-    from proofroll.studies.stability_content import content
+    from proofroll.studies.stability_content import stability_document
     from proofroll.studies.stability_reproducers import write_reproducers
 
     found = stability(asked.scene, axes, runner, engines=engines, effort=effort, progress=progress)
-    map_alone = content(found)
+    map_alone = stability_document(found)
     path = stability_path(folder, asked, axes, engines, effort)
     written = write_reproducers(found, map_alone["points"], path.with_suffix(""), runner.workers)
     study: dict[str, Any] = plain(
@@ -162,7 +162,7 @@ def make_stability(
             ],
             "claims": {"file": asked.name, "contradictions": asked.contradictions(map_alone)},
             "effort": dataclasses.asdict(effort),
-            "measured": installed.measured(),
+            "measured": study_identity.measured(),
         }
     )
     keep(study, path)

@@ -37,7 +37,7 @@ class Side:
     said: str
 
 
-def worth(
+def worth_of_term(
     on: Side,
     off: Side,
     change: float | None,

@@ -13,7 +13,7 @@ from proofroll.core.observable import Role
 from proofroll.files.json_data import plain
 from proofroll.running.case import Status
 from proofroll.running.timing import Timing
-from proofroll.studies import study_identity as installed
+from proofroll.studies import study_identity
 from proofroll.studies.budget import Budget, budget, sentence
 from proofroll.studies.curve import Curve, CurvePoint
 from proofroll.studies.hosts import hosts, said_of
@@ -40,7 +40,7 @@ def budgets(found: Tradeoff) -> list[tuple[Curve, Budget]]:
     return made
 
 
-def content(found: Tradeoff) -> dict[str, Any]:
+def tradeoff_document(found: Tradeoff) -> dict[str, Any]:
     """Everything as plain data: what ``--json`` prints, what is stored, and what a recommendation is made from."""
     reference, known = found.reference, found.reference.scene.observables
     numbers = {point.case.key: number for number, point in enumerate(found.points)}
@@ -79,7 +79,7 @@ def content(found: Tradeoff) -> dict[str, Any]:
         "over": found.over,
         "findings": findings(found, made),
         "brief": found.brief,
-        "measured": installed.measured(),
+        "measured": study_identity.measured(),
     }
     return dict(plain(document))
 

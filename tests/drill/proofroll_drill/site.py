@@ -14,7 +14,7 @@ from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
-from proofroll.files.atomic import content
+from proofroll.files.atomic import ordinary_content
 from proofroll.files.comparison_file import load_comparison
 from proofroll.files.scene_file import load_scene
 from proofroll.running.asking import resolve
@@ -162,7 +162,7 @@ def contents(store: Path) -> dict[str, str]:
         pair = hashlib.sha256()
         for path in (record, record.with_suffix(".nc")):
             with contextlib.suppress(OSError):  # it may be none, or no file
-                pair.update(content(path))
+                pair.update(ordinary_content(path))
         found[record.stem] = pair.hexdigest()
     return found
 

@@ -26,7 +26,7 @@ from proofroll.studies.axes import Axis, AxisTerm, chosen, thinned
 from proofroll.studies.failure import meanings
 from proofroll.studies.stability import _refused, stability
 from proofroll.studies.stability_claims import Claim, file_for
-from proofroll.studies.stability_content import content, dependence
+from proofroll.studies.stability_content import dependence, stability_document
 from proofroll.studies.stability_places import Effort, places_of
 from proofroll.studies.stability_reproducers import write_reproducers
 from proofroll.studies.step_numbers import OSCILLATION, explanation, values
@@ -63,7 +63,7 @@ def small(resumed: tuple[Runner, int, Path]) -> Any:
 
 def test_a_map(small: Any) -> None:
     """RK4 has a boundary at either speed, and as nothing but Ωh matters here, it is the same Ωh."""
-    study = plain(content(small))
+    study = plain(stability_document(small))
     assert [point["value"] for point in study["points"]] == [2.0, 8.0]
     turns = [point["sides"]["accurate"]["numbers"]["turn"] for point in study["points"]]
     assert turns[0] == pytest.approx(turns[1])
@@ -104,7 +104,7 @@ def test_a_closed_form_has_no_boundary(tmp_path: Path) -> None:
     found = mapped(tmp_path, ["reduced[preset=matched]"], [axis], progress=lambda text, _: told.append(text))
     assert told[-1].endswith("V0 = 4: 1 of 1 points")
     assert [point.curve.facts.settings["formulation"] for point in found.points] == ["equations"]
-    assert content(found)["points"][0]["resolution"] == "rtol"
+    assert stability_document(found)["points"][0]["resolution"] == "rtol"
     (reason,) = found.absent.values()
     assert "neither step nor tolerance" in reason
 
@@ -129,7 +129,8 @@ def test_a_map_resumes(small: Any, resumed: tuple[Any, int, Path]) -> None:
     assert before >= 4
     assert runner.reused == before
     again = Runner(Store(folder), jobs=1)
-    assert content(stability("sphere_in_cylinder", [SPEED], again, engines=[ENGINE], effort=SHORT)) == content(small)
+    other = stability("sphere_in_cylinder", [SPEED], again, engines=[ENGINE], effort=SHORT)
+    assert stability_document(other) == stability_document(small)
     assert again.reused == small.runs + 2  # and the truth of both places
 
 
@@ -137,7 +138,7 @@ def test_reports_of_a_map(small: Any) -> None:
     """Terminal and heat map say of every point what it is, within 100 columns."""
     from rich.console import Console
 
-    study = plain(content(small))
+    study = plain(stability_document(small))
     assert headline(study).startswith("2 points, ")
     console = Console(width=100, record=True, file=open("/dev/null", "w"))  # noqa: SIM115 -- nobody reads it
     console.print(boundary_table(study))
@@ -164,7 +165,7 @@ def programs(tmp_path_factory: pytest.TempPathFactory) -> dict[str, dict[str, An
     ]
     axis = Axis("V0", "m/s", "initial speed", [4.0], {"speed": AxisTerm()})
     found = mapped(folder, engines, [axis])
-    points = content(found)["points"]
+    points = stability_document(found)["points"]
     written = write_reproducers(found, points, folder / "reproducers")
     return {entry["engine"]: entry | dataclasses.asdict(one) for entry, one in zip(points, written, strict=True)}
 
@@ -186,7 +187,7 @@ def test_what_is_ours_is_shown_through_proofroll(tmp_path: Path) -> None:
     """Where an engine has no program of its own, the program asks proofroll, says why, and exits with 1."""
     axis = Axis("V0", "m/s", "initial speed", [4.0], {"speed": AxisTerm()})
     found = mapped(tmp_path, ["projection[formulation=euler,preset=default]"], [axis])
-    (written,) = write_reproducers(found, content(found)["points"], tmp_path / "reproducers")
+    (written,) = write_reproducers(found, stability_document(found)["points"], tmp_path / "reproducers")
     assert written.reproducer_needs == ["numpy", "proofroll"]
     assert written.reproducer is not None
     assert written.reproducer_note is not None

@@ -8,22 +8,22 @@ import pytest
 
 from proofroll.running.environments import STAMP, VARIABLE, Environment
 from proofroll.running.timing import machine
-from proofroll.studies import study_identity as installed
+from proofroll.studies import study_identity
 
 
 def measured() -> dict[str, object]:
     """A study that was made here and now."""
-    return {"machine": machine(), "versions": installed.versions(), "code": installed.code()}
+    return {"machine": machine(), "versions": study_identity.versions(), "code": study_identity.code()}
 
 
 def test_nothing_has_changed_since_now() -> None:
     """What was measured here with this code still holds."""
-    assert installed.changes(measured()) == []
+    assert study_identity.changes(measured()) == []
 
 
 def test_engines_are_among_the_versions() -> None:
     """Every engine's package is told with its version, without importing it."""
-    assert {"proofroll", "mujoco", "exudyn", "pin", "numpy", "scipy"} <= installed.versions().keys()
+    assert {"proofroll", "mujoco", "exudyn", "pin", "numpy", "scipy"} <= study_identity.versions().keys()
 
 
 def test_an_environment_that_was_made_anew_is_a_change(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
@@ -37,21 +37,22 @@ def test_an_environment_that_was_made_anew_is_a_change(tmp_path: Path, monkeypat
     make("1.0", "numpy==2.0")
     before = measured()
     make("2.0", "numpy==2.0")
-    assert installed.changes(before) == []
+    assert study_identity.changes(before) == []
     make("1.0", "numpy==2.1")
-    (change,) = installed.changes(before)
+    (change,) = study_identity.changes(before)
     assert change.startswith("aged@1.0 ")
     (tmp_path / "aged" / "1.0" / STAMP).unlink()
-    assert installed.changes(before) == []
+    assert study_identity.changes(before) == []
 
 
 def test_each_change_is_told() -> None:
     """Another machine, another version, a package that is gone and other code are each one short text."""
     now = measured()
-    other = installed.changes(
+    other = study_identity.changes(
         {
             "machine": machine() | {"processor": "an abacus"},
-            "versions": {name: v for name, v in installed.versions().items() if name != "mujoco"} | {"numpy": "1.0"},
+            "versions": {name: v for name, v in study_identity.versions().items() if name != "mujoco"}
+            | {"numpy": "1.0"},
             "code": "0",
         }
     )
@@ -59,4 +60,4 @@ def test_each_change_is_told() -> None:
     text = "; ".join(other)
     for words in ("processor an abacus then", "mujoco absent then", "numpy 1.0 then", "own code has changed"):
         assert words in text
-    assert installed.changes({**now, "machine": None}) != []
+    assert study_identity.changes({**now, "machine": None}) != []

@@ -9,7 +9,7 @@ from typing import Any
 
 import pytest
 
-from proofroll.studies import study_identity as installed
+from proofroll.studies import study_identity
 from proofroll.studies.stability_claims import file_for
 from proofroll.studies.stability_places import QUICK, Effort
 from proofroll.studies.study_store import keep, kept, stability_path
@@ -19,7 +19,7 @@ from proofroll.studies.study_store import keep, kept, stability_path
 def path(tmp_path: Path) -> Path:
     """A study that was kept just now."""
     path = tmp_path / "study.json"
-    keep({"points": [1], "measured": installed.measured()}, path)
+    keep({"points": [1], "measured": study_identity.measured()}, path)
     return path
 
 

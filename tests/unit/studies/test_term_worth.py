@@ -5,7 +5,7 @@ from __future__ import annotations
 import pytest
 
 from proofroll.running.timing import Interval
-from proofroll.studies.term_worth import Side, Worth, worth
+from proofroll.studies.term_worth import Side, Worth, worth_of_term
 
 CLEAR, NOISE = Interval(1.5, 1.4, 1.6, 0.97), Interval(1.5, 0.9, 2.0, 0.97)
 
@@ -36,7 +36,7 @@ def test_verdict(
     verdict: Worth,
 ) -> None:
     """A term is needed, harmful, paid for or free by what leaving it out does, and saves."""
-    found, reason = worth(
+    found, reason = worth_of_term(
         Side(on, "ended so"), Side(off, "ended so"), change, cost, tolerance=tolerance, bar=1e-13, scale=0.1
     )
     assert found is verdict

@@ -157,7 +157,7 @@ def hypotheses_of(element: Element) -> Sequence[Any]:
     return ()
 
 
-def worth(difference: float, size: float) -> bool:
+def above_round_off(difference: float, size: float) -> bool:
     """Whether a difference is large enough to have a cause other than round-off."""
     return bool(np.isfinite(difference) and difference > _LEAST * max(size, 1e-300))
 

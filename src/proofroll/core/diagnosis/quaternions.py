@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from proofroll.core.arrays import FloatArray
-from proofroll.core.diagnosis import Cause, apart, worth
+from proofroll.core.diagnosis import Cause, above_round_off, apart
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -40,7 +40,7 @@ def quaternions(said: FloatArray, true: FloatArray) -> Iterator[Cause]:
         return apart(said * signs, values)
 
     lengths, before = np.linalg.norm(said, axis=-1, keepdims=True), from_true(true)
-    if not worth(before, 1.0) or not np.all(lengths > 0):
+    if not above_round_off(before, 1.0) or not np.all(lengths > 0):
         return
     unit = said / lengths
     signs = np.where(np.sum(unit * true, axis=-1, keepdims=True) < 0, -1.0, 1.0)

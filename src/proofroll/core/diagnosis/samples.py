@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING, Any, ClassVar
 import numpy as np
 
 from proofroll.core.arrays import FloatArray
-from proofroll.core.diagnosis import Cause, Evidence, apart, worth
+from proofroll.core.diagnosis import Cause, Evidence, above_round_off, apart
 from proofroll.core.diagnosis.clocks import late, said_delay, stretched
 from proofroll.core.diagnosis.lines import single_precision
 from proofroll.core.diagnosis.quaternions import quaternions, rounded
@@ -68,7 +68,7 @@ class AnotherClock:
         if found is None:
             return
         said, true = (self.state(evidence.element, data) for data in found)
-        if said.shape != true.shape or not worth(apart(said, true), float(np.max(np.abs(true)))):
+        if said.shape != true.shape or not above_round_off(apart(said, true), float(np.max(np.abs(true)))):
             return
         time = found[1]["time"].to_numpy()
         moved = late(time, said, true)

@@ -13,7 +13,7 @@ from dataclasses import dataclass, field, replace
 import numpy as np
 
 from proofroll.core.arrays import FloatArray
-from proofroll.core.diagnosis import Cause, apart, worth
+from proofroll.core.diagnosis import Cause, above_round_off, apart
 from proofroll.core.diagnosis.clocks import late, said_delay
 from proofroll.core.diagnosis.fitting import known_factor, said_factor
 
@@ -72,7 +72,7 @@ class Reported:
         if (
             len(said) > 1
             and said.shape == true.shape
-            and not worth(apart(said[0], true[0]), max(float(np.max(np.abs(true))), least))
+            and not above_round_off(apart(said[0], true[0]), max(float(np.max(np.abs(true))), least))
         ):
             said, true, time = said[1:], true[1:], time[1:]
             frames = {key: frame[1:] for key, frame in frames.items()}
@@ -91,7 +91,7 @@ class Reported:
     def causes(self, step: float | None) -> Iterator[Cause]:
         """All of this module, as far as there is a difference."""
         size = float(np.max(np.abs(self.true), initial=self.least))
-        if self.said.shape != self.true.shape or not worth(self.before, size):
+        if self.said.shape != self.true.shape or not above_round_off(self.before, size):
             return
         sign = self.cause("sign", f"{self.name} has the wrong sign: it is minus {self.what}", -self.true, _SIGN)
         for causes in (

@@ -9,7 +9,7 @@ import numpy as np
 from scipy.spatial.transform import Rotation
 
 from proofroll.core.arrays import FloatArray, cross
-from proofroll.core.diagnosis import Cause, Evidence, apart, worth
+from proofroll.core.diagnosis import Cause, Evidence, above_round_off, apart
 from proofroll.core.diagnosis.at_start import AtStart
 from proofroll.core.diagnosis.clocks import said_delay
 from proofroll.core.diagnosis.fitting import fitted
@@ -145,7 +145,7 @@ class StaleNormal:
         if (
             said.shape != true.shape
             or not np.all(np.isfinite(said))
-            or not worth(apart(said, true), float(np.max(abs(true))))
+            or not above_round_off(apart(said, true), float(np.max(abs(true))))
         ):
             return
         local = into(body.surface.frame(body.surface.locate(p)), true)

@@ -8,7 +8,7 @@ from typing import ClassVar
 import numpy as np
 
 from proofroll.core.arrays import FloatArray
-from proofroll.core.diagnosis import Cause, Evidence, worth
+from proofroll.core.diagnosis import Cause, Evidence, above_round_off
 from proofroll.core.diagnosis.lines import differing
 from proofroll.core.diagnosis.samples import both
 from proofroll.elements.mechanism.diagnosis.equations import placed_of
@@ -41,7 +41,7 @@ class OtherAxis:
             own = np.linalg.svd(seen)[2][0]
             own = own * np.sign(own @ axis or 1.0)
             before, after = (float(np.max(np.linalg.norm(seen - np.outer(seen @ n, n), axis=-1))) for n in (axis, own))
-            if worth(before, float(np.max(np.abs(seen)))):
+            if above_round_off(before, float(np.max(np.abs(seen)))):
                 says = f"the joint {joint.name} turns about ({_shown(own)}) of its parent, not about ({_shown(axis)})"
                 remedy = "an axis is given in the frame of the parent body; look at whose frame the engine takes"
                 covered = ("p_WB", "v_WB", "w_WB", "q_WB", "motion", "force", "torque")
