@@ -1,10 +1,13 @@
 from __future__ import annotations
 
 import dataclasses
+from functools import reduce
+from itertools import accumulate
 
 import numpy as np
 import pytest
 import xarray as xr
+from scipy.interpolate import make_interp_spline
 from scipy.spatial.transform import Rotation
 
 from proofroll.core.dataset import from_samples, observe, scales
@@ -120,14 +123,13 @@ def test_rate_audit_sees_an_orientation_of_its_own() -> None:
     scene = load_scene("sphere_in_cylinder")
     motion = reduced(rolling_ball(scene), TIMES)
     fine = np.linspace(0, TIMES[-1], 40 * (len(TIMES) - 1) + 1)
-    spin = reduced(rolling_ball(scene), np.linspace(0, TIMES[-1], 2 * len(fine) - 1)).w_WB[1::2]  # at the middles
+    knots = np.linspace(0, TIMES[-1], 4 * len(TIMES) - 3)
+    spin = make_interp_spline(knots, reduced(rolling_ball(scene), knots).w_WB, k=5)((fine[1:] + fine[:-1]) / 2)
 
     def audited(factor: float) -> float:
-        attitude, found = Rotation.identity(), [Rotation.identity()]
-        for index, (h, w) in enumerate(zip(np.diff(fine), spin, strict=True), 1):
-            attitude = Rotation.from_rotvec(factor * h * w) * attitude
-            if index % 40 == 0:
-                found.append(attitude)
+        turns = Rotation.from_rotvec(factor * np.diff(fine)[:, None] * spin)
+        between = reduce(lambda whole, k: turns[k::40] * whole, range(1, 40), turns[::40])
+        found = list(accumulate(between, lambda attitude, turn: turn * attitude, initial=Rotation.identity()))
         q = np.array([one.as_quat(scalar_first=True) for one in found])
         return largest(
             rate_audit(

@@ -74,15 +74,15 @@ def test_chaos_has_a_horizon(scene):
 
 def test_singular_poses_are_passed_by_the_closed_form(scene):
     """Where error control stalls, the closed form is the truth and equal steps of another route its witness."""
-    truth = find_truth(scene("four_bar", windows=1), np.array([0.0, 1.5]))
+    truth = find_truth(scene("four_bar", windows=1), np.array([0.0, 1.0]))
     assert truth.routes[0].startswith("closed form")
     assert truth.bars["points"][-1] < 1e-8
 
 
 def test_singular_poses_without_a_closed_form_are_refused(scene):
     """The reason and the time are said."""
-    with pytest.raises(Refused, match=r"stalls at t = 0.382.*; end before it \(singular poses near t = 0.382, 1.2"):
-        find_truth(scene("slider_crank", crank=0.3999999999999, speed=3.0), np.array([0.0, 2.0]))
+    with pytest.raises(Refused, match=r"stalls at t = 0.382.*; end before it \(singular poses near t = 0.382 s"):
+        find_truth(scene("slider_crank", crank=0.3999999999999, speed=3.0), np.array([0.0, 0.5]))
 
 
 def test_a_joint_that_reaches_its_limit_is_refused(scene):
@@ -157,7 +157,7 @@ def test_bodies_without_inertia_are_carried_by_others():
         Joint("slide", "prismatic", "dot", "hand", (0.3, 0, 0.1), axis=(0, 1, 1), q0=(-0.2,), v0=(2.0,), armature=0.4),
         Joint("grip", "fixed", "hand", "tool", (0, 0, 0.2), (1, 0, 0)),
     )
-    found = find_truth(Mechanism(bodies, joints), np.array([0.0, 0.1, 0.2]))
+    found = find_truth(Mechanism(bodies, joints), np.array([0.0, 0.05, 0.1]))
     assert found.differences["p_WB"] < 1e-13
     assert found.differences["wrench"] < 1e-11
     assert found.differences["energy"] < 1e-12
@@ -181,7 +181,7 @@ def test_moving_bodies_without_inertia_are_moved_by_what_they_carry():
         Joint("thread", "revolute", "hub", "point", (-0.1, 0, 0), axis=(1, 0, 0), v0=(2.0,)),
         Joint("axle", "revolute", "point", "wheel", (0, 0.3, 0), axis=(0, 0, 1), armature=0.02, v0=(3.0,)),
     )
-    found = find_truth(Mechanism(bodies, joints), np.array([0.0, 0.2]))
+    found = find_truth(Mechanism(bodies, joints), np.array([0.0, 0.1]))
     assert found.differences["p_WB"] < 1e-13
     assert found.differences["wrench"] < 1e-11
     assert found.differences["energy"] < 1e-12
