@@ -8,6 +8,7 @@ import mechanism_runs as runs
 import numpy as np
 import pytest
 
+from proofroll.core.certificate import certify, first_difference
 from proofroll.core.errors import Diverged, InputError, Refused
 from proofroll.core.plugins import load_engine, resolve_settings
 from proofroll.elements.mechanism import Body, Joint, Loop, Mechanism
@@ -16,6 +17,7 @@ from proofroll.elements.mechanism.loop_points import held_points, is_planar
 from proofroll.engines.pinocchio.joint_tree import JointTree
 from proofroll.engines.pinocchio.loop_rows import LoopRows
 from proofroll.engines.projection.dependent import DependentCoordinates
+from proofroll.files.scene_file import load_scene
 
 
 @pytest.mark.parametrize(
@@ -155,3 +157,14 @@ def test_what_only_some_models_need_is_refused_in_words():
         runs.build("redundant", Mechanism(bodies[:1], joints[:1]))
     for formulation in ("joints", "null_space"):
         assert runs.build(formulation, mechanism).sample().p_WB[1, 0] == pytest.approx(1.0)
+
+
+@pytest.mark.parametrize("formulation", ["joints", "redundant", "null_space", "dependent"])
+def test_a_missing_spring_shows_in_the_first_reactions(formulation):
+    """Andrews' spring pulls at a dead centre and accelerates nothing at the start; bearings and loops feel it."""
+    scene = load_scene("andrews_squeezer")
+    engine, settings = runs.settings(formulation)
+    without = replace(runs.model("andrews_squeezer"), springs=())
+    found = first_difference(certify(engine.build(without, settings), scene))
+    assert found is not None
+    assert "forces" in found

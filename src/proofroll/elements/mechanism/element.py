@@ -196,6 +196,12 @@ class MechanismElement:
         scale = max(float(np.max(np.abs(acceleration[:, :3]))), self._speed**2 / self.length)
         return FirstMotion(acceleration[:, :3], acceleration[:, 3:], scale, _PART * self.natural_time)
 
+    @cached_property
+    def first_wrench(self) -> FloatArray:
+        """What each joint and loop does to its child at the start: force [N] and moment [N m], (joints + loops, 6)."""
+        wrench: FloatArray = self._equations.sample(*self.mechanism.start())["wrench"]
+        return wrench
+
     @property
     def softened(self) -> frozenset[str]:
         """See the protocol."""

@@ -13,8 +13,10 @@ from proofroll.core.observable import Role
 from proofroll.elements.mechanism.dataset import UNDETERMINED, UNSAID
 from proofroll.elements.mechanism.element import ENERGY_GAIN, OPENED, MechanismElement
 from proofroll.elements.mechanism.sampling import MechanismBuilt
+from proofroll.files.json_data import plain
 from proofroll.files.scene_file import load_scene
 from proofroll.report.kinds import kind_of
+from proofroll.report.pen import Disc
 
 SCENES = ("pendulum", "slider_crank", "bricard", "heavy_top", "andrews_squeezer", "free_body", "gyroscope_cart")
 
@@ -163,15 +165,15 @@ def test_a_scene_is_drawn(name: str) -> None:
     kind = kind_of(scene)
     assert kind is not None
     (drawing,), undrawn = kind.drawings([scene])
-    x, y, width, height = drawing["box"]
-    discs = [mark for mark in drawing["marks"] if "centre" in mark]
-    looks = [mark["look"] for mark in discs]
+    x, y, width, height = drawing.box
+    discs = [mark for mark in drawing.marks if isinstance(mark, Disc)]
+    looks = [disc.look for disc in discs]
     assert undrawn == ""
-    assert json.dumps(drawing, allow_nan=False)
+    assert json.dumps(plain(drawing), allow_nan=False)
     assert looks.count("ball") == len(element.mechanism.bodies)
     assert looks.count("wall") == sum(joint.kind != "free" for joint in element.mechanism.joints)
     assert looks.count("ghost") == len(element.mechanism.loops)
-    assert all(x <= disc["centre"][0] <= x + width and y <= disc["centre"][1] <= y + height for disc in discs)
+    assert all(x <= disc.centre[0] <= x + width and y <= disc.centre[1] <= y + height for disc in discs)
 
 
 def test_gravity_points_down_in_a_drawing() -> None:
@@ -179,9 +181,8 @@ def test_gravity_points_down_in_a_drawing() -> None:
     scene = load_scene("pendulum", angle=0.0)
     kind = kind_of(scene)
     assert kind is not None
-    marks = kind.drawings([scene])[0][0]["marks"]
-    pivot = next(mark["centre"] for mark in marks if mark["look"] == "wall")
-    mass = next(mark["centre"] for mark in marks if mark["look"] == "ball")
+    discs = [mark for mark in kind.drawings([scene])[0][0].marks if isinstance(mark, Disc)]
+    pivot, mass = (next(disc.centre for disc in discs if disc.look == look) for look in ("wall", "ball"))
     assert mass[1] > pivot[1] + 50
     assert mass[0] == pytest.approx(pivot[0], abs=0.2)
 
