@@ -44,6 +44,5 @@ def findings(
         write_json({"counts": counts, "findings": told})
     else:
         console().print(findings_table(rows))
-        console().print(
-            f"{len(rows)} findings: {', '.join(f'{count} {name}' for name, count in counts.items() if count)}."
-        )
+        shares = ", ".join(f"{name} {count}" for name, count in counts.items() if count)
+        console().print(f"Of {len(rows)} findings: {shares}.")
