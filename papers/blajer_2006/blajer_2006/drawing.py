@@ -16,7 +16,7 @@ from blajer_2006.quantities import TIME
 from blajer_2006.study import FigureRun, FigureRuns
 from proofroll.core.errors import InputError, Missing
 from proofroll.core.events import events_of
-from proofroll.report.svg import element
+from proofroll.report.pages import element
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes

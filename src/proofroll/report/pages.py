@@ -1,9 +1,10 @@
-"""What every page is made with: templates that escape what is put into them, and large contents compressed."""
+"""What every page is made with: templates that escape, pictures as elements, and large contents compressed."""
 
 from __future__ import annotations
 
 import base64
 import gzip
+import re
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -32,3 +33,16 @@ def rendered(templates: jinja2.Environment, name: str, **said: Any) -> str:
 def packed(content: bytes) -> str:
     """Bytes as text that ``templates/unpack.js`` reads: gzip in base64, so no markup; always the same of the same."""
     return base64.b64encode(gzip.compress(content, compresslevel=9, mtime=0)).decode("ascii")
+
+
+def element(text: str, prefix: str) -> str:
+    """A picture from matplotlib as an element: its ids begin with ``prefix``, and no style of it reaches the page."""
+    text = text[text.index("<svg") :]
+    text = re.sub(r"<(metadata|style)\b.*?</\1>", "", text, flags=re.DOTALL)
+    start, _, rest = text.partition(">")
+    start = re.sub(r' (?:xmlns(?::\w+)?|version|width|height)="[^"]*"', "", start)
+    text = f'{start} aria-hidden="true">{rest}'  # whoever shows it says in words what is on it
+    # Only ids that something refers to: equal images would share theirs.
+    text = re.sub(r' id="([^"]*)"', lambda found: f' id="{prefix}{found[1]}"' if f"#{found[1]}" in text else "", text)
+    text = re.sub(r'href="#', f'href="#{prefix}', text)
+    return re.sub(r"url\(#", f"url(#{prefix}", text)

@@ -108,7 +108,7 @@ class TradeoffPart:
 
     def pictures(self, prefix: str) -> dict[str, str]:
         """The work-precision diagram."""
-        from proofroll.report.svg import element
+        from proofroll.report.pages import element
         from proofroll.report.work_precision import svg
 
         assert self.study is not None  # it was made

@@ -7,16 +7,16 @@ from dataclasses import dataclass, field, replace
 
 import numpy as np
 
-from proofroll.core.comparison import Comparison, Row
+from proofroll.core.comparison import Comparison, Edge, Row
 from proofroll.core.errors import InputError, ProofrollError
 from proofroll.core.plugins import parse_engine, place_of, plain_name
 from proofroll.core.scene import Scene
+from proofroll.core.truth import edge_between
 from proofroll.files.scene_file import load_scene
 from proofroll.running.asking import resolve
 from proofroll.running.case import Case, EngineFacts
 from proofroll.running.worker_pool import Workers
 from proofroll.studies.cases import case_of
-from proofroll.studies.comparison_points import settled
 
 
 def point_name(parameters: dict[str, float]) -> str:
@@ -153,3 +153,31 @@ def _case(
 ) -> Case:
     limits = {"timed": timed, "time_limit": comparison.time_limit}
     return case_of(comparison.scene, scene, point, facts, comparison.until, comparison.every, **limits)
+
+
+def settled(comparison: Comparison) -> Comparison:
+    """The comparison with every edge found.
+
+    Raises:
+        InputError: an edge of a parameter for which it is not defined, or none between the two values.
+    """
+    points = [dict(point) for point in comparison.points]
+    for point in points:
+        for name, value in point.items():
+            if isinstance(value, Edge):
+                point[name] = _edge_found(comparison, point, name, value)
+    return replace(comparison, points=points)
+
+
+def _edge_found(comparison: Comparison, point: dict[str, float | Edge], name: str, edge: Edge) -> float:
+    where = f"{comparison.name}: points: {name}"
+    low, high = edge.edge_between
+    others = {key: value for key, value in point.items() if isinstance(value, float)}
+    scene = load_scene(comparison.scene, **{**others, name: high})
+    try:
+        found = edge_between(scene, name, low, high, comparison.until)
+    except InputError as error:
+        raise InputError(where, error.value, error.advice) from None
+    if found is None:
+        raise InputError(where, list(edge.edge_between), f"nothing jumps between these values of {name}")
+    return found

@@ -12,7 +12,7 @@ import numpy as np
 
 from proofroll.files.atomic import replacing
 from proofroll.files.json_data import plain
-from proofroll.report.svg import element
+from proofroll.report.pages import element
 from proofroll.truth.regimes import Regime
 
 if TYPE_CHECKING:
