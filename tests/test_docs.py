@@ -103,6 +103,7 @@ def test_the_workflow_runs_the_two_commands() -> None:
     commands = [step["run"] for step in job["steps"] if "run" in step]
     assert commands == [".ci/run", "make report"]
     within = (ROOT / ".ci" / "run").read_text(encoding="utf-8").splitlines()
-    assert {"make check", "make docs", "make test"} <= set(within)
-    for line in [*commands[1:], "make check", "make docs", "make test"]:
+    made = [line for line in within if line.startswith("make ")]
+    assert {word for line in made for word in line.split()} >= {"check", "docs", "test"}
+    for line in [*commands[1:], *made]:
         subprocess.run(["make", "--dry-run", *line.split()[1:]], cwd=ROOT, check=True, capture_output=True)
