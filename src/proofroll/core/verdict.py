@@ -100,6 +100,7 @@ def judge(
     ladder: bool = False,
     lost: str = "",
     doubt: Doubt = Doubt.NONE,
+    own_bar: float = 0.0,
 ) -> Judgement:
     """Holds a curve and its limit of small steps against the true curve. The only place that gives a verdict.
 
@@ -115,6 +116,8 @@ def judge(
         ladder: whether several steps were asked for; without a limit they then confirm nothing.
         lost: the first of these steps that has no curve, and why, as a clause; empty if each has one.
         doubt: what an ill-posed question leaves to be judged.
+        own_bar: how far the run itself leaves open what it shows, as where an event lies between two of its samples;
+            an error that may come of this alone is no difference.
     """
     error = largest_difference(values, true)
     round_off = _ROUND_OFF * max(scale, float(np.max(np.abs(true), initial=0.0)))
@@ -123,7 +126,9 @@ def judge(
     if limit is not None:
         rungs = _read(limit, largest_difference(limit.values, true), tolerance, truth_error_bar, round_off, shown_unit)
     verdict = _verdict(error, tolerance, rungs, doubt)
-    if truth_error_bar > tolerance or (verdict != Verdict.CONVERGES and abs(error - tolerance) <= truth_error_bar):
+    unknown = truth_error_bar + (own_bar if error > tolerance else 0.0)
+    placed = verdict in {Verdict.AGREES, Verdict.UNCONFIRMED, Verdict.DIFFERS}
+    if truth_error_bar > tolerance or (placed and abs(error - tolerance) <= unknown):
         verdict = Verdict.NOT_JUDGED
     remark = f"within tolerance, but the limit of small steps is shown not to be the truth: {rungs.text}"
     return Judgement(
@@ -138,7 +143,7 @@ def judge(
         limit_error=rungs.error,
         limit_error_bar=rungs.bar,
         limit=rungs.finding,
-        reason=_reason(verdict, error, tolerance, truth_error_bar, shown_unit, rungs),
+        reason=_reason(verdict, error, tolerance, (truth_error_bar, own_bar), shown_unit, rungs),
         remarks=(remark,) if rungs.wrong_within else (),
     )
 
@@ -194,15 +199,19 @@ def _verdict(error: float, tolerance: float, rungs: _Ladder, doubt: Doubt) -> Ve
     return Verdict.DIFFERS if doubt == Doubt.NONE else Verdict.ILL_POSED
 
 
-def _reason(verdict: Verdict, error: float, tolerance: float, truth_error_bar: float, unit: str, rungs: _Ladder) -> str:
-    """Why the verdict, as a clause with numbers."""
+def _reason(
+    verdict: Verdict, error: float, tolerance: float, bars: tuple[float, float], unit: str, rungs: _Ladder
+) -> str:
+    """Why the verdict, as a clause with numbers; error bars are the truth's and the run's own."""
+    truth_error_bar, own_bar = bars
     found, allowed, bar = *_told_apart(error, tolerance), f"{truth_error_bar:.2g}{unit}"
     if truth_error_bar > tolerance:
         return f"not judged: the truth's error bar {bar} exceeds the tolerance {allowed}{unit}"
     if verdict == Verdict.NOT_JUDGED:
-        return (
-            f"not judged: error {found}{unit} ± {bar}, the truth's error bar, may be within {allowed}{unit} or beyond"
-        )
+        whose = "the truth's error bar"
+        if own_bar > truth_error_bar:
+            bar, whose = f"{own_bar:.2g}{unit}", "for the run shows it only between two times"
+        return f"not judged: error {found}{unit} ± {bar}, {whose}, may be within {allowed}{unit} or beyond"
     text = f"error {found}{unit} {'within' if error <= tolerance else 'beyond'} {allowed}{unit}"
     if not np.isfinite(error):
         text = "not finite, or not as many values as the truth"

@@ -155,6 +155,7 @@ def _judgements(
             ladder=_has_ladder(run, curve),
             lost=lost,
             doubt=reference.doubt(name),
+            own_bar=reference.own_bar(name, trajectories[1.0]),
         )
         judgements.append(judgement)
     return judgements

@@ -254,15 +254,18 @@ def _compared(
         values = observed[name]
         true, bar = reference.true(name, values)
         scale, doubt = reference.sizes.get(name, 1.0), reference.doubt(name)
+        own = reference.own_bar(name, dataset)
     else:
         values, truth_of = dataset[name].to_numpy(), reference.dataset[name]
         true, bar = truth_of.to_numpy(), float(truth_of.attrs["error_bar"])
         if item and item.role is Role.REACTION and dataset["time"].to_numpy()[0] == 0:
             true, values = true[1:], values[1:]  # several engines define reactions only after a first step
         scale, doubt = reference.sizes.get(name) or float(np.ptp(true)) or 1.0, Doubt.NONE
+        own = 0.0
     found = judge_curve(
         name, _unit(reference, name), values, true,
         truth_error_bar=bar, tolerance=bound.absolute(scale), scale=scale, limit=None, doubt=doubt,
+        own_bar=own,
     )  # fmt: skip
     return Compared(found, _farthest(values, true, dataset["time"].to_numpy()))
 

@@ -109,6 +109,14 @@ class Reference:
         # Zero for a perfect run: what is left on the truth is what the measurement itself cannot resolve.
         return np.zeros_like(values), float(np.max(np.abs(known), initial=0.0))
 
+    def own_bar(self, name: str, dataset: xr.Dataset) -> float:
+        """How far a run leaves open what it shows of an observable: half the width of its widest event."""
+        item = self.scene.observables[name]
+        if item.role != Role.EVENT or item.name == EVENT_ORDER:
+            return 0.0
+        found = [event for one in self.scene.elements for event in events_of(part(self.scene, one, dataset))]
+        return max((event.time_high - event.time_low for event in found), default=0.0) / 2
+
     @property
     def events(self) -> list[Event]:
         """Of all elements."""

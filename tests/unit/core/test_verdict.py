@@ -259,6 +259,17 @@ def test_an_error_that_the_truth_cannot_place_is_not_judged(error: float) -> Non
     assert verdict_of(1.95e-3, bar=0.9e-3).verdict is Verdict.DIFFERS
 
 
+def test_a_difference_that_may_be_the_sampling_alone_is_not_judged() -> None:
+    """An event that a run shows 7 ms off, but only between two times 50 ms apart, is no difference of 2 ms."""
+    late = {"truth_error_bar": 1e-9, "tolerance": 2e-3, "scale": 1.0, "limit": None}
+    times = np.array([0.2727])
+    found = judge("first_slip", "s", times + 7e-3, times, own_bar=25e-3, **late)
+    assert found.verdict is Verdict.NOT_JUDGED
+    assert "error 0.007 s ± 0.025 s, for the run shows it only between two times" in found.reason
+    assert judge("first_slip", "s", times + 7e-3, times, own_bar=1e-3, **late).verdict is Verdict.DIFFERS
+    assert judge("first_slip", "s", times + 1e-3, times, own_bar=25e-3, **late).verdict is Verdict.AGREES
+
+
 def test_a_reason_never_sets_a_number_against_itself() -> None:
     """An error a millionth beyond the tolerance is written with as many digits as show it."""
     assert verdict_of(1.000001e-3).reason.startswith("error 0.001000001 m beyond 0.001 m")

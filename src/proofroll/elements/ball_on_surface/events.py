@@ -25,6 +25,8 @@ EventKind = Literal["slip", "stick", "lift_off", "bounce", "settle"]
 _FLIGHT = 0.01
 # Normal force, relative to the natural one, that is round-off or what a solver's tolerance leaves.
 _FAINT = 1e-6
+# A time known to this part of it is told as one number, of six digits.
+_TOLD = 1e-6
 # What there is on the wall only.
 _ON_WALL = ("N", "F2", "F3", "needed_friction", "slip2", "slip3", "slip", "gap")
 
@@ -58,8 +60,10 @@ class Watch:
                 kept -= 1
             # Not where it fails later, in flight
             if left is not None and kept < len(at) and left.time_high >= at[kept - 1]:
-                ended = f"the ball leaves the wall at t = {left.time:.6g} s, where this run ends: "
-                ended += "the model does not let go"
+                when = f"at t = {left.time:.6g} s"
+                if left.time_high - left.time_low > _TOLD * left.time_high:
+                    when = f"between t = {left.time_low:.6g} s and {left.time_high:.6g} s"
+                ended = f"the ball leaves the wall {when}, where this run ends: the model does not let go"
         sticking = [sample.sticking for sample in samples[:kept]]
         if any(value is None for value in sticking):
             return SeenInRun(kept, [left] if left is not None else None, ended)
