@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Any, ClassVar
 from blajer_2006 import statement_tables
 from blajer_2006.judging import count
 from blajer_2006.reading import STUDY, load_figures
-from proofroll.report.study_parts import PartEntry
+from proofroll.report.study_parts import Part, PartEntry
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -22,7 +22,7 @@ if TYPE_CHECKING:
 
 
 @dataclass
-class FiguresPart:
+class FiguresPart(Part):
     """Figures of an article from our own runs, and what it states."""
 
     kind: ClassVar[str] = STUDY
@@ -31,7 +31,6 @@ class FiguresPart:
     words: ClassVar[str] = "figures"
     template: ClassVar[str] = "figures.html"
     names: ClassVar[Mapping[str, Any]] = {"statements": statement_tables}
-    on_request: ClassVar[bool] = False
     asked: Figures
     maps: dict[str, list[xr.Dataset]] = field(default_factory=dict)
     """Regime maps by the name of their study."""
@@ -53,10 +52,6 @@ class FiguresPart:
         asked = self.asked
         command = f"proofroll figures {asked.name}"
         return {"name": asked.name, "title": asked.title, "question": "", "scene": asked.scene, "command": command}
-
-    def keeps(self, out: Path) -> bool:  # noqa: ARG002 -- the protocol's
-        """Its runs are cases, which the runner reuses."""
-        return False
 
     def make(self, runner: Runner, out: Path, tell: Tell) -> None:  # noqa: ARG002 -- the protocol's
         """Makes the runs and the maps."""

@@ -35,10 +35,10 @@ class ReportKind(Protocol):
             ``replay.js`` for what it is given and what it gives.
     """
 
-    template: ClassVar[str]
-    names: ClassVar[Mapping[str, Any]]
-    caption: ClassVar[str]
-    replay_script: ClassVar[str]
+    template: ClassVar[str] = ""
+    names: ClassVar[Mapping[str, Any]] = {}
+    caption: ClassVar[str] = ""
+    replay_script: ClassVar[str] = ""
 
     @staticmethod
     def covers(scene: Scene) -> bool:
@@ -49,11 +49,12 @@ class ReportKind(Protocol):
         """Drawings of a comparison's scene for all its cases; and why there are none, if so."""
 
     @staticmethod
-    def truth_facts(scene: Scene, dataset: xr.Dataset) -> Any:
+    def truth_facts(scene: Scene, dataset: xr.Dataset) -> Any:  # noqa: ARG004 -- for those who have any
         """What is told of a truth besides its route and error bars: a record, or None."""
+        return None
 
     @staticmethod
-    def run_facts(truths: Sequence[ReportedTruth], runs: Sequence[Run], store: Store) -> Sequence[Any]:
+    def run_facts(truths: Sequence[ReportedTruth], runs: Sequence[Run], store: Store) -> Sequence[Any]:  # noqa: ARG004 -- as above
         """What is told of each run of a comparison besides its verdicts: a record, or None.
 
         Args:
@@ -61,18 +62,22 @@ class ReportKind(Protocol):
             runs: of the comparison.
             store: where the trajectories are.
         """
+        return [None] * len(runs)
 
     @staticmethod
-    def curves(scene: Scene, truth: xr.Dataset) -> Sequence[Observable]:
+    def curves(scene: Scene, truth: xr.Dataset) -> Sequence[Observable]:  # noqa: ARG004 -- as above
         """What is drawn over time besides the scene's own observables, and judged within one of them."""
+        return ()
 
     @staticmethod
-    def sentences(truths: Sequence[ReportedTruth]) -> Sequence[str]:
+    def sentences(truths: Sequence[ReportedTruth]) -> Sequence[str]:  # noqa: ARG004 -- as above
         """What the truths of a comparison say of it."""
+        return ()
 
     @staticmethod
-    def mark(content: ReportedComparison, curves: Sequence[PointCurves]) -> Sequence[PointCurves]:
+    def mark(content: ReportedComparison, curves: Sequence[PointCurves]) -> Sequence[PointCurves]:  # noqa: ARG004 -- as above
         """The curves of a comparison with its marks."""
+        return curves
 
     @staticmethod
     def replay() -> ReplayKind:

@@ -8,7 +8,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any, ClassVar
 
 from proofroll.report import heat_map
-from proofroll.report.study_parts import PartEntry, head_of, held
+from proofroll.report.study_parts import Part, PartEntry, head_of, held
 from proofroll.studies.stability_claims import STUDY, Claim, StabilityFile, file_for
 
 if TYPE_CHECKING:
@@ -38,7 +38,7 @@ class StabilityEntry(PartEntry):
 
 
 @dataclass
-class StabilityPart:
+class StabilityPart(Part):
     """Where engines stop being right in one scene."""
 
     kind: ClassVar[str] = STUDY
@@ -128,10 +128,6 @@ class StabilityPart:
             contradictions=contradictions,
             lost=[] if study["points"] else [f"{name}: {reason}" for name, reason in study["absent"].items()],
         )
-
-    def pictures(self, prefix: str) -> dict[str, str]:  # noqa: ARG002 -- the protocol's
-        """None: the maps are tables."""
-        return {}
 
 
 def _programs(path: Path) -> str:

@@ -65,7 +65,7 @@ class Part(Protocol):
     order: ClassVar[float]
     words: ClassVar[str]
     template: ClassVar[str]
-    names: ClassVar[Mapping[str, Any]]
+    names: ClassVar[Mapping[str, Any]] = {}
 
     @classmethod
     def load(cls, path: Path, engines: Sequence[str]) -> Part:
@@ -86,13 +86,15 @@ class Part(Protocol):
     @property
     def on_request(self) -> bool:
         """Whether a report of everything leaves it out unless it is kept."""
+        return False
 
     @property
     def head(self) -> dict[str, str]:
         """``name`` of the file, ``title``, ``question``, ``scene`` and the ``command`` that makes it."""
 
-    def keeps(self, out: Path) -> bool:
+    def keeps(self, out: Path) -> bool:  # noqa: ARG002 -- for those that keep something
         """Takes what is kept under ``out`` and still holds; False: there is nothing."""
+        return False
 
     def make(self, runner: Runner, out: Path, tell: Tell) -> None:
         """Makes it, with the least effort that says something."""
@@ -100,8 +102,9 @@ class Part(Protocol):
     def entry(self) -> PartEntry:
         """What is known, with whatever its template needs besides; only after it was made or taken."""
 
-    def pictures(self, prefix: str) -> dict[str, str]:
+    def pictures(self, prefix: str) -> dict[str, str]:  # noqa: ARG002 -- for those that have any
         """Its pictures as markup, by name; every id in them begins with ``prefix``."""
+        return {}
 
 
 @cache

@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Any, ClassVar
 
 from proofroll.core.comparison import Tolerance
 from proofroll.files.json_data import MERGED
-from proofroll.report.study_parts import PartEntry, head_of, held
+from proofroll.report.study_parts import Part, PartEntry, head_of, held
 from proofroll.report.tradeoff_tables import default_quantities
 from proofroll.studies.claimed import ClaimJudgement
 from proofroll.studies.claims import STUDY, TradeoffClaims, load_claims
@@ -46,7 +46,7 @@ class TradeoffEntry(PartEntry):
 
 
 @dataclass
-class TradeoffPart:
+class TradeoffPart(Part):
     """Speed against accuracy in one scene."""
 
     kind: ClassVar[str] = STUDY
@@ -54,8 +54,6 @@ class TradeoffPart:
     order: ClassVar[float] = 30
     words: ClassVar[str] = "speed against accuracy"
     template: ClassVar[str] = "tradeoff.html"
-    names: ClassVar[Mapping[str, Any]] = {}
-    on_request: ClassVar[bool] = False
     asked: TradeoffClaims
     engines: Sequence[str] = ()
     study: Mapping[str, Any] | None = None

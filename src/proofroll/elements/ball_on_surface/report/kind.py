@@ -8,11 +8,11 @@ from typing import TYPE_CHECKING, Any, ClassVar
 from proofroll.core.scene import Scene
 from proofroll.elements.ball_on_surface.element import BallOnSurface, rolling_ball
 from proofroll.elements.ball_on_surface.report import onset_tables, onsets
+from proofroll.report.kinds import ReportKind
 
 if TYPE_CHECKING:
     import xarray as xr
 
-    from proofroll.core.observable import Observable
     from proofroll.report.comparison_records import ReportedComparison
     from proofroll.report.pen import Picture
     from proofroll.report.plots import PointCurves
@@ -22,7 +22,7 @@ if TYPE_CHECKING:
     from proofroll.studies.outcome import Run
 
 
-class BallReport:
+class BallReport(ReportKind):
     """See :class:`proofroll.report.kinds.ReportKind`."""
 
     template: ClassVar[str] = "slips.html"
@@ -57,11 +57,6 @@ class BallReport:
     def run_facts(truths: Sequence[ReportedTruth], runs: Sequence[Run], store: Store) -> list[onsets.RunSlips]:
         """Their slips."""
         return onsets.run_facts(truths, runs, store)
-
-    @staticmethod
-    def curves(scene: Scene, truth: xr.Dataset) -> Sequence[Observable]:  # noqa: ARG004 -- the protocol's
-        """None: each is judged by itself."""
-        return ()
 
     @staticmethod
     def sentences(truths: Sequence[ReportedTruth]) -> Sequence[str]:

@@ -2,13 +2,13 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, ClassVar
+from typing import TYPE_CHECKING, ClassVar
 
 from proofroll.elements.ball_on_surface.regimes_study import STUDY, RegimesStudy, load_regimes, regime_maps
-from proofroll.report.study_parts import PartEntry, head_of
+from proofroll.report.study_parts import Part, PartEntry, head_of
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -18,7 +18,7 @@ if TYPE_CHECKING:
 
 
 @dataclass
-class RegimesPart:
+class RegimesPart(Part):
     """See :class:`proofroll.report.study_parts.Part`."""
 
     kind: ClassVar[str] = STUDY
@@ -26,8 +26,6 @@ class RegimesPart:
     order: ClassVar[float] = 20
     words: ClassVar[str] = "regime maps"
     template: ClassVar[str] = "regimes.html"
-    names: ClassVar[Mapping[str, Any]] = {}
-    on_request: ClassVar[bool] = False
     asked: RegimesStudy
     maps: list[xr.Dataset] = field(default_factory=list)
 
@@ -47,10 +45,6 @@ class RegimesPart:
     def head(self) -> dict[str, str]:
         """What it is."""
         return head_of(self.asked, f"proofroll regimes {self.asked.name}")
-
-    def keeps(self, out: Path) -> bool:  # noqa: ARG002 -- the protocol's
-        """Nothing is kept: a map is made anew by each report."""
-        return False
 
     def make(self, runner: Runner, out: Path, tell: Tell) -> None:  # noqa: ARG002 -- the protocol's
         """The maps, briefly."""

@@ -2,30 +2,24 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
-from typing import TYPE_CHECKING, Any, ClassVar
+from collections.abc import Sequence
+from typing import TYPE_CHECKING, ClassVar
 
 from proofroll.core.scene import Scene
 from proofroll.elements.mechanism.element import MechanismElement
+from proofroll.report.kinds import ReportKind
 
 if TYPE_CHECKING:
     import xarray as xr
 
     from proofroll.core.observable import Observable
-    from proofroll.report.comparison_records import ReportedComparison
     from proofroll.report.pen import Picture
-    from proofroll.report.plots import PointCurves
     from proofroll.report.replay import ReplayKind
-    from proofroll.report.report_content import ReportedTruth
-    from proofroll.running.store import Store
-    from proofroll.studies.outcome import Run
 
 
-class MechanismReport:
+class MechanismReport(ReportKind):
     """See :class:`proofroll.report.kinds.ReportKind`."""
 
-    template: ClassVar[str] = ""
-    names: ClassVar[Mapping[str, Any]] = {}
     replay_script: ClassVar[str] = "replay_mechanism.js"
     caption: ClassVar[str] = (
         "At the start, to scale. Filled dots are centres of mass, with a line to all that is fastened to the body; "
@@ -48,15 +42,6 @@ class MechanismReport:
         return [drawn(element).picture("at the start")], ""
 
     @staticmethod
-    def truth_facts(scene: Scene, dataset: xr.Dataset) -> None:
-        """Nothing besides its route and error bars."""
-
-    @staticmethod
-    def run_facts(truths: Sequence[ReportedTruth], runs: Sequence[Run], store: Store) -> list[None]:  # noqa: ARG004 -- the protocol's
-        """Nothing."""
-        return [None] * len(runs)
-
-    @staticmethod
     def curves(scene: Scene, truth: xr.Dataset) -> Sequence[Observable]:
         """Forces and torques of joints and loops; their arrays are judged as a whole."""
         from proofroll.elements.mechanism.report.reactions import reactions
@@ -64,16 +49,6 @@ class MechanismReport:
         element = scene.elements[0]
         assert isinstance(element, MechanismElement)  # it covers no other
         return reactions(element, truth)
-
-    @staticmethod
-    def sentences(truths: Sequence[ReportedTruth]) -> Sequence[str]:  # noqa: ARG004 -- the protocol's
-        """None."""
-        return ()
-
-    @staticmethod
-    def mark(content: ReportedComparison, curves: Sequence[PointCurves]) -> Sequence[PointCurves]:  # noqa: ARG004 -- the protocol's
-        """The curves as they are."""
-        return curves
 
     @staticmethod
     def replay() -> ReplayKind:
