@@ -157,7 +157,9 @@ def _dataset(run: Run, scene: Scene) -> xr.Dataset:
         raise InputError("run", ", ".join(map(str, run.variables)), "it has no time; add the times in s as time")
     made_of = run.attrs.get("scene_digest")
     if made_of is not None and made_of != scene.digest:
-        advice = f"it is a run of {run.attrs.get('scene')} with other numbers; give those parameters here too"
+        made = str(run.attrs.get("scene"))
+        numbers = made == scene.name
+        advice = f"it is a run of {made}" + (" with other numbers; give those parameters here too" if numbers else "")
         raise InputError("scene", scene.name, advice)
     times = run["time"].to_numpy()
     if not (times.size and np.all(np.isfinite(times)) and times[0] >= 0 and np.all(np.diff(times) > 0)):

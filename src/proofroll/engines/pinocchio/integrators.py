@@ -9,10 +9,16 @@ import pinocchio as pin
 
 from proofroll.core.arrays import FloatArray
 from proofroll.core.engine import whole_steps
-from proofroll.core.errors import Diverged
+from proofroll.core.errors import Diverged, Refused
 from proofroll.core.events import Event
 from proofroll.engines.pinocchio.mechanism import BallWithRows, left_the_wall
 from proofroll.engines.pinocchio.settings import PinocchioSettings
+
+
+def require_tangent_map() -> None:
+    """Raises Refused where this version has no rates of quaternions."""
+    if not hasattr(pin, "tangentMap"):
+        raise Refused(f"the rates of quaternions need tangentMap of pinocchio 4.0, and this is {pin.__version__}")
 
 
 class TangentIntegrator:
@@ -146,6 +152,8 @@ class Adaptive(TangentIntegrator):
 
     def __init__(self, mechanism: BallWithRows, settings: PinocchioSettings) -> None:
         super().__init__(mechanism, settings)
+        if self.turns:
+            require_tangent_map()
         # In both formulations the orientation is last. Without it, see FixedStep, no more than the place is integrated,
         # and its rates are velocities of the joints.
         self._places = self._model.nq if self.turns else self._model.nq - _QUATERNION

@@ -15,6 +15,7 @@ from proofroll.elements.mechanism.capabilities import require
 from proofroll.elements.mechanism.rotations import Array
 from proofroll.elements.mechanism.sampling import MechanismBuilt, independent, mechanism_of, unsaid
 from proofroll.engines.pinocchio.constraint_dynamics import ConstraintDynamics
+from proofroll.engines.pinocchio.integrators import require_tangent_map
 from proofroll.engines.pinocchio.joint_tree import AXIS_COLUMN, JointTree
 from proofroll.engines.pinocchio.loop_rows import LoopRows
 from proofroll.engines.pinocchio.null_space import NullSpace
@@ -35,6 +36,8 @@ class MechanismRun:
         self.dynamics: NullSpace | ConstraintDynamics = kind(self.tree, rows, settings)
         self._rows, self.rank = rows, rows.rank
         self._turns = self._nq != self._model.nv  # configurations hold quaternions
+        if self._turns:
+            require_tangent_map()
         self._eliminates = settings.projection and bool(rows.rank)
         start = np.concatenate([self.tree.q0, self.tree.v0])
         resolution = float(getattr(settings, settings.resolution))
