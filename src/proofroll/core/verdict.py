@@ -15,9 +15,9 @@ from proofroll.core.convergence import Limit
 _FLAT = 1 / 20
 # Scatter that may be this many times as large without leaving the tolerance is no doubt.
 _SEVERAL = 3
-# A limit is shown to be wrong by this many of its error bars: extrapolations of engines of second order that solve the
-# scene's own equations were off by up to 2.3 of theirs, those of softened contacts by 6 to 6,000.
-_SHOWN_WRONG = 4
+# A limit is shown to be wrong by this many of its error bars: extrapolations of engines that solve the scene's own
+# equations were off by up to 8 of theirs where the motion ends abruptly, those of softened contacts by up to 20,000.
+_SHOWN_WRONG = 10
 # Round-off of a curve, relative to its size: a thousand operations, each off by one machine epsilon.
 _ROUND_OFF = 1e3 * np.finfo(float).eps
 

@@ -129,8 +129,8 @@ def test_a_right_limit_is_not_remarked() -> None:
 
 
 def test_an_extrapolation_that_is_off_by_a_few_of_its_bars_is_not_remarked() -> None:
-    """Error bars of limits are estimates; nobody is told to have another limit by three of them."""
-    for bars, count in ((3, 0), (5, 1)):
+    """Error bars of limits are estimates; nobody is told to have another limit by eight of them."""
+    for bars, count in ((8, 0), (12, 1)):
         assert len(verdict_of(1e-4, Limit(TRUE + bars * 1e-6, 1e-6, 2.0)).remarks) == count
 
 
