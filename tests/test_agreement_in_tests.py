@@ -19,6 +19,8 @@ import proofroll
 from proofroll.core.engine import Sample
 from proofroll.core.errors import InputError
 from proofroll.files.netcdf import write
+from proofroll.files.scene_file import load_scene
+from proofroll.running.simulation import build
 from proofroll.testing import assert_agrees
 
 Proofroll = Callable[..., tuple[int, str, str]]
@@ -171,3 +173,10 @@ def test_the_plug_in_costs_nothing_until_it_is_used(tmp_path: Path) -> None:
     command = [sys.executable, "-m", "pytest", "-q", "-p", "no:cacheprovider", "-p", "no:hypothesispytest", "."]
     done = subprocess.run(command, cwd=tmp_path, capture_output=True, text=True, check=False, timeout=600)
     assert "2 passed" in done.stdout, done.stdout
+
+
+@pytest.mark.parametrize("given", [object, 3])
+def test_what_is_no_engine(given: object) -> None:
+    """A class or a thing without the methods of an engine is told what it lacks."""
+    with pytest.raises(InputError, match=r"give a name, or a class that has name, .*build, advance, sample, built too"):
+        build(load_scene("pendulum"), given)

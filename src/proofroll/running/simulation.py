@@ -22,6 +22,10 @@ if TYPE_CHECKING:
     import xarray as xr
 
 
+# What a class needs to be one; see proofroll.core.engine.Engine.
+_OF_AN_ENGINE = ("name", "provides", "settings", "presets", "version", "build", "advance", "sample", "built")
+
+
 def build(scene: Scene, engine: Any, **settings: Any) -> Any:
     """The scene in the engine at time 0, after checking that the engine can represent it.
 
@@ -42,6 +46,10 @@ def build(scene: Scene, engine: Any, **settings: Any) -> Any:
 def _resolved(scene: Scene, engine: Any, settings: dict[str, Any]) -> tuple[Any, Any]:
     """The engine's class, and its complete settings."""
     if not isinstance(engine, str):
+        lacking = [name for name in _OF_AN_ENGINE if not hasattr(engine, name)]
+        if lacking:
+            shown = engine.__name__ if isinstance(engine, type) else repr(engine)
+            raise InputError("engine", shown, f"give a name, or a class that has {', '.join(lacking)} too")
         return engine, resolve_settings(engine, settings, scene.requires)
     spec = parse_engine(engine)
     for key, value in settings.items():

@@ -162,7 +162,8 @@ def _dataset(run: Run, scene: Scene) -> xr.Dataset:
         advice = f"it is a run of {made}" + (" with other numbers; give those parameters here too" if numbers else "")
         raise InputError("scene", scene.name, advice)
     times = run["time"].to_numpy()
-    if not (times.size and np.all(np.isfinite(times)) and times[0] >= 0 and np.all(np.diff(times) > 0)):
+    number = np.issubdtype(times.dtype, np.number)
+    if not (times.size and number and np.all(np.isfinite(times)) and times[0] >= 0 and np.all(np.diff(times) > 0)):
         raise InputError("run", "time", "give times in s that rise from 0 or later")
     return run if made_of is not None else _completed(run, scene, times)
 
