@@ -187,7 +187,8 @@ class DrakeMechanism:
             rates["angular_acceleration"] = np.array([rate.rotational() for rate in found])
         loops = bool(self._mechanism.loops)
         soft = {name: Regularised(1.0, _SOFT) for name in ("acceleration", "angular_acceleration") if loops}
-        if self._settings.dt and not loops:
+        sprung = self._mechanism.springs or any(one.stiffness or one.damping for one in self._mechanism.joints)
+        if self._settings.dt and sprung and not loops:
             soft |= {name: Regularised(min(3 * self._turn, 0.5), _AT_ITS_END) for name in ("forces", "torques")}
         return MechanismBuilt(
             mass=np.array([inertia.get_mass() for inertia in inertias]),
