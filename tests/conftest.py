@@ -116,6 +116,15 @@ def share_workers(request: pytest.FixtureRequest, warm_workers: WarmWorkers) -> 
             yield
 
 
+@pytest.fixture(autouse=True)
+def signals_as_before() -> Iterator[None]:
+    """What the command line does at Ctrl-C is undone after a test that called it in this process."""
+    before = {number: signal.getsignal(number) for number in (signal.SIGINT, signal.SIGTERM, signal.SIGHUP)}
+    yield
+    for number, handler in before.items():
+        signal.signal(number, handler)
+
+
 @pytest.fixture(scope="session")
 def site_of(tmp_path_factory: pytest.TempPathFactory) -> Callable[[Mapping[str, str]], Path]:
     """Makes a folder in which engines of ``tests/plugins`` are announced: one for all who want the same ones."""
