@@ -62,9 +62,12 @@ def errors(run, mechanism, until):
         run.advance(float(t))
         sample = run.sample()
         position = max(position, np.abs(sample.p_WB - truth.p_WB[k]).max())
-        for point, place in zip(mechanism.points, truth.points[k], strict=True):
+        for point in mechanism.points:
             i = mechanism.body_index[point.body]
-            found = sample.p_WB[i] + from_quaternion(sample.q_WB[i]) @ point.position
+            found, place = (
+                p_WB[i] + from_quaternion(q_WB[i]) @ point.position
+                for p_WB, q_WB in ((sample.p_WB, sample.q_WB), (truth.p_WB[k], truth.q_WB[k]))
+            )
             position = max(position, np.abs(found - place).max())
         if sample.joint_force is not None:
             reaction = max(reaction, np.nanmax(np.abs(wrench(sample) - truth.wrench[k])[determinate], initial=0.0))

@@ -15,7 +15,8 @@ from proofroll.files.scene_file import load_scene
 from proofroll.report.html import page
 from proofroll.report.kinds import kind_of
 from proofroll.report.plots import PointCurves, point_curves
-from proofroll.report.replay import Replay, joined, replay_content
+from proofroll.report.replay import joined, replay_content
+from proofroll.report.replay_records import Replay
 from proofroll.report.report_content import ReportContent, Sentences, report_content
 from proofroll.report.study_parts import Part, PartEntry, absent, attempt
 from proofroll.report.summary import three_sentences

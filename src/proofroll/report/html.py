@@ -29,7 +29,7 @@ if TYPE_CHECKING:
 
     from proofroll.report.comparison_records import ReportedComparison, ReportedRun
     from proofroll.report.plots import PointCurves
-    from proofroll.report.replay import Replay
+    from proofroll.report.replay_records import Replay
     from proofroll.report.report_content import ReportContent
 
 _EXPONENT = re.compile(r"\d[\d.]*e-\d+")

@@ -15,7 +15,7 @@ if TYPE_CHECKING:
     from proofroll.report.comparison_records import ReportedComparison
     from proofroll.report.pen import Picture
     from proofroll.report.plots import PointCurves
-    from proofroll.report.replay import ReplayKind
+    from proofroll.report.replay_records import ReplayKind
     from proofroll.report.report_content import ReportedTruth
     from proofroll.running.store import Store
     from proofroll.studies.outcome import Run

@@ -14,8 +14,9 @@ from proofroll.files.netcdf import write
 from proofroll.files.scene_file import load_scene
 from proofroll.report.kinds import kind_of, report_kinds
 from proofroll.report.labels import settings_text
-from proofroll.report.replay import Ghost, Replay, Replayed, case_content, distance
+from proofroll.report.replay import case_content, distance
 from proofroll.report.replay_library import three
+from proofroll.report.replay_records import Ghost, Replay, Replayed
 from proofroll.studies.planning import point_name
 
 if TYPE_CHECKING:

@@ -15,7 +15,8 @@ from proofroll.elements.ball_on_surface.report.wall import middle, wall
 from proofroll.files.json_data import plain
 from proofroll.files.netcdf import read_some
 from proofroll.report.labels import symbol, unit
-from proofroll.report.replay import PackedNumbers, Replayed, frame_times
+from proofroll.report.replay import frame_times
+from proofroll.report.replay_records import PackedNumbers, Replayed
 
 # What the numbers of the picture are rounded to, powers of two: 8e-6 m, 6e-5 of a quaternion, 1e-3 N. None is seen.
 LENGTH, TURN, FORCE = 2.0**-17, 2.0**-14, 2.0**-10

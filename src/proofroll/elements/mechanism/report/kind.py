@@ -14,7 +14,7 @@ if TYPE_CHECKING:
 
     from proofroll.core.observable import Observable
     from proofroll.report.pen import Picture
-    from proofroll.report.replay import ReplayKind
+    from proofroll.report.replay_records import ReplayKind
 
 
 class MechanismReport(ReportKind):
@@ -54,6 +54,6 @@ class MechanismReport(ReportKind):
     def replay() -> ReplayKind:
         """Bodies and joints in motion."""
         from proofroll.elements.mechanism.report.replay import drawn, seen
-        from proofroll.report.replay import ReplayKind
+        from proofroll.report.replay_records import ReplayKind
 
         return ReplayKind("mechanism", seen, drawn)

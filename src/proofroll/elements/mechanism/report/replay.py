@@ -21,7 +21,8 @@ from proofroll.elements.mechanism.report.drawing import direction
 from proofroll.files.json_data import plain
 from proofroll.files.netcdf import read_some
 from proofroll.report.labels import symbol, unit
-from proofroll.report.replay import SPEEDS, PackedNumbers, Replayed, frame_times
+from proofroll.report.replay import frame_times
+from proofroll.report.replay_records import SPEEDS, PackedNumbers, Replayed
 
 # Thickness of what is drawn, and what looks right, as parts of the mechanism's length.
 _SCALE, _SEEN = 0.035, 1e-3
