@@ -21,8 +21,8 @@ from proofroll.report.labels import SYMBOLS, detail, verdict_text
 from proofroll.report.plots import point_curves
 from proofroll.report.report_content import report_content
 from proofroll.report.summary import three_sentences
-from proofroll.report.tables import counted, overview
 from proofroll.report.terminal import closing_lines, verdict_table
+from proofroll.report.verdict_matrix import counted, overview
 from proofroll.running.case import Result, Status
 from proofroll.running.store import Store
 from proofroll.studies.outcome import Outcome, Run

@@ -112,3 +112,9 @@ def test_one_place_makes_cases() -> None:
         if isinstance(node, ast.Call) and isinstance(node.func, ast.Name) and node.func.id == "Case"
     }
     assert makers == {"studies/cases.py"}
+
+
+def test_modules_are_short_enough_to_be_read_at_once() -> None:
+    """No module has more than 300 lines."""
+    long = [str(file.relative_to(ROOT)) for file in ROOT.rglob("*.py") if len(file.read_text().splitlines()) > 300]
+    assert long == []

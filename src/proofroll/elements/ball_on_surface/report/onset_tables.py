@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING
 
 from proofroll.elements.ball_on_surface.report.onsets import TrueSlips, first_slip
 from proofroll.report.labels import names, number
-from proofroll.report.tables import anchor
+from proofroll.report.verdict_matrix import anchor
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
