@@ -25,7 +25,9 @@ def run(
     scene: SceneName,
     engine: Annotated[str, typer.Option(help="truth, or name[key=value,…], e.g. mujoco[formulation=chart,dt=1e-4].")],
     settings: Set = None,
-    until: Annotated[float, typer.Option(help="Last time [s].")] = 2.0,
+    until: Annotated[
+        float | None, typer.Option(help="Last time [s]; by default 2, or the scene's duration where that is shorter.")
+    ] = None,
     every: Annotated[
         float | None, typer.Option(help="Interval between samples [s]; by default 0.01, or near it in whole steps.")
     ] = None,
@@ -56,7 +58,8 @@ def run(
     from proofroll.running.runner import run_one
     from proofroll.studies.run_once import single_case
 
-    time_grid(until, EVERY if every is None else every)
+    if until is not None:
+        time_grid(until, EVERY if every is None else every)
     for file in (out, plot):
         if file is not None:
             require_writable(file)

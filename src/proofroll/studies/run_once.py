@@ -8,11 +8,14 @@ from collections.abc import Mapping, Sequence
 from proofroll.core.errors import InputError, ProofrollError
 from proofroll.core.plugins import parse_engine
 from proofroll.core.time_grid import sampling_interval
-from proofroll.files.scene_file import load_scene
+from proofroll.files.scene_file import load_scene, read_scene_file
 from proofroll.running.asking import resolve
 from proofroll.running.case import Case
 from proofroll.running.worker_pool import Workers
 from proofroll.studies.cases import case_of
+
+# Length of a run that nobody gives [s].
+USUAL = 2.0
 
 
 def single_case(
@@ -20,7 +23,7 @@ def single_case(
     parameters: Mapping[str, object],
     engine: str,
     *,
-    until: float,
+    until: float | None,
     every: float | None,
     time_limit: float,
     asks: Sequence[str] = (),
@@ -28,6 +31,7 @@ def single_case(
 ) -> Case:
     """The case of one run.
 
+    Without ``until`` it ends after 2 s, or sooner where the scene's file has a shorter ``duration``.
     Without an interval ``every`` between samples it is that of :func:`proofroll.core.time_grid.sampling_interval`.
     The engine is asked in one of ``workers``, if they are given: the run can then go on in the same process.
 
@@ -43,6 +47,8 @@ def single_case(
     facts = resolve([(spec.name, spec.options)], workers, loaded.requires)[0]
     if isinstance(facts, ProofrollError):
         raise facts
+    if until is None:
+        until = min(USUAL, read_scene_file(scene).duration or USUAL)
     if every is None:
         every = sampling_interval(facts.settings["dt"] if facts.resolution == "dt" else None)
     return case_of(scene, loaded, parameters, facts, until, every, time_limit=time_limit)
