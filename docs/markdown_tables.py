@@ -9,6 +9,7 @@ from proofroll.core.comparison import Tolerance
 from proofroll.core.engine_abilities import Level
 from proofroll.report.comparison_records import ReportedComparison
 from proofroll.report.labels import SYMBOLS, caveat_lines, number, verdict_text
+from proofroll.report.tables import remarks
 from proofroll.report.terminal import columns, step
 from proofroll.report.tradeoff_tables import name_of, step_of
 from proofroll.studies.recommend import recommend
@@ -33,6 +34,11 @@ def verdict_table(content: ReportedComparison) -> str:
 def caveat_list(content: ReportedComparison) -> str:
     """What of some settings is not the engine's own, a line each."""
     return "".join(f"- {line}\n" for line in caveat_lines(content.rows))
+
+
+def remark_list(content: ReportedComparison) -> str:
+    """What is remarked of settings with a star, a line each."""
+    return "".join(f"- {name}: {text}\n" for name, text in remarks(content))
 
 
 # Among what the cheapest is named: everything that is an engine's model, contact models, and the scene's own equations.

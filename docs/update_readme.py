@@ -12,7 +12,7 @@ import matplotlib as mpl
 import matplotlib.pyplot as plt
 import numpy as np
 from made_from import facts, restamped, stamp
-from markdown_tables import caveat_list, cheapest_table, verdict_table
+from markdown_tables import caveat_list, cheapest_table, remark_list, verdict_table
 from screenshot import screenshot
 
 from proofroll.elements.ball_on_surface.regimes_study import load_regimes, regime_maps
@@ -110,6 +110,7 @@ def main() -> None:
     for name, table in (
         ("verdicts", verdict_table(outcome_content(outcome))),
         ("caveats", caveat_list(outcome_content(outcome))),
+        ("remarks", remark_list(outcome_content(outcome))),
         ("cheapest", cheapest_table(study, TOLERANCES)),
     ):
         text = between(text, name, table)

@@ -165,7 +165,7 @@ def complaint(text: str, settings: list[EngineFacts], now: str) -> str:
         if cells[:4] != expected:
             return f"{STALE}: it has {cells[:4]}, the comparison {expected}"
         allowed = {*row.expect, *(verdict for exception in row.except_at for verdict in exception.expect)}
-        if cells[4].split()[1] not in allowed:
+        if cells[4].split()[1].rstrip("*") not in allowed:
             return f"{STALE}: {row.engine} is expected to show {' or '.join(sorted(allowed))}, it has {cells[4]}"
     return "" if made_from.stamped(text) == now else f"{STALE}: comparison, scene, settings or versions have changed"
 
