@@ -33,13 +33,13 @@ PLUGIN_PARTS = {"report", "onset_study", "regimes_study", "commands"}
 
 
 @cache
-def _tree(file: Path) -> ast.Module:
-    return ast.parse(file.read_text(encoding="utf-8"))
+def _nodes(file: Path) -> list[ast.AST]:
+    return list(ast.walk(ast.parse(file.read_text(encoding="utf-8"))))
 
 
 def _imported(file: Path) -> list[tuple[int, str]]:
     found = []
-    for node in ast.walk(_tree(file)):
+    for node in _nodes(file):
         if isinstance(node, ast.ImportFrom) and node.module and node.module.startswith("proofroll."):
             found.append((node.lineno, node.module))
         elif isinstance(node, ast.Import):
@@ -55,7 +55,7 @@ def test_nothing_here_imports_what_stands_on_it() -> None:
     """No module imports an article, a benchmark or the drill; these announce themselves."""
     wrong = []
     for file in ROOT.rglob("*.py"):
-        for node in ast.walk(_tree(file)):
+        for node in _nodes(file):
             names = [alias.name for alias in node.names] if isinstance(node, ast.Import) else []
             names += [node.module] if isinstance(node, ast.ImportFrom) and node.module else []
             wrong += [f"{file.relative_to(ROOT)} imports {name}" for name in names if name.split(".")[0] in OUTSIDE]
@@ -83,7 +83,7 @@ def test_engines_know_no_scene_and_no_surface_by_name() -> None:
     wrong = []
     for file in (ROOT / "engines").rglob("*.py"):
         where = file.relative_to(ROOT)
-        for node in ast.walk(_tree(file)):
+        for node in _nodes(file):
             if isinstance(node, ast.ImportFrom):
                 wrong += [f"{where} imports {alias.name}" for alias in node.names if alias.name in surfaces]
             if isinstance(node, ast.Constant) and isinstance(node.value, str):
@@ -97,7 +97,7 @@ def test_each_class_has_a_name_of_its_own() -> None:
     """No two public classes are called the same: a name says what it is wherever one reads it."""
     homes: dict[str, list[str]] = {}
     for file in ROOT.rglob("*.py"):
-        for node in ast.walk(_tree(file)):
+        for node in _nodes(file):
             if isinstance(node, ast.ClassDef) and not node.name.startswith("_"):
                 homes.setdefault(node.name, []).append(f"{file.relative_to(ROOT)}:{node.lineno}")
     assert {name: where for name, where in homes.items() if len(where) > 1} == {}
@@ -108,7 +108,7 @@ def test_one_place_makes_cases() -> None:
     makers = {
         str(file.relative_to(ROOT))
         for file in ROOT.rglob("*.py")
-        for node in ast.walk(_tree(file))
+        for node in _nodes(file)
         if isinstance(node, ast.Call) and isinstance(node.func, ast.Name) and node.func.id == "Case"
     }
     assert makers == {"studies/cases.py"}

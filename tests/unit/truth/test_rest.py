@@ -2,8 +2,11 @@
 
 from __future__ import annotations
 
+from functools import cache
+
 import numpy as np
 import pytest
+import xarray as xr
 
 from proofroll.core.errors import Refused
 from proofroll.core.events import events_of
@@ -19,7 +22,7 @@ EULER, FRAME = "projection[formulation=euler]", "projection[formulation=rotating
 RK4 = "projection[formulation=rotating_frame,preset=default]"
 
 
-@pytest.mark.parametrize("f", [5e-4, A, 3 * A])
+@pytest.mark.parametrize("f", [5e-4, 3 * A])
 @pytest.mark.parametrize("engine", ["truth", EULER, FRAME, RK4])
 def test_a_level_plane(engine: str, f: float) -> None:
     """The ball stops after V²/(2 · 5/7 g f/a), also where f is larger than the ball, and never moves again."""
@@ -36,13 +39,20 @@ def test_a_level_plane(engine: str, f: float) -> None:
     assert np.all(np.diff(speed) < 1e-13)
 
 
+@cache
+def _rolled_up(f: float, cross_speed: float) -> xr.Dataset:
+    """The truth of a ball that rolls up a slope."""
+    scene = load_scene("inclined_plane", tilt=-0.35, cross_speed=cross_speed, rolling_resistance=f)
+    return simulate(scene, "truth", until=0.5, every=0.05)
+
+
 @pytest.mark.parametrize("engine", [EULER, FRAME, RK4])
 @pytest.mark.parametrize("cross_speed", [0.0, 0.2])
 @pytest.mark.parametrize("f", [1e-3, 0.02])
 def test_rolling_up_a_slope(engine: str, f: float, cross_speed: float) -> None:
     """At the highest point the ball rolls back if f/a is less than tan α, else it stays there by friction's force."""
     scene = load_scene("inclined_plane", tilt=-0.35, cross_speed=cross_speed, rolling_resistance=f)
-    true = simulate(scene, "truth", until=0.5, every=0.05)
+    true = _rolled_up(f, cross_speed)
     found = simulate(scene, engine, until=0.5, every=0.05)
     accuracy = 1e-6 if engine == RK4 else 1e-11
     for name in ("p_WB", "v_WB", "N", "F2"):
@@ -63,9 +73,9 @@ def test_a_start_from_rest(engine: str, f: float, acceleration: float) -> None:
 
 def test_less_and_less_to_and_fro() -> None:
     """A ball that slips to a stop and back infinitely often in a finite time comes to rest at the end of that time."""
-    f, mu, v = 3e-3, 0.0654, 0.5
+    f, mu, v = 3e-3, 0.08, 0.5
     scene = load_scene("inclined_plane", tilt=0, speed=v, cross_speed=0, rolling_resistance=f, mu_static=mu)
-    found = simulate(scene, "truth", until=2.0, every=0.1)
+    found = simulate(scene, "truth", until=1.0, every=0.1)
     # Half a cycle: friction stops the centre while the contact slips ever faster, and reverses it until it slips no
     # more. With φ = f/a, κ = 2/5: u̇ = g ((φ - μ)/κ - μ), then -g ((φ + μ)/κ + μ); every half the speed is r times less.
     phi, kappa = f / A, 0.4

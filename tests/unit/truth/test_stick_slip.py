@@ -264,7 +264,7 @@ def test_between_two_regimes_the_answer_is_ill_posed(factor: float) -> None:
 
 
 @pytest.mark.parametrize(
-    ("parameters", "until", "kinds"), [({"mu_static": 0.15}, 8.0, 28), ({"speed": 100.0, "mu_static": 2e-4}, 2.0, 32)]
+    ("parameters", "until", "kinds"), [({"mu_static": 0.15}, 4.0, 14), ({"speed": 100.0, "mu_static": 2e-4}, 0.1, 15)]
 )
 def test_long_sequences(
     parameters: dict[str, float], until: float, kinds: int, monkeypatch: pytest.MonkeyPatch
