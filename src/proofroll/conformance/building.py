@@ -9,7 +9,7 @@ from unittest import SkipTest
 
 import numpy as np
 
-from proofroll.conformance.explaining import explained
+from proofroll.conformance.explaining import UnlikeSceneError
 from proofroll.conformance.subject import Subject, bits, lacking, require, scenes
 from proofroll.core.certificate import certify, first_difference
 from proofroll.core.element_abilities import HasOptionalCapabilities
@@ -66,7 +66,8 @@ def _refusal(engine: Any, formulation: str, scene: Scene) -> str:
 def certificate_holds(subject: Subject) -> None:
     """What was built is what the scene says: mass, inertia, gravity, radius, start, first accelerations and forces."""
     difference = first_difference(certify(subject.build(), subject.scene))
-    require(difference is None, explained(subject, str(difference)) if difference else "")
+    if difference is not None:
+        raise UnlikeSceneError(subject, str(difference))
 
 
 def builds_only_what_is_required(subject: Subject) -> None:

@@ -10,6 +10,7 @@ from typing import Any
 from unittest import SkipTest
 
 from proofroll.conformance import building, declarations, motion, response
+from proofroll.conformance.explaining import UnlikeSceneError, explained
 from proofroll.conformance.subject import Subject, lacking, scenes
 
 # One per engine.
@@ -83,7 +84,10 @@ class Check:
         except Exception as error:
             if self.known:
                 raise SkipTest(f"known: {self.known}") from error
-            what = str(error) if isinstance(error, AssertionError) else f"{type(error).__name__}: {error}"
+            if isinstance(error, UnlikeSceneError):
+                what = explained(error)
+            else:
+                what = str(error) if isinstance(error, AssertionError) else f"{type(error).__name__}: {error}"
             raise AssertionError(f"{what}\n\nTo reproduce:\n{self.reproducer}") from error
         if self.known:
             raise AssertionError(f"{self.name} passes, though it is said to fail ({self.known}); take it off the list")

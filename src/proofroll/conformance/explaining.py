@@ -16,10 +16,19 @@ from proofroll.core.errors import Diverged, InputError, Refused
 _SAMPLES, _PART = 36, 100
 
 
-def explained(subject: Subject, sentence: str) -> str:
+class UnlikeSceneError(AssertionError):
+    """What an engine built or did is not what the scene says; the causes are looked for where they are told."""
+
+    def __init__(self, subject: Subject, sentence: str) -> None:
+        super().__init__(sentence)
+        self.subject = subject
+
+
+def explained(error: UnlikeSceneError) -> str:
     """The sentence of a failed check, with the proven causes of the difference behind it, if there are any."""
     from proofroll.core.truth import truth
 
+    subject, sentence = error.subject, str(error)
     scene, step = subject.scene, subject.settings.dt if subject.fixed_step else None
     interval = scene.natural_time / _PART
     if step is not None:

@@ -10,6 +10,7 @@ import numpy as np
 from scipy.spatial.transform import Rotation
 
 from proofroll.conformance.subject import Subject, bits, require
+from proofroll.core.arrays import FloatArray
 from proofroll.core.engine_abilities import declared_order
 from proofroll.core.errors import Diverged
 from proofroll.files.scene_file import load_scene
@@ -117,20 +118,21 @@ def order_is_as_declared(subject: Subject) -> None:
     declared = declared_order(subject.engine, subject.settings, subject.scene)
     if declared is None:
         raise SkipTest("no order is declared")
-    rung, seen = subject, []
+    ends, factor, seen = _Ends(subject), 1.0, []
     # The preset's step may be so small that only round-off is left, or so large that the order is not yet seen; which,
     # is decided without a look at what was declared.
     for _ in range(_TRIES):
-        first, second = _observed_orders(rung)
-        seen.append(f"{first:.2f}, {second:.2f} at dt = {rung.settings.dt:g}")
+        first, second = ends.orders(factor)
+        dt = subject.settings.dt * factor
+        seen.append(f"{first:.2f}, {second:.2f} at dt = {dt:g}")
         if math.isnan(second):
-            rung = rung.finer(2.0)
+            factor *= 2
         elif abs(first - second) > _SETTLED:
-            rung = rung.finer(0.5)
+            factor /= 2
         else:
             require(
                 abs(second - declared) <= _ORDER_TOLERANCE,
-                f"the declared order is {declared}, the observed one {second:.2f} at dt = {rung.settings.dt:g}",
+                f"the declared order is {declared}, the observed one {second:.2f} at dt = {dt:g}",
             )
             return
     if all("nan" in text for text in seen):
@@ -138,18 +140,36 @@ def order_is_as_declared(subject: Subject) -> None:
     raise AssertionError(f"the declared order is {declared}, but none is observed: {'; '.join(seen)}")
 
 
-def _observed_orders(subject: Subject) -> tuple[float, float]:
-    """Orders from the steps 2h, h, h/2 and h, h/2, h/4; NaN where round-off hides them."""
-    ladder = [subject.finer(factor) for factor in (2.0, 1.0, 0.5, 0.25)]
-    t = ladder[0].span(1, _ORDER_SPAN)
-    try:
-        states = [each.scaled(each.at(t).sample()) for each in ladder]
-    except Diverged:
-        return math.inf, 0.0  # too coarse
-    changes = [float(np.max(np.abs(coarse - fine))) for coarse, fine in pairwise(states)]
-    if changes[-1] < _ROUND_OFF:
-        return math.nan, math.nan
-    return math.log2(changes[0] / changes[1]), math.log2(changes[1] / changes[2])
+class _Ends:
+    """Where runs of one motion with several steps end, each made once."""
+
+    def __init__(self, subject: Subject) -> None:
+        self._subject = subject
+        self._known: dict[tuple[float, float], FloatArray | None] = {}
+
+    def orders(self, factor: float) -> tuple[float, float]:
+        """Orders from the steps 2h, h, h/2 and h, h/2, h/4, with h so many steps; NaN where round-off hides them."""
+        t = self._subject.finer(2 * factor).span(1, _ORDER_SPAN)
+        states = []
+        for part in (2.0, 1.0, 0.5, 0.25):
+            state = self._end(part * factor, t)
+            if state is None:
+                return math.inf, 0.0  # too coarse
+            states.append(state)
+        changes = [float(np.max(np.abs(coarse - fine))) for coarse, fine in pairwise(states)]
+        if changes[-1] < _ROUND_OFF:
+            return math.nan, math.nan
+        return math.log2(changes[0] / changes[1]), math.log2(changes[1] / changes[2])
+
+    def _end(self, factor: float, t: float) -> FloatArray | None:
+        """The state at time ``t`` [s], none where the run diverges."""
+        if (factor, t) not in self._known:
+            rung = self._subject.finer(factor)
+            try:
+                self._known[factor, t] = rung.scaled(rung.at(t).sample())
+            except Diverged:
+                self._known[factor, t] = None
+        return self._known[factor, t]
 
 
 def tolerance_has_an_effect(subject: Subject) -> None:

@@ -3,14 +3,15 @@
 from __future__ import annotations
 
 import dataclasses
+import math
 from functools import cache
 from typing import TYPE_CHECKING, Any
 from unittest import SkipTest
 
 import numpy as np
 
-from proofroll.conformance.explaining import explained
-from proofroll.conformance.subject import Subject, require
+from proofroll.conformance.explaining import UnlikeSceneError
+from proofroll.conformance.subject import Subject
 from proofroll.core.arrays import FloatArray
 from proofroll.core.certificate import first_difference
 from proofroll.core.dataset import from_samples, scales
@@ -49,7 +50,8 @@ def first_steps_fit_the_scene(subject: Subject) -> None:
     if not lines:
         raise SkipTest("its contact is so soft that its springs move first; the run against the truth judges it")
     difference = first_difference([dataclasses.replace(line, tolerance=min(line.tolerance, MOST)) for line in lines])
-    require(difference is None, explained(subject, str(difference)) if difference else "")
+    if difference is not None:
+        raise UnlikeSceneError(subject, str(difference))
 
 
 def moves_as_the_truth(subject: Subject) -> None:
@@ -70,8 +72,9 @@ def moves_as_the_truth(subject: Subject) -> None:
         # The speed may be many times what gravity adds to it; a tolerance is relative to it.
         rough = max(_ROUND_OFF, 10 * subject.closeness)
         allowed = min(_MOST, _MARGIN * change + soft + rough)
-        off = f"{name} is off by {error:.2g} of what gravity makes of it in {times[-1]:.2g} s, allowed {allowed:.2g}"
-        require(error <= allowed, off if error <= allowed else explained(subject, off))
+        if error > allowed or math.isnan(error):
+            made = f"of what gravity makes of it in {times[-1]:.2g} s"
+            raise UnlikeSceneError(subject, f"{name} is off by {error:.2g} {made}, allowed {allowed:.2g}")
 
 
 def _moved(subject: Subject, times: FloatArray, true: xr.Dataset) -> dict[str, FloatArray]:
