@@ -130,7 +130,7 @@ WRONGS = [_values(np.negative), _values(lambda v: v[::-1]), _values(lambda v: 1.
 
 def test_no_statement_is_one_that_no_run_can_contradict(runner: Runner) -> None:
     """For each statement about each run there is a wrong run that contradicts it, and the right one does not."""
-    figures = dataclasses.replace(load_figures("paper_figures"), every=4e-3)
+    figures = dataclasses.replace(load_figures("paper_figures"), every=8e-3)
     whole = run_figures(figures, runner, "projection[formulation=euler,rtol=1e-8]")
     right = judged(whole)
     assert [entry["says"] for entry in right if entry["holds"] is not True] == []
@@ -219,7 +219,7 @@ def test_past_the_first_slip_by_the_truth(runner: Runner) -> None:
     panels = [dataclasses.replace(panel, runs=["slipping"]) for panel in figure.panels]
     panels.append(dataclasses.replace(panels[0], y=["theta"]))
     mine = only(
-        whole, "slipping", until=SHORT, every=5e-3, statements=statements,
+        whole, "slipping", until=SHORT, every=1e-2, statements=statements,
         figures=[dataclasses.replace(figure, panels=panels)],
     )  # fmt: skip
     study = run_figures(mine, runner, "truth")

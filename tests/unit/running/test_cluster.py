@@ -165,8 +165,8 @@ def test_results_are_those_of_home(dask: DaskCluster, tmp_path: Path, room: Path
     own = str(tmp_path / "mine" / "my_plane")
     robot = tmp_path / "arm.urdf"
     robot.write_text(urdf(), encoding="utf-8")
-    some = [case("oracle"), case("exits"), case("truth"), case("oracle", 1.5, own)]
-    some += [single_case(str(robot), {}, "projection", until=0.02, every=0.01, time_limit=60.0, workers=ASKED)]
+    some = [case("oracle"), case("exits"), case("oracle", 1.5, own)]
+    some += [single_case(str(robot), {}, "truth", until=0.02, every=0.01, time_limit=60.0, workers=ASKED)]
     waiting = [case("waiting", speed) for speed in (3.0, 3.5)]
     home, away = Store(tmp_path / "home"), Store(tmp_path / "away")
 

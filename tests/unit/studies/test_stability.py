@@ -33,7 +33,7 @@ from proofroll.studies.step_numbers import OSCILLATION, explanation, values
 
 SPEED = Axis("V0", "m/s", "initial speed", [2.0, 8.0], {"speed": AxisTerm()})
 ENGINE = "projection[formulation=rotating_frame,preset=default]"
-SHORT = Effort(periods=1.0, steps=700)
+SHORT = Effort(periods=1.0, steps=200)
 
 
 def mapped(folder: Path, engines: list[str], axes: list[Axis], **more: Any) -> Any:

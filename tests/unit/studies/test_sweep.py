@@ -23,7 +23,6 @@ def swept(tmp_path_factory: pytest.TempPathFactory) -> tuple[dict[str, Curve], f
     """Curves over steps and over tolerances, and the range of z."""
     curves, absent = curves_of(
         [
-            "exudyn[formulation=generic,preset=default]",
             "projection[formulation=rotating_frame,preset=default]",
             "projection[formulation=rotating_frame,preset=matched]",
             "pinocchio[formulation=composite,preset=matched]",
@@ -37,14 +36,13 @@ def swept(tmp_path_factory: pytest.TempPathFactory) -> tuple[dict[str, Curve], f
 def test_a_curve_over_steps_begins_where_it_breaks(swept: tuple[dict[str, Curve], float]) -> None:
     """The coarsest step is extended until the run is broken, the finest while the error still falls."""
     curves, scale = swept
-    for name in ("exudyn[formulation=generic,preset=default]", "projection[formulation=rotating_frame,preset=default]"):
-        points = curves[name].points
-        assert len(points) >= 6
-        first = points[0]
-        assert first.step is not None
-        broken = first.result.status != Status.DONE or first.errors["z"] >= BROKEN * scale
-        assert broken or first.step == 8 * QUESTION.every
-        assert points[-1].errors["z"] < 1e-4 * scale
+    points = curves["projection[formulation=rotating_frame,preset=default]"].points
+    assert len(points) >= 6
+    first = points[0]
+    assert first.step is not None
+    broken = first.result.status != Status.DONE or first.errors["z"] >= BROKEN * scale
+    assert broken or first.step == 8 * QUESTION.every
+    assert points[-1].errors["z"] < 1e-4 * scale
 
 
 def test_a_curve_over_tolerances(swept: tuple[dict[str, Curve], float]) -> None:
@@ -95,13 +93,13 @@ def test_a_tolerance_that_holds_only_between_many_samples_does_not_hold(
         assert loose.sparse is not None
         assert loose.errors["z"] == loose.sparse.errors["z"]
         assert loose.sparse.case.every == QUESTION.until / 2
-    fixed = swept[0]["exudyn[formulation=generic,preset=default]"].points
+    fixed = swept[0]["projection[formulation=rotating_frame,preset=default]"].points
     assert all(point.sparse is None for point in fixed)
 
 
 def test_how_far_a_curve_goes_does_not_hang_on_how_fast_the_machine_is() -> None:
     """Runs that seem to have taken a thousand times as long are followed by the same finer steps."""
-    (curve,), _ = curves_of(["exudyn[formulation=generic,preset=default]"])
+    (curve,), _ = curves_of(["projection[formulation=rotating_frame,preset=default]"])
 
     def point(step: float, error: float, seconds: float) -> CurvePoint:
         facts = replace(curve.facts, settings=curve.facts.settings | {"dt": step})
