@@ -211,7 +211,7 @@ def test_curves_of_another_version_are_not_answered_from(
 
 def test_tradeoff_and_then_recommend(proofroll: Proofroll, tmp_path: Path) -> None:
     """Tables fit 100 columns, the diagram and pyperf's file are written, and an answer comes from what was measured."""
-    given = ["--set", "speed=3", "--until", "0.2", "--engine", ENGINE, "--out", str(tmp_path)]
+    given = ["--set", "speed=3", "--until", "0.1", "--engine", ENGINE, "--out", str(tmp_path)]
     code, out, err = proofroll("tradeoff", "sphere_in_cylinder", *given)
     assert (code, err) == (0, "")
     assert all(len(line) <= 100 for line in out.splitlines())

@@ -187,7 +187,8 @@ def test_stopping_on_a_plane(tilt: float, speed: float, across: float, resistanc
         cross_speed=across * speed * natural,
         rolling_resistance=resistance * radius,
     )
-    until = 3 * (speed + 1) * math.sqrt(radius / G) / min(resistance, 1.0)
+    # Until the stronger one, resistance or slope, has stopped it or turned it round.
+    until = 3 * (speed + 1) * math.sqrt(radius / G) / min(max(resistance, abs(tilt)), 1.0)
     true = check_truth(scene, until)
     assert_agrees(simulated(scene, FRAME, until), true, ("p_WB", "v_WB", "w_WB"))
     level = true["energy"].to_numpy()
