@@ -13,7 +13,7 @@ import pytest
 import xarray as xr
 
 from blajer_2006.definition import Figures
-from blajer_2006.drawing import drawn, inline, looks, picture
+from blajer_2006.drawing import drawn, inline, looks, picture, saved
 from blajer_2006.judging import count, judged, rounds_to
 from blajer_2006.reading import load_figures
 from blajer_2006.study import FigureRuns, run_figures
@@ -174,9 +174,9 @@ def test_every_axis_has_a_unit(study: FigureRuns) -> None:
     """Both axes of each panel are named with a unit, in the figure and in the file."""
     for figure in study.figures.figures:
         with looks():
-            axes = drawn(figure, study).axes
+            made = drawn(figure, study)
+            axes, text = made.axes, saved(made, "svg", figure).decode()
         assert len(axes) == len(figure.panels)
-        text = picture(figure, study, "svg").decode()
         for item, panel in zip(axes, figure.panels, strict=True):
             for label in (item.get_xlabel(), item.get_ylabel()):
                 assert re.search(r" \[(m|s|N|rad|rad/s|–)\]$", label)
