@@ -7,6 +7,7 @@ from typing import Any
 
 from blajer_2006.part import FiguresPart
 from blajer_2006.reading import load_figures
+from blajer_2006.study import run_figures
 from proofroll.elements.ball_on_surface.regimes_study import load_regimes, regime_map
 from proofroll.elements.ball_on_surface.report.regimes_part import RegimesPart
 from proofroll.files.scene_file import load_scene
@@ -117,6 +118,11 @@ name = "height"
 caption = "The height over time."
 panels = [{ y = ["z"], runs = ["free"] }]
 
+[[figures]]
+name = "map"
+caption = "What happens where."
+regimes = "regimes"
+
 [[statements]]
 says = "ω3 is constant"
 source = "section 3"
@@ -134,9 +140,9 @@ def regimes_part() -> RegimesPart:
 
 
 def figures_part(folder: Path) -> FiguresPart:
-    """A figure of a true run, and a statement that holds."""
+    """A figure of a true run, one of a map, and a statement that holds."""
     file = folder / "invented.toml"
     file.write_text(FIGURES, encoding="utf-8")
-    part = FiguresPart(load_figures(str(file)))
-    part.make(Runner(Store(folder / "cases"), jobs=1), folder, lambda *_: None)
+    part = FiguresPart(load_figures(str(file)), maps={"regimes": regimes_part().maps})
+    part.study = run_figures(part.asked, Runner(Store(folder / "cases"), jobs=1), None, lambda *_: None)
     return part
