@@ -66,9 +66,10 @@ class _TogetherWhatShares(LoadScopeScheduling):
     def _split_scope(self, nodeid: str) -> str:
         path = nodeid.partition("::")[0]
         folder = path.split("/")[1]
-        # A browser and pages are shared by a whole folder, truths by the rows of a comparison; the many checks of
-        # conformance share nothing dear.
-        return {"report": folder, "agreement": nodeid.partition("-")[0], "conformance": nodeid}.get(folder, path)
+        # A browser and pages are shared by a whole folder, truths by the rows of a comparison and by the engines that
+        # are held against them; the many other checks of conformance share nothing dear.
+        check = nodeid.rpartition("-")[2] if "moves_as_the_truth" in nodeid else nodeid
+        return {"report": folder, "agreement": nodeid.partition("-")[0], "conformance": check}.get(folder, path)
 
 
 @pytest.hookimpl(optionalhook=True)
