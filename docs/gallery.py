@@ -6,9 +6,10 @@ import dataclasses
 import sys
 from pathlib import Path
 
-from markdown_tables import caveat_list, verdict_table
+from markdown_tables import caveat_list, remark_list, verdict_table
 
 from proofroll.core.comparison import Comparison
+from proofroll.core.verdict import Verdict
 from proofroll.files.comparison_file import load_comparison
 from proofroll.files.data_folders import data_folder
 from proofroll.files.netcdf import read
@@ -54,9 +55,9 @@ def comparisons() -> dict[str, Comparison]:
 def failures(content: ReportedComparison) -> str:
     """Why rows have no result, a line each."""
     return "".join(
-        f"- {row['name']} {row['formulation']} {row['setting']} failed, {row['reason']}.\n"
+        f"- {row.name} {row.formulation} {row.setting} failed, {row.reason}.\n"
         for row in content.rows
-        if row["verdict"] == "failed"
+        if row.verdict is Verdict.FAILED
     )
 
 
@@ -102,7 +103,7 @@ def section(scene: str, comparison: Comparison | None, runner: Runner) -> str:
     parts += [f"**Asked** ({path}): {comparison.question}\n", f"**True**: {truth(outcome, runner)}\n"]
     # Without costs, which are measured in turns where that is asked.
     table = "".join(line.rstrip("\n").rsplit("|", 2)[0] + "|\n" for line in verdict_table(content).splitlines())
-    parts += [table, failures(content) + caveat_list(content)]
+    parts += [table, failures(content) + caveat_list(content) + remark_list(content)]
     return "\n".join(part for part in parts if part)
 
 
