@@ -18,6 +18,7 @@ from other_pythons import PLUGINS, script, seen_line
 from proofroll.core.errors import InputError, ProofrollError
 from proofroll.running import environments, make_environment
 from proofroll.running.interpreters import python_at
+from proofroll_drill.processes import alive, wait_until
 
 
 @pytest.fixture
@@ -103,7 +104,7 @@ def test_an_interrupted_environment_leaves_nothing(wheels: Path, tmp_path: Path)
     folder = environments.place("aged", "2.0")
     assert not folder.exists()
     assert environments.remembered() == []
-    assert not Path(f"/proc/{pidfile.read_text().strip()}/cmdline").is_file()
+    assert wait_until(lambda: not alive(int(pidfile.read_text())))
     with environments.making(folder), pytest.raises(ProofrollError, match="by another process"):
         make_environment.add("aged", ["aged==2.0"])
     assert wheels.is_dir()

@@ -17,6 +17,7 @@ from proofroll.core.errors import ProofrollError
 from proofroll.running import process
 from proofroll.running.case import Status
 from proofroll.running.process import Worker, WorkerDied, end_all
+from proofroll_drill.processes import alive
 
 # Where a worker stands is read from /proc; without it memory is not watched either.
 pytestmark = [
@@ -55,14 +56,6 @@ def pretend(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Pretend:
         monkeypatch.setattr(process.subprocess, "Popen", start)
 
     return install
-
-
-def alive(number: int) -> bool:
-    """Whether a process runs; one that only waits to be reaped does not."""
-    try:
-        return Path(f"/proc/{number}/stat").read_text().rpartition(")")[2].split()[0] not in "ZX"
-    except FileNotFoundError:
-        return False
 
 
 def died(time_limit: float = 60.0, memory: float | None = None) -> WorkerDied:
