@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -10,14 +11,18 @@ from blajer_2006.reading import load_figures
 from blajer_2006.study import run_figures
 from proofroll.elements.ball_on_surface.regimes_study import load_regimes, regime_map
 from proofroll.elements.ball_on_surface.report.regimes_part import RegimesPart
+from proofroll.files.json_data import plain
 from proofroll.files.scene_file import load_scene
 from proofroll.report.stability_part import StabilityPart
 from proofroll.report.tradeoff_part import TradeoffPart
 from proofroll.running.runner import Runner
 from proofroll.running.store import Store
 from proofroll.studies import study_identity
+from proofroll.studies.axes import Axis
 from proofroll.studies.claims import claims_for
 from proofroll.studies.stability_claims import file_for
+from proofroll.studies.stability_places import QUICK
+from proofroll.studies.stability_records import Boundary, BoundaryPoint, ExplainedBoundary, StabilityStudy
 
 
 def point(number: int, engine: str, error: float, seconds: float, **more: Any) -> dict[str, Any]:
@@ -55,43 +60,39 @@ def tradeoff_study() -> dict[str, Any]:
         "quantity": "z", "quantities": quantities, "points": points, "dropped": [],
         "absent": {"lost": "lost is not installed here"}, "budgets": [budget],
         "pareto": {"z": [0, 2]}, "pareto_engines": {"z": [0, 1]}, "truth": {"seconds_per_second": 1.0, "route": ""},
-        "over": {}, "findings": ["3 runs: none refused."], "brief": True, "measured": study_identity.measured(),
+        "over": {}, "findings": ["3 runs: none refused."], "brief": True, "measured": plain(study_identity.measured()),
     }  # fmt: skip
 
 
-def stability_study() -> dict[str, Any]:
-    """A map of two points: one silent at every step, one with a boundary and a program."""
-    side = {
-        "largest": None, "reached": False, "numbers": {}, "beyond": 1e-4, "failure": "sank in", "silent": True,
-        "error": 1.5, "time": 0.1, "message": "reached 2 s",
-    }  # fmt: skip
-    base = {
+def boundary_point(**more: Any) -> BoundaryPoint:
+    """A point of an invented map: silent at every step."""
+    side = Boundary(None, False, {}, 1e-4, "sank in", True, 1.5, 0.1, "reached 2 s")
+    values = {
         "engine": "good", "settings": {"formulation": "only", "preset": "tuned"}, "curve": "good[formulation=only]",
-        "level": None, "resolution": "dt", "axis": "V0", "value": 4.0, "parameters": {"speed": 4.0}, "until": 2.0,
-        "period": 0.6, "largest_stable": None, "largest_accurate": None, "boundary": "stable", "failure": "sank in",
-        "silent": True, "message": "reached 2 s", "sides": {"stable": side, "accurate": side}, "least_error": 0.9,
-        "finest": 1e-4, "too_slow": None, "timed_out": False, "runs": 7,
-        "problem": None, "reproducer": None, "reproducer_note": None,
+        "level": None, "caveat": "", "resolution": "dt", "axis": "V0", "value": 4.0, "parameters": {"speed": 4.0},
+        "until": 2.0, "period": 0.6, "largest_stable": None, "largest_accurate": None, "boundary": "stable",
+        "failure": "sank in", "silent": True, "message": "reached 2 s", "sides": {"stable": side, "accurate": side},
+        "least_error": 0.9, "finest": 1e-4, "too_slow": None, "timed_out": False, "runs": 7, "problem": None,
     }  # fmt: skip
-    held = side | {"largest": 1e-3, "reached": True, "numbers": {"turn": 0.2}, "silent": False}
-    other = base | {
-        "value": 8.0, "largest_stable": 1e-3, "largest_accurate": 1e-3, "silent": False,
-        "sides": {"stable": held, "accurate": held}, "reproducer": "/somewhere/else/stability/x/good-V0-8.py",
-    }  # fmt: skip
-    axis = {"name": "V0", "unit": "m/s", "meaning": "how fast it begins", "values": [4.0, 8.0], "parameters": {}}
-    explained = {
-        "curve": base["curve"], "axis": "V0", "boundary": "stable", "number": "turn", "low": 0.2, "high": 0.3,
-        "spread": 1.5, "explains": True,
-    }  # fmt: skip
-    return {
-        "study": "stability", "scene": "sphere_in_cylinder", "axes": [axis], "periods": 3.0, "accurate": 0.01,
-        "runs": 14, "boundaries": 2, "silent": 1, "refused": 0,
-        "failures": {"sank in": 2}, "never_accurate": 1, "meanings": {},
-        "points": [base, other], "explanations": [explained], "findings": ["good depends on mass, as it should not"],
-        "step_symbols": {}, "places": [], "absent": {},
-        "effort": {"values": 3, "steps": 75_000, "matched": True, "longest": None},
-        "measured": study_identity.measured(),
-    }  # fmt: skip
+    return BoundaryPoint(**(values | more))
+
+
+def stability_study() -> StabilityStudy:
+    """A map of two points: one silent at every step, one with a boundary and a program."""
+    silent = boundary_point()
+    held = replace(silent.shown, largest=1e-3, reached=True, numbers={"turn": 0.2}, silent=False)
+    other = boundary_point(
+        value=8.0, largest_stable=1e-3, largest_accurate=1e-3, silent=False, sides={"stable": held, "accurate": held},
+        reproducer="/somewhere/else/stability/x/good-V0-8.py",
+    )  # fmt: skip
+    explained = ExplainedBoundary("turn", 0.2, 0.3, 1.5, True, curve=silent.curve, axis="V0", boundary="stable")
+    return StabilityStudy(
+        scene="sphere_in_cylinder", axes=[Axis("V0", "m/s", "how fast it begins", [4.0, 8.0])], periods=3.0,
+        accurate=0.01, runs=14, boundaries=2, silent=1, refused=0, failures={"sank in": 2}, never_accurate=1,
+        meanings={}, points=[silent, other], explanations=[explained],
+        findings=["good depends on mass, as it should not"], step_symbols={}, places=[], absent={}, effort=QUICK,
+        measured=study_identity.measured(),
+    )  # fmt: skip
 
 
 def further() -> list[Any]:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from types import SimpleNamespace
 from typing import Any
 
@@ -71,7 +72,7 @@ def test_advice_and_silent_failures_carry_the_caveat() -> None:
     mine = {"caveat": "somebody else's steps"}
     offered, mapped = tradeoff_study(), stability_study()
     offered["points"] = [point | mine for point in offered["points"]]
-    mapped["points"] = [point | mine for point in mapped["points"]]
+    mapped = replace(mapped, points=[replace(point, caveat=mine["caveat"]) for point in mapped.points])
     answer = recommend(offered, Wish("z", Tolerance(1e-2, False, "m")))
     chosen = next(line for line in answer_lines(answer) if "use rough" in line)
     assert "somebody else's steps" in chosen

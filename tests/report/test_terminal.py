@@ -69,7 +69,7 @@ def test_each_further_study_has_its_line(content: ReportContent) -> None:
         "figures": [entry(study={"statements": stated}, name="figs")],
         "regimes": [],
         "tradeoffs": [claimed(study={"points": [1, 2, 3]}, claims=held, name="speed"), entry(name="absent")],
-        "stability": [claimed(study={"silent": 4, "boundaries": 9}, claims=[held[0], held[2]], name="map")],
+        "stability": [claimed(study=claimed(silent=4, boundaries=9), claims=[held[0], held[2]], name="map")],
     }
     assert part_lines(replace(content, entries=entries)) == [
         "figs: 1 of 2 statements and 0 of 1 of this project's own hold.",

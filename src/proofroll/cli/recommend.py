@@ -121,7 +121,7 @@ def _stored_study(
 
     reasons: list[str] = []
     for path in (stored(out, question), *restricted(out, question)):
-        study, changes = kept(path)
+        study, changes = kept(path, dict)
         if study is not None and not covers(study.get("engines", ()), engines):
             changes = [f"what is stored is of {', '.join(study['engines'])}; choose among these with --engine"]
             study = None

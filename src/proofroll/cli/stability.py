@@ -54,7 +54,7 @@ def stability(
     runner = new_runner(out, fresh, jobs, scheduler)
     with progress_bar("stability", None) as advance:
         study, path = make_stability(asked, axes, runner, out, engines=engine or [], effort=effort, progress=advance)
-    contradictions = study["claims"]["contradictions"]
+    contradictions = study.claims.contradictions if study.claims else []
     draw(study, path.with_suffix(".svg"))
     if as_json:
         write_json(study)
@@ -72,18 +72,18 @@ def stability(
             terminal.print("The worst that nobody is told of:", markup=False)
         for line in worst:
             terminal.print(f"  {line}", markup=False)
-        for line in study["findings"]:
+        for line in study.findings:
             terminal.print(line, markup=False)
-        for place in study["places"]:
-            if place["problem"]:
-                terminal.print(f"{place['axis']} = {place['value']:g}: {place['problem']}", markup=False)
-        for name, reason in study["absent"].items():
+        for place in study.places:
+            if place.problem:
+                terminal.print(f"{place.axis} = {place.value:g}: {place.problem}", markup=False)
+        for name, reason in study.absent.items():
             terminal.print(f"{name}: {reason}", markup=False)
         for line in contradictions:
             terminal.print(f"!! {line}", markup=False)
         terminal.print(f"The map is in {path.with_suffix('.svg')}, everything in {path}.", markup=False)
-    if study["absent"] and not study["points"]:
-        for name, reason in study["absent"].items():
+    if study.absent and not study.points:
+        for name, reason in study.absent.items():
             complain(f"{name}: {reason}")
         raise typer.Exit(ENGINE)
     raise typer.Exit(CONTRADICTED if contradictions else OK)

@@ -5,7 +5,9 @@ from __future__ import annotations
 import math
 from collections.abc import Mapping
 from dataclasses import fields, is_dataclass
-from typing import Any
+from typing import Any, TypeVar
+
+_Record = TypeVar("_Record")
 
 # How a field of a record stands in JSON, where not under its own name: with its own fields among those around it; or
 # not at all where it is None.
@@ -39,3 +41,14 @@ def _plain_record(record: Any) -> Any:
         elif value is not None or how != "optional":
             told[field.name] = plain(value)
     return told
+
+
+def record(kind: type[_Record], content: object) -> _Record:
+    """The record of which :func:`plain` made this; what has no field is left out.
+
+    Raises:
+        ValueError: it is of something else.
+    """
+    from pydantic import TypeAdapter  # takes a while to import, and few commands read records
+
+    return TypeAdapter(kind).validate_python(content)

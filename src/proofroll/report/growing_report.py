@@ -96,7 +96,9 @@ class Report:
         entries[index : index + 1] = [said]
         known = {**content.entries, part.key: entries}
         # Of a kept study the versions are those of now.
-        versions = content.environment.versions | dict((said.study or {}).get("versions", {}))
+        versions = content.environment.versions | dict(
+            said.study.get("versions", {}) if isinstance(said.study, dict) else {}
+        )
         self.content = replace(
             content,
             entries=known,

@@ -2,13 +2,15 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
 from dataclasses import dataclass
-from typing import Any
+from typing import TYPE_CHECKING
 
 from proofroll.report.labels import number, unit
 from proofroll.report.stability_map import LETTERS, cell
 from proofroll.report.stability_tables import label
+
+if TYPE_CHECKING:
+    from proofroll.studies.stability_records import BoundaryPoint, StabilityStudy
 
 # From here on a colour is dark enough for light letters.
 _DEEP = 0.5
@@ -50,7 +52,7 @@ class ListedPoint:
 
     id: str
     label: str
-    found: Mapping[str, Any]
+    found: BoundaryPoint
 
 
 @dataclass(frozen=True)
@@ -63,64 +65,63 @@ class HeatMap:
     points: list[ListedPoint]
 
 
-def table(study: Mapping[str, Any], prefix: str) -> HeatMap:
+def table(study: StabilityStudy, prefix: str) -> HeatMap:
     """The map and the list of its points.
 
     Args:
-        study: as :func:`proofroll.studies.stability_content.stability_document` has it.
+        study: of a scene.
         prefix: of the points' ids.
     """
     valued = {
-        axis["name"]: list(dict.fromkeys(p["value"] for p in study["points"] if p["axis"] == axis["name"]))
-        for axis in study["axes"]
+        axis.name: list(dict.fromkeys(p.value for p in study.points if p.axis == axis.name)) for axis in study.axes
     }
     axes = [
-        HeatAxis(axis["name"], unit(axis["unit"]), axis["meaning"], valued[axis["name"]])
-        for axis in study["axes"]
-        if valued[axis["name"]]
+        HeatAxis(axis.name, unit(axis.unit), axis.meaning, valued[axis.name])
+        for axis in study.axes
+        if valued[axis.name]
     ]
     columns = [(axis.name, value) for axis in axes for value in axis.values]
     cells: dict[str, dict[tuple[str, float], HeatCell]] = {}
-    for index, point in enumerate(study["points"]):
-        cells.setdefault(point["curve"], {})[point["axis"], point["value"]] = _cell(point, f"{prefix}{index}")
+    for index, point in enumerate(study.points):
+        cells.setdefault(point.curve, {})[point.axis, point.value] = _cell(point, f"{prefix}{index}")
     groups: dict[str, list[HeatLine]] = {}
-    for point in {point["curve"]: point for point in study["points"]}.values():
-        line = HeatLine(_rest(point), [cells[point["curve"]].get(column) for column in columns])
-        groups.setdefault(point["engine"], []).append(line)
-    seen = {point["failure"] for point in study["points"]}
-    listed = [ListedPoint(f"{prefix}{index}", label(point), point) for index, point in enumerate(study["points"])]
+    for point in {point.curve: point for point in study.points}.values():
+        line = HeatLine(_rest(point), [cells[point.curve].get(column) for column in columns])
+        groups.setdefault(point.engine, []).append(line)
+    seen = {point.failure for point in study.points}
+    listed = [ListedPoint(f"{prefix}{index}", label(point), point) for index, point in enumerate(study.points)]
     return HeatMap(axes, groups, {letter: kind for kind, letter in LETTERS.items() if kind in seen}, listed)
 
 
-def _rest(point: Mapping[str, Any]) -> str:
+def _rest(point: BoundaryPoint) -> str:
     """Formulation and preset."""
-    settings = point["settings"]
-    return " ".join(filter(None, (settings.get("formulation"), settings.get("preset")))) or str(point["curve"])
+    settings = point.settings
+    return " ".join(filter(None, (settings.get("formulation"), settings.get("preset")))) or str(point.curve)
 
 
-def told(point: Mapping[str, Any]) -> str:
+def told(point: BoundaryPoint) -> str:
     """Who was told of a failure: nobody, or before the run, or the engine said so."""
-    if point["failure"] == "refused":
+    if point.failure == "refused":
         return "before the run"
-    return "silent" if point["silent"] else "says so"
+    return "silent" if point.silent else "says so"
 
 
-def _cell(point: Mapping[str, Any], href: str) -> HeatCell:
+def _cell(point: BoundaryPoint, href: str) -> HeatCell:
     text, shade = cell(point)
-    words = [f"{label(point)} at {point['axis']} = {point['value']:g}"]
-    if point["problem"]:
+    words = [f"{label(point)} at {point.axis} = {point.value:g}"]
+    if point.problem:
         words.append("there is no truth")
-    elif point["largest_accurate"] is None:
+    elif point.largest_accurate is None:
         words.append("no affordable step or tolerance holds 1 %")
     else:
-        words.append(f"1 % up to {point['resolution']} {number(point['largest_accurate'])}")
-    if point["failure"]:
-        words.append(f"beyond: {point['failure']}, {told(point)}")
+        words.append(f"1 % up to {point.resolution} {number(point.largest_accurate)}")
+    if point.failure:
+        words.append(f"beyond: {point.failure}, {told(point)}")
     return HeatCell(
         text=text,
         shade=None if shade is None else round(min(max(shade, 0.0), 1.0), 2),
         deep=shade is not None and shade > _DEEP,
-        never=point["largest_accurate"] is None,
+        never=point.largest_accurate is None,
         href=href,
         title="; ".join(words),
     )

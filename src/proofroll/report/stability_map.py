@@ -6,14 +6,18 @@ import io
 import itertools
 import math
 import textwrap
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 from proofroll.core.errors import Missing
 from proofroll.files.atomic import replacing
 from proofroll.report.labels import number
 from proofroll.report.stability_tables import label
+
+if TYPE_CHECKING:
+    from proofroll.studies.axes import Axis
+    from proofroll.studies.stability_records import BoundaryPoint, StabilityStudy
 
 # Letters for what is beyond the boundary; with "!" where the engine was silent.
 LETTERS = {
@@ -36,7 +40,7 @@ _TOLERANCE_DECADES = 13
 _LETTERS_PER_PANEL = 118
 
 
-def draw(study: Mapping[str, Any], path: Path) -> None:
+def draw(study: StabilityStudy, path: Path) -> None:
     """Writes the heat maps as one SVG file, a panel per axis.
 
     Raises:
@@ -47,7 +51,7 @@ def draw(study: Mapping[str, Any], path: Path) -> None:
         temporary.write_text(text, encoding="utf-8")
 
 
-def svg(study: Mapping[str, Any]) -> str:
+def svg(study: StabilityStudy) -> str:
     """All heat maps as one SVG text.
 
     Raises:
@@ -57,22 +61,22 @@ def svg(study: Mapping[str, Any]) -> str:
     return _drawn(study, axes, columns=min(2, len(axes)) or 1)
 
 
-def legend(study: Mapping[str, Any]) -> list[str]:
+def legend(study: StabilityStudy) -> list[str]:
     """What the cells say, as sentences."""
     kinds = ", ".join(f"{letter} {kind}" for kind, letter in LETTERS.items())
     return [
-        f"{study['scene']}: {len(study['points'])} points, {study['boundaries']} boundaries, {study['silent']} silent.",
+        f"{study.scene}: {len(study.points)} points, {study.boundaries} boundaries, {study.silent} silent.",
         "Steps per natural time (or tolerance) that 1 % of the range needs; – no affordable one does; ? no truth.",
         f"Letter: what is beyond the boundary of stability, or else of 1 % ({kinds}); ! the engine did not say so.",
     ]
 
 
-def _axes(study: Mapping[str, Any]) -> list[Mapping[str, Any]]:
+def _axes(study: StabilityStudy) -> list[Axis]:
     """Those that have points."""
-    return [axis for axis in study["axes"] if any(point["axis"] == axis["name"] for point in study["points"])]
+    return [axis for axis in study.axes if any(point.axis == axis.name for point in study.points)]
 
 
-def _drawn(study: Mapping[str, Any], axes: Sequence[Mapping[str, Any]], columns: int) -> str:
+def _drawn(study: StabilityStudy, axes: Sequence[Axis], columns: int) -> str:
     """Panels of these axes, row by row; texts stay texts, which a page can scale, search and read out."""
     try:
         import matplotlib as mpl
@@ -82,9 +86,9 @@ def _drawn(study: Mapping[str, Any], axes: Sequence[Mapping[str, Any]], columns:
     rows = math.ceil(len(axes) / columns) or 1
     settings: Any = {"svg.hashsalt": "proofroll", "svg.fonttype": "none", "font.size": 8.0}
     with mpl.rc_context(settings):
-        names = list(dict.fromkeys(point["curve"] for point in study["points"]))
-        of_axes = {axis["name"] for axis in axes}
-        curves = [n for n in names if any(p["curve"] == n and p["axis"] in of_axes for p in study["points"])]
+        names = list(dict.fromkeys(point.curve for point in study.points))
+        of_axes = {axis.name for axis in axes}
+        curves = [n for n in names if any(p.curve == n and p.axis in of_axes for p in study.points)]
         height = rows * (0.9 + 0.24 * len(curves)) + 1.0
         figure = Figure(figsize=(7.2 * columns, height), layout="constrained")
         panels = figure.subplots(rows, columns, squeeze=False).ravel()
@@ -99,12 +103,12 @@ def _drawn(study: Mapping[str, Any], axes: Sequence[Mapping[str, Any]], columns:
     return out.getvalue()
 
 
-def _panel(panel: Any, study: Mapping[str, Any], axis: Mapping[str, Any], curves: list[str], colours: Any) -> None:
-    points = [point for point in study["points"] if point["axis"] == axis["name"]]
-    values = list(dict.fromkeys(point["value"] for point in points))
-    names = {point["curve"]: label(point) for point in study["points"]}
+def _panel(panel: Any, study: StabilityStudy, axis: Axis, curves: list[str], colours: Any) -> None:
+    points = [point for point in study.points if point.axis == axis.name]
+    values = list(dict.fromkeys(point.value for point in points))
+    names = {point.curve: label(point) for point in study.points}
     for point in points:
-        x, y = values.index(point["value"]), curves.index(point["curve"])
+        x, y = values.index(point.value), curves.index(point.curve)
         text, shade = cell(point)
         face = "#ffffff" if shade is None else colours(shade)
         hatch = "////" if text.startswith("–") else None
@@ -116,7 +120,7 @@ def _panel(panel: Any, study: Mapping[str, Any], axis: Mapping[str, Any], curves
     panel.set(
         xlim=(-0.5, len(values) - 0.5),
         ylim=(len(curves) - 0.5, -0.5),
-        xlabel=f"{axis['name']}" + (f" [{axis['unit']}]" if axis["unit"] != "1" else ""),
+        xlabel=f"{axis.name}" + (f" [{axis.unit}]" if axis.unit != "1" else ""),
     )
     panel.set_xticks(range(len(values)), [f"{value:g}" for value in values])
     panel.set_yticks(range(len(curves)), [names[curve] for curve in curves])
@@ -133,17 +137,17 @@ def _rectangle(x: int, y: int, face: Any, hatch: str | None) -> Any:
     return Rectangle((x - 0.5, y - 0.5), 1, 1, facecolor=face, hatch=hatch, edgecolor="0.8", lw=0.5)
 
 
-def cell(point: Mapping[str, Any]) -> tuple[str, float | None]:
+def cell(point: BoundaryPoint) -> tuple[str, float | None]:
     """Text of a cell and its place between the lightest (0, cheap) and the darkest colour; None: no colour."""
-    largest, failure = point["largest_accurate"], point["failure"]
-    beyond = (LETTERS.get(failure, failure) + ("!" if point["silent"] else "")) if failure else ""
-    if point["problem"]:
+    largest, failure = point.largest_accurate, point.failure
+    beyond = (LETTERS.get(failure, failure) + ("!" if point.silent else "")) if failure else ""
+    if point.problem:
         return f"? {beyond}".strip(), None
     if largest is None:
         return f"– {beyond}".strip(), None
-    if point["resolution"] != "dt":
+    if point.resolution != "dt":
         shade = -math.log10(largest) / _TOLERANCE_DECADES
         return f"{number(largest)} {beyond}".strip(), shade
-    steps = point["period"] / largest
+    steps = point.period / largest
     shade = math.log(max(steps, _FEWEST) / _FEWEST) / math.log(_MOST / _FEWEST)
     return f"{steps:.0f} {beyond}".strip(), min(shade, 1.0)

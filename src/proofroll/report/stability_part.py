@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, ClassVar
 
@@ -15,6 +15,7 @@ if TYPE_CHECKING:
     from proofroll.report.study_parts import Tell
     from proofroll.running.runner import Runner
     from proofroll.studies.axes import Axis
+    from proofroll.studies.stability_records import StabilityStudy
 
 
 @dataclass(frozen=True)
@@ -49,7 +50,7 @@ class StabilityPart(Part):
     names: ClassVar[Mapping[str, Any]] = {"heat_map": heat_map.table, "told": heat_map.told}
     asked: StabilityFile
     engines: Sequence[str] = ()
-    study: Mapping[str, Any] | None = None
+    study: StabilityStudy | None = None
     folder: str = ""
 
     @classmethod
@@ -61,7 +62,7 @@ class StabilityPart(Part):
     def line(entry: StabilityEntry) -> str:
         """How many boundaries are silent, and what holds of what was claimed."""
         study = entry.study
-        return f"{study['silent']} of {study['boundaries']} boundaries are silent{held(entry.claims)}"
+        return f"{study.silent} of {study.boundaries} boundaries are silent{held(entry.claims)}"
 
     @property
     def on_request(self) -> bool:
@@ -76,11 +77,12 @@ class StabilityPart(Part):
     def keeps(self, out: Path) -> bool:
         """The whole map, or else a quick one, of all axes if there is."""
         from proofroll.studies.stability_places import QUICK, Effort
+        from proofroll.studies.stability_records import StabilityStudy
         from proofroll.studies.study_store import kept, stability_path
 
         for effort, axes in ((Effort(), self.asked.axes), (QUICK, self.asked.axes), (QUICK, self._quick_axes)):
             path = stability_path(out, self.asked, axes, self.engines, effort)
-            self.study, _ = kept(path)
+            self.study, _ = kept(path, StabilityStudy)
             if self.study is not None:
                 self.folder = _programs(path)
                 return True
@@ -107,26 +109,26 @@ class StabilityPart(Part):
 
         study = self.study
         assert study is not None  # it was made
-        mapped = {axis["name"] for axis in study["axes"]}
+        mapped = {axis.name for axis in study.axes}
         claims, contradictions = [], []
         for claim in () if self.engines else self.asked.claims:
-            against = claim.contradictions(study["points"])
+            against = claim.contradictions(study.points)
             contradictions += against
-            untested = "" if against else claim.untested(study["points"])
+            untested = "" if against else claim.untested(study.points)
             holds = None if untested else not against
-            claims.append(JudgedBoundary(_says(claim, study["step_symbols"]), claim.because, against, untested, holds))
+            claims.append(JudgedBoundary(_says(claim, study.step_symbols), claim.because, against, untested, holds))
         points = [
-            point | {"reproducer": f"{self.folder}/{Path(point['reproducer']).name}" if point["reproducer"] else None}
-            for point in study["points"]
+            replace(point, reproducer=f"{self.folder}/{Path(point.reproducer).name}") if point.reproducer else point
+            for point in study.points
         ]
         return StabilityEntry(
             **self.head,
-            study={**study, "points": points},
+            study=replace(study, points=points),
             silent=list(silent_lines(study)),
             claims=claims,
             left_out=[axis.name for axis in self.asked.axes if axis.name not in mapped],
             contradictions=contradictions,
-            lost=[] if study["points"] else [f"{name}: {reason}" for name, reason in study["absent"].items()],
+            lost=[] if study.points else [f"{name}: {reason}" for name, reason in study.absent.items()],
         )
 
 

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections import Counter
 from collections.abc import Iterator, Mapping, Sequence
-from typing import Any
+from typing import TYPE_CHECKING
 
 from rich.table import Table
 from rich.text import Text
@@ -13,28 +13,31 @@ from proofroll.report.labels import number, with_caveat
 from proofroll.studies.hosts import said_of
 from proofroll.studies.stability_content import silent_ranking
 
+if TYPE_CHECKING:
+    from proofroll.studies.stability_records import BoundaryPoint, ExplainedBoundary, StabilityStudy
 
-def headline(study: Mapping[str, Any]) -> str:
+
+def headline(study: StabilityStudy) -> str:
     """How many points, boundaries, and silent ones among them."""
-    counts = ", ".join(f"{count} {kind}" for kind, count in sorted(study["failures"].items(), key=lambda i: -i[1]))
+    counts = ", ".join(f"{count} {kind}" for kind, count in sorted(study.failures.items(), key=lambda i: -i[1]))
     said = (
-        f"{len(study['points'])} points, {study['boundaries']} boundaries of which {study['silent']} are silent "
-        f"({study['runs']} runs). Beyond: {counts}."
+        f"{len(study.points)} points, {study.boundaries} boundaries of which {study.silent} are silent "
+        f"({study.runs} runs). Beyond: {counts}."
     )
-    if study["refused"]:
-        said += f" {study['refused']} points were refused before the run."
-    if study["never_accurate"]:
-        said += f" At {study['never_accurate']} points no step or tolerance that was affordable holds 1 %."
-    return " ".join([said, *said_of(study.get("hosts", {}))])
+    if study.refused:
+        said += f" {study.refused} points were refused before the run."
+    if study.never_accurate:
+        said += f" At {study.never_accurate} points no step or tolerance that was affordable holds 1 %."
+    return " ".join([said, *said_of(study.hosts)])
 
 
-def boundary_table(study: Mapping[str, Any]) -> Table:
+def boundary_table(study: StabilityStudy) -> Table:
     """One line per engine, formulation, setting and axis: its boundaries from the least to the largest.
 
     A ``+`` stands where nothing broke on the ladder, ``n!`` for n silent failures beyond the boundaries.
     """
-    named = (name for point in study["points"] for name in point["sides"]["stable"]["numbers"])
-    symbol = study["step_symbols"].get(next(named, ""), "step in natural times")
+    named = (name for point in study.points for name in point.sides["stable"].numbers)
+    symbol = study.step_symbols.get(next(named, ""), "step in natural times")
     title = f"Largest {symbol} (or tolerance) along each axis; n!: n times silent"
     table = Table(title=Text(title), title_justify="left", box=None, padding=(0, 1, 0, 0))
     table.add_column("engine formulation setting", no_wrap=True)
@@ -43,12 +46,12 @@ def boundary_table(study: Mapping[str, Any]) -> Table:
         table.add_column(column, justify="right", no_wrap=True)
     table.add_column("which is", no_wrap=True)
     table.add_column("beyond", no_wrap=True)
-    explained = {(e["curve"], e["axis"]): e for e in study["explanations"] if e["boundary"] == "accurate"}
+    explained = {(e.curve, e.axis): e for e in study.explanations if e.boundary == "accurate"}
     before = ""
     for (curve, axis), points in grouped(study).items():
         name = label(points[0])
-        kinds = Counter(point["failure"] for point in points if point["failure"])
-        silent = sum(point["silent"] for point in points)
+        kinds = Counter(point.failure for point in points if point.failure)
+        silent = sum(point.silent for point in points)
         common = kinds.most_common(1)
         beyond = f"{common[0][0]} {silent}!" if common and silent else common[0][0] if common else ""
         table.add_row(
@@ -56,37 +59,37 @@ def boundary_table(study: Mapping[str, Any]) -> Table:
             axis,
             _range(points, "stable"),
             _range(points, "accurate"),
-            Text(_explained(explained.get((curve, axis)), study["step_symbols"])),
+            Text(_explained(explained.get((curve, axis)), study.step_symbols)),
             Text(beyond),
         )
         before = name
     return table
 
 
-def grouped(study: Mapping[str, Any]) -> dict[tuple[str, str], list[Mapping[str, Any]]]:
+def grouped(study: StabilityStudy) -> dict[tuple[str, str], list[BoundaryPoint]]:
     """The points by curve and axis."""
-    found: dict[tuple[str, str], list[Mapping[str, Any]]] = {}
-    for point in study["points"]:
-        found.setdefault((point["curve"], point["axis"]), []).append(point)
+    found: dict[tuple[str, str], list[BoundaryPoint]] = {}
+    for point in study.points:
+        found.setdefault((point.curve, point.axis), []).append(point)
     return found
 
 
-def label(point: Mapping[str, Any]) -> str:
+def label(point: BoundaryPoint) -> str:
     """Engine, formulation and preset."""
-    settings = point["settings"]
-    return " ".join(filter(None, (point["engine"], settings.get("formulation"), settings.get("preset"))))
+    settings = point.settings
+    return " ".join(filter(None, (point.engine, settings.get("formulation"), settings.get("preset"))))
 
 
-def size(point: Mapping[str, Any], side: str) -> float | None:
+def size(point: BoundaryPoint, side: str) -> float | None:
     """A boundary as the first dimensionless number that the scene has of a step; a tolerance as it is."""
-    found = point["sides"][side]
-    if point["resolution"] != "dt":
-        return found["largest"]  # type: ignore[no-any-return]  # JSON
-    return next(iter(found["numbers"].values()), None)
+    found = point.sides[side]
+    if point.resolution != "dt":
+        return found.largest
+    return next(iter(found.numbers.values()), None)
 
 
-def _range(points: Sequence[Mapping[str, Any]], side: str) -> str:
-    known = [point for point in points if not (point["problem"] and side == "accurate")]
+def _range(points: Sequence[BoundaryPoint], side: str) -> str:
+    known = [point for point in points if not (point.problem and side == "accurate")]
     if not known:
         return "no truth"
     values = [size(point, side) for point in known]
@@ -94,31 +97,31 @@ def _range(points: Sequence[Mapping[str, Any]], side: str) -> str:
     if not held:
         return "none"
     low = "none" if len(held) < len(values) else number(min(held))
-    high = number(max(held)) + ("" if any(p["sides"][side]["reached"] for p in known) else "+")
+    high = number(max(held)) + ("" if any(p.sides[side].reached for p in known) else "+")
     return low if low == high else f"{low}…{high}"
 
 
-def _explained(found: Mapping[str, Any] | None, symbols: Mapping[str, str]) -> str:
+def _explained(found: ExplainedBoundary | None, symbols: Mapping[str, str]) -> str:
     """The number that stays the same while the axis moves the others."""
-    if found is None or not found["explains"]:
+    if found is None or not found.explains:
         return ""
-    return f"{symbols[found['number']]} {number(found['low'])}…{number(found['high'])}"
+    return f"{symbols[found.number]} {number(found.low)}…{number(found.high)}"
 
 
-def silent_lines(study: Mapping[str, Any]) -> Iterator[str]:
+def silent_lines(study: StabilityStudy) -> Iterator[str]:
     """The eight worst silent cases as sentences, one for each engine, formulation, setting and axis."""
     seen: set[tuple[str, str]] = set()
     for point in silent_ranking(study):
-        if (point["curve"], point["axis"]) in seen or len(seen) >= 8:
+        if (point.curve, point.axis) in seen or len(seen) >= 8:
             continue
-        seen.add((point["curve"], point["axis"]))
-        side = point["sides"][point["boundary"]]
-        wrong = "" if side["error"] is None else f", off by {number(100 * side['error'])} % of the range"
-        if side["largest"] is None and point["too_slow"] is not None:
-            step = f"down to {point['resolution']} {number(point['finest'])}, finer ones have too many steps"
-        elif side["largest"] is None:
-            step = f"at every {point['resolution']} down to {number(point['finest'])}"
+        seen.add((point.curve, point.axis))
+        side = point.shown
+        wrong = "" if side.error is None else f", off by {number(100 * side.error)} % of the range"
+        if side.largest is None and point.cut:
+            step = f"down to {point.resolution} {number(point.finest)}, finer ones have too many steps"
+        elif side.largest is None:
+            step = f"at every {point.resolution} down to {number(point.finest)}"
         else:
-            step = f"just beyond {point['resolution']} {number(side['largest'])}"
-        where = f"{with_caveat(label(point), point.get('caveat', ''))} at {point['axis']} = {number(point['value'])}"
-        yield f"{where}: {point['failure']} {step}{wrong}"
+            step = f"just beyond {point.resolution} {number(side.largest)}"
+        where = f"{with_caveat(label(point), point.caveat)} at {point.axis} = {number(point.value)}"
+        yield f"{where}: {point.failure} {step}{wrong}"

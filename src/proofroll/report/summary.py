@@ -15,6 +15,7 @@ if TYPE_CHECKING:
     from proofroll.report.comparison_records import ReportedComparison
     from proofroll.report.study_parts import PartEntry
     from proofroll.studies.recommend import Answer
+    from proofroll.studies.stability_records import StabilityStudy
 
 
 def three_sentences(comparisons: Sequence[ReportedComparison], entries: Mapping[str, Sequence[PartEntry]]) -> list[str]:
@@ -62,10 +63,10 @@ def _comparisons(count: int) -> str:
     return "one comparison" if count == 1 else f"{count} comparisons"
 
 
-def _silent(comparisons: Sequence[ReportedComparison], maps: Sequence[Mapping[str, Any]]) -> str:
+def _silent(comparisons: Sequence[ReportedComparison], maps: Sequence[StabilityStudy]) -> str:
     """What is wrong at every step and says nothing, and how many boundaries of stability are passed in silence."""
     found = [item for comparison in comparisons for item in _wrong(comparison)]
-    silent, boundaries = (sum(int(study[key]) for study in maps) for key in ("silent", "boundaries"))
+    silent, boundaries = (sum(getattr(study, key) for study in maps) for key in ("silent", "boundaries"))
     passed = f"{silent} of {boundaries} boundaries of stability and accuracy are passed without a word"
     if not found:
         nothing = "No setting that ran to its end differs from the truth"

@@ -79,7 +79,7 @@ class TradeoffPart(Part):
         from proofroll.studies.tradeoff import stored
 
         paths = (stored(out, self.asked.swept, self.engines, brief=brief) for brief in (False, True))
-        self.study = next((study for path in paths if (study := kept(path)[0]) is not None), None)
+        self.study = next((study for path in paths if (study := kept(path, dict)[0]) is not None), None)
         return self.study is not None
 
     def make(self, runner: Runner, out: Path, tell: Tell) -> None:

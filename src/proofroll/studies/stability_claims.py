@@ -2,10 +2,10 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
-from typing import Any, Literal
+from typing import Literal
 
 from pydantic import ConfigDict, TypeAdapter, ValidationError
 
@@ -18,6 +18,7 @@ from proofroll.studies.axes import Axis, AxisTerm
 from proofroll.studies.failure import meanings
 from proofroll.studies.first_look import axes_of
 from proofroll.studies.stability_content import dependence
+from proofroll.studies.stability_records import Boundary, BoundaryPoint, StabilityStudy
 from proofroll.studies.step_numbers import step_numbers
 
 STUDY = "stability"
@@ -57,70 +58,70 @@ class Claim:
     failure: list[str] = field(default_factory=list)
     silent: bool | None = None
 
-    def untested(self, points: Sequence[Mapping[str, Any]]) -> str:
+    def untested(self, points: Sequence[BoundaryPoint]) -> str:
         """Why the points of a map can say nothing of it; empty if they can."""
-        about = [point for point in points if self._about(point) and not point["problem"]]
+        about = [point for point in points if self._about(point) and not point.problem]
         if not about:
             return "no point of this map is about it"
-        about = [point for point in about if not point["timed_out"]]
+        about = [point for point in about if not point.timed_out]
         if not about:
             return "runs met the limit of time, which a faster machine might not"
-        sides = [(point, point["sides"][self.boundary]) for point in about]
-        if self.same and sum(side["largest"] is not None for _, side in sides) < _FEWEST_ALIKE:
+        sides = [(point, point.sides[self.boundary]) for point in about]
+        if self.same and sum(side.largest is not None for _, side in sides) < _FEWEST_ALIKE:
             return "nothing holds at two values of the axis"
-        cut = [side["largest"] is None and point["too_slow"] is not None for point, side in sides]
-        tried = max(point["runs"] for point in about)
+        cut = [side.largest is None and point.cut for point, side in sides]
+        tried = max(point.runs for point in about)
         if all(cut) and not self.failure and not (self.never and tried >= _TRIED):
             return "its searches were cut: finer runs have too many steps for this map"
         return ""
 
-    def contradictions(self, points: Sequence[Mapping[str, Any]]) -> list[str]:
+    def contradictions(self, points: Sequence[BoundaryPoint]) -> list[str]:
         """What the points of a map do not confirm, as sentences; where a run met the limit of time, nothing."""
         found = []
-        about = [p for p in points if self._about(p) and not p["problem"] and not p["timed_out"]]
+        about = [p for p in points if self._about(p) and not p.problem and not p.timed_out]
         if self.same:
-            for curve, axis in dict.fromkeys((point["curve"], point["axis"]) for point in about):
-                along = [p for p in about if (p["curve"], p["axis"]) == (curve, axis)]
+            for curve, axis in dict.fromkeys((point.curve, point.axis) for point in about):
+                along = [p for p in about if (p.curve, p.axis) == (curve, axis)]
                 said = dependence(along, self.boundary)
                 if said:
                     found.append(f"{curve} along {axis}: {self.boundary} up to {said}, expected the same everywhere")
-        expected = self.failure and not any(point["sides"][self.boundary]["failure"] for point in about)
-        if about and expected and not any(point["too_slow"] for point in about):
+        expected = self.failure and not any(point.sides[self.boundary].failure for point in about)
+        if about and expected and not any(point.cut for point in about):
             found.append(f"{self.engine}: nothing fails beyond {self.boundary}, expected: {' or '.join(self.failure)}")
         for point in about:
-            side = point["sides"][self.boundary]
-            where = f"{point['curve']} at {point['axis']} = {point['value']:g}"
-            found += [f"{where}: {sentence}" for sentence in self._wrong(side, point["too_slow"] is not None)]
+            side = point.sides[self.boundary]
+            where = f"{point.curve} at {point.axis} = {point.value:g}"
+            found += [f"{where}: {sentence}" for sentence in self._wrong(side, point.cut)]
         return found
 
-    def _about(self, point: Mapping[str, Any]) -> bool:
+    def _about(self, point: BoundaryPoint) -> bool:
         spec = parse_engine(self.engine)
-        settings = point["settings"]
-        if point["engine"] != spec.name or any(str(settings.get(k)) != str(v) for k, v in spec.options.items()):
+        settings = point.settings
+        if point.engine != spec.name or any(str(settings.get(k)) != str(v) for k, v in spec.options.items()):
             return False
-        if self.axes and point["axis"] not in self.axes:
+        if self.axes and point.axis not in self.axes:
             return False
-        return not self.values or self.values[0] <= point["value"] <= self.values[1]
+        return not self.values or self.values[0] <= point.value <= self.values[1]
 
-    def _wrong(self, side: Mapping[str, Any], cut: bool) -> list[str]:
+    def _wrong(self, side: Boundary, cut: bool) -> list[str]:
         """Of one boundary; where the search was ``cut`` for its many steps, a boundary that is missing says nothing."""
         found = []
-        largest = side["largest"]
+        largest = side.largest
         if self.never and largest is not None:
             found.append(f"{self.boundary} at a step or tolerance of {largest:g}, expected at none")
         if self.number is not None:
-            value = side["numbers"].get(self.number)
+            value = side.numbers.get(self.number)
             low, high = self.between
             if value is None and cut:
                 return found
             if value is None or not low <= value <= high:
                 said = "no step is" if value is None else f"{value:.3g} is the largest"
                 found.append(f"{self.boundary}: {self.number}: {said}, expected between {low:g} and {high:g}")
-        if self.failure and side["failure"] and side["failure"] not in self.failure:
-            found.append(f"beyond {self.boundary}: {side['failure']}, expected: {' or '.join(self.failure)}")
-        if self.silent is not None and side["failure"] and side["silent"] != self.silent:
+        if self.failure and side.failure and side.failure not in self.failure:
+            found.append(f"beyond {self.boundary}: {side.failure}, expected: {' or '.join(self.failure)}")
+        if self.silent is not None and side.failure and side.silent != self.silent:
             words = {True: "silent", False: "said so"}
-            found.append(f"beyond {self.boundary}: {words[side['silent']]}, expected: {words[self.silent]}")
+            found.append(f"beyond {self.boundary}: {words[side.silent]}, expected: {words[self.silent]}")
         return found
 
 
@@ -145,9 +146,9 @@ class StabilityFile:
     claims: list[Claim] = field(default_factory=list)
     on_request: bool = False
 
-    def contradictions(self, study: Mapping[str, Any]) -> list[str]:
+    def contradictions(self, study: StabilityStudy) -> list[str]:
         """What a map does not confirm, as sentences."""
-        return [sentence for claim in self.claims for sentence in claim.contradictions(study["points"])]
+        return [sentence for claim in self.claims for sentence in claim.contradictions(study.points)]
 
 
 def file_for(scene: str) -> StabilityFile:

@@ -1,17 +1,24 @@
-"""A stability map as plain data: what ``proofroll stability --json`` prints and what the reports are made from."""
+"""What is kept of a stability map: counts, boundaries, what explains them, and what depends on what it should not."""
 
 from __future__ import annotations
 
 from collections import Counter
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import asdict
-from typing import Any
+from dataclasses import asdict, replace
 
 from proofroll.files.scene_file import load_scene
 from proofroll.studies.failure import ACCURATE, REFUSED, RunOutcome, meanings
 from proofroll.studies.hosts import hosts
 from proofroll.studies.stability import MapPoint, StabilityMap, failure_beyond
+from proofroll.studies.stability_records import (
+    Boundary,
+    BoundaryPoint,
+    ExplainedBoundary,
+    MappedPlace,
+    StabilityStudy,
+)
 from proofroll.studies.step_numbers import explanation, step_numbers, values
+from proofroll.studies.study_identity import measured
 
 BOUNDARIES = ("stable", "accurate")
 # Boundaries this factor apart count as the same: two rungs of the ladder of steps, one of that of tolerances.
@@ -22,75 +29,74 @@ _PASSES: Mapping[str, Callable[[RunOutcome], bool]] = {
 }
 
 
-def stability_document(found: StabilityMap) -> dict[str, Any]:
+def stability_study(found: StabilityMap) -> StabilityStudy:
     """Everything, with counts on top."""
     points = [_point(point) for point in found.points]
     scene = load_scene(found.scene)
     # Who refuses before the run, or is refused by the certificate, has passed no boundary.
-    failing = [point for point in points if point["failure"] and point["failure"] != REFUSED]
-    return {
-        "study": "stability",
-        "scene": found.scene,
-        "axes": [asdict(axis) for axis in found.axes],
-        "periods": found.effort.periods,
-        "accurate": ACCURATE,
-        "runs": found.runs,
-        "boundaries": len(failing),
-        "silent": sum(point["silent"] for point in failing),
-        "refused": sum(point["failure"] == REFUSED for point in points),
-        "failures": dict(Counter(point["failure"] for point in failing)),
-        "never_accurate": sum(point["largest_accurate"] is None and not point["problem"] for point in points),
-        "meanings": dict(meanings(scene)),
-        "step_symbols": {item.name: item.symbol for item in step_numbers(scene)},
-        "points": points,
-        "explanations": _explanations(points),
-        "findings": _scale_findings(found, points),
-        "places": [
-            {"axis": place.axis.name, "value": place.value, "parameters": place.parameters, "problem": place.problem}
-            for place in found.places
-        ],
-        "absent": found.absent,
-        "hosts": hosts(result for point in found.points for result in point.results.values()),
-    }
+    failing = [point for point in points if point.failure and point.failure != REFUSED]
+    return StabilityStudy(
+        scene=found.scene,
+        axes=found.axes,
+        periods=found.effort.periods,
+        accurate=ACCURATE,
+        runs=found.runs,
+        boundaries=len(failing),
+        silent=sum(point.silent for point in failing),
+        refused=sum(point.failure == REFUSED for point in points),
+        failures=dict(Counter(point.failure for point in failing if point.failure)),
+        never_accurate=sum(point.largest_accurate is None and not point.problem for point in points),
+        meanings=dict(meanings(scene)),
+        step_symbols={item.name: item.symbol for item in step_numbers(scene)},
+        points=points,
+        explanations=_explanations(points),
+        findings=_scale_findings(found, points),
+        places=[MappedPlace(place.axis.name, place.value, place.parameters, place.problem) for place in found.places],
+        absent=found.absent,
+        hosts=hosts(result for point in found.points for result in point.results.values()),
+        effort=found.effort,
+        measured=measured(),
+    )
 
 
-def _point(point: MapPoint) -> dict[str, Any]:
+def _point(point: MapPoint) -> BoundaryPoint:
     place, facts = point.place, point.curve.facts
     sides = {name: _side(point, name) for name in BOUNDARIES}
     if place.yardstick is None or place.yardstick.true is None:
-        sides["accurate"] = {**sides["accurate"], "largest": None, "numbers": {}}  # without truth nobody is right
+        sides["accurate"] = replace(sides["accurate"], largest=None, numbers={})  # without truth nobody is right
     # Where nothing breaks on the ladder, what is to be shown is where it stops being right.
-    first = sides["stable"] if sides["stable"]["failure"] else sides["accurate"]
+    boundary = "stable" if sides["stable"].failure else "accurate"
+    first = sides[boundary]
     errors = [item.error for item in point.found.seen.values() if item.stable and item.error is not None]
-    return {
-        "engine": facts.name,
-        "settings": {key: value for key, value in facts.settings.items() if key != facts.resolution},
-        "curve": point.curve.engine,
-        "level": point.curve.level,
-        "caveat": facts.caveat,
-        "resolution": facts.resolution,
-        "axis": place.axis.name,
-        "value": place.value,
-        "parameters": place.parameters,
-        "until": place.until,
-        "period": place.period,
-        "largest_stable": sides["stable"]["largest"],
-        "largest_accurate": sides["accurate"]["largest"],
-        "boundary": "stable" if first is sides["stable"] else "accurate",
-        "failure": first["failure"],
-        "silent": first["silent"],
-        "message": first["message"],
-        "sides": sides,
-        "least_error": min(errors, default=None),
-        "finest": None if not point.found.seen else point.ladder[max(point.found.seen)],
-        "too_slow": None if point.found.limit >= len(point.ladder) else point.ladder[point.found.limit],
-        "timed_out": point.timeouts > 0,
-        "runs": len(point.results),
-        "problem": place.problem,
-    }
+    return BoundaryPoint(
+        engine=facts.name,
+        settings={key: value for key, value in facts.settings.items() if key != facts.resolution},
+        curve=point.curve.engine,
+        level=point.curve.level,
+        caveat=facts.caveat,
+        resolution=facts.resolution,
+        axis=place.axis.name,
+        value=place.value,
+        parameters=place.parameters,
+        until=place.until,
+        period=place.period,
+        largest_stable=sides["stable"].largest,
+        largest_accurate=sides["accurate"].largest,
+        boundary=boundary,
+        failure=first.failure,
+        silent=first.silent,
+        message=first.message,
+        sides=sides,
+        least_error=min(errors, default=None),
+        finest=point.ladder[max(point.found.seen)] if point.found.seen else None,
+        too_slow=point.ladder[point.found.limit] if point.found.limit < len(point.ladder) else None,
+        timed_out=point.timeouts > 0,
+        runs=len(point.results),
+        problem=place.problem,
+    )
 
 
-def _side(point: MapPoint, name: str) -> dict[str, Any]:
+def _side(point: MapPoint, name: str) -> Boundary:
     """One boundary: the largest step or tolerance that holds, and what is beyond."""
     holding, failing = point.found.boundary(_PASSES[name])
     beyond = failure_beyond(point, failing)
@@ -98,86 +104,79 @@ def _side(point: MapPoint, name: str) -> dict[str, Any]:
     assert scene is not None  # points have both
     assert yardstick is not None
     largest = None if holding is None else point.ladder[holding]
-    steps = point.curve.fixed_step and largest is not None
-    return {
-        "largest": largest,
-        "reached": beyond is not None and holding is not None,
-        "numbers": values(scene, largest, yardstick.truth) if steps and largest is not None else {},
-        "beyond": None if failing is None else point.ladder[failing],
-        "failure": None if beyond is None else beyond.failure,
-        "silent": beyond is not None and beyond.silent,
-        "error": None if beyond is None else beyond.error,
-        "time": None if beyond is None else beyond.time,
-        "message": None if beyond is None else beyond.message,
-    }
+    return Boundary(
+        largest=largest,
+        reached=beyond is not None and holding is not None,
+        numbers=values(scene, largest, yardstick.truth) if point.curve.fixed_step and largest is not None else {},
+        beyond=None if failing is None else point.ladder[failing],
+        failure=None if beyond is None else beyond.failure,
+        silent=beyond is not None and beyond.silent,
+        error=None if beyond is None else beyond.error,
+        time=None if beyond is None else beyond.time,
+        message=None if beyond is None else beyond.message,
+    )
 
 
-def _explanations(points: list[dict[str, Any]]) -> list[dict[str, Any]]:
+def _explanations(points: Sequence[BoundaryPoint]) -> list[ExplainedBoundary]:
     """For every curve, axis and boundary, the number that is the most constant along the axis."""
     found = []
-    for curve in dict.fromkeys(point["curve"] for point in points):
-        for axis in dict.fromkeys(point["axis"] for point in points):
-            of_both = [point for point in points if point["curve"] == curve and point["axis"] == axis]
+    for curve in dict.fromkeys(point.curve for point in points):
+        for axis in dict.fromkeys(point.axis for point in points):
             for name in BOUNDARIES:
-                sides = [point["sides"][name] for point in of_both]
-                best = explanation([side["numbers"] for side in sides if side["reached"] and side["numbers"]])
+                sides = [point.sides[name] for point in points if point.curve == curve and point.axis == axis]
+                best = explanation([side.numbers for side in sides if side.reached and side.numbers])
                 if best is not None:
-                    entry = {"curve": curve, "axis": axis, "boundary": name, "number": best.number}
-                    entry |= {"low": best.low, "high": best.high, "spread": best.spread, "explains": best.explains}
-                    found.append(entry)
+                    found.append(ExplainedBoundary(**asdict(best), curve=curve, axis=axis, boundary=name))
     return found
 
 
-def _scale_findings(found: StabilityMap, points: list[dict[str, Any]]) -> list[str]:
+def _scale_findings(found: StabilityMap, points: Sequence[BoundaryPoint]) -> list[str]:
     """What depends on an axis along which the dimensionless problem is the same, as sentences."""
     sentences = []
     for axis in (axis for axis in found.axes if axis.scale_free):
-        for curve in dict.fromkeys(point["curve"] for point in points):
-            along = [point for point in points if point["curve"] == curve and point["axis"] == axis.name]
+        for curve in dict.fromkeys(point.curve for point in points):
+            along = [point for point in points if point.curve == curve and point.axis == axis.name]
             for name in BOUNDARIES:
-                said = dependence([p for p in along if not (p["problem"] and name == "accurate")], name)
+                said = dependence([p for p in along if not (p.problem and name == "accurate")], name)
                 if said:
                     sentences.append(f"{curve} depends on {axis.name}, as it should not: {name} up to {said}")
     return sentences
 
 
-def dependence(points: Sequence[Mapping[str, Any]], name: str) -> str:
+def dependence(points: Sequence[BoundaryPoint], name: str) -> str:
     """How a boundary, in parts of the natural time, changes along an axis, if it does; else nothing.
 
     Where the search was cut for its many steps, a boundary that is missing says nothing.
 
     Args:
-        points: of one curve along one axis, as the study has them.
+        points: of one curve along one axis.
         name: of the boundary.
     """
-    sizes: list[tuple[float, float]] = []
-    for point in points:
-        largest = point["sides"][name]["largest"]
-        if largest is not None:
-            fixed_step = point["resolution"] == "dt"
-            sizes.append((largest / point["period"] if fixed_step else largest, point["value"]))
-    without = [point for point in points if point["sides"][name]["largest"] is None and point["too_slow"] is None]
+    fixed_step = any(point.resolution == "dt" for point in points)
+    sizes = [
+        (largest / point.period if fixed_step else largest, point.value)
+        for point in points
+        if (largest := point.sides[name].largest) is not None
+    ]
+    without = [point for point in points if point.sides[name].largest is None and not point.cut]
     if not sizes or (not without and max(sizes)[0] <= _SAME[fixed_step] * min(sizes)[0]):
         return ""
     what = " of the natural time" if fixed_step else ""
     said = f"{max(sizes)[0]:.2g}{what} at {max(sizes)[1]:g}"
     if without:
-        places = ", ".join(f"{point['value']:g} ({point['sides'][name]['failure']})" for point in without)
+        places = ", ".join(f"{point.value:g} ({point.sides[name].failure})" for point in without)
         return f"{said}, but nowhere at {places}"
     return f"{said}, but {min(sizes)[0]:.2g}{what} at {min(sizes)[1]:g}"
 
 
-def silent_ranking(study: Mapping[str, Any]) -> list[dict[str, Any]]:
+def silent_ranking(study: StabilityStudy) -> list[BoundaryPoint]:
     """The silent failures, the worst first: wrong at any step, then by how wrong the run beyond the boundary was.
 
     Searches that were cut because finer runs have too many steps come last: a finer step might have been right.
     """
-    silent = [point for point in study["points"] if point["silent"]]
 
-    def badness(point: Mapping[str, Any]) -> tuple[bool, bool, bool, float]:
-        error = point["sides"][point["boundary"]]["error"]
-        never = point["sides"][point["boundary"]]["largest"] is None
-        cut = never and point["too_slow"] is not None
-        return not cut, never, point["boundary"] == "stable", error if error is not None else 0.0
+    def badness(point: BoundaryPoint) -> tuple[bool, bool, bool, float]:
+        never, error = point.shown.largest is None, point.shown.error
+        return not (never and point.cut), never, point.boundary == "stable", error if error is not None else 0.0
 
-    return sorted(silent, key=badness, reverse=True)
+    return sorted((point for point in study.points if point.silent), key=badness, reverse=True)

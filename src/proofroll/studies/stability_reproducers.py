@@ -3,10 +3,8 @@
 from __future__ import annotations
 
 import re
-from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import replace
 from pathlib import Path
-from typing import Any
 
 from proofroll.core.element_abilities import WritesPrograms
 from proofroll.core.failed_run import FailedRun, imported
@@ -16,6 +14,8 @@ from proofroll.running.store import write_text
 from proofroll.running.worker_pool import Workers
 from proofroll.studies.failure import ACCURATE, REFUSED, TOO_SLOW, WRONG
 from proofroll.studies.stability import MapPoint, StabilityMap
+from proofroll.studies.stability_content import BOUNDARIES
+from proofroll.studies.stability_records import BoundaryPoint, StabilityStudy
 
 # A run that did not begin, and one that nobody waited for, show nothing.
 _NOTHING_TO_SHOW = {
@@ -24,73 +24,63 @@ _NOTHING_TO_SHOW = {
 }
 
 
-@dataclass(frozen=True)
-class Reproducer:
-    """A program of one point.
-
-    Attributes:
-        reproducer: its path; None: there is none.
-        reproducer_needs: packages that it imports.
-        reproducer_note: why it needs proofroll, or why there is none.
-    """
-
-    reproducer: str | None = None
-    reproducer_needs: Sequence[str] = ()
-    reproducer_note: str | None = None
-
-
-def write_reproducers(
-    found: StabilityMap, entries: Sequence[Mapping[str, Any]], folder: Path, workers: Workers | None = None
-) -> list[Reproducer]:
-    """Writes a program for each point that shows a failure; one answer for each point.
+def with_programs(
+    found: StabilityMap, study: StabilityStudy, folder: Path, workers: Workers | None = None
+) -> StabilityStudy:
+    """Writes a program for each point that shows a failure.
 
     Args:
         found: the map.
-        entries: its points as :func:`proofroll.studies.stability_content.stability_document` has them.
+        study: what is kept of it.
         folder: where the programs go.
         workers: idle ones that may be asked.
+
+    Returns:
+        the study, whose points name their programs or say why they have none.
     """
-    written = [Reproducer() for _ in entries]
+    points = list(study.points)
     wanted: list[tuple[int, str, Case]] = []
-    for index, (point, entry) in enumerate(zip(found.points, entries, strict=True)):
-        name = _shown(entry)
-        side = entry["sides"][name]
-        if side["failure"] in _NOTHING_TO_SHOW:
-            written[index] = Reproducer(reproducer_note=_NOTHING_TO_SHOW[side["failure"]])
-        elif side["failure"] is not None:
-            wanted.append((index, name, point.cases[point.ladder.index(side["beyond"])]))
+    for index, (made, point) in enumerate(zip(found.points, study.points, strict=True)):
+        name = _shown(point)
+        side = point.sides[name]
+        if side.failure in _NOTHING_TO_SHOW:
+            points[index] = replace(point, reproducer_note=_NOTHING_TO_SHOW[side.failure])
+        elif side.failure is not None and side.beyond is not None:
+            wanted.append((index, name, made.cases[made.ladder.index(side.beyond)]))
     for (index, name, case), (engine, reason) in zip(
         wanted, programs([item[-1] for item in wanted], workers), strict=True
     ):
-        point, entry = found.points[index], entries[index]
-        element = point.place.scene.elements[0] if point.place.scene is not None else None
+        made, point = found.points[index], study.points[index]
+        element = made.place.scene.elements[0] if made.place.scene is not None else None
         if not isinstance(element, WritesPrograms):
-            written[index] = Reproducer(reproducer_note="elements of this kind offer no program")
+            points[index] = replace(point, reproducer_note="elements of this kind offer no program")
             continue
         note = None if engine is not None else reason
-        path = folder / f"{_file_name(entry)}.py"
-        text = element.failure_program(_failed(point, entry, case, name, note), engine)
+        path = folder / f"{_file_name(point)}.py"
+        text = element.failure_program(_failed(made, point, case, name, note), engine)
         write_text(path, text)
-        written[index] = Reproducer(str(path), [package for package in imported(text) if package != "sys"], note)
-    return written
+        needs = [package for package in imported(text) if package != "sys"]
+        points[index] = replace(point, reproducer=str(path), reproducer_needs=needs, reproducer_note=note)
+    return replace(study, points=points)
 
 
-def _failed(point: MapPoint, entry: Mapping[str, Any], case: Case, boundary: str, note: str | None) -> FailedRun:
-    yardstick, facts, side = point.place.yardstick, case.engine, entry["sides"][boundary]
+def _failed(made: MapPoint, point: BoundaryPoint, case: Case, boundary: str, note: str | None) -> FailedRun:
+    yardstick, facts, side = made.place.yardstick, case.engine, point.sides[boundary]
     assert yardstick is not None  # a point has one
+    assert side.failure is not None  # it is shown
     return FailedRun(
         scene=case.scene,
-        parameters=point.place.parameters,
+        parameters=point.parameters,
         engine=facts.name,
         version=facts.version,
         settings=facts.settings,
         resolution=str(facts.resolution),
         until=case.until,
         every=case.every,
-        where=f"{entry['axis']} = {entry['value']:g}",
+        where=f"{point.axis} = {point.value:g}",
         boundary=boundary,
-        failure=side["failure"],
-        silent=side["silent"],
+        failure=side.failure,
+        silent=side.silent,
         truth=yardstick.truth,
         scale=yardstick.scale,
         allowed=WRONG if boundary == "stable" else ACCURATE,
@@ -98,16 +88,16 @@ def _failed(point: MapPoint, entry: Mapping[str, Any], case: Case, boundary: str
     )
 
 
-def _shown(entry: Mapping[str, Any]) -> str:
+def _shown(point: BoundaryPoint) -> str:
     """The boundary that a program can show: that of stability, or else that of accuracy."""
-    for name in ("stable", "accurate"):
-        failure = entry["sides"][name]["failure"]
+    for name in BOUNDARIES:
+        failure = point.sides[name].failure
         if failure and failure not in _NOTHING_TO_SHOW:
             return name
-    return str(entry["boundary"])
+    return point.boundary
 
 
-def _file_name(entry: Mapping[str, Any]) -> str:
-    settings = entry["settings"]
-    words = (entry["engine"], settings.get("formulation"), settings.get("preset"), entry["axis"], f"{entry['value']:g}")
+def _file_name(point: BoundaryPoint) -> str:
+    settings = point.settings
+    words = (point.engine, settings.get("formulation"), settings.get("preset"), point.axis, f"{point.value:g}")
     return re.sub(r"[^\w.+-]+", "_", "-".join(str(word) for word in words if word))

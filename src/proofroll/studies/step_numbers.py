@@ -45,18 +45,15 @@ class Explanation:
     Attributes:
         number: its name.
         low, high: its least and largest value.
+        spread: largest over least value.
         explains: it stays within a factor of two, while the axis moves at least one of the others by more.
     """
 
     number: str
     low: float
     high: float
+    spread: float
     explains: bool
-
-    @property
-    def spread(self) -> float:
-        """Largest over least value."""
-        return self.high / self.low
 
 
 def explanation(boundaries: Sequence[Mapping[str, float]]) -> Explanation | None:
@@ -73,4 +70,4 @@ def explanation(boundaries: Sequence[Mapping[str, float]]) -> Explanation | None
     best = min(spreads, key=lambda name: spreads[name])
     values = [item[best] for item in boundaries]
     tells = spreads[best] <= _EXPLAINS < max(spreads.values())
-    return Explanation(best, min(values), max(values), tells)
+    return Explanation(best, min(values), max(values), spreads[best], tells)

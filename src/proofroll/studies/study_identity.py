@@ -5,6 +5,7 @@ from __future__ import annotations
 import datetime
 import hashlib
 import re
+from dataclasses import dataclass
 from importlib.metadata import PackageNotFoundError, entry_points, requires, version
 from pathlib import Path
 
@@ -50,26 +51,27 @@ def code() -> str:
     return content.hexdigest()[:16]
 
 
-def measured() -> dict[str, object]:
-    """When, on which machine and with which versions and code a study is being made."""
-    return {
-        "when": datetime.datetime.now(datetime.UTC).isoformat(timespec="seconds"),
-        "machine": machine(),
-        "versions": versions(),
-        "code": code(),
-    }
+@dataclass(frozen=True)
+class Measured:
+    """When, on which machine and with which versions and code a study was made."""
+
+    when: str
+    machine: dict[str, str]
+    versions: dict[str, str]
+    code: str
 
 
-def changes(measured: dict[str, object]) -> list[str]:
-    """What is another than when a study was measured, as short texts; empty if it still holds here.
+def measured() -> Measured:
+    """Of a study that is being made."""
+    return Measured(datetime.datetime.now(datetime.UTC).isoformat(timespec="seconds"), machine(), versions(), code())
 
-    Args:
-        measured: ``machine``, ``versions`` and ``code`` as they were then.
-    """
+
+def changes(measured: Measured) -> list[str]:
+    """What is another than when a study was measured, as short texts; empty if it still holds here."""
     found = []
-    then, now = dict(measured.get("machine") or {}), machine()  # type: ignore[call-overload]
+    then, now = measured.machine, machine()
     found += [f"{key} {then.get(key)} then, {value} now" for key, value in now.items() if then.get(key) != value]
-    then, now = dict(measured.get("versions") or {}), versions()  # type: ignore[call-overload]
+    then, now = measured.versions, versions()
     own = _required()
     for name in sorted(then.keys() | now.keys(), key=str.lower):
         if name not in then and name not in own:
@@ -78,6 +80,6 @@ def changes(measured: dict[str, object]) -> list[str]:
             continue  # an environment that is gone was not made anew with something else
         if then.get(name) != now.get(name):
             found.append(f"{name} {then.get(name, 'absent')} then, {now.get(name, 'absent')} now")
-    if measured.get("code") != code():
+    if measured.code != code():
         found.append("proofroll's own code has changed")
     return found

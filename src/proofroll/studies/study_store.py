@@ -7,12 +7,13 @@ import hashlib
 import json
 from collections.abc import Callable, Mapping, Sequence
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, TypeVar
 
 from proofroll.files.atomic import ordinary_content
-from proofroll.files.json_data import plain
+from proofroll.files.json_data import plain, record
 from proofroll.running.store import write_text
 from proofroll.studies import study_identity
+from proofroll.studies.study_identity import Measured
 
 if TYPE_CHECKING:
     from proofroll.running.runner import Runner
@@ -21,29 +22,25 @@ if TYPE_CHECKING:
     from proofroll.studies.curve import Question
     from proofroll.studies.stability_claims import StabilityFile
     from proofroll.studies.stability_places import Effort
+    from proofroll.studies.stability_records import StabilityStudy
+
+_Study = TypeVar("_Study")
 
 
-def kept(path: Path) -> tuple[dict[str, Any] | None, list[str]]:
+def kept(path: Path, kind: type[_Study]) -> tuple[_Study | None, list[str]]:
     """A kept study if it still holds here.
 
     Returns:
         the study, or None and why there is none: what has changed since, or nothing if there is no such file.
     """
     try:
-        study: dict[str, Any] = json.loads(ordinary_content(path))
-        if study["seal"] != _seal(study):
+        content = json.loads(ordinary_content(path))
+        if content["seal"] != _seal(content):
             return None, ["what is stored is not what had been put there"]
-        reasons = study_identity.changes(study["measured"])
-    except (
-        OSError,
-        ValueError,
-        KeyError,
-        TypeError,
-        AttributeError,
-        RecursionError,
-    ):  # absent, half written, or something else
+        reasons = study_identity.changes(record(Measured, content["measured"]))
+        return (None, reasons) if reasons else (record(kind, content), [])
+    except (OSError, ValueError, KeyError, TypeError, RecursionError):  # absent, half written, or something else
         return None, []
-    return (None, reasons) if reasons else (study, [])
 
 
 def _seal(study: Mapping[str, Any]) -> str:
@@ -52,14 +49,14 @@ def _seal(study: Mapping[str, Any]) -> str:
     return hashlib.sha256(json.dumps(content, sort_keys=True).encode()).hexdigest()
 
 
-def keep(study: Mapping[str, Any], path: Path) -> None:
+def keep(study: Any, path: Path) -> None:
     """Writes a study as :func:`kept` reads it.
 
     Raises:
         ProofrollError: the folder cannot be written.
     """
-    as_read = json.loads(json.dumps(study))  # what will be read: no tuples, and no numbers as keys
-    write_text(path, json.dumps({**as_read, "seal": _seal(as_read)}))
+    content = plain(study)
+    write_text(path, json.dumps({**content, "seal": _seal(content)}))
 
 
 def make_tradeoff(
@@ -126,7 +123,7 @@ def make_stability(
     engines: Sequence[str] = (),
     effort: Effort,
     progress: Callable[[str, int], None] | None = None,
-) -> tuple[dict[str, Any], Path]:
+) -> tuple[StabilityStudy, Path]:
     """Maps the boundaries of a scene, and keeps the map with a program for each boundary.
 
     Args:
@@ -139,32 +136,21 @@ def make_stability(
         progress: called with a short text and the number of points finished since the last call.
 
     Returns:
-        the study as plain data with ``claims``, and its file.
+        the study with ``claims``, and its file.
 
     Raises:
         InputError: something that does not exist.
         ProofrollError: the folder cannot be written.
     """
     from proofroll.studies.stability import stability
-    from proofroll.studies.stability_content import stability_document
-    from proofroll.studies.stability_reproducers import write_reproducers
+    from proofroll.studies.stability_content import stability_study
+    from proofroll.studies.stability_records import MapClaims
+    from proofroll.studies.stability_reproducers import with_programs
 
     found = stability(asked.scene, axes, runner, engines=engines, effort=effort, progress=progress)
-    map_alone = stability_document(found)
     path = stability_path(folder, asked, axes, engines, effort)
-    written = write_reproducers(found, map_alone["points"], path.with_suffix(""), runner.workers)
-    study: dict[str, Any] = plain(
-        {
-            **map_alone,
-            "points": [
-                {**entry, **dataclasses.asdict(program)}
-                for entry, program in zip(map_alone["points"], written, strict=True)
-            ],
-            "claims": {"file": asked.name, "contradictions": asked.contradictions(map_alone)},
-            "effort": dataclasses.asdict(effort),
-            "measured": study_identity.measured(),
-        }
-    )
+    study = with_programs(found, stability_study(found), path.with_suffix(""), runner.workers)
+    study = dataclasses.replace(study, claims=MapClaims(asked.name, asked.contradictions(study)))
     keep(study, path)
     return study, path
 

@@ -13,9 +13,10 @@ from types import SimpleNamespace
 from typing import Any
 
 import pytest
+from invented import boundary_point
 
 from proofroll.core.errors import InputError
-from proofroll.files.json_data import plain
+from proofroll.files.json_data import plain, record
 from proofroll.files.scene_file import load_scene
 from proofroll.report.stability_map import LETTERS, legend, svg
 from proofroll.report.stability_tables import boundary_table, headline, silent_lines
@@ -26,9 +27,10 @@ from proofroll.studies.axes import Axis, AxisTerm, chosen, thinned
 from proofroll.studies.failure import meanings
 from proofroll.studies.stability import _refused, stability
 from proofroll.studies.stability_claims import Claim, file_for
-from proofroll.studies.stability_content import dependence, stability_document
+from proofroll.studies.stability_content import dependence, stability_study
 from proofroll.studies.stability_places import Effort, places_of
-from proofroll.studies.stability_reproducers import write_reproducers
+from proofroll.studies.stability_records import Boundary, BoundaryPoint, StabilityStudy
+from proofroll.studies.stability_reproducers import with_programs
 from proofroll.studies.step_numbers import OSCILLATION, explanation, values
 
 SPEED = Axis("V0", "m/s", "initial speed", [2.0, 8.0], {"speed": AxisTerm()})
@@ -63,14 +65,14 @@ def small(resumed: tuple[Runner, int, Path]) -> Any:
 
 def test_a_map(small: Any) -> None:
     """RK4 has a boundary at either speed, and as nothing but Ωh matters here, it is the same Ωh."""
-    study = plain(stability_document(small))
-    assert [point["value"] for point in study["points"]] == [2.0, 8.0]
-    turns = [point["sides"]["accurate"]["numbers"]["turn"] for point in study["points"]]
+    study = stability_study(small)
+    assert [point.value for point in study.points] == [2.0, 8.0]
+    turns = [point.sides["accurate"].numbers["turn"] for point in study.points]
     assert turns[0] == pytest.approx(turns[1])
     assert 0.1 < turns[0] < 1.5
-    assert all(point["largest_accurate"] <= point["largest_stable"] for point in study["points"])
-    assert study["boundaries"] == sum(study["failures"].values())
-    json.dumps(study, allow_nan=False)
+    assert all(point.largest_accurate <= point.largest_stable for point in study.points)
+    assert study.boundaries == sum(study.failures.values())
+    assert record(StabilityStudy, json.loads(json.dumps(plain(study), allow_nan=False))) == study
 
 
 def test_a_search_hangs_on_no_clock(small: Any) -> None:
@@ -87,12 +89,14 @@ def test_a_search_hangs_on_no_clock(small: Any) -> None:
 def test_a_run_that_met_the_limit_of_time_contradicts_nothing() -> None:
     """What a faster machine would have shown is left open: the claim is not tested there."""
     claim = Claim(ENGINE, "stable", "it is", number="turn", between=[0.4, 0.6])
-    side = {"largest": 1.0, "numbers": {"turn": 9.0}, "failure": None, "silent": False}
-    point = {"engine": "projection", "settings": {"formulation": "rotating_frame", "preset": "default"},
-             "curve": ENGINE, "axis": "V0", "value": 4.0, "problem": None, "too_slow": 1e-3, "timed_out": False,
-             "runs": 5, "sides": {"stable": side}}  # fmt: skip
+    point = boundary_point(
+        engine="projection",
+        settings={"formulation": "rotating_frame", "preset": "default"},
+        too_slow=1e-3,
+        sides={"stable": side(largest=1.0, numbers={"turn": 9.0})},
+    )
     assert claim.contradictions([point]) != []
-    late = [point | {"timed_out": True}]
+    late = [dataclasses.replace(point, timed_out=True)]
     assert claim.contradictions(late) == []
     assert "limit of time" in claim.untested(late)
 
@@ -104,7 +108,7 @@ def test_a_closed_form_has_no_boundary(tmp_path: Path) -> None:
     found = mapped(tmp_path, ["reduced[preset=matched]"], [axis], progress=lambda text, _: told.append(text))
     assert told[-1].endswith("V0 = 4: 1 of 1 points")
     assert [point.curve.facts.settings["formulation"] for point in found.points] == ["equations"]
-    assert stability_document(found)["points"][0]["resolution"] == "rtol"
+    assert stability_study(found).points[0].resolution == "rtol"
     (reason,) = found.absent.values()
     assert "neither step nor tolerance" in reason
 
@@ -130,7 +134,7 @@ def test_a_map_resumes(small: Any, resumed: tuple[Any, int, Path]) -> None:
     assert runner.reused == before
     again = Runner(Store(folder), jobs=1)
     other = stability("sphere_in_cylinder", [SPEED], again, engines=[ENGINE], effort=SHORT)
-    assert stability_document(other) == stability_document(small)
+    assert stability_study(other).points == stability_study(small).points
     assert again.reused == small.runs + 2  # and the truth of both places
 
 
@@ -138,7 +142,7 @@ def test_reports_of_a_map(small: Any) -> None:
     """Terminal and heat map say of every point what it is, within 100 columns."""
     from rich.console import Console
 
-    study = plain(stability_document(small))
+    study = stability_study(small)
     assert headline(study).startswith("2 points, ")
     console = Console(width=100, record=True, file=open("/dev/null", "w"))  # noqa: SIM115 -- nobody reads it
     console.print(boundary_table(study))
@@ -152,7 +156,7 @@ def test_reports_of_a_map(small: Any) -> None:
 
 
 @pytest.fixture(scope="module")
-def programs(tmp_path_factory: pytest.TempPathFactory) -> dict[str, dict[str, Any]]:
+def programs(tmp_path_factory: pytest.TempPathFactory) -> dict[str, BoundaryPoint]:
     """Points of three engines, with the programs that show their boundaries."""
     pytest.importorskip("mujoco")
     pytest.importorskip("exudyn")
@@ -165,16 +169,15 @@ def programs(tmp_path_factory: pytest.TempPathFactory) -> dict[str, dict[str, An
     ]
     axis = Axis("V0", "m/s", "initial speed", [4.0], {"speed": AxisTerm()})
     found = mapped(folder, engines, [axis])
-    points = stability_document(found)["points"]
-    written = write_reproducers(found, points, folder / "reproducers")
-    return {entry["engine"]: entry | dataclasses.asdict(one) for entry, one in zip(points, written, strict=True)}
+    written = with_programs(found, stability_study(found), folder / "reproducers")
+    return {point.engine: point for point in written.points}
 
 
 @pytest.mark.parametrize("engine", ["mujoco", "exudyn", "pinocchio"])
-def test_a_program_shows_the_failure_without_us(programs: dict[str, dict[str, Any]], engine: str) -> None:
+def test_a_program_shows_the_failure_without_us(programs: dict[str, BoundaryPoint], engine: str) -> None:
     """The program of a boundary runs where proofroll and the other engines cannot be imported, and exits with 1."""
-    path = programs[engine]["reproducer"]
-    assert path is not None, programs[engine]["reproducer_note"]
+    path = programs[engine].reproducer
+    assert path is not None, programs[engine].reproducer_note
     hidden = [name for name in ("proofroll", "mujoco", "exudyn", "pinocchio", "xarray") if name != engine]
     hide = f"import sys, runpy; sys.modules.update(dict.fromkeys({hidden!r}))"
     code = f"{hide}; runpy.run_path({path!r}, run_name='__main__')"
@@ -187,7 +190,7 @@ def test_what_is_ours_is_shown_through_proofroll(tmp_path: Path) -> None:
     """Where an engine has no program of its own, the program asks proofroll, says why, and exits with 1."""
     axis = Axis("V0", "m/s", "initial speed", [4.0], {"speed": AxisTerm()})
     found = mapped(tmp_path, ["projection[formulation=euler,preset=default]"], [axis])
-    (written,) = write_reproducers(found, stability_document(found)["points"], tmp_path / "reproducers")
+    (written,) = with_programs(found, stability_study(found), tmp_path / "reproducers").points
     assert written.reproducer_needs == ["numpy", "proofroll"]
     assert written.reproducer is not None
     assert written.reproducer_note is not None
@@ -200,11 +203,12 @@ def test_what_is_ours_is_shown_through_proofroll(tmp_path: Path) -> None:
     assert ": shown" in run.stdout
 
 
-def test_a_program_does_not_cry_wolf(programs: dict[str, dict[str, Any]]) -> None:
+def test_a_program_does_not_cry_wolf(programs: dict[str, BoundaryPoint]) -> None:
     """The same program with a far smaller step says that nothing is shown."""
     point = programs["exudyn"]
-    text = Path(point["reproducer"]).read_text()
-    beyond = point["sides"][point["boundary"]]["beyond"]
+    assert point.reproducer is not None
+    assert point.shown.beyond is not None
+    text, beyond = Path(point.reproducer).read_text(), point.shown.beyond
     line = f"STEP_SIZE = {beyond!r}"
     assert line in text
     run = subprocess.run(
@@ -271,16 +275,9 @@ def test_scale_free_axes() -> None:
 def test_adependence_on_scale() -> None:
     """A boundary that moves along a scale-free axis by more than the rungs are apart is a finding."""
 
-    def points(*largest: float | None) -> list[dict[str, Any]]:
+    def points(*largest: float | None) -> list[BoundaryPoint]:
         return [
-            {
-                "value": 10.0**k,
-                "too_slow": None,
-                "timed_out": False,
-                "period": 2.0,
-                "resolution": "dt",
-                "sides": {"stable": {"largest": x, "failure": "refused"}},
-            }
+            boundary_point(value=10.0**k, period=2.0, sides={"stable": side(largest=x, failure="refused")})
             for k, x in enumerate(largest)
         ]
 
@@ -290,7 +287,7 @@ def test_adependence_on_scale() -> None:
         points(0.1, 0.04), "stable"
     )
     assert "nowhere at 10 (refused)" in dependence(points(0.1, None), "stable")
-    cut = [point | {"too_slow": 0.05} for point in points(0.1, None)]
+    cut = [dataclasses.replace(point, too_slow=0.05) for point in points(0.1, None)]
     assert dependence(cut, "stable") == ""
 
 
@@ -311,14 +308,20 @@ def claim(**more: Any) -> Claim:
     return Claim("made[formulation=only]", more.pop("boundary", "stable"), "a reason", **more)
 
 
-POINT = {
-    "engine": "made", "settings": {"formulation": "only"}, "curve": "made[formulation=only]",
-    "axis": "V0", "value": 4.0, "problem": None, "too_slow": None, "timed_out": False,
-    "sides": {
-        "stable": {"largest": 0.1, "numbers": {"spin": 0.3}, "failure": "energy gain", "silent": True},
-        "accurate": {"largest": None, "numbers": {}, "failure": "creep", "silent": True},
+def side(**more: Any) -> Boundary:
+    """A boundary of the made-up point."""
+    values = {"largest": None, "reached": True, "numbers": {}, "beyond": None, "failure": None, "silent": True}
+    return Boundary(**(values | {"error": None, "time": None, "message": None} | more))
+
+
+POINT = boundary_point(
+    engine="made",
+    curve="made[formulation=only]",
+    sides={
+        "stable": side(largest=0.1, numbers={"spin": 0.3}, failure="energy gain"),
+        "accurate": side(failure="creep"),
     },
-}  # fmt: skip
+)
 
 
 @pytest.mark.parametrize(
@@ -343,11 +346,13 @@ def test_claims(made: Claim, contradictions: int) -> None:
 def test_a_claim_that_nothing_depends_on_an_axis() -> None:
     """Boundaries that are the same in natural times confirm it; one that moves along the axis is named."""
 
-    def along(*steps: float) -> list[dict[str, Any]]:
+    def along(*steps: float) -> list[BoundaryPoint]:
         """Points with the same natural time."""
-        sides = ({"stable": POINT["sides"]["stable"] | {"largest": step}} for step in steps)
-        more = {"axis": "mass", "period": 1.0, "resolution": "dt"}
-        return [POINT | more | {"value": 10.0**k, "sides": side} for k, side in enumerate(sides)]
+        sides = (dataclasses.replace(POINT.sides["stable"], largest=step) for step in steps)
+        return [
+            dataclasses.replace(POINT, axis="mass", value=10.0**k, period=1.0, sides={"stable": one})
+            for k, one in enumerate(sides)
+        ]
 
     assert claim(same=True).contradictions(along(0.1, 0.1, 0.2)) == []
     (said,) = claim(same=True).contradictions(along(0.1, 0.1, 0.01))

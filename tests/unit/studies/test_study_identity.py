@@ -11,14 +11,9 @@ from proofroll.running.timing import machine
 from proofroll.studies import study_identity
 
 
-def measured() -> dict[str, object]:
-    """A study that was made here and now."""
-    return {"machine": machine(), "versions": study_identity.versions(), "code": study_identity.code()}
-
-
 def test_nothing_has_changed_since_now() -> None:
     """What was measured here with this code still holds."""
-    assert study_identity.changes(measured()) == []
+    assert study_identity.changes(study_identity.measured()) == []
 
 
 def test_engines_are_among_the_versions() -> None:
@@ -35,7 +30,7 @@ def test_an_environment_that_was_made_anew_is_a_change(tmp_path: Path, monkeypat
         Environment("aged", label, tmp_path / "aged" / label, "1.0", [], "3.11", list(packages)).stamp()
 
     make("1.0", "numpy==2.0")
-    before = measured()
+    before = study_identity.measured()
     make("2.0", "numpy==2.0")
     assert study_identity.changes(before) == []
     make("1.0", "numpy==2.1")
@@ -47,17 +42,15 @@ def test_an_environment_that_was_made_anew_is_a_change(tmp_path: Path, monkeypat
 
 def test_each_change_is_told() -> None:
     """Another machine, another version, a package that is gone and other code are each one short text."""
-    now = measured()
     other = study_identity.changes(
-        {
-            "machine": machine() | {"processor": "an abacus"},
-            "versions": {name: v for name, v in study_identity.versions().items() if name != "mujoco"}
-            | {"numpy": "1.0"},
-            "code": "0",
-        }
+        study_identity.Measured(
+            "then",
+            machine() | {"processor": "an abacus"},
+            {name: v for name, v in study_identity.versions().items() if name != "mujoco"} | {"numpy": "1.0"},
+            "0",
+        )
     )
     assert len(other) == 4
     text = "; ".join(other)
     for words in ("processor an abacus then", "mujoco absent then", "numpy 1.0 then", "own code has changed"):
         assert words in text
-    assert study_identity.changes({**now, "machine": None}) != []

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import dataclasses
-import json
 from pathlib import Path
 from typing import Any
 
@@ -15,27 +14,35 @@ from proofroll.studies.stability_places import QUICK, Effort
 from proofroll.studies.study_store import keep, kept, stability_path
 
 
+@dataclasses.dataclass
+class Study:
+    """The least that can be kept."""
+
+    points: list[int]
+    measured: study_identity.Measured
+
+
 @pytest.fixture
 def path(tmp_path: Path) -> Path:
     """A study that was kept just now."""
     path = tmp_path / "study.json"
-    keep({"points": [1], "measured": study_identity.measured()}, path)
+    keep(Study([1], study_identity.measured()), path)
     return path
 
 
 def changed(path: Path, **values: Any) -> Path:
     """The same file with something else in what it was measured with."""
-    study = json.loads(path.read_text())
-    study["measured"] |= values
-    keep(study, path)
+    study, _ = kept(path, Study)
+    assert study is not None
+    keep(dataclasses.replace(study, measured=dataclasses.replace(study.measured, **values)), path)
     return path
 
 
 def test_a_study_of_this_code_on_this_machine_holds(path: Path) -> None:
     """It comes back as it was put, and nothing speaks against it."""
-    study, reasons = kept(path)
+    study, reasons = kept(path, Study)
     assert study is not None
-    assert (study["points"], reasons) == ([1], [])
+    assert (study.points, reasons) == ([1], [])
 
 
 @pytest.mark.parametrize(
@@ -48,7 +55,7 @@ def test_a_study_of_this_code_on_this_machine_holds(path: Path) -> None:
 )
 def test_a_study_of_another_code_version_or_machine_does_not(path: Path, values: Any, words: str) -> None:
     """It is not given, and what has changed is said."""
-    study, reasons = kept(changed(path, **values))
+    study, reasons = kept(changed(path, **values), Study)
     assert study is None
     assert any(reason.startswith(words) for reason in reasons), reasons
 
@@ -56,7 +63,7 @@ def test_a_study_of_another_code_version_or_machine_does_not(path: Path, values:
 def test_a_study_that_was_tampered_with_does_not(path: Path) -> None:
     """One number that is not what was put there, and it is not given."""
     path.write_text(path.read_text().replace('"points": [1]', '"points": [2]'))
-    assert kept(path) == (None, ["what is stored is not what had been put there"])
+    assert kept(path, Study) == (None, ["what is stored is not what had been put there"])
 
 
 def test_another_file_has_a_map_of_its_own(tmp_path: Path) -> None:
@@ -71,8 +78,8 @@ def test_another_file_has_a_map_of_its_own(tmp_path: Path) -> None:
 def test_a_file_that_is_no_study_is_as_none(tmp_path: Path, text: str) -> None:
     """Half a file, another file and none at all are alike: there is no study, and no reason to name."""
     (tmp_path / "study.json").write_text(text)
-    assert kept(tmp_path / "study.json") == (None, [])
-    assert kept(tmp_path / "nothing.json") == (None, [])
+    assert kept(tmp_path / "study.json", Study) == (None, [])
+    assert kept(tmp_path / "nothing.json", Study) == (None, [])
 
 
 def test_a_part_of_a_map_never_takes_the_place_of_the_whole(tmp_path: Path) -> None:

@@ -1,0 +1,176 @@
+"""What a stability map is kept as, printed as and drawn from."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+from typing import Any
+
+from proofroll.studies.axes import Axis
+from proofroll.studies.stability_places import Effort
+from proofroll.studies.step_numbers import Explanation
+from proofroll.studies.study_identity import Measured
+
+
+@dataclass(frozen=True)
+class Boundary:
+    """Where a curve stops being stable, or accurate, at one place.
+
+    Attributes:
+        largest: step [s] or tolerance that holds; None: none that is affordable does.
+        reached: something holds, and something beyond it fails.
+        numbers: dimensionless numbers of that step, by name.
+        beyond: the next step or tolerance, which fails.
+        failure: what happens there.
+        silent: the engine does not say so.
+        error: of the deciding observable there, in parts of its range.
+        time: when the failure shows [s].
+        message: how the run there ended.
+    """
+
+    largest: float | None
+    reached: bool
+    numbers: dict[str, float]
+    beyond: float | None
+    failure: str | None
+    silent: bool
+    error: float | None
+    time: float | None
+    message: str | None
+
+
+@dataclass(frozen=True)
+class BoundaryPoint:
+    """One engine with its settings at one value of an axis.
+
+    Attributes:
+        engine, settings, curve, level, caveat, resolution: which.
+        axis, value, parameters: where.
+        until: length of every run [s].
+        period: natural time of the scene there [s].
+        largest_stable, largest_accurate: of the two boundaries.
+        boundary: which of them is to be shown; ``failure``, ``silent`` and ``message`` are its own.
+        sides: both, ``stable`` and ``accurate``.
+        least_error: of all stable runs.
+        finest: the finest step or tolerance that was run.
+        too_slow: the first that was not, for its many steps or for runs that met the limit of time.
+        timed_out: a run met that limit.
+        runs: how many there were.
+        problem: why there is no truth here.
+        reproducer: path of a program that shows the failure.
+        reproducer_needs: packages that it imports.
+        reproducer_note: why it needs proofroll, or why there is none.
+    """
+
+    engine: str
+    settings: dict[str, Any]
+    curve: str
+    level: str | None
+    caveat: str
+    resolution: str | None
+    axis: str
+    value: float
+    parameters: dict[str, float]
+    until: float
+    period: float
+    largest_stable: float | None
+    largest_accurate: float | None
+    boundary: str
+    failure: str | None
+    silent: bool
+    message: str | None
+    sides: dict[str, Boundary]
+    least_error: float | None
+    finest: float | None
+    too_slow: float | None
+    timed_out: bool
+    runs: int
+    problem: str | None
+    reproducer: str | None = None
+    reproducer_needs: list[str] = field(default_factory=list)
+    reproducer_note: str | None = None
+
+    @property
+    def shown(self) -> Boundary:
+        """The boundary that is to be shown."""
+        return self.sides[self.boundary]
+
+    @property
+    def cut(self) -> bool:
+        """Whether the search ended for runs that were too slow: a boundary that is missing then says nothing."""
+        return self.too_slow is not None
+
+
+@dataclass(frozen=True, kw_only=True)
+class ExplainedBoundary(Explanation):
+    """The number that changes least among the boundaries of a curve along an axis."""
+
+    curve: str
+    axis: str
+    boundary: str
+
+
+@dataclass(frozen=True)
+class MappedPlace:
+    """A value of an axis, the scene's parameters there, and why there is no truth."""
+
+    axis: str
+    value: float
+    parameters: dict[str, float]
+    problem: str | None
+
+
+@dataclass(frozen=True)
+class MapClaims:
+    """The file whose claims were held against a map, and what the map does not confirm."""
+
+    file: str
+    contradictions: list[str]
+
+
+@dataclass(frozen=True, kw_only=True)
+class StabilityStudy:
+    """A map with counts on top.
+
+    Attributes:
+        scene, axes, periods, effort: what was asked.
+        accurate: part of the range that an accurate run holds.
+        runs: how many there were.
+        boundaries: how many points have a failure beyond them.
+        silent: how many of these the engine did not report.
+        refused: points that were refused before the run.
+        failures: kind of failure -> how many points.
+        never_accurate: points at which nothing affordable holds.
+        meanings: kind of failure -> what it is.
+        step_symbols: dimensionless number of a step -> its symbol.
+        points: every engine at every place.
+        explanations: which number explains which boundaries.
+        findings: what stands out, as sentences.
+        places: the values of the axes.
+        absent: engine -> why it is not on the map.
+        hosts: machine of a cluster -> how many of the results it made.
+        measured: when, where and with what.
+        claims: what was held against it.
+    """
+
+    study: str = "stability"
+    scene: str
+    axes: list[Axis]
+    periods: float
+    accurate: float
+    runs: int
+    boundaries: int
+    silent: int
+    refused: int
+    failures: dict[str, int]
+    never_accurate: int
+    meanings: dict[str, str]
+    step_symbols: dict[str, str]
+    points: list[BoundaryPoint]
+    explanations: list[ExplainedBoundary]
+    findings: list[str]
+    places: list[MappedPlace]
+    absent: dict[str, str]
+    hosts: dict[str, int] = field(default_factory=dict)
+    effort: Effort
+    measured: Measured
+    claims: MapClaims | None = None
