@@ -36,6 +36,20 @@ def test_every_section_says_something(report_page: Path, visit: Visiting) -> Non
         assert seen.page.evaluate("reading.empty()") == ["findings"]
 
 
+def test_a_table_with_rows_below_says_so(report_page: Path, visit: Visiting) -> None:
+    """A table that shows not all of its rows says that there are more, until the last one has been in sight."""
+    says = "(table) => getComputedStyle(table, '::after').content"
+    with visit(report_page) as seen:
+        seen.page.set_viewport_size({"width": 1280, "height": 420})
+        table = seen.page.locator(".scroll:has(.matrix)").first
+        table.evaluate("(table) => { table.style.maxHeight = '9rem'; }")
+        seen.page.wait_for_function("document.querySelector('.scroll.more') !== null")
+        assert "more rows" in table.evaluate(says)
+        table.evaluate("(table) => { table.scrollTop = table.scrollHeight; }")
+        seen.page.wait_for_function("!document.querySelector('.scroll:has(.matrix)').classList.contains('more')")
+        assert table.evaluate(says) == "none"
+
+
 def test_figures_are_drawn_when_they_come_into_view(report_page: Path, visit: Visiting) -> None:
     """None far below before, each after a reader has scrolled to it, one that is not there is missed.
 

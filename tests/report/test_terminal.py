@@ -45,16 +45,17 @@ def claimed(**more: Any) -> Any:
     return SimpleNamespace(**more)
 
 
-@pytest.mark.parametrize("unexpected", [[], ["alpha at speed=4 differs, " + 40 * "expected " + "otherwise"]])
+@pytest.mark.parametrize("unexpected", [[], ["alpha at speed=4 differs, " + 40 * "expected\n" + "otherwise"]])
 @pytest.mark.parametrize("missing", ["", "It has not been made yet; proofroll tradeoff x makes it."])
-def test_what_to_look_at_first_is_three_lines_at_most(
+def test_what_to_look_at_first_is_three_sentences_at_most(
     content: ReportContent, unexpected: list[str], missing: str
 ) -> None:
-    """The unexpected before all, then what is missing; each line fits, whatever it quotes."""
+    """The unexpected before all, then what is missing; whatever is quoted arrives whole, without breaks of its own."""
     comparison = replace(content.comparisons[0], contradictions=unexpected)
     lines = first_lines(replace(content, comparisons=[comparison], entries={"tradeoffs": [entry(missing=missing)]}))
     assert 1 <= len(lines) <= 3
-    assert all(len(line) <= WIDTH and "\n" not in line for line in lines)
+    assert not any("\n" in line for line in lines)
+    assert not unexpected or lines[0].endswith("otherwise")
     assert lines[0].startswith(
         "Look first at what was not expected (1)" if unexpected else ("Missing" if missing else "L")
     )

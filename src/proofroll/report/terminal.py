@@ -132,22 +132,21 @@ def part_lines(content: ReportContent) -> list[str]:
 
 
 def first_lines(content: ReportContent) -> list[str]:
-    """What to look at first, in at most three lines."""
+    """What to look at first, in at most three sentences; the terminal wraps them."""
     entries = content.further
     unexpected = [line for comparison in content.comparisons for line in comparison.contradictions]
     unexpected += [line for entry in entries for line in entry.contradictions]
     missing = [entry for entry in entries if entry.missing]
     lines = []
     if unexpected:
-        lines.append(_cut(f"Look first at what was not expected ({len(unexpected)}): {unexpected[0]}"))
+        lines.append(_one_line(f"Look first at what was not expected ({len(unexpected)}): {unexpected[0]}"))
     if missing:
-        lines.append(_cut(f"Missing ({len(missing)}): {missing[0].title}: {missing[0].missing}"))
+        lines.append(_one_line(f"Missing ({len(missing)}): {missing[0].title}: {missing[0].missing}"))
     if not unexpected:
-        lines.append(_cut(f"Look first at what is silent: {content.findings.sentences[1]}"))
+        lines.append(_one_line(f"Look first at what is silent: {content.findings.sentences[1]}"))
     return lines
 
 
-def _cut(text: str) -> str:
-    """A text as one line of the terminal."""
-    text = " ".join(text.split())
-    return text if len(text) <= WIDTH else f"{text[: WIDTH - 1]}…"
+def _one_line(text: str) -> str:
+    """A text without the breaks of what it quotes."""
+    return " ".join(text.split())

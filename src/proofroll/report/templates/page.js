@@ -37,3 +37,12 @@ const stored = unpack;
   addEventListener("scroll", follow, { passive: true });
   follow();
 })();
+
+// A table that has more rows than it shows says so, until its last row has been in sight.
+(() => {
+  const regions = [...document.querySelectorAll(".scroll")];
+  const look = (region) => region.classList.toggle("more", region.scrollTop + region.clientHeight < region.scrollHeight - 4);
+  regions.forEach((region) => region.addEventListener("scroll", () => look(region), { passive: true }));
+  const sizes = new ResizeObserver((changes) => changes.forEach((change) => look(change.target)));
+  regions.forEach((region) => sizes.observe(region));
+})();
