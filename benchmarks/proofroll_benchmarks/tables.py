@@ -111,3 +111,15 @@ def adapter_table(found: dict[str, Any]) -> Table:
                 Text(row["message"]),
             )
     return table
+
+
+def cluster_lines(found: dict[str, Any]) -> Iterator[str]:
+    """What a cluster costs besides its cases, in sentences."""
+    cases = found["cases"]
+    yield (
+        f"{cases} cases on {found['threads']} threads: {found['wall']:.1f} s, of which {found['processor']:.1f} s of "
+        f"this process ({1e3 * found['processor'] / cases:.2g} ms a case), {found['memory']:.0f} MB more than it began "
+        f"with, {found['stored'] / cases:.0f} bytes stored a case."
+    )
+    if found["efficiency"] is not None:
+        yield f"Efficiency for cases of {found['seconds']:g} s: {found['efficiency']:.2f} a thread."

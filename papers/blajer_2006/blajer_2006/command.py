@@ -8,19 +8,7 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from proofroll.cli.options import (
-    CONTRADICTED,
-    ENGINE,
-    OK,
-    Fresh,
-    Jobs,
-    Json,
-    Out,
-    complain,
-    new_runner,
-    progress_bar,
-    write_json,
-)
+from proofroll.cli import options
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -42,10 +30,10 @@ def figures(
         str | None, typer.Option(help="truth, or name[key=value,…]; by default the one that the file names.")
     ] = None,
     form: Annotated[list[Form] | None, typer.Option("--format", help="Form of the files; repeat. svg.")] = None,
-    out: Out = Path("out"),
-    fresh: Fresh = False,
-    jobs: Jobs = None,
-    as_json: Json = False,
+    out: options.Out = Path("out"),
+    fresh: options.Fresh = False,
+    jobs: options.Jobs = None,
+    as_json: options.Json = False,
 ) -> None:
     """Draw the paper's figures from runs; exit 1 if a number that it states does not hold."""
     from blajer_2006.drawing import looks
@@ -56,25 +44,18 @@ def figures(
     loaded = load_figures(study)
     with looks():  # what is missing shows before the runs rather than after them
         pass
-    runner = new_runner(out, fresh, jobs)
-    with progress_bar("runs") as advance:
+    runner = options.new_runner(out, fresh, jobs)
+    with options.progress_bar("runs") as advance:
         made = run_figures(loaded, runner, engine, lambda case, _: advance(case.engine.name))
     maps = {name: _maps(name, jobs) for name in dict.fromkeys(item.regimes for item in loaded.figures) if name}
     content = write_figures(made, maps, out, list(dict.fromkeys(item.value for item in form or [Form.SVG])))
-    if as_json:
-        write_json(content)
-    else:
-        from proofroll.report.terminal import console
-
-        console().print(statement_table(content))
-        for line in closing_lines(content, out):
-            console().print(line, markup=False)
+    options.show(content, as_json, lambda: [statement_table(content), *closing_lines(content, out)])
     for line in content["lost"]:
-        complain(line)
+        options.complain(line)
     if content["lost"]:
-        raise typer.Exit(ENGINE)
+        raise typer.Exit(options.ENGINE)
     contradicted = any(item["holds"] is False for item in content["statements"])
-    raise typer.Exit(CONTRADICTED if contradicted else OK)
+    raise typer.Exit(options.CONTRADICTED if contradicted else options.OK)
 
 
 def _maps(name: str, jobs: int | None) -> list[xr.Dataset]:
@@ -84,5 +65,5 @@ def _maps(name: str, jobs: int | None) -> list[xr.Dataset]:
     from proofroll.elements.ball_on_surface.regimes_study import load_regimes, regime_maps
 
     wanted = load_regimes(name)
-    with progress_bar("runs of the truth", total=wanted.runs) as advance:
+    with options.progress_bar("runs of the truth", total=wanted.runs) as advance:
         return regime_maps(wanted, jobs or os.cpu_count() or 1, lambda count: advance("runs of the truth", count))

@@ -8,7 +8,7 @@ from collections.abc import Mapping
 from importlib.metadata import entry_points
 from pathlib import Path
 
-from proofroll.cli.options import write_json
+from proofroll.cli import options
 from proofroll.core.errors import InputError, choices
 
 # What reads the files of a study: the name of the entry point is the file's ``study``; it is given the path as text.
@@ -28,7 +28,7 @@ def check_text(name: str, as_json: bool) -> None:
     """
     found = checked(name)
     if as_json:
-        write_json(found)
+        options.write_json(found)
         return
     counts = ", ".join(
         f"{count} {what.removesuffix('s') if count == 1 else what}" for what, count in found.counts.items()

@@ -7,7 +7,7 @@ from typing import Annotated
 
 import typer
 
-from proofroll.cli.options import Json, write_json
+from proofroll.cli import options
 
 
 def cite(
@@ -16,7 +16,7 @@ def cite(
         typer.Argument(help="Results (.json of a command, .nc of a run), comparisons, scenes, or engines."),
     ] = None,
     bibtex: Annotated[bool, typer.Option("--bibtex", help="Print BibTeX instead of sentences.")] = False,
-    as_json: Json = False,
+    as_json: options.Json = False,
 ) -> None:
     """Print the references behind a result: engines with their versions, the scene, the truth, and proofroll itself."""
     from proofroll.report.screen import printable
@@ -24,7 +24,7 @@ def cite(
 
     told = cited(subject or [])
     if as_json:
-        write_json({"cited": content(told)})
+        options.write_json({"cited": content(told)})
         return
     shown: set[str] = set()
     lines = []

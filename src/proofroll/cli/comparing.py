@@ -8,27 +8,10 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
-from proofroll.cli.options import (
-    CONTRADICTED,
-    ENGINE,
-    OK,
-    Engines,
-    Fresh,
-    Jobs,
-    Json,
-    Out,
-    Scheduler,
-    Set,
-    assignments,
-    complain,
-    new_runner,
-    progress_bar,
-    write_json,
-)
+from proofroll.cli import options
 
 if TYPE_CHECKING:
     from proofroll.core.comparison import Comparison
-    from proofroll.report.comparison_records import ReportedComparison
     from proofroll.running.runner import Runner
     from proofroll.studies.outcome import Outcome
 
@@ -38,13 +21,13 @@ def compare(
         str,
         typer.Argument(help="A comparison file, e.g. comparisons/paper.toml, or its name; or a scene, a robot file."),
     ],
-    engine: Engines = None,
-    settings: Set = None,
-    out: Out = Path("out"),
-    fresh: Fresh = False,
-    jobs: Jobs = None,
-    scheduler: Scheduler = None,
-    as_json: Json = False,
+    engine: options.Engines = None,
+    settings: options.Set = None,
+    out: options.Out = Path("out"),
+    fresh: options.Fresh = False,
+    jobs: options.Jobs = None,
+    scheduler: options.Scheduler = None,
+    as_json: options.Json = False,
 ) -> None:
     """Hold the engines of a comparison file against the truth; exit 1 if a verdict contradicts the file.
 
@@ -52,14 +35,12 @@ def compare(
     these.
     """
     from proofroll.report.comparison_content import outcome_content
+    from proofroll.report.terminal import verdict_parts
 
-    loaded = asked(comparison, assignments(settings or []))
-    outcomes = outcomes_of([loaded], engine or [], new_runner(out, fresh, jobs, scheduler))
+    loaded = asked(comparison, options.assignments(settings))
+    outcomes = outcomes_of([loaded], engine or [], options.new_runner(out, fresh, jobs, scheduler))
     content = outcome_content(outcomes[0])
-    if as_json:
-        write_json(content)
-    else:
-        print_outcome(content)
+    options.show(content, as_json, lambda: verdict_parts(content))
     raise typer.Exit(exit_code(outcomes))
 
 
@@ -91,26 +72,15 @@ def outcomes_of(comparisons: list[Any], engines: list[str], runner: Runner, stag
 
     plans = [plan(comparison, engines, runner.workers) for comparison in comparisons]
     cases = {case.key: case for item in plans for case in item.cases}
-    with progress_bar(f"{stage}cases", total=len(cases)) as advance:
+    with options.progress_bar(f"{stage}cases", total=len(cases)) as advance:
         results = runner.run(cases.values(), lambda case, _: advance(f"{stage}{case.engine.name}"))
     if runner.damaged:
-        complain(f"{len(runner.damaged)} stored results were damaged and have been run again")
+        options.complain(f"{len(runner.damaged)} stored results were damaged and have been run again")
     return [evaluate(item, results, runner) for item in plans]
 
 
 def exit_code(outcomes: list[Outcome]) -> int:
     """3 if an engine was lost, 1 if a verdict contradicts its file, else 0."""
     if any(outcome.lost for outcome in outcomes):
-        return ENGINE
-    return CONTRADICTED if any(outcome.contradictions for outcome in outcomes) else OK
-
-
-def print_outcome(content: ReportedComparison) -> None:
-    """A comparison on the terminal: the table of verdicts, and what came of it in words."""
-    from proofroll.report.terminal import closing_lines, console, verdict_table
-
-    out = console()
-    out.print(verdict_table(content))
-    for line in closing_lines(content):
-        out.print(line, markup=False)
-    out.print()
+        return options.ENGINE
+    return options.CONTRADICTED if any(outcome.contradictions for outcome in outcomes) else options.OK

@@ -9,14 +9,14 @@ from typing import Annotated, Any
 
 import typer
 
-from proofroll.cli.options import Json, spinner, write_json
+from proofroll.cli import options
 from proofroll.core.errors import Missing, ProofrollError
 
 engines = typer.Typer(help="List the engines, and make environments of other versions.", rich_markup_mode=None)
 
 
 @engines.callback(invoke_without_command=True)
-def listed(context: typer.Context, as_json: Json = False) -> None:
+def listed(context: typer.Context, as_json: options.Json = False) -> None:
     """List the engines: what is installed, what each provides, and why one is missing.
 
     Environments made by ``add`` are among them, as ``NAME@LABEL``; any command that takes ``--engine`` takes these.
@@ -30,7 +30,7 @@ def listed(context: typer.Context, as_json: Json = False) -> None:
     with ThreadPoolExecutor() as pool:
         found = list(pool.map(_described, [*engine_names(), *others]))
     if as_json:
-        write_json(found)
+        options.write_json(found)
         return
     from rich.table import Table
 
@@ -69,7 +69,7 @@ def add(
     """
     from proofroll.running.make_environment import add as made
 
-    with spinner(f"{name}: making an environment") as say:
+    with options.spinner(f"{name}: making an environment") as say:
         found = made(name, requirement, label, python, lambda text: say(f"{name}: {text}"))
     sys.stdout.write(f"{name}@{found.label}: {name} {found.version}, Python {found.interpreter}, in {found.folder}\n")
 

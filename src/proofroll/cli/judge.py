@@ -8,29 +8,29 @@ from typing import Annotated
 
 import typer
 
-from proofroll.cli.options import CONTRADICTED, OK, Json, Set, assignments, spinner, write_json
+from proofroll.cli import options
 
 
 def judge(
     run: Annotated[Path, typer.Argument(help="netCDF file with time [s] and the state, or variables of the truth.")],
     scene: Annotated[str, typer.Option(help="The scene, or the path of its folder.")],
-    settings: Set = None,
+    settings: options.Set = None,
     tolerance: Annotated[
         list[str] | None, typer.Option(help="variable='1 %' of its scale, or variable='1e-3 m'; repeat.")
     ] = None,
     because: Annotated[str, typer.Option(help="Why that is close enough.")] = "",
-    as_json: Json = False,
+    as_json: options.Json = False,
 ) -> None:
     """Hold a trajectory from anywhere against the truth of a scene; exit 1 if it differs."""
     from proofroll.files.scene_file import load_scene
     from proofroll.studies import judging
 
-    loaded = load_scene(scene, **assignments(settings or []))  # type: ignore[arg-type]  # text is checked there
-    bounds = assignments(tolerance, "--tolerance") if tolerance else None
-    with spinner(f"the truth of {loaded.name}"):
+    loaded = load_scene(scene, **options.assignments(settings))  # type: ignore[arg-type]  # text is checked there
+    bounds = options.assignments(tolerance, "--tolerance") if tolerance else None
+    with options.spinner(f"the truth of {loaded.name}"):
         found = judging.judge(run, loaded, bounds, because=because)
     if as_json:
-        write_json(found.content())
+        options.write_json(found.content())
     else:
         sys.stdout.write(f"{found}\n")
-    raise typer.Exit(OK if found.agrees else CONTRADICTED)
+    raise typer.Exit(options.OK if found.agrees else options.CONTRADICTED)

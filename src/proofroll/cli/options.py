@@ -7,7 +7,7 @@ import os
 import sys
 import threading
 import time
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterable, Iterator
 from contextlib import contextmanager, nullcontext
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
@@ -17,7 +17,7 @@ import typer
 from proofroll.core.errors import InputError, Missing
 
 if TYPE_CHECKING:
-    from rich.console import Console
+    from rich.console import Console, RenderableType
 
     from proofroll.running.cluster import Cluster
     from proofroll.running.runner import Runner
@@ -64,7 +64,7 @@ def progress_bar(what: str, total: int | None = None) -> Iterator[Callable[..., 
     """
     from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn, TimeElapsedColumn
 
-    columns = (TextColumn("{task.description}"), BarColumn(), MofNCompleteColumn(), TimeElapsedColumn())
+    columns = (TextColumn("{task.description}", markup=False), BarColumn(), MofNCompleteColumn(), TimeElapsedColumn())
     console, moves = _standard_error()
     with Progress(*columns, console=console, transient=True, disable=not moves) as progress:
         task = progress.add_task(what, total=total)
@@ -103,10 +103,10 @@ def _standard_error() -> tuple[Console, bool]:
     return console, console.is_terminal and not console.is_dumb_terminal and not os.environ.get("NO_COLOR")
 
 
-def assignments(texts: list[str], option: str = "--set") -> dict[str, str]:
-    """Reads ``name=value``, as given to an option."""
+def assignments(texts: list[str] | None, option: str = "--set") -> dict[str, str]:
+    """Reads ``name=value``, as given to an option, or not."""
     found: dict[str, str] = {}
-    for text in texts:
+    for text in texts or ():
         name, equals, value = text.partition("=")
         if not equals or not name:
             raise InputError(option, text, "write parameter=value")
@@ -145,6 +145,28 @@ def json_text(content: object) -> str:
 def write_json(content: object) -> None:
     """One JSON document on standard output."""
     sys.stdout.write(json_text(content))
+
+
+def show(
+    content: object, as_json: bool, parts: Callable[[], Iterable[RenderableType]], *, widest: int | None = None
+) -> None:
+    """The content of a command as one JSON document, or else on the terminal the tables and lines it is shown by.
+
+    Args:
+        content: records, or plain data.
+        as_json: which of the two.
+        parts: makes the tables and lines.
+        widest: columns; None: as many as :func:`proofroll.report.terminal.console` has.
+    """
+    if as_json:
+        write_json(content)
+        return
+    from proofroll.report.terminal import console
+
+    out = console()
+    out.width = min(out.width, widest or out.width)
+    for part in parts():
+        out.print(part)
 
 
 def require_pages() -> None:

@@ -8,7 +8,7 @@ from typing import Annotated
 
 import typer
 
-from proofroll.cli.options import require_pages, require_writable, spinner
+from proofroll.cli import options
 from proofroll.core.errors import InputError
 
 
@@ -23,8 +23,8 @@ def plot(
 
     target = trajectory.with_suffix(".html") if out is None else out
     require_ending(target)
-    require_pages()
-    require_writable(target)
+    options.require_pages()
+    options.require_writable(target)
     draw_run(read_run(trajectory), target)
     sys.stdout.write(f"The plot is in {target}.\n")
 
@@ -41,10 +41,10 @@ def replay(
     target = trajectory.with_name(f"{trajectory.stem}-replay.html") if out is None else out
     if target.suffix.lower() != ".html":
         raise InputError("--out", str(target), "a replay is a page: end the name of the file in .html")
-    require_writable(target)
-    require_pages()
+    options.require_writable(target)
+    options.require_pages()
     run = read_run(trajectory)
-    with spinner("the truth"):
+    with options.spinner("the truth"):
         text = replay_page(trajectory, run)
     write_text(target, text)
     sys.stdout.write(f"The replay is in {target}.\n")

@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
-from proofroll.cli.options import CONTRADICTED, OK, Jobs, Json, Out, Set, new_runner, write_json
+from proofroll.cli import options
 from proofroll.cli.tradeoff import Over, SceneOrFile, Until, measure, question_of, ranges_of, require_observables
 from proofroll.core.errors import InputError
 
@@ -29,16 +29,16 @@ def recommend(
         str, typer.Option(help="Largest error: 1e-3 in its unit, '1 mm', or '1 %' of its scale.")
     ] = "",
     budget: Annotated[float | None, typer.Option(help="Wall seconds per simulated second that you can afford.")] = None,
-    settings: Set = None,
+    settings: options.Set = None,
     engine: Annotated[
         list[str] | None, typer.Option(help="Choose among these engines, name[key=value,…]; repeat.")
     ] = None,
     over: Over = None,
     until: Until = None,
     measure_first: Annotated[bool, typer.Option("--measure", help="Measure first if no curves are stored.")] = False,
-    out: Out = Path("out"),
-    jobs: Jobs = None,
-    as_json: Json = False,
+    out: options.Out = Path("out"),
+    jobs: options.Jobs = None,
+    as_json: options.Json = False,
 ) -> None:
     """Name the cheapest engine, formulation and step that holds a tolerance here, and why.
 
@@ -61,14 +61,8 @@ def recommend(
     known = {*study["absent"], *(point["engine"] for point in study["points"])}
     not_measured = [] if engine else [name for name in engine_names() if name not in known]
     found = replace(answered(study, wish), not_measured=not_measured)
-    if as_json:
-        write_json(found)
-    else:
-        from proofroll.report.terminal import console
-
-        for line in answer_lines(found):
-            console().print(line, markup=False)
-    raise typer.Exit(OK if found.answer.choice and found.affordable else CONTRADICTED)
+    options.show(found, as_json, lambda: answer_lines(found))
+    raise typer.Exit(options.OK if found.answer.choice and found.affordable else options.CONTRADICTED)
 
 
 def _tolerance(text: str, unit: str) -> Any:
@@ -138,4 +132,4 @@ def _stored_study(
         advice = f"{why}; add --measure, which takes some minutes, or run proofroll tradeoff first"
         raise InputError("stored curves", "none that hold here", advice)
     over = ranges if ranges is not None else (claims.over if claims else {})
-    return measure(question, engines, over, claims, new_runner(out, False, jobs), out)[0]
+    return measure(question, engines, over, claims, options.new_runner(out, False, jobs), out)[0]

@@ -8,25 +8,14 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from proofroll.cli.comparing import asked, exit_code, outcomes_of, print_outcome
-from proofroll.cli.options import (
-    CONTRADICTED,
-    ENGINE,
-    OK,
-    Engines,
-    Fresh,
-    Jobs,
-    Json,
-    Out,
-    Scheduler,
-    complain,
-    new_runner,
-    progress_bar,
-    require_pages,
-    write_json,
-)
+from proofroll.cli import options
+from proofroll.cli.comparing import asked, exit_code, outcomes_of
 
 if TYPE_CHECKING:
+    from collections.abc import Iterator
+
+    from rich.table import Table
+
     from proofroll.report.growing_report import Report
     from proofroll.report.report_content import ReportContent
     from proofroll.report.study_parts import Part
@@ -39,12 +28,12 @@ def report(
         list[str] | None,
         typer.Argument(help="Comparisons, other studies, scenes, robot files; all studies by default."),
     ] = None,
-    engine: Engines = None,
-    out: Out = Path("out"),
-    fresh: Fresh = False,
-    jobs: Jobs = None,
-    scheduler: Scheduler = None,
-    as_json: Json = False,
+    engine: options.Engines = None,
+    out: options.Out = Path("out"),
+    fresh: options.Fresh = False,
+    jobs: options.Jobs = None,
+    scheduler: options.Scheduler = None,
+    as_json: options.Json = False,
 ) -> None:
     """Run the comparisons and the further studies, and write report.html and report.json.
 
@@ -60,8 +49,8 @@ def report(
     loaded = [asked(name, {}) for name in names]
     if not studies:
         loaded = [item.briefly() for item in loaded]
-    require_pages()
-    runner = new_runner(out, fresh, jobs, scheduler)
+    options.require_pages()
+    runner = options.new_runner(out, fresh, jobs, scheduler)
     keys = list(dict.fromkeys(part.key for part in parts))
     stages = _Stages(len(keys) + bool(loaded))
     command = _command(studies or [], engine or [], out)
@@ -73,7 +62,7 @@ def report(
             first = begun(outcomes_of(loaded[:1], engine or [], runner, stage), runner.store, command, awaited)
             first.expect(parts, out, fresh=fresh)
             first.write(out)
-            complain(f"{stage}the first is in {out / 'report.html'}")
+            options.complain(f"{stage}the first is in {out / 'report.html'}")
         outcomes = outcomes_of(loaded, engine or [], runner, stage)
     made = begun(outcomes, runner.store, command)
     missing = made.expect(parts, out, fresh=fresh)
@@ -84,10 +73,7 @@ def report(
         for part in wanted:
             _make(made, part, runner, out, stage)
             made.write(out)
-    if as_json:
-        write_json(made.content)
-    else:
-        _print(made.content, out)
+    options.show(made.content, as_json, lambda: _shown(made.content, out))
     raise typer.Exit(_exit_code(made.content, exit_code(outcomes)))
 
 
@@ -109,34 +95,32 @@ class _Stages:
         """Begins the next stage; returns what its progress bar puts before its own words."""
         self._number += 1
         where = f"{self._number} of {self._total}"
-        complain(f"{where}, {words}" + (": kept from before" if kept else ""))
+        options.complain(f"{where}, {words}" + (": kept from before" if kept else ""))
         return f"{where}: "
 
 
 def _make(made: Report, part: Part, runner: Runner, out: Path, stage: str) -> None:
     """Makes one further study with a progress bar; a sentence on standard error says if that failed."""
-    with progress_bar(f"{stage}{part.words}") as advance:
+    with options.progress_bar(f"{stage}{part.words}") as advance:
         said = made.make(part, lambda: part.make(runner, out, lambda text, count: advance(f"{stage}{text}", count)))
     if said.missing:
-        complain(f"{part.head['title']}: {said.missing}")
+        options.complain(f"{part.head['title']}: {said.missing}")
 
 
 def _exit_code(content: ReportContent, compared: int) -> int:
     """As for the comparisons; a further study that failed counts as a lost engine, a false statement as a verdict."""
     entries = content.further
-    if compared == ENGINE or any(entry.missing or entry.lost for entry in entries):
-        return ENGINE
-    return CONTRADICTED if compared or any(entry.contradictions for entry in entries) else OK
+    if compared == options.ENGINE or any(entry.missing or entry.lost for entry in entries):
+        return options.ENGINE
+    return options.CONTRADICTED if compared or any(entry.contradictions for entry in entries) else options.OK
 
 
-def _print(content: ReportContent, out: Path) -> None:
+def _shown(content: ReportContent, out: Path) -> Iterator[Table | str]:
     """The verdicts, what came of the further studies, what to look at first, and where the report is."""
-    from proofroll.report.terminal import console, first_lines, part_lines
+    from proofroll.report.terminal import first_lines, part_lines, verdict_parts
 
     for item in content.comparisons:
-        print_outcome(item)
-    terminal = console()
-    for line in [*part_lines(content), *first_lines(content)]:
-        terminal.print(line, markup=False)
-    where = out / "report.html"
-    terminal.print(f"The report is in {where}, the same content in {where.with_suffix('.json')}.", markup=False)
+        yield from verdict_parts(item)
+    yield from part_lines(content)
+    yield from first_lines(content)
+    yield f"The report is in {out / 'report.html'}, the same content in {out / 'report.json'}."

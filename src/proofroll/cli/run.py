@@ -8,23 +8,13 @@ from typing import Annotated
 
 import typer
 
-from proofroll.cli.options import (
-    ENGINE,
-    Json,
-    SceneName,
-    Set,
-    assignments,
-    complain,
-    require_writable,
-    spinner,
-    write_json,
-)
+from proofroll.cli import options
 
 
 def run(
-    scene: SceneName,
+    scene: options.SceneName,
     engine: Annotated[str, typer.Option(help="truth, or name[key=value,…], e.g. mujoco[formulation=chart,dt=1e-4].")],
-    settings: Set = None,
+    settings: options.Set = None,
     until: Annotated[
         float | None, typer.Option(help="Last time [s]; by default 2, or the scene's duration where that is shorter.")
     ] = None,
@@ -37,7 +27,7 @@ def run(
     plot: Annotated[
         Path | None, typer.Option(help="Draw the run to this file, by its ending: html, svg, png or pdf.")
     ] = None,
-    as_json: Json = False,
+    as_json: options.Json = False,
 ) -> None:
     """Run one scene in one engine."""
     import tempfile
@@ -62,14 +52,14 @@ def run(
         time_grid(until, EVERY if every is None else every)
     for file in (out, plot):
         if file is not None:
-            require_writable(file)
+            options.require_writable(file)
     if plot is not None:
         require_ending(plot)
     import_xarray()
     preparing.join()
     case = single_case(
         scene,
-        assignments(settings or []),
+        options.assignments(settings),
         engine,
         until=until,
         every=every,
@@ -79,7 +69,7 @@ def run(
     )
     with tempfile.TemporaryDirectory() as folder:
         target = Path(folder) / "run.nc"
-        with spinner(f"{scene} in {case.engine.name}"):
+        with options.spinner(f"{scene} in {case.engine.name}"):
             result = run_one(case, target, workers)
         content = run_content(case, result, target)
         if plot is not None and result.trajectory is not None:
@@ -95,13 +85,8 @@ def run(
             content = replace(content, trajectory=str(out))
     done = content.status == "done"
     if not done:
-        complain(f"{content.engine} {content.status}: {content.message}")
-    if as_json:
-        write_json(content)
-    elif done or content.final:
-        from proofroll.report.terminal import console
-
-        for line in run_lines(content):
-            console().print(line)
+        options.complain(f"{content.engine} {content.status}: {content.message}")
+    if as_json or done or content.final:
+        options.show(content, as_json, lambda: run_lines(content))
     if not done:
-        raise typer.Exit(ENGINE)
+        raise typer.Exit(options.ENGINE)

@@ -7,21 +7,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
-from proofroll.cli.options import (
-    CONTRADICTED,
-    OK,
-    Fresh,
-    Jobs,
-    Json,
-    Out,
-    Scheduler,
-    Set,
-    assignments,
-    new_runner,
-    progress_bar,
-    require_pages,
-    write_json,
-)
+from proofroll.cli import options
 from proofroll.core.errors import InputError
 
 if TYPE_CHECKING:
@@ -44,64 +30,32 @@ def tradeoff(
     quantity: Annotated[
         list[str] | None, typer.Option(help="Observable to show; repeat. The first decides how far curves go.")
     ] = None,
-    settings: Set = None,
+    settings: options.Set = None,
     engine: Annotated[
         list[str] | None, typer.Option(help="Engine, or name[key=value,…]; repeat. All by default.")
     ] = None,
     over: Over = None,
     until: Until = None,
     every_point: Annotated[bool, typer.Option("--all", help="List every point, not only the best.")] = False,
-    out: Out = Path("out"),
-    fresh: Fresh = False,
-    jobs: Jobs = None,
-    scheduler: Scheduler = None,
-    as_json: Json = False,
+    out: options.Out = Path("out"),
+    fresh: options.Fresh = False,
+    jobs: options.Jobs = None,
+    scheduler: options.Scheduler = None,
+    as_json: options.Json = False,
 ) -> None:
     """Measure error against cost for every engine, formulation and setting, from coarse to fine."""
-    from proofroll.report.tradeoff_tables import (
-        budget_lines,
-        budget_table,
-        corner_table,
-        default_quantities,
-        front_tables,
-        point_table,
-    )
+    from proofroll.report.tradeoff_tables import default_quantities, tradeoff_parts
     from proofroll.report.work_precision import draw
 
     claims, question = question_of(scene, settings, quantity, until)
     require_observables(question, quantity or [])
     ranges = ranges_of(question, over) if over is not None else (claims.over if claims else {})
-    require_pages()
-    study, path = measure(question, engine or [], ranges, claims, new_runner(out, fresh, jobs, scheduler), out)
-    contradictions = study["claims"]["contradictions"]
+    options.require_pages()
+    study, path = measure(question, engine or [], ranges, claims, options.new_runner(out, fresh, jobs, scheduler), out)
     shown = [name for name in quantity or [] if name in study["quantities"]] or default_quantities(study)
     draw(study, shown, path.with_suffix(".svg"))
-    if as_json:
-        write_json(study)
-    else:
-        from proofroll.report.terminal import console
-
-        terminal = console()
-        if every_point:
-            terminal.print(point_table(study, study["points"], shown, "Every point"))
-        else:
-            for table in front_tables(study, shown):
-                terminal.print(table)
-        if study["over"]:
-            terminal.print()
-            terminal.print(corner_table(study, shown[0]))
-        terminal.print()
-        terminal.print(budget_table(study, shown[0]))
-        terminal.print()
-        for line in [*(budget_lines(study, shown[0]) if every_point else ()), *study["findings"]]:
-            terminal.print(line, markup=False)
-        for name, reason in study["absent"].items():
-            terminal.print(f"{name}: {reason}", markup=False)
-        for sign, lines in (("??", study["claims"]["undecided"]), ("!!", contradictions)):
-            for line in lines:
-                terminal.print(f"{sign} {line}", markup=False)
-        terminal.print(f"The diagram is in {path.with_suffix('.svg')}, everything in {path}.", markup=False)
-    raise typer.Exit(CONTRADICTED if contradictions else OK)
+    options.show(study, as_json, lambda: tradeoff_parts(study, shown, path, every_point=every_point))
+    raise typer.Exit(options.CONTRADICTED if study["claims"]["contradictions"] else options.OK)
 
 
 def question_of(
@@ -116,7 +70,7 @@ def question_of(
     path = Path(scene)
     claims = load_claims(path) if path.suffix == ".toml" else claims_for(scene)
     name = claims.scene if claims else scene
-    given = dict(assignments(settings or []))
+    given = options.assignments(settings)
     if claims and not given and until is None:
         quantity = quantities[0] if quantities else claims.quantity
         return claims, Question(name, claims.parameters, claims.until, quantity)
@@ -141,7 +95,7 @@ def ranges_of(question: Question, texts: list[str]) -> dict[str, list[float]]:
     from proofroll.files.scene_file import load_scene
 
     found = {}
-    for name, text in assignments(texts, "--over").items():
+    for name, text in options.assignments(texts, "--over").items():
         try:
             low, high = (float(part) for part in text.split(":"))
         except ValueError:
@@ -165,5 +119,5 @@ def measure(
     """Measures and keeps the curves that a recommendation can be made from, with a progress bar."""
     from proofroll.studies.study_store import make_tradeoff
 
-    with progress_bar("runs and timings") as advance:
+    with options.progress_bar("runs and timings") as advance:
         return make_tradeoff(question, runner, out, engines=engines, over=over, claims=claims, progress=advance)

@@ -12,22 +12,7 @@ from typing import Annotated, Any
 
 import typer
 
-from proofroll.cli.options import (
-    CONTRADICTED,
-    ENGINE,
-    OK,
-    Fresh,
-    Jobs,
-    Json,
-    Out,
-    Scheduler,
-    complain,
-    new_runner,
-    progress_bar,
-    require_pages,
-    spinner,
-    write_json,
-)
+from proofroll.cli import options
 from proofroll.core.errors import InputError, ProofrollError
 
 # What else than a scene or a comparison can be held against two versions, by the ending of its file.
@@ -42,11 +27,11 @@ def versions(
         str, typer.Argument(help="A comparison, a scene or a robot file; by default all comparisons.")
     ] = "",
     rounds: Annotated[int, typer.Option(min=0, help="Rounds of timing; 0: no speed.")] = 20,
-    out: Out = Path("out"),
-    fresh: Fresh = False,
-    jobs: Jobs = None,
-    scheduler: Scheduler = None,
-    as_json: Json = False,
+    out: options.Out = Path("out"),
+    fresh: options.Fresh = False,
+    jobs: options.Jobs = None,
+    scheduler: options.Scheduler = None,
+    as_json: options.Json = False,
 ) -> None:
     """Run the same cases in two versions of an engine and show what changed; exit 1 if a verdict did.
 
@@ -63,35 +48,26 @@ def versions(
         from proofroll.studies.version_subjects import comparisons_about
 
         comparisons = comparisons_about(subject, engine)  # before minutes are spent on environments
-    require_pages()
+    options.require_pages()
     sides = _place(engine, old), _place(engine, new)
     if sides[0] == sides[1]:
         raise InputError("new", new, f"both are {sides[0]}; name two versions")
     if robot is not None:
-        with spinner(f"{engine} {old} and {new}"):
+        with options.spinner(f"{engine} {old} and {new}"):
             content: dict[str, Any] = robot.load()(subject, *sides)
     else:
         from proofroll.studies.versions import compared
 
-        runner = new_runner(out, fresh, jobs, scheduler)
-        with progress_bar("cases") as advance:
+        runner = options.new_runner(out, fresh, jobs, scheduler)
+        with options.progress_bar("cases") as advance:
             content = compared(sides, comparisons, runner, rounds, advance)
     _keep(content, page(content), out)
-    if as_json:
-        write_json(content)
-    else:
-        from proofroll.report.terminal import console
-
-        terminal = console()
-        terminal.width = min(terminal.width, 80)
-        terminal.print(heading(content), markup=False)
-        terminal.print(table(content) if robot is None else robot_table(content))
-        for line in lines(content):
-            terminal.print(line, markup=False)
-        terminal.print(f"The page is in {_file(content, out)}.html.", markup=False)
+    made = table if robot is None else robot_table
+    where = f"The page is in {_file(content, out)}.html."
+    options.show(content, as_json, lambda: [heading(content), made(content), *lines(content), where], widest=80)
     if content["lost"]:
-        raise typer.Exit(ENGINE)
-    raise typer.Exit(CONTRADICTED if content["changed"] else OK)
+        raise typer.Exit(options.ENGINE)
+    raise typer.Exit(options.CONTRADICTED if content["changed"] else options.OK)
 
 
 def _file(content: dict[str, Any], out: Path) -> Path:
@@ -141,13 +117,13 @@ def _made(engine: str, version: str) -> str:
     by_hand = f"proofroll engines add {engine} --requirement {package or 'PACKAGE'}=={version}"
     if not package:
         raise InputError("engine", engine, f"no environment of {version} is remembered; {by_hand}")
-    complain(f"no environment of {engine} {version} is remembered: making one, as {by_hand} does")
+    options.complain(f"no environment of {engine} {version} is remembered: making one, as {by_hand} does")
 
     def tell(say: Callable[[str], None]) -> None:
         add(engine, [f"{package}=={version}"], tell=lambda text: say(f"{engine} {version}: {text}"))
 
     try:
-        with spinner(f"{engine} {version}") as say:
+        with options.spinner(f"{engine} {version}") as say:
             tell(say)
     except ProofrollError as error:
         raise ProofrollError(f"{error}; when that is mended, or with more requirements: {by_hand}") from None

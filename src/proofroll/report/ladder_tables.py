@@ -14,6 +14,11 @@ _SHORT = {Worth.NOT_NEEDED: "not needed"}
 _STYLES = {Worth.NEEDED: "green", Worth.NOT_NEEDED: "yellow", Worth.HARMFUL: "red", Worth.NO_ANSWER: "bold red"}
 
 
+def ladder_parts(content: LadderContent) -> list[Table | str]:
+    """Both tables, and what to take home."""
+    return [rung_table(content), "", term_table(content), "", *content.findings]
+
+
 def rung_table(content: LadderContent) -> Table:
     """One line per rung, from the least model to the most."""
     title = f"{content.quantity} of {content.scene} over {content.until:g} s, from the least model to the most"

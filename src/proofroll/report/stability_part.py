@@ -31,7 +31,7 @@ class JudgedBoundary:
 
 @dataclass(frozen=True, kw_only=True)
 class StabilityEntry(PartEntry):
-    """A map, the worst of what nobody is told, what was claimed, and the axes that were left out."""
+    """A map, the largest errors that no engine reports, what was claimed, and the axes that were left out."""
 
     silent: list[str]
     claims: list[JudgedBoundary]

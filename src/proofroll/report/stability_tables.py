@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections import Counter
 from collections.abc import Iterator, Mapping, Sequence
+from pathlib import Path
 from typing import TYPE_CHECKING
 
 from rich.table import Table
@@ -15,6 +16,25 @@ from proofroll.studies.stability_content import silent_ranking
 
 if TYPE_CHECKING:
     from proofroll.studies.stability_records import BoundaryPoint, ExplainedBoundary, StabilityStudy
+
+
+def stability_parts(study: StabilityStudy, path: Path) -> Iterator[Table | str]:
+    """A map: its boundaries, the worst silent cases, and what else is to be known.
+
+    Args:
+        study: stored in ``path``, its drawing beside it.
+        path: see there.
+    """
+    yield from (headline(study), "", boundary_table(study), "")
+    silent = list(silent_lines(study))
+    if silent:
+        yield "The largest errors that the engines do not report:"
+    yield from (f"  {line}" for line in silent)
+    yield from study.findings
+    yield from (f"{place.axis} = {place.value:g}: {place.problem}" for place in study.places if place.problem)
+    yield from (f"{name}: {reason}" for name, reason in study.absent.items())
+    yield from (f"!! {line}" for line in (study.claims.contradictions if study.claims else ()))
+    yield f"The map is in {path.with_suffix('.svg')}, everything in {path}."
 
 
 def headline(study: StabilityStudy) -> str:

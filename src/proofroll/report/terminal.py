@@ -16,6 +16,8 @@ from proofroll.report.study_parts import part_kinds
 from proofroll.studies.hosts import said_of
 
 if TYPE_CHECKING:
+    from collections.abc import Iterator
+
     from proofroll.report.comparison_records import ReportedComparison, WorstJudgement
     from proofroll.report.report_content import ReportContent
 
@@ -35,8 +37,11 @@ _STYLES = {
 
 
 def console() -> Screen:
-    """The console for data, on standard output: at most 100 columns of a terminal; in a pipe 100, or COLUMNS."""
-    out = Screen(highlight=False)
+    """The console for data, on standard output: at most 100 columns of a terminal; in a pipe 100, or COLUMNS.
+
+    A text is shown as it is, whatever rich would make of ``[words]`` or ``:words:`` in it.
+    """
+    out = Screen(highlight=False, markup=False, emoji=False)
     if out.is_terminal:
         out.width = min(out.width, WIDTH)
     elif not os.environ.get("COLUMNS", "").isdecimal():  # else rich has read it
@@ -97,6 +102,13 @@ def columns(content: ReportedComparison) -> list[tuple[str, str]]:
     shown = [name for name in content.headlines("motion") if name in units]
     shown += [name for name in content.headlines("reaction") if name in units][:1]
     return [(name, units[name]) for name in shown]
+
+
+def verdict_parts(content: ReportedComparison) -> Iterator[Table | str]:
+    """A comparison: the table of verdicts, and what came of it in words."""
+    yield verdict_table(content)
+    yield from closing_lines(content)
+    yield ""
 
 
 def closing_lines(content: ReportedComparison) -> list[str]:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import itertools
 from collections.abc import Collection, Iterator, Mapping, Sequence
+from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from rich.table import Table
@@ -49,6 +50,33 @@ def cost_of(point: Mapping[str, Any]) -> str:
         return f"{number(cost)} (once)"
     spread = max(point["interval"][1] - cost, cost - point["interval"][0]) / cost
     return f"{number(cost)} ±{100 * spread:.0f}%" + (f" ({100 * confidence:.2g}%)" if confidence < CONFIDENCE else "")
+
+
+def tradeoff_parts(
+    study: Mapping[str, Any], shown: Sequence[str], path: Path, *, every_point: bool
+) -> Iterator[Table | str]:
+    """A trade-off: its fronts or all its points, what errors consist of, and what was found.
+
+    Args:
+        study: stored in ``path``, its diagram beside it.
+        shown: quantities with a column; the last tables are about the first of them.
+        path: see there.
+        every_point: whether all points are listed, and errors told in sentences too.
+    """
+    if every_point:
+        yield point_table(study, study["points"], shown, "Every point")
+    else:
+        yield from front_tables(study, shown)
+    if study["over"]:
+        yield from ("", corner_table(study, shown[0]))
+    yield from ("", budget_table(study, shown[0]), "")
+    if every_point:
+        yield from budget_lines(study, shown[0])
+    yield from study["findings"]
+    yield from (f"{name}: {reason}" for name, reason in study["absent"].items())
+    yield from (f"?? {line}" for line in study["claims"]["undecided"])
+    yield from (f"!! {line}" for line in study["claims"]["contradictions"])
+    yield f"The diagram is in {path.with_suffix('.svg')}, everything in {path}."
 
 
 def point_table(

@@ -7,29 +7,19 @@ from typing import Annotated
 
 import typer
 
+from proofroll.cli import options
 from proofroll.cli.checking import check_text, is_text_check
-from proofroll.cli.options import (
-    CONTRADICTED,
-    ENGINE,
-    OK,
-    Engines,
-    Json,
-    Scheduler,
-    new_cluster,
-    progress_bar,
-    write_json,
-)
 
 
 def check(
     file: Annotated[Path, typer.Argument(help="A robot file (URDF, MJCF), a scene, or a comparison or other study.")],
-    engine: Engines = None,
+    engine: options.Engines = None,
     base: Annotated[str, typer.Option(help="What carries the root of a URDF: fixed or free.")] = "fixed",
     states: Annotated[int, typer.Option(min=1, max=1000, help="Random states that are compared.")] = 20,
     seed: Annotated[int, typer.Option(min=0, help="Of the random states.")] = 0,
     out: Annotated[Path | None, typer.Option("--out", help="Write check.html and check.json to this folder.")] = None,
     time_limit: Annotated[float, typer.Option(min=0.1, help="Wall seconds for each engine.")] = 120.0,
-    as_json: Json = False,
+    as_json: options.Json = False,
 ) -> None:
     """Check a scene or a comparison without running it, or a robot file with every engine's own importer.
 
@@ -40,8 +30,9 @@ def check(
         return
     from proofroll.robots.check import check as checked
     from proofroll.robots.check import differs
+    from proofroll.robots.terminal import WIDTH, check_parts
 
-    with progress_bar("engines") as advance:
+    with options.progress_bar("engines") as advance:
         content = checked(
             file, engine or (), base=base, states=states, seed=seed, time_limit=time_limit, progress=advance
         )
@@ -54,41 +45,25 @@ def check(
 
         write_text(out / "check.html", page(plain(content)))
         write_text(out / "check.json", json.dumps(plain(content), indent=1, ensure_ascii=False))
-    if as_json:
-        write_json(content)
-    else:
-        from proofroll.robots.terminal import console, lines, table, verdict_lines
-
-        printed = console()
-        for line in lines(content):
-            printed.print(line, markup=False)
-        printed.print(table(content))
-        for line in verdict_lines(content):
-            printed.print(line, markup=False)
+    options.show(content, as_json, lambda: check_parts(content), widest=WIDTH)
     if any(differs(row) for row in content["engines"]):
-        raise typer.Exit(CONTRADICTED)
-    raise typer.Exit(OK if any(row["layers"] for row in content["engines"]) else ENGINE)
+        raise typer.Exit(options.CONTRADICTED)
+    raise typer.Exit(options.OK if any(row["layers"] for row in content["engines"]) else options.ENGINE)
 
 
 def robots(
     name: Annotated[list[str] | None, typer.Argument(help="Robots of the gallery; by default all.")] = None,
-    engine: Engines = None,
-    scheduler: Scheduler = None,
-    as_json: Json = False,
+    engine: options.Engines = None,
+    scheduler: options.Scheduler = None,
+    as_json: options.Json = False,
 ) -> None:
     """Check the robots of comparisons/robots.toml; exit 1 if an engine does otherwise than the file expects."""
     from proofroll.robots.gallery import gallery
+    from proofroll.robots.terminal import gallery_lines
 
-    with progress_bar("robots") as advance:
-        content = gallery(name or (), engine or (), progress=advance, cluster=new_cluster(scheduler))
-    if as_json:
-        write_json(content)
-    else:
-        from proofroll.robots.terminal import console, gallery_lines
-
-        printed = console()
-        for line in gallery_lines(content):
-            printed.print(line, markup=False)
+    with options.progress_bar("robots") as advance:
+        content = gallery(name or (), engine or (), progress=advance, cluster=options.new_cluster(scheduler))
+    options.show(content, as_json, lambda: gallery_lines(content))
     if any(row["unexpected"] for row in content["robots"]):
-        raise typer.Exit(CONTRADICTED)
-    raise typer.Exit(OK if any(row["engines"] for row in content["robots"]) else ENGINE)
+        raise typer.Exit(options.CONTRADICTED)
+    raise typer.Exit(options.OK if any(row["engines"] for row in content["robots"]) else options.ENGINE)

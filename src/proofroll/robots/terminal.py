@@ -6,7 +6,6 @@ import textwrap
 from collections.abc import Iterator
 from typing import Any
 
-from rich.console import Console
 from rich.table import Table
 from rich.text import Text
 
@@ -26,11 +25,11 @@ _MARKS = {"holds": "✓", "explained": "✗", "differs": "✗", "refused": "–"
 _COLOURS = {"holds": "green", "explained": "yellow", "differs": "red", "refused": "magenta"}
 
 
-def console() -> Console:
-    """Standard output, never wider than 80 columns."""
-    out = Console(highlight=False)
-    out.width = min(out.width, WIDTH) if out.is_terminal else WIDTH
-    return out
+def check_parts(content: dict[str, Any]) -> Iterator[Table | str]:
+    """What was read, what each engine holds, and what that means."""
+    yield from lines(content)
+    yield table(content)
+    yield from verdict_lines(content)
 
 
 def table(content: dict[str, Any]) -> Table:

@@ -39,6 +39,16 @@ def test_a_screen_obeys_its_own_styles_alone(coloured: bool) -> None:
         assert command not in shown
 
 
+def test_a_text_is_shown_as_it_is(capsys: pytest.CaptureFixture[str]) -> None:
+    """What looks like a style or a picture's name in a line or a cell, as in names of files and settings, stays."""
+    said = "[bold]x[/bold] :smile:"
+    table = Table("engine", title=said)
+    table.add_row(said)
+    for part in (said, table):
+        console().print(part)
+    assert capsys.readouterr().out.count(said) == 3
+
+
 @pytest.mark.parametrize("width", [24, 40, 60, 80, 100])
 def test_a_table_is_never_cut(width: int, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]) -> None:
     """Whatever the width of a pipe, each word and number of a table is there whole, and no line is wider."""
