@@ -37,12 +37,12 @@ def first_slip(scene: Scene, until: float, model: Model = "reduced") -> float | 
     """When the ball first slips [s]; None: not until ``until`` [s].
 
     Args:
-        scene: a ball on a cylinder or plane.
+        scene: a ball in a cylinder along whose axis gravity points.
         until: how long to look [s].
         model: the reduced equations, or the projection method with quasi-velocities or with Euler angles.
 
     Raises:
-        Refused: heyoka is missing, or the scene is not one of the compiled equations.
+        Refused: heyoka is missing, or the scene is another.
     """
     return FirstSlip(rolling_ball(scene), model).run(until)
 
@@ -63,13 +63,13 @@ class FirstSlip:
             tolerance: of each step, relative to the state [-].
 
         Raises:
-            Refused: heyoka is missing, or the scene is not one of the compiled equations.
+            Refused: heyoka is missing, or the scene is another.
         """
-        resistance, mu = body.contact.rolling_resistance > 0, min(body.contact.mu_static, UNREACHABLE)
-        require_supported(body, resistance)
+        mu = min(body.contact.mu_static, UNREACHABLE)
+        require_supported(body)
         self._scales = np.array(body.surface.length_scales)
         if model == "reduced":
-            compiled, margin = _reduced(resistance, rolling.is_uniform(body), tolerance)
+            compiled, margin = _reduced(tolerance)
             self._start = rolling.start(body)
             pars = [*rolling.parameters(body), mu]
         else:
@@ -112,20 +112,17 @@ class FirstSlip:
         return self._surface.position(self.x[:2] / self._scales)
 
 
-def require_supported(body: RollingBall, resistance: bool) -> None:
-    """Refuses what the compiled equations cannot follow to the first slip, with or without rolling resistance.
+def require_supported(body: RollingBall) -> None:
+    """Refuses what the compiled equations cannot follow to the first slip.
+
+    Elsewhere than on a cylinder along whose axis gravity points, a ball may come to rest, where the direction of its
+    rolling resistance jumps: a series sees no jump.
 
     Raises:
-        Refused: heyoka is missing; the surface is another; or resistance may bring the ball to rest, where its
-            direction jumps and a series sees no jump.
+        Refused: heyoka is missing, or the scene is another.
     """
-    if not rolling.supports(body):
-        raise Refused("compiled first slips have equations of cylinders and planes only")
-    if resistance and not _always_moves(body):
-        raise Refused(
-            "compiled first slips with rolling resistance need a cylinder along whose axis gravity points: elsewhere "
-            "the ball may come to rest, where the resistance has no direction"
-        )
+    if not (rolling.supports(body) and isinstance(body.surface, Cylinder) and rolling.is_uniform(body)):
+        raise Refused("compiled first slips need a cylinder along whose axis gravity points")
     require_heyoka("a compiled first slip")
 
 
@@ -135,11 +132,6 @@ def _projected_start(body: RollingBall, formulation: projection.Formulation) -> 
         return np.concatenate([body.u0, body.udot0, body.surface.frame(body.u0).T @ body.w0])
     w_x, w_y, w_z = body.w0  # there φ turns about -y, θ about x and ψ about z
     return np.concatenate([body.u0, [0.0, np.pi / 2, 0.0], body.udot0, [-w_y, w_x, w_z]])
-
-
-def _always_moves(body: RollingBall) -> bool:
-    """Whether a pressed ball cannot stand still: what presses it is its speed alone."""
-    return isinstance(body.surface, Cylinder) and rolling.is_uniform(body)
 
 
 def slips_at_once(margin: FloatArray) -> Any:
@@ -156,10 +148,10 @@ def margins(excess: Any, available: Any, system: list[tuple[Any, Any]]) -> rolli
 
 
 @lru_cache(maxsize=16)
-def _reduced(resistance: bool, uniform: bool, tolerance: float) -> tuple[Any, rolling.Function]:
+def _reduced(tolerance: float) -> tuple[Any, rolling.Function]:
     import heyoka as hy
 
-    found = rolling.expressions(resistance, uniform)
+    found = rolling.expressions(resistance=True, uniform=True)
     mu = hy.par[len(rolling.PARAMETERS)]
     available = (found.A * mu * found.N) ** 2
     return _stopping(found.rolling(), found.excess(mu), available, tolerance)

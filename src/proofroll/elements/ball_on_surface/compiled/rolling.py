@@ -160,16 +160,10 @@ def is_uniform(body: RollingBall) -> bool:
 
 def parameters(body: RollingBall) -> list[float]:
     """Values of :data:`PARAMETERS`."""
-    surface, ball, f = body.surface, body.ball, body.contact.rolling_resistance
-    curvature = 1 / surface.radius if isinstance(surface, Cylinder) else 0.0
-    gravity = local_gravity(body).tolist()
-    return [float(value) for value in parameters_of(curvature, gravity, ball.radius, ball.inertia_ratio, f)]
-
-
-def parameters_of(curvature: Any, gravity: Sequence[Any], radius: Any, kappa: Any, f: Any) -> list[Any]:
-    """Values of :data:`PARAMETERS` from numbers or arrays: k [1/m], g along the axes [m/s²], a [m], κ [-], f [m]."""
+    a, kappa, f = body.ball.radius, body.ball.inertia_ratio, body.contact.rolling_resistance
+    k = 1 / body.surface.radius if isinstance(body.surface, Cylinder) else 0.0
     A = (1 + kappa) / kappa
-    return [curvature, *gravity, curvature / radius, curvature * radius, A, 1 / A, f / (kappa * radius)]
+    return [float(value) for value in (k, *local_gravity(body), k / a, k * a, A, 1 / A, f / (kappa * a))]
 
 
 def start(body: RollingBall) -> FloatArray:
