@@ -54,9 +54,8 @@ def first_slips(scene: Scene, until: float, v2: npt.ArrayLike, mu: npt.ArrayLike
     """
     body = rolling_ball(scene)
     require_supported(body)
-    return _Lanes(body, *np.broadcast_arrays(*(np.asarray(values, dtype=np.float64) for values in (v2, mu, f)))).run(
-        until
-    )
+    varied = np.broadcast_arrays(*(np.asarray(values, dtype=np.float64) for values in (v2, mu, f)))
+    return _Lanes(body, *varied).run(until)
 
 
 class _Lanes:

@@ -5,10 +5,11 @@ from __future__ import annotations
 from collections.abc import Iterator
 from typing import Any
 
-from rich.table import Table
+from rich.table import Column, Table
 from rich.text import Text
 
 from proofroll.report.labels import number
+from proofroll.report.screen import numeric, plain_table, unbroken
 
 _MEANING = {
     "reduced_over_engine": "reduced, against the fastest engine",
@@ -21,7 +22,8 @@ _MEANING = {
 def reference_tables(content: dict[str, Any]) -> Iterator[Table]:
     """What was run, how many times faster it is, and whether that is what was wanted."""
     slip = content["first_slip"]["seconds"]
-    runs = _table(f"To the first slip at {slip:.6f} s", "", "error [m]", "time [ms]", "interval", "built in [s]")
+    columns = numeric("error [m]", "time [ms]", "interval", "built in [s]")
+    runs = plain_table(*unbroken(""), *columns, title=f"To the first slip at {slip:.6f} s")
     for row in [*content["models"], *content["engines"]]:
         seconds = row["seconds"]
         runs.add_row(
@@ -32,19 +34,12 @@ def reference_tables(content: dict[str, Any]) -> Iterator[Table]:
             number(row.get("build_seconds")),
         )
     yield runs
-    ratios = _table("How many times faster", "", "ratio", "interval", "goal", "")
+    ratios = plain_table(*unbroken(""), *numeric("ratio", "interval", "goal", ""), title="How many times faster")
     for name, found in content["ratios"].items():
         ratios.add_row(_MEANING[name], *_measured(found))
     found = content["onsets_per_second"]
     ratios.add_row("first slips in bulk, per second of one core", *_measured(found))
     yield ratios
-
-
-def _table(title: str, *columns: str) -> Table:
-    table = Table(title=title, title_justify="left", box=None, padding=(0, 2, 0, 0))
-    for index, column in enumerate(columns):
-        table.add_column(Text(column), justify="left" if index == 0 else "right", no_wrap=True)
-    return table
 
 
 def _measured(found: dict[str, Any]) -> tuple[str, str, str, str]:
@@ -58,17 +53,12 @@ def _measured(found: dict[str, Any]) -> tuple[str, str, str, str]:
 def study_tables(found: dict[str, Any]) -> Iterator[Table]:
     """Where wall time × workers went, and every case."""
     title = f"{found['wall_seconds']:.1f} s with {found['jobs']} workers: {found['outside']:.0%} outside the engines"
-    shares = Table(box=None, padding=(0, 2, 0, 0), title=Text(title), title_justify="left")
-    shares.add_column("wall time × workers")
-    shares.add_column("part", justify="right")
-    shares.add_column("of processor time", justify="right")
+    shares = plain_table(*unbroken("wall time × workers"), *numeric("part", "of processor time"), title=title)
     parts = found["shares"], found["processor"]["shares"]
     for cause in {**parts[0], **parts[1]}:
         shares.add_row(Text(cause), *(f"{part[cause]:.1%}" if cause in part else "–" for part in parts))
     yield shares
-    cases = Table(box=None, padding=(0, 2, 0, 0))
-    for column in ("case", "f", "simulated", "wall", "outside"):
-        cases.add_column(column, justify="left" if column == "case" else "right")
+    cases = plain_table(*unbroken("case"), *numeric("f", "simulated", "wall", "outside"))
     for case in found["cases"]:
         outside = "–" if case["outside"] is None else f"{case['outside']:.0%}"
         resistance = "> 0" if case["parameters"] else "0"
@@ -95,10 +85,8 @@ def study_lines(found: dict[str, Any]) -> Iterator[str]:
 
 def adapter_table(found: dict[str, Any]) -> Table:
     """One line per engine, formulation and variant of the scene."""
-    table = Table(box=None, padding=(0, 1, 0, 0), title=Text("advance over bare loop"), title_justify="left")
-    for column in ("engine formulation setting", "variant", "ratio", "interval"):
-        table.add_column(column, no_wrap=True)
-    table.add_column("")
+    columns = unbroken("engine formulation setting", "variant", "ratio", "interval")
+    table = plain_table(*columns, Column(""), title="advance over bare loop")
     for name, item in found["engines"].items():
         for row in item["rows"]:
             ratio = row["ratio"]

@@ -7,7 +7,7 @@ from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from rich.table import Table
+from rich.table import Column, Table
 from rich.text import Text
 
 from blajer_2006 import style
@@ -19,6 +19,7 @@ from proofroll.elements.ball_on_surface.report.regime_map import picture as map_
 from proofroll.files.atomic import replacing
 from proofroll.files.json_data import plain
 from proofroll.report.labels import number, unit
+from proofroll.report.screen import numeric, plain_table, unbroken
 from proofroll.running.store import write_text
 
 if TYPE_CHECKING:
@@ -79,12 +80,10 @@ def write_figures(study: FigureRuns, maps: Maps, out: Path, forms: Sequence[str]
 
 def statement_table(content: dict[str, Any]) -> Table:
     """What is stated, what was found, and whether it holds, one line for each."""
-    table = Table(title=Text(content["title"]), title_justify="left", box=None, padding=(0, 1, 0, 0))
-    table.add_column("statement")
-    table.add_column("run", no_wrap=True)
-    table.add_column("stated", justify="right", no_wrap=True)
-    table.add_column("found", justify="right", max_width=24)
-    table.add_column("", no_wrap=True)
+    found = Column("found", justify="right", max_width=24)
+    table = plain_table(
+        Column("statement"), *unbroken("run"), *numeric("stated"), found, *unbroken(""), title=content["title"]
+    )
     said = ""
     for item in content["statements"]:
         sign, look = _SIGNS[item["holds"]]

@@ -27,7 +27,7 @@ def plain(value: Any) -> Any:
         return [plain(item) for item in value]
     if is_dataclass(value):
         return _plain_record(value)
-    return plain(value.item()) if hasattr(value, "item") else value  # a numpy number
+    return plain(value.tolist()) if hasattr(value, "tolist") else value  # of numpy
 
 
 def _plain_record(record: Any) -> Any:

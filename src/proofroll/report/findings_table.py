@@ -4,9 +4,10 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 
-from rich.table import Table
+from rich.table import Column, Table
 from rich.text import Text
 
+from proofroll.report.screen import plain_table, unbroken
 from proofroll.studies.findings import EngineFinding, FindingState, Shown
 
 _STYLES = {
@@ -19,9 +20,7 @@ _STYLES = {
 
 def findings_table(rows: Sequence[Shown]) -> Table:
     """One line per finding: what it is, whether it shows in what is installed, and what its program says."""
-    table = Table(box=None, padding=(0, 1, 0, 0))
-    for name in ("finding", "state", "installed", "said"):
-        table.add_column(name, overflow="fold", no_wrap=name == "state")
+    table = plain_table(*_folded("finding"), *unbroken("state"), *_folded("installed", "said"))
     for row in rows:
         version = f"{row.finding.package} {row.version}".strip() if row.version else ""
         table.add_row(Text(row.finding.title), Text(row.state, style=_STYLES[row.state]), Text(version), Text(row.said))
@@ -30,9 +29,11 @@ def findings_table(rows: Sequence[Shown]) -> Table:
 
 def findings_list(findings: Sequence[EngineFinding]) -> Table:
     """One line per finding: what it is, in which versions it was seen, and where it is discussed."""
-    table = Table(box=None, padding=(0, 1, 0, 0))
-    for name in ("finding", "seen in", "gone in", "issue"):
-        table.add_column(name, overflow="fold")
+    table = plain_table(*_folded("finding", "seen in", "gone in", "issue"))
     for item in findings:
         table.add_row(*(Text(text) for text in (item.title, item.seen, item.gone, item.issue)))
     return table
+
+
+def _folded(*names: str) -> list[Column]:
+    return [Column(name, overflow="fold") for name in names]

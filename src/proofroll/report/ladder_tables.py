@@ -2,11 +2,12 @@
 
 from __future__ import annotations
 
-from rich.table import Table
+from rich.table import Column, Table
 from rich.text import Text
 
 from proofroll.report.labels import number
 from proofroll.report.ladder import LadderContent, label
+from proofroll.report.screen import numeric, plain_table, unbroken
 from proofroll.report.terminal import step
 from proofroll.studies.term_worth import Worth
 
@@ -22,11 +23,11 @@ def ladder_parts(content: LadderContent) -> list[Table | str]:
 def rung_table(content: LadderContent) -> Table:
     """One line per rung, from the least model to the most."""
     title = f"{content.quantity} of {content.scene} over {content.until:g} s, from the least model to the most"
-    table = Table(title=Text(title), title_justify="left", box=None, padding=(0, 1, 0, 0))
-    for column in ("level", "engine formulation", "step"):
-        table.add_column(column, no_wrap=True)
-    for column in (f"error [{content.unit}]", "s/s", "low … high"):
-        table.add_column(Text(column), justify="right", no_wrap=True)
+    table = plain_table(
+        *unbroken("level", "engine formulation", "step"),
+        *numeric(f"error [{content.unit}]", "s/s", "low … high"),
+        title=title,
+    )
     for rung in content.rungs:
         speed = rung.ran.seconds_per_second
         if rung.ran.error is None:
@@ -45,13 +46,13 @@ def rung_table(content: LadderContent) -> Table:
 
 def term_table(content: LadderContent) -> Table:
     """One line per term and model: what it costs, what leaving it out does, and the verdict."""
-    table = Table(title=Text("Terms, with and without"), title_justify="left", box=None, padding=(0, 1, 0, 0))
-    table.add_column("term", max_width=25)
-    table.add_column("engine formulation", no_wrap=True)
-    unit = content.unit
-    for column in ("cost", f"with [{unit}]", "without", "moves"):
-        table.add_column(Text(column), justify="right", no_wrap=True)
-    table.add_column("verdict", no_wrap=True)
+    table = plain_table(
+        Column("term", max_width=25),
+        *unbroken("engine formulation"),
+        *numeric("cost", f"with [{content.unit}]", "without", "moves"),
+        *unbroken("verdict"),
+        title="Terms, with and without",
+    )
     for row in content.terms:
         table.add_row(
             Text(row.term),

@@ -12,6 +12,7 @@ from rich.console import Console, ConsoleOptions, RenderableType
 from rich.measure import Measurement
 from rich.segment import Segment
 from rich.table import Column, Table
+from rich.text import Text
 
 # Control characters but line feed, which is layout, and what reverses or ends a line in Unicode.
 _COMMANDS = re.compile("[\x00-\x09\x0b-\x1f\x7f-\x9f\u2028\u2029\u202a-\u202e\u2066-\u2069]")
@@ -42,6 +43,21 @@ class Screen(Console):
                 super().print(part, **options)
         else:
             super().print(*objects, **options)
+
+
+def plain_table(*columns: Column, title: str = "") -> Table:
+    """A table without lines."""
+    return Table(*columns, title=Text(title), title_justify="left", box=None, padding=(0, 1, 0, 0))
+
+
+def unbroken(*names: str) -> list[Column]:
+    """Columns in which no line ends before its end."""
+    return [Column(Text(name), no_wrap=True) for name in names]
+
+
+def numeric(*names: str) -> list[Column]:
+    """Columns of numbers."""
+    return [Column(Text(name), no_wrap=True, justify="right") for name in names]
 
 
 _WIDEST = 10_000  # characters: the width at which nothing wraps

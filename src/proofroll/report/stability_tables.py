@@ -11,6 +11,7 @@ from rich.table import Table
 from rich.text import Text
 
 from proofroll.report.labels import number, with_caveat
+from proofroll.report.screen import numeric, plain_table, unbroken
 from proofroll.studies.hosts import said_of
 from proofroll.studies.stability_content import silent_ranking
 
@@ -58,14 +59,12 @@ def boundary_table(study: StabilityStudy) -> Table:
     """
     named = (name for point in study.points for name in point.sides["stable"].numbers)
     symbol = study.step_symbols.get(next(named, ""), "step in natural times")
-    title = f"Largest {symbol} (or tolerance) along each axis; n!: n times silent"
-    table = Table(title=Text(title), title_justify="left", box=None, padding=(0, 1, 0, 0))
-    table.add_column("engine formulation setting", no_wrap=True)
-    table.add_column("axis", no_wrap=True, min_width=7)
-    for column in ("stable", "holds 1 %"):
-        table.add_column(column, justify="right", no_wrap=True)
-    table.add_column("which is", no_wrap=True)
-    table.add_column("beyond", no_wrap=True)
+    table = plain_table(
+        *unbroken("engine formulation setting", "axis"),
+        *numeric("stable", "holds 1 %"),
+        *unbroken("which is", "beyond"),
+        title=f"Largest {symbol} (or tolerance) along each axis; n!: n times silent",
+    )
     explained = {(e.curve, e.axis): e for e in study.explanations if e.boundary == "accurate"}
     before = ""
     for (curve, axis), points in grouped(study).items():

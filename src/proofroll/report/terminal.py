@@ -6,12 +6,12 @@ import math
 import os
 from typing import TYPE_CHECKING
 
-from rich.table import Table
+from rich.table import Column, Table
 from rich.text import Text
 
 from proofroll.core.verdict import Verdict
 from proofroll.report.labels import SYMBOLS, caveat_lines, names, number, unjudged, verdict_text
-from proofroll.report.screen import Screen
+from proofroll.report.screen import Screen, numeric, plain_table, unbroken
 from proofroll.report.study_parts import part_kinds
 from proofroll.studies.hosts import said_of
 
@@ -52,16 +52,16 @@ def console() -> Screen:
 def verdict_table(content: ReportedComparison) -> Table:
     """One line per engine with settings: the worst over all points of the parameters."""
     names = columns(content)
-    table = Table(title=Text(content.title), title_justify="left", box=None, padding=(0, 1, 0, 0))
-    # Where the window is narrow these break between words, and nothing is cut.
-    table.add_column("engine formulation setting", min_width=_WORD, overflow="fold")
-    table.add_column("step", no_wrap=True)
-    table.add_column("verdict", min_width=_WORD)
-    for name, unit in names:
-        table.add_column(Text(f"{name} [{unit}]"), justify="right", min_width=_NUMBER)
-    table.add_column("order", justify="right", no_wrap=True)
-    table.add_column("s/s", justify="right", no_wrap=True)
-    table.add_column("", no_wrap=True)
+    table = plain_table(
+        # Where the window is narrow those with a least width break between words, and nothing is cut.
+        Column("engine formulation setting", min_width=_WORD, overflow="fold"),
+        *unbroken("step"),
+        Column("verdict", min_width=_WORD),
+        *(Column(Text(f"{name} [{unit}]"), justify="right", min_width=_NUMBER) for name, unit in names),
+        *numeric("order", "s/s"),
+        *unbroken(""),
+        title=content.title,
+    )
     for row in content.rows:
         verdict = row.verdict
         observables = row.observables
@@ -85,12 +85,10 @@ def _beyond(item: WorstJudgement) -> float:
 
 
 def step(resolution: str | None, value: float | None) -> str:
-    """A resolution in few characters: ``1e-3 s``, or ``tol 2e-14``; nothing where there is none."""
+    """A resolution in few characters: ``2.5e-3 s``, or ``tol 2e-14``; nothing where there is none."""
     if not resolution:
         return ""
-    mantissa, _, exponent = f"{value:.0e}".partition("e")
-    text = f"{mantissa}e{int(exponent)}"
-    return f"{text} s" if resolution == "dt" else f"tol {text}"
+    return f"{number(value)} s" if resolution == "dt" else f"tol {number(value, 1)}"
 
 
 def columns(content: ReportedComparison) -> list[tuple[str, str]]:

@@ -5,11 +5,12 @@ from __future__ import annotations
 from collections.abc import Iterator, Mapping
 from typing import Any
 
-from rich.table import Table
+from rich.table import Column, Table
 from rich.text import Text
 
 from proofroll.report.labels import SYMBOLS, number
 from proofroll.report.pages import environment, rendered
+from proofroll.report.screen import plain_table, unbroken
 from proofroll.studies.hosts import said_of
 
 _MOST = 12  # sentences of a kind on the terminal; the JSON document has all
@@ -71,13 +72,12 @@ def speed_text(row: Mapping[str, Any]) -> str:
 
 def table(content: Mapping[str, Any]) -> Table:
     """One line for each setting of each comparison."""
-    made = Table(box=None, padding=(0, 1, 0, 0))
-    made.add_column("setting", overflow="fold", min_width=16)
-    made.add_column("verdicts")
-    made.add_column("numbers", justify="right")
-    made.add_column("declared\norder", no_wrap=True)
-    if any(row["speed"] for row in content["rows"]):
-        made.add_column("time", no_wrap=True)
+    made = plain_table(
+        Column("setting", overflow="fold", min_width=16),
+        Column("verdicts"),
+        Column("numbers", justify="right"),
+        *unbroken("declared\norder", *(["time"] if any(row["speed"] for row in content["rows"]) else [])),
+    )
     before = ""
     for row in content["rows"]:
         if row["comparison"] != before and len(content["comparisons"]) > 1:
@@ -91,9 +91,7 @@ def table(content: Mapping[str, Any]) -> Table:
 
 def robot_table(content: Mapping[str, Any]) -> Table:
     """One line for each layer of a robot's check."""
-    made = Table(box=None, padding=(0, 1, 0, 0))
-    for column in ("layer", content["old"]["version"], content["new"]["version"]):
-        made.add_column(str(column))
+    made = plain_table(*map(Column, ("layer", content["old"]["version"], content["new"]["version"])))
     for layer in content["robot"]["layers"]:
         shown = ["–" if layer[side] is None else layer[side] for side in ("old", "new")]
         made.add_row(Text(layer["layer"], style="red" if layer["changed"] else ""), *shown)

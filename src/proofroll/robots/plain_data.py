@@ -1,8 +1,7 @@
-"""Robots and states as plain data, which JSON holds, and back."""
+"""Robots and states back from the plain data that JSON holds."""
 
 from __future__ import annotations
 
-import dataclasses
 from collections.abc import Mapping
 from typing import Any
 
@@ -12,19 +11,8 @@ from proofroll.robots.model import Mimic, Robot, RobotBody, RobotJoint
 from proofroll.robots.states import RobotStates
 
 
-def plain(value: Any) -> Any:
-    """Dataclasses, mappings and arrays as dicts, lists and numbers."""
-    if dataclasses.is_dataclass(value) and not isinstance(value, type):
-        return {field.name: plain(getattr(value, field.name)) for field in dataclasses.fields(value)}
-    if isinstance(value, Mapping):
-        return {str(key): plain(item) for key, item in value.items()}
-    if isinstance(value, (list, tuple)):
-        return [plain(item) for item in value]
-    return value.tolist() if isinstance(value, (np.ndarray, np.generic)) else value
-
-
 def robot_from(data: Mapping[str, Any]) -> Robot:
-    """The robot of which :func:`plain` made this; its ``sources`` stay plain."""
+    """The robot of which :func:`proofroll.files.json_data.plain` made this; its ``sources`` stay plain."""
     return Robot(
         data["name"],
         {name: RobotBody(**_arrays(body)) for name, body in data["bodies"].items()},
@@ -36,7 +24,7 @@ def robot_from(data: Mapping[str, Any]) -> Robot:
 
 
 def states_from(data: Mapping[str, Any]) -> RobotStates:
-    """The states of which :func:`plain` made this."""
+    """The states of which :func:`proofroll.files.json_data.plain` made this."""
     return RobotStates(**{field: _arrays(by_joint) for field, by_joint in data.items()})
 
 

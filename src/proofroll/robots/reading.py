@@ -14,8 +14,9 @@ from xml.etree import ElementTree
 import numpy as np
 
 from proofroll.core.errors import InputError, Missing, Refused
+from proofroll.files.json_data import plain
 from proofroll.robots.model import Robot
-from proofroll.robots.plain_data import plain, robot_from, states_from
+from proofroll.robots.plain_data import robot_from, states_from
 from proofroll.robots.protocol import GROUP, Reading, Request
 from proofroll.robots.robot_file import RobotFile
 from proofroll.running.loading import here

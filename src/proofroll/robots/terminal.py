@@ -6,8 +6,11 @@ import textwrap
 from collections.abc import Iterator
 from typing import Any
 
-from rich.table import Table
+from rich.table import Column, Table
 from rich.text import Text
+
+from proofroll.report.labels import error
+from proofroll.report.screen import numeric, plain_table, unbroken
 
 WIDTH = 80
 SHORT = {
@@ -34,11 +37,8 @@ def check_parts(content: dict[str, Any]) -> Iterator[Table | str]:
 
 def table(content: dict[str, Any]) -> Table:
     """One line per engine: the difference at each layer that does not hold."""
-    made = Table(box=None, padding=(0, 1, 0, 0))
-    made.add_column("engine", no_wrap=True, max_width=20)
-    made.add_column("", no_wrap=True)
-    for layer in content["layers"]:
-        made.add_column(SHORT[layer], justify="right", no_wrap=True)
+    layers = numeric(*(SHORT[layer] for layer in content["layers"]))
+    made = plain_table(Column("engine", no_wrap=True, max_width=20), *unbroken(""), *layers)
     for row in content["engines"]:
         style = _COLOURS.get(row["status"], "bold red")
         # A path would fill the column, and the version says which it is.
@@ -52,16 +52,12 @@ def table(content: dict[str, Any]) -> Table:
 def _cell(layer: dict[str, Any] | None) -> Text:
     if layer is None:
         return Text("–", style="dim")
-    return Text("✓", style="green") if layer["holds"] else Text(amount(layer["difference"], 0), style="red")
+    return Text("✓", style="green") if layer["holds"] else Text(amount(layer["difference"], 1), style="red")
 
 
-def amount(value: float | None, digits: int = 1) -> str:
-    """A difference in few characters."""
-    if value is None or value == float("inf"):
-        return "inf"
-    if value in range(100):
-        return f"{value:.0f}"
-    return f"{value:.{digits}e}".replace("e-0", "e-").replace("e+0", "e")
+def amount(value: float | None, digits: int = 2) -> str:
+    """A difference in few characters; a small whole number counts something, and is never rounded."""
+    return f"{value:.0f}" if value in range(100) else error(value, digits)
 
 
 def lines(content: dict[str, Any]) -> Iterator[str]:

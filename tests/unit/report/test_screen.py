@@ -7,7 +7,7 @@ import pytest
 from rich.table import Table
 
 from proofroll.report.screen import Screen, escaped, printable
-from proofroll.report.terminal import console
+from proofroll.report.terminal import console, step
 
 COMMANDS = "\x1b]0;title\x07\x1b[2J\x9b31m\x00\x08\r\x7f\u202e\u2028"
 
@@ -76,3 +76,12 @@ def test_a_pipe_has_the_width_that_it_is_given(monkeypatch: pytest.MonkeyPatch) 
     assert console().width == 133
     monkeypatch.delenv("COLUMNS")
     assert console().width == 100
+
+
+@pytest.mark.parametrize(
+    ("resolution", "value", "shown"),
+    [("dt", 1e-3, "1e-3 s"), ("dt", 2.5e-3, "2.5e-3 s"), ("rtol", 2.2e-14, "tol 2e-14"), (None, None, "")],
+)
+def test_a_step_is_shown_as_it_is(resolution: str | None, value: float | None, shown: str) -> None:
+    """A step keeps its digits, a tolerance its order of magnitude."""
+    assert step(resolution, value) == shown
