@@ -9,6 +9,7 @@ from proofroll.core.errors import Refused
 from proofroll.elements.mechanism import Body, Joint, Mechanism
 from proofroll.elements.mechanism.joint_coordinates import JointCoordinates
 from proofroll.truth.mechanism import maximal_taylor
+from proofroll.truth.mechanism.maximal_bodies import Planar, made_bodies
 from proofroll.truth.mechanism.maximal_coordinates import MaximalCoordinates
 from proofroll.truth.mechanism.two_routes import CHAOS, find_truth
 
@@ -182,6 +183,30 @@ def test_moving_bodies_without_inertia_are_moved_by_what_they_carry():
         Joint("axle", "revolute", "point", "wheel", (0, 0.3, 0), axis=(0, 0, 1), armature=0.02, v0=(3.0,)),
     )
     found = find_truth(Mechanism(bodies, joints), np.array([0.0, 0.03]))
+    assert found.differences["p_WB"] < 1e-13
+    assert found.differences["wrench"] < 1e-11
+    assert found.differences["energy"] < 1e-12
+
+
+def test_plane_bodies_without_inertia_are_moved_by_what_they_carry():
+    """Massless bodies and points with three coordinates each: both routes agree on the motion and on every wrench."""
+    bodies = (
+        Body("hub", 0.0),
+        Body("carriage", 0.0),
+        Body("hand", 0.7, (0.1, 0.05, 0), INERTIA),
+        Body("point", 0.5, (0.3, 0, 0)),
+        Body("wheel", 0.0),
+    )
+    joints = (
+        Joint("shaft", "revolute", "world", "hub", axis=(0, 0, 1), q0=(0.4,), v0=(1.0,)),
+        Joint("slide", "prismatic", "hub", "carriage", axis=(1, 0, 0), q0=(0.1,), v0=(0.5,)),
+        Joint("wrist", "revolute", "carriage", "hand", (0.3, 0, 0), axis=(0, 0, 1), q0=(0.3,), damping=0.1),
+        Joint("thread", "revolute", "hub", "point", (0, -0.1, 0), axis=(0, 0, 1), v0=(2.0,)),
+        Joint("axle", "revolute", "point", "wheel", (0.3, 0, 0), axis=(0, 0, 1), armature=0.02, v0=(3.0,)),
+    )
+    mechanism = Mechanism(bodies, joints, gravity=(0.0, -9.81, 0.0))
+    assert [type(body) for body in made_bodies(mechanism, allow_planar=True)] == [Planar] * 5
+    found = find_truth(mechanism, np.array([0.0, 0.03]))
     assert found.differences["p_WB"] < 1e-13
     assert found.differences["wrench"] < 1e-11
     assert found.differences["energy"] < 1e-12
