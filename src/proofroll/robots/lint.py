@@ -12,6 +12,8 @@ from proofroll.robots.model import Robot, RobotJoint
 from proofroll.robots.robot_file import LintFinding, RobotFile
 from proofroll.robots.safe_xml import numbers
 
+# Level, where and what of a :class:`LintFinding`.
+_Noticed = tuple[str, str, str]
 # An axis written with six digits is off its length by less.
 _UNIT = 1e-6
 _KNOWN = {
@@ -28,48 +30,46 @@ def lint(file: RobotFile, robot: Robot) -> list[LintFinding]:
         file: what was read.
         robot: what it means.
     """
-    found = list(_urdf(file, robot) if file.kind == "urdf" else _mjcf(file))
-    found += [*_bodies(file, robot), *_joints(robot)]
+    own = _urdf(file, robot) if file.kind == "urdf" else _mjcf(file)
+    found = [LintFinding(*noticed) for noticed in (*own, *_bodies(file, robot), *_joints(robot))]
     return sorted(found, key=lambda finding: ("error", "warning", "note").index(finding.level))
 
 
-def _bodies(file: RobotFile, robot: Robot) -> Iterator[LintFinding]:
+def _bodies(file: RobotFile, robot: Robot) -> Iterator[_Noticed]:
     noun = "link" if file.kind == "urdf" else "body"
     for name, body in robot.bodies.items():
         where = f"{noun} {name}"
         if body.mass < 0:
-            yield LintFinding("error", where, f"negative mass {body.mass:g} kg")
+            yield "error", where, f"negative mass {body.mass:g} kg"
         if not np.any(body.inertia):
             continue
         if not body.mass:
-            yield LintFinding("error", where, "it has inertia but no mass; engines invent different masses")
+            yield "error", where, "it has inertia but no mass; engines invent different masses"
         if not_positive(body.inertia):
             least = moments(body.inertia)[0]
-            yield LintFinding("error", where, f"inertia is not positive definite (smallest moment {least:.3g} kg m²)")
+            yield "error", where, f"inertia is not positive definite (smallest moment {least:.3g} kg m²)"
         elif breaks_triangle(body.inertia):
             a, b, c = moments(body.inertia)
-            yield LintFinding(
-                "error", where, f"inertia breaks the triangle inequality ({c:.3g} > {a:.3g} + {b:.3g} kg m²)"
-            )
+            yield "error", where, f"inertia breaks the triangle inequality ({c:.3g} > {a:.3g} + {b:.3g} kg m²)"
     for joint in robot.moving:
         if joint.kind == "free" or robot.groups[joint.name].mass:
             continue
         if not any(other.parent == child for other in robot.moving for child in _carried(robot, joint)):
-            yield LintFinding("error", f"joint {joint.name}", "it moves no mass: the mass matrix is singular")
+            yield "error", f"joint {joint.name}", "it moves no mass: the mass matrix is singular"
 
 
 def _carried(robot: Robot, joint: RobotJoint) -> list[str]:
     return [name for name, (home, _, _) in robot.welded.items() if home == joint.name]
 
 
-def _joints(robot: Robot) -> Iterator[LintFinding]:
+def _joints(robot: Robot) -> Iterator[_Noticed]:
     for joint in robot.moving:
         where = f"joint {joint.name}"
         for name, value in (("damping", joint.damping), ("friction", joint.friction), ("armature", joint.armature)):
             if value < 0:
-                yield LintFinding("error", where, f"negative {name} {value:g}")
+                yield "error", where, f"negative {name} {value:g}"
         if joint.lower is not None and joint.upper is not None and joint.lower > joint.upper:
-            yield LintFinding("error", where, f"lower limit {joint.lower:g} is above the upper one {joint.upper:g}")
+            yield "error", where, f"lower limit {joint.lower:g} is above the upper one {joint.upper:g}"
     for name, what in (
         ("damping", "some engines leave it out of their dynamics"),
         ("friction", "engines leave it out or make it a soft constraint"),
@@ -78,60 +78,52 @@ def _joints(robot: Robot) -> Iterator[LintFinding]:
     ):
         number = sum(bool(getattr(joint, name)) for joint in robot.moving)
         if number:
-            yield LintFinding("warning", "joints", f"{name} on {number} of {len(robot.moving)}: {what}")
+            yield "warning", "joints", f"{name} on {number} of {len(robot.moving)}: {what}"
     if robot.mimics:
         names = _some([mimic.joint for mimic in robot.mimics])
-        yield LintFinding(
-            "warning", "joints", f"{len(robot.mimics)} follow another (mimic): {names}; engines differ in that"
-        )
+        yield "warning", "joints", f"{len(robot.mimics)} follow another (mimic): {names}; engines differ in that"
 
 
 def _some(names: list[str]) -> str:
     return ", ".join(names[:3]) + (", …" if len(names) > 3 else "")
 
 
-def _urdf(file: RobotFile, robot: Robot) -> Iterator[LintFinding]:
+def _urdf(file: RobotFile, robot: Robot) -> Iterator[_Noticed]:
     bare = [name for name, source in robot.sources.items() if not source["inertial"]]
     carrying = [name for name in bare if robot.welded[name][0] in robot.columns]
     if carrying:
         names = _some(carrying)
-        yield LintFinding(
-            "warning", "links", f"{len(carrying)} without <inertial>: {names}; engines invent different masses"
-        )
+        yield "warning", "links", f"{len(carrying)} without <inertial>: {names}; engines invent different masses"
     for name in (name for name in bare if robot.sources[name]["shapes"]):
-        yield LintFinding(
-            "warning", f"link {name}", "a collision shape without <inertial>: MuJoCo weighs it at 1000 kg/m³"
-        )
+        yield "warning", f"link {name}", "a collision shape without <inertial>: MuJoCo weighs it at 1000 kg/m³"
     for name, source in robot.sources.items():
         if source["inertial"] and np.any(source["frame"] != np.eye(3)):
             off = source["written"] - np.diag(np.diag(source["written"]))
             words = "together with products of inertia" if np.any(off) else "with principal moments"
-            yield LintFinding(
-                "note", f"link {name}", f"its inertial has rpy {words}, which MuJoCo 3.1.3 to 3.13.0 ignores"
-            )
+            yield "note", f"link {name}", f"its inertial has rpy {words}, which MuJoCo 3.1.3 to 3.13.0 ignores"
     for element in file.root.iter():
         for child in element:
             if element.tag in _KNOWN and child.tag not in _KNOWN[element.tag]:
                 where = f"{element.tag} {element.get('name', '')}".strip()
-                yield LintFinding("warning", where, f"the specification has no <{child.tag}> here")
+                yield "warning", where, f"the specification has no <{child.tag}> here"
     for joint in file.root.findall("joint"):
         yield from _urdf_joint(joint)
 
 
-def _urdf_joint(joint: Element) -> Iterator[LintFinding]:
+def _urdf_joint(joint: Element) -> Iterator[_Noticed]:
     where, kind = f"joint {joint.get('name')}", joint.get("type")
     axis, limit = joint.find("axis"), joint.find("limit")
     if axis is not None and kind != "fixed":
         length = float(np.linalg.norm(numbers(axis, "xyz", "1 0 0", 3)))
         if abs(length - 1) > _UNIT:
-            yield LintFinding("warning", where, f"its axis has length {length:.6g}, not 1")
+            yield "warning", where, f"its axis has length {length:.6g}, not 1"
     if kind in {"revolute", "prismatic"} and limit is None:
-        yield LintFinding("warning", where, f"a {kind} joint needs <limit>; engines refuse it or take it as unlimited")
+        yield "warning", where, f"a {kind} joint needs <limit>; engines refuse it or take it as unlimited"
     if kind == "fixed" and joint.find("mimic") is not None:
-        yield LintFinding("warning", where, "a fixed joint cannot follow another; some engines refuse the file")
+        yield "warning", where, "a fixed joint cannot follow another; some engines refuse the file"
 
 
-def _mjcf(file: RobotFile) -> Iterator[LintFinding]:
+def _mjcf(file: RobotFile) -> Iterator[_Noticed]:
     for compiler in file.root.iter("compiler"):
         for name, what in (
             ("settotalmass", "other engines ignore it"),
@@ -140,20 +132,20 @@ def _mjcf(file: RobotFile) -> Iterator[LintFinding]:
             ("boundinertia", "it raises small inertias"),
         ):
             if compiler.get(name) not in {None, "false", "0"}:
-                yield LintFinding("warning", "compiler", f"{name}: {what}")
+                yield "warning", "compiler", f"{name}: {what}"
     for option in file.root.iter("option"):
         if option.get("gravity"):
-            yield LintFinding("note", "option", f"gravity {option.get('gravity')}: some engines ignore it")
+            yield "note", "option", f"gravity {option.get('gravity')}: some engines ignore it"
         for name in ("density", "viscosity"):
             if option.get(name) not in {None, "0"}:
-                yield LintFinding("note", "option", f"{name}: forces of the medium are not compared")
+                yield "note", "option", f"{name}: forces of the medium are not compared"
     if next(file.root.iter("tendon"), None) is not None:
-        yield LintFinding("note", "tendon", "springs and damping of tendons are not compared")
+        yield "note", "tendon", "springs and damping of tendons are not compared"
     if any(body.get("gravcomp") for body in file.root.iter("body")):
-        yield LintFinding("note", "bodies", "compensation of gravity (gravcomp) is not compared")
+        yield "note", "bodies", "compensation of gravity (gravcomp) is not compared"
     if len(trees := [body for world in file.root.iter("worldbody") for body in world.findall("body")]) > 1:
-        yield LintFinding("warning", "worldbody", f"{len(trees)} trees: some engines keep only the first")
+        yield "warning", "worldbody", f"{len(trees)} trees: some engines keep only the first"
     for body in file.root.iter("body"):
         if len([*body.findall("joint"), *body.findall("freejoint")]) > 1:
-            yield LintFinding("note", "bodies", "several joints in one body: engines place them differently")
+            yield "note", "bodies", "several joints in one body: engines place them differently"
             return

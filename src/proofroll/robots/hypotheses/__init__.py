@@ -9,6 +9,7 @@ from __future__ import annotations
 import dataclasses
 import functools
 import importlib
+import inspect
 import pkgutil
 from collections.abc import Callable, Mapping
 from xml.etree.ElementTree import Element
@@ -57,9 +58,15 @@ class RobotHypothesis:
     change: Change
 
 
-def hypothesis(name: str, known: Mapping[str, str], remedy: str) -> Callable[[Change], RobotHypothesis]:
-    """Makes a hypothesis of a function; see :class:`RobotHypothesis`."""
-    return lambda change: RobotHypothesis(change.__name__, name, known, remedy, change)
+def hypothesis(known: Mapping[str, str], remedy: str) -> Callable[[Change], RobotHypothesis]:
+    """Makes a hypothesis of a function, whose first line says what the engine does; see :class:`RobotHypothesis`."""
+
+    def made(change: Change) -> RobotHypothesis:
+        said = inspect.getdoc(change) or change.__name__
+        name = said[0].lower() + said[1:].partition("\n")[0].removesuffix(".")
+        return RobotHypothesis(change.__name__, name, known, remedy, change)
+
+    return made
 
 
 @functools.cache

@@ -36,23 +36,15 @@ def _replaced(evidence: RobotEvidence, instead: Callable[[RobotBody], RobotBody]
     return evidence.robot.with_bodies(bodies) if bodies else None
 
 
-@hypothesis(
-    "an impossible inertia is replaced by zero",
-    {"pybullet": "3.2.7", "mujoco": "4.0.0 (of a link without mass)"},
-    "correct the inertia in the file",
-)
+@hypothesis({"pybullet": "3.2.7", "mujoco": "4.0.0 (of a link without mass)"}, "correct the inertia in the file")
 def impossible_inertia_zeroed(evidence: RobotEvidence) -> Robot | None:
     """An impossible inertia is replaced by zero."""
     return _replaced(evidence, lambda body: dataclasses.replace(body, inertia=np.zeros((3, 3))))
 
 
-@hypothesis(
-    "an impossible inertia is replaced by a sphere with the mean of its principal moments",
-    {"mujoco": "with balanceinertia"},
-    "correct the inertia in the file, and leave balanceinertia out",
-)
+@hypothesis({"mujoco": "with balanceinertia"}, "correct the inertia in the file, and leave balanceinertia out")
 def inertia_balanced(evidence: RobotEvidence) -> Robot | None:
-    """An impossible inertia is replaced by a sphere with the mean principal moment."""
+    """An impossible inertia is replaced by a sphere with the mean of its principal moments."""
     return _replaced(evidence, lambda body: dataclasses.replace(body, inertia=np.trace(body.inertia) / 3 * np.eye(3)))
 
 
@@ -66,13 +58,9 @@ def _sphere_of_water(body: RobotBody) -> RobotBody:
     return dataclasses.replace(body, mass=mass, inertia=0.4 * mass * radius**2 * np.eye(3))
 
 
-@hypothesis(
-    "an impossible inertia is replaced by that of a sphere of water (of 1 kg where the mass is 0)",
-    {"drake": "1.51.1 (a line of its log says so)"},
-    "correct the inertia in the file",
-)
+@hypothesis({"drake": "1.51.1 (a line of its log says so)"}, "correct the inertia in the file")
 def water_sphere(evidence: RobotEvidence) -> Robot | None:
-    """An impossible inertia is replaced by that of a sphere of water with the same mass."""
+    """An impossible inertia is replaced by that of a sphere of water (of 1 kg where the mass is 0)."""
     return _replaced(evidence, _sphere_of_water)
 
 
@@ -86,13 +74,9 @@ def _raised(body: RobotBody, com: Array) -> RobotBody:
     return dataclasses.replace(body, mass=max(body.mass, _MASS), com=com, inertia=bounded)
 
 
-@hypothesis(
-    "small masses and inertias are raised to a bound (1e-6 kg, 1e-8 kg m²)",
-    {"mujoco": "with boundmass, boundinertia"},
-    "leave the bounds out, or correct the masses in the file",
-)
+@hypothesis({"mujoco": "with boundmass, boundinertia"}, "leave the bounds out, or correct the masses in the file")
 def mass_bounded(evidence: RobotEvidence) -> Robot | None:
-    """Masses and principal moments are raised to a bound."""
+    """Small masses and inertias are raised to a bound (1e-6 kg, 1e-8 kg m²)."""
     robot = evidence.robot
     small = []
     for joint in robot.joints:
@@ -104,13 +88,12 @@ def mass_bounded(evidence: RobotEvidence) -> Robot | None:
     return robot.with_bodies(small) if small else None
 
 
-@hypothesis(
-    "the rpy of <inertial> is ignored",
-    {"mujoco": "3.1.3 to 3.13.0"},
-    "update the engine, or write the inertia in the axes of the link with rpy 0",
-)
+@hypothesis({"mujoco": "3.1.3 to 3.13.0"}, "update the engine, or write the inertia in the axes of the link with rpy 0")
 def inertial_rotation_ignored(evidence: RobotEvidence) -> Robot | None:
-    """The rpy of an inertial is ignored: its moments are taken in the axes of the link."""
+    """The rpy of <inertial> is ignored.
+
+    The moments are taken in the axes of the link.
+    """
     robot = evidence.robot
     turned = [
         dataclasses.replace(robot.bodies[name], inertia=np.array(source["written"]))
@@ -121,12 +104,11 @@ def inertial_rotation_ignored(evidence: RobotEvidence) -> Robot | None:
 
 
 @hypothesis(
-    "settotalmass is ignored: masses are as written",
     {"pinocchio": "4.1.0", "drake": "1.51.1"},
     "compile the file once with MuJoCo, save it (mj_saveLastXML), and give others the saved file",
 )
 def total_mass_ignored(evidence: RobotEvidence) -> Robot | None:
-    """The total mass that the file asks for is not set: all masses and inertias keep the scale that was written."""
+    """Settotalmass is ignored: masses are as written."""
     robot, held = evidence.robot, evidence.reading.mass
     if not any(compiler.get("settotalmass") for compiler in evidence.file.root.iter("compiler")):
         return None

@@ -16,22 +16,17 @@ def _without(law: str, robot: Robot) -> Robot | None:
 
 
 @hypothesis(
-    "armature is not included in the mass matrix",
     {"pinocchio": "before 3", "exudyn": "1.13.6 (its tree has none)"},
     "add the armature to the diagonal of the mass matrix",
 )
 def armature_left_out(evidence: RobotEvidence) -> Robot | None:
-    """Armature of joints is not part of the mass matrix."""
+    """Armature is not included in the mass matrix."""
     return _without("armature", evidence.robot)
 
 
-@hypothesis(
-    "armature is used only of joints that have an actuator",
-    {"drake": "1.51.1"},
-    "give every joint with armature an actuator",
-)
+@hypothesis({"drake": "1.51.1"}, "give every joint with armature an actuator")
 def armature_of_actuated_joints_only(evidence: RobotEvidence) -> Robot | None:
-    """Armature counts only where an actuator acts on the joint."""
+    """Armature is used only of joints that have an actuator."""
     robot = evidence.robot
     if all(joint.actuated or not joint.armature for joint in robot.moving):
         return None
@@ -40,25 +35,20 @@ def armature_of_actuated_joints_only(evidence: RobotEvidence) -> Robot | None:
 
 
 @hypothesis(
-    "damping is not used in the forward dynamics",
     {"pinocchio": "all versions so far"},
     "subtract damping · velocity from the torques yourself (Pinocchio keeps it in model.damping)",
 )
 def damping_left_out(evidence: RobotEvidence) -> Robot | None:
-    """Damping of joints is read but not used in the dynamics."""
+    """Damping is not used in the forward dynamics."""
     return _without("damping", evidence.robot)
 
 
 _LAWS = ("damping", "armature", "stiffness", "friction")
 
 
-@hypothesis(
-    "a default class without a <joint> of its own loses the joint defaults of the class around it",
-    {"drake": "1.51.1"},
-    "put an empty <joint/> into every default class",
-)
+@hypothesis({"drake": "1.51.1"}, "put an empty <joint/> into every default class")
 def defaults_not_inherited(evidence: RobotEvidence) -> Robot | None:
-    """A default class without a <joint> element takes over nothing for joints from the class around it."""
+    """A default class without a <joint> of its own loses the joint defaults of the class around it."""
     robot, root = evidence.robot, copy.deepcopy(evidence.file.root)
     bare = [
         inner for outer in root.iter("default") for inner in outer.findall("default") if inner.find("joint") is None
@@ -82,7 +72,6 @@ def defaults_not_inherited(evidence: RobotEvidence) -> Robot | None:
 
 
 @hypothesis(
-    "friction of joints is not used in the forward dynamics",
     {
         "pinocchio": "all versions so far",
         "mujoco": "all versions so far (frictionloss is a soft constraint of its solver)",
@@ -93,12 +82,11 @@ def defaults_not_inherited(evidence: RobotEvidence) -> Robot | None:
     "add the friction torque yourself; in MuJoCo slow joints slip with less than frictionloss: see solreffriction",
 )
 def friction_left_out(evidence: RobotEvidence) -> Robot | None:
-    """Coulomb friction of joints is not part of the smooth dynamics."""
+    """Friction of joints is not used in the forward dynamics."""
     return _without("friction", evidence.robot)
 
 
 @hypothesis(
-    "mimic is ignored: the following joint moves freely",
     {
         "pinocchio": "default of all versions",
         "pybullet": "3.2.7",
@@ -108,15 +96,14 @@ def friction_left_out(evidence: RobotEvidence) -> Robot | None:
     "in Pinocchio build the model with mimic=True; elsewhere couple q = multiplier · q_other + offset yourself",
 )
 def mimic_ignored(evidence: RobotEvidence) -> Robot | None:
-    """Joints that should follow others move freely."""
+    """Mimic is ignored: the following joint moves freely."""
     return evidence.robot.change(mimics=()) if evidence.robot.mimics else None
 
 
 @hypothesis(
-    "springs of joints are not used in the forward dynamics",
     {"pinocchio": "4.1.0", "drake": "1.51.1", "exudyn": "1.13.6"},
     "add stiffness · (coordinate − springref) to the torques yourself",
 )
 def springs_left_out(evidence: RobotEvidence) -> Robot | None:
-    """Springs of joints are not used."""
+    """Springs of joints are not used in the forward dynamics."""
     return _without("stiffness", evidence.robot)

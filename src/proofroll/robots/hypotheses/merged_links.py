@@ -19,13 +19,12 @@ def _moments(inertia: Array) -> Array:
     return np.asarray(values[order])
 
 
-@hypothesis(
-    "links at fixed joints are merged by their origins: inertial origins and rotations are dropped",
-    {"pybullet": "3.2.7 with URDF_MERGE_FIXED_LINKS"},
-    "load without URDF_MERGE_FIXED_LINKS",
-)
+@hypothesis({"pybullet": "3.2.7 with URDF_MERGE_FIXED_LINKS"}, "load without URDF_MERGE_FIXED_LINKS")
 def merged_at_link_origins(evidence: RobotEvidence) -> Robot | None:
-    """Links are merged at their origins, their principal moments taken about the axes of the whole."""
+    """Links at fixed joints are merged by their origins: inertial origins and rotations are dropped.
+
+    Their principal moments are taken about the axes of the whole.
+    """
     robot = evidence.robot
     bodies: list[RobotBody] = []
     for home in robot.columns:
@@ -88,12 +87,10 @@ def _misplaced(evidence: RobotEvidence, *, turned: bool) -> Robot | None:
 
 
 @hypothesis(
-    "the inertial of a merged link is placed in the wrong order (default fusestatic for URDF)",
-    {"mujoco": "3.8.1 to 3.10.0"},
-    'update MuJoCo, or put <mujoco><compiler fusestatic="false"/></mujoco> into the file',
+    {"mujoco": "3.8.1 to 3.10.0"}, 'update MuJoCo, or put <mujoco><compiler fusestatic="false"/></mujoco> into the file'
 )
 def merged_inertial_misplaced(evidence: RobotEvidence) -> Robot | None:
-    """A link that is merged into its parent is placed by its principal frame and its pose in the wrong order.
+    """The inertial of a merged link is placed in the wrong order (default fusestatic for URDF).
 
     The pose (p, R) of the link in its parent and the pose (c, Q) of its principal frame in the link are multiplied as
     (c, Q) (p, R): the centre of mass comes to lie at c + Q p instead of p + R c. The principal frame is MuJoCo's:
@@ -103,11 +100,7 @@ def merged_inertial_misplaced(evidence: RobotEvidence) -> Robot | None:
     return _misplaced(evidence, turned=True)
 
 
-@hypothesis(
-    "the inertial of a merged link is placed in the wrong order and not turned (default fusestatic for URDF)",
-    {"mujoco": "3.3.3"},
-    'update MuJoCo, or put <mujoco><compiler fusestatic="false"/></mujoco> into the file',
-)
+@hypothesis({"mujoco": "3.3.3"}, 'update MuJoCo, or put <mujoco><compiler fusestatic="false"/></mujoco> into the file')
 def merged_inertial_misplaced_unturned(evidence: RobotEvidence) -> Robot | None:
-    """A merged link is placed in the wrong order, and its principal axes are not turned with it."""
+    """The inertial of a merged link is placed in the wrong order and not turned (default fusestatic for URDF)."""
     return _misplaced(evidence, turned=False)

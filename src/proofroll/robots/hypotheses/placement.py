@@ -10,13 +10,12 @@ from proofroll.robots.hypotheses import RobotEvidence, hypothesis
 from proofroll.robots.model import WORLD, Robot, RobotJoint
 
 
-@hypothesis(
-    "of several joints in one body all but the last are placed in the parent's frame",
-    {"drake": "1.51.1"},
-    "give each further joint a body of its own without mass",
-)
+@hypothesis({"drake": "1.51.1"}, "give each further joint a body of its own without mass")
 def body_placed_by_last_joint(evidence: RobotEvidence) -> Robot | None:
-    """Of several joints in one body all but the last sit in the parent's frame; the body's pose comes with the last."""
+    """Of several joints in one body all but the last are placed in the parent's frame.
+
+    The body's pose comes with the last.
+    """
     robot = evidence.robot
     chains: dict[str, list[int]] = {}
     for index, joint in enumerate(robot.joints):
@@ -38,23 +37,19 @@ _DEFAULT = np.array([0.0, 0.0, -9.81])
 
 
 @hypothesis(
-    "the file's gravity is ignored: 9.81 m/s² downwards instead",
-    {"pinocchio": "4.1.0", "drake": "1.51.1"},
-    "set the gravity of the model yourself (Pinocchio: model.gravity.linear)",
+    {"pinocchio": "4.1.0", "drake": "1.51.1"}, "set the gravity of the model yourself (Pinocchio: model.gravity.linear)"
 )
 def default_gravity(evidence: RobotEvidence) -> Robot | None:
-    """The gravity of the file is ignored."""
+    """The file's gravity is ignored: 9.81 m/s² downwards instead."""
     robot = evidence.robot
     return None if np.array_equal(robot.gravity, _DEFAULT) else robot.change(gravity=_DEFAULT)
 
 
 @hypothesis(
-    "only the first tree under the world is read",
-    {"pinocchio": "4.1.0"},
-    "put everything under one body of the world, or read each tree from a file of its own",
+    {"pinocchio": "4.1.0"}, "put everything under one body of the world, or read each tree from a file of its own"
 )
 def first_tree_only(evidence: RobotEvidence) -> Robot | None:
-    """Of several trees under the world only the first is kept."""
+    """Only the first tree under the world is read."""
     robot, kept = evidence.robot, {WORLD}
     joints: list[RobotJoint] = []
     for joint in robot.joints:
@@ -69,13 +64,9 @@ def first_tree_only(evidence: RobotEvidence) -> Robot | None:
     return robot.change(joints=tuple(joints), bodies=bodies, mimics=mimics)
 
 
-@hypothesis(
-    "a free base without mass is fixed to the world",
-    {"pybullet": "3.2.7"},
-    "give the root link a mass",
-)
+@hypothesis({"pybullet": "3.2.7"}, "give the root link a mass")
 def free_base_is_fixed(evidence: RobotEvidence) -> Robot | None:
-    """A free base is fixed to the world."""
+    """A free base without mass is fixed to the world."""
     robot = evidence.robot
     known = set(evidence.reading.joints)
     lost = [joint for joint in robot.joints if joint.kind == "free" and joint.name not in known]
@@ -95,12 +86,13 @@ def _offset(joint: RobotJoint, robot: Robot) -> RobotJoint:
 
 
 @hypothesis(
-    "a free body whose pose (p, R) in the file is turned is offset by p − R p",
-    {"pinocchio": "4.1.0"},
-    "write free bodies with pos 0 0 0 or without rotation, and set the start in the coordinates",
+    {"pinocchio": "4.1.0"}, "write free bodies with pos 0 0 0 or without rotation, and set the start in the coordinates"
 )
 def free_body_offset(evidence: RobotEvidence) -> Robot | None:
-    """A free body that the file turns is offset: its pose (p, R) is undone in the wrong order, which leaves p − R p."""
+    """A free body whose pose (p, R) in the file is turned is offset by p − R p.
+
+    The pose is undone in the wrong order.
+    """
     robot = evidence.robot
     joints = tuple(_offset(joint, robot) for joint in robot.joints)
     changed = any(one is not other for one, other in zip(joints, robot.joints, strict=True))

@@ -39,13 +39,12 @@ def _box(mass: float, shapes: list[Any], com: Array, frame: Array) -> Array | No
     return mass / 12 * np.array([y + z, x + z, x + y])
 
 
-@hypothesis(
-    "inertias are computed from collision shapes, not taken from the file",
-    {"pybullet": "default of 3.2.7"},
-    "load with flags=URDF_USE_INERTIA_FROM_FILE",
-)
+@hypothesis({"pybullet": "default of 3.2.7"}, "load with flags=URDF_USE_INERTIA_FROM_FILE")
 def inertia_from_collision(evidence: RobotEvidence) -> Robot | None:
-    """Inertias are those of a box around the collision shapes, in the axes of the file's inertial."""
+    """Inertias are computed from collision shapes, not taken from the file.
+
+    Inertias are those of a box around the shapes, in the axes of the file's inertial.
+    """
     robot, bodies = evidence.robot, []
     for name, source in robot.sources.items():
         body = robot.bodies.get(name)
@@ -64,12 +63,11 @@ _STAND_IN = {"pos": "0 0 0", "mass": "1", "diaginertia": "1 1 1"}
 
 
 @hypothesis(
-    "shapes that collide with nothing (contype 0, conaffinity 0) give no mass",
     {"pinocchio": "4.1.0"},
     "give every body an <inertial>; compile once with MuJoCo and save (mj_saveLastXML) to get one",
 )
 def noncolliding_shapes_weightless(evidence: RobotEvidence) -> Robot | None:
-    """Shapes that collide with nothing (contype and conaffinity 0) give a body no mass."""
+    """Shapes that collide with nothing (contype 0, conaffinity 0) give no mass."""
     robot, root = evidence.robot, copy.deepcopy(evidence.file.root)
     bare, touched = set(), False
     for body in root.iter("body"):
@@ -127,26 +125,18 @@ def _weighed(name: str, shapes: list[Any]) -> RobotBody | None:
     return composed(name, parts) if parts else None
 
 
-@hypothesis(
-    "collision shapes of links without <inertial> are weighed at 1000 kg/m³",
-    {"mujoco": "all versions so far"},
-    "give every link an <inertial>",
-)
+@hypothesis({"mujoco": "all versions so far"}, "give every link an <inertial>")
 def shapes_weighed(evidence: RobotEvidence) -> Robot | None:
-    """A link without <inertial> gets the mass of its collision shapes at the density of water."""
+    """Collision shapes of links without <inertial> are weighed at 1000 kg/m³."""
     robot = evidence.robot
     bare = {name: source for name, source in robot.sources.items() if not source.get("inertial", True)}
     bodies = [body for name, source in bare.items() if (body := _weighed(name, source["shapes"])) is not None]
     return robot.with_bodies(bodies) if bodies else None
 
 
-@hypothesis(
-    "links without <inertial> are given 1 kg and unit inertia",
-    {"pybullet": "3.2.7"},
-    "give every link an <inertial>; a massless one with mass 0 and inertia 0",
-)
+@hypothesis({"pybullet": "3.2.7"}, "give every link an <inertial>; a massless one with mass 0 and inertia 0")
 def unit_mass_without_inertial(evidence: RobotEvidence) -> Robot | None:
-    """A link without <inertial> weighs 1 kg and has unit inertia."""
+    """Links without <inertial> are given 1 kg and unit inertia."""
     robot = evidence.robot
     bare = [name for name, source in robot.sources.items() if name in robot.bodies and not source.get("inertial", True)]
     if not bare:
