@@ -52,7 +52,7 @@ def exudyn_solver(scene: Scene, settings: Any) -> Bare:
     if settings.formulation != "redundant":
         raise Refused("there is a bare loop of mechanisms only for redundant coordinates")
     built = Redundant(scene, settings)
-    (system, bodies), mechanism = built.native, mechanism_of(scene)
+    system, bodies, mechanism = built.system, built.bodies, mechanism_of(scene)
     dependent = built.integration.options.linearSolver.ignoreSingularJacobian
     kept: dict[str, int] = {}
     for body in mechanism.bodies:

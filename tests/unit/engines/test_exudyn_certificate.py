@@ -17,8 +17,7 @@ from proofroll.running.simulation import build
 pytest.importorskip("exudyn")
 
 from proofroll.elements.ball_on_surface.element import changed, rolling_ball
-from proofroll.engines.exudyn import MODELS as OF_BALLS
-from proofroll.engines.exudyn import PRESETS
+from proofroll.engines.exudyn import OF_BALLS, PRESETS
 from proofroll.engines.exudyn import ball as ball_module
 from proofroll.engines.exudyn import generic as generic_module
 

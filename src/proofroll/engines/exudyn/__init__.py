@@ -37,7 +37,7 @@ from proofroll.engines.exudyn.world_coordinates import WorldCoordinates
 
 OfBall = Generic | WorldCoordinates | Carrier | RollingDisc | PenaltyContact
 OfMechanism = Redundant | KinematicTree
-MODELS: Mapping[str, Callable[[RollingBall, ExudynSettings], OfBall]] = {
+OF_BALLS: Mapping[str, Callable[[RollingBall, ExudynSettings], OfBall]] = {
     "generic": lambda body, settings: (Generic if slides(body) else WorldCoordinates)(body, settings),
     "carrier": Carrier,
     "rolling_disc": RollingDisc,
@@ -117,7 +117,7 @@ class Exudyn:
 
     @staticmethod
     def caveat(settings: ExudynSettings) -> str:
-        """See :class:`engine.TellsCaveats`. The order of a step that halves itself cannot be measured."""
+        """See :class:`proofroll.core.engine_abilities.TellsCaveats`; a step that halves itself has no order."""
         if settings.preset != "default" or settings.halvings:
             return ""
         return "Exudyn's adaptive step, which it has on by default, is off, so that the step is the one given"
@@ -153,18 +153,17 @@ class Exudyn:
             )
         if settings.formulation in OF_MECHANISMS:
             return cls(OF_MECHANISMS[settings.formulation](scene, settings))
-        return cls(MODELS[settings.formulation](rolling_ball(scene), settings))
+        return cls(OF_BALLS[settings.formulation](rolling_ball(scene), settings))
 
     @classmethod
     def reproducer(cls, scene: Scene, settings: ExudynSettings) -> str:
         """See :class:`proofroll.core.engine_abilities.Reproduces`."""
         from proofroll.engines.exudyn.reproducer import mechanism, source
 
+        model = cls.build(scene, settings)._model
         if settings.formulation in OF_MECHANISMS:
-            model = OF_MECHANISMS[settings.formulation](scene, settings)
             return mechanism.source(model, mechanism_of(scene), settings)
-        body = rolling_ball(scene)
-        return source(MODELS[settings.formulation](body, settings), body, settings)
+        return source(model, rolling_ball(scene), settings)
 
     def advance(self, t: float) -> None:
         """See :class:`proofroll.core.engine.Engine`."""
@@ -176,7 +175,7 @@ class Exudyn:
 
     def events(self) -> Sequence[Event]:
         """See :class:`proofroll.core.engine_abilities.LocatesEvents`."""
-        return self._model.events()
+        return list(self._model.integration.events)
 
     def built(self) -> Built | MechanismBuilt:
         """See :class:`proofroll.core.engine.Engine`."""

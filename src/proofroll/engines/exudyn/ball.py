@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Iterator
+from collections.abc import Iterator
 from dataclasses import dataclass
 from typing import Any
 
@@ -12,7 +12,6 @@ import numpy as np
 from proofroll.core.arrays import FloatArray
 from proofroll.core.engine import Built, Sample
 from proofroll.elements.ball_on_surface.model import BallCapability, RollingBall
-from proofroll.elements.ball_on_surface.surfaces import Surface
 from proofroll.engines.exudyn.local_frame import curvature
 from proofroll.engines.exudyn.native import Output, add_rigid_body, items, loads, rigid_body
 from proofroll.engines.exudyn.resistance import slow
@@ -98,15 +97,18 @@ def add_ball(system: Any, rolling: RollingBall) -> RigidBall:
     )
     resistance = None
     if rolling.contact.rolling_resistance:
-        resistance = system.AddLoad(
-            items.LoadTorqueVector(
-                markerNumber=marker,
-                # Not used as a moment: it hands f to the function, and can be read back.
-                loadVector=[rolling.contact.rolling_resistance, 0.0, 0.0],
-                loadVectorUserFunction=_resistance(rolling, node),
-            )
-        )
+        resistance = system.AddLoad(items.LoadTorqueVector(**resisting(rolling, marker, node)))
     return RigidBall(system, node, body, weight, marker, resistance)
+
+
+def resisting(rolling: RollingBall, marker: Any, node: Any) -> dict[str, Any]:
+    """Arguments of the load of the rolling resistance on a marker, of a ball whose centre is that of a node."""
+    return {
+        "markerNumber": marker,
+        # Not used as a moment: it hands f to the function, and can be read back.
+        "loadVector": [rolling.contact.rolling_resistance, 0.0, 0.0],
+        "loadVectorUserFunction": _resistance(rolling, node),
+    }
 
 
 def _resistance(rolling: RollingBall, node: Any) -> Any:
@@ -115,10 +117,9 @@ def _resistance(rolling: RollingBall, node: Any) -> Any:
     N follows from the state: along e1 the centre accelerates by -v·(∂e1/∂p)v, so that
     N = m (v·(∂e1/∂p)v + e1·g). The last multiplier instead would lag by an iterate and make the moment ring with it.
     """
-    triad = rolling.surface.triad
+    triad, normal_rate = rolling.surface.triad, rolling.surface.normal_rate
     (k22, k23), (_, k33) = curvature(rolling.surface, rolling.u0).tolist()
-    twist = 2 * k23
-    bend = None if rolling.surface.generators is not None else _bend(rolling.surface)
+    twist, homogeneous = 2 * k23, rolling.surface.generators is not None
     m, least = rolling.ball.mass, slow(rolling)
     gx, gy, gz = rolling.gravity.tolist()
     position, velocity = Output.Position, Output.Velocity
@@ -133,7 +134,11 @@ def _resistance(rolling: RollingBall, node: Any) -> Any:
         if not speed:
             return [0.0, 0.0, 0.0]
         # v·(∂e1/∂p)v, of which a homogeneous surface has the same coefficients everywhere
-        turning = k22 * v2 * v2 + (twist * v2 + k33 * v3) * v3 if bend is None else bend(x, y, z, v2, v3)
+        if homogeneous:
+            turning = k22 * v2 * v2 + (twist * v2 + k33 * v3) * v3
+        else:
+            ex, ey, ez = normal_rate((x, y, z), (vx, vy, vz))
+            turning = vx * ex + vy * ey + vz * ez
         N = m * (turning + x1 * gx + y1 * gy + z1 * gz)
         # as resistance_moment, the call of which would be felt
         factor = load[0] * N / speed
@@ -141,14 +146,3 @@ def _resistance(rolling: RollingBall, node: Any) -> Any:
         return [M2 * x2 + M3 * x3, M2 * y2 + M3 * y3, M2 * z2 + M3 * z3]
 
     return moment
-
-
-def _bend(surface: Surface) -> Callable[[float, float, float, float, float], float]:
-    """v·(∂e1/∂p)v [m/s²] as a function of place and of v along e2 and e3."""
-
-    def anywhere(x: float, y: float, z: float, v2: float, v3: float) -> float:
-        p = np.array([x, y, z])
-        v = surface.frame(surface.locate(p))[:, 1:] @ (v2, v3)
-        return float(v @ surface.normal_gradient(p) @ v)
-
-    return anywhere

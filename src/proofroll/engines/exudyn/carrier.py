@@ -7,30 +7,43 @@ without rolling resistance no Python runs while it integrates. The carrier has n
 
 from __future__ import annotations
 
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 
-from proofroll.core.arrays import FloatArray
+from proofroll.core.arrays import FloatArray, cross
 from proofroll.core.engine import Built, Sample
 from proofroll.core.errors import Refused
-from proofroll.core.events import Event
 from proofroll.elements.ball_on_surface.model import RollingBall
 from proofroll.elements.ball_on_surface.surfaces import Generator
 from proofroll.engines.exudyn.ball import add_ball, add_body
-from proofroll.engines.exudyn.friction import refuse_slip
 from proofroll.engines.exudyn.integration import Integration, consistent_start, new_system
 from proofroll.engines.exudyn.local_frame import LocalGeometry, local_geometry
 from proofroll.engines.exudyn.native import Output, exu, items
 from proofroll.engines.exudyn.settings import ExudynSettings
 
 
+class RollingRow(NamedTuple):
+    """One constraint of rolling: a rate of the carrier, and the spin of the ball relative to it.
+
+    Attributes:
+        item: Exudyn's number of it.
+        generator: whose coordinate of the carrier it takes.
+        along: what the ball moves per unit of that coordinate, along e2 or e3 [m/unit].
+        axis: of the spin, in the world at time 0.
+    """
+
+    item: Any
+    generator: Generator
+    along: float
+    axis: FloatArray
+
+
 class Carrier:
     """Ball, carrier, two ``GenericJoint`` and two ``CoordinateConstraint`` at velocity level."""
 
     def __init__(self, body: RollingBall, settings: ExudynSettings) -> None:
-        """Builds and initialises; raises Refused if friction is bounded, or the generators do not fit one joint."""
-        refuse_slip(body)
+        """Builds and initialises; raises Refused if the generators do not fit one joint."""
         local = local_geometry(body.surface, body.u0)
         self.container, self.system = new_system()
         add_marker, add_object = self.system.AddMarker, self.system.AddObject
@@ -53,11 +66,11 @@ class Carrier:
         )
         self.rolling = self._constrain(body, local)
         self.system.Assemble()
-        start = consistent_start(self.system, settings, self._turning(body, self.spin))
+        start = consistent_start(self.system, settings, self._turning(body))
         self.integration = Integration(self.system, settings, start)
 
-    def _constrain(self, body: RollingBall, local: LocalGeometry) -> list[tuple[Any, float]]:
-        """Rolling along e2 and e3: K u̇ ± a (spin of the ball relative to the carrier) = 0; gives (item, K)."""
+    def _constrain(self, body: RollingBall, local: LocalGeometry) -> list[RollingRow]:
+        """Rolling along e2 and e3: K u̇ ± a (spin of the ball relative to the carrier) = 0."""
         frame, a = body.surface.frame(body.u0), body.ball.radius
         result = []
         for along, about, sign in ((1, 2, 1.0), (2, 1, -1.0)):
@@ -66,46 +79,38 @@ class Carrier:
             if len(columns) != 1:
                 raise Refused("rolling along one direction needs both of the carrier's coordinates at once")
             k = int(columns[0])
-            markers = [self._coordinate(local.generators[k]), self._spin(frame[:, about])]
+            generator, axis = local.generators[k], frame[:, about]
+            coordinate = getattr(items, f"MarkerBodiesRelative{generator.kind.capitalize()}Coordinate")
+            rate = coordinate(bodyNumbers=[self.ground, self.carrier], axis0=generator.axis)
+            spin = items.MarkerBodiesRelativeRotationCoordinate(
+                bodyNumbers=[self.carrier, self.ball.body], axis0=axis, localPosition0=self.centre
+            )
             # Exudyn's constraint is factor1 value1 - value0 = 0.
             item = items.CoordinateConstraint(
-                markerNumbers=[self.system.AddMarker(marker) for marker in markers],
+                markerNumbers=[self.system.AddMarker(marker) for marker in (rate, spin)],
                 factor1=-sign * a / row[k],
                 velocityLevel=True,
             )
-            result.append((self.system.AddObject(item), float(row[k])))
+            result.append(RollingRow(self.system.AddObject(item), generator, float(row[k]), axis))
         return result
 
-    def _turning(self, body: RollingBall, carrier: FloatArray) -> dict[Any, FloatArray]:
+    def _factor(self, row: RollingRow) -> float:
+        """How much of the spin makes up for a rate of the coordinate, in Exudyn."""
+        return float(self.system.GetObject(row.item)["factor1"])
+
+    def _turning(self, body: RollingBall) -> dict[Any, FloatArray]:
         """-Ċ q̇ of the rolling constraints: the axis e of the relative spin turns with the carrier, ė = ω × e."""
-        frame = body.surface.frame(body.u0)
+        relative = body.w0 - self.spin
         return {
-            item: np.array([-self.system.GetObject(item)["factor1"] * (body.w0 - carrier) @ np.cross(carrier, axis)])
-            for (item, _), axis in zip(self.rolling, (frame[:, 2], frame[:, 1]), strict=True)
+            row.item: np.array([-self._factor(row) * relative @ cross(self.spin, row.axis)]) for row in self.rolling
         }
 
-    def _coordinate(self, generator: Generator) -> Any:
-        kind = (
-            items.MarkerBodiesRelativeRotationCoordinate
-            if generator.kind == "rotation"
-            else items.MarkerBodiesRelativeTranslationCoordinate
-        )
-        return kind(bodyNumbers=[self.ground, self.carrier], axis0=generator.axis)
-
-    def _spin(self, axis: FloatArray) -> Any:
-        return items.MarkerBodiesRelativeRotationCoordinate(
-            bodyNumbers=[self.carrier, self.ball.body], axis0=axis, localPosition0=self.centre
-        )
-
-    def numbers(self, body: RollingBall) -> list[str]:
+    def numbers(self) -> list[str]:
         """Assignments for the program of :mod:`reproducer`: the carrier's start, its joint and the rolling."""
-        frame = body.surface.frame(body.u0)
-        local, rolling = local_geometry(body.surface, body.u0), []
-        for (item, _), along, about, sign in zip(self.rolling, (1, 2), (2, 1), (1.0, -1.0), strict=True):
-            row = local.tangents[along] + sign * body.ball.radius * local.turn[about]
-            generator = local.generators[int(np.argmax(np.abs(row)))]
-            factor = float(self.system.GetObject(item)["factor1"])
-            rolling.append((generator.kind.capitalize(), list(generator.axis), frame[:, about].tolist(), factor))
+        rolling = [
+            (row.generator.kind.capitalize(), list(row.generator.axis), row.axis.tolist(), self._factor(row))
+            for row in self.rolling
+        ]
         return [
             f"CARRIER_VELOCITY = {self.velocity.tolist()!r}",
             f"CARRIER_SPIN = {self.spin.tolist()!r}",
@@ -119,16 +124,12 @@ class Carrier:
         turn = self.system.GetNodeOutput(self.node, Output.RotationMatrix).reshape(3, 3)
         return self.ball.sample(-turn @ self.system.GetObjectOutput(self.joint, Output.ForceLocal))
 
-    def events(self) -> list[Event]:
-        """None: the ball never slips."""
-        return []
-
     def built(self) -> Built:
         """See :class:`proofroll.core.engine.Engine`."""
-        item, rate = self.rolling[1]
+        row = self.rolling[1]
         # How far the ball's centre is from its place in the carrier, which is not turned at time 0.
         off = self.system.GetObjectOutput(self.joint, Output.DisplacementLocal)
-        return self.ball.built(abs(self.system.GetObject(item)["factor1"] * rate), -float(off @ self.normal))
+        return self.ball.built(abs(self._factor(row) * row.along), -float(off @ self.normal))
 
 
 def _joint_axes(generators: tuple[Generator, Generator]) -> tuple[FloatArray, list[int]]:

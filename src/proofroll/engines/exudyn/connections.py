@@ -5,12 +5,12 @@ Each has two markers with the axes of the joint's own frames, along whose first 
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from typing import Any, NamedTuple
 
 import numpy as np
 
-from proofroll.elements.mechanism import WORLD, Joint, Loop
+from proofroll.elements.mechanism import WORLD, Joint, Loop, Mechanism
 from proofroll.elements.mechanism.checks import Vector
 from proofroll.elements.mechanism.rotations import Array, cross
 from proofroll.engines.exudyn.native import Output, exu, items
@@ -46,6 +46,20 @@ class Connected(NamedTuple):
     bodies: tuple[str, str]
     frames: tuple[Array, Array]
     rows: tuple[tuple[int, int] | None, ...]
+
+
+def add_springs(system: Any, mechanism: Mechanism, marker: Callable[[str, Any], Any]) -> None:
+    """The springs between points; ``marker`` makes Exudyn's marker at a place in a body's frame."""
+    for spring in mechanism.springs:
+        ends = ((spring.body_a, spring.position_a), (spring.body_b, spring.position_b))
+        system.AddObject(
+            items.ObjectConnectorSpringDamper(
+                markerNumbers=[marker(*end) for end in ends],
+                stiffness=spring.stiffness,
+                damping=spring.damping,
+                referenceLength=spring.length,
+            )
+        )
 
 
 class Connections:

@@ -110,15 +110,15 @@ class PenaltyContact:
         )
         self.system.Assemble()
         self._softened = _softened(body, settings, creep, N, mu, hollow)
-        self._t, self._events = 0.0, []
+        self._t = 0.0
         self._left: tuple[float, float] | None = None
         self._sticks = needed <= mu * N and not slips
-        if not self._sticks and not body.flies:
-            self._events.append(Event("slip", 0.0, 0.0, 0.0))
+        self._flies = body.flies
         if not body.flies:  # else slip and stick are those of impacts, shorter than any sample
             self.system.SetPostStepUserFunction(self._watch)
-        self._flies = body.flies
         self.integration = Integration(self.system, settings, impacts=body.flies)
+        if not self._sticks and not body.flies:
+            self.integration.events.append(Event("slip", 0.0, 0.0, 0.0))
 
     def _watch(self, system: Any, t: float) -> bool:
         """Called by Exudyn after each step, and once where it starts."""
@@ -126,7 +126,7 @@ class PenaltyContact:
             return True
         gap, speed, _, _ = system.GetNodeOutput(self.data, COORDINATES).tolist()
         if gap > 0:
-            self._events.append(Event("lift_off", 0.5 * (self._t + t), self._t, t))
+            self.integration.events.append(Event("lift_off", 0.5 * (self._t + t), self._t, t))
             self.integration.complaint = "the ball leaves the wall"
             return False
         slip = speed / self.zone
@@ -150,17 +150,13 @@ class PenaltyContact:
                 return
             self.integration.complaint = "the ball slips, as rolling needs more friction than grip (use a larger grip),"
             return
-        self._events.append(Event(kind, 0.5 * (low + high), low, high))
+        self.integration.events.append(Event(kind, 0.5 * (low + high), low, high))
         self._sticks, self._left = kind == "stick", None
 
     def _pressing(self) -> float:
         """N [N] of a ball that slips."""
         force = np.asarray(self.system.GetObjectOutput(self.contact, Output.Force))
         return float(np.linalg.norm(force)) / math.hypot(1.0, self._grip)
-
-    def events(self) -> list[Event]:
-        """Stick and slip so far, each between two steps."""
-        return list(self._events)
 
     def sample(self) -> Sample:
         """See :class:`proofroll.core.engine.Engine`. The force is that of the contact."""

@@ -11,7 +11,6 @@ from collections.abc import Callable
 from dataclasses import dataclass
 from typing import NamedTuple
 
-from proofroll.core.errors import Refused
 from proofroll.elements.ball_on_surface.model import RollingBall
 from proofroll.engines.exudyn.local_frame import curvature
 from proofroll.engines.exudyn.resistance import resistance_moment, slow
@@ -76,12 +75,6 @@ NeededAt = Callable[[float, float, float, float, float, float], tuple[float, flo
 def mobility(body: RollingBall) -> float:
     """β = 1/m + a²/J: change of the slip velocity per impulse of friction [1/kg]."""
     return 1 / body.ball.mass + body.ball.radius**2 / body.ball.inertia
-
-
-def refuse_slip(body: RollingBall) -> None:
-    """Raises Refused if friction is bounded, for models whose ball cannot slip."""
-    if math.isfinite(body.contact.mu_static):
-        raise Refused("this formulation only rolls without slip; with bounded friction use generic or contact")
 
 
 def needed_function(body: RollingBall) -> NeededAt:

@@ -16,16 +16,15 @@ import numpy as np
 from proofroll.core.arrays import FloatArray
 from proofroll.core.engine import Built, Sample
 from proofroll.core.errors import Refused
-from proofroll.core.events import Event
 from proofroll.elements.ball_on_surface.model import BallCapability, RollingBall
 from proofroll.engines.exudyn.friction import KineticFriction, Touch, needed_function
 from proofroll.engines.exudyn.generic_forces import (
     SIZE,
     base,
-    constant_weight,
     force_function,
     quadratic_terms,
     weight_function,
+    weight_turns,
 )
 from proofroll.engines.exudyn.integration import Integration, initial_matrices, new_system
 from proofroll.engines.exudyn.local_frame import local_geometry
@@ -39,16 +38,17 @@ class Generic:
 
     def __init__(self, body: RollingBall, settings: ExudynSettings) -> None:
         """Builds and initialises; raises Refused if the surface is not homogeneous."""
-        self.surface = body.surface
+        self._body = body
         self.local = local_geometry(body.surface, body.u0)
         self.container, self.system = new_system()
         m, J = body.ball.mass, body.ball.inertia
         frame = body.surface.frame(body.u0)
+        self._rates = [0.0, *body.udot0.tolist(), *(frame.T @ body.w0).tolist()]
         node = self.system.AddNode(
             items.NodeGenericODE2(
                 referenceCoordinates=[0.0] * SIZE,
                 initialCoordinates=[0.0, *body.u0, 0.0, 0.0, 0.0],
-                initialCoordinates_t=[0.0, *body.udot0, *(frame.T @ body.w0)],
+                initialCoordinates_t=self._rates,
                 numberOfODE2Coordinates=SIZE,
             )
         )
@@ -67,10 +67,8 @@ class Generic:
         if self.friction is None:
             self.integration = Integration(self.system, settings)
         else:
+            self.place_matters = weight_turns(body, self.local)
             self._needed, self._local_gravity = needed_function(body), weight_function(body, self.local, np.eye(3))
-            constant = constant_weight(body, self.local, np.eye(3))
-            self._constant_gravity = None if constant is None else tuple(constant[:3])
-            self._radius = body.ball.radius
             self._tangents: tuple[float, ...] = tuple(self.local.tangents[1:].ravel().tolist())
             self.integration = SwitchedIntegration(self, body, settings)
 
@@ -98,7 +96,7 @@ class Generic:
         data.SetODE2Coordinates_t(q_t, initial)
         N = abs(float(press[0]))
         f, mu = (float(np.linalg.norm(x)) / N if N > 0 else None for x in (moment, friction))
-        return self.surface.frame(q[1:3]) @ weight / mass, f, None if self.friction is None else mu
+        return self._body.surface.frame(q[1:3]) @ weight / mass, f, None if self.friction is None else mu
 
     def _constrain(self, node: Any, radius: float) -> Any:
         """The wall first and then rolling, so that the multipliers are N, -F2, -F3."""
@@ -117,72 +115,69 @@ class Generic:
             items.CoordinateVectorConstraint(markerNumbers=all_of, scalingMarker1=rows, velocityLevel=True)
         )
 
-    def numbers(self, body: RollingBall) -> list[str]:
+    def numbers(self) -> list[str]:
         """Assignments for the program of :mod:`reproducer`.
 
         Raises:
             Refused: the weight turns with the coordinates.
         """
-        weight = weight_function(body, self.local, body.ball.mass * base(self.local))
-        forces = [weight([0.0, *(body.u0 + turned), 0.0, 0.0, 0.0]) for turned in (np.zeros(2), np.ones(2))]
-        if forces[0] != forces[1]:
+        body = self._body
+        if weight_turns(body, self.local):
             raise Refused("the program for this formulation has no gravity across the wall's axis")
+        weight = weight_function(body, self.local, body.ball.mass * base(self.local))
         generators = [(generator.kind, list(generator.axis)) for generator in self.local.generators]
-        mass = self.system.GetObject(self.object)["massMatrix"].Convert2DenseMatrix()
-        frame = body.surface.frame(body.u0)
         return [
-            f"MASS_MATRIX = {np.array(mass).tolist()!r}",
+            f"MASS_MATRIX = {self._mass_matrix().tolist()!r}",
             f"QUADRATIC = {quadratic_terms(body, self.local)!r}",
-            f"WEIGHT = {forces[0]!r}",
-            f"ROWS = {np.array(self.system.GetObject(self.rolling)['scalingMarker1']).tolist()!r}",
+            f"WEIGHT = {weight([])!r}",
+            f"ROWS = {self._rows().tolist()!r}",
             f"COORDINATES = {body.u0.tolist()!r}",
-            f"RATES = {[0.0, *body.udot0.tolist(), *(frame.T @ body.w0).tolist()]!r}",
+            f"RATES = {self._rates!r}",
             f"TANGENTS = {self.local.tangents.tolist()!r}",
             f"GENERATORS = {generators!r}",
         ]
 
+    def _mass_matrix(self) -> FloatArray:
+        """As Exudyn holds it."""
+        return np.array(self.system.GetObject(self.object)["massMatrix"].Convert2DenseMatrix())
+
+    def _rows(self) -> FloatArray:
+        """Of rolling, on the rates, as Exudyn holds them."""
+        return np.array(self.system.GetObject(self.rolling)["scalingMarker1"])
+
     def sample(self) -> Sample:
-        """See :class:`engine.Engine`. The spin is a quasi-velocity, so there is no orientation to report.
+        """See :class:`proofroll.core.engine.Engine`. The spin is a quasi-velocity, the rate of no orientation.
 
         While the ball slips, N is the wall's multiplier, and the friction what Exudyn was given for this state.
         """
         data = self.system.systemData
         q, q_t, multipliers = data.GetODE2Coordinates(), data.GetODE2Coordinates_t(), data.GetAECoordinates()
-        frame = self.surface.frame(q[1:3])
+        frame = self._body.surface.frame(q[1:3])
         velocity = self.local.tangents @ q_t[1:3] + np.array([q_t[0], 0.0, 0.0])
         force = -multipliers
         if self.friction is not None and self.friction.applied is not None:
             force[1:] = self.friction.force(self.friction.applied, self.touch(q, q_t).N)
         return Sample(
-            p_WB=self.surface.position(q[1:3]) + q[0] * frame[:, 0],
+            p_WB=self._body.surface.position(q[1:3]) + q[0] * frame[:, 0],
             v_WB=frame @ velocity,
             w_WB=frame @ q_t[3:],
             force=frame @ force,
             sticking=None if self.friction is None else self.friction.applied is None,
         )
 
-    def events(self) -> list[Event]:
-        """Stick and slip so far."""
-        return self.integration.events if isinstance(self.integration, SwitchedIntegration) else []
-
-    @property
-    def place_matters(self) -> bool:
-        """See :class:`Switched`."""
-        return self._constant_gravity is None
-
     def needed(self, q: FloatArray, q_t: FloatArray) -> tuple[float, float, float]:
         """See :class:`Switched`."""
         _, rate1, rate2, w1, _, _ = q_t.tolist()
         t2u, t2v, t3u, t3v = self._tangents
-        g1, g2, g3 = self._constant_gravity or self._local_gravity(q)[:3]
+        g1, g2, g3 = self._local_gravity(q)[:3]
         return self._needed(t2u * rate1 + t2v * rate2, t3u * rate1 + t3v * rate2, w1, g1, g2, g3)
 
     def touch(self, q: FloatArray, q_t: FloatArray) -> Touch:
         """See :class:`Switched`."""
         _, rate1, rate2, _, w2, w3 = q_t.tolist()
-        t2u, t2v, t3u, t3v = self._tangents
-        slip2 = t2u * rate1 + t2v * rate2 + self._radius * w3
-        slip3 = t3u * rate1 + t3v * rate2 - self._radius * w2
+        (t2u, t2v, t3u, t3v), radius = self._tangents, self._body.ball.radius
+        slip2 = t2u * rate1 + t2v * rate2 + radius * w3
+        slip3 = t3u * rate1 + t3v * rate2 - radius * w2
         return Touch(*self.needed(q, q_t), slip2, slip3)
 
     def hold(self, direction: tuple[float, float] | None) -> None:
@@ -199,17 +194,15 @@ class Generic:
 
     def without_slip(self, q_t: FloatArray) -> FloatArray:
         """See :class:`Switched`. The impulse is that of the constraint itself, through the mass matrix."""
-        rows = np.array(self.system.GetObject(self.rolling)["scalingMarker1"])
-        mass = self.system.GetObject(self.object)["massMatrix"].Convert2DenseMatrix()
-        by_impulse = np.linalg.solve(mass, rows.T)
+        rows = self._rows()
+        by_impulse = np.linalg.solve(self._mass_matrix(), rows.T)
         return np.asarray(q_t - by_impulse @ np.linalg.solve(rows @ by_impulse, rows @ q_t))
 
     def built(self) -> Built:
         """See :class:`proofroll.core.engine.Engine`. Gravity, f and μk stem from the forces Exudyn computed."""
-        mass = self.system.GetObject(self.object)["massMatrix"].Convert2DenseMatrix()
-        data = self.system.systemData
+        mass, data = self._mass_matrix(), self.system.systemData
         q, q_t, q_tt = data.GetODE2Coordinates(), data.GetODE2Coordinates_t(), data.GetODE2Coordinates_tt()
-        tangents, frame = self.local.tangents, self.surface.frame(q[1:3])
+        tangents, frame = self.local.tangents, self._body.surface.frame(q[1:3])
         acceleration = tangents @ q_tt[1:3] + np.einsum("ijk,j,k->i", self.local.second, q_t[1:3], q_t[1:3])
         acceleration[0] += q_tt[0]
         # The spin is given in a frame that turns.
@@ -218,7 +211,7 @@ class Generic:
             mass=float(mass[0, 0]),
             inertia=np.diag(mass)[3:],
             gravity=self._gravity,
-            ball_radius=float(np.array(self.system.GetObject(self.rolling)["scalingMarker1"])[0, 5]),
+            ball_radius=float(self._rows()[0, 5]),
             rolling_resistance=self._resistance,
             mu_static=self.integration.mu_static if isinstance(self.integration, SwitchedIntegration) else None,
             mu_kinetic=self._mu_kinetic,

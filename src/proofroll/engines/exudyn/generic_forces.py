@@ -45,15 +45,13 @@ def force_function(body: RollingBall, local: LocalGeometry, friction: KineticFri
     tangents = local.tangents
     (t2u, t2v), (t3u, t3v) = tangents[1:].tolist()
     scaled = body.ball.mass * base(local)
-    weight, constant = weight_function(body, local, scaled), constant_weight(body, local, scaled)
-    terms = _summed(constant or [0.0] * SIZE, quadratic_terms(body, local))
+    weight, terms = weight_function(body, local, scaled), quadratic_terms(body, local)
     a = body.ball.radius
 
     def force(system: Any, t: float, item: int, q: list[float], rates: list[float]) -> list[float]:  # noqa: ARG001 -- Exudyn's signature
-        result = terms(*rates)
-        if constant is None:
-            along1, along2, along3 = weight(q)[:3]
-            result[0], result[1], result[2] = result[0] + along1, result[1] + along2, result[2] + along3
+        result = weight(q)
+        for row, i, j, factor in terms:  # of which a cylinder has four
+            result[row] += factor * rates[i] * rates[j]
         N = result[0]  # along the distance nothing accelerates
         if f:
             v2, v3 = t2u * rates[1] + t2v * rates[2], t3u * rates[1] + t3v * rates[2]
@@ -71,44 +69,24 @@ def force_function(body: RollingBall, local: LocalGeometry, friction: KineticFri
     return force
 
 
-def _summed(constant: list[float], quadratic: list[tuple[int, int, int, float]]) -> Callable[..., list[float]]:
-    """A function of the rates: a constant in each row, and the quadratic terms, of which a cylinder has four."""
-
-    def function(*rates: float) -> list[float]:
-        rows = constant[:]
-        for row, i, j, factor in quadratic:
-            rows[row] += factor * rates[i] * rates[j]
-        return rows
-
-    return function
+def weight_turns(body: RollingBall, local: LocalGeometry) -> bool:
+    """Whether gravity turns in the local frame as the ball goes along."""
+    axes = [np.asarray(generator.axis) for generator in local.generators if generator.kind == "rotation"]
+    return bool(axes) and bool(np.any(np.abs(np.cross(axes[0], body.gravity)) > 1e-14 * np.linalg.norm(body.gravity)))
 
 
-def _rotations(local: LocalGeometry) -> tuple[list[int], FloatArray]:
-    """Which coordinates turn the frame, and about which axis the first of them does."""
-    rotations = [k for k, generator in enumerate(local.generators) if generator.kind == "rotation"]
-    return rotations, np.asarray(local.generators[rotations[0]].axis) if rotations else np.zeros(3)
-
-
-def constant_weight(body: RollingBall, local: LocalGeometry, scaled: FloatArray) -> list[float] | None:
-    """Generalised gravity if it is the same everywhere, else None."""
-    rotations, axis = _rotations(local)
-    if rotations and np.any(np.abs(np.cross(axis, body.gravity)) > 1e-14 * np.linalg.norm(body.gravity)):
-        return None
-    return [*(scaled.T @ body.surface.frame(body.u0).T @ body.gravity).tolist(), 0.0, 0.0, 0.0]
-
-
-def weight_function(body: RollingBall, local: LocalGeometry, scaled: FloatArray) -> Any:
+def weight_function(body: RollingBall, local: LocalGeometry, scaled: FloatArray) -> Callable[[Any], list[float]]:
     """Generalised gravity as a function of q: constant, or turning once around with one of the coordinates."""
-    constant = constant_weight(body, local, scaled)
-    if constant is not None:
+    to_local, zero = body.surface.frame(body.u0).T, [0.0, 0.0, 0.0]
+    if not weight_turns(body, local):
+        constant = [*(scaled.T @ to_local @ body.gravity).tolist(), *zero]
         return lambda q: constant[:]  # noqa: ARG005 -- the place does not matter here
-    to_local = body.surface.frame(body.u0).T
-    rotations, axis = _rotations(local)
-    along = axis * (axis @ body.gravity)
-    cosine, sine = body.gravity - along, np.cross(axis, body.gravity)
-    zero = [0.0, 0.0, 0.0]
+    rotations = [k for k, generator in enumerate(local.generators) if generator.kind == "rotation"]
     if len(rotations) > 1:
         raise Refused("gravity along a wall with two rotations is not built")
+    axis = np.asarray(local.generators[rotations[0]].axis)
+    along = axis * (axis @ body.gravity)
+    cosine, sine = body.gravity - along, np.cross(axis, body.gravity)
     steady, with_cosine, with_sine = (scaled.T @ to_local @ part for part in (along, cosine, sine))
     column, start = 1 + rotations[0], float(body.u0[rotations[0]])
 

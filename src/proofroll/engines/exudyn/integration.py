@@ -10,6 +10,7 @@ import numpy as np
 from proofroll.core.arrays import FloatArray
 from proofroll.core.engine import whole_steps
 from proofroll.core.errors import Diverged, Refused
+from proofroll.core.events import Event
 from proofroll.engines.exudyn.native import ExudynError, exu, new_settings
 from proofroll.engines.exudyn.settings import EXPLICIT, ExudynSettings
 
@@ -62,6 +63,7 @@ class Integration:
     Attributes:
         t: present time [s].
         complaint: why a user function of the system has stopped the run for good.
+        events: what the system's user functions have found of stick, slip and lift-off so far.
     """
 
     def __init__(
@@ -90,6 +92,7 @@ class Integration:
         """
         self.t = at
         self.complaint: str | None = None
+        self.events: list[Event] = []
         self.dt = settings.dt
         self.system = system
         self.options = simulation_settings(settings, dependent=dependent, impacts=impacts)

@@ -7,6 +7,7 @@ from typing import Any
 
 import exudyn
 import exudyn.itemInterface
+import numpy as np
 
 exu: Any = exudyn
 items: Any = exudyn.itemInterface
@@ -62,6 +63,35 @@ def rigid_body(system: Any, number: Any) -> dict[str, Any]:
 
 def _named(prefix: str, name: str) -> str:
     return prefix + name[0].upper() + name[1:] if prefix else name
+
+
+def add_kinematic_tree(
+    system: Any, q: Any, v: Any, turns: Any, offsets: Any, inertias: Any, coms: Any, **others: Any
+) -> Any:
+    """An ``ObjectKinematicTree`` with a node of its own, which starts at the coordinates ``q`` with the rates ``v``.
+
+    Of each link: rotation and offset [m] of its joint in the frame of its parent, its inertia about the centre of mass
+    [kg m²], and where that is [m]; ``others`` are arguments of the object that are plain lists.
+    """
+    size = len(turns)
+    node = system.AddNode(
+        items.NodeGenericODE2(
+            referenceCoordinates=np.zeros(size),
+            initialCoordinates=q,
+            initialCoordinates_t=v,
+            numberOfODE2Coordinates=size,
+        )
+    )
+    return system.AddObject(
+        items.ObjectKinematicTree(
+            nodeNumber=node,
+            jointTransformations=exu.Matrix3DList(list(turns)),
+            jointOffsets=exu.Vector3DList(list(offsets)),
+            linkInertiasCOM=exu.Matrix3DList(list(inertias)),
+            linkCOMs=exu.Vector3DList(list(coms)),
+            **others,
+        )
+    )
 
 
 def loads(system: Any) -> list[str]:

@@ -5,7 +5,7 @@ Bodies are referenced at their centres of mass.
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Mapping
 from typing import Any
 
 import numpy as np
@@ -17,7 +17,7 @@ from proofroll.elements.mechanism.capabilities import ALL_JOINTS, ALL_LOOPS, FOR
 from proofroll.elements.mechanism.loop_points import is_planar
 from proofroll.elements.mechanism.rotations import Array, quaternion_rate, to_quaternion
 from proofroll.elements.mechanism.sampling import WITH_AXIS, MechanismBuilt, independent, mechanism_of, unsaid
-from proofroll.engines.exudyn.connections import Connections
+from proofroll.engines.exudyn.connections import Connections, add_springs
 from proofroll.engines.exudyn.integration import Integration, initial_matrices, new_system
 from proofroll.engines.exudyn.native import Output, add_rigid_body, exu, items, rigid_body
 from proofroll.engines.exudyn.settings import ExudynSettings
@@ -42,46 +42,26 @@ class Redundant:
         require(mechanism, PROVIDES, LACKING)
         _check(mechanism)
         self._mechanism = mechanism
-        self._container, self._system = new_system()
-        self._bodies: dict[str, Any] = {WORLD: self._system.CreateGround()}
+        self.container, self.system = new_system()
+        self.bodies: dict[str, Any] = {WORLD: self.system.CreateGround()}
         self._com = {WORLD: np.zeros(3)} | {body.name: np.array(body.com) for body in mechanism.bodies}
         self._add_bodies()
-        self._connections = Connections(self._system, self._bodies, self._com)
+        self._connections = Connections(self.system, self.bodies, self._com)
         flat = is_planar(mechanism)
         self._joints = [self._connections.joint(joint) for joint in mechanism.joints]
         self._joints += [self._connections.loop(loop, flat=flat) for loop in mechanism.loops]
-        for spring in mechanism.springs:
-            ends = ((spring.body_a, spring.position_a), (spring.body_b, spring.position_b))
-            markers = [self._connections.marker(*end, np.eye(3)) for end in ends]
-            self._system.AddObject(
-                items.ObjectConnectorSpringDamper(
-                    markerNumbers=markers,
-                    stiffness=spring.stiffness,
-                    damping=spring.damping,
-                    referenceLength=spring.length,
-                )
-            )
-        self._system.Assemble()
+        add_springs(self.system, mechanism, self.marker)
+        self.system.Assemble()
         self._rows = self._constraint_rows(settings)
         self._rank = independent(self._rows)
-        self.integration = Integration(self._system, settings, dependent=self._rank < len(self._rows))
-
-    @property
-    def native(self) -> tuple[Any, Mapping[str, Any]]:
-        """Exudyn's own system, and its numbers of the bodies."""
-        return self._system, self._bodies
-
-    @property
-    def system(self) -> Any:
-        """Exudyn's own system."""
-        return self._system
+        self.integration = Integration(self.system, settings, dependent=self._rank < len(self._rows))
 
     def marker(self, body: str, position: Any) -> Any:
         """A marker at a place in a body's frame."""
         return self._connections.marker(body, position, np.eye(3))
 
     def _add_bodies(self) -> None:
-        system, motion = self._system, Tree(self._mechanism).at(*self._mechanism.start())
+        system, motion = self.system, Tree(self._mechanism).at(*self._mechanism.start())
         for number, body in enumerate(self._mechanism.bodies):
             R, w = motion.R_WB[number], motion.w_WB[number]
             arm, q = R @ self._com[body.name], to_quaternion(R)
@@ -93,13 +73,13 @@ class Redundant:
             )
             (xx, xy, xz), (_, yy, yz), (_, _, zz) = body.inertia
             made = add_rigid_body(system, body.mass, [xx, yy, zz, yz, xz, xy], node)
-            self._bodies[body.name] = made
+            self.bodies[body.name] = made
             marker = system.AddMarker(items.MarkerBodyMass(bodyNumber=made))
             system.AddLoad(items.LoadMassProportional(markerNumber=marker, loadVector=self._mechanism.gravity))
 
     def _constraint_rows(self, settings: ExudynSettings) -> Array:
         """Rows of all constraints on Exudyn's velocities; free axes have none."""
-        mass, jacobian, _ = initial_matrices(self._system, settings, dependent=True)
+        mass, jacobian, _ = initial_matrices(self.system, settings, dependent=True)
         rows = jacobian[len(mass) :, : len(mass)]
         return np.asarray(rows[np.abs(rows).max(axis=1, initial=0.0) > 0])
 
@@ -123,14 +103,10 @@ class Redundant:
             joint_torque=torque,
         )
 
-    def events(self) -> Sequence[Any]:
-        """None: nothing here switches."""
-        return ()
-
     def built(self) -> MechanismBuilt:
         """See :class:`proofroll.core.engine.Engine`."""
-        system, bodies = self._system, self._mechanism.bodies
-        data = [rigid_body(system, self._bodies[body.name]) for body in bodies]
+        system, bodies = self.system, self._mechanism.bodies
+        data = [rigid_body(system, self.bodies[body.name]) for body in bodies]
         joints = self._joints[: len(self._mechanism.joints)]
         axes = np.full((len(joints), 3), np.nan)
         for number, (joint, made) in enumerate(zip(self._mechanism.joints, joints, strict=True)):

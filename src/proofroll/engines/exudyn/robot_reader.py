@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import importlib
 import importlib.metadata
 from collections.abc import Mapping
 from typing import Any, ClassVar
@@ -11,10 +10,12 @@ import numpy as np
 from scipy.spatial.transform import Rotation
 
 from proofroll.core.errors import Refused
+from proofroll.engines.exudyn.native import Output, add_kinematic_tree, exu, items, new_settings
 from proofroll.robots.model import WORLD, Array, RobotJoint
 from proofroll.robots.protocol import AtState, Reading, Request, evaluate
 
-_FREE = (("prismatic", 0), ("prismatic", 1), ("prismatic", 2), ("revolute", 0), ("revolute", 1), ("revolute", 2))
+# Types of links, and their axes.
+_FREE = tuple((kind, axis) for kind in ("prismatic", "revolute") for axis in "XYZ")
 
 
 class ExudynRobots:
@@ -73,8 +74,6 @@ class _Tree:
     """The tree in a system of its own, and where its coordinates are."""
 
     def __init__(self, request: Request) -> None:
-        exu: Any = importlib.import_module("exudyn")  # its stubs have other signatures than its classes
-        ii: Any = importlib.import_module("exudyn.itemInterface")
         self.request, self.robot = request, request.robot
         if any(joint.kind == "spherical" for joint in self.robot.moving):
             raise Refused("the tree of Exudyn has no spherical joint")
@@ -82,34 +81,20 @@ class _Tree:
         self.damping = np.concatenate([np.full(joint.dofs, joint.damping) for joint in self.robot.moving])
         self.link: dict[str, int] = {}
         rows = [row for joint in self.robot.moving for row in self._rows(joint)]
-        types = {("revolute", 0): exu.JointType.RevoluteX, ("revolute", 1): exu.JointType.RevoluteY}
-        types |= {("revolute", 2): exu.JointType.RevoluteZ, ("prismatic", 0): exu.JointType.PrismaticX}
-        types |= {("prismatic", 1): exu.JointType.PrismaticY, ("prismatic", 2): exu.JointType.PrismaticZ}
         kinds, parents, turns, offsets, masses, coms, inertias = zip(*rows, strict=True)
         self.container = exu.SystemContainer()
         self.mbs = self.container.AddSystem()
         zeros = [0.0] * len(rows)
-        node = self.mbs.AddNode(
-            ii.NodeGenericODE2(
-                referenceCoordinates=zeros, initialCoordinates=zeros, initialCoordinates_t=zeros,
-                numberOfODE2Coordinates=len(rows),
-            )
-        )  # fmt: skip
-        self.tree = self.mbs.AddObject(
-            ii.ObjectKinematicTree(
-                nodeNumber=node, jointTypes=[types[kind] for kind in kinds], linkParents=list(parents),
-                jointTransformations=exu.Matrix3DList([np.array(turn) for turn in turns]),
-                jointOffsets=exu.Vector3DList([np.array(offset) for offset in offsets]),
-                linkInertiasCOM=exu.Matrix3DList([np.array(inertia) for inertia in inertias]),
-                linkCOMs=exu.Vector3DList([np.array(com) for com in coms]), linkMasses=list(masses),
-                gravity=list(self.robot.gravity), jointForceVector=zeros, jointPControlVector=zeros,
-                jointDControlVector=list(self.damping), jointPositionOffsetVector=zeros,
-                jointVelocityOffsetVector=zeros,
-            )
+        self.tree = add_kinematic_tree(
+            self.mbs, zeros, zeros, turns=turns, offsets=offsets, inertias=inertias, coms=coms,
+            jointTypes=[getattr(exu.JointType, f"{kind.capitalize()}{axis}") for kind, axis in kinds],
+            linkParents=list(parents), linkMasses=list(masses), gravity=list(self.robot.gravity),
+            jointForceVector=zeros, jointPControlVector=zeros, jointDControlVector=list(self.damping),
+            jointPositionOffsetVector=zeros, jointVelocityOffsetVector=zeros,
         )  # fmt: skip
         self.markers = {
             joint.name: self.mbs.AddMarker(
-                ii.MarkerKinematicTreeRigid(
+                items.MarkerKinematicTreeRigid(
                     objectNumber=self.tree, linkNumber=self.link[joint.name],
                     localPosition=list(-self.turn[joint.name].T @ joint.child_position),
                 )
@@ -118,9 +103,8 @@ class _Tree:
         }  # fmt: skip
         self.mbs.Assemble()
         self.solver = exu.MainSolverImplicitSecondOrder()
-        settings = exu.SimulationSettings()
+        settings = new_settings(dependent=False)
         settings.timeIntegration.verboseMode = 0
-        settings.solution.file.write = False
         self.solver.InitializeSolver(self.mbs, settings)
 
     def _rows(self, joint: RobotJoint) -> list[tuple[Any, ...]]:
@@ -139,7 +123,7 @@ class _Tree:
         self.link[joint.name] = start + joint.dofs - 1
         if joint.kind != "free":
             # the tree's rotation takes coordinates of the parent to those of the joint
-            return [((joint.kind, 2), parent, rotation, position, *carried)]
+            return [((joint.kind, "Z"), parent, rotation, position, *carried)]
         empty = (0.0, np.zeros(3), np.zeros((3, 3)))
         return [
             (kind, start + index - 1 if index else -1, np.eye(3), np.zeros(3), *(carried if index == 5 else empty))
@@ -189,12 +173,10 @@ class _Tree:
 
     def frames(self) -> dict[str, tuple[Array, Array]]:
         """Position and rotation of the body that each joint carries."""
-        import exudyn as exu
-
-        kind, found = exu.OutputVariableType, {}
+        found = {}
         for name, marker in self.markers.items():
-            p = self.mbs.GetMarkerOutput(marker, kind.Position)
-            R = np.array(self.mbs.GetMarkerOutput(marker, kind.RotationMatrix)).reshape(3, 3)
+            p = self.mbs.GetMarkerOutput(marker, Output.Position)
+            R = np.array(self.mbs.GetMarkerOutput(marker, Output.RotationMatrix)).reshape(3, 3)
             found[name] = (np.array(p), R @ self.turn[name].T)
         return found
 

@@ -12,10 +12,8 @@ import numpy as np
 
 from proofroll.core.arrays import FloatArray
 from proofroll.core.engine import Built, Sample
-from proofroll.core.events import Event
 from proofroll.elements.ball_on_surface.model import RollingBall
 from proofroll.engines.exudyn.ball import add_ball
-from proofroll.engines.exudyn.friction import refuse_slip
 from proofroll.engines.exudyn.integration import Integration, consistent_start, new_system
 from proofroll.engines.exudyn.native import Output, items
 from proofroll.engines.exudyn.settings import ExudynSettings
@@ -25,8 +23,6 @@ class RollingDisc:
     """A rigid ball and one re-aimed ``ObjectJointRollingDisc``; needs no generators of the surface."""
 
     def __init__(self, body: RollingBall, settings: ExudynSettings) -> None:
-        """Builds and initialises; raises Refused if friction is bounded."""
-        refuse_slip(body)
         self.container, self.system = new_system()
         ground = self.system.AddObject(items.ObjectGround())
         self.ball = add_ball(self.system, body)
@@ -71,10 +67,6 @@ class RollingDisc:
     def sample(self) -> Sample:
         """See :class:`proofroll.core.engine.Engine`."""
         return self.ball.sample(self._directions() @ self.system.GetObjectOutput(self.joint, Output.ForceLocal))
-
-    def events(self) -> list[Event]:
-        """None: the ball never slips."""
-        return []
 
     def built(self) -> Built:
         """See :class:`proofroll.core.engine.Engine`. The joint holds velocities only and knows no distance."""

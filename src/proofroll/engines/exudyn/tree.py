@@ -17,8 +17,9 @@ from proofroll.elements.mechanism import WORLD
 from proofroll.elements.mechanism.capabilities import ALL_JOINTS, ALL_LOOPS, FORCES, MechanismCapability, require
 from proofroll.elements.mechanism.rotations import Array, to_quaternion
 from proofroll.elements.mechanism.sampling import MechanismBuilt, mechanism_of
+from proofroll.engines.exudyn.connections import add_springs
 from proofroll.engines.exudyn.integration import Integration, new_system
-from proofroll.engines.exudyn.native import Output, exu, items
+from proofroll.engines.exudyn.native import Output, add_kinematic_tree, exu, items
 from proofroll.engines.exudyn.settings import ExudynSettings
 
 _KNOWN = {MechanismCapability.REVOLUTE, MechanismCapability.PRISMATIC}
@@ -40,44 +41,25 @@ class KinematicTree:
         mechanism = mechanism_of(scene)
         require(mechanism, PROVIDES, LACKING)
         self._mechanism = mechanism
-        self._container, self._system = new_system()
+        self.container, self.system = new_system()
         self._link = {joint.child: number for number, joint in enumerate(mechanism.joints)}
         self._frames = {WORLD: (np.eye(3), np.zeros(3))} | {  # each body's frame in that of its link
             joint.child: (joint.child_frame.T, -joint.child_frame.T @ joint.child_position)
             for joint in mechanism.joints
         }
-        self._tree = self._system.AddObject(self._kinematic_tree())
-        self._ground = self._system.CreateGround()
-        for spring in mechanism.springs:
-            ends = ((spring.body_a, spring.position_a), (spring.body_b, spring.position_b))
-            markers = [self.marker(body, np.array(position)) for body, position in ends]
-            self._system.AddObject(
-                items.ObjectConnectorSpringDamper(
-                    markerNumbers=markers,
-                    stiffness=spring.stiffness,
-                    damping=spring.damping,
-                    referenceLength=spring.length,
-                )
-            )
+        self._tree = self._add_tree()
+        self._ground = self.system.CreateGround()
+        add_springs(self.system, mechanism, self.marker)
         origins = [(self._link[body.name], self._in_link(body.name, np.zeros(3))) for body in mechanism.bodies]
         self._sensors = {name: self._add_sensors(name, origins) for name in _READ}
         on_joints = [(number, [0.0, 0.0, 0.0]) for number in range(len(mechanism.joints))]
         self._on_joints = {name: self._add_sensors(name, on_joints) for name in ("Position", "RotationMatrix")}
-        self._system.Assemble()
-        self.integration = Integration(self._system, settings)
+        self.system.Assemble()
+        self.integration = Integration(self.system, settings)
 
-    def _kinematic_tree(self) -> Any:
+    def _add_tree(self) -> Any:
         mechanism, joints = self._mechanism, self._mechanism.joints
         data = {body.name: body for body in mechanism.bodies}
-        q, v = mechanism.start()
-        node = self._system.AddNode(
-            items.NodeGenericODE2(
-                referenceCoordinates=np.zeros(len(joints)),
-                initialCoordinates=q,
-                initialCoordinates_t=v,
-                numberOfODE2Coordinates=len(joints),
-            )
-        )
         turns, offsets, coms, inertias = [], [], [], []
         for joint in joints:
             R, p = self._frames[joint.parent]
@@ -86,14 +68,15 @@ class KinematicTree:
             R, p = self._frames[joint.child]
             coms.append(p + R @ data[joint.child].com)
             inertias.append(R @ np.array(data[joint.child].inertia) @ R.T)
-        return items.ObjectKinematicTree(
-            nodeNumber=node,
+        return add_kinematic_tree(
+            self.system,
+            *mechanism.start(),
+            turns=turns,
+            offsets=offsets,
+            inertias=inertias,
+            coms=coms,
             jointTypes=[_TYPES[joint.kind] for joint in joints],
             linkParents=[self._link.get(joint.parent, -1) for joint in joints],
-            jointTransformations=exu.Matrix3DList(turns),
-            jointOffsets=exu.Vector3DList(offsets),
-            linkInertiasCOM=exu.Matrix3DList(inertias),
-            linkCOMs=exu.Vector3DList(coms),
             linkMasses=[data[joint.child].mass for joint in joints],
             gravity=list(mechanism.gravity),
             jointForceVector=[joint.torque for joint in joints],
@@ -108,16 +91,11 @@ class KinematicTree:
         R, p = self._frames[body]
         return [float(x) for x in p + R @ position]
 
-    @property
-    def system(self) -> Any:
-        """Exudyn's own system."""
-        return self._system
-
     def marker(self, body: str, position: Any) -> Any:
         """A marker at a place in a body's frame."""
         if body == WORLD:
-            return self._system.AddMarker(items.MarkerBodyRigid(bodyNumber=self._ground, localPosition=list(position)))
-        return self._system.AddMarker(
+            return self.system.AddMarker(items.MarkerBodyRigid(bodyNumber=self._ground, localPosition=list(position)))
+        return self.system.AddMarker(
             items.MarkerKinematicTreeRigid(
                 objectNumber=self._tree, linkNumber=self._link[body], localPosition=self._in_link(body, position)
             )
@@ -126,7 +104,7 @@ class KinematicTree:
     def _add_sensors(self, name: str, places: Sequence[tuple[int, list[float]]]) -> list[Any]:
         """Sensors of a quantity at places of links, which are read when it is asked for."""
         return [
-            self._system.AddSensor(
+            self.system.AddSensor(
                 items.SensorKinematicTree(
                     objectNumber=self._tree,
                     linkNumber=link,
@@ -139,7 +117,7 @@ class KinematicTree:
         ]
 
     def _read(self, sensors: Sequence[Any]) -> Array:
-        return np.array([self._system.GetSensorValues(sensor) for sensor in sensors])
+        return np.array([self.system.GetSensorValues(sensor) for sensor in sensors])
 
     def sample(self) -> Sample:
         """See :class:`proofroll.core.engine.Engine`; the tree knows no reactions."""
@@ -154,13 +132,9 @@ class KinematicTree:
             q_WB=np.array([to_quaternion(R) for R in bodies]),
         )
 
-    def events(self) -> Sequence[Any]:
-        """None: nothing here switches."""
-        return ()
-
     def built(self) -> MechanismBuilt:
         """See :class:`proofroll.core.engine.Engine`; accelerations from Exudyn's own mass matrix and forces."""
-        tree = self._system.GetObject(self._tree)
+        tree = self.system.GetObject(self._tree)
         order = [self._link[body.name] for body in self._mechanism.bodies]
         frames = [self._frames[body.name] for body in self._mechanism.bodies]
         # Exudyn's lists do not end as Python's do: they are read by index
@@ -183,9 +157,9 @@ class KinematicTree:
 
     def _accelerations(self) -> tuple[Array, Array]:
         """Of the origins of the bodies' frames, and angular; the state stays as it is."""
-        solver, state = self.integration.solver, self._system.systemData
-        solver.ComputeMassMatrix(self._system, 1.0)
-        solver.ComputeODE2RHS(self._system)
+        solver, state = self.integration.solver, self.system.systemData
+        solver.ComputeMassMatrix(self.system, 1.0)
+        solver.ComputeODE2RHS(self.system)
         kept = state.GetODE2Coordinates_tt()
         found = np.linalg.solve(solver.GetSystemMassMatrix(), solver.GetSystemResidual())
         state.SetODE2Coordinates_tt(found, exu.ConfigurationType.Current)

@@ -17,12 +17,10 @@ import numpy as np
 from proofroll.core.arrays import FloatArray, cross
 from proofroll.core.engine import Built, Sample
 from proofroll.core.errors import Refused
-from proofroll.core.events import Event
-from proofroll.elements.ball_on_surface.mechanics import resistance_moment
 from proofroll.elements.ball_on_surface.model import BallCapability, RollingBall
+from proofroll.engines.exudyn.ball import resisting
 from proofroll.engines.exudyn.integration import Integration, consistent_start, initial_matrices, new_system
 from proofroll.engines.exudyn.native import Output, items
-from proofroll.engines.exudyn.resistance import slow
 from proofroll.engines.exudyn.settings import ExudynSettings
 
 
@@ -36,7 +34,6 @@ class WorldCoordinates:
                 "generic lets a ball slip only on a wall at rest that slides along itself, in whose coordinates its "
                 "friction is built; use contact"
             )
-        self._body = body
         self.container, self.system = new_system()
         add = self.system
         m, J = body.ball.mass, body.ball.inertia
@@ -50,7 +47,10 @@ class WorldCoordinates:
         )
         marker = add.AddMarker(items.MarkerBodyMass(bodyNumber=self._objects[0]))
         self._weight = add.AddLoad(items.LoadMassProportional(markerNumber=marker, loadVector=body.gravity.tolist()))
-        self._resistance = self._resist() if body.contact.rolling_resistance else None
+        self._resistance = None
+        if body.contact.rolling_resistance:  # a force on what has the angular velocity for its velocity
+            turned = add.AddMarker(items.MarkerNodePosition(nodeNumber=spin))
+            self._resistance = add.AddLoad(items.LoadForceVector(**resisting(body, turned, centre)))
         self._rolling = add.AddObject(
             items.CoordinateVectorConstraint(
                 markerNumbers=[add.AddMarker(items.MarkerNodeCoordinates(nodeNumber=node)) for node in self._nodes],
@@ -72,31 +72,6 @@ class WorldCoordinates:
         self._radius = float(np.linalg.norm(jacobian[6:, 3:6])) / math.sqrt(2)
         self.integration = Integration(self.system, settings, start)
 
-    def _resist(self) -> Any:
-        """The moment of the rolling resistance, a force on what has the angular velocity for its velocity.
-
-        N follows from the state: along e1 the centre accelerates by -v·(∂e1/∂p)v.
-        """
-        body, (centre, spin) = self._body, self._nodes
-        surface, m, least = body.surface, body.ball.mass, slow(body)
-        output, position, velocity = self.system.GetNodeOutput, Output.Position, Output.Velocity
-
-        def moment(system: Any, t: float, load: list[float]) -> FloatArray:  # noqa: ARG001 -- Exudyn's signature
-            p, v = output(centre, position), output(centre, velocity)
-            e1 = surface.normal(p)
-            N = m * (e1 @ body.gravity + v @ surface.normal_gradient(p) @ v)
-            speed = float(np.linalg.norm(v))
-            return resistance_moment(load[0], N, e1, v) * min(1.0, speed / least if least else 1.0)
-
-        return self.system.AddLoad(
-            items.LoadForceVector(
-                markerNumber=self.system.AddMarker(items.MarkerNodePosition(nodeNumber=spin)),
-                # Not used as a force: it hands f to the function, and can be read back.
-                loadVector=[body.contact.rolling_resistance, 0.0, 0.0],
-                loadVectorUserFunction=moment,
-            )
-        )
-
     def sample(self) -> Sample:
         """See :class:`proofroll.core.engine.Engine`. The velocity ω is the rate of no orientation."""
         output, (centre, spin) = self.system.GetNodeOutput, self._nodes
@@ -106,10 +81,6 @@ class WorldCoordinates:
             w_WB=output(spin, Output.Velocity),
             force=-np.array(self.system.systemData.GetAECoordinates()),
         )
-
-    def events(self) -> list[Event]:
-        """None: the ball never slips."""
-        return []
 
     def built(self) -> Built:
         """See :class:`proofroll.core.engine.Engine`. The constraint holds velocities only and knows no distance."""

@@ -101,7 +101,7 @@ def _start(model: Any) -> tuple[list[float], list[float]]:
 def _numbers(model: Any, body: RollingBall) -> list[str]:
     """Assignments that only one formulation needs."""
     if isinstance(model, (Carrier, Generic)):
-        return model.numbers(body)
+        return model.numbers()
     if isinstance(model, PenaltyContact):
         contact = model.system.GetObject(model.contact)
         state = model.system.GetNode(model.data)["initialCoordinates"]
