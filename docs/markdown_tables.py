@@ -2,8 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
-from typing import Any
+from collections.abc import Sequence
 
 from proofroll.core.comparison import Tolerance
 from proofroll.core.engine_abilities import Level
@@ -13,6 +12,7 @@ from proofroll.report.tables import remarks
 from proofroll.report.terminal import columns, step
 from proofroll.report.tradeoff_tables import name_of, step_of
 from proofroll.studies.recommend import recommend
+from proofroll.studies.tradeoff_records import MeasuredPoint, TradeoffStudy
 from proofroll.studies.wish import Wish
 
 
@@ -49,10 +49,10 @@ _AMONG: tuple[tuple[str, tuple[str, ...]], ...] = (
 )
 
 
-def cheapest_table(study: Mapping[str, Any], tolerances: Sequence[float]) -> str:
+def cheapest_table(study: TradeoffStudy, tolerances: Sequence[float]) -> str:
     """One line per tolerance of the study's quantity: the cheapest that holds it, with step and cost."""
-    name = study["quantity"]
-    unit = study["quantities"][name]["unit"]
+    name = study.quantity
+    unit = study.quantities[name].unit
     lines = [f"| {name} to | " + " | ".join(words for words, _ in _AMONG) + " |", "|---" * (1 + len(_AMONG)) + "|"]
     for tolerance in tolerances:
         cells = [f"{number(tolerance)} {unit}"]
@@ -63,5 +63,5 @@ def cheapest_table(study: Mapping[str, Any], tolerances: Sequence[float]) -> str
     return "\n".join(lines) + "\n"
 
 
-def _cell(choice: Mapping[str, Any]) -> str:
-    return f"{name_of(choice)}, {step_of(choice)}: {number(choice['seconds_per_second'])} s/s"
+def _cell(choice: MeasuredPoint) -> str:
+    return f"{name_of(choice)}, {step_of(choice)}: {number(choice.seconds_per_second)} s/s"

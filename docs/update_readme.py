@@ -6,7 +6,6 @@ import os
 import sys
 import tempfile
 from pathlib import Path
-from typing import Any
 
 import matplotlib as mpl
 import matplotlib.pyplot as plt
@@ -29,7 +28,8 @@ from proofroll.studies.compare import compare
 from proofroll.studies.outcome import Outcome
 from proofroll.studies.planning import point_name
 from proofroll.studies.tradeoff import tradeoff
-from proofroll.studies.tradeoff_content import tradeoff_document
+from proofroll.studies.tradeoff_content import tradeoff_study
+from proofroll.studies.tradeoff_records import TradeoffStudy
 
 ROOT = Path(__file__).resolve().parents[1]
 TOLERANCES = (1e-2, 1e-3, 1e-4, 1e-6)
@@ -77,11 +77,11 @@ def draw(outcome: Outcome, store: Store, path: Path) -> None:
     figure.savefig(path, metadata={"Date": None})
 
 
-def measured(runner: Runner) -> dict[str, Any]:
+def measured(runner: Runner) -> TradeoffStudy:
     """The trade-off that the comparison file asks for."""
     claims = claims_for("sphere_in_cylinder")
     assert claims is not None  # the file is part of this repository
-    study = tradeoff_document(tradeoff(claims.swept, runner, over=claims.over))
+    study = tradeoff_study(tradeoff(claims.swept, runner, over=claims.over))
     for sentence in (*claims.contradictions(study), *claims.undecided(study)):
         sys.stderr.write(f"{sentence}\n")
     return study
@@ -103,7 +103,7 @@ def main() -> None:
         write_report([outcome], runner.store, Path(folder), "proofroll report paper")
         screenshot(Path(folder) / "report.html", ROOT / "docs" / "report.png")
         study = measured(runner)
-    draw_work_precision(study, [study["quantity"]], ROOT / "docs" / "work_precision.svg")
+    draw_work_precision(study, [study.quantity], ROOT / "docs" / "work_precision.svg")
     draw_regimes(regime_maps(load_regimes("regimes"), workers=os.cpu_count() or 1), ROOT / "docs" / "regimes.svg")
     target = ROOT / "docs" / "sphere_in_cylinder.md"
     text = target.read_text(encoding="utf-8")

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 from collections.abc import Callable
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -19,40 +20,39 @@ from proofroll.studies import study_identity
 from proofroll.studies.curve import Question
 from proofroll.studies.study_store import keep
 from proofroll.studies.tradeoff import stored
+from proofroll.studies.tradeoff_records import MeasuredPoint, TradeoffStudy
 
 Proofroll = Callable[..., tuple[int, str, str]]
 ENGINE = "exudyn[formulation=generic,preset=matched]"
 
 
 @pytest.fixture(scope="session")
-def measured(tmp_path_factory: pytest.TempPathFactory) -> dict[str, Any]:
+def measured(tmp_path_factory: pytest.TempPathFactory) -> TradeoffStudy:
     """A real trade-off of two curves over half a second, and of a range of two speeds."""
     from proofroll.running.runner import Runner
     from proofroll.running.store import Store
     from proofroll.studies.tradeoff import tradeoff
-    from proofroll.studies.tradeoff_content import tradeoff_document
+    from proofroll.studies.tradeoff_content import tradeoff_study
 
     question = Question("sphere_in_cylinder", {"rolling_resistance": 5e-4}, 0.5, "z")
     engines = [ENGINE, "mujoco[formulation=free,preset=default]"]
     found = tradeoff(
         question, Runner(Store(tmp_path_factory.mktemp("cases"))), engines=engines, over={"speed": [3, 5]}, rounds=2
     )
-    return tradeoff_document(found)
+    return tradeoff_study(found)
 
 
 @pytest.fixture
-def folder(measured: dict[str, Any], tmp_path: Path) -> Path:
+def folder(measured: TradeoffStudy, tmp_path: Path) -> Path:
     """A folder with that study in it, as if it had just been made with this code on a machine without noise."""
     path = stored(tmp_path, Question("sphere_in_cylinder", {"rolling_resistance": 5e-4}, 0.5, "z"))
     path.parent.mkdir()
-    now = measured["measured"] | {"versions": study_identity.versions(), "code": study_identity.code()}
     points = []
-    for point in measured["points"]:
-        if point["seconds_per_second"] is not None:
-            cost = 1e-5 / point["step"]
-            point = point | {"seconds_per_second": cost, "interval": [0.99 * cost, 1.01 * cost]}  # noqa: PLW2901 -- a copy
-        points.append(point)
-    keep(measured | {"measured": now, "points": points}, path)
+    for point in measured.points:
+        cost = 1e-5 / (point.step or 1.0)
+        steady = replace(point, seconds_per_second=cost, interval=(0.99 * cost, 1.01 * cost))
+        points.append(point if point.seconds_per_second is None else steady)
+    keep(replace(measured, measured=study_identity.measured(), points=points), path)
     return tmp_path
 
 
@@ -62,64 +62,64 @@ def asked(folder: Path, *more: str, tolerance: str = "1e-3") -> list[str]:
     return ["recommend", "sphere_in_cylinder", "--quantity", "z", "--tolerance", tolerance, *given, *more]
 
 
-def test_curves_reach_from_broken_to_fine(measured: dict[str, Any]) -> None:
+def test_curves_reach_from_broken_to_fine(measured: TradeoffStudy) -> None:
     """Each curve has six points or more, coarse first; the good one begins broken and ends a thousandfold better."""
-    curves: dict[str, list[dict[str, Any]]] = {}
-    for point in measured["points"]:
-        curves.setdefault(point["engine"], []).append(point)
+    curves: dict[str, list[MeasuredPoint]] = {}
+    for point in measured.points:
+        curves.setdefault(point.engine, []).append(point)
     assert {name: len(points) >= 6 for name, points in curves.items()} == {"exudyn": True, "mujoco": True}
-    steps = [point["step"] for point in curves["exudyn"]]
+    steps = [point.step for point in curves["exudyn"]]
     assert steps == sorted(steps, reverse=True)
-    errors = [point["error"]["z"] for point in curves["exudyn"] if point["status"] == "done"]
+    errors = [point.error["z"] for point in curves["exudyn"] if point.status == "done"]
     assert errors[-1] < 1e-3 * errors[0]
-    assert min(point["error"]["z"] for point in curves["mujoco"] if point["status"] == "done") > 0.01
+    assert min(point.error["z"] for point in curves["mujoco"] if point.status == "done") > 0.01
 
 
-def test_every_point_has_a_cost_with_its_interval(measured: dict[str, Any]) -> None:
+def test_every_point_has_a_cost_with_its_interval(measured: TradeoffStudy) -> None:
     """A run that reached the end has a positive cost within its interval, from so many rounds."""
-    done = [point for point in measured["points"] if point["status"] == "done"]
+    done = [point for point in measured.points if point.status == "done"]
     for point in done:
-        assert 0 < point["interval"][0] <= point["seconds_per_second"] <= point["interval"][1]
-        assert len(point["rounds"]) == point["measurements"] == 2
+        assert 0 < point.interval[0] <= point.seconds_per_second <= point.interval[1]
+        assert len(point.rounds) == point.measurements == 2
 
 
-def test_the_truth_has_a_cost_with_its_interval(measured: dict[str, Any]) -> None:
+def test_the_truth_has_a_cost_with_its_interval(measured: TradeoffStudy) -> None:
     """It was measured in turns with the points, and not once."""
-    truth = measured["truth"]
-    assert 0 < truth["interval"][0] <= truth["seconds_per_second"] <= truth["interval"][1]
-    assert truth["interval"][0] < truth["interval"][1]
+    truth = measured.truth
+    assert 0 < truth.interval[0] <= truth.seconds_per_second <= truth.interval[1]
+    assert truth.interval[0] < truth.interval[1]
 
 
-def test_budget_of_a_good_and_of_a_soft_model(measured: dict[str, Any]) -> None:
+def test_budget_of_a_good_and_of_a_soft_model(measured: TradeoffStudy) -> None:
     """The trapezoidal rule shows its order 2 and no error of the model; MuJoCo's default contact shows one of cm."""
-    budgets = {item["engine"]: item for item in measured["budgets"] if item["quantity"] == "z"}
+    budgets = {item.engine: item for item in measured.budgets if item.quantity == "z"}
     good, soft = budgets["exudyn"], budgets["mujoco"]
-    assert good["order_low"] - 0.1 < 2 < good["order_high"] + 0.1
-    assert good["order_from"] > good["order_to"] > 0
-    assert good["model_form"] < 1e-8
-    assert soft["model_form"] > 0.01
-    assert soft["fine"] == "model form"
+    assert good.order_low - 0.1 < 2 < good.order_high + 0.1
+    assert good.order_from > good.order_to > 0
+    assert good.model_form < 1e-8
+    assert soft.model_form > 0.01
+    assert soft.fine == "model form"
 
 
-def test_every_run_is_counted(measured: dict[str, Any]) -> None:
+def test_every_run_is_counted(measured: TradeoffStudy) -> None:
     """Runs that were refused, that ended early and that are silently wrong are told apart."""
-    status = [point["status"] for point in measured["points"]]
-    scale = measured["quantities"]["z"]["scale"]
-    wrong = sum(p["status"] == "done" and p["error"]["z"] > 0.1 * scale for p in measured["points"])
+    status = [point.status for point in measured.points]
+    scale = measured.quantities["z"].scale
+    wrong = sum(p.status == "done" and p.error["z"] > 0.1 * scale for p in measured.points)
     refused = status.count("refused")
     ended = len(status) - refused - status.count("done")
-    said = measured["findings"][-1]
+    said = measured.findings[-1]
     assert said.startswith(f"{len(status)} runs: {refused} refused, {ended} that did not reach the end")
     assert f"; {wrong} that reached it silently" in said
 
 
-def test_the_front_is_within_the_points(measured: dict[str, Any]) -> None:
+def test_the_front_is_within_the_points(measured: TradeoffStudy) -> None:
     """Every point of the Pareto front is one of the points, and was run over the range."""
-    by_id = {point["id"]: point for point in measured["points"]}
-    assert measured["pareto"]["z"]
-    for number in measured["pareto"]["z"]:
-        corners = by_id[number]["corners"]
-        assert [corner["parameters"] for corner in corners] == [{"speed": 3.0}, {"speed": 5.0}]
+    by_id = {point.id: point for point in measured.points}
+    assert measured.pareto["z"]
+    for number in measured.pareto["z"]:
+        corners = by_id[number].corners or []
+        assert [corner.parameters for corner in corners] == [{"speed": 3.0}, {"speed": 5.0}]
 
 
 def test_recommend_from_stored_curves(proofroll: Proofroll, folder: Path) -> None:
@@ -194,15 +194,12 @@ def test_a_tolerance_as_engineers_write_it(proofroll: Proofroll, folder: Path, t
 
 
 def test_curves_of_another_version_are_not_answered_from(
-    proofroll: Proofroll, folder: Path, measured: dict[str, Any]
+    proofroll: Proofroll, folder: Path, measured: TradeoffStudy
 ) -> None:
     """Curves measured with another version of an engine, or on another machine, are named stale, and why."""
     (path,) = (folder / "tradeoff").iterdir()
-    old = measured["measured"] | {
-        "versions": study_identity.versions() | {"mujoco": "1.0"},
-        "code": study_identity.code(),
-    }
-    keep(measured | {"measured": old}, path)
+    old = replace(study_identity.measured(), versions=study_identity.versions() | {"mujoco": "1.0"})
+    keep(replace(measured, measured=old), path)
     code, _, err = proofroll(*asked(folder))
     assert code == 2
     assert "mujoco 1.0 then" in err
@@ -247,19 +244,20 @@ def test_an_answer_over_a_range(proofroll: Proofroll, folder: Path, monkeypatch:
     assert given == [{"speed": [3.0, 4.5]}]
 
 
-def test_what_was_found_over_a_range(measured: dict[str, Any], capsys: pytest.CaptureFixture[str]) -> None:
+def test_what_was_found_over_a_range(measured: TradeoffStudy, capsys: pytest.CaptureFixture[str]) -> None:
     """Each point that was run there has its worst corner, within 100 columns, and one without a result says why."""
-    points = [point for point in measured["points"] if point["corners"]]
-    last = {**points[-1], "corners": [{**points[-1]["corners"][0], "errors": {}, "message": "it fell"}]}
-    study = measured | {"points": [*points[:-1], last]}
+    points = [point for point in measured.points if point.corners]
+    corners = points[-1].corners or []
+    last = replace(points[-1], corners=[replace(corners[0], errors={}, message="it fell")])
+    study = replace(measured, points=[*points[:-1], last])
     Console(width=100).print(corner_table(study, "z"))
     lines = capsys.readouterr().out.splitlines()
     assert all(len(line) <= 100 for line in lines)
     assert lines[0].strip() == "Over speed 3 to 5: error of z [m]"
     assert "it fell" in " ".join(lines)
     for point in points[:-1]:
-        worst = max(point["corners"], key=lambda corner: corner["errors"]["z"])
-        expected = f"{labels.number(worst['errors']['z'])} speed = {worst['parameters']['speed']:g}"
+        worst = max(point.corners or [], key=lambda corner: corner.errors["z"])
+        expected = f"{labels.number(worst.errors['z'])} speed = {worst.parameters['speed']:g}"
         assert any(expected in " ".join(line.split()) for line in lines)
 
 
@@ -309,11 +307,11 @@ def test_a_trade_off_that_makes_no_sense(proofroll: Proofroll, tmp_path: Path, m
     assert not list(tmp_path.glob("**/*.nc"))
 
 
-def test_the_diagram_says_what_was_run(measured: dict[str, Any]) -> None:
+def test_the_diagram_says_what_was_run(measured: TradeoffStudy) -> None:
     """It names scene, parameters and length, and one front where no equations of the scene's own are on another."""
     drawn = svg(measured, ["z", "N"])
     assert "sphere_in_cylinder, rolling_resistance = 0.0005, over 0.5 s" in drawn
     assert "Pareto front of the engines" in drawn
     assert "own equations" not in drawn
-    other = measured["pareto_engines"] | {"z": measured["pareto"]["z"][1:]}
-    assert "own equations" in svg(measured | {"pareto_engines": other}, ["z"])
+    other = measured.pareto_engines | {"z": measured.pareto["z"][1:]}
+    assert "own equations" in svg(replace(measured, pareto_engines=other), ["z"])

@@ -11,10 +11,10 @@ from blajer_2006.reading import load_figures
 from blajer_2006.study import run_figures
 from proofroll.elements.ball_on_surface.regimes_study import load_regimes, regime_map
 from proofroll.elements.ball_on_surface.report.regimes_part import RegimesPart
-from proofroll.files.json_data import plain
 from proofroll.files.scene_file import load_scene
 from proofroll.report.stability_part import StabilityPart
 from proofroll.report.tradeoff_part import TradeoffPart
+from proofroll.running.case import Status
 from proofroll.running.runner import Runner
 from proofroll.running.store import Store
 from proofroll.studies import study_identity
@@ -23,51 +23,76 @@ from proofroll.studies.claims import claims_for
 from proofroll.studies.stability_claims import file_for
 from proofroll.studies.stability_places import QUICK
 from proofroll.studies.stability_records import Boundary, BoundaryPoint, ExplainedBoundary, StabilityStudy
+from proofroll.studies.tradeoff_records import CurveBudget, MeasuredPoint, MeasuredQuantity, TradeoffStudy, TruthCost
 
 
-def point(number: int, engine: str, error: float, seconds: float, **more: Any) -> dict[str, Any]:
+def measured_point(**more: Any) -> MeasuredPoint:
     """A point of an invented trade-off."""
-    values = {
-        "id": number, "engine": engine, "curve": f"{engine}[formulation=only]", "level": "engine constraint",
-        "settings": {"formulation": "only", "preset": "tuned", "dt": 1e-3}, "resolution": "dt", "step": 1e-3,
-        "order": 2, "status": "done", "message": "reached 2 s", "error": {"z": error, "N": 10 * error},
-        "envelope": {"z": error, "N": 10 * error}, "seconds_per_second": seconds,
-        "interval": [0.9 * seconds, 1.1 * seconds], "confidence": 0.97, "rounds": 6 * [seconds],
-        "measurements": 3, "corners": None,
+    values: dict[str, Any] = {
+        "id": 0, "engine": "good", "level": "engine constraint", "resolution": "dt", "step": 1e-3, "order": 2,
+        "settings": {"formulation": "only", "preset": "tuned", "dt": 1e-3}, "status": Status.DONE,
+        "message": "reached 2 s", "error": {"z": 1e-5}, "confidence": 0.97, "corners": None,
+    } | more  # fmt: skip
+    curve = f"{values['engine']}[formulation={values['settings']['formulation']}]"
+    return MeasuredPoint(**({"curve": curve, "envelope": values["error"]} | values))
+
+
+def timed(seconds: float) -> dict[str, Any]:
+    """A cost that was measured six times."""
+    interval = (0.9 * seconds, 1.1 * seconds)
+    return {"seconds_per_second": seconds, "interval": interval, "rounds": 6 * [seconds], "measurements": 6}
+
+
+def invented_study(*points: MeasuredPoint, **more: Any) -> TradeoffStudy:
+    """What is kept of an invented trade-off."""
+    values: dict[str, Any] = {
+        "scene": "sphere_in_cylinder", "parameters": {}, "until": 2.0, "every": 0.05, "quantity": "z",
+        "quantities": {"z": MeasuredQuantity("m", 0.1, 1e-13)}, "absent": {}, "budgets": [], "pareto": {},
+        "pareto_engines": {}, "truth": TruthCost(route=""), "over": {}, "findings": [], "brief": False,
+        "measured": study_identity.measured(),
     }  # fmt: skip
-    return values | more
+    return TradeoffStudy(points=list(points), **(values | more))
 
 
-def tradeoff_study() -> dict[str, Any]:
-    """A trade-off of a rough and cheap engine, a good and dear one, and the scene's own equations."""
-    points = [
-        point(0, "rough", 3e-3, 1e-3),
-        point(1, "good", 1e-9, 0.5, interval=None, confidence=0.0, rounds=[0.5], measurements=1),
-        point(2, "own", 1e-12, 0.01, level="reduced equations"),
-    ]
-    budget = {
+def invented_budget(**more: Any) -> CurveBudget:
+    """An error budget."""
+    values: dict[str, Any] = {
         "engine": "good", "curve": "good[formulation=only]", "quantity": "z", "model_form": 2e-10,
         "model_form_bar": 1e-10, "order": 1.97, "order_low": 1.9, "order_high": 2.04, "declared": 2, "floor": 1e-12,
         "truth": 1e-13, "coarse": "time step", "fine": "model form", "contradicts_declaration": False,
         "sentence": "At dt 0.05 s the time step dominates.",
     }  # fmt: skip
-    quantities = {
-        "z": {"unit": "m", "scale": 0.1, "truth_error_bar": 1e-13},
-        "N": {"unit": "N", "scale": 40.0, "truth_error_bar": 1e-12},
+    return CurveBudget(**(values | more))
+
+
+def tradeoff_study() -> TradeoffStudy:
+    """A trade-off of a rough and cheap engine, a good and dear one, and the scene's own equations."""
+    once: dict[str, Any] = {
+        "seconds_per_second": 0.5,
+        "interval": None,
+        "confidence": 0.0,
+        "rounds": [0.5],
+        "measurements": 1,
     }
-    return {
-        "study": "tradeoff", "scene": "sphere_in_cylinder", "parameters": {}, "until": 2.0, "every": 0.05,
-        "quantity": "z", "quantities": quantities, "points": points, "dropped": [],
-        "absent": {"lost": "lost is not installed here"}, "budgets": [budget],
-        "pareto": {"z": [0, 2]}, "pareto_engines": {"z": [0, 1]}, "truth": {"seconds_per_second": 1.0, "route": ""},
-        "over": {}, "findings": ["3 runs: none refused."], "brief": True, "measured": plain(study_identity.measured()),
-    }  # fmt: skip
+    return invented_study(
+        measured_point(id=0, engine="rough", error={"z": 3e-3, "N": 3e-2}, **timed(1e-3)),
+        measured_point(id=1, engine="good", error={"z": 1e-9, "N": 1e-8}, **once),
+        measured_point(id=2, engine="own", error={"z": 1e-12, "N": 1e-11}, level="reduced equations", **timed(0.01)),
+        quantities={"z": MeasuredQuantity("m", 0.1, 1e-13), "N": MeasuredQuantity("N", 40.0, 1e-12)},
+        absent={"lost": "lost is not installed here"},
+        budgets=[invented_budget()],
+        pareto={"z": [0, 2]},
+        pareto_engines={"z": [0, 1]},
+        truth=TruthCost(seconds_per_second=1.0, route=""),
+        findings=["3 runs: none refused."],
+        brief=True,
+    )
 
 
 def boundary_point(**more: Any) -> BoundaryPoint:
     """A point of an invented map: silent at every step."""
     side = Boundary(None, False, {}, 1e-4, "sank in", True, 1.5, 0.1, "reached 2 s")
-    values = {
+    values: dict[str, Any] = {
         "engine": "good", "settings": {"formulation": "only", "preset": "tuned"}, "curve": "good[formulation=only]",
         "level": None, "caveat": "", "resolution": "dt", "axis": "V0", "value": 4.0, "parameters": {"speed": 4.0},
         "until": 2.0, "period": 0.6, "largest_stable": None, "largest_accurate": None, "boundary": "stable",

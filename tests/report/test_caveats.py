@@ -69,10 +69,10 @@ def test_a_caveat_stands_beside_verdicts_and_advice() -> None:
 
 def test_advice_and_silent_failures_carry_the_caveat() -> None:
     """The line that recommends a setting and the one that blames it say what is not the engine's own."""
-    mine = {"caveat": "somebody else's steps"}
+    mine = "somebody else's steps"
     offered, mapped = tradeoff_study(), stability_study()
-    offered["points"] = [point | mine for point in offered["points"]]
-    mapped = replace(mapped, points=[replace(point, caveat=mine["caveat"]) for point in mapped.points])
+    offered = replace(offered, points=[replace(point, caveat=mine) for point in offered.points])
+    mapped = replace(mapped, points=[replace(point, caveat=mine) for point in mapped.points])
     answer = recommend(offered, Wish("z", Tolerance(1e-2, False, "m")))
     chosen = next(line for line in answer_lines(answer) if "use rough" in line)
     assert "somebody else's steps" in chosen

@@ -69,7 +69,7 @@ def test_each_further_study_has_its_line(content: ReportContent) -> None:
     entries: dict[str, Any] = {
         "figures": [entry(study={"statements": stated}, name="figs")],
         "regimes": [],
-        "tradeoffs": [claimed(study={"points": [1, 2, 3]}, claims=held, name="speed"), entry(name="absent")],
+        "tradeoffs": [claimed(study=claimed(points=[1, 2, 3]), claims=held, name="speed"), entry(name="absent")],
         "stability": [claimed(study=claimed(silent=4, boundaries=9), claims=[held[0], held[2]], name="map")],
     }
     assert part_lines(replace(content, entries=entries)) == [

@@ -99,10 +99,10 @@ def test_advice_names_the_cheapest_the_runner_up_and_the_first_failure(report: R
     """At a millimetre the cheap one fails, with its reason; costs measured once say so."""
     answers = {item.answer.tolerance: item.answer for item in report.content.entries["tradeoffs"][0].advice}
     answer = answers[1e-3]
-    assert answer.choice.point["engine"] == "good"
-    assert answer.first_failure.point["engine"] == "rough"
+    assert answer.choice.point.engine == "good"
+    assert answer.first_failure.point.engine == "rough"
     assert "off by 0.003 m" in answer.first_failure.reason
-    assert answers[1e-2].choice.point["engine"] == "rough"
+    assert answers[1e-2].choice.point.engine == "rough"
     text = parse(page(report.content, report.curves)).text
     assert "0.5 (once)" in text
     assert "1e-3 ±10%" in text
@@ -220,15 +220,14 @@ def test_what_is_kept_is_taken_and_what_is_outdated_is_not(tmp_path: Path) -> No
     for name, study, brief in (("whole", tradeoff_study(), False), ("brief", tradeoff_study(), True)):
         path = stored(tmp_path, question, brief=brief)
         path.parent.mkdir(exist_ok=True)
-        keep({**study, "mark": name}, path)
+        keep(replace(study, findings=[name]), path)
     assert tradeoff.keeps(tmp_path)
-    assert tradeoff.study["mark"] == "whole"
+    assert tradeoff.study.findings == ["whole"]
     stored(tmp_path, question).unlink()
     assert tradeoff.keeps(tmp_path)
-    assert tradeoff.study["mark"] == "brief"
+    assert tradeoff.study.findings == ["brief"]
     old = tradeoff_study()
-    old["measured"]["code"] = "another"
-    keep(old, stored(tmp_path, question, brief=True))
+    keep(replace(old, measured=replace(old.measured, code="another")), stored(tmp_path, question, brief=True))
     assert not tradeoff.keeps(tmp_path)
     assert not stability.keeps(tmp_path)
     axes = stability.asked.axes

@@ -17,6 +17,7 @@ from proofroll.core.errors import InputError
 if TYPE_CHECKING:
     from proofroll.studies.claims import TradeoffClaims
     from proofroll.studies.curve import Question
+    from proofroll.studies.tradeoff_records import TradeoffStudy
 
 # Of SI, before the unit of a tolerance; the second µ is the Greek letter.
 _PREFIXES = {"k": 1e3, "m": 1e-3, "µ": 1e-6, "\u03bc": 1e-6, "u": 1e-6, "n": 1e-9}
@@ -58,7 +59,7 @@ def recommend(
     wish = Wish(question.quantity, _tolerance(tolerance, unit), _positive("budget", budget), tuple(engine or ()))
     ranges = ranges_of(question, over) if over is not None else None
     study = _stored_study(question, engine or [], claims, ranges, out, jobs, measure_first=measure_first)
-    known = {*study["absent"], *(point["engine"] for point in study["points"])}
+    known = {*study.absent, *(point.engine for point in study.points)}
     not_measured = [] if engine else [name for name in engine_names() if name not in known]
     found = replace(answered(study, wish), not_measured=not_measured)
     options.show(found, as_json, lambda: answer_lines(found))
@@ -101,7 +102,7 @@ def _stored_study(
     jobs: int | None,
     *,
     measure_first: bool,
-) -> dict[str, Any]:
+) -> TradeoffStudy:
     """The stored curves, of all engines or of some with those that are asked for, or new ones if the user agrees.
 
     With ``ranges`` of parameters they must have been checked over these.
@@ -112,14 +113,15 @@ def _stored_study(
     from proofroll.studies.recommend import covers
     from proofroll.studies.study_store import kept
     from proofroll.studies.tradeoff import restricted, stored
+    from proofroll.studies.tradeoff_records import TradeoffStudy
 
     reasons: list[str] = []
     for path in (stored(out, question), *restricted(out, question)):
-        study, changes = kept(path, dict)
-        if study is not None and not covers(study.get("engines", ()), engines):
-            changes = [f"what is stored is of {', '.join(study['engines'])}; choose among these with --engine"]
+        study, changes = kept(path, TradeoffStudy)
+        if study is not None and not covers(study.engines, engines):
+            changes = [f"what is stored is of {', '.join(study.engines)}; choose among these with --engine"]
             study = None
-        if study is not None and ranges is not None and study["over"] != ranges:
+        if study is not None and ranges is not None and study.over != ranges:
             study, changes = None, ["the stored curves were not checked over these ranges"]
         if study is not None:
             return study

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Any
+from typing import TYPE_CHECKING, Annotated
 
 import typer
 
@@ -14,6 +14,7 @@ if TYPE_CHECKING:
     from proofroll.running.runner import Runner
     from proofroll.studies.claims import TradeoffClaims
     from proofroll.studies.curve import Question
+    from proofroll.studies.tradeoff_records import TradeoffStudy
 
 SceneOrFile = Annotated[
     str, typer.Argument(help="A scene, or a comparison file for it, e.g. comparisons/tradeoff.toml.")
@@ -52,10 +53,10 @@ def tradeoff(
     ranges = ranges_of(question, over) if over is not None else (claims.over if claims else {})
     options.require_pages()
     study, path = measure(question, engine or [], ranges, claims, options.new_runner(out, fresh, jobs, scheduler), out)
-    shown = [name for name in quantity or [] if name in study["quantities"]] or default_quantities(study)
+    shown = [name for name in quantity or [] if name in study.quantities] or default_quantities(study)
     draw(study, shown, path.with_suffix(".svg"))
     options.show(study, as_json, lambda: tradeoff_parts(study, shown, path, every_point=every_point))
-    raise typer.Exit(options.CONTRADICTED if study["claims"]["contradictions"] else options.OK)
+    raise typer.Exit(options.CONTRADICTED if study.claims.contradictions else options.OK)
 
 
 def question_of(
@@ -115,7 +116,7 @@ def measure(
     claims: TradeoffClaims | None,
     runner: Runner,
     out: Path,
-) -> tuple[dict[str, Any], Path]:
+) -> tuple[TradeoffStudy, Path]:
     """Measures and keeps the curves that a recommendation can be made from, with a progress bar."""
     from proofroll.studies.study_store import make_tradeoff
 

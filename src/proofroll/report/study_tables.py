@@ -2,9 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 from proofroll.report.labels import error, number, symbol, unit
 from proofroll.report.tables import Column
@@ -13,6 +12,7 @@ from proofroll.report.tradeoff_tables import cost_of, name_of, step_of
 if TYPE_CHECKING:
     from proofroll.report.tradeoff_part import Advice, TradeoffEntry
     from proofroll.studies.recommend import Choice
+    from proofroll.studies.tradeoff_records import CurveBudget, TradeoffStudy
 
 
 @dataclass(frozen=True)
@@ -102,72 +102,70 @@ def _advice_line(item: Advice) -> AdviceLine:
 
 def front(entry: TradeoffEntry, key: str = "pareto_engines") -> list[FrontLine]:
     """The points that nothing beats for the study's own quantity: cost, and the error of every shown quantity."""
-    study = entry.study
-    by_id = {point["id"]: point for point in study["points"]}
     return [
         FrontLine(
             name_of(point),
             step_of(point),
             cost_of(point),
-            [error(point["error"].get(name)) if name in point["error"] else "–" for name in entry.shown],
+            [error(point.error.get(name)) if name in point.error else "–" for name in entry.shown],
         )
-        for point in (by_id[number] for number in study[key].get(study["quantity"], []))
+        for point in entry.study.front(key, entry.study.quantity)
     ]
 
 
 def budgets(entry: TradeoffEntry, quantity: str) -> list[BudgetLine]:
     """What the error of a quantity consists of along each curve."""
-    study = entry.study
-    first = {point["curve"]: point for point in study["points"]}
+    study: TradeoffStudy = entry.study
+    first = {point.curve: point for point in study.points}
     return [
         BudgetLine(
-            name=name_of(first[item["curve"]]) if item["curve"] in first else item["curve"],
+            name=name_of(first[item.curve]) if item.curve in first else item.curve,
             order=_order(item),
-            declared=item["declared"],
-            contradicts=item["contradicts_declaration"],
-            model_form=number(item["model_form"]),
-            model_form_bar=number(item["model_form_bar"], 1),
-            floor=number(item["floor"], 1),
-            truth=number(item["truth"], 1),
-            sentence=item["sentence"],
+            declared=item.declared,
+            contradicts=item.contradicts_declaration,
+            model_form=number(item.model_form),
+            model_form_bar=number(item.model_form_bar, 1),
+            floor=number(item.floor, 1),
+            truth=number(item.truth, 1),
+            sentence=item.sentence,
         )
-        for item in study["budgets"]
-        if item["quantity"] == quantity
+        for item in study.budgets
+        if item.quantity == quantity
     ]
 
 
 def quantities(entry: TradeoffEntry) -> list[Column]:
     """The shown quantities with symbol and unit."""
-    known = entry.study["quantities"]
-    return [Column(name, symbol(name), unit(known.get(name, {}).get("unit", ""))) for name in entry.shown]
+    known = entry.study.quantities
+    return [Column(name, symbol(name), unit(known[name].unit if name in known else "")) for name in entry.shown]
 
 
-def effort(study: Mapping[str, Any]) -> str:
+def effort(study: TradeoffStudy) -> str:
     """How well speeds are known and where the choices hold, in a sentence or two."""
     said = ""
-    if study.get("brief"):
+    if study.brief:
         said = (
             "Speeds were measured briefly, twice at most and those of long runs once, and the finest steps were "
             "left out: they contradict no claim. "
         )
-    over = ", ".join(f"{name} {min(values):g} to {max(values):g}" for name, values in study["over"].items())
-    at = ", ".join(f"{name} = {value:g}" for name, value in study["parameters"].items()) or "the default parameters"
-    where = f"at {at} over {study['until']:g} s"
+    over = ", ".join(f"{name} {min(values):g} to {max(values):g}" for name, values in study.over.items())
+    at = ", ".join(f"{name} = {value:g}" for name, value in study.parameters.items()) or "the default parameters"
+    where = f"at {at} over {study.until:g} s"
     if over:
         return f"{said}Every choice holds {where}, and at the corners of {over}; nothing is known beyond."
     return f"{said}Every choice holds {where}; it was not checked over ranges of the parameters."
 
 
-def _order(item: Mapping[str, Any]) -> str:
-    if item["order"] is None:
+def _order(item: CurveBudget) -> str:
+    if item.order is None:
         return "–"
-    if item["order_low"] is None or item["order_high"] is None:
-        return f"{item['order']:.2f}"
-    return f"{item['order']:.2f} ± {(item['order_high'] - item['order_low']) / 2:.2f}"
+    if item.order_low is None or item.order_high is None:
+        return f"{item.order:.2f}"
+    return f"{item.order:.2f} ± {(item.order_high - item.order_low) / 2:.2f}"
 
 
 def _told(choice: Choice | None, of: str) -> ShownChoice | None:
     if choice is None:
         return None
     point, off = choice.point, f"{error(choice.error)} {of}".strip()
-    return ShownChoice(name_of(point), point.get("caveat", ""), step_of(point), cost_of(point), off, choice.reason)
+    return ShownChoice(name_of(point), point.caveat, step_of(point), cost_of(point), off, choice.reason)

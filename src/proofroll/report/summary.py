@@ -16,6 +16,7 @@ if TYPE_CHECKING:
     from proofroll.report.study_parts import PartEntry
     from proofroll.studies.recommend import Answer
     from proofroll.studies.stability_records import StabilityStudy
+    from proofroll.studies.tradeoff_records import TradeoffStudy
 
 
 def three_sentences(comparisons: Sequence[ReportedComparison], entries: Mapping[str, Sequence[PartEntry]]) -> list[str]:
@@ -113,14 +114,14 @@ def _use(comparisons: Sequence[ReportedComparison], tradeoffs: Sequence[Any]) ->
         if answer is not None:
             choice, least = answer.choice.point, answer.least_model
             wanted = f"{symbol(answer.quantity)} to {number(answer.tolerance)} {unit(answer.unit)}".strip()
-            said = f"For {wanted} use {with_caveat(name_of(choice), choice.get('caveat', ''))}" + (
+            said = f"For {wanted} use {with_caveat(name_of(choice), choice.caveat)}" + (
                 f" at {step_of(choice)}" if step_of(choice) else ""
             )
-            said += f", at {number(choice['seconds_per_second'])} s of computing per simulated second"
+            said += f", at {number(choice.seconds_per_second)} s of computing per simulated second"
             if least:
                 said += (
                     f"; where this scene is all there is, its own equations do it at "
-                    f"{number(least.point['seconds_per_second'])} s ({name_of(least.point)})"
+                    f"{number(least.point.seconds_per_second)} s ({name_of(least.point)})"
                 )
             return f"{said}."
     for comparison in comparisons:
@@ -133,9 +134,9 @@ def _use(comparisons: Sequence[ReportedComparison], tradeoffs: Sequence[Any]) ->
     return f"Nothing that was timed holds motion and forces to {100 * EVERYDAY:g} %, so nothing can be recommended."
 
 
-def _from_everyday(answer: Answer, study: Mapping[str, Any]) -> tuple[bool, float]:
+def _from_everyday(answer: Answer, study: TradeoffStudy) -> tuple[bool, float]:
     """How far a tolerance is from the usual one: of the study's own quantity first, and then by its logarithm."""
     from math import log
 
-    scale = study["quantities"].get(answer.quantity, {}).get("scale") or 1.0
-    return answer.quantity != study["quantity"], abs(log(answer.tolerance / scale / EVERYDAY))
+    scale = study.quantities[answer.quantity].scale or 1.0
+    return answer.quantity != study.quantity, abs(log(answer.tolerance / scale / EVERYDAY))

@@ -2,10 +2,10 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, ClassVar
+from typing import TYPE_CHECKING, ClassVar
 
 from proofroll.core.comparison import Tolerance
 from proofroll.files.json_data import MERGED
@@ -19,6 +19,7 @@ from proofroll.studies.wish import Wish
 if TYPE_CHECKING:
     from proofroll.report.study_parts import Tell
     from proofroll.running.runner import Runner
+    from proofroll.studies.tradeoff_records import TradeoffStudy
 
 # Parts of its scale to which a quantity is wanted where nobody says otherwise: what an eye sees, an engineer needs, a
 # reference is made from, and what tells the orders of methods apart.
@@ -56,7 +57,7 @@ class TradeoffPart(Part):
     template: ClassVar[str] = "tradeoff.html"
     asked: TradeoffClaims
     engines: Sequence[str] = ()
-    study: Mapping[str, Any] | None = None
+    study: TradeoffStudy | None = None
 
     @classmethod
     def load(cls, path: Path, engines: Sequence[str]) -> TradeoffPart:
@@ -66,7 +67,7 @@ class TradeoffPart(Part):
     @staticmethod
     def line(entry: TradeoffEntry) -> str:
         """How much was measured, and what holds of what was claimed."""
-        return f"{len(entry.study['points'])} points{held(entry.claims)}"
+        return f"{len(entry.study.points)} points{held(entry.claims)}"
 
     @property
     def head(self) -> dict[str, str]:
@@ -77,9 +78,10 @@ class TradeoffPart(Part):
         """The whole study, or else a brief one."""
         from proofroll.studies.study_store import kept
         from proofroll.studies.tradeoff import stored
+        from proofroll.studies.tradeoff_records import TradeoffStudy
 
         paths = (stored(out, self.asked.swept, self.engines, brief=brief) for brief in (False, True))
-        self.study = next((study for path in paths if (study := kept(path, dict)[0]) is not None), None)
+        self.study = next((study for path in paths if (study := kept(path, TradeoffStudy)[0]) is not None), None)
         return self.study is not None
 
     def make(self, runner: Runner, out: Path, tell: Tell) -> None:
@@ -113,24 +115,24 @@ class TradeoffPart(Part):
         return {"diagram": element(svg(self.study, default_quantities(self.study)), prefix)}
 
 
-def wishes(study: Mapping[str, Any], claims: TradeoffClaims | None) -> list[Wish]:
+def wishes(study: TradeoffStudy, claims: TradeoffClaims | None) -> list[Wish]:
     """What a report asks of a trade-off.
 
     Args:
-        study: as :func:`proofroll.studies.tradeoff_content.tradeoff_document` has it.
+        study: as :func:`proofroll.studies.tradeoff_content.tradeoff_study` makes it.
         claims: their tolerances are those of the study's own quantity.
     """
     own = list({claim.tolerance.value: claim.tolerance for claim in claims.cheapest}.values()) if claims else []
     found = []
-    for name in default_quantities(dict(study)):
-        if study["quantities"][name]["scale"] is None:
+    for name in default_quantities(study):
+        if study.quantities[name].scale is None:
             continue  # a part of nothing
         parts = [Tolerance(part, True) for part in PARTS]
-        found += [Wish(name, tolerance) for tolerance in (own if own and name == study["quantity"] else parts)]
+        found += [Wish(name, tolerance) for tolerance in (own if own and name == study.quantity else parts)]
     return found
 
 
-def advice(study: Mapping[str, Any], claims: TradeoffClaims | None) -> list[Advice]:
+def advice(study: TradeoffStudy, claims: TradeoffClaims | None) -> list[Advice]:
     """The answers of :func:`proofroll.studies.recommend.recommend` to all wishes."""
     return [
         Advice(wish.tolerance.value if wish.tolerance.relative else None, recommend(study, wish).answer)

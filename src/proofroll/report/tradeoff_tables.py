@@ -3,9 +3,9 @@
 from __future__ import annotations
 
 import itertools
-from collections.abc import Collection, Iterator, Mapping, Sequence
+from collections.abc import Collection, Iterator, Sequence
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 from rich.table import Table
 from rich.text import Text
@@ -16,44 +16,46 @@ from proofroll.studies.pareto import tied
 
 if TYPE_CHECKING:
     from proofroll.studies.recommend import Choice, Recommendation
+    from proofroll.studies.study_identity import Measured
+    from proofroll.studies.tradeoff_records import Corner, CurveBudget, MeasuredPoint, TradeoffStudy
 
 
-def default_quantities(study: Mapping[str, Any]) -> list[str]:
+def default_quantities(study: TradeoffStudy) -> list[str]:
     """Path, reaction, onset and energy, as far as the scene has them."""
-    wanted = [study["quantity"], "N", "F3", "first_slip", "energy_balance"]
-    return [name for name in dict.fromkeys(wanted) if name in study["quantities"]][:4]
+    wanted = [study.quantity, "N", "F3", "first_slip", "energy_balance"]
+    return [name for name in dict.fromkeys(wanted) if name in study.quantities][:4]
 
 
-def name_of(point: Mapping[str, Any]) -> str:
+def name_of(point: MeasuredPoint) -> str:
     """Engine, formulation and preset of a point."""
-    settings = point["settings"]
-    return " ".join(filter(None, (point["engine"], settings.get("formulation"), settings.get("preset"))))
+    settings = point.settings
+    return " ".join(filter(None, (point.engine, settings.get("formulation"), settings.get("preset"))))
 
 
-def step_of(point: Mapping[str, Any]) -> str:
+def step_of(point: MeasuredPoint) -> str:
     """Its step or tolerance."""
-    if point["step"] is None:
+    if point.step is None:
         return ""
-    return f"{point['resolution']} {number(point['step'])}" + (" s" if point["resolution"] == "dt" else "")
+    return f"{point.resolution} {number(point.step)}" + (" s" if point.resolution == "dt" else "")
 
 
-def cost_of(point: Mapping[str, Any]) -> str:
+def cost_of(point: MeasuredPoint) -> str:
     """Seconds per second, and how far its interval goes to either side at most.
 
     The range of fewer than six values is no interval of 95 %, so its own confidence stands behind it.
     """
-    cost = point["seconds_per_second"]
+    cost = point.seconds_per_second
     if cost is None:
         return "–"
-    confidence = point.get("confidence")
-    if point["interval"] is None or not confidence:
+    confidence = point.confidence
+    if point.interval is None or not confidence:
         return f"{number(cost)} (once)"
-    spread = max(point["interval"][1] - cost, cost - point["interval"][0]) / cost
+    spread = max(point.interval[1] - cost, cost - point.interval[0]) / cost
     return f"{number(cost)} ±{100 * spread:.0f}%" + (f" ({100 * confidence:.2g}%)" if confidence < CONFIDENCE else "")
 
 
 def tradeoff_parts(
-    study: Mapping[str, Any], shown: Sequence[str], path: Path, *, every_point: bool
+    study: TradeoffStudy, shown: Sequence[str], path: Path, *, every_point: bool
 ) -> Iterator[Table | str]:
     """A trade-off: its fronts or all its points, what errors consist of, and what was found.
 
@@ -64,24 +66,24 @@ def tradeoff_parts(
         every_point: whether all points are listed, and errors told in sentences too.
     """
     if every_point:
-        yield point_table(study, study["points"], shown, "Every point")
+        yield point_table(study, study.points, shown, "Every point")
     else:
         yield from front_tables(study, shown)
-    if study["over"]:
+    if study.over:
         yield from ("", corner_table(study, shown[0]))
     yield from ("", budget_table(study, shown[0]), "")
     if every_point:
         yield from budget_lines(study, shown[0])
-    yield from study["findings"]
-    yield from (f"{name}: {reason}" for name, reason in study["absent"].items())
-    yield from (f"?? {line}" for line in study["claims"]["undecided"])
-    yield from (f"!! {line}" for line in study["claims"]["contradictions"])
+    yield from study.findings
+    yield from (f"{name}: {reason}" for name, reason in study.absent.items())
+    yield from (f"?? {line}" for line in study.claims.undecided)
+    yield from (f"!! {line}" for line in study.claims.contradictions)
     yield f"The diagram is in {path.with_suffix('.svg')}, everything in {path}."
 
 
 def point_table(
-    study: Mapping[str, Any],
-    points: Sequence[Mapping[str, Any]],
+    study: TradeoffStudy,
+    points: Sequence[MeasuredPoint],
     quantities: Sequence[str],
     title: str,
     ties: Collection[int] = (),
@@ -109,41 +111,38 @@ def point_table(
     for column in ("engine formulation setting", "step", "cost s/s"):
         table.add_column(column, no_wrap=True)
     for name in quantities:
-        unit = study["quantities"][name]["unit"]
+        unit = study.quantities[name].unit
         table.add_column(Text(f"{_SHORT.get(name, name)} [{unit}]"), justify="right", no_wrap=True)
     for point in points:
-        shown = [error(point["error"].get(name)) if name in point["error"] else "–" for name in quantities]
-        if point["status"] != "done":
-            shown = [str(point["status"]), *[""] * (len(quantities) - 1)]
-        mark = " ≈" if point["id"] in ties else ""
+        shown = [error(point.error.get(name)) if name in point.error else "–" for name in quantities]
+        if point.status != "done":
+            shown = [str(point.status), *[""] * (len(quantities) - 1)]
+        mark = " ≈" if point.id in ties else ""
         table.add_row(Text(name_of(point)), step_of(point), cost_of(point) + mark, *shown)
     return table
 
 
-def front_tables(study: Mapping[str, Any], quantities: Sequence[str]) -> Iterator[Table]:
+def front_tables(study: TradeoffStudy, quantities: Sequence[str]) -> Iterator[Table]:
     """The Pareto front of the engines, and that of everything where the scene's own equations are better."""
-    by_id = {point["id"]: point for point in study["points"]}
-    fronts = {key: study[key][quantities[0]] for key in ("pareto_engines", "pareto")}
+    engines, everything = (study.front(key, quantities[0]) for key in ("pareto_engines", "pareto"))
     title = f"The Pareto front of the engines for {quantities[0]}: nothing is cheaper and more accurate"
-    if fronts["pareto_engines"]:
-        yield _front(study, [by_id[number] for number in fronts["pareto_engines"]], quantities, title)
-    if fronts["pareto"] != fronts["pareto_engines"]:
+    if engines:
+        yield _front(study, engines, quantities, title)
+    if everything != engines:
         title = "The front with the scene's own equations, which no engine needs"
-        yield _front(study, [by_id[number] for number in fronts["pareto"]], quantities, title)
+        yield _front(study, everything, quantities, title)
 
 
-def _front(
-    study: Mapping[str, Any], points: Sequence[Mapping[str, Any]], quantities: Sequence[str], title: str
-) -> Table:
-    ties = {cheap["id"] for cheap, fine in itertools.pairwise(points) if tied(cheap["interval"], fine["interval"])}
+def _front(study: TradeoffStudy, points: Sequence[MeasuredPoint], quantities: Sequence[str], title: str) -> Table:
+    ties = {cheap.id for cheap, fine in itertools.pairwise(points) if tied(cheap.interval, fine.interval)}
     return point_table(study, points, quantities, title, ties)
 
 
-def corner_table(study: Mapping[str, Any], quantity: str) -> Table:
+def corner_table(study: TradeoffStudy, quantity: str) -> Table:
     """For every point that was run over the range: its error here, and the worst at the corners and where."""
-    over = ", ".join(f"{name} {number(min(v))} to {number(max(v))}" for name, v in study["over"].items())
+    over = ", ".join(f"{name} {number(min(v))} to {number(max(v))}" for name, v in study.over.items())
     table = Table(
-        title=Text(f"Over {over}: error of {quantity} [{study['quantities'][quantity]['unit']}]"),
+        title=Text(f"Over {over}: error of {quantity} [{study.quantities[quantity].unit}]"),
         title_justify="left",
         box=None,
         padding=(0, 1, 0, 0),
@@ -153,30 +152,30 @@ def corner_table(study: Mapping[str, Any], quantity: str) -> Table:
     for column in ("here", "worst"):
         table.add_column(column, justify="right", no_wrap=True)
     table.add_column("where")
-    checked = [p for p in study["points"] if p["corners"] and quantity in p["error"]]
-    for point in sorted(checked, key=lambda p: p["seconds_per_second"] or 0.0):
-        worst, where = _worst(point["corners"], quantity)
-        table.add_row(Text(name_of(point)), step_of(point), error(point["error"][quantity]), worst, Text(where))
+    checked = [p for p in study.points if p.corners and quantity in p.error]
+    for point in sorted(checked, key=lambda p: p.seconds_per_second or 0.0):
+        worst, where = _worst(point.corners or [], quantity)
+        table.add_row(Text(name_of(point)), step_of(point), error(point.error[quantity]), worst, Text(where))
     return table
 
 
-def _worst(corners: Sequence[Mapping[str, Any]], quantity: str) -> tuple[str, str]:
+def _worst(corners: Sequence[Corner], quantity: str) -> tuple[str, str]:
     """The largest error at any corner and where that is; a corner without a result is worse than any error."""
-    missing = [corner for corner in corners if corner["errors"].get(quantity) is None]
+    missing = [corner for corner in corners if corner.errors.get(quantity) is None]
     if missing:
         more = f" and {len(missing) - 1} more" if len(missing) > 1 else ""
-        return "–", f"{_place(missing[0])}{more}: {missing[0]['message']}"
-    corner = max(corners, key=lambda c: float(c["errors"][quantity]))
-    return error(corner["errors"][quantity]), _place(corner)
+        return "–", f"{_place(missing[0])}{more}: {missing[0].message}"
+    corner = max(corners, key=lambda c: c.errors[quantity])
+    return error(corner.errors[quantity]), _place(corner)
 
 
-def _place(corner: Mapping[str, Any]) -> str:
-    return ", ".join(f"{name} = {number(value)}" for name, value in corner["parameters"].items())
+def _place(corner: Corner) -> str:
+    return ", ".join(f"{name} = {number(value)}" for name, value in corner.parameters.items())
 
 
-def budget_table(study: Mapping[str, Any], quantity: str) -> Table:
+def budget_table(study: TradeoffStudy, quantity: str) -> Table:
     """For every curve, what its error consists of and what dominates at either end."""
-    unit = study["quantities"][quantity]["unit"]
+    unit = study.quantities[quantity].unit
     title = f"What the error of {quantity} consists of [{unit}]: the coarse end, then the fine end"
     table = Table(title=Text(title), title_justify="left", box=None, padding=(0, 1, 0, 0))
     table.add_column("engine formulation setting", no_wrap=True)
@@ -185,15 +184,15 @@ def budget_table(study: Mapping[str, Any], quantity: str) -> Table:
     for column in ("limit off", "known to", "floor"):
         table.add_column(column, justify="right", no_wrap=True)
     table.add_column("dominated by", no_wrap=True)
-    first = {point["curve"]: point for point in study["points"]}
-    for item in study["budgets"]:
-        if item["quantity"] != quantity:
+    first = {point.curve: point for point in study.points}
+    for item in study.budgets:
+        if item.quantity != quantity:
             continue
-        limit = (item["model_form"], item["model_form_bar"], item["floor"])
-        ends = [_DOMINANT.get(item[end], item[end]) for end in ("coarse", "fine")]
+        limit = (item.model_form, item.model_form_bar, item.floor)
+        ends = [_DOMINANT.get(end, end) for end in (item.coarse, item.fine)]
         table.add_row(
-            Text(name_of(first[item["curve"]])),
-            Text(_order(item), style="yellow" if item["contradicts_declaration"] else ""),
+            Text(name_of(first[item.curve])),
+            Text(_order(item), style="yellow" if item.contradicts_declaration else ""),
             _steps(item),
             *(number(value) for value in limit),
             " → ".join(dict.fromkeys(ends)),
@@ -213,27 +212,27 @@ _DOMINANT = {
 }
 
 
-def _order(item: Mapping[str, Any]) -> str:
-    declared = "" if item["declared"] is None else f" ({item['declared']})"
-    if item["order"] is None:
+def _order(item: CurveBudget) -> str:
+    declared = "" if item.declared is None else f" ({item.declared})"
+    if item.order is None:
         return f"–{declared}"
-    if item["order_low"] is None:
-        return f"{item['order']:.2f} ±?{declared}"  # from two differences, which say nothing of their scatter
-    return f"{item['order']:.2f} ±{(item['order_high'] - item['order_low']) / 2:.2f}{declared}"
+    if item.order_low is None or item.order_high is None:
+        return f"{item.order:.2f} ±?{declared}"  # from two differences, which say nothing of their scatter
+    return f"{item.order:.2f} ±{(item.order_high - item.order_low) / 2:.2f}{declared}"
 
 
-def _steps(item: Mapping[str, Any]) -> str:
+def _steps(item: CurveBudget) -> str:
     """Coarsest and finest step between which the order was observed."""
-    if item["order_from"] is None:
+    if item.order_from is None:
         return ""
-    return f"{number(item['order_from'])} → {number(item['order_to'])}"
+    return f"{number(item.order_from)} → {number(item.order_to)}"
 
 
-def budget_lines(study: Mapping[str, Any], quantity: str) -> Iterator[str]:
+def budget_lines(study: TradeoffStudy, quantity: str) -> Iterator[str]:
     """The same as sentences."""
-    for item in study["budgets"]:
-        if item["quantity"] == quantity:
-            yield f"{item['curve']}: {item['sentence']}"
+    for item in study.budgets:
+        if item.quantity == quantity:
+            yield f"{item.curve}: {item.sentence}"
 
 
 def answer_lines(found: Recommendation) -> Iterator[str]:
@@ -269,7 +268,7 @@ def _line(choice: Choice, of: str) -> str:
     point = choice.point
     said = ", ".join(filter(None, (name_of(point), step_of(point))))
     said += f": error {error(choice.error)} {of}, cost {cost_of(point)} s/s"
-    return with_caveat(f"{said}; {choice.reason}", point.get("caveat", "")) + "."
+    return with_caveat(f"{said}; {choice.reason}", point.caveat) + "."
 
 
 def _checked(found: Recommendation) -> str:
@@ -282,6 +281,6 @@ def _checked(found: Recommendation) -> str:
     return said + "; nothing is known beyond."
 
 
-def _measured(measured: Mapping[str, Any]) -> str:
-    machine = measured["machine"]
-    return f"Measured {measured['when']} on {machine['processor']} ({machine['cores']} cores, {machine['system']})."
+def _measured(measured: Measured) -> str:
+    machine = measured.machine
+    return f"Measured {measured.when} on {machine['processor']} ({machine['cores']} cores, {machine['system']})."

@@ -4,14 +4,17 @@ from __future__ import annotations
 
 import io
 import math
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 from proofroll.core.errors import Missing
 from proofroll.files.atomic import replacing
 from proofroll.report.labels import symbol
 from proofroll.report.labels import unit as shown_unit
+
+if TYPE_CHECKING:
+    from proofroll.studies.tradeoff_records import MeasuredPoint, TradeoffStudy
 
 # One colour per engine, one dash and marker per formulation: a curve is told apart without colour too.
 _COLOURS = ("#3b6fb6", "#c9622f", "#3f8f5b", "#8b5fa8", "#b08a1e", "#5b6770", "#b8476b", "#2a8f9c")
@@ -23,7 +26,7 @@ _SMALLEST = 1e-17
 _LINE = 0.145
 
 
-def draw(study: Mapping[str, Any], quantities: Sequence[str], path: Path) -> None:
+def draw(study: TradeoffStudy, quantities: Sequence[str], path: Path) -> None:
     """Writes the diagram as an SVG file, one panel per quantity.
 
     Raises:
@@ -34,7 +37,7 @@ def draw(study: Mapping[str, Any], quantities: Sequence[str], path: Path) -> Non
         temporary.write_text(text, encoding="utf-8")
 
 
-def svg(study: Mapping[str, Any], quantities: Sequence[str]) -> str:
+def svg(study: TradeoffStudy, quantities: Sequence[str]) -> str:
     """The diagram as SVG text.
 
     Raises:
@@ -45,7 +48,7 @@ def svg(study: Mapping[str, Any], quantities: Sequence[str]) -> str:
         from matplotlib.figure import Figure
     except ModuleNotFoundError:
         raise Missing("matplotlib is not installed: pip install 'proofroll[report]'") from None
-    curves = {point["curve"] for point in study["points"]}
+    curves = {point.curve for point in study.points}
     columns = min(2, len(quantities))
     rows = math.ceil(len(quantities) / columns)
     with mpl.rc_context({"svg.hashsalt": "proofroll", "font.size": 9}):
@@ -57,8 +60,8 @@ def svg(study: Mapping[str, Any], quantities: Sequence[str]) -> str:
             _panel(panel, study, quantity)
         for panel in panels[len(quantities) :]:
             panel.set_visible(False)
-        at = ", ".join(f"{name} = {value:g}" for name, value in study["parameters"].items()) or "default parameters"
-        figure.suptitle(f"{study['scene']}, {at}, over {study['until']:g} s", fontsize=9)
+        at = ", ".join(f"{name} = {value:g}" for name, value in study.parameters.items()) or "default parameters"
+        figure.suptitle(f"{study.scene}, {at}, over {study.until:g} s", fontsize=9)
         handles, labels = panels[0].get_legend_handles_labels()
         figure.legend(handles, labels, loc="outside right upper", frameon=False, fontsize=7)
         out = io.StringIO()
@@ -66,24 +69,24 @@ def svg(study: Mapping[str, Any], quantities: Sequence[str]) -> str:
     return out.getvalue()
 
 
-def _panel(panel: Any, study: Mapping[str, Any], quantity: str) -> None:
-    facts = study["quantities"][quantity]
-    curves: dict[str, list[Mapping[str, Any]]] = {}
-    for point in study["points"]:
-        if point["seconds_per_second"] is not None and point["error"].get(quantity) is not None:
-            curves.setdefault(point["curve"], []).append(point)
-    engines = list(dict.fromkeys(point["engine"] for point in study["points"]))
+def _panel(panel: Any, study: TradeoffStudy, quantity: str) -> None:
+    facts = study.quantities[quantity]
+    curves: dict[str, list[MeasuredPoint]] = {}
+    for point in study.points:
+        if point.seconds_per_second is not None and point.error.get(quantity) is not None:
+            curves.setdefault(point.curve, []).append(point)
+    engines = list(dict.fromkeys(point.engine for point in study.points))
     seen: dict[str, list[str]] = {}
     for name, points in curves.items():
-        engine, formulation = points[0]["engine"], str(points[0]["settings"].get("formulation", ""))
-        preset = str(points[0]["settings"].get("preset", ""))
+        engine, formulation = points[0].engine, str(points[0].settings.get("formulation", ""))
+        preset = str(points[0].settings.get("preset", ""))
         styles = seen.setdefault(engine, [])
         if formulation not in styles:
             styles.append(formulation)
         index = styles.index(formulation)
         panel.plot(
-            [point["seconds_per_second"] for point in points],
-            [max(point["error"][quantity], _SMALLEST) for point in points],
+            [point.seconds_per_second for point in points],
+            [max(point.error[quantity] or 0.0, _SMALLEST) for point in points],
             color=_COLOURS[engines.index(engine) % len(_COLOURS)],
             linestyle=_DASHES[index % len(_DASHES)],
             marker=_MARKERS[index % len(_MARKERS)],
@@ -95,13 +98,13 @@ def _panel(panel: Any, study: Mapping[str, Any], quantity: str) -> None:
         )
     panel.set(xscale="log", yscale="log")
     _front(panel, study, quantity)
-    bar = facts["truth_error_bar"]
+    bar = facts.truth_error_bar
     if bar:
         panel.axhspan(_SMALLEST, bar, color="0.88", lw=0, zorder=0)
-    cost = study["truth"]["seconds_per_second"]
+    cost = study.truth.seconds_per_second
     if cost and bar:
         panel.plot([cost], [bar], marker="*", color="black", markersize=9, linestyle="", label="truth: its error bar")
-    unit = shown_unit(facts["unit"])
+    unit = shown_unit(facts.unit)
     panel.set(
         xlabel="cost through this adapter [wall seconds per simulated second]",
         ylabel=f"largest error of {symbol(quantity)}" + (f" [{unit}]" if unit else ""),
@@ -109,20 +112,19 @@ def _panel(panel: Any, study: Mapping[str, Any], quantity: str) -> None:
     panel.grid(which="major", color="0.9", lw=0.6)
 
 
-def _front(panel: Any, study: Mapping[str, Any], quantity: str) -> None:
+def _front(panel: Any, study: TradeoffStudy, quantity: str) -> None:
     """The Pareto fronts as staircases: what is left of one and below it nobody has."""
-    by_id = {point["id"]: point for point in study["points"]}
-    floor = max(study["quantities"][quantity]["truth_error_bar"] or 0.0, _SMALLEST)
-    right = max((p["seconds_per_second"] for p in study["points"] if p["seconds_per_second"]), default=1.0)
+    floor = max(study.quantities[quantity].truth_error_bar or 0.0, _SMALLEST)
+    right = max((p.seconds_per_second for p in study.points if p.seconds_per_second), default=1.0)
     for key, colour, words in (
         ("pareto_engines", "black", "Pareto front of the engines"),
         ("pareto", "#8f9aa3", "with the scene's own equations"),
     ):
-        chosen = [by_id[number] for number in study[key].get(quantity, [])]
-        if not chosen or (key == "pareto" and study[key][quantity] == study["pareto_engines"].get(quantity)):
+        chosen = study.front(key, quantity)
+        if not chosen or (key == "pareto" and chosen == study.front("pareto_engines", quantity)):
             continue  # there are no equations of the scene's own, or none that is better
-        costs = [point["seconds_per_second"] for point in chosen]
-        errors = [max(point["envelope"][quantity], floor) for point in chosen]
+        costs = [point.seconds_per_second for point in chosen]
+        errors = [max(point.held(quantity), floor) for point in chosen]
         panel.step(
             [costs[0], *costs, right],
             [panel.get_ylim()[1], *errors, errors[-1]],

@@ -91,7 +91,7 @@ class Budget:
     order_to: float | None = None
 
     @property
-    def contradicts_declaration(self) -> bool:
+    def contradicted(self) -> bool:
         """Whether the declared order lies outside the interval of the observed one."""
         if self.declared is None or self.order_low is None or self.order_high is None:
             return False

@@ -7,17 +7,15 @@ machine is, or on what else it does, may contradict one.
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass, field
-from typing import Any
 
 from proofroll.core.comparison import Tolerance
 from proofroll.core.engine_abilities import Level
 from proofroll.running.timing import FACTOR, Timing, named, ratio
 from proofroll.studies.recommend import fits, holding
+from proofroll.studies.tradeoff_records import MeasuredPoint, TradeoffStudy
 from proofroll.studies.wish import Wish
-
-_Study = Mapping[str, Any]
 
 
 @dataclass(frozen=True)
@@ -53,13 +51,13 @@ class Holds:
     step: float
     because: str
 
-    def judged(self, study: _Study, quantity: str) -> ClaimJudgement:
+    def judged(self, study: TradeoffStudy, quantity: str) -> ClaimJudgement:
         """Exactly, in a brief study too."""
         said = f"{self.engine} holds {_to(quantity, self.tolerance)} up to a step of {self.step:g}"
         if unknown := _unknown(study, [self.engine]):
             return ClaimJudgement(said, self.because, None, unknown)
         held = holding(study, Wish(quantity, self.tolerance, engines=(self.engine,)), here=True)
-        steps = [point["step"] for point in held if point["step"] is not None]
+        steps = [point.step for point in held if point.step is not None]
         if not steps:
             return ClaimJudgement(said, self.because, False, "no step of the sweep does")
         found = f"the coarsest that does is {max(steps):g}"
@@ -80,15 +78,15 @@ class Converges:
     order: tuple[float, float]
     because: str
 
-    def judged(self, study: _Study, quantity: str) -> ClaimJudgement:
+    def judged(self, study: TradeoffStudy, quantity: str) -> ClaimJudgement:
         """Exactly, in a brief study too."""
         lowest, highest = self.order
         said = f"{self.engine} converges in {quantity} with order {lowest:g} to {highest:g}"
         if unknown := _unknown(study, [self.engine]):
             return ClaimJudgement(said, self.because, None, unknown)
-        curves = {point["curve"] for point in study["points"] if fits(point, self.engine)}
-        found = [b for b in study["budgets"] if b["curve"] in curves and b["quantity"] == quantity and b["order"]]
-        orders = [(b["order_low"] or b["order"], b["order_high"] or b["order"]) for b in found]
+        curves = {point.curve for point in study.points if fits(point, self.engine)}
+        found = [b for b in study.budgets if b.curve in curves and b.quantity == quantity]
+        orders = [(b.order_low or b.order, b.order_high or b.order) for b in found if b.order]
         if not orders:
             return ClaimJudgement(said, self.because, False, "no order shows")
         shown = "what shows is " + ", ".join(f"{low:.3g} to {high:.3g}" for low, high in orders)
@@ -112,7 +110,7 @@ class Cheapest:
     because: str
     levels: list[Level] = field(default_factory=list)
 
-    def judged(self, study: _Study, quantity: str) -> ClaimJudgement:
+    def judged(self, study: TradeoffStudy, quantity: str) -> ClaimJudgement:
         """By the ratio of its cost to that of the cheapest other that holds the tolerance.
 
         It holds where the whole interval of the ratio is at most 1, and is contradicted where all of it exceeds
@@ -125,7 +123,7 @@ class Cheapest:
             said, self.because, *self._found(study, Wish(quantity, self.tolerance, levels=tuple(self.levels)))
         )
 
-    def _found(self, study: _Study, wish: Wish) -> tuple[bool | None, str]:
+    def _found(self, study: TradeoffStudy, wish: Wish) -> tuple[bool | None, str]:
         if unknown := _unknown(study, self.engine):
             return None, unknown
         held = holding(study, wish)
@@ -136,16 +134,16 @@ class Cheapest:
         if not others:
             return True, "nothing else holds that"
         best, rival = mine[0], others[0]
-        if not best["rounds"] or len(best["rounds"]) != len(rival["rounds"]):
+        if not best.rounds or len(best.rounds) != len(rival.rounds):
             return None, f"{_name(best)} and {_name(rival)} were not timed in the same rounds"
-        cost = ratio(Timing(tuple(best["rounds"])), Timing(tuple(rival["rounds"])))
+        cost = ratio(Timing(tuple(best.rounds)), Timing(tuple(rival.rounds)))
         said = (
             f"{_name(best)} takes {cost.value:.3g} times as long as {_name(rival)} "
             f"({cost.low:.3g} to {cost.high:.3g}, {named(cost.confidence)})"
         )
         if cost.high <= 1:
             return True, said
-        contradicted = cost.low > FACTOR and cost.known and not study["brief"]
+        contradicted = cost.low > FACTOR and cost.known and not study.brief
         return (False if contradicted else None), said
 
 
@@ -153,15 +151,15 @@ def _to(quantity: str, tolerance: Tolerance) -> str:
     return f"{quantity} to {tolerance.value:g} {tolerance.unit}"
 
 
-def _name(point: Mapping[str, Any]) -> str:
-    step = "" if point["step"] is None else f" at {point['step']:g}"
-    return f"{point['engine']} {point['settings'].get('formulation', '')}{step}"
+def _name(point: MeasuredPoint) -> str:
+    step = "" if point.step is None else f" at {point.step:g}"
+    return f"{point.engine} {point.settings.get('formulation', '')}{step}"
 
 
-def _unknown(study: _Study, engines: Sequence[str]) -> str:
+def _unknown(study: TradeoffStudy, engines: Sequence[str]) -> str:
     """Why nothing can be said of some engines here; empty if something can."""
-    about = [point for point in study["points"] if any(fits(point, text) for text in engines)]
+    about = [point for point in study.points if any(fits(point, text) for text in engines)]
     if not about:
         return "it was not measured"
-    late = next((point for point in about if point["status"] == "timeout"), None)
-    return f"a run of it met the limit of time: {late['message']}" if late else ""
+    late = next((point for point in about if point.status == "timeout"), None)
+    return f"a run of it met the limit of time: {late.message}" if late else ""

@@ -2,10 +2,9 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
 from dataclasses import dataclass, field
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 from pydantic import ConfigDict, TypeAdapter, ValidationError
 
@@ -16,6 +15,9 @@ from proofroll.files.toml import read_toml, study_files
 from proofroll.files.validation import first_problem
 from proofroll.studies.claimed import Cheapest, ClaimJudgement, Converges, Holds
 from proofroll.studies.curve import Question
+
+if TYPE_CHECKING:
+    from proofroll.studies.tradeoff_records import TradeoffStudy
 
 STUDY = "tradeoff"
 
@@ -49,20 +51,20 @@ class TradeoffClaims:
         """What is to be swept."""
         return Question(self.scene, self.parameters, self.until, self.quantity)
 
-    def judged(self, study: Mapping[str, Any]) -> list[ClaimJudgement]:
+    def judged(self, study: TradeoffStudy) -> list[ClaimJudgement]:
         """What a study says of each claim."""
         claims: list[Holds | Converges | Cheapest] = [*self.holds, *self.converges, *self.cheapest]
         return [claim.judged(study, self.quantity) for claim in claims]
 
-    def contradictions(self, study: Mapping[str, Any]) -> list[str]:
+    def contradictions(self, study: TradeoffStudy) -> list[str]:
         """What a study contradicts, as sentences."""
         return self._said(study, False, "contradicted")
 
-    def undecided(self, study: Mapping[str, Any]) -> list[str]:
+    def undecided(self, study: TradeoffStudy) -> list[str]:
         """What a study neither confirms nor contradicts, as sentences."""
         return self._said(study, None, "undecided")
 
-    def _said(self, study: Mapping[str, Any], verdict: bool | None, word: str) -> list[str]:
+    def _said(self, study: TradeoffStudy, verdict: bool | None, word: str) -> list[str]:
         found = (item for item in self.judged(study) if item.holds is verdict)
         return [f"{self.name}, {word}: {item.claim}; {item.found}" for item in found]
 

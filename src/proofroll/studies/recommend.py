@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterable, Mapping, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from typing import Any
 
 from proofroll.core.engine_abilities import Level
@@ -11,7 +11,9 @@ from proofroll.core.errors import InputError
 from proofroll.core.plugins import parse_engine
 from proofroll.files.json_data import MERGED, OPTIONAL
 from proofroll.studies.pareto import tied
-from proofroll.studies.wish import MARGIN, MeasuredPoint, Wish, absolute_tolerance, why_it_fails
+from proofroll.studies.study_identity import Measured
+from proofroll.studies.tradeoff_records import MeasuredPoint, TradeoffStudy
+from proofroll.studies.wish import MARGIN, Wish, absolute_tolerance, why_it_fails
 
 # What of a measured point is told.
 _OF_A_POINT = (
@@ -36,8 +38,8 @@ class Choice:
 
     def as_dict(self) -> dict[str, Any]:
         """For JSON: what a person needs of the point, the error and the reason."""
-        told = {name: self.point.get(name) for name in _OF_A_POINT}
-        return told | {"caveat": self.point.get("caveat", ""), "error": self.error, "reason": self.reason}
+        told = {name: getattr(self.point, name) for name in _OF_A_POINT}
+        return told | {"caveat": self.point.caveat, "error": self.error, "reason": self.reason}
 
 
 @dataclass(frozen=True)
@@ -99,19 +101,19 @@ class Recommendation:
     affordable: bool
     best_within_budget: Choice | None
     checked: CheckedOver
-    measured: Mapping[str, Any]
+    measured: Measured
     not_measured: list[str] | None = field(default=None, metadata=OPTIONAL)
 
 
-def recommend(study: Mapping[str, Any], wish: Wish) -> Recommendation:
+def recommend(study: TradeoffStudy, wish: Wish) -> Recommendation:
     """The cheapest point that holds a tolerance, and what else a person should know.
 
     Raises:
         InputError: a quantity or an engine that was not measured, or a percentage of what has no size.
     """
     absolute = absolute_tolerance(study, wish)
-    timed = [p for p in study["points"] if p["seconds_per_second"] is not None and wish.quantity in p["envelope"]]
-    timed.sort(key=lambda p: float(p["seconds_per_second"]))
+    timed = [p for p in study.points if p.seconds_per_second is not None and wish.quantity in p.envelope]
+    timed.sort(key=lambda p: p.cost)
     _require_measured(study, wish)
 
     def why_not(point: MeasuredPoint) -> str | None:
@@ -120,48 +122,48 @@ def recommend(study: Mapping[str, Any], wish: Wish) -> Recommendation:
     def told(point: MeasuredPoint | None, reason: str = "") -> Choice | None:
         if point is None:
             return None
-        return Choice(point, point["error"].get(wish.quantity), reason or _holds(study, point, wish, absolute))
+        return Choice(point, point.error.get(wish.quantity), reason or _holds(study, point, wish, absolute))
 
     def best(points: Iterable[MeasuredPoint], reason: str) -> Choice | None:
-        return told(min(points, key=lambda p: _error(p, wish.quantity), default=None), reason)
+        return told(min(points, key=lambda p: p.held(wish.quantity), default=None), reason)
 
     asked = [p for p in timed if _asked(p, wish)]
     choice = next((p for p in asked if why_not(p) is None), None)
-    affordable = choice is not None and (wish.budget is None or choice["seconds_per_second"] <= wish.budget)
-    others = [p for p in asked if choice is not None and p["id"] != choice["id"] and why_not(p) is None]
+    affordable = choice is not None and (wish.budget is None or choice.cost <= wish.budget)
+    others = [p for p in asked if choice is not None and p.id != choice.id and why_not(p) is None]
     cheaper = asked if choice is None else asked[: asked.index(choice)]
-    failing = min(cheaper, key=lambda p: _error(p, wish.quantity), default=None)
-    hand = next((p for p in timed if by_hand(p["level"]) and why_not(p) is None), None)
+    failing = min(cheaper, key=lambda p: p.held(wish.quantity), default=None)
+    hand = next((p for p in timed if by_hand(p.level) and why_not(p) is None), None)
     answer = Answer(
         quantity=wish.quantity,
-        unit=study["quantities"][wish.quantity]["unit"],
+        unit=study.quantities[wish.quantity].unit,
         tolerance=absolute,
         margin=MARGIN,
         choice=told(choice),
-        ties=[tie for p in others if choice and tied(p["interval"], choice["interval"]) and (tie := told(p))],
+        ties=[tie for p in others if choice and tied(p.interval, choice.interval) and (tie := told(p))],
         runner_up=told(next((p for p in others if choice and _model(p) != _model(choice)), None)),
         first_failure=told(failing, why_not(failing) or "") if failing is not None else None,
-        least_model=None if hand is not None and choice is not None and hand["id"] == choice["id"] else told(hand),
+        least_model=None if hand is not None and choice is not None and hand.id == choice.id else told(hand),
         closest=best(asked, "the most accurate that was measured; nothing beyond is guessed") if not choice else None,
     )
-    within = [p for p in asked if wish.budget is not None and p["seconds_per_second"] <= wish.budget]
+    within = [p for p in asked if wish.budget is not None and p.cost <= wish.budget]
     return Recommendation(
         answer,
-        study["scene"],
-        study["parameters"],
+        study.scene,
+        study.parameters,
         wish.budget,
         affordable,
         None if affordable else best(within, "the most accurate within the budget"),
         CheckedOver(
-            {name: [min(values), max(values)] for name, values in study["over"].items()},
-            max((len(p["corners"]) for p in study["points"] if p["corners"] is not None), default=0),
-            study["until"],
+            {name: [min(values), max(values)] for name, values in study.over.items()},
+            max((len(p.corners) for p in study.points if p.corners is not None), default=0),
+            study.until,
         ),
-        study["measured"],
+        study.measured,
     )
 
 
-def holding(study: Mapping[str, Any], wish: Wish, *, here: bool = False) -> list[MeasuredPoint]:
+def holding(study: TradeoffStudy, wish: Wish, *, here: bool = False) -> list[MeasuredPoint]:
     """Every point among those asked for that holds the tolerance with margin, the cheapest first, untimed ones last.
 
     Args:
@@ -170,33 +172,33 @@ def holding(study: Mapping[str, Any], wish: Wish, *, here: bool = False) -> list
         here: whether the scene's own parameters are enough, whatever happens at the corners of the range.
     """
     absolute = absolute_tolerance(study, wish)
-    within = {**study, "over": {}} if here else study
-    found = [p for p in study["points"] if _asked(p, wish) and why_it_fails(within, p, wish, absolute) is None]
-    return sorted(found, key=lambda p: float("inf") if p["seconds_per_second"] is None else p["seconds_per_second"])
+    within = replace(study, over={}) if here else study
+    found = [p for p in study.points if _asked(p, wish) and why_it_fails(within, p, wish, absolute) is None]
+    return sorted(found, key=lambda p: p.cost)
 
 
-def _require_measured(study: Mapping[str, Any], wish: Wish) -> None:
-    measured = list(dict.fromkeys(point["engine"] for point in study["points"]))
+def _require_measured(study: TradeoffStudy, wish: Wish) -> None:
+    measured = list(dict.fromkeys(point.engine for point in study.points))
     for text in wish.engines:
         if parse_engine(text).name not in measured:
-            absent = study["absent"].get(parse_engine(text).name)
+            absent = study.absent.get(parse_engine(text).name)
             raise InputError("engine", text, absent or f"measured are {', '.join(measured)}")
 
 
 def _asked(point: MeasuredPoint, wish: Wish) -> bool:
-    if wish.levels and point["level"] not in wish.levels:
+    if wish.levels and point.level not in wish.levels:
         return False
     if not wish.engines:
-        return not by_hand(point["level"]) or bool(wish.levels)
+        return not by_hand(point.level) or bool(wish.levels)
     return any(fits(point, text) for text in wish.engines)
 
 
 def fits(point: MeasuredPoint, text: str) -> bool:
     """Whether a point is of the engine, and has the settings, of ``name[key=value,…]``."""
     spec = parse_engine(text)
-    if point["engine"] != spec.name:
+    if point.engine != spec.name:
         return False
-    return all(_same(point["settings"].get(key), value) for key, value in spec.options.items())
+    return all(_same(point.settings.get(key), value) for key, value in spec.options.items())
 
 
 def covers(measured: Sequence[str], asked: Sequence[str]) -> bool:
@@ -214,26 +216,20 @@ def _same(value: object, text: str) -> bool:
         return str(value).lower() == text.lower()
 
 
-def _holds(study: Mapping[str, Any], point: MeasuredPoint, wish: Wish, absolute: float) -> str:
+def _holds(study: TradeoffStudy, point: MeasuredPoint, wish: Wish, absolute: float) -> str:
     """By how much a point holds the tolerance."""
-    held, bar = point["envelope"][wish.quantity], study["quantities"][wish.quantity]["truth_error_bar"] or 0.0
+    held, bar = point.held(wish.quantity), study.quantities[wish.quantity].truth_error_bar or 0.0
     if not max(held, bar):
         return "no error is seen"
     # Of an error below the truth's error bar no more is known than that.
     said = f"{'at least ' if held < bar else ''}{absolute / max(held, bar):.3g} times better than asked"
-    if point["corners"]:
-        key = "relative" if wish.tolerance.relative else "errors"
-        worst = max(corner[key][wish.quantity] for corner in point["corners"])
+    if point.corners:
+        worst = max(corner.off(wish.tolerance.relative)[wish.quantity] for corner in point.corners)
         there = wish.tolerance.value if wish.tolerance.relative else absolute
-        said += f", and {there / worst:.3g} times at the worst of {len(point['corners'])} corners" if worst else ""
+        said += f", and {there / worst:.3g} times at the worst of {len(point.corners)} corners" if worst else ""
     return said
 
 
 def _model(point: MeasuredPoint) -> tuple[str, str | None]:
     """The engine and the formulation."""
-    return point["engine"], point["settings"].get("formulation")
-
-
-def _error(point: MeasuredPoint, quantity: str) -> float:
-    held = point["envelope"].get(quantity)
-    return float("inf") if held is None else float(held)
+    return point.engine, point.settings.get("formulation")

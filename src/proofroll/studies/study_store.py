@@ -23,6 +23,7 @@ if TYPE_CHECKING:
     from proofroll.studies.stability_claims import StabilityFile
     from proofroll.studies.stability_places import Effort
     from proofroll.studies.stability_records import StabilityStudy
+    from proofroll.studies.tradeoff_records import TradeoffStudy
 
 _Study = TypeVar("_Study")
 
@@ -69,7 +70,7 @@ def make_tradeoff(
     claims: TradeoffClaims | None = None,
     brief: bool = False,
     progress: Callable[[str], None] | None = None,
-) -> tuple[dict[str, Any], Path]:
+) -> tuple[TradeoffStudy, Path]:
     """Measures a trade-off, and keeps it with all its timings in pyperf's form.
 
     Args:
@@ -83,7 +84,7 @@ def make_tradeoff(
         progress: called with a short text after every run and every measurement.
 
     Returns:
-        the study as plain data with ``claims``, and its file.
+        the study with ``claims``, and its file.
 
     Raises:
         InputError: something that does not exist.
@@ -91,20 +92,18 @@ def make_tradeoff(
     """
     from proofroll.running.timing import write_benchmarks
     from proofroll.studies.tradeoff import stored, tradeoff
-    from proofroll.studies.tradeoff_content import tradeoff_document
+    from proofroll.studies.tradeoff_content import tradeoff_study
+    from proofroll.studies.tradeoff_records import TradeoffJudged
 
     found = tradeoff(question, runner, engines=engines, over=over, brief=brief, progress=progress)
-    measured = tradeoff_document(found)
+    study = tradeoff_study(found)
     judged = claims if not engines else None
-    study = {
-        **measured,
-        "engines": sorted(engines),
-        "claims": {
-            "file": claims.name if claims else None,
-            "contradictions": judged.contradictions(measured) if judged else [],
-            "undecided": judged.undecided(measured) if judged else [],
-        },
-    }
+    held = TradeoffJudged(
+        claims.name if claims else None,
+        judged.contradictions(study) if judged else [],
+        judged.undecided(study) if judged else [],
+    )
+    study = dataclasses.replace(study, engines=sorted(engines), claims=held)
     path = stored(folder, question, engines, brief=brief)
     keep(study, path)
     names = {

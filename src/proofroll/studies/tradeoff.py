@@ -27,6 +27,7 @@ from proofroll.studies.curves_asked import curves_of
 from proofroll.studies.pareto import envelope, front
 from proofroll.studies.reference import Reference
 from proofroll.studies.sweep import FINER, GAIN, sweep
+from proofroll.studies.tradeoff_records import Corner
 
 # What makes up most of a study's time is the repetition of measurements. A brief one repeats less: two rounds
 # show how far a cost can be trusted; a run longer than this [s] warms itself up, and is measured once.
@@ -35,23 +36,6 @@ BRIEF_ROUNDS, BRIEF_ONCE, BRIEF_SECONDS = 2, 0.1, 0.02
 # The finest steps take as long as all others together, and tell little of a choice: at most this part of an interval,
 # and only where a step takes off as much of the error as with order 2: with order 1 the curve goes on as it came.
 BRIEF_FINER, BRIEF_GAIN = tuple(part for part in FINER if part >= 1e-3), 0.65
-
-
-@dataclass(frozen=True)
-class Corner:
-    """One run of a point at other parameters.
-
-    Attributes:
-        parameters: where.
-        errors: largest distance from the truth, by observable; empty if the run did not reach the end.
-        relative: the same in parts of the observable's scale there.
-        message: how the run ended.
-    """
-
-    parameters: dict[str, float]
-    errors: dict[str, float]
-    relative: dict[str, float]
-    message: str
 
 
 @dataclass

@@ -1,4 +1,4 @@
-"""What a trade-off study found, as plain data: printed by ``--json``, stored, and answered from."""
+"""What is kept of a trade-off: its points, error budgets, fronts and findings."""
 
 from __future__ import annotations
 
@@ -10,17 +10,26 @@ import numpy as np
 
 from proofroll.core.arrays import FloatArray
 from proofroll.core.observable import Role
-from proofroll.files.json_data import plain
+from proofroll.files.json_data import plain, record
 from proofroll.running.case import Status
 from proofroll.running.timing import Timing
-from proofroll.studies import study_identity
 from proofroll.studies.budget import Budget, budget, sentence
 from proofroll.studies.curve import Curve, CurvePoint
 from proofroll.studies.hosts import hosts, said_of
 from proofroll.studies.pareto import envelope, front
 from proofroll.studies.recommend import by_hand
+from proofroll.studies.study_identity import measured
 from proofroll.studies.sweep import BROKEN
 from proofroll.studies.tradeoff import Tradeoff, judged_quantities, pareto_entries
+from proofroll.studies.tradeoff_records import (
+    CurveBudget,
+    DroppedStep,
+    MeasuredPoint,
+    MeasuredQuantity,
+    SparseRun,
+    TradeoffStudy,
+    TruthCost,
+)
 
 
 def budgets(found: Tradeoff) -> list[tuple[Curve, Budget]]:
@@ -40,48 +49,41 @@ def budgets(found: Tradeoff) -> list[tuple[Curve, Budget]]:
     return made
 
 
-def tradeoff_document(found: Tradeoff) -> dict[str, Any]:
-    """Everything as plain data: what ``--json`` prints, what is stored, and what a recommendation is made from."""
+def tradeoff_study(found: Tradeoff) -> TradeoffStudy:
+    """What is kept of it, as it will be read: numbers that are not finite are None."""
     reference, known = found.reference, found.reference.scene.observables
     numbers = {point.case.key: number for number, point in enumerate(found.points)}
     made = budgets(found)
     quantities = {
-        name: {
-            "unit": known[name].unit,
-            "scale": reference.scale(name),
-            "truth_error_bar": reference.true(name, curve)[1],
-        }
+        name: MeasuredQuantity(known[name].unit, reference.scale(name), reference.true(name, curve)[1])
         for name, curve in reference.curves.items()
     }
-    document = {
-        "study": "tradeoff",
-        "scene": found.question.scene,
-        "parameters": found.question.parameters,
-        "until": found.question.until,
-        "every": found.question.every,
-        "quantity": found.question.quantity,
-        "quantities": quantities,
-        "points": [
+    study = TradeoffStudy(
+        scene=found.question.scene,
+        parameters=found.question.parameters,
+        until=found.question.until,
+        every=found.question.every,
+        quantity=found.question.quantity,
+        quantities=quantities,
+        points=[
             _point(curve, point, numbers[point.case.key], held, found)
             for curve in found.curves
             for point, held in zip(curve.points, _envelopes(curve, quantities), strict=True)
         ],
-        "dropped": [
-            {"engine": curve.engine, "step": step, "reason": reason}
-            for curve in found.curves
-            for step, reason in curve.dropped.items()
+        dropped=[
+            DroppedStep(curve.engine, step, reason) for curve in found.curves for step, reason in curve.dropped.items()
         ],
-        "absent": found.absent,
-        "budgets": [_budget(curve, entry, known[entry.quantity].unit) for curve, entry in made],
-        "pareto": _fronts(found.curves, numbers, found),
-        "pareto_engines": _fronts([curve for curve in found.curves if not by_hand(curve.level)], numbers, found),
-        "truth": {**_cost(found.truth_timing), "route": reference.dataset.attrs.get("route", "")},
-        "over": found.over,
-        "findings": findings(found, made),
-        "brief": found.brief,
-        "measured": study_identity.measured(),
-    }
-    return dict(plain(document))
+        absent=found.absent,
+        budgets=[_budget(curve, entry, known[entry.quantity].unit) for curve, entry in made],
+        pareto=_fronts(found.curves, numbers, found),
+        pareto_engines=_fronts([curve for curve in found.curves if not by_hand(curve.level)], numbers, found),
+        truth=TruthCost(**_cost(found.truth_timing), route=reference.dataset.attrs.get("route", "")),
+        over=found.over,
+        findings=findings(found, made),
+        brief=found.brief,
+        measured=measured(),
+    )
+    return record(TradeoffStudy, plain(study))
 
 
 def _fronts(curves: Sequence[Curve], numbers: dict[str, int], found: Tradeoff) -> dict[str, list[int]]:
@@ -97,62 +99,51 @@ def _envelopes(curve: Curve, quantities: Iterable[str]) -> list[dict[str, float]
     return [{name: held[index] for name, held in by_name.items()} for index in range(len(curve.points))]
 
 
-def _point(curve: Curve, point: CurvePoint, number: int, held: dict[str, float], found: Tradeoff) -> dict[str, Any]:
-    timing = found.timings.get(point.case.key)
-    corners = found.corners.get(point.case.key)
-    facts = point.case.engine
-    return {
-        "id": number,
-        "engine": facts.name,
-        "curve": curve.engine,
-        "level": curve.level,
-        "settings": facts.settings,
-        "resolution": facts.resolution,
-        "step": point.step,
-        "order": facts.order,
-        "caveat": facts.caveat,
-        "status": point.result.status,
-        "message": point.result.message,
-        "host": point.result.host,
-        "error": point.errors,
-        "envelope": {name: value for name, value in held.items() if name in point.errors},
-        "sparse": None
-        if point.sparse is None
-        else {
-            "every": point.sparse.case.every,
-            "error": point.sparse.errors,
-            "dense_error": point.dense,
-            "message": point.sparse.result.message,
-        },
-        **_cost(timing),
-        "corners": [dataclasses.asdict(corner) for corner in corners] if corners is not None else None,
-    }
+def _point(curve: Curve, point: CurvePoint, number: int, held: dict[str, float], found: Tradeoff) -> MeasuredPoint:
+    facts, few = point.case.engine, point.sparse
+    return MeasuredPoint(
+        **_cost(found.timings.get(point.case.key)),
+        id=number,
+        engine=facts.name,
+        curve=curve.engine,
+        level=curve.level,
+        settings=facts.settings,
+        resolution=facts.resolution,
+        step=point.step,
+        order=facts.order,
+        caveat=facts.caveat,
+        status=point.result.status,
+        message=point.result.message,
+        host=point.result.host,
+        error={**point.errors},
+        envelope={name: value for name, value in held.items() if name in point.errors},
+        sparse=SparseRun(few.case.every, {**few.errors}, {**point.dense}, few.result.message) if few else None,
+        corners=found.corners.get(point.case.key),
+    )
 
 
 def _cost(timing: Timing | None) -> dict[str, Any]:
-    """Median of wall seconds per simulated second, its interval and confidence, and the rounds; None: not measured.
-
-    The rounds are those of all points, so that a ratio of two can be taken round by round. A single measurement has no
-    interval.
-    """
-    found = timing.interval if timing else None
+    """The fields of :class:`~proofroll.studies.tradeoff_records.MeasuredCost`."""
+    if timing is None:
+        return {}
+    found = timing.interval
     return {
-        "seconds_per_second": found.value if found else None,
-        "interval": [found.low, found.high] if found and found.confidence else None,
-        "confidence": found.confidence if found else None,
-        "rounds": list(timing.values) if timing else [],
-        "measurements": len(timing.values) if timing else 0,
+        "seconds_per_second": found.value,
+        "interval": (found.low, found.high) if found.confidence else None,
+        "confidence": found.confidence,
+        "rounds": list(timing.values),
+        "measurements": len(timing.values),
     }
 
 
-def _budget(curve: Curve, found: Budget, unit: str) -> dict[str, Any]:
-    return {
-        "engine": curve.facts.name,
-        "curve": curve.engine,
+def _budget(curve: Curve, found: Budget, unit: str) -> CurveBudget:
+    return CurveBudget(
         **dataclasses.asdict(found),
-        "contradicts_declaration": found.contradicts_declaration,
-        "sentence": sentence(found, unit, str(curve.facts.resolution)),
-    }
+        engine=curve.facts.name,
+        curve=curve.engine,
+        contradicts_declaration=found.contradicted,
+        sentence=sentence(found, unit, str(curve.facts.resolution)),
+    )
 
 
 def findings(found: Tradeoff, made: Sequence[tuple[Curve, Budget]]) -> list[str]:
@@ -162,7 +153,7 @@ def findings(found: Tradeoff, made: Sequence[tuple[Curve, Budget]]) -> list[str]
     scale, unit = found.reference.scale(quantity) or 1.0, found.reference.scene.observables[quantity].unit
     judged = judged_quantities(found)
     for curve in found.curves:
-        other = [i for of, i in made if of is curve and i.quantity in judged and i.contradicts_declaration]
+        other = [i for of, i in made if of is curve and i.quantity in judged and i.contradicted]
         if other:
             shown = ", ".join(f"{i.quantity} {i.order:.2f} ({i.order_low:.2f} to {i.order_high:.2f})" for i in other)
             said.append(f"{curve.engine} declares order {other[0].declared}, but there show: {shown}.")

@@ -40,8 +40,8 @@ def test_order_with_its_interval(order: int) -> None:
     assert found.order_low is not None
     assert found.order_high is not None
     assert found.order_low <= order <= found.order_high
-    assert not found.contradicts_declaration
-    assert made(order=order, declared=order + 1).contradicts_declaration
+    assert not found.contradicted
+    assert made(order=order, declared=order + 1).contradicted
     assert found.coarse == found.fine == TIME_STEP
     assert found.floor is None
 

@@ -2,16 +2,20 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
 import pytest
+from invented import invented_budget, invented_study, measured_point
 
 from proofroll.core.errors import InputError
 from proofroll.files.comparison_file import comparison_names, load_comparison
 from proofroll.files.data_folders import data_folder
+from proofroll.running.case import Status
 from proofroll.running.timing import FACTOR
 from proofroll.studies.claims import claims_for, load_claims
+from proofroll.studies.tradeoff_records import TradeoffStudy
 
 TEXT = """
 study = "tradeoff"
@@ -41,42 +45,21 @@ def written(tmp_path: Path, text: str = TEXT) -> Path:
 STEADY = (1.0, 1.01, 0.99, 1.0, 1.02, 0.98)
 
 
-def measured(cost_of_fast: float, rounds: tuple[float, ...] = STEADY, *, brief: bool = False) -> dict[str, Any]:
+def measured(cost_of_fast: float, rounds: tuple[float, ...] = STEADY, **more: Any) -> TradeoffStudy:
     """Two points that hold the tolerance; ``rounds`` are those of the slower one, and slow the faster one as well."""
-    points = []
-    for number, (engine, cost) in enumerate({"fast": cost_of_fast, "slow": 1.0}.items()):
-        points.append(
-            {
-                "id": number,
-                "engine": engine,
-                "curve": engine,
-                "level": None,
-                "settings": {"formulation": "only"},
-                "resolution": "dt",
-                "step": 1e-3,
-                "status": "done",
-                "message": "",
-                "error": {"z": 1e-5},
-                "envelope": {"z": 1e-5},
-                "seconds_per_second": cost,
-                "interval": [cost, cost],
-                "rounds": [cost * value for value in rounds],
-                "corners": [],
-            }
+    points = [
+        measured_point(
+            id=number,
+            engine=engine,
+            level=None,
+            seconds_per_second=cost,
+            interval=(cost, cost),
+            rounds=[cost * value for value in rounds],
+            corners=[],
         )
-    return {
-        "scene": "sphere_in_cylinder",
-        "parameters": {},
-        "until": 1.0,
-        "every": 0.025,
-        "brief": brief,
-        "quantities": {"z": {"unit": "m", "scale": 0.1, "truth_error_bar": 1e-13}},
-        "points": points,
-        "budgets": [],
-        "over": {},
-        "absent": {},
-        "measured": {},
-    }
+        for number, (engine, cost) in enumerate({"fast": cost_of_fast, "slow": 1.0}.items())
+    ]
+    return invented_study(*points, **more)
 
 
 def test_a_claim_is_held_against_the_points(tmp_path: Path) -> None:
@@ -86,7 +69,8 @@ def test_a_claim_is_held_against_the_points(tmp_path: Path) -> None:
     (sentence,) = claims.contradictions(measured(10.0))
     assert "fast only at 0.001 takes 10 times as long as slow only at 0.001" in sentence
     study = measured(0.1)
-    study["points"][0] |= {"error": {"z": 1e-2}, "envelope": {"z": 1e-2}}
+    off = replace(study.points[0], error={"z": 1e-2}, envelope={"z": 1e-2})
+    study = replace(study, points=[off, study.points[1]])
     assert "no step of it holds that" in claims.contradictions(study)[0]
 
 
@@ -99,7 +83,7 @@ def test_a_cost_that_is_not_clearly_higher_leaves_a_claim_undecided(tmp_path: Pa
         measured(FACTOR - 0.01),
         measured(10.0, STEADY[:3]),
         measured(10.0, STEADY, brief=True),
-        measured(10.0) | {"points": measured(10.0)["points"][1:]},
+        replace(measured(10.0), points=measured(10.0).points[1:]),
     ):
         assert claims.contradictions(study) == []
         assert "undecided" in claims.undecided(study)[0]
@@ -111,8 +95,8 @@ def test_a_cost_that_is_not_clearly_higher_leaves_a_claim_undecided(tmp_path: Pa
 def test_costs_within_each_others_noise_contradict_nothing(tmp_path: Path) -> None:
     """Two costs whose rounds overlap, 4.3 (4.2 to 4.7) against 4.5 (3.8 to 4.6) in ms, are undecided."""
     study = measured(1.0)
-    study["points"][0]["rounds"] = [4.47e-3, 3.79e-3, 4.59e-3, 4.5e-3, 4.4e-3, 4.3e-3]
-    study["points"][1]["rounds"] = [4.30e-3, 4.24e-3, 4.68e-3, 4.3e-3, 4.3e-3, 4.25e-3]
+    study.points[0].rounds[:] = [4.47e-3, 3.79e-3, 4.59e-3, 4.5e-3, 4.4e-3, 4.3e-3]
+    study.points[1].rounds[:] = [4.30e-3, 4.24e-3, 4.68e-3, 4.3e-3, 4.3e-3, 4.25e-3]
     claims = load_claims(written(tmp_path))
     assert claims.contradictions(study) == []
     assert len(claims.undecided(study)) == 1
@@ -135,16 +119,17 @@ because = "its rule has order 2"
 def test_steps_and_orders_are_judged_exactly_in_a_brief_study_too(tmp_path: Path) -> None:
     """The coarsest step that holds and the order hang on no clock: another one is a contradiction, however timed."""
     claims = load_claims(written(tmp_path, TEXT + EXACT))
-    budget = {"curve": "fast", "quantity": "z", "order": 2.0, "order_low": 1.97, "order_high": 2.03, "model_form": None}
-    study = measured(0.1, (1.0,), brief=True) | {"budgets": [budget]}
+    budget = invented_budget(curve="fast[formulation=only]", order=2.0, order_low=1.97, order_high=2.03)
+    study = measured(0.1, (1.0,), brief=True, budgets=[budget])
+    first = study.points[0]
     assert claims.contradictions(study) == []
-    coarser = [study["points"][0] | {"step": 2e-3, "id": 9, "rounds": []}, *study["points"]]
-    (sentence,) = claims.contradictions(study | {"points": coarser})
+    coarser = [replace(first, step=2e-3, id=9, rounds=[]), *study.points]
+    (sentence,) = claims.contradictions(replace(study, points=coarser))
     assert "the coarsest that does is 0.002" in sentence
-    (sentence,) = claims.contradictions(study | {"budgets": [budget | {"order_low": 0.9, "order_high": 1.1}]})
+    (sentence,) = claims.contradictions(replace(study, budgets=[replace(budget, order_low=0.9, order_high=1.1)]))
     assert "what shows is 0.9 to 1.1" in sentence
-    late = [study["points"][0] | {"status": "timeout", "id": 9}, *study["points"]]
-    assert claims.contradictions(study | {"points": late}) == []
+    late = [replace(first, status=Status.TIMEOUT, id=9), *study.points]
+    assert claims.contradictions(replace(study, points=late)) == []
 
 
 @pytest.mark.parametrize(

@@ -2,9 +2,11 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from typing import Any
 
 import pytest
+from invented import invented_budget, invented_study, measured_point, timed
 
 from proofroll.core.comparison import Tolerance
 from proofroll.core.errors import InputError
@@ -12,55 +14,34 @@ from proofroll.files.json_data import plain
 from proofroll.report.tradeoff_tables import answer_lines, front_tables
 from proofroll.studies.recommend import covers
 from proofroll.studies.recommend import recommend as recommended
+from proofroll.studies.tradeoff_records import Corner, MeasuredPoint, MeasuredQuantity, SparseRun, TradeoffStudy
 from proofroll.studies.wish import Wish
 
 
 def point(  # noqa: D103 -- one measured point
-    number: int, engine: str, cost: float, error: float | None, *, level: str = "engine constraint", **more: Any
-) -> dict[str, Any]:
-    formulation = more.pop("formulation", "only")
-    return {
+    number: int, engine: str, cost: float, error: float | None, *, formulation: str = "only", **more: Any
+) -> MeasuredPoint:
+    values: dict[str, Any] = {
         "id": number,
         "engine": engine,
-        "curve": f"{engine}[formulation={formulation}]",
-        "level": level,
         "settings": {"formulation": formulation, "preset": "matched", "dt": 10.0**-number},
-        "resolution": "dt",
         "step": 10.0**-number,
-        "status": "done",
-        "message": "reached 2 s",
         "error": {"z": error},
-        "envelope": {"z": error},
-        "seconds_per_second": cost,
-        "interval": [0.9 * cost, 1.1 * cost],
-        "confidence": 0.97,
-        "rounds": 6 * [cost],
         "corners": [corner(error)],
-    } | more
+    }
+    return measured_point(**(values | timed(cost) | more))
 
 
-def corner(error: float | None) -> dict[str, Any]:
+def corner(error: float | None) -> Corner:
     """One run at other parameters."""
     errors = {} if error is None else {"z": error}
     relative = {} if error is None else {"z": error / 0.1}
-    return {"parameters": {"speed": 6.0}, "errors": errors, "relative": relative, "message": "ended at 1 s"}
+    return Corner({"speed": 6.0}, errors, relative, "ended at 1 s")
 
 
-def study(*points: dict[str, Any], **more: Any) -> dict[str, Any]:
+def study(*points: MeasuredPoint, **more: Any) -> TradeoffStudy:
     """What a trade-off study stores."""
-    return {
-        "scene": "made",
-        "parameters": {},
-        "until": 2.0,
-        "every": 0.05,
-        "quantity": "z",
-        "quantities": {"z": {"unit": "m", "scale": 0.1, "truth_error_bar": 1e-13}},
-        "points": list(points),
-        "budgets": [],
-        "absent": {},
-        "over": {"speed": [2.0, 6.0]},
-        "measured": {"when": "now", "machine": {}, "versions": {}},
-    } | more
+    return invented_study(*points, **({"over": {"speed": [2.0, 6.0]}} | more))
 
 
 def wish(value: float, *, relative: bool = False, **more: Any) -> Wish:
@@ -68,7 +49,7 @@ def wish(value: float, *, relative: bool = False, **more: Any) -> Wish:
     return Wish("z", Tolerance(value, relative, "%" if relative else "m"), **more)
 
 
-def recommend(measured: dict[str, Any], wanted: Wish) -> dict[str, Any]:
+def recommend(measured: TradeoffStudy, wanted: Wish) -> dict[str, Any]:
     """The recommendation as JSON has it."""
     return dict(plain(recommended(measured, wanted)))
 
@@ -90,7 +71,7 @@ def test_the_cheapest_that_holds_with_margin() -> None:
 
 def test_what_holds_only_on_the_grid_of_samples_is_excluded() -> None:
     """A tolerance that many samples alone make good is no choice, and the reason names both intervals and the error."""
-    sparse = {"every": 1.0, "error": {"z": 3e-2}, "dense_error": {"z": 5e-10}, "message": "reached 2 s"}
+    sparse = SparseRun(1.0, {"z": 3e-2}, {"z": 5e-10}, "reached 2 s")
     lucky = point(1, "fast", 1e-3, 3e-2, sparse=sparse)
     answer = recommend(study(lucky, MIDDLE), wish(1e-3))
     assert answer["choice"]["engine"] == "middle"
@@ -99,9 +80,9 @@ def test_what_holds_only_on_the_grid_of_samples_is_excluded() -> None:
         "it holds only because its steps end at every sample: sampled every 1 s instead of 0.05 s, z"
     )
     assert "off by 0.03 m" in said
-    lost = lucky | {"sparse": sparse | {"error": {}, "message": "the steps became too short"}}
+    lost = replace(lucky, sparse=replace(sparse, error={}, message="the steps became too short"))
     assert "the steps became too short" in recommend(study(lost, MIDDLE), wish(1e-3))["first_failure"]["reason"]
-    honest = point(1, "fast", 1e-3, 1e-5, sparse=sparse | {"error": {"z": 1e-5}})
+    honest = point(1, "fast", 1e-3, 1e-5, sparse=replace(sparse, error={"z": 1e-5}))
     assert recommend(study(honest, MIDDLE), wish(1e-3))["choice"]["engine"] == "fast"
 
 
@@ -125,7 +106,7 @@ def test_a_percentage_is_of_the_scale() -> None:
 
 def test_a_percentage_of_what_has_no_size() -> None:
     """Where a quantity has no size, as the first slip of a ball that does not slip, a percentage of it is refused."""
-    sizeless = {"z": {"unit": "m", "scale": None, "truth_error_bar": 1e-13}}
+    sizeless = {"z": MeasuredQuantity("m", None, 1e-13)}
     with pytest.raises(InputError, match="z has no size here; give it in m"):
         recommend(study(FAST, MIDDLE, quantities=sizeless), wish(0.01, relative=True))
     assert recommend(study(FAST, MIDDLE, quantities=sizeless), wish(1e-3))["choice"]["engine"] == "middle"
@@ -220,7 +201,7 @@ def test_restricted_to_engines_settings_and_levels() -> None:
 
 def test_why_a_finer_step_would_not_do() -> None:
     """Where the limit of small steps is off by more than the tolerance, the reason says that no step would do."""
-    budgets = [{"curve": FAST["curve"], "quantity": "z", "model_form": 5e-3, "model_form_bar": 1e-5}]
+    budgets = [invented_budget(curve=FAST.curve, model_form=5e-3, model_form_bar=1e-5)]
     answer = recommend(study(FAST, MIDDLE, budgets=budgets), wish(1e-3))
     assert "no step would do" in answer["first_failure"]["reason"]
 
@@ -229,8 +210,8 @@ def test_ties_are_marked_on_the_front() -> None:
     """A line of the front whose cost cannot be told from that of a more accurate one is marked, and the mark named."""
     near = point(4, "near", 1.15e-2, 1e-5)
     for points, marked in (((FAST, MIDDLE, near, SLOW), ["middle"]), ((FAST, MIDDLE, SLOW), [])):
-        numbers = [p["id"] for p in points]
-        fronts = {"pareto": {"z": numbers}, "pareto_engines": {"z": numbers}}
+        numbers = [p.id for p in points]
+        fronts: dict[str, Any] = {"pareto": {"z": numbers}, "pareto_engines": {"z": numbers}}
         (table,) = front_tables(study(*points, **fronts), ["z"])
         names, costs = (list(table.columns[index].cells) for index in (0, 2))
         assert [str(name).split()[0] for name, cost in zip(names, costs, strict=True) if "≈" in str(cost)] == marked

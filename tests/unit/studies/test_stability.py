@@ -310,7 +310,14 @@ def claim(**more: Any) -> Claim:
 
 def side(**more: Any) -> Boundary:
     """A boundary of the made-up point."""
-    values = {"largest": None, "reached": True, "numbers": {}, "beyond": None, "failure": None, "silent": True}
+    values: dict[str, Any] = {
+        "largest": None,
+        "reached": True,
+        "numbers": {},
+        "beyond": None,
+        "failure": None,
+        "silent": True,
+    }
     return Boundary(**(values | {"error": None, "time": None, "message": None} | more))
 
 

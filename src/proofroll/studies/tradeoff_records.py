@@ -1,0 +1,204 @@
+"""What a trade-off is kept as, printed as, answered from and drawn from."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass, field
+from typing import Any
+
+from proofroll.running.case import Status
+from proofroll.studies.budget import Budget
+from proofroll.studies.study_identity import Measured
+
+
+@dataclass(frozen=True, kw_only=True)
+class MeasuredCost:
+    """What computing costs.
+
+    Attributes:
+        seconds_per_second: median of wall seconds per simulated second; None: not measured.
+        interval: lowest and highest, with ``confidence``; None where it was measured once.
+        rounds: the measurements, in the order of the rounds, which are those of all points: a ratio of two costs can
+            be taken round by round.
+        measurements: how many they are.
+    """
+
+    seconds_per_second: float | None = None
+    interval: tuple[float, float] | None = None
+    confidence: float | None = None
+    rounds: list[float] = field(default_factory=list)
+    measurements: int = 0
+
+    @property
+    def cost(self) -> float:
+        """``seconds_per_second``; infinite where it was not measured."""
+        return math.inf if self.seconds_per_second is None else self.seconds_per_second
+
+
+@dataclass(frozen=True)
+class SparseRun:
+    """The run of an adaptive step over few samples.
+
+    Attributes:
+        every: sampling interval [s].
+        error: largest distance from the truth, by observable.
+        dense_error: that of the run over many samples.
+        message: how the run ended.
+    """
+
+    every: float
+    error: dict[str, float | None]
+    dense_error: dict[str, float | None]
+    message: str
+
+
+@dataclass(frozen=True)
+class Corner:
+    """One run of a point at other parameters.
+
+    Attributes:
+        parameters: where.
+        errors: largest distance from the truth, by observable; empty if the run did not reach the end.
+        relative: the same in parts of the observable's scale there.
+        message: how the run ended.
+    """
+
+    parameters: dict[str, float]
+    errors: dict[str, float]
+    relative: dict[str, float]
+    message: str
+
+    def off(self, relative: bool) -> dict[str, float]:
+        """``relative`` or ``errors``."""
+        return self.relative if relative else self.errors
+
+
+@dataclass(frozen=True, kw_only=True)
+class MeasuredPoint(MeasuredCost):
+    """One engine with complete settings.
+
+    Attributes:
+        id: number of the point in its study.
+        engine, curve, level, settings, resolution, step, order, caveat: which, and what it says of itself.
+        status, message, host: how the run ended, and on which machine of a cluster.
+        error: largest distance from the truth, by observable; None: not finite.
+        envelope: the largest of that and of the next finer runs.
+        sparse: the run over few samples; None with a fixed step.
+        corners: the runs over the range of parameters; None: there are none.
+    """
+
+    id: int
+    engine: str
+    curve: str
+    level: str | None
+    settings: dict[str, Any]
+    resolution: str | None
+    step: float | None
+    order: int | None
+    caveat: str = ""
+    status: Status
+    message: str
+    host: str = ""
+    error: dict[str, float | None]
+    envelope: dict[str, float | None]
+    sparse: SparseRun | None = None
+    corners: list[Corner] | None
+
+    def held(self, quantity: str) -> float:
+        """Its envelope of an observable; infinite where that is not finite."""
+        error = self.envelope.get(quantity)
+        return math.inf if error is None else error
+
+
+@dataclass(frozen=True)
+class MeasuredQuantity:
+    """An observable: its unit, what a percentage of it refers to, and the truth's error bar; None: there is none."""
+
+    unit: str
+    scale: float | None
+    truth_error_bar: float | None
+
+
+@dataclass(frozen=True)
+class DroppedStep:
+    """A step or tolerance of an engine with which there is no run, and why."""
+
+    engine: str
+    step: float
+    reason: str
+
+
+@dataclass(frozen=True, kw_only=True)
+class CurveBudget(Budget):
+    """The error budget of a curve, whether it contradicts the declared order, and what it says in one sentence."""
+
+    engine: str
+    curve: str
+    contradicts_declaration: bool
+    sentence: str
+
+
+@dataclass(frozen=True, kw_only=True)
+class TruthCost(MeasuredCost):
+    """What the truth costs, and by which route it was computed."""
+
+    route: str
+
+
+@dataclass(frozen=True)
+class TradeoffJudged:
+    """What the claims of a file say of a study, as sentences."""
+
+    file: str | None = None
+    contradictions: list[str] = field(default_factory=list)
+    undecided: list[str] = field(default_factory=list)
+
+
+@dataclass(frozen=True, kw_only=True)
+class TradeoffStudy:
+    """Error against cost.
+
+    Attributes:
+        scene, parameters, until, every, quantity: what was swept, and sampled how often [s].
+        quantities: the observables of the truth.
+        points: of all curves, coarse first.
+        dropped: what was not run.
+        absent: engine -> why it has no curve.
+        budgets: what the errors consist of.
+        pareto: observable -> numbers of the points that nothing beats, cheapest first.
+        pareto_engines: the same without solutions of the scene's own equations.
+        truth: its cost.
+        over: parameter -> values; the range over which the best points were checked.
+        findings: what stands out, as sentences.
+        brief: whether speeds were measured less often.
+        measured: when, where and with what.
+        engines: those to which it is restricted; none: all.
+        claims: what was held against it.
+    """
+
+    study: str = "tradeoff"
+    scene: str
+    parameters: dict[str, float]
+    until: float
+    every: float
+    quantity: str
+    quantities: dict[str, MeasuredQuantity]
+    points: list[MeasuredPoint]
+    dropped: list[DroppedStep] = field(default_factory=list)
+    absent: dict[str, str]
+    budgets: list[CurveBudget]
+    pareto: dict[str, list[int]]
+    pareto_engines: dict[str, list[int]]
+    truth: TruthCost
+    over: dict[str, list[float]]
+    findings: list[str]
+    brief: bool
+    measured: Measured
+    engines: list[str] = field(default_factory=list)
+    claims: TradeoffJudged = field(default_factory=TradeoffJudged)
+
+    def front(self, key: str, quantity: str) -> list[MeasuredPoint]:
+        """The points of ``pareto`` or ``pareto_engines`` for an observable, cheapest first; none where it has none."""
+        numbers = {"pareto": self.pareto, "pareto_engines": self.pareto_engines}[key].get(quantity, [])
+        by_number = {point.id: point for point in self.points}
+        return [by_number[number] for number in numbers]
