@@ -11,6 +11,7 @@ from rich.console import Console
 from robot_templates import inertial, urdf
 
 from proofroll.robots.layers import LAYERS
+from proofroll.robots.records import DrawnRobot, HeldLayer, ImporterRow, RobotCheck, UsedTruth
 from proofroll.robots.terminal import WIDTH, table
 
 Proofroll = Callable[..., tuple[int, str, str]]
@@ -55,13 +56,16 @@ def test_a_difference(proofroll: Proofroll, tmp_path: Path) -> None:
 
 def test_wide_table(tmp_path: Path) -> None:
     """A row in which every layer fails, and a long name, fit into 80 columns without a number cut off."""
-    layers = {
-        layer: {"difference": 1.234e-12 * 7**n, "tolerance": 0.0, "holds": False} for n, layer in enumerate(LAYERS)
-    }
-    row = {"engine": "pybullet[inertia_from_file=false]", "version": "3.2.7", "status": "differs", "layers": layers}
-    refused = {"engine": "mujoco", "version": "4.0.0", "status": "crashed", "layers": {}}
+    layers = {layer: HeldLayer(1.234e-12 * 7**n, 0.0, False) for n, layer in enumerate(LAYERS)}
+    name = "pybullet[inertia_from_file=false]"
+    rows = [
+        ImporterRow(engine=name, version="3.2.7", status="differs", layers=layers),
+        ImporterRow(engine="mujoco", version="4.0.0", status="crashed"),
+    ]
+    truth, robot = UsedTruth("us", 0.0, 1, 0, 1), DrawnRobot("robot", [], {})
+    content = RobotCheck("robot.urdf", "urdf", "fixed", [], truth, LAYERS, rows, robot)
     with (tmp_path / "table.txt").open("w+") as text:
-        Console(file=text, width=WIDTH).print(table({"layers": LAYERS, "engines": [row, refused]}))
+        Console(file=text, width=WIDTH).print(table(content))
         text.seek(0)
         lines = text.read().splitlines()
     assert max(map(len, lines)) <= 80

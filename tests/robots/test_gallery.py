@@ -9,7 +9,9 @@ from pathlib import Path
 import pytest
 
 from proofroll.core.errors import InputError
+from proofroll.robots.explain import RobotCause
 from proofroll.robots.gallery import locate, outcome, read_gallery
+from proofroll.robots.records import HeldLayer, ImporterRow
 
 Proofroll = Callable[..., tuple[int, str, str]]
 
@@ -36,10 +38,12 @@ def test_unknown_cause(tmp_path: Path) -> None:
 
 def test_outcomes() -> None:
     """What an engine does is its causes in order, and whether something stays open."""
-    row = {"layers": {"mass": {}}, "causes": [{"id": "b"}, {"id": "a"}, {"id": "b"}], "unexplained": "bias"}
+    causes = [RobotCause(name, name, "mass", 1.0, 0.0, "", "") for name in "bab"]
+    layers = {"mass": HeldLayer(1.0, 0.0, False)}
+    row = ImporterRow(engine="one", status="differs", layers=layers, causes=causes, unexplained="bias")
     assert outcome(row) == ["b", "a", "open"]
-    assert outcome({"layers": {}, "status": "refused"}) == ["refuses"]
-    assert outcome({"layers": {}, "status": "timeout"}) == ["timeout"]
+    assert outcome(ImporterRow(engine="one", status="refused")) == ["refuses"]
+    assert outcome(ImporterRow(engine="one", status="timeout")) == ["timeout"]
 
 
 def test_unknown_robot(proofroll: Proofroll) -> None:

@@ -6,7 +6,6 @@ import dataclasses
 import re
 from collections.abc import Callable
 from pathlib import Path
-from typing import Any
 
 import numpy as np
 import pytest
@@ -20,6 +19,7 @@ from proofroll.robots.judging import judged
 from proofroll.robots.layers import RobotTruth
 from proofroll.robots.model import Robot
 from proofroll.robots.protocol import Reading, Request
+from proofroll.robots.records import ImporterRow
 from proofroll.robots.robot_file import RobotFile, open_robot
 from proofroll.robots.states import random_states
 from proofroll.robots.two_formulations import passive, poses
@@ -127,12 +127,12 @@ def test_real_engines(
     request = _request(written, file, truth, reading.options_of(spec.options, spec.name))
     answer = reading.ask(robot_workers(spec.name), spec.name, request, place, 60)
     row = judged(file, truth, 1e-14, spec, answer, truth.torques())
-    assert row["refused"] is None
-    assert row["unexplained"] is None, row["layers"]
-    assert {cause["id"] for cause in row["causes"]} == expected
-    assert row["status"] == ("explained" if expected else "holds")
-    for cause in row["causes"]:
-        assert cause["after"] < cause["before"]
+    assert row.refused is None
+    assert row.unexplained is None, row.layers
+    assert {cause.id for cause in row.causes} == expected
+    assert row.status == ("explained" if expected else "holds")
+    for cause in row.causes:
+        assert cause.after < cause.before
 
 
 def _defect(pattern: str, instead: str) -> Callable[[str], str]:
@@ -239,7 +239,7 @@ def _held(robot: Robot, truth: RobotTruth) -> Reading:
     )
 
 
-def _row(text: str, change: Callable[[str], str], base: str, folder: Path) -> dict[str, Any]:
+def _row(text: str, change: Callable[[str], str], base: str, folder: Path) -> ImporterRow:
     files = []
     for name, content in (("true", text), ("held", change(text))):
         path = folder / f"{name}.urdf"
@@ -258,18 +258,18 @@ def _row(text: str, change: Callable[[str], str], base: str, folder: Path) -> di
 def test_planted_causes(text: str, change: Callable[[str], str], expected: set[str], base: str, tmp_path: Path) -> None:
     """A known cause that is planted is named, whatever the engine is called, and nothing else is."""
     row = _row(text, change, base, tmp_path)
-    assert {cause["id"] for cause in row["causes"]} == expected
-    assert row["unexplained"] is None
-    assert row["status"] == ("explained" if expected else "holds")
+    assert {cause.id for cause in row.causes} == expected
+    assert row.unexplained is None
+    assert row.status == ("explained" if expected else "holds")
 
 
 @pytest.mark.parametrize(("change", "layer"), [row[1:] for row in UNKNOWN], ids=[row[0] for row in UNKNOWN])
 def test_unknown_causes(change: Callable[[str], str], layer: str, tmp_path: Path) -> None:
     """A difference that no hypothesis knows is found at its layer and called unexplained."""
     row = _row(urdf(tip=FLAT, first=BOTH, third=DAMPED), change, "fixed", tmp_path)
-    assert row["status"] == "differs"
-    assert row["unexplained"] == layer
-    assert row["causes"] == []
+    assert row.status == "differs"
+    assert row.unexplained == layer
+    assert row.causes == ()
 
 
 LOADED = '<joint name="k2" axis="1 0 0" pos="0.02 0 0.1" armature="0.3"/>'
@@ -321,8 +321,8 @@ def test_planted_causes_in_mjcf(
     truth = RobotTruth.of(robots[0], random_states(robots[0], 5, 1))
     answer = reading.ReaderAnswer("1", "", {}, _held(robots[1], truth), "")
     row = judged(files[0], truth, 1e-14, parse_engine("planted"), answer, truth.torques())
-    assert [found["id"] for found in row["causes"]] == [cause]
-    assert row["status"] == "explained"
+    assert [found.id for found in row.causes] == [cause]
+    assert row.status == "explained"
 
 
 def test_free_base_that_was_fixed(tmp_path: Path) -> None:
@@ -334,5 +334,5 @@ def test_free_base_that_was_fixed(tmp_path: Path) -> None:
     truth = RobotTruth.of(robot, random_states(robot, 5, 1))
     answer = reading.ReaderAnswer("1", "", {}, dataclasses.replace(_held(held, truth)), "")
     row = judged(free, truth, 1e-14, parse_engine("planted"), answer, truth.torques())
-    assert [cause["id"] for cause in row["causes"]] == ["free_base_is_fixed"]
-    assert row["status"] == "explained"
+    assert [cause.id for cause in row.causes] == ["free_base_is_fixed"]
+    assert row.status == "explained"

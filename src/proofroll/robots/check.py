@@ -8,7 +8,6 @@ import tempfile
 from collections.abc import Callable, Sequence
 from concurrent.futures import ThreadPoolExecutor
 from pathlib import Path
-from typing import Any
 
 import numpy as np
 
@@ -16,10 +15,11 @@ from proofroll.core.errors import InputError, Missing
 from proofroll.core.plugins import EngineSpec, parse_engine, place_of, plain_name
 from proofroll.robots import reading
 from proofroll.robots.body_recursion import body_recursion
-from proofroll.robots.judging import TIME_LIMIT, judged, meaning, unread
+from proofroll.robots.judging import TIME_LIMIT, judged, meaning
 from proofroll.robots.layers import LAYERS, RobotTruth
 from proofroll.robots.lint import lint
 from proofroll.robots.protocol import Request
+from proofroll.robots.records import DrawnBody, DrawnJoint, DrawnRobot, ImporterRow, RobotCheck, UsedTruth
 from proofroll.robots.robot_file import RobotFile, open_robot
 from proofroll.robots.states import RobotStates, random_states
 from proofroll.robots.two_formulations import poses
@@ -37,7 +37,7 @@ def check(
     seed: int = 0,
     time_limit: float = TIME_LIMIT,
     progress: Callable[[str], None] | None = None,
-) -> dict[str, Any]:
+) -> RobotCheck:
     """Reads a file with every engine and compares what each holds with what the file says.
 
     Args:
@@ -50,18 +50,18 @@ def check(
         progress: called with the name of an engine that has been asked.
 
     Returns:
-        plain data: file, kind, base, lint, truth, robot, engines.
+        everything that is said of it.
 
     Raises:
         InputError: the file, an engine or an option is wrong.
     """
-    specs = [parse_engine(text) for text in engines or reading.reader_names()]
-    for spec in specs:
+    asked = []
+    for spec in map(parse_engine, engines or reading.reader_names()):
         if not place_of(spec.name) and spec.name not in reading.reader_names():
             raise InputError(
                 "engine", spec.name, f"it reads no robot files; choose one of {', '.join(reading.reader_names())}"
             )
-        reading.options_of(spec.options, spec.name)
+        asked.append((spec, reading.options_of(spec.options, spec.name)))
     file = open_robot(path, base)
     with tempfile.TemporaryDirectory() as name:
         folder = Path(name)
@@ -77,50 +77,46 @@ def check(
         children = {joint.name: joint.child for joint in robot.moving}
         request = Request(written, file.kind, base, BASE_JOINT, {}, children, sampled, torques, robot.gravity, robot)
 
-        def one(item: tuple[int, EngineSpec]) -> dict[str, Any]:
-            place = folder / str(item[0])
-            place.mkdir()
-            options = reading.options_of(item[1].options, item[1].name)
-            row = _row(
-                file,
-                truth,
-                bar,
-                dataclasses.replace(request, options=options),
-                item[1],
-                place,
-                time_limit,
-                bool(engines),
-            )
+        def row(spec: EngineSpec, options: dict[str, bool]) -> ImporterRow:
+            own = dataclasses.replace(request, options=options)
+            try:
+                with start(spec.name) as worker, tempfile.TemporaryDirectory(dir=folder) as place:
+                    answer = reading.ask(worker, spec.name, own, Path(place), time_limit)
+            except Missing as error:
+                if engines:
+                    raise
+                return ImporterRow(engine=str(spec), status="missing", refused=str(error))
+            except WorkerDied as error:
+                return ImporterRow(engine=str(spec), status=str(error.status), refused=str(error))
+            found = judged(file, truth, bar, spec, answer, torques)
+            if _is_another_version(spec, answer.version, compiler):
+                found = dataclasses.replace(found, says=f"{found.says}; held against {by}".removeprefix("; "))
+            return found
+
+        def told(item: tuple[EngineSpec, dict[str, bool]]) -> ImporterRow:
+            found = row(*item)
             if progress is not None:
-                progress(str(item[1]))
-            return row
+                progress(found.engine)
+            return found
 
         with ThreadPoolExecutor(os.cpu_count() or 1) as pool:
-            rows = list(pool.map(one, enumerate(specs)))
-        for row in rows:
-            _say_whose_truth(row, compiler, by)
-    return {
-        "file": str(path),
-        "kind": file.kind,
-        "base": base if file.kind == "urdf" else "as in the file",
-        "lint": [dataclasses.asdict(finding) for finding in (*file.findings, *lint(file, robot))],
-        "truth": {"by": by, "difference": bar, "states": states, "seed": seed, "velocities": robot.dofs},
-        "layers": LAYERS,
-        "engines": rows,
-        "robot": _skeleton(truth),
-    }
+            rows = list(pool.map(told, asked))
+    return RobotCheck(
+        file=str(path),
+        kind=file.kind,
+        base=base if file.kind == "urdf" else "as in the file",
+        lint=[*file.findings, *lint(file, robot)],
+        truth=UsedTruth(by, bar, states, seed, robot.dofs),
+        layers=LAYERS,
+        engines=rows,
+        robot=_drawn(truth),
+    )
 
 
-def _say_whose_truth(row: dict[str, Any], compiler: str, by: str) -> None:
-    """An engine that defines the format is held against itself, unless it is of another version."""
-    engine, _, version = compiler.partition(" ")
-    if plain_name(parse_engine(row["engine"]).name) == engine and row["version"] not in {None, version}:
-        row["says"] = f"{row['says']}; held against {by}".removeprefix("; ")
-
-
-def differs(row: dict[str, Any]) -> bool:
-    """Whether an engine does not hold the model that the file describes: another one, or none."""
-    return row["status"] not in {"holds", "missing"}
+def _is_another_version(spec: EngineSpec, version: str, compiler: str) -> bool:
+    """Whether the engine defines the format, and its meaning here is that of another version of it."""
+    engine, _, compiled_by = compiler.partition(" ")
+    return plain_name(spec.name) == engine and version != compiled_by
 
 
 def _fixed_hint(file: RobotFile) -> str:
@@ -134,44 +130,16 @@ def _bar(truth: RobotTruth) -> float:
     return max(float(np.abs(a - b).max() / (np.abs(b).max() or 1.0)) for a, b in pairs)
 
 
-def _row(
-    file: RobotFile,
-    truth: RobotTruth,
-    bar: float,
-    request: Request,
-    spec: EngineSpec,
-    folder: Path,
-    limit: float,
-    asked: bool,
-) -> dict[str, Any]:
-    """One engine."""
-    try:
-        with start(spec.name) as worker:
-            answer = reading.ask(worker, spec.name, request, folder, limit)
-    except Missing as error:
-        if asked:
-            raise
-        return unread(spec, "missing", str(error))
-    except WorkerDied as error:
-        return unread(spec, str(error.status), str(error))
-    return judged(file, truth, bar, spec, answer, dict(request.torques))
-
-
-def _skeleton(truth: RobotTruth) -> dict[str, Any]:
-    """Where every body is at rest coordinates, for a drawing."""
+def _drawn(truth: RobotTruth) -> DrawnRobot:
+    """Where every body is at rest coordinates."""
     robot = truth.robot
     zero = {joint.name: np.zeros(1) for joint in robot.moving}
     upright = {joint.name: np.eye(3)[None] for joint in robot.moving}
     origin = {joint.name: np.zeros((1, 3)) for joint in robot.moving}
     still = {joint.name: np.zeros((1, joint.dofs)) for joint in robot.moving}
     placed = poses(robot, RobotStates(zero, upright, origin, still, still))
-    return {
-        "name": robot.name,
-        "joints": [
-            {"name": joint.name, "kind": joint.kind, "parent": joint.parent, "child": joint.child}
-            for joint in robot.joints
-        ],
-        "bodies": {
-            name: {"position": placed[name][0][0].tolist(), "mass": body.mass} for name, body in robot.bodies.items()
-        },
-    }  # fmt: skip
+    return DrawnRobot(
+        robot.name,
+        [DrawnJoint(joint.name, joint.kind, joint.parent, joint.child) for joint in robot.joints],
+        {name: DrawnBody(placed[name][0][0].tolist(), body.mass) for name, body in robot.bodies.items()},
+    )

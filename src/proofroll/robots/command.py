@@ -29,7 +29,6 @@ def check(
         check_text(str(file), as_json)
         return
     from proofroll.robots.check import check as checked
-    from proofroll.robots.check import differs
     from proofroll.robots.terminal import WIDTH, check_parts
 
     with options.progress_bar("engines") as advance:
@@ -43,12 +42,12 @@ def check(
         from proofroll.robots.page import page
         from proofroll.running.store import write_text
 
-        write_text(out / "check.html", page(plain(content)))
+        write_text(out / "check.html", page(content))
         write_text(out / "check.json", json.dumps(plain(content), indent=1, ensure_ascii=False))
     options.show(content, as_json, lambda: check_parts(content), widest=WIDTH)
-    if any(differs(row) for row in content["engines"]):
+    if any(row.differs for row in content.engines):
         raise typer.Exit(options.CONTRADICTED)
-    raise typer.Exit(options.OK if any(row["layers"] for row in content["engines"]) else options.ENGINE)
+    raise typer.Exit(options.OK if any(row.layers for row in content.engines) else options.ENGINE)
 
 
 def robots(
@@ -64,6 +63,6 @@ def robots(
     with options.progress_bar("robots") as advance:
         content = gallery(name or (), engine or (), progress=advance, cluster=options.new_cluster(scheduler))
     options.show(content, as_json, lambda: gallery_lines(content))
-    if any(row["unexpected"] for row in content["robots"]):
+    if any(row.unexpected for row in content.robots):
         raise typer.Exit(options.CONTRADICTED)
-    raise typer.Exit(options.OK if any(row["engines"] for row in content["robots"]) else options.ENGINE)
+    raise typer.Exit(options.OK if any(row.engines for row in content.robots) else options.ENGINE)

@@ -7,7 +7,7 @@ from collections.abc import Callable, Sequence
 from functools import partial
 from importlib.metadata import PackageNotFoundError, files
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 from proofroll.core.errors import InputError
 from proofroll.core.plugins import parse_engine
@@ -16,6 +16,7 @@ from proofroll.files.toml import read_toml
 from proofroll.robots import reading
 from proofroll.robots.check import check
 from proofroll.robots.hypotheses import hypotheses
+from proofroll.robots.records import GalleryContent, GalleryReading, GalleryRow, ImporterRow
 
 if TYPE_CHECKING:
     from proofroll.running.cluster import Cluster
@@ -80,7 +81,7 @@ def gallery(
     engines: Sequence[str] = (),
     progress: Callable[[str], None] | None = None,
     cluster: Cluster | None = None,
-) -> dict[str, Any]:
+) -> GalleryContent:
     """Checks robots, each with every engine that its entry expects something of and that is installed.
 
     Args:
@@ -90,7 +91,7 @@ def gallery(
         cluster: where the robots are checked; None: here.
 
     Returns:
-        plain data: for every robot its file, what each engine does, and what of that was not expected.
+        for every robot its file, what each engine does, and what of that was not expected.
 
     Raises:
         InputError: there is no such robot or engine.
@@ -103,41 +104,31 @@ def gallery(
     rows = []
     wanted, row = [entry for entry in entries if not names or entry.name in names], partial(_row, tuple(engines))
     for host, found in cluster.map(row, wanted) if cluster else (("", row(entry)) for entry in wanted):
-        rows.append(found | {"ran_on": host})
+        rows.append(dataclasses.replace(found, ran_on=host))
         if progress is not None:
-            progress(found["name"])
-    return {"robots": rows}
+            progress(found.name)
+    return GalleryContent(rows)
 
 
-def _row(engines: Sequence[str], entry: Entry) -> dict[str, Any]:
+def _row(engines: Sequence[str], entry: Entry) -> GalleryRow:
     path = locate(entry)
-    row: dict[str, Any] = {
-        "name": entry.name,
-        "package": entry.package,
-        "file": None if path is None else str(path),
-        "engines": [],
-        "unexpected": [],
-    }
     wanted = [name for name in entry.engines if parse_engine(name).name in reading.reader_names()]
     if engines:
         wanted = [name for name in wanted if name in engines or parse_engine(name).name in engines]
     if path is None or not wanted:
-        return row
-    found = check(path, wanted, base=entry.base)
-    for item in found["engines"]:
+        return GalleryRow(entry.name, entry.package, None if path is None else str(path))
+    readings, unexpected = [], []
+    for item in check(path, wanted, base=entry.base).engines:
         does = outcome(item)
-        row["engines"].append(
-            {key: item[key] for key in ("engine", "version", "status", "causes", "refused")} | {"does": does}
-        )
-        if item["status"] != "missing" and set(does) != set(entry.engines[item["engine"]]):
-            expected = ", ".join(entry.engines[item["engine"]]) or "to hold the file"
-            what = ", ".join(does) or "holds the file"
-            row["unexpected"].append(f"{item['engine']} {item['version'] or ''}: expected {expected}; found {what}")
-    return row
+        readings.append(GalleryReading(item.engine, item.version, item.status, item.causes, item.refused, does))
+        if item.status != "missing" and set(does) != set(entry.engines[item.engine]):
+            expected = ", ".join(entry.engines[item.engine]) or "to hold the file"
+            unexpected.append(f"{item.named}: expected {expected}; found {', '.join(does) or 'holds the file'}")
+    return GalleryRow(entry.name, entry.package, str(path), readings, unexpected)
 
 
-def outcome(row: dict[str, Any]) -> list[str]:
+def outcome(row: ImporterRow) -> list[str]:
     """What an engine does, as a gallery expects it."""
-    if not row["layers"]:
-        return [REFUSES] if row["status"] == "refused" else [row["status"]]
-    return [*dict.fromkeys(cause["id"] for cause in row["causes"]), *([OPEN] if row["unexplained"] else [])]
+    if not row.layers:
+        return [REFUSES] if row.status == "refused" else [row.status]
+    return [*dict.fromkeys(cause.id for cause in row.causes), *([OPEN] if row.unexplained else [])]

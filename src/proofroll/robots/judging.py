@@ -6,7 +6,6 @@ import contextlib
 import dataclasses
 import tempfile
 from pathlib import Path
-from typing import Any
 from xml.etree.ElementTree import Element, tostring
 
 import numpy as np
@@ -17,6 +16,8 @@ from proofroll.robots import reading
 from proofroll.robots.explain import explain
 from proofroll.robots.layers import LAYERS, TOLERANCE, RobotTruth, differences
 from proofroll.robots.model import Array, Robot
+from proofroll.robots.protocol import Reading
+from proofroll.robots.records import HeldLayer, ImporterRow
 from proofroll.robots.robot_file import RobotFile
 from proofroll.robots.urdf import read_urdf
 from proofroll.running.process import Worker, WorkerDied
@@ -27,12 +28,6 @@ TIME_LIMIT = 120.0
 _MARGIN = 10.0
 
 
-def unread(spec: EngineSpec, status: str, why: str) -> dict[str, Any]:
-    """The row of an engine that holds nothing."""
-    row: dict[str, Any] = {"engine": str(spec), "version": None, "status": status, "refused": why, "says": ""}
-    return row | {"remarks": [], "layers": {}, "causes": [], "unexplained": None, "offending": []}
-
-
 def judged(
     file: RobotFile,
     truth: RobotTruth,
@@ -40,7 +35,7 @@ def judged(
     spec: EngineSpec,
     answer: reading.ReaderAnswer,
     torques: dict[str, Array],
-) -> dict[str, Any]:
+) -> ImporterRow:
     """The row of an engine that answered.
 
     Args:
@@ -51,28 +46,30 @@ def judged(
         answer: what it holds, or why it refused.
         torques: by joint, that the forward dynamics were asked for.
     """
-    row = unread(spec, "refused", answer.refused) | {"version": answer.version, "says": answer.says}
+    row = ImporterRow(
+        engine=str(spec), status="refused", version=answer.version, refused=answer.refused, says=answer.says
+    )
     if answer.reading is None:
         return row
     tolerances = {layer: max(answer.tolerances.get(layer, TOLERANCE), _MARGIN * bar) for layer in LAYERS}
     tolerances["joints"] = 0.0
     found = differences(truth, torques, answer.reading)
     layers = {
-        layer: {"difference": value, "tolerance": tolerances[layer], "holds": bool(value <= tolerances[layer])}
-        for layer, value in found.items()
+        layer: HeldLayer(value, tolerances[layer], bool(value <= tolerances[layer])) for layer, value in found.items()
     }
     recompiled = _Recompiler(file)
     causes, unexplained = explain(file, truth, torques, answer.reading, plain_name(spec.name), tolerances, recompiled)
-    holds = all(item["holds"] for item in layers.values())
-    return row | {
-        "status": "holds" if holds else ("differs" if unexplained else "explained"),
-        "refused": None,
-        "remarks": list(answer.reading.remarks),
-        "layers": layers,
-        "causes": [dataclasses.asdict(cause) for cause in causes],
-        "unexplained": unexplained,
-        "offending": _offending(truth, answer.reading),
-    }
+    holds = all(layer.holds for layer in layers.values())
+    return dataclasses.replace(
+        row,
+        status="holds" if holds else ("differs" if unexplained else "explained"),
+        refused=None,
+        remarks=answer.reading.remarks,
+        layers=layers,
+        causes=causes,
+        unexplained=unexplained,
+        offending=_offending(truth, answer.reading),
+    )
 
 
 class _Recompiler:
@@ -95,7 +92,7 @@ class _Recompiler:
         return None
 
 
-def _offending(truth: RobotTruth, held: Any) -> list[str]:
+def _offending(truth: RobotTruth, held: Reading) -> list[str]:
     """Joints whose carried body an engine holds with another mass, centre of mass or inertia, or lacks."""
     groups = truth.robot.groups
     found = [name for name in groups if name not in held.joints]

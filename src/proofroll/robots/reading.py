@@ -23,6 +23,8 @@ from proofroll.running.loading import here
 from proofroll.running.process import Worker
 
 _BY_JOINT = ("mass", "com", "inertia", "position", "rotation")
+# What no importer raises, but a mistake in a reader does.
+_OF_A_READER = (AttributeError, TypeError, NameError, LookupError, ImportError)
 _ARRAYS = ("M", "g", "h", "inverse", "forward")
 
 
@@ -77,7 +79,7 @@ def ask(worker: Worker, engine: str, request: Request, folder: Path, time_limit:
     """
     asked, arrays = folder / "request.json", folder / "answer.npz"
     asked.write_text(json.dumps(plain(request) | {"path": str(request.path)}), encoding="utf-8")
-    told = worker.request(_call("read", engine=engine, asked=str(asked), arrays=str(arrays)), time_limit)
+    told = worker.request(_call(read_robot, engine=engine, asked=str(asked), arrays=str(arrays)), time_limit)
     reading = None
     if not told["refused"]:
         with np.load(arrays, allow_pickle=False) as found:
@@ -95,16 +97,10 @@ def read_robot(engine: str, asked: str, arrays: str) -> dict[str, Any]:
 
     reader = load_reader(here(engine))
     content = json.loads(Path(asked).read_text(encoding="utf-8"))
-    request = Request(
-        **content
-        | {
-            "path": Path(content["path"]),
-            "states": states_from(content["states"]),
-            "robot": robot_from(content["robot"]),
-        }
-        | {"torques": {name: np.array(rows) for name, rows in content["torques"].items()}}
-        | {"gravity": np.array(content["gravity"])}
-    )
+    content["path"], content["gravity"] = Path(content["path"]), np.array(content["gravity"])
+    content["states"], content["robot"] = states_from(content["states"]), robot_from(content["robot"])
+    content["torques"] = {name: np.array(rows) for name, rows in content["torques"].items()}
+    request = Request(**content)
     for option in request.options:
         if option not in reader.options:
             known = ", ".join(reader.options) or "none"
@@ -116,13 +112,7 @@ def read_robot(engine: str, asked: str, arrays: str) -> dict[str, Any]:
         reading = reader.read(request)
     except Refused as error:
         return told | {"refused": str(error)}
-    except (
-        AttributeError,
-        TypeError,
-        NameError,
-        LookupError,
-        ImportError,
-    ) as error:  # an importer raises none of these
+    except _OF_A_READER as error:
         return {"error": "crashed", "message": f"the reader of {engine} failed: {one_line(error)}"}
     except Exception as error:  # whatever an importer raises is its refusal
         return told | {"refused": one_line(error)}
@@ -135,27 +125,21 @@ def read_robot(engine: str, asked: str, arrays: str) -> dict[str, Any]:
 
 def compile_robot(path: str) -> dict[str, Any]:
     """The worker's side: what a file means in a format that an engine defines."""
+    from proofroll.running.worker import one_line
+
     for name in reader_names():
         try:
             reader = load_reader(name)
         except Missing:
             continue
         if getattr(reader, "defines", None) == "mjcf":
-            from proofroll.running.worker import one_line
-
+            by = f"{name} {reader.version()}"
             try:
-                return {"robot": plain(reader.compiled(Path(path))), "by": f"{name} {reader.version()}"}
+                return {"robot": plain(reader.compiled(Path(path))), "by": by}
             except Exception as error:
-                return {"robot": None, "by": f"{name} {reader.version()}", "message": one_line(error)}
-    return {
-        "robot": None,
-        "by": "",
-        "message": "no engine that defines MJCF is installed: pip install 'proofroll[mujoco]'",
-    }
-
-
-# What a worker can be asked about robots.
-STEPS: dict[str, Callable[..., dict[str, Any]]] = {"read": read_robot, "compile": compile_robot}
+                return {"robot": None, "by": by, "message": one_line(error)}
+    lacking = "no engine that defines MJCF is installed: pip install 'proofroll[mujoco]'"
+    return {"robot": None, "by": "", "message": lacking}
 
 
 def compiled(worker: Worker, file: RobotFile, written: Path, time_limit: float) -> tuple[Robot, str]:
@@ -165,7 +149,7 @@ def compiled(worker: Worker, file: RobotFile, written: Path, time_limit: float) 
         InputError: the engine that defines the format cannot compile it, or is not installed.
         WorkerDied: it crashed or took too long.
     """
-    told = worker.request(_call("compile", path=str(written)), time_limit)
+    told = worker.request(_call(compile_robot, path=str(written)), time_limit)
     if told["robot"] is None:
         raise InputError("file", str(file.path), f"it has no meaning: {told['by']} says: {told['message']}")
     return robot_from(told["robot"]), told["by"]
@@ -194,6 +178,6 @@ def options_of(given: Mapping[str, Any], engine: str) -> dict[str, bool]:
     return found
 
 
-def _call(step: str, **arguments: Any) -> dict[str, Any]:
-    """A request to a worker for one of :data:`STEPS`."""
-    return {"do": "call", "function": f"{__name__}:{STEPS[step].__name__}", "arguments": arguments}
+def _call(function: Callable[..., dict[str, Any]], **arguments: Any) -> dict[str, Any]:
+    """A request to a worker for one of the functions above."""
+    return {"do": "call", "function": f"{__name__}:{function.__name__}", "arguments": arguments}

@@ -4,13 +4,13 @@ from __future__ import annotations
 
 import textwrap
 from collections.abc import Iterator
-from typing import Any
 
 from rich.table import Column, Table
 from rich.text import Text
 
 from proofroll.report.labels import error
 from proofroll.report.screen import numeric, plain_table, unbroken
+from proofroll.robots.records import GalleryContent, HeldLayer, ImporterRow, RobotCheck
 
 WIDTH = 80
 SHORT = {
@@ -28,31 +28,31 @@ _MARKS = {"holds": "✓", "explained": "✗", "differs": "✗", "refused": "–"
 _COLOURS = {"holds": "green", "explained": "yellow", "differs": "red", "refused": "magenta"}
 
 
-def check_parts(content: dict[str, Any]) -> Iterator[Table | str]:
+def check_parts(content: RobotCheck) -> Iterator[Table | str]:
     """What was read, what each engine holds, and what that means."""
     yield from lines(content)
     yield table(content)
     yield from verdict_lines(content)
 
 
-def table(content: dict[str, Any]) -> Table:
+def table(content: RobotCheck) -> Table:
     """One line per engine: the difference at each layer that does not hold."""
-    layers = numeric(*(SHORT[layer] for layer in content["layers"]))
+    layers = numeric(*(SHORT[layer] for layer in content.layers))
     made = plain_table(Column("engine", no_wrap=True, max_width=20), *unbroken(""), *layers)
-    for row in content["engines"]:
-        style = _COLOURS.get(row["status"], "bold red")
+    for row in content.engines:
+        style = _COLOURS.get(row.status, "bold red")
         # A path would fill the column, and the version says which it is.
-        name = row["engine"].partition("@")[0] if "/" in row["engine"] else row["engine"]
-        label = Text(one_line(f"{name} {row['version'] or ''}"), overflow="ellipsis")
-        cells = (_cell(row["layers"].get(layer)) for layer in content["layers"])
-        made.add_row(label, Text(_MARKS.get(row["status"], "!"), style=style), *cells)
+        name = row.engine.partition("@")[0] if "/" in row.engine else row.engine
+        label = Text(one_line(f"{name} {row.version or ''}"), overflow="ellipsis")
+        cells = (_cell(row.layers.get(layer)) for layer in content.layers)
+        made.add_row(label, Text(_MARKS.get(row.status, "!"), style=style), *cells)
     return made
 
 
-def _cell(layer: dict[str, Any] | None) -> Text:
+def _cell(layer: HeldLayer | None) -> Text:
     if layer is None:
         return Text("–", style="dim")
-    return Text("✓", style="green") if layer["holds"] else Text(amount(layer["difference"], 1), style="red")
+    return Text("✓", style="green") if layer.holds else Text(amount(layer.difference, 1), style="red")
 
 
 def amount(value: float | None, digits: int = 2) -> str:
@@ -60,40 +60,39 @@ def amount(value: float | None, digits: int = 2) -> str:
     return f"{value:.0f}" if value in range(100) else error(value, digits)
 
 
-def lines(content: dict[str, Any]) -> Iterator[str]:
+def lines(content: RobotCheck) -> Iterator[str]:
     """What was read, what is wrong with the file, and every engine's causes, in lines of at most 80 characters."""
-    truth = content["truth"]
-    base = f", {content['base']} base" if content["kind"] == "urdf" else ""
-    said = f"{content['file']}: {content['kind'].upper()}{base}, {truth['velocities']} velocities, "
-    said += f"{truth['states']} states"
+    truth = content.truth
+    base = f", {content.base} base" if content.kind == "urdf" else ""
+    said = f"{content.file}: {content.kind.upper()}{base}, {truth.velocities} velocities, {truth.states} states"
     yield from wrapped(said)
-    yield from wrapped(f"true is {truth['by']}; its two formulations differ by {amount(truth['difference'])}")
-    for finding in content["lint"]:
-        yield from wrapped(f"{finding['level']}: {finding['where']}: {finding['what']}")
+    yield from wrapped(f"true is {truth.by}; its two formulations differ by {amount(truth.difference)}")
+    for finding in content.lint:
+        yield from wrapped(f"{finding.level}: {finding.where}: {finding.what}")
 
 
-def verdict_lines(content: dict[str, Any]) -> Iterator[str]:
+def verdict_lines(content: RobotCheck) -> Iterator[str]:
     """What each engine does, with proof."""
-    for row in content["engines"]:
+    for row in content.engines:
         for sentence in sentences(row):
             yield from wrapped(sentence)
 
 
-def sentences(row: dict[str, Any]) -> Iterator[str]:
+def sentences(row: ImporterRow) -> Iterator[str]:
     """What one engine does, a sentence each."""
-    name = f"{row['engine']} {row['version'] or ''}".strip()
-    if row["says"] and row["layers"]:
-        yield f"{name}: {row['says']}"
-    if row["refused"]:
-        yield f"{name} {_VERBS.get(row['status'], row['status'])}: {row['refused']}"
-    for cause in row["causes"]:
+    name = row.named
+    if row.says and row.layers:
+        yield f"{name}: {row.says}"
+    if row.refused:
+        yield f"{name} {_VERBS.get(row.status, row.status)}: {row.refused}"
+    for cause in row.causes:
         yield (
-            f"{name} differs in {cause['layer']} by {amount(cause['before'])}; explained by: {cause['name']}; "
-            f"with that hypothesis {amount(cause['after'])}. Do: {cause['remedy']}."
+            f"{name} differs in {cause.layer} by {amount(cause.before)}; explained by: {cause.name}; "
+            f"with that hypothesis {amount(cause.after)}. Do: {cause.remedy}."
         )
-    if row["unexplained"]:
-        layer = row["unexplained"]
-        yield f"{name} differs in {layer} by {amount(row['layers'][layer]['difference'])}; no known cause explains it."
+    if row.unexplained:
+        off = amount(row.layers[row.unexplained].difference)
+        yield f"{name} differs in {row.unexplained} by {off}; no known cause explains it."
 
 
 _VERBS = {"refused": "refuses the file", "missing": "is left out", "timeout": "took too long"}
@@ -109,22 +108,22 @@ def one_line(text: str) -> str:
     return " ".join("".join(c if c.isprintable() else " " for c in text).split())
 
 
-def gallery_lines(content: dict[str, Any]) -> Iterator[str]:
+def gallery_lines(content: GalleryContent) -> Iterator[str]:
     """A line or more for each robot: what every engine does, and what was not expected."""
-    for row in content["robots"]:
-        if row["file"] is None:
-            yield from wrapped(f"{row['name']}: not here: pip install {row['package']}")
+    for row in content.robots:
+        if row.file is None:
+            yield from wrapped(f"{row.name}: not here: pip install {row.package}")
             continue
-        does = (f"{item['engine']}: {', '.join(item['does']) or 'holds'}" for item in row["engines"])
-        yield from wrapped(f"{row['name']}: {'; '.join(does)}")
-        for sentence in row["unexpected"]:
-            yield from wrapped(f"!! {row['name']}: {sentence}")
-    unexpected = sum(len(row["unexpected"]) for row in content["robots"])
-    checked = [item for row in content["robots"] for item in row["engines"]]
-    named = sum(bool(item["causes"]) for item in checked)
-    unnamed = sum("open" in item["does"] for item in checked)
-    refused = sum(item["status"] == "refused" for item in checked)
+        does = (f"{item.engine}: {', '.join(item.does) or 'holds'}" for item in row.engines)
+        yield from wrapped(f"{row.name}: {'; '.join(does)}")
+        for sentence in row.unexpected:
+            yield from wrapped(f"!! {row.name}: {sentence}")
+    unexpected = sum(len(row.unexpected) for row in content.robots)
+    checked = [item for row in content.robots for item in row.engines]
+    named = sum(bool(item.causes) for item in checked)
+    unnamed = sum("open" in item.does for item in checked)
+    refused = sum(item.status == "refused" for item in checked)
     yield from wrapped(
-        f"{len(content['robots'])} robots, {len(checked)} readings: {named} differ for named causes, {unnamed} have an "
+        f"{len(content.robots)} robots, {len(checked)} readings: {named} differ for named causes, {unnamed} have an "
         f"open one, {refused} refused; {unexpected} otherwise than expected."
     )

@@ -7,6 +7,7 @@ from typing import Any
 
 from proofroll.core.plugins import plain_name
 from proofroll.robots.check import check
+from proofroll.robots.records import ImporterRow
 from proofroll.robots.terminal import amount
 from proofroll.running.asking import describe
 
@@ -22,16 +23,16 @@ def between(file: str, old: str, new: str) -> dict[str, Any]:
     Raises:
         InputError, Missing: see :func:`proofroll.robots.check.check`.
     """
-    rows = check(Path(file), [old, new])["engines"]
+    rows = check(Path(file), [old, new]).engines
     layers, changed = [], []
-    for layer in dict.fromkeys(name for row in rows for name in row["layers"]):
-        found = [row["layers"].get(layer) for row in rows]
-        held = [None if item is None else item["holds"] for item in found]
-        shown = [None if item is None else "holds" if item["holds"] else amount(item["difference"]) for item in found]
+    for layer in dict.fromkeys(name for row in rows for name in row.layers):
+        found = [row.layers.get(layer) for row in rows]
+        held = [None if item is None else item.holds for item in found]
+        shown = [None if item is None else "holds" if item.holds else amount(item.difference) for item in found]
         layers.append({"layer": layer, "old": shown[0], "new": shown[1], "changed": held[0] != held[1]})
         if held[0] != held[1]:
             changed.append(f"{layer}: {shown[0] or 'not offered'} → {shown[1] or 'not offered'}")
-    if rows[0]["status"] != rows[1]["status"]:
+    if rows[0].status != rows[1].status:
         changed.insert(0, f"the robot: {_does(rows[0])} → {_does(rows[1])}")
     elif _causes(rows[0]) != _causes(rows[1]):
         changed.insert(0, f"causes: {_causes(rows[0]) or 'none'} → {_causes(rows[1]) or 'none'}")
@@ -46,18 +47,18 @@ def between(file: str, old: str, new: str) -> dict[str, Any]:
         "hosts": {},
         "robot": {"file": file, "layers": layers, "old": rows[0], "new": rows[1]},
         "changed": changed,
-        "lost": [f"{row['engine']}: {row['refused']}" for row in rows if row["status"] == "missing"],
+        "lost": [f"{row.engine}: {row.refused}" for row in rows if row.status == "missing"],
     }
 
 
-def _side(name: str, row: dict[str, Any]) -> dict[str, Any]:
-    return {"name": name, "version": row["version"] or "", "interpreter": describe(name).interpreter}
+def _side(name: str, row: ImporterRow) -> dict[str, Any]:
+    return {"name": name, "version": row.version or "", "interpreter": describe(name).interpreter}
 
 
-def _causes(row: dict[str, Any]) -> str:
-    return "; ".join(f"{cause['name']} ({cause['layer']})" for cause in row["causes"])
+def _causes(row: ImporterRow) -> str:
+    return "; ".join(f"{cause.name} ({cause.layer})" for cause in row.causes)
 
 
-def _does(row: dict[str, Any]) -> str:
-    by = f" by: {_causes(row)}" if row["causes"] else ""
-    return f"{row['status']}{by}" + (f": {row['refused']}" if row["refused"] else "")
+def _does(row: ImporterRow) -> str:
+    by = f" by: {_causes(row)}" if row.causes else ""
+    return f"{row.status}{by}" + (f": {row.refused}" if row.refused else "")

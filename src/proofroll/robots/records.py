@@ -1,0 +1,139 @@
+"""What a check of a robot file, and of the gallery's robots, says: as records."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field
+
+from proofroll.robots.explain import RobotCause
+from proofroll.robots.robot_file import LintFinding
+
+
+@dataclass(frozen=True)
+class HeldLayer:
+    """How far an engine is off at a layer, and whether that is within the tolerance."""
+
+    difference: float
+    tolerance: float
+    holds: bool
+
+
+@dataclass(frozen=True, kw_only=True)
+class ImporterRow:
+    """What one engine's importer makes of a file.
+
+    Attributes:
+        engine: as the user wrote it.
+        status: ``holds``, ``explained``, ``differs``, ``refused``, ``missing``, or how its process ended.
+        refused: why it holds nothing.
+        says: what is told with every reading of this engine.
+        remarks: of its reader, on this file.
+        layers: those that it offers.
+        causes: of its differences.
+        unexplained: the first layer that they leave open.
+        offending: joints whose carried body it holds differently, or lacks.
+    """
+
+    engine: str
+    status: str
+    version: str | None = None
+    refused: str | None = None
+    says: str = ""
+    remarks: Sequence[str] = ()
+    layers: Mapping[str, HeldLayer] = field(default_factory=dict)
+    causes: Sequence[RobotCause] = ()
+    unexplained: str | None = None
+    offending: Sequence[str] = ()
+
+    @property
+    def differs(self) -> bool:
+        """Whether it does not hold the model that the file describes: another one, or none."""
+        return self.status not in {"holds", "missing"}
+
+    @property
+    def named(self) -> str:
+        """The engine with its version."""
+        return f"{self.engine} {self.version or ''}".strip()
+
+
+@dataclass(frozen=True)
+class UsedTruth:
+    """By whose reading the file has its meaning, and the largest relative ``difference`` of the two formulations."""
+
+    by: str
+    difference: float
+    states: int
+    seed: int
+    velocities: int
+
+
+@dataclass(frozen=True)
+class DrawnBody:
+    """Where a body is at rest coordinates [m], and its mass [kg]."""
+
+    position: list[float]
+    mass: float
+
+
+@dataclass(frozen=True)
+class DrawnJoint:
+    """What a joint connects."""
+
+    name: str
+    kind: str
+    parent: str
+    child: str
+
+
+@dataclass(frozen=True)
+class DrawnRobot:
+    """What a drawing of a robot needs."""
+
+    name: str
+    joints: list[DrawnJoint]
+    bodies: dict[str, DrawnBody]
+
+
+@dataclass(frozen=True)
+class RobotCheck:
+    """A file, what is noticed in it, what is true of it, and what engines hold; ``layers``: name -> meaning."""
+
+    file: str
+    kind: str
+    base: str
+    lint: list[LintFinding]
+    truth: UsedTruth
+    layers: Mapping[str, str]
+    engines: list[ImporterRow]
+    robot: DrawnRobot
+
+
+@dataclass(frozen=True)
+class GalleryReading:
+    """What an engine ``does`` with a robot, in the words of the gallery's file."""
+
+    engine: str
+    version: str | None
+    status: str
+    causes: Sequence[RobotCause]
+    refused: str | None
+    does: list[str]
+
+
+@dataclass(frozen=True)
+class GalleryRow:
+    """A robot of the gallery; ``file`` is None where its package is not installed."""
+
+    name: str
+    package: str
+    file: str | None
+    engines: list[GalleryReading] = field(default_factory=list)
+    unexpected: list[str] = field(default_factory=list)
+    ran_on: str = ""
+
+
+@dataclass(frozen=True)
+class GalleryContent:
+    """All robots that were checked."""
+
+    robots: list[GalleryRow]
