@@ -202,23 +202,6 @@ def test_orientation_is_absent_where_it_is_not_integrated() -> None:
         assert "q_WB" not in simulate(cylinder(), f"pinocchio[{options}]", until=0.01)
 
 
-@pytest.mark.parametrize("formulation", FORMULATIONS)
-@pytest.mark.parametrize("preset", PRESETS)
-def test_sampling_disturbs_nothing(formulation: str, preset: str) -> None:
-    """Looking at the state, the forces and the model does not change the motion, and a rebuild gives the same bits."""
-    scene, last = cylinder(rolling_resistance=RESISTANCE), []
-    for looks in (0, 3):
-        engine = build(scene, "pinocchio", formulation=formulation, preset=preset)
-        for t in (0.01, 0.02, 0.03):
-            for _ in range(looks):
-                engine.sample()
-                engine.built()
-            engine.advance(t)
-        last.append(engine.sample())
-    for name in ("p_WB", "v_WB", "w_WB", "force"):
-        np.testing.assert_array_equal(getattr(last[0], name), getattr(last[1], name))
-
-
 def test_samples_keep_their_values() -> None:
     """A sample is a copy: later steps do not change it."""
     engine = build(cylinder(), "pinocchio")

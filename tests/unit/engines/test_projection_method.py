@@ -12,7 +12,7 @@ from proofroll.elements.ball_on_surface.element import rolling_ball
 from proofroll.elements.ball_on_surface.rolling_equations import reduced_rates
 from proofroll.elements.ball_on_surface.surfaces import Cylinder, Plane
 from proofroll.engines.projection import uniform
-from proofroll.engines.projection.geometry import GeneralSurface, Uniform, geometry_of, local_geometry
+from proofroll.engines.projection.geometry import GeneralSurface, Uniform, geometry_of
 from proofroll.engines.projection.method import ProjectedBall
 from proofroll.engines.projection.orientation import EulerAngles, RotatingFrame
 
@@ -74,7 +74,8 @@ def test_slip_is_the_papers(seed):
     gamma, _, _, theta, psi, gamma_rate, z_rate, phi_rate, theta_rate, psi_rate = x
     w2 = theta_rate * np.sin(psi - gamma) - phi_rate * np.sin(theta) * np.cos(psi - gamma)
     w3 = psi_rate + phi_rate * np.cos(theta)
-    close(euler_ball().slip(x), [C * gamma_rate + A * w3, z_rate - A * w2])
+    ball = euler_ball()
+    close(ball.violation(ball.kinematics(x)), [C * gamma_rate + A * w3, z_rate - A * w2])
 
 
 @SEEDS
@@ -100,7 +101,8 @@ def test_drift_of_the_rows_is_their_derivative(seed):
     """Ċ_nh q̇ is what finite differences along the motion with constant q̇ give."""
     x, ball = random_state(seed), euler_ball()
     h = 1e-6  # differences of slips of some 10 m/s lose 1e-16 * 10 / 1e-6 and neglect 160² h² of the rate
-    ahead, behind = (ball.slip(np.concatenate([x[:5] + step * x[5:], x[5:]])) for step in (h, -h))
+    moved = (np.concatenate([x[:5] + step * x[5:], x[5:]]) for step in (h, -h))
+    ahead, behind = (ball.violation(ball.kinematics(y)) for y in moved)
     found = ball.slip_drift(ball.kinematics(x))
     np.testing.assert_allclose(found, (ahead - behind) / (2 * h), rtol=1e-6, atol=1e-6 * np.max(np.abs(found)))
 
@@ -113,7 +115,7 @@ def test_elimination_is_the_mass_orthogonal_projection(seed):
     result = ball.eliminated(x)
     admissible = np.linalg.svd(ball.rows @ kin.D)[2][2:]
     close(admissible @ ball.mass_matrix(kin) @ (result - x)[5:], np.zeros(3))
-    close(ball.slip(result), np.zeros(2))
+    close(ball.violation(ball.kinematics(result)), np.zeros(2))
     np.testing.assert_array_equal(result[:5], x[:5])
 
 
@@ -183,7 +185,8 @@ def test_turning_of_the_frame_follows_from_its_definition(surface, u):
     steps = 1e-6 * np.eye(2)
     slopes = np.stack([(surface.frame(u + h) - surface.frame(u - h)) / 2e-6 for h in steps], axis=-1)
     expected = np.einsum("ji,jkl->ikl", surface.frame(u), slopes)
-    np.testing.assert_allclose(local_geometry(surface, u).turning, expected, atol=1e-9)  # 1e-16 / 1e-6, with a margin
+    turning = GeneralSurface(surface).at(u).turning
+    np.testing.assert_allclose(turning, expected, atol=1e-9)  # 1e-16 / 1e-6, with a margin
 
 
 @SEEDS

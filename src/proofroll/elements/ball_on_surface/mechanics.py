@@ -6,6 +6,8 @@ Array arguments may carry leading dimensions.
 
 from __future__ import annotations
 
+import math
+
 import numpy as np
 import numpy.typing as npt
 
@@ -77,6 +79,13 @@ def natural_acceleration(body: RollingBall) -> float:
     """
     acceleration = initial_response(body)[0]
     return max(float(np.linalg.norm(body.gravity)), float(np.linalg.norm(acceleration))) or 1.0
+
+
+def natural_speed(body: RollingBall) -> float:
+    """Natural speed [m/s], never zero: of the centre and of the spin at the start, and of a fall by one radius."""
+    a = body.ball.radius
+    parts = np.linalg.norm(body.v0), a * np.linalg.norm(body.w0), math.sqrt(a * float(np.linalg.norm(body.gravity)))
+    return math.hypot(*(float(part) for part in parts)) or 1.0
 
 
 def initial_response(body: RollingBall) -> tuple[FloatArray, FloatArray]:

@@ -12,7 +12,6 @@ from typing import Any, ClassVar
 import numpy as np
 import pinocchio as pin
 
-from proofroll.core.engine import Regularised
 from proofroll.elements.mechanism import WORLD, Loop
 from proofroll.elements.mechanism.capabilities import ALL_LOOPS, MechanismCapability
 from proofroll.elements.mechanism.loop_points import held_points
@@ -53,26 +52,21 @@ class ConstraintDynamics:
                 kind = pin.ContactType.CONTACT_3D
                 self.constraints.append(pin.RigidConstraintModel(kind, self._model, *ends, pin.LOCAL))
                 self._loops.append(number)
-        self._results = self._new_results()
+        self._results = pin.StdVec_RigidConstraintData()
+        for constraint in self.constraints:
+            self._results.append(constraint.createData())
         self._ready: Any = None  # the data that the results belong to
-        self.regularised: Mapping[str, Regularised] = {}
 
     @staticmethod
     def _first_is_b(loop: Loop) -> bool:
         """Whether Pinocchio's first joint carries body_b: its solver crashes where that is the world."""
         return loop.body_a == WORLD
 
-    def _new_results(self) -> Any:
-        results = pin.StdVec_RigidConstraintData()
-        for constraint in self.constraints:
-            results.append(constraint.createData())
-        return results
-
     def acceleration(self, data: Any, q: Array, v: Array) -> Array:
         """Of the joints, shape (nv,), which the next call may overwrite."""
         tree, model = self._tree, self._model
         tau = tree.drives(q, v)
-        if tree.has_springs:  # constraintDynamics takes no external forces: they are put to the joints
+        if tree.springs:  # constraintDynamics takes no external forces: they are put to the joints
             pin.forwardKinematics(model, data, q, v)
             pin.updateFramePlacements(model, data)
             rest = np.zeros(model.nv)
@@ -84,14 +78,14 @@ class ConstraintDynamics:
         found: Array = pin.constraintDynamics(model, data, q, v, tau, self.constraints, self._results, self._proximal)
         return found
 
-    def reactions(self, data: Any, q: Array, v: Array) -> tuple[Array, Any]:
-        """Acceleration, and forces of springs and loops on Pinocchio's joints."""
+    def reactions(self, data: Any, q: Array, v: Array) -> tuple[Array, Any, Array]:
+        """Acceleration; forces on Pinocchio's joints of springs and loops; force and moment on body_b of each loop."""
         tree = self._tree
         acceleration = self.acceleration(data, q, v).copy()
         pin.updateFramePlacements(self._model, data)
         pin.forwardKinematics(self._model, data, q, v)
         forces = tree.pulls(data)
-        self._on_loops = np.zeros((2, len(tree.loops), 3))
+        on_loops = np.zeros((2, len(tree.loops), 3))
         for number, result in zip(self._loops, self._results, strict=True):
             a, b = tree.loops[number]
             on_first = result.oMc1.rotation @ result.contact_force.linear
@@ -99,13 +93,9 @@ class ConstraintDynamics:
             place = result.oMc1.translation
             tree.put(forces, data, b, place, on_b)
             tree.put(forces, data, a, place, -on_b)
-            self._on_loops[0, number] += on_b
-            self._on_loops[1, number] += np.cross(place - data.oMf[b].translation, on_b)
-        return acceleration, forces
-
-    def on_loops(self, data: Any) -> tuple[Array, Array]:  # noqa: ARG002 -- the results say it
-        """Force and moment on body_b of each loop, as the last :meth:`reactions` found them."""
-        return self._on_loops[0], self._on_loops[1]
+            on_loops[0, number] += on_b
+            on_loops[1, number] += np.cross(place - data.oMf[b].translation, on_b)
+        return acceleration, forces, on_loops
 
     def constraint_rows(self, data: Any, q: Array, v: Array) -> Array:
         """Rows of Pinocchio's constraints on the velocities of the joints."""

@@ -105,7 +105,6 @@ class JointTree:
         self._damping = np.array([joint.damping for joint in by_velocity])
         sprung = zip(joints, self.mechanism.q_slices, self.mechanism.v_slices, strict=True)
         self._sprung = [(joint.stiffness, joint.rest, at_q, at_v) for joint, at_q, at_v in sprung if joint.stiffness]
-        self.has_springs = bool(self.springs)
         self._constant = not self._sprung and not self._damping.any()
 
     def drives(self, q: Array, v: Array) -> Array:

@@ -80,22 +80,22 @@ class MechanismRun:
         """None: nothing here switches."""
         return ()
 
-    def _evaluated(self) -> tuple[Any, Array, Array, Array, Any]:
-        """Data of the present state, q, v, acceleration, and forces of springs and loops on Pinocchio's joints."""
+    def _evaluated(self) -> tuple[Any, Array, Array, Array, Any, Array]:
+        """Data of the present state, q, v, and what the reactions are."""
         data = self._model.createData()
         q, v = self.motion.x[: self._nq], self.motion.x[self._nq :]
-        acceleration, forces = self.dynamics.reactions(data, q, v)
+        acceleration, forces, on_loops = self.dynamics.reactions(data, q, v)
         pin.forwardKinematics(self._model, data, q, v, acceleration)
         pin.updateFramePlacements(self._model, data)
-        return data, q, v, acceleration, forces
+        return data, q, v, acceleration, forces, on_loops
 
     def sample(self) -> Sample:
         """See :class:`proofroll.core.engine.Engine`."""
-        data, q, v, acceleration, forces = self._evaluated()
+        data, q, v, acceleration, forces, on_loops = self._evaluated()
         velocities = [self.tree.velocity(data, frame) for frame in self.tree.body]
         force, torque = unsaid(self._mechanism)
         count = len(self._mechanism.joints)
-        force[count:], torque[count:] = self.dynamics.on_loops(data)
+        force[count:], torque[count:] = on_loops
         pin.rnea(self._model, data, q, v, acceleration, forces)
         for number, (joint, index) in enumerate(zip(self._mechanism.joints, self.tree.joint, strict=True)):
             if joint.kind != "fixed":  # bodies held by a fixed joint are one body to Pinocchio
@@ -133,7 +133,6 @@ class MechanismRun:
             acceleration=np.array([acceleration.linear for acceleration in accelerations]),
             angular_acceleration=np.array([acceleration.angular for acceleration in accelerations]),
             mass_matrix_error=self._mass_matrix_error(q),
-            regularised=self.dynamics.regularised,
         )
 
     def _axes(self, q: Array) -> Array:

@@ -8,7 +8,6 @@ from typing import Any, ClassVar
 import numpy as np
 import pinocchio as pin
 
-from proofroll.core.engine import Regularised
 from proofroll.elements.mechanism.rotations import Array
 from proofroll.engines.pinocchio.joint_tree import LACKING, PROVIDES, JointTree
 from proofroll.engines.pinocchio.loop_rows import LoopRows, RowsAtState
@@ -20,7 +19,6 @@ class NullSpace:
 
     provides: ClassVar[frozenset[str]] = frozenset(PROVIDES)
     lacking: ClassVar[Mapping[str, str]] = LACKING
-    regularised: ClassVar[Mapping[str, Regularised]] = {}
 
     def __init__(self, tree: JointTree, rows: LoopRows, settings: PinocchioSettings) -> None:  # noqa: ARG002 -- as others
         self._tree, self._model, self._rows = tree, tree.model, rows
@@ -31,7 +29,7 @@ class NullSpace:
         tree, model = self._tree, self._model
         tau = tree.drives(q, v)
         if not tree.loops:
-            if not tree.has_springs:
+            if not tree.springs:
                 found: Array = pin.aba(model, data, q, v, tau)
                 return found
             pin.forwardKinematics(model, data, q, v)
@@ -43,7 +41,7 @@ class NullSpace:
         """Acceleration, rows and multipliers, the smallest in norm where rows depend on each other."""
         tree, model = self._tree, self._model
         rows = self._rows.at(data, q, v)
-        pulls = tree.pulls(data) if tree.has_springs else None
+        pulls = tree.pulls(data) if tree.springs else None
         M = pin.crba(model, data, q).copy()
         bias = pin.rnea(model, data, q, v, self._rest, pulls) if pulls else pin.rnea(model, data, q, v, self._rest)
         split = self._rows.split(M, rows.C)
@@ -51,29 +49,24 @@ class NullSpace:
         normal = -split.back @ (rows.drift + rows.C @ free)
         return free + split.locked @ normal, rows, split.back.T @ normal
 
-    def reactions(self, data: Any, q: Array, v: Array) -> tuple[Array, Any]:
-        """Acceleration, and forces of springs and loops on Pinocchio's joints."""
+    def reactions(self, data: Any, q: Array, v: Array) -> tuple[Array, Any, Array]:
+        """Acceleration; forces on Pinocchio's joints of springs and loops; force and moment on body_b of each loop."""
         tree = self._tree
-        self._on_loops = np.zeros((2, 0, 3))
+        on_loops = np.zeros((2, len(tree.loops), 3))
         if not tree.loops:
             acceleration = self.acceleration(data, q, v).copy()
             pin.forwardKinematics(self._model, data, q, v)
             pin.updateFramePlacements(self._model, data)
-            return acceleration, tree.pulls(data)
+            return acceleration, tree.pulls(data), on_loops
         acceleration, rows, multipliers = self._solved(data, q, v, tree.drives(q, v))
         forces = tree.pulls(data)
-        self._on_loops = np.zeros((2, len(tree.loops), 3))
-        np.add.at(self._on_loops[0], rows.loop, multipliers[:, None] * rows.force)
-        np.add.at(self._on_loops[1], rows.loop, multipliers[:, None] * rows.torque)
-        for (a, b), force, torque in zip(tree.loops, *self._on_loops, strict=True):
+        np.add.at(on_loops[0], rows.loop, multipliers[:, None] * rows.force)
+        np.add.at(on_loops[1], rows.loop, multipliers[:, None] * rows.torque)
+        for (a, b), force, torque in zip(tree.loops, *on_loops, strict=True):
             place = data.oMf[b].translation
             tree.put(forces, data, b, place, force, torque)
             tree.put(forces, data, a, place, -force, -torque)
-        return acceleration, forces
-
-    def on_loops(self, data: Any) -> tuple[Array, Array]:  # noqa: ARG002 -- the multipliers say it
-        """Force and moment on body_b of each loop, as the last :meth:`reactions` found them."""
-        return self._on_loops[0], self._on_loops[1]
+        return acceleration, forces, on_loops
 
     def constraint_rows(self, data: Any, q: Array, v: Array) -> Array:
         """Rows of the loops on the velocities of the joints."""

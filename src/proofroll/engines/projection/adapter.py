@@ -18,6 +18,7 @@ from proofroll.core.integrators import INTEGRATORS, Integrator
 from proofroll.core.scene import Scene
 from proofroll.elements.ball_on_surface.compiled.library import with_heyoka
 from proofroll.elements.ball_on_surface.element import rolling_ball
+from proofroll.elements.ball_on_surface.mechanics import natural_speed
 from proofroll.elements.ball_on_surface.model import ALL_OF_A_BALL, BallCapability, RollingBall
 from proofroll.engines.projection import mechanism
 from proofroll.engines.projection.friction import Friction
@@ -28,7 +29,7 @@ from proofroll.engines.projection.modes import Pace
 from proofroll.engines.projection.orientation import EulerAngles, FollowedFrame, Orientation, RotatingFrame
 from proofroll.engines.projection.settings import PRESETS, ProjectionSettings
 from proofroll.engines.projection.stepping import STEPPERS
-from proofroll.engines.projection.switching import Hooks, Switching
+from proofroll.engines.projection.switching import Switching
 from proofroll.engines.projection.taylor import TaylorSeries
 
 # Numbers of the state that are not the ball's orientation: two coordinates and five velocities.
@@ -122,12 +123,13 @@ class Projection:
             self._motion = TaylorSeries(body, settings.formulation, x, resolution, self._check, self._accepted)
         elif math.isfinite(body.contact.mu_static) or body.contact.rolling_resistance > 0:
             stepper = STEPPERS[settings.integrator](resolution)
-            speed = _speed(body) or 1.0
+            speed = natural_speed(body)
             pace = Pace(speed, body.ball.radius / speed, stepper.stability, stepper.reach)
             self._friction = Friction(self._ball, body.contact)
-            hooks = Hooks(self._check, self._renewed)
             slip = frame[:, 1:].T @ body.slip0 if np.any(body.slip0) else None
-            self._motion = Switching(self._friction, stepper, x, scales, pace, hooks, self._eliminate, slip)
+            self._motion = Switching(
+                self._friction, stepper, x, scales, pace, self._check, self._renewed, self._eliminate, slip
+            )
         else:
             self._motion = INTEGRATORS[settings.integrator](self._ball.rates, self._accept, x, scales, resolution)
 
@@ -237,22 +239,11 @@ class Projection:
             yield BallCapability.ORIENTATION
 
 
-def _speed(body: RollingBall) -> float:
-    """Natural speed [m/s]: the initial one, or that of a fall by one radius."""
-    a = body.ball.radius
-    return math.hypot(
-        float(np.linalg.norm(body.v0)),
-        a * float(np.linalg.norm(body.w0)),
-        math.sqrt(a * float(np.linalg.norm(body.gravity))),
-    )
-
-
 def _scales(body: RollingBall, angles: int) -> FloatArray:
     """Natural size of each component of the state, against which an adaptive step measures absolute errors.
 
-    The lengths are of the order of the ball's radius, the speeds of :func:`_speed`.
+    The lengths are of the order of the ball's radius, the speeds of the natural one.
     """
-    a, speed = body.ball.radius, _speed(body)
+    a, speed = body.ball.radius, natural_speed(body)
     per_metre = 1 / np.asarray(body.surface.length_scales)
-    velocities = [*(speed * per_metre), *np.full(3, speed / a)]
-    return np.array([*(a * per_metre), *np.ones(angles), *(velocities if speed else np.ones(5))])
+    return np.concatenate([a * per_metre, np.ones(angles), speed * per_metre, np.full(3, speed / a)])

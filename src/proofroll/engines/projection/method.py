@@ -208,11 +208,8 @@ class ProjectedBall:
         other.rows, other._closed = rows, None
         return other
 
-    def slip(self, x: FloatArray) -> FloatArray:
-        """C v: violation of the active rows [m/s]."""
-        return self._violation(self.kinematics(x))
-
-    def _violation(self, kin: Kinematics) -> FloatArray:
+    def violation(self, kin: Kinematics) -> FloatArray:
+        """C v of the active rows, less what the wall carries along [m/s]."""
         return np.asarray(self.rows @ kin.v - self.rows[:, :3] @ kin.carried[0])
 
     def eliminated(self, x: FloatArray, slip: FloatArray | None = None) -> FloatArray:
@@ -228,7 +225,7 @@ class ProjectedBall:
         if self._closed is not None and slip is None:
             return self._closed.eliminated(x)
         kin = self.kinematics(x)
-        violation = self._violation(kin) if slip is None else self._violation(kin) - slip
+        violation = self.violation(kin) - (0.0 if slip is None else slip)
         result = x.copy()
         result[self._coordinates :] -= self._solve(kin, np.zeros(5), violation)[:5]
         return result

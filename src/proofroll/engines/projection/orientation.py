@@ -193,9 +193,6 @@ class RotatingFrame:
     size: ClassVar[int] = 0
     periodic: ClassVar[tuple[bool, ...]] = ()
 
-    def __init__(self) -> None:
-        self._identity = np.eye(3)
-
     def start(self, frame: FloatArray, w: FloatArray) -> tuple[FloatArray, FloatArray]:  # noqa: ARG002 -- no angles
         """See :class:`Orientation`."""
         return np.empty(0), w
@@ -208,7 +205,7 @@ class RotatingFrame:
         turning: FloatArray,
     ) -> tuple[FloatArray, FloatArray]:
         """See :class:`Orientation`. The axes turn with the frame: F ω' has the rate F (ω̇' + FᵀḞ ω')."""
-        return self._identity, turning @ r
+        return np.eye(3), turning @ r
 
     def rates(self, u: FloatArray, angles: FloatArray, r: FloatArray) -> FloatArray:  # noqa: ARG002 -- no angles
         """See :class:`Orientation`."""
@@ -232,7 +229,6 @@ class FollowedFrame(RotatingFrame):
     periodic: ClassVar[tuple[bool, ...]] = (False,) * 4
 
     def __init__(self, geometry: Geometry) -> None:
-        super().__init__()
         self._geometry = geometry
 
     def start(self, frame: FloatArray, w: FloatArray) -> tuple[FloatArray, FloatArray]:  # noqa: ARG002 -- as above

@@ -17,6 +17,8 @@ is no parameter of the result but of the cost: the steps that an explicit method
 from __future__ import annotations
 
 import math
+from abc import ABC, abstractmethod
+from typing import ClassVar
 
 import numpy as np
 
@@ -32,14 +34,33 @@ START = 1e-3
 _DYING = 0.25
 
 
-class SlavedSlip:
-    """Slip whose direction follows the drive. y = [x, ρ]."""
+class _Slip(ABC):
+    """What both descriptions share: ``size`` numbers of a slip behind x."""
 
     sticking = False
-    exits = (Exit.STILL, Exit.LIFTOFF, Exit.CHANGE)
+    size: ClassVar[int]
 
     def __init__(self, friction: Friction, pace: Pace) -> None:
         self._friction, self._ball, self._pace = friction, friction.sliding, pace
+
+    @abstractmethod
+    def look(self, y: FloatArray) -> SlidingForces:
+        """The slip at y."""
+
+    def x(self, y: FloatArray) -> FloatArray:
+        """See :class:`ContactMode`."""
+        return y[: -self.size]
+
+    def force(self, y: FloatArray) -> FloatArray:
+        """See :class:`ContactMode`."""
+        return self._friction.force(self.look(y))
+
+
+class SlavedSlip(_Slip):
+    """Slip whose direction follows the drive. y = [x, ρ]."""
+
+    exits = (Exit.STILL, Exit.LIFTOFF, Exit.CHANGE)
+    size = 1
 
     def look(self, y: FloatArray) -> SlidingForces:
         """The slip at y."""
@@ -65,20 +86,16 @@ class SlavedSlip:
         return min(span, 0.1 * math.hypot(*kin.v[1:3].tolist()) / (math.hypot(*acceleration.tolist()) or 1.0))
 
     def rates(self, y: FloatArray) -> FloatArray:
-        """See :class:`Mode`."""
+        """See :class:`ContactMode`."""
         sliding = self.look(y)
         return np.append(self._ball.derivative(y[:-1], sliding.response), sliding.growth)
 
-    def x(self, y: FloatArray) -> FloatArray:
-        """See :class:`Mode`."""
-        return y[:-1]
-
     def eliminated(self, y: FloatArray) -> FloatArray:
-        """See :class:`Mode`."""
+        """See :class:`ContactMode`."""
         return np.append(self._friction.rolling.eliminated(y[:-1], y[-1] * self.look(y).direction), y[-1])
 
     def survey(self, y: FloatArray) -> Survey:
-        """See :class:`Mode`."""
+        """See :class:`ContactMode`."""
         sliding, rho = self.look(y), float(y[-1])
         slow = START * self._pace.time * sliding.strength - rho
         dying = sliding.growth + _DYING * sliding.strength
@@ -89,19 +106,15 @@ class SlavedSlip:
         d = self.look(y).direction
         return np.append(y, math.atan2(d[1], d[0]))
 
-    def force(self, y: FloatArray) -> FloatArray:
-        """See :class:`Mode`."""
-        return self._friction.force(self.look(y))
 
-
-class FreeSlip:
+class FreeSlip(_Slip):
     """Slip in polar variables: y = [x, ρ, φ] with u = ρ (cos φ, sin φ)."""
 
-    sticking = False
     exits = (Exit.STILL, Exit.LIFTOFF)
+    size = 2
 
     def __init__(self, friction: Friction, pace: Pace) -> None:
-        self._friction, self._ball, self._pace = friction, friction.sliding, pace
+        super().__init__(friction, pace)
         self._slaved = SlavedSlip(friction, pace)
 
     def look(self, y: FloatArray) -> SlidingForces:
@@ -109,22 +122,18 @@ class FreeSlip:
         return self._friction.slide(self._ball.kinematics(y[:-2]), along(float(y[-1])))
 
     def rates(self, y: FloatArray) -> FloatArray:
-        """See :class:`Mode`."""
+        """See :class:`ContactMode`."""
         sliding = self.look(y)
         rate = self._ball.derivative(y[:-2], sliding.response)
         return np.concatenate([rate, [sliding.growth, sliding.across / float(y[-2])]])
 
-    def x(self, y: FloatArray) -> FloatArray:
-        """See :class:`Mode`."""
-        return y[:-2]
-
     def eliminated(self, y: FloatArray) -> FloatArray:
-        """See :class:`Mode`."""
+        """See :class:`ContactMode`."""
         x = self._friction.rolling.eliminated(y[:-2], y[-2] * along(float(y[-1])))
         return np.concatenate([x, y[-2:]])
 
     def survey(self, y: FloatArray) -> Survey:
-        """See :class:`Mode`. The stiff direction bounds a step before it would make the method unstable."""
+        """See :class:`ContactMode`. The stiff direction bounds a step before it would make the method unstable."""
         sliding, rho = self.look(y), float(y[-2])
         N, span = sliding.response.N, DIFFERENCE * self._pace.time
         ahead = self._ball.kinematics(y[:-2] + span * self._ball.derivative(y[:-2], sliding.response))
@@ -139,7 +148,3 @@ class FreeSlip:
         doubling = rho / change if change else math.inf
         longest = min(self._pace.reach * doubling, 0.8 * self._pace.stability * relaxation)
         return Survey((rho - self._pace.still, N), trend, 1, longest, slaved)
-
-    def force(self, y: FloatArray) -> FloatArray:
-        """See :class:`Mode`."""
-        return self._friction.force(self.look(y))

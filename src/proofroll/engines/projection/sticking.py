@@ -25,19 +25,19 @@ class _Held:
         self._ball, self._friction = ball, friction
 
     def rates(self, y: FloatArray) -> FloatArray:
-        """See :class:`Mode`."""
+        """See :class:`ContactMode`."""
         return self._ball.rates(y)
 
     def x(self, y: FloatArray) -> FloatArray:
-        """See :class:`Mode`."""
+        """See :class:`ContactMode`."""
         return y
 
     def eliminated(self, y: FloatArray) -> FloatArray:
-        """See :class:`Mode`."""
+        """See :class:`ContactMode`."""
         return self._ball.eliminated(y)
 
     def force(self, y: FloatArray) -> FloatArray:
-        """See :class:`Mode`."""
+        """See :class:`ContactMode`."""
         return self._ball.contact_force(self._ball.response(self._ball.kinematics(y)))
 
 
@@ -52,7 +52,7 @@ class Stick(_Held):
         self.exits = (*((Exit.CONE,) if friction.bounded else ()), *((Exit.HALT,) if self.halts else ()))
 
     def survey(self, y: FloatArray) -> Survey:
-        """See :class:`Mode`. With rolling resistance steps shorten towards the place where the centre stands still."""
+        """See :class:`ContactMode`. Rolling resistance shortens steps towards where the centre stands still."""
         response, trend = self._ball.response_at(y), 0.0
         cone: tuple[float, ...] = ()
         if self._friction.bounded:
@@ -116,5 +116,5 @@ class Rest(_Held):
         return ball.eliminated(result)
 
     def survey(self, y: FloatArray) -> Survey:  # noqa: ARG002 -- nothing changes any more
-        """See :class:`Mode`."""
+        """See :class:`ContactMode`."""
         return Survey(())

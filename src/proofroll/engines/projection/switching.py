@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable
-from typing import NamedTuple
 
 import numpy as np
 
@@ -24,18 +23,6 @@ _LOCATED = 1e-12
 _WITHOUT_PROGRESS = 20
 
 
-class Hooks(NamedTuple):
-    """What is asked about the state x after each step.
-
-    Attributes:
-        check: called with the time [s] and x; raises Diverged if x is not to be trusted.
-        renewed: called with them where the motion goes on from there; the same state in other coordinates, or None.
-    """
-
-    check: Callable[[float, FloatArray], None]
-    renewed: Callable[[float, FloatArray], FloatArray | None]
-
-
 class Switching:
     """A ball under bounded friction.
 
@@ -52,7 +39,8 @@ class Switching:
         x: FloatArray,
         scales: FloatArray,
         pace: Pace,
-        hooks: Hooks,
+        check: Callable[[float, FloatArray], None],
+        renewed: Callable[[float, FloatArray], FloatArray | None],
         eliminate: bool,
         slip: FloatArray | None = None,
     ) -> None:
@@ -64,13 +52,15 @@ class Switching:
             x: coordinates and velocities.
             scales: natural size of each component of x.
             pace: of the motion.
-            hooks: see there.
+            check: called with the time [s] and x after each step; raises Diverged if x is not to be trusted.
+            renewed: called with them where the motion goes on from there; the same state in other coordinates, or None.
             eliminate: remove the violation of what C v shall be after each step.
             slip: velocity of the contact point along e2 and e3 [m/s], shape (2,); None: it stands still.
         """
         self.stepper = stepper
         self.events: list[Event] = []
-        self._friction, self._hooks, self._eliminate, self._pace = friction, hooks, eliminate, pace
+        self._friction, self._eliminate, self._pace = friction, eliminate, pace
+        self._check, self._renewed = check, renewed
         self._scales = np.append(scales, [pace.speed, 1.0])
         self._stick, self._rest = Stick(friction, pace), Rest(friction)
         self._slaved, self._free = SlavedSlip(friction, pace), FreeSlip(friction, pace)
@@ -123,7 +113,7 @@ class Switching:
                 self._switch(*ended)
             elif survey.slaved:
                 self._enter(self._slaved, stepper.t, stepper.y[:-1])
-            elif (renewed := self._hooks.renewed(stepper.t, self.x)) is not None:
+            elif (renewed := self._renewed(stepper.t, self.x)) is not None:
                 self._enter(self.mode, stepper.t, np.concatenate([renewed, stepper.y[len(renewed) :]]))
             else:
                 self._survey, self._idle = survey, 0
@@ -137,7 +127,7 @@ class Switching:
 
     def _enter(self, mode: ContactMode, t: float, y: FloatArray) -> None:
         def accept(at: float, state: FloatArray) -> FloatArray:
-            self._hooks.check(at, mode.x(state))
+            self._check(at, mode.x(state))
             return mode.eliminated(state) if self._eliminate else state
 
         self.mode = mode

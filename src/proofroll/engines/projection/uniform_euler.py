@@ -30,9 +30,9 @@ class Euler(Closed):
         (self._u2, self._u3), (self._v2, self._v3) = np.linalg.inv(self.tangents).tolist()
         # Where the frame turns about the vertical, or not at all, the axes of the angles as seen from it are those at
         # its start, with the precession counted from the frame: nothing but that angle then changes with the place.
-        axis = np.array([0.0, 0.0, 1.0]) if geometry.axis is None else np.asarray(geometry.axis)
-        self._upright = self.steady and bool(np.all(np.abs(axis[:2]) <= _VERTICAL))
-        self._along = math.copysign(1.0, float(axis[2]))
+        x, y, z = geometry.axis
+        self._upright = self.steady and max(abs(x), abs(y)) <= _VERTICAL
+        self._along = math.copysign(1.0, z)
 
     def _view(self, state: list[float]) -> tuple[tuple[float, ...], tuple[float, ...], float, float, float, float]:
         """Local axes, gravity along them [m/s²], and sine and cosine of θ and of ψ, from where the axes are given.

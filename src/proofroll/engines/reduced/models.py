@@ -5,18 +5,19 @@ They share their equations with the truth's first route; only its second route c
 
 from __future__ import annotations
 
-import math
 from typing import Protocol
 
 import numpy as np
 
 from proofroll.core.arrays import FloatArray
 from proofroll.core.errors import Diverged, Refused
+from proofroll.core.integrators import DormandPrince853
 from proofroll.elements.ball_on_surface.closed_form import closed_form
 from proofroll.elements.ball_on_surface.compiled.library import require_heyoka
 from proofroll.elements.ball_on_surface.compiled.rolling import is_uniform, parameters, reduced, supports
 from proofroll.elements.ball_on_surface.compiled.rolling import start as start_along_arc
 from proofroll.elements.ball_on_surface.compiled.series import Series, still_moving
+from proofroll.elements.ball_on_surface.mechanics import natural_speed
 from proofroll.elements.ball_on_surface.model import RollingBall
 from proofroll.elements.ball_on_surface.motion import BallMotion, world_motion
 from proofroll.elements.ball_on_surface.rolling_equations import placed, reduced_rates, start
@@ -79,33 +80,29 @@ class Integrated:
     """The reduced equations by Dormand and Prince's method of order 8; a step ends at each sample."""
 
     def __init__(self, body: RollingBall, rtol: float) -> None:
-        from scipy.integrate import DOP853
-
-        self._body = body
-        speed = _speed(body)
+        self._body, self._span = body, 0.0
+        speed = natural_speed(body)
         self._scales = np.array(body.surface.length_scales)
         a, per_metre = body.ball.radius, 1 / self._scales
         scales = np.concatenate([a * per_metre, speed * per_metre, [speed / a]])
-        self._solver = DOP853(
-            lambda _, x: reduced_rates(body, x)[0], 0.0, start(body), np.inf, rtol=rtol, atol=rtol * scales
-        )
+        x = start(body)
+        self._motion = DormandPrince853(lambda x: reduced_rates(body, x)[0], self._accepted, x, scales, rtol)
+        self._last, self._until = (0.0, x), 0.0
 
     def advance(self, t: float) -> None:
         """See :class:`ReducedModel`."""
-        solver, span = self._solver, t - self._solver.t
-        if span <= 0:
-            return
-        solver.t_bound, solver.status = t, "running"
-        while solver.status == "running":
-            wanted, before, velocity = solver.h_abs, solver.t, self._along(solver.y)
-            if solver.step() is not None or (solver.t < t and solver.t - before < _STUCK * span):
-                raise Diverged(f"the step size fell to nothing at t = {solver.t:.6g} s")
-            if not np.all(np.isfinite(solver.y)):
-                raise Diverged(f"the state is not finite (NaN or overflow) at t = {solver.t:.6g} s")
-            if self._body.contact.rolling_resistance > 0:
-                still_moving(velocity, float(solver.t), self._along(solver.y))
-            if solver.t == t:
-                solver.h_abs = max(wanted, solver.h_abs)  # a step cut short at a sample says nothing about the next
+        self._span, self._until = t - self._motion.t, t
+        self._motion.advance(t)
+
+    def _accepted(self, t: float, x: FloatArray) -> FloatArray:
+        (before, y), self._last = self._last, (t, x)
+        if t < self._until and t - before < _STUCK * self._span:
+            raise Diverged(f"the step size fell to nothing at t = {t:.6g} s")
+        if not np.all(np.isfinite(x)):
+            raise Diverged(f"the state is not finite (NaN or overflow) at t = {t:.6g} s")
+        if self._body.contact.rolling_resistance > 0:
+            still_moving(self._along(y), t, self._along(x))
+        return x
 
     def _along(self, x: FloatArray) -> FloatArray:
         """Velocity of the centre along the coordinates [m/s], shape (2,)."""
@@ -113,12 +110,13 @@ class Integrated:
 
     def motion(self) -> BallMotion:
         """See :class:`ReducedModel`."""
-        _, v, force = reduced_rates(self._body, self._solver.y)
-        return BallMotion(*placed(self._body, self._solver.y[None, :], v[None, :]), force[None, :], "reduced equations")
+        x = self._motion.x
+        _, v, force = reduced_rates(self._body, x)
+        return BallMotion(*placed(self._body, x[None, :], v[None, :]), force[None, :], "reduced equations")
 
     def spin_rate(self) -> float:
         """See :class:`ReducedModel`."""
-        return float(reduced_rates(self._body, self._solver.y)[0][4])
+        return float(reduced_rates(self._body, self._motion.x)[0][4])
 
 
 class Compiled:
@@ -161,10 +159,3 @@ class Compiled:
     def spin_rate(self) -> float:
         """See :class:`ReducedModel`."""
         return float(self._evaluate(self._series.x, self._pars)[4])
-
-
-def _speed(body: RollingBall) -> float:
-    """Natural speed [m/s]: the initial one, or that of a fall by one radius."""
-    a = body.ball.radius
-    parts = np.linalg.norm(body.v0), a * np.linalg.norm(body.w0), math.sqrt(a * float(np.linalg.norm(body.gravity)))
-    return math.hypot(*(float(part) for part in parts)) or 1.0

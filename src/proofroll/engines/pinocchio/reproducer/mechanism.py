@@ -9,6 +9,7 @@ import numpy as np
 from proofroll.elements.mechanism.joint import FACTS
 from proofroll.engines.pinocchio.constraint_dynamics import ConstraintDynamics
 from proofroll.engines.pinocchio.mechanism_run import MechanismRun
+from proofroll.engines.pinocchio.reproducer.stepping import ADAPTIVE_STEPS
 from proofroll.engines.pinocchio.settings import PinocchioSettings
 
 _MODEL = """
@@ -178,20 +179,15 @@ def states(times):
         yield y
 """
 _DOP853 = """
+def accept(solver):
+    \"\"\"Takes away violations of loops.\"\"\"
+    solver.y = accepted(solver.y)
+    solver.f = rates(solver.y)
+
+
 def states(times):
-    \"\"\"By scipy's DOP853; a step ends at each time.\"\"\"
-    solver = DOP853(lambda _, y: rates(y), 0.0, np.array(START), np.inf, rtol=RTOL, atol=RTOL)
-    for t in times:
-        solver.t_bound, solver.status = t, "running" if t > solver.t else "finished"
-        while solver.status == "running":
-            wanted, message = solver.h_abs, solver.step()
-            if message is not None:
-                raise RuntimeError(f"no step is small enough past {solver.t:g} s: {message}")
-            if solver.t == t:  # a step cut short at a sample says nothing about the next
-                solver.h_abs = max(wanted, solver.h_abs)
-            solver.y = accepted(solver.y)
-            solver.f = rates(solver.y)
-        yield solver.y
+    \"\"\"At each time.\"\"\"
+    return steps(DOP853(lambda _, y: rates(y), 0.0, np.array(START), np.inf, rtol=RTOL, atol=RTOL), times, accept)
 """
 
 
@@ -262,6 +258,6 @@ def source(run: MechanismRun, settings: PinocchioSettings) -> str:
             _MODEL,
             _CONSTRAINT_DYNAMICS if by_constraints else _NULL_SPACE,
             _MOTION,
-            _DOP853 if adaptive else _RK4,
+            ADAPTIVE_STEPS + _DOP853 if adaptive else _RK4,
         ]
     )

@@ -54,6 +54,22 @@ def states(times):
         yield q, v
 '''
 
+ADAPTIVE_STEPS = '''
+def steps(solver, times, accept):
+    """States at each time by scipy's DOP853, of which a step ends at each; accept may change that of the solver."""
+    for t in times:
+        solver.t_bound, solver.status = t, "running" if t > solver.t else "finished"
+        while solver.status == "running":
+            wanted, message = solver.h_abs, solver.step()
+            if message is not None:
+                raise RuntimeError(f"no step is small enough past {solver.t:g} s: {message}")
+            if solver.t == t:  # a step cut short at a sample says nothing about the next
+                solver.h_abs = max(wanted, solver.h_abs)
+            accept(solver)
+        yield solver.y
+
+'''
+
 _ADAPTIVE = '''
 PLACES = model.nq if ORIENTATION else model.nq - 4  # without the orientation no more than the place is integrated
 
@@ -72,31 +88,30 @@ def derivative(t, y):
     return np.concatenate([moved, acceleration(q, v)])
 
 
+short = 0
+
+
+def accept(solver):
+    """Counts steps that are too short, puts the state back on the rows, and looks whether the wall presses."""
+    global short
+    faster = max(1.0, float(np.max(np.abs(solver.y[PLACES:]) / V_SCALE)))
+    short = short + 1 if solver.step_size * faster < SHORT * Q_SCALE[0] / V_SCALE[0] else 0
+    if short > PATIENCE:
+        raise RuntimeError(f"the steps became too short at {solver.t:g} s: the forces jump there")
+    if PROJECTION:
+        q, v = project(*split(solver.y))
+        solver.y = np.concatenate([q[:PLACES], v])
+        solver.f = derivative(solver.t, solver.y)
+    if normal_force() < -FAINT:
+        raise RuntimeError("the wall would have to pull the ball")
+
+
 def states(times):
-    """Configuration and velocity at each time; a step ends at each."""
+    """Configuration and velocity at each time."""
     start = np.concatenate([START_Q[:PLACES], START_V])
     atol = 1e-2 * RTOL * np.concatenate([Q_SCALE[:PLACES], V_SCALE])
-    solver, short = DOP853(derivative, 0.0, start, np.inf, rtol=RTOL, atol=atol), 0
-    longest = SHORT * Q_SCALE[0] / V_SCALE[0]
-    for t in times:
-        solver.t_bound, solver.status = t, "running" if t > solver.t else "finished"
-        while solver.status == "running":
-            wanted, message = solver.h_abs, solver.step()
-            if message is not None:
-                raise RuntimeError(f"no step is small enough past {solver.t:g} s: {message}")
-            if solver.t == t:  # a step cut short at a sample says nothing about the next
-                solver.h_abs = max(wanted, solver.h_abs)
-            faster = max(1.0, float(np.max(np.abs(solver.y[PLACES:]) / V_SCALE)))
-            short = short + 1 if solver.step_size * faster < longest else 0
-            if short > PATIENCE:
-                raise RuntimeError(f"the steps became too short at {solver.t:g} s: the forces jump there")
-            if PROJECTION:
-                q, v = project(*split(solver.y))
-                solver.y = np.concatenate([q[:PLACES], v])
-                solver.f = derivative(solver.t, solver.y)
-            if normal_force() < -FAINT:
-                raise RuntimeError("the wall would have to pull the ball")
-        yield split(solver.y)
+    solver = DOP853(derivative, 0.0, start, np.inf, rtol=RTOL, atol=atol)
+    return (split(y) for y in steps(solver, times, accept))
 '''
 
 _RUN = '''
@@ -116,7 +131,7 @@ def run(times):
 
 def source(settings: PinocchioSettings) -> str:
     """``states(times)`` and ``run(times)`` for what a formulation defines."""
-    return (_ADAPTIVE if settings.integrator == "dop853" else _FIXED) + _RUN
+    return (ADAPTIVE_STEPS + _ADAPTIVE if settings.integrator == "dop853" else _FIXED) + _RUN
 
 
 def numbers(mechanism: BallWithRows, settings: PinocchioSettings) -> str:
