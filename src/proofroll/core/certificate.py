@@ -11,7 +11,7 @@ from typing import Any
 import numpy as np
 
 from proofroll.core.scene import Scene
-from proofroll.core.several import sample_of
+from proofroll.core.several import sample_of, shaped
 
 # Engines that compute in double precision reproduce the scene's numbers to this relative difference.
 EXACT = 1e-12
@@ -66,8 +66,12 @@ class Line:
 
 
 def certify(engine: Any, scene: Scene) -> list[Line]:
-    """Compares a freshly built engine with the scene: the lines of all its elements."""
-    built, sample = engine.built(), engine.sample()
+    """Compares a freshly built engine with the scene: the lines of all its elements.
+
+    Raises:
+        Diverged: what it samples has another shape than the scene's bodies.
+    """
+    built, sample = engine.built(), shaped(scene, engine.sample(), 0.0)
     lines: list[Line] = []
     for element in scene.elements:
         own = built[element.name] if len(scene.elements) > 1 else built

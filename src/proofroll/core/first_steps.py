@@ -15,7 +15,7 @@ from proofroll.core.engine import fixed_step
 from proofroll.core.engine_abilities import declared_order
 from proofroll.core.errors import Diverged, Refused
 from proofroll.core.scene import Scene
-from proofroll.core.several import build, sample_of
+from proofroll.core.several import build, sample_of, shaped
 
 # Derivative at the first of equally spaced values, over the spacing: by a parabola, by a cubic.
 _PARABOLA = np.array([-3.0, 4.0, -1.0, 0.0]) / 2
@@ -117,10 +117,11 @@ def derivable(kind: Any, scene: Scene, settings: Any) -> list[Line]:
 def _derivatives(kind: Any, scene: Scene, element: Element, settings: Any, h: float) -> tuple[FloatArray, FloatArray]:
     """Accelerations of all bodies' centres and turning at time 0, by a parabola and a cubic; (2, bodies, 3)."""
     engine = build(kind, scene, settings)
-    samples = [sample_of(scene, element, engine.sample())]
-    for steps in (1, 2, 3):
-        engine.advance(steps * h)
-        samples.append(sample_of(scene, element, engine.sample()))
+    samples = []
+    for t in (0.0, h, 2 * h, 3 * h):
+        if t:
+            engine.advance(t)
+        samples.append(sample_of(scene, element, shaped(scene, engine.sample(), t)))
     shape = (len(element.bodies), 3)
     pairs = [[np.reshape(part, shape) for part in (sample.v_WB, sample.w_WB)] for sample in samples]
     velocities = np.array(pairs)

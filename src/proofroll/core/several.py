@@ -3,18 +3,26 @@
 from __future__ import annotations
 
 import dataclasses
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from typing import Any
 
+import numpy as np
+
+from proofroll.core.arrays import FloatArray
 from proofroll.core.element import Element
 from proofroll.core.engine import Sample, fixed_step
 from proofroll.core.engine_abilities import LocatesEvents, TellsRemarks, require_provided
+from proofroll.core.errors import Diverged
 from proofroll.core.events import Event
 from proofroll.core.plugins import resolve_settings
 from proofroll.core.scene import Scene
 
 AnySample = Sample | Mapping[str, Sample]
 """What an engine samples: of a scene of several elements one sample for each, by its name."""
+
+# Arrays of a sample with the numbers that each has for a body; an engine need not give the last two.
+SAMPLED = {"p_WB": 3, "v_WB": 3, "w_WB": 3, "q_WB": 4, "force": 3}
+_OPTIONAL = frozenset({"q_WB", "force"})
 
 
 class EachAlone:
@@ -83,6 +91,35 @@ def sample_of(scene: Scene, element: Element, sample: AnySample) -> Sample:
         assert len(scene.elements) == 1  # of several, a sample is a mapping
         return sample
     return sample[element.name]
+
+
+def arrays(scene: Scene, sample: AnySample, t: float) -> Iterator[tuple[str, FloatArray]]:
+    """Every array of a sample at time ``t`` [s] with its name.
+
+    Raises:
+        Diverged: one is lacking, is not of numbers, or has another shape than the scene's bodies.
+    """
+    for element in scene.elements:
+        own, bodies = sample_of(scene, element, sample), len(element.bodies)
+        for name, width in SAMPLED.items():
+            given = getattr(own, name)
+            if given is None and name in _OPTIONAL:
+                continue
+            try:
+                values = np.asarray(given, dtype=np.float64)
+            except (TypeError, ValueError):
+                raise Diverged(f"the engine gave {name} that is no array of numbers at {t:g} s") from None
+            shape = (width,) if bodies == 1 else (bodies, width)
+            if values.shape not in {shape, (bodies, width)}:
+                raise Diverged(f"the engine gave {name} with shape {values.shape} instead of {shape} at {t:g} s")
+            yield name, values
+
+
+def shaped(scene: Scene, sample: AnySample, t: float) -> AnySample:
+    """The sample itself, after a look at its shapes; raises as :func:`arrays`."""
+    for _ in arrays(scene, sample, t):
+        pass
+    return sample
 
 
 def events_of_engine(engine: Any, element: Element) -> Sequence[Event] | None:

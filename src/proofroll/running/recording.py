@@ -14,12 +14,11 @@ from proofroll.core.arrays import FloatArray
 from proofroll.core.dataset import add_events, from_samples
 from proofroll.core.element import Element
 from proofroll.core.element_abilities import WatchesRuns
-from proofroll.core.engine import Sample
 from proofroll.core.engine_abilities import TellsRemarks
 from proofroll.core.errors import Diverged, lack_behind
 from proofroll.core.events import Event
 from proofroll.core.scene import Scene
-from proofroll.core.several import AnySample, events_of_engine, sample_of
+from proofroll.core.several import SAMPLED, AnySample, arrays, events_of_engine, sample_of
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -143,32 +142,17 @@ def record(engine: Any, scene: Scene, times: FloatArray, probes: Iterable[float]
     return Recording(dataset, failure, wall, (wall, inside), sampling, remarks, ended)
 
 
-_SAMPLED = ("p_WB", "v_WB", "w_WB", "q_WB", "force")
 _NOT_FINITE = "is not finite (NaN or overflow)"
 
 
 def noticed(message: str) -> bool:
     """Whether a failure's sentence says that a sample was not finite: noticed here, not said by the engine."""
-    return any(message.startswith(f"{name} {_NOT_FINITE}") for name in _SAMPLED)
+    return any(message.startswith(f"{name} {_NOT_FINITE}") for name in SAMPLED)
 
 
 def _finite(sample: AnySample, t: float, scene: Scene) -> AnySample:
-    for element in scene.elements:
-        _check(sample_of(scene, element, sample), t, len(element.bodies))
-    return sample
-
-
-def _check(sample: Sample, t: float, bodies: int) -> None:
-    for name in _SAMPLED:
-        values = getattr(sample, name)
-        if values is None:
-            continue
-        values = np.asarray(values)
-        width = 4 if name == "q_WB" else 3
-        shapes = {(bodies, width)} | ({(width,)} if bodies == 1 else set())
-        if np.shape(values) not in shapes:
-            shape = (width,) if bodies == 1 else (bodies, width)
-            raise Diverged(f"the engine gave {name} with shape {np.shape(values)} instead of {shape} at {t:g} s")
+    for name, values in arrays(scene, sample, t):
         # The sum of finite numbers is finite but for overflow; numpy's own question takes ten times as long.
         if not math.isfinite(sum(values.ravel().tolist())) and not np.all(np.isfinite(values)):
             raise Diverged(f"{name} {_NOT_FINITE} at {t:g} s")
+    return sample

@@ -17,7 +17,7 @@ from tiny import Tiny
 
 import proofroll
 from proofroll.core.engine import Built, Sample
-from proofroll.core.errors import InputError, Missing, Refused
+from proofroll.core.errors import Diverged, InputError, Missing, Refused
 from proofroll.core.scene import Scene
 from proofroll.files.data_folders import data_folder
 
@@ -184,3 +184,22 @@ def test_a_scene_may_be_named() -> None:
         proofroll.simulate(scene, until=0.1, every=0.1) for scene in ("pendulum", proofroll.load_scene("pendulum"))
     )
     assert np.array_equal(one["p_WB"], two["p_WB"])
+
+
+@pytest.mark.parametrize(
+    ("wrong", "words"),
+    [
+        ({"p_WB": np.zeros(2)}, r"p_WB with shape \(2,\) instead of \(3,\) at 0 s"),
+        ({"force": np.zeros((2, 3))}, r"force with shape \(2, 3\) instead of \(3,\) at 0 s"),
+        ({"v_WB": [[1.0, 2.0], [3.0]]}, "v_WB that is no array of numbers at 0 s"),
+    ],
+)
+def test_a_sample_of_a_wrong_shape(wrong: dict[str, Any], words: str) -> None:
+    """Whoever writes an engine reads which array has which shape, before its numbers are held against the scene's."""
+
+    class Misshapen(Tiny):
+        def sample(self) -> Sample:
+            return dataclasses.replace(super().sample(), **wrong)
+
+    with pytest.raises(Diverged, match=words):
+        proofroll.simulate("inclined_plane", Misshapen, until=0.05)
