@@ -4,12 +4,12 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterator, Mapping, Sequence
-from typing import Any, ClassVar, Protocol, Self
+from typing import Any, ClassVar, Self
 
 import mujoco
 import numpy as np
 
-from proofroll.core.engine import Built, Sample, whole_steps
+from proofroll.core.engine import Built, Sample
 from proofroll.core.engine_abilities import Level, Term
 from proofroll.core.events import Event
 from proofroll.core.scene import Scene
@@ -19,12 +19,13 @@ from proofroll.elements.ball_on_surface.model import ALL_OF_A_BALL, BallCapabili
 from proofroll.elements.mechanism.sampling import mechanism_of
 from proofroll.engines.mujoco import mechanism
 from proofroll.engines.mujoco.chart import Chart
-from proofroll.engines.mujoco.contact import Resistance, contact_coefficient, contact_force
+from proofroll.engines.mujoco.contact import contact_coefficient, contact_force
+from proofroll.engines.mujoco.formulation import Formulation
 from proofroll.engines.mujoco.free import Facets, Free
 from proofroll.engines.mujoco.friction import BoundedFriction, check_coefficients
 from proofroll.engines.mujoco.mechanism import MujocoMechanism
 from proofroll.engines.mujoco.model import read_spec, write_physics
-from proofroll.engines.mujoco.running import compiled, forget_callbacks, raise_if_fatal, silent
+from proofroll.engines.mujoco.running import SteppedModel, compiled, forget_callbacks, silent
 from proofroll.engines.mujoco.settings import (
     PRESETS,
     ROLLS,
@@ -38,33 +39,6 @@ from proofroll.engines.mujoco.softness import softness
 from proofroll.engines.mujoco.start import EVALUATIONS, accelerations, start
 from proofroll.engines.mujoco.terms import TERMS
 
-
-class Formulation(Protocol):
-    """One way to present the wall to MuJoCo."""
-
-    def __init__(
-        self, model: Any, body: RollingBall, settings: MujocoSettings, friction: BoundedFriction | None
-    ) -> None: ...
-
-    @staticmethod
-    def write(spec: Any, body: RollingBall) -> None:
-        """Sets the numbers of the wall and of the joints."""
-
-    @property
-    def resistance(self) -> Resistance:
-        """The torque of rolling resistance that its steps apply."""
-
-    @property
-    def resists(self) -> bool:
-        """Whether its steps do apply it."""
-
-    def run(self, data: Any, steps: int) -> None:
-        """Makes ``steps`` steps."""
-
-    def evaluate(self, data: Any) -> None:
-        """Computes forces and accelerations of the present state, as a step would."""
-
-
 _FORMULATIONS: Mapping[str, type[Formulation]] = {"free": Free, "chart": Chart, "facets": Facets}
 # Joints whose coordinates hold an orientation.
 _TURNING_JOINTS = (int(mujoco.mjtJoint.mjJNT_BALL), int(mujoco.mjtJoint.mjJNT_FREE))
@@ -72,7 +46,7 @@ _TURNING_JOINTS = (int(mujoco.mjtJoint.mjJNT_BALL), int(mujoco.mjtJoint.mjJNT_FR
 _PRESSED = 1e-6
 
 
-class Mujoco:
+class Mujoco(SteppedModel):
     """MuJoCo behind proofroll's protocol.
 
     The ball's orientation is in every model, asked for or not: free and ball joints have it in their state.
@@ -110,18 +84,14 @@ class Mujoco:
     }
 
     def __init__(self, model: Any, body: RollingBall, settings: MujocoSettings) -> None:
-        self._model = model
+        super().__init__(model, settings)
         self._body = body
-        self._settings = settings
         self._friction = BoundedFriction(model, body, settings) if math.isfinite(body.contact.mu_static) else None
         self._formulation = _FORMULATIONS[settings.formulation](model, body, settings, self._friction)
-        self._data = mujoco.MjData(model)
-        self._scratch = mujoco.MjData(model)
         self._ball = model.body("ball").id
         self._geom = model.geom("ball").id
         wall = model.geom("wall").id if settings.formulation != "facets" else int(model.body("wall").geomadr[0])
         self._geoms = (wall, self._geom)
-        self._steps = 0
         with silent():
             self._start(slips=False)
             if self._friction is not None and not self._friction.start(self._data):
@@ -190,22 +160,12 @@ class Mujoco:
         compiled(spec)
         return source(spec.to_xml(), built._model, built._data, built._body, settings)
 
-    def advance(self, t: float) -> None:
-        """See :class:`proofroll.core.engine.Engine`."""
-        dt = self._settings.dt
-        # Counted, because the sum that MjData.time keeps drifts from the grid by round-off.
-        steps = whole_steps(self._steps * dt, t, dt)
-        if steps == 0:
-            return
-        with silent():
-            self._formulation.run(self._data, steps)
-        self._steps += steps
-        raise_if_fatal(self._data, t)
+    def _run(self, steps: int) -> None:
+        self._formulation.run(self._data, steps)
 
-    @property
-    def native(self) -> tuple[Any, Any]:
-        """MuJoCo's own model and data, for whoever goes on with MuJoCo itself."""
-        return self._model, self._data
+    def _evaluate(self, data: Any) -> None:
+        for _ in range(EVALUATIONS if self._body.contact.rolling_resistance else 1):
+            self._formulation.evaluate(data)
 
     def sample(self) -> Sample:
         """See :class:`proofroll.core.engine.Engine`."""
@@ -282,14 +242,6 @@ class Mujoco:
         if least < N and not self._formulation.resistance.stops(N, float(np.linalg.norm(self._body.v0))):
             return torque / N
         return self._formulation.resistance.lever()
-
-    def _evaluated(self) -> Any:
-        """A copy of the present state with its own forces: after a step MjData holds those of the last stage."""
-        mujoco.mj_copyData(self._scratch, self._model, self._data)
-        with silent():
-            for _ in range(EVALUATIONS if self._body.contact.rolling_resistance else 1):
-                self._formulation.evaluate(self._scratch)
-        return self._scratch
 
 
 def _spec(scene: Scene, body: RollingBall, settings: MujocoSettings) -> Any:

@@ -11,13 +11,14 @@ import numpy as np
 
 from proofroll.core.errors import Refused
 from proofroll.elements.ball_on_surface.model import RollingBall
-from proofroll.engines.mujoco.contact import Resistance, foreseen_normal_force
+from proofroll.engines.mujoco.contact import foreseen_normal_force
+from proofroll.engines.mujoco.formulation import Formulation
 from proofroll.engines.mujoco.friction import BoundedFriction, corrects
 from proofroll.engines.mujoco.model import pose, quaternion_of, tangent_plane
 from proofroll.engines.mujoco.settings import MujocoSettings
 
 
-class Chart:
+class Chart(Formulation):
     """Joints ``u1``, ``u2`` (the surface's own motions), ``normal`` (the depth) and ``spin`` (a ball joint).
 
     In these coordinates the contact's Jacobian is constant along the surface, so the term J̇v that MuJoCo leaves out
@@ -26,17 +27,10 @@ class Chart:
     """
 
     def __init__(
-        self,
-        model: Any,
-        body: RollingBall,
-        settings: MujocoSettings,
-        friction: BoundedFriction | None,
+        self, model: Any, body: RollingBall, settings: MujocoSettings, friction: BoundedFriction | None
     ) -> None:
-        self._model = model
-        self._friction = friction
+        super().__init__(model, body, settings, friction)
         self._corrects = corrects(body.contact, settings)
-        self.resistance = Resistance.of(body, settings.dt)
-        self._ball = model.body("ball").id
         self._wall = model.geom("wall").id
         self._touch = model.site("touch").id
         self._depth = int(model.joint("normal").dofadr[0])
@@ -68,7 +62,7 @@ class Chart:
 
     @property
     def resists(self) -> bool:
-        """See :class:`~proofroll.engines.mujoco.adapter.Formulation`: whether MuJoCo is given the torque's callback."""
+        """See :class:`Formulation`: whether MuJoCo is given the torque's callback."""
         with self._callbacks(mujoco.MjData(self._model)):
             return mujoco.get_mjcb_passive() is not None
 

@@ -119,17 +119,10 @@ class Resistance:
         ahead = [one + pull - inward * normal for one, pull, normal in zip(v, self.pull, e1, strict=True)]
         speed = math.hypot(*ahead)
         scale = -min(self.f * N / speed, self.stopping) if speed else 0.0
-        torque[:] = [scale * component for component in cross(ahead, e1)]
+        torque[:] = scale * np.cross(ahead, e1)
 
     def lever(self) -> float:
         """The lever that the torque has at a normal force of 1 N and a speed at which the ball goes on [m]."""
         torque = np.zeros(3)
         self.apply(torque, 1.0, (1.0, 0.0, 0.0), (0.0, 1.0 + 2 * self.f / self.stopping, 0.0))
         return float(np.linalg.norm(torque))
-
-
-def cross(x: Sequence[float], y: Sequence[float]) -> tuple[float, float, float]:
-    """Vector product of two triples (``numpy.cross`` takes ten times as long)."""
-    x0, x1, x2 = x
-    y0, y1, y2 = y
-    return (x1 * y2 - x2 * y1, x2 * y0 - x0 * y2, x0 * y1 - x1 * y0)

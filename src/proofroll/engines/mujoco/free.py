@@ -12,35 +12,28 @@ import numpy as np
 from proofroll.core.arrays import FloatArray, cross
 from proofroll.core.errors import Diverged, Refused
 from proofroll.elements.ball_on_surface.model import RollingBall
-from proofroll.engines.mujoco.contact import Resistance, foreseen_normal_force
+from proofroll.engines.mujoco.contact import foreseen_normal_force
+from proofroll.engines.mujoco.formulation import Formulation
 from proofroll.engines.mujoco.friction import BoundedFriction, corrects
 from proofroll.engines.mujoco.model import pose, quaternion_of, tangent_plane
 from proofroll.engines.mujoco.settings import MujocoSettings, normal_lead, own_share, velocity_lag
 
 
-class Free:
+class Free(Formulation):
     """The ball on a free joint; the wall a mocap body, which MuJoCo treats as fixed wherever it is put.
 
     The plane stands for the wall only to first order: the contact rows lack J̇v (the turning of the normal).
     """
 
     def __init__(
-        self,
-        model: Any,
-        body: RollingBall,
-        settings: MujocoSettings,
-        friction: BoundedFriction | None,
+        self, model: Any, body: RollingBall, settings: MujocoSettings, friction: BoundedFriction | None
     ) -> None:
-        self._model = model
-        self._friction = friction
+        super().__init__(model, body, settings, friction)
         self._edits = settings.curvature or corrects(body.contact, settings)
-        self._surface = body.surface
         self._radius = body.ball.radius
         self._wall_rate, self._geom = body.wall_rate, model.geom("ball").id
         if body.wall_rate is not None and not settings.curvature:
             raise Refused("for MuJoCo a mocap plane has no velocity, so the wall's is added with curvature=true alone")
-        self.resistance = Resistance.of(body, settings.dt)
-        self._ball = model.body("ball").id
         self._wall = model.geom("wall").id
         self._curvature = settings.curvature
         self._half = velocity_lag(settings)
@@ -53,11 +46,6 @@ class Free:
         """Puts the wall where the ball starts."""
         spec.body("ball").pos = body.p0
         pose(spec.body("wall"), *tangent_plane(body))
-
-    @property
-    def resists(self) -> bool:
-        """See :class:`~proofroll.engines.mujoco.adapter.Formulation`: whether a step applies the torque's law."""
-        return self.resistance.f > 0
 
     def run(self, data: Any, steps: int) -> None:
         """Makes ``steps`` steps."""
@@ -168,20 +156,13 @@ class Free:
         data.efc_aref[first : first + contact.dim] += self._share * rows[: contact.dim]
 
 
-class Facets:
+class Facets(Formulation):
     """The ball on a free joint in a ring of boxes whose faces are tangent to the wall: the obvious concave wall."""
 
     def __init__(
-        self,
-        model: Any,
-        body: RollingBall,
-        settings: MujocoSettings,
-        friction: BoundedFriction | None,  # noqa: ARG002 -- refused before
+        self, model: Any, body: RollingBall, settings: MujocoSettings, friction: BoundedFriction | None
     ) -> None:
-        self._model = model
-        self._surface = body.surface
-        self.resistance = Resistance.of(body, settings.dt)
-        self._ball = model.body("ball").id
+        super().__init__(model, body, settings, friction)
         wall = model.body("wall")
         axis = np.zeros(9)
         mujoco.mju_quat2Mat(axis, wall.quat)
@@ -219,11 +200,6 @@ class Facets:
             thickness, _, height = box.size
             box.pos = face + np.array([thickness, 0.0, 0.0])
             box.size = [thickness, face[0] * math.tan(math.pi / len(boxes)), height]
-
-    @property
-    def resists(self) -> bool:
-        """See :class:`~proofroll.engines.mujoco.adapter.Formulation`: whether a step applies the torque's law."""
-        return self.resistance.f > 0
 
     def run(self, data: Any, steps: int) -> None:
         """Makes ``steps`` steps."""

@@ -9,7 +9,7 @@ import mujoco
 import numpy as np
 
 from proofroll.core.arrays import cross
-from proofroll.core.engine import Sample, whole_steps
+from proofroll.core.engine import Sample
 from proofroll.core.errors import InputError, Refused
 from proofroll.elements.mechanism import Joint, Mechanism
 from proofroll.elements.mechanism.capabilities import ALL_JOINTS, FORCES, MechanismCapability, require
@@ -18,7 +18,7 @@ from proofroll.elements.mechanism.rotations import Array, to_quaternion
 from proofroll.elements.mechanism.sampling import MechanismBuilt, mechanism_of, unsaid
 from proofroll.engines.mujoco import mechanism_model
 from proofroll.engines.mujoco.mechanism_built import read_back
-from proofroll.engines.mujoco.running import compiled, forget_callbacks, raise_if_fatal, silent
+from proofroll.engines.mujoco.running import SteppedModel, compiled, forget_callbacks, silent
 from proofroll.engines.mujoco.settings import MujocoSettings, impedance
 
 _CAPABILITY = MechanismCapability
@@ -37,20 +37,18 @@ LACKING: Mapping[str, str] = {
 }
 
 
-class MujocoMechanism:
+class MujocoMechanism(SteppedModel):
     """See :class:`proofroll.core.engine.Engine` for the methods."""
 
     def __init__(self, mechanism: Mechanism, settings: MujocoSettings) -> None:
         require(mechanism, PROVIDES, LACKING)
         forget_callbacks()
-        self._mechanism, self._settings = mechanism, settings
-        self._model = compiled(mechanism_model.write(mechanism, settings))
-        self._data, self._scratch = mujoco.MjData(self._model), mujoco.MjData(self._model)
+        super().__init__(compiled(mechanism_model.write(mechanism, settings)), settings)
+        self._mechanism = mechanism
         self._bodies = [self._model.body(body.name).id for body in mechanism.bodies]
         self._sites = [self._model.site(f"{number}").id for number in range(len(mechanism.joints))]
         # Sensors tell reactions; in each of the steps between samples they would cost a twentieth to a fifth of it.
         self._model.opt.disableflags |= _NO_SENSORS
-        self._steps = 0
         for number, joint in enumerate(mechanism.joints):
             self._start(number, joint)
         with silent():
@@ -99,21 +97,6 @@ class MujocoMechanism:
         if joint.torque:
             self._data.qfrc_applied[first] = joint.torque
 
-    def advance(self, t: float) -> None:
-        """See :class:`proofroll.core.engine.Engine`."""
-        dt = self._settings.dt
-        steps = whole_steps(self._steps * dt, t, dt)
-        if steps:
-            with silent():
-                mujoco.mj_step(self._model, self._data, steps)
-            self._steps += steps
-            raise_if_fatal(self._data, t)
-
-    @property
-    def native(self) -> tuple[Any, Any]:
-        """MuJoCo's own model and data."""
-        return self._model, self._data
-
     def sample(self) -> Sample:
         """See :class:`proofroll.core.engine.Engine`."""
         data = self._evaluated()
@@ -161,14 +144,10 @@ class MujocoMechanism:
         """See :class:`proofroll.core.engine.Engine`."""
         return read_back(self._model, self._evaluated(), self._mechanism, impedance(self._settings)[0])
 
-    def _evaluated(self) -> Any:
-        """A copy of the present state with its own forces: after a step MjData holds those of the last stage."""
-        mujoco.mj_copyData(self._scratch, self._model, self._data)
+    def _evaluate(self, data: Any) -> None:
         self._model.opt.disableflags &= ~_NO_SENSORS
-        with silent():
-            mujoco.mj_forward(self._model, self._scratch)
+        super()._evaluate(data)
         self._model.opt.disableflags |= _NO_SENSORS
-        return self._scratch
 
 
 def check(settings: MujocoSettings) -> None:

@@ -16,15 +16,13 @@ from proofroll.elements.ball_on_surface.model import RollingBall
 from proofroll.engines.mujoco.contact import MEMORY
 from proofroll.engines.mujoco.friction import MEMORY as SLIP_MEMORY
 from proofroll.engines.mujoco.friction import condim, corrects
-from proofroll.engines.mujoco.settings import MujocoSettings, friction_coefficients, impedance, time_constant
+from proofroll.engines.mujoco.settings import (
+    MujocoSettings,
+    friction_coefficients,
+    impedance,
+    time_constant,
+)
 from proofroll.engines.mujoco.written import written
-
-_INTEGRATORS = {
-    "Euler": mujoco.mjtIntegrator.mjINT_EULER,
-    "RK4": mujoco.mjtIntegrator.mjINT_RK4,
-    "implicitfast": mujoco.mjtIntegrator.mjINT_IMPLICITFAST,
-}
-_CONES = {"pyramidal": mujoco.mjtCone.mjCONE_PYRAMIDAL, "elliptic": mujoco.mjtCone.mjCONE_ELLIPTIC}
 
 
 def read_spec(scene: Scene, body: RollingBall, formulation: str) -> Any:
@@ -53,8 +51,8 @@ def write_physics(spec: Any, body: RollingBall, settings: MujocoSettings) -> Non
     option = spec.option
     option.gravity = body.gravity
     option.timestep = settings.dt
-    option.integrator = _INTEGRATORS[settings.integrator]
-    option.cone = _CONES[settings.cone]
+    option.integrator = getattr(mujoco.mjtIntegrator, f"mjINT_{settings.integrator.upper()}")
+    option.cone = getattr(mujoco.mjtCone, f"mjCONE_{settings.cone.upper()}")
     spec.nuserdata = MEMORY if body.contact.rolling_resistance else 0
     spec.nuserdata += SLIP_MEMORY if corrects(body.contact, settings) else 0
     # A blow-up must be seen: by default MuJoCo puts the model back to its initial state and goes on.

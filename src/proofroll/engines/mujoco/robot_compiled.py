@@ -32,10 +32,8 @@ def robot_of(model: Any) -> Robot:
     driven = {int(model.actuator_trnid[index, 0]) for index in range(model.nu) if model.actuator_trntype[index] == 0}
     for index in range(1, model.nbody):
         name, parent = names[index], names[int(model.body_parentid[index])]
-        A = _matrix(model.body_iquat[index])
-        inertia = A @ np.diag(model.body_inertia[index]) @ A.T
-        bodies[name] = RobotBody(name, float(model.body_mass[index]), np.array(model.body_ipos[index]), inertia)
-        position, rotation = np.array(model.body_pos[index]), _matrix(model.body_quat[index])
+        bodies[name] = body_of(model, index, name)
+        position, rotation = np.array(model.body_pos[index]), matrix(model.body_quat[index])
         first, count = int(model.body_jntadr[index]), int(model.body_jntnum[index])
         if not count:
             joints.append(RobotJoint(f"({name})", "fixed", parent, name, position, rotation, np.array([0.0, 0.0, 1.0])))
@@ -52,6 +50,13 @@ def robot_of(model: Any) -> Robot:
     return robot.with_joints(**{law: 0.0 for flag, law in laws.items() if _off(model, flag)})
 
 
+def body_of(model: Any, index: int, name: str) -> RobotBody:
+    """One of MuJoCo's bodies, in its own frame."""
+    A = matrix(model.body_iquat[index])
+    inertia = A @ np.diag(model.body_inertia[index]) @ A.T
+    return RobotBody(name, float(model.body_mass[index]), np.array(model.body_ipos[index]), inertia)
+
+
 def _off(model: Any, flag: str) -> bool:
     """Whether the file disables a part of the physics; MuJoCo up to 3.3 has one flag for springs and dampers."""
     bits = mujoco.mjtDisableBit
@@ -65,7 +70,7 @@ def _sources(model: Any, names: list[str]) -> dict[str, dict[str, Any]]:
         names[index]: {
             "collides": [],
             "position": np.array(model.body_pos[index]),
-            "rotation": _matrix(model.body_quat[index]),
+            "rotation": matrix(model.body_quat[index]),
         }
         for index in range(1, model.nbody)
     }
@@ -116,5 +121,6 @@ def _first(value: Any) -> float:
     return float(np.ravel(value)[0])
 
 
-def _matrix(quaternion: Array) -> Array:
+def matrix(quaternion: Array) -> Array:
+    """The rotation of a quaternion of MuJoCo's."""
     return np.asarray(Rotation.from_quat(quaternion, scalar_first=True).as_matrix())

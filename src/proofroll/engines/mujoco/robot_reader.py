@@ -3,13 +3,16 @@
 from __future__ import annotations
 
 import importlib.metadata
-from collections.abc import Callable, Mapping
+from collections.abc import Mapping
 from pathlib import Path
 from typing import Any, ClassVar
 
+import mujoco
 import numpy as np
 from scipy.spatial.transform import Rotation
 
+from proofroll.engines.mujoco.robot_compiled import body_of, matrix, robot_of
+from proofroll.engines.mujoco.running import mass_matrix
 from proofroll.robots.model import Array, Robot, RobotBody, composed
 from proofroll.robots.protocol import AtState, Reading, Request, evaluate
 
@@ -40,16 +43,10 @@ class MujocoRobots:
 
     def compiled(self, path: Path) -> Robot:
         """The compiled model of an MJCF as plain data."""
-        import mujoco
-
-        from proofroll.engines.mujoco.robot_compiled import robot_of
-
         return robot_of(mujoco.MjModel.from_xml_path(str(path)))
 
     def read(self, request: Request) -> Reading:
         """The compiled model without actuators, tendons, medium and constraints, of which friction is one."""
-        import mujoco
-
         model = _compile(request)
         off = mujoco.mjtDisableBit
         model.opt.disableflags |= int(off.mjDSBL_CONSTRAINT) | int(off.mjDSBL_ACTUATION)
@@ -86,8 +83,6 @@ class MujocoRobots:
 
 def _compile(request: Request) -> Any:
     """The model; options go into the file, where every version reads them."""
-    import mujoco
-
     text = request.path.read_text(encoding="utf-8")
     written = {key: str(on).lower() for key, on in request.options.items() if key != "boundmass"}
     if request.options.get("boundmass"):
@@ -108,10 +103,6 @@ def _compile(request: Request) -> Any:
 def _at(
     request: Request, model: Any, data: Any, joints: tuple[str, ...], dofs: tuple[int, ...], k: int, frames: list[Any]
 ) -> AtState:
-    import mujoco
-
-    from proofroll.engines.mujoco.running import mass_matrix
-
     states = request.states
     T = np.eye(model.nv)
     data.qpos[:], data.qvel[:] = model.qpos0, 0.0
@@ -162,21 +153,10 @@ def _group(model: Any, body: int) -> RobotBody:
             if int(model.body_weldid[index]) != body or parent not in poses:
                 continue
             p, R = poses[parent]
-            poses[index] = (p + R @ model.body_pos[index], R @ _matrix(model.body_quat[index]))
-        A = _matrix(model.body_iquat[index])
-        inertia = A @ np.diag(model.body_inertia[index]) @ A.T
-        parts.append(
-            (RobotBody("", float(model.body_mass[index]), model.body_ipos[index].copy(), inertia), *poses[index])
-        )
+            poses[index] = (p + R @ model.body_pos[index], R @ matrix(model.body_quat[index]))
+        parts.append((body_of(model, index, ""), *poses[index]))
     return composed("", parts)
 
 
-def _matrix(quaternion: Array) -> Array:
-    return np.asarray(Rotation.from_quat(quaternion, scalar_first=True).as_matrix())
-
-
 def _coupled(model: Any, joints: tuple[str, ...]) -> tuple[str, ...]:
-    import mujoco
-
-    joint: Callable[[int], bool] = lambda index: model.eq_type[index] == mujoco.mjtEq.mjEQ_JOINT  # noqa: E731
-    return tuple(joints[int(model.eq_obj1id[index])] for index in range(model.neq) if joint(index))
+    return tuple(joints[number] for number in model.eq_obj1id[model.eq_type == int(mujoco.mjtEq.mjEQ_JOINT)].tolist())

@@ -8,7 +8,9 @@ import mujoco
 import numpy as np
 
 from proofroll.core.arrays import FloatArray
+from proofroll.core.engine import whole_steps
 from proofroll.core.errors import Diverged, Refused
+from proofroll.engines.mujoco.settings import MujocoSettings
 
 _FATAL = (
     (mujoco.mjtWarning.mjWARN_BADQPOS, "positions are not finite or huge"),
@@ -52,6 +54,52 @@ class silent:  # noqa: N801 -- used as a statement; a generator's context would 
 
 def _nothing(_: str) -> None:
     pass
+
+
+class SteppedModel:
+    """A model that MuJoCo steps, and how its state is looked at without being touched.
+
+    Args:
+        model: compiled.
+        settings: of the adapter.
+    """
+
+    def __init__(self, model: Any, settings: MujocoSettings) -> None:
+        self._model, self._settings = model, settings
+        self._data, self._scratch = mujoco.MjData(model), mujoco.MjData(model)
+        self._steps = 0
+
+    def advance(self, t: float) -> None:
+        """See :class:`proofroll.core.engine.Engine`."""
+        dt = self._settings.dt
+        # Counted, because the sum that MjData.time keeps drifts from the grid by round-off.
+        steps = whole_steps(self._steps * dt, t, dt)
+        if steps == 0:
+            return
+        with silent():
+            self._run(steps)
+        self._steps += steps
+        raise_if_fatal(self._data, t)
+
+    @property
+    def native(self) -> tuple[Any, Any]:
+        """MuJoCo's own model and data, for whoever goes on with MuJoCo itself."""
+        return self._model, self._data
+
+    def _run(self, steps: int) -> None:
+        """Makes ``steps`` steps."""
+        mujoco.mj_step(self._model, self._data, steps)
+
+    def _evaluate(self, data: Any) -> None:
+        """Computes forces and accelerations of the state in ``data``, as a step would."""
+        mujoco.mj_forward(self._model, data)
+
+    def _evaluated(self) -> Any:
+        """A copy of the present state with its own forces: after a step MjData holds those of the last stage."""
+        mujoco.mj_copyData(self._scratch, self._model, self._data)
+        with silent():
+            self._evaluate(self._scratch)
+        return self._scratch
 
 
 def raise_if_fatal(data: Any, t: float) -> None:

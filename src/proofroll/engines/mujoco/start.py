@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable
-from typing import Any, Protocol
+from typing import Any
 
 import mujoco
 import numpy as np
@@ -12,6 +12,7 @@ import numpy as np
 from proofroll.core.arrays import FloatArray
 from proofroll.core.errors import Refused
 from proofroll.elements.ball_on_surface.model import RollingBall
+from proofroll.engines.mujoco.formulation import Formulation
 from proofroll.engines.mujoco.friction import corrects
 from proofroll.engines.mujoco.settings import MujocoSettings, impedance, time_constant, velocity_lag
 
@@ -26,13 +27,6 @@ _SOFT = 0.9
 _SEQUENCE = 1e-10
 # A start "at depth zero" is this part of the radius inside: at zero, round-off would decide whether there is a contact.
 _TOUCHING = 1e-13
-
-
-class Evaluates(Protocol):
-    """What the start needs of a formulation."""
-
-    def evaluate(self, data: Any) -> None:
-        """Computes forces and accelerations of the present state."""
 
 
 def place(model: Any, data: Any, body: RollingBall, depth: float) -> None:
@@ -63,7 +57,7 @@ def place(model: Any, data: Any, body: RollingBall, depth: float) -> None:
 
 
 def start(
-    model: Any, data: Any, body: RollingBall, settings: MujocoSettings, formulation: Evaluates, *, slips: bool
+    model: Any, data: Any, body: RollingBall, settings: MujocoSettings, formulation: Formulation, *, slips: bool
 ) -> None:
     """The state at time 0 with its own forces; ``slips`` if they are known not to hold the ball.
 
