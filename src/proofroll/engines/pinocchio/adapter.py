@@ -113,7 +113,7 @@ class Pinocchio:
         if settings.formulation in _OF_PINOCCHIO_4 and release(cls.version()) < (4,):
             raise Refused(f"{settings.formulation} needs the constraints of pinocchio 4.0, and this is {cls.version()}")
         if settings.formulation in OF_MECHANISMS:
-            return cls(MechanismRun.build(scene, settings))
+            return cls(MechanismRun(scene, settings))
         settings = _decided(scene, settings)
         return cls((ContactRun if settings.formulation == "contact" else RowsRun)(rolling_ball(scene), settings))
 
@@ -123,7 +123,7 @@ class Pinocchio:
         from proofroll.engines.pinocchio.reproducer import mechanism, source
 
         if settings.formulation in OF_MECHANISMS:
-            return mechanism.source(MechanismRun.build(scene, settings), settings)
+            return mechanism.source(MechanismRun(scene, settings), settings)
         return source(rolling_ball(scene), _decided(scene, settings))
 
     def advance(self, t: float) -> None:

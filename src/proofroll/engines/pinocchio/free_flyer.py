@@ -30,13 +30,7 @@ class FreeFlyer(BallWithRows):
         self._matrix = np.zeros((9, 9))
         self._directions = np.zeros((3, 6))
         self._entries = self._directions.reshape(-1)
-        x, y, z = body.p0.tolist()
-        moving = self._surface.moving_triad(x, y, z, 0.0, 0.0, 0.0)
-        changing = _changing(body)
-        entries = _entries(self._radius)
-        self._changing = [entry for entry in entries if entry[1] in changing]
-        for index, source, factor in entries:
-            self._entries[index] = factor * moving[source]
+        self._sources = _sources(self._radius)
         self._add_ball(body, 0, pin.JointModelFreeFlyer(), pin.SE3.Identity())
         self.q0 = np.concatenate([body.p0, [0.0, 0.0, 0.0, 1.0]])
         self.v0 = np.concatenate([body.v0, body.w0])
@@ -78,13 +72,13 @@ class FreeFlyer(BallWithRows):
     def _aimed(self, moving: Sequence[float]) -> FloatArray:
         """Velocity along e1, and of slip along e2 and e3, from (v, ω) in the world, shape (3, 6).
 
-        The next call overwrites it: only what changes from place to place is written again.
+        The next call overwrites it.
 
         Args:
             moving: of :meth:`proofroll.elements.ball_on_surface.surfaces.Surface.moving_triad`.
         """
         entries = self._entries
-        for index, source, factor in self._changing:
+        for index, source, factor in self._sources:
             entries[index] = factor * moving[source]
         return self._directions
 
@@ -219,22 +213,10 @@ class FreeFlyer(BallWithRows):
         return q, np.array(pin.impulseDynamics(self.model, data, v, rows[:1]))
 
 
-def _entries(radius: float) -> list[tuple[int, int, float]]:
+def _sources(radius: float) -> list[tuple[int, int, float]]:
     """What the directions consist of: place in their 18 numbers, place in a moving triad, and factor.
 
     Along e1 it is e1·v, along e2 the slip e2·v + a e3·ω, along e3 the slip e3·v - a e2·ω.
     """
     blocks = ((0, 1, 1.0), (6, 4, 1.0), (9, 7, radius), (12, 7, 1.0), (15, 4, -radius))
     return [(index + k, source + k, factor) for index, source, factor in blocks for k in range(3)]
-
-
-def _changing(body: RollingBall) -> set[int]:
-    """Places in a moving triad of what changes from place to place of e1, e2, e3; all, if that is not known."""
-    surface = body.surface
-    if surface.generators is None:
-        return set(range(1, 10))
-    # A component of a frame that one motion turns by α is p + q sin α + r cos α: where it is the same at three angles
-    # it is the same at all.
-    places = [[x, y] for x in (0.0, 1.0, 2.5) for y in (0.0, 1.0, 2.5)]
-    triads = surface.frame(np.array(places)).swapaxes(-1, -2).reshape(-1, 9)
-    return set((1 + np.flatnonzero(np.ptp(triads, axis=0) > 0)).tolist())

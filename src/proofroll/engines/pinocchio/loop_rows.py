@@ -7,6 +7,7 @@ found anew at each evaluation, it flickers with round-off.
 
 from __future__ import annotations
 
+from functools import partial
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -17,10 +18,8 @@ from scipy.linalg.lapack import dpotrf, dtrtri
 from proofroll.core.arrays import cross
 from proofroll.elements.mechanism.joint import FACTS
 from proofroll.elements.mechanism.rotations import Array
-from proofroll.elements.mechanism.sampling import independent
+from proofroll.elements.mechanism.sampling import independent_anywhere
 from proofroll.engines.pinocchio.joint_tree import JointTree
-
-_NEARBY = 0.05  # rad or m: far enough from a singular start to see the rank that holds in general
 
 
 class RowsAtState(NamedTuple):
@@ -50,7 +49,7 @@ class LoopRows:
     """
 
     def __init__(self, tree: JointTree) -> None:
-        self._tree, self._model = tree, tree.model
+        self._model = tree.model
         kinds = [loop.kind for loop in tree.mechanism.loops]
         points = [(number, k) for number, kind in enumerate(kinds) for k in FACTS[kind].translations]
         angles = [(number, *pair) for number, kind in enumerate(kinds) for pair in FACTS[kind].rotations]
@@ -61,12 +60,15 @@ class LoopRows:
         self._fixed = np.eye(3)[self._axis]
         self._loop = np.concatenate([self._point, self._angle])
         self._ends = np.array(tree.loops, dtype=np.intp).reshape(-1, 2).T
+        data, rest = self._model.createData(), np.zeros(self._model.nv)
+
+        def at_rest(q: Array) -> tuple[Array, Array]:
+            rows = self.at(data, q, rest)
+            return rows.residual, rows.C
+
         self.rank = 0
         if tree.loops:
-            data = self._model.createData()
-            at_start = self.at(data, tree.q0, tree.v0)
-            self.rank = independent(at_start.C)
-            self.rank = max(self.rank, independent(self._nearby(data, at_start).C))
+            self.rank = independent_anywhere(tree.q0, at_rest, partial(pin.integrate, self._model))
 
     def at(self, data: Any, q: Array, v: Array) -> RowsAtState:
         """Rows at a state; positions, velocities and drifts of all frames are in ``data`` then."""
@@ -126,18 +128,6 @@ class LoopRows:
         split = self.split(pin.crba(self._model, data, q), rows.C)
         v = v - split.locked @ (split.back @ (rows.C @ v))
         return pin.integrate(self._model, q, -split.locked @ (split.back @ rows.residual)), v
-
-    def _nearby(self, data: Any, rows: RowsAtState) -> RowsAtState:
-        """The rows at a pose near the start that the loops allow and that no symmetry distinguishes."""
-        n = self._model.nv
-        direction = 1.0 + np.modf(np.arange(1, n + 1) * 0.6180339887498949)[0]  # golden ratio: no two alike
-        direction -= np.linalg.pinv(rows.C, 1e-8) @ (rows.C @ direction)
-        step = _NEARBY * direction / max(np.abs(direction).max(), 1e-300)
-        q = pin.integrate(self._model, self._tree.q0, step)
-        for _ in range(10):  # Newton's method doubles the digits; four rounds do from so near
-            rows = self.at(data, q, np.zeros(n))
-            q = pin.integrate(self._model, q, -np.linalg.pinv(rows.C, 1e-8) @ rows.residual)
-        return rows
 
 
 def _dot(a: Array, b: Array) -> Array:

@@ -10,7 +10,6 @@ import pinocchio as pin
 from proofroll.core.engine import Sample
 from proofroll.core.errors import Diverged
 from proofroll.core.integrators import INTEGRATORS
-from proofroll.elements.mechanism import Mechanism
 from proofroll.elements.mechanism.capabilities import require
 from proofroll.elements.mechanism.rotations import Array
 from proofroll.elements.mechanism.sampling import MechanismBuilt, independent, mechanism_of, unsaid
@@ -25,8 +24,8 @@ from proofroll.engines.pinocchio.settings import PinocchioSettings
 class MechanismRun:
     """See :class:`proofroll.core.engine.Engine` for the methods."""
 
-    def __init__(self, mechanism: Mechanism, settings: PinocchioSettings) -> None:
-        self._mechanism = mechanism
+    def __init__(self, scene: Any, settings: PinocchioSettings) -> None:
+        self._mechanism = mechanism = mechanism_of(scene)
         kind = NullSpace if settings.formulation == "null_space" else ConstraintDynamics
         require(mechanism, kind.provides, kind.lacking)
         self.tree = JointTree(mechanism)
@@ -43,11 +42,6 @@ class MechanismRun:
         resolution = float(getattr(settings, settings.resolution))
         integrator = INTEGRATORS[settings.integrator]
         self.motion = integrator(self._rates, self._accepted, start, np.ones(len(start)), resolution)
-
-    @classmethod
-    def build(cls, scene: Any, settings: PinocchioSettings) -> MechanismRun:
-        """See :class:`proofroll.core.engine.Engine`; ``scene`` may be a mechanism."""
-        return cls(mechanism_of(scene), settings)
 
     def _rates(self, y: Array) -> Array:
         q, v = y[: self._nq], y[self._nq :]

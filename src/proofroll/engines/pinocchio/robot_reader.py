@@ -7,6 +7,7 @@ from collections.abc import Mapping
 from typing import Any, ClassVar
 
 import numpy as np
+import pinocchio as pin
 from scipy.spatial.transform import Rotation
 
 from proofroll.robots.model import Array
@@ -27,8 +28,6 @@ class PinocchioRobots:
 
     def read(self, request: Request) -> Reading:
         """The model, evaluated by crba, rnea and aba."""
-        import pinocchio as pin
-
         model = _build(request)
         if request.kind == "urdf":
             model.gravity.linear = request.gravity
@@ -78,8 +77,6 @@ class PinocchioRobots:
 
 
 def _build(request: Request) -> Any:
-    import pinocchio as pin
-
     mimic = {"mimic": True} if request.options.get("mimic") else {}
     if request.kind == "mjcf":
         return pin.buildModelFromMJCF(str(request.path))
@@ -113,8 +110,6 @@ def _composite(request: Request, model: Any, index: int) -> list[str]:
 
 def _frame(request: Request, model: Any, joint: str, index: int) -> int | None:
     """The frame of the body that a joint carries, where the model has it; its placement is against the joint."""
-    import pinocchio as pin
-
     body = request.children.get(joint)
     if body is None or not model.existFrame(body, pin.FrameType.BODY):
         return None
@@ -126,8 +121,6 @@ def _state(
     request: Request, model: Any, columns: list[tuple[str, int, int]], k: int
 ) -> tuple[Array, Array, Array, Array]:
     """Configuration, velocity, and the relation to the common velocity: both parts of a free base have body axes."""
-    import pinocchio as pin
-
     states = request.states
     described = [entry.key() for entry in model.referenceConfigurations]  # the pose that an MJCF describes
     q = np.array(model.referenceConfigurations["qpos0"] if "qpos0" in described else pin.neutral(model))

@@ -20,17 +20,12 @@ from proofroll.engines.pinocchio.settings import PinocchioSettings
 from proofroll.engines.pinocchio.stick_slip import AdaptiveStickSlip
 from proofroll.engines.pinocchio.stick_slip_steps import StickSlipEuler, StickSlipRungeKutta4
 
+# Of a ball that rolls, and of one that can slip.
 _INTEGRATORS = {
-    "dop853": Adaptive,
-    "semi_implicit_euler": SemiImplicitEuler,
-    "rk4": TangentRungeKutta4,
-    "rk4_dexpinv": TangentRungeKutta4,
-}
-_THAT_SLIPS = {
-    "dop853": AdaptiveStickSlip,
-    "semi_implicit_euler": StickSlipEuler,
-    "rk4": StickSlipRungeKutta4,
-    "rk4_dexpinv": StickSlipRungeKutta4,
+    "dop853": (Adaptive, AdaptiveStickSlip),
+    "semi_implicit_euler": (SemiImplicitEuler, StickSlipEuler),
+    "rk4": (TangentRungeKutta4, StickSlipRungeKutta4),
+    "rk4_dexpinv": (TangentRungeKutta4, StickSlipRungeKutta4),
 }
 
 
@@ -42,10 +37,11 @@ class RowsRun:
         kind = Composite if settings.formulation == "composite" else FreeFlyer
         self.mechanism: BallWithRows = kind(body, bool(settings.orientation))
         self.motion: TangentIntegrator
+        rolling, slipping = _INTEGRATORS[settings.integrator]
         if math.isfinite(body.contact.mu_static):
-            self.motion = _THAT_SLIPS[settings.integrator](self.mechanism, settings, body.contact)
+            self.motion = slipping(self.mechanism, settings, body.contact)
         else:
-            self.motion = _INTEGRATORS[settings.integrator](self.mechanism, settings)
+            self.motion = rolling(self.mechanism, settings)
         self._looked_at = self.mechanism.model.createData()  # for sampling, which leaves the running data alone
 
     def advance(self, start: float, end: float) -> None:

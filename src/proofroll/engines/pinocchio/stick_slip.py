@@ -105,11 +105,6 @@ class AdaptiveStickSlip(Adaptive):
     def _excess(self, y: FloatArray) -> float:
         return excess(self._mechanism, self._data, *self._split(y), self.mu_static)[0]
 
-    def _normal_force(self, y: FloatArray) -> float:
-        if self._mode is FrictionLaw.STICKING:
-            return excess(self._mechanism, self._data, *self._split(y), self.mu_static)[1]
-        return self._slide(self._data, y, self._direction(self._data, y)).normal_force
-
     def _turning(self, data: Any, y: FloatArray) -> tuple[SlidingContact, FloatArray]:
         """The ball without friction, and the rate at which the direction of its slip_rate turns [1/s], shape (3,)."""
         free = self._slide(data, y, np.zeros(3))
@@ -243,7 +238,7 @@ class AdaptiveStickSlip(Adaptive):
         Raises:
             Diverged: the ball leaves the wall.
         """
-        lift = located(solver, lambda y: -self._normal_force(y), -before, -after, self._span)
+        lift = located(solver, lambda y: -self._monitor(y)[2], -before, -after, self._span)
         time, width = lift[:2] if lift is not None else (float(solver.t), float(solver.step_size))
         if stop is None or time <= stop[0]:
             self._record("lift_off", time, width)

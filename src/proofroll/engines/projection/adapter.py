@@ -88,7 +88,7 @@ class Projection:
     def build(cls, scene: Scene, settings: ProjectionSettings) -> Self | ProjectionMechanism:
         """See :class:`proofroll.core.engine.Engine`; what ``dependent`` builds is a run of a mechanism."""
         if settings.formulation == "dependent":
-            return ProjectionMechanism.build(scene, settings)
+            return ProjectionMechanism(scene, settings)
         follow = BallCapability.ORIENTATION in scene.requires
         if follow and settings.integrator == "taylor" and settings.formulation == "rotating_frame":
             raise Refused("the compiled series do not follow the orientation; use integrator=dop853")

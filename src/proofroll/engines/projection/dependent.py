@@ -19,11 +19,9 @@ import numpy as np
 from proofroll.core.arrays import cross
 from proofroll.elements.mechanism import Mechanism, Tree
 from proofroll.elements.mechanism.rotations import Array, to_quaternion
-from proofroll.elements.mechanism.sampling import independent
+from proofroll.elements.mechanism.sampling import independent_anywhere
 from proofroll.engines.projection.applied import Applied
 from proofroll.engines.projection.connections import Bodies, ConnectionRows, Ends, ProjectedConnections
-
-_NEARBY = 0.05  # rad or m: far enough from a singular start to see the rank that holds in general
 
 
 class SolvedState(NamedTuple):
@@ -60,9 +58,8 @@ class DependentCoordinates:
             self._root[at[0], at[0]] = np.eye(3) / np.sqrt(self.mass[i])
             self._root[at[1], at[1]] = np.linalg.inv(np.linalg.cholesky(self.inertia[i])).T
         self.start = self._start(mechanism)
-        self.rank = independent(self.solve(self.start, rank=0).rows.C)
-        if self.rank:
-            self.rank = max(self.rank, independent(self._nearby()))
+        self.rank = 0
+        self.rank = independent_anywhere(self.start, self._residual_and_rows, self._moved)
 
     def _start(self, mechanism: Mechanism) -> Array:
         motion = Tree(mechanism).at(*mechanism.start())
@@ -94,27 +91,32 @@ class DependentCoordinates:
         padded[2, :n] = np.matmul(R[:n], w[:, :, None])[:, :, 0]
         return Bodies(padded[0], R, padded[1], padded[2])
 
-    def solve(self, x: Array, rank: int | None = None) -> SolvedState:
+    def _residual_and_rows(self, x: Array) -> tuple[Array, Array]:
+        bodies = self.bodies(x)
+        rows = self.connections.rows(bodies, self.connections.ends(bodies))
+        return rows.residual, rows.C
+
+    def solve(self, x: Array) -> SolvedState:
         """Projections of the equations of motion at a state."""
         bodies = self.bodies(x)
         ends = self.connections.ends(bodies)
         rows = self.connections.rows(bodies, ends)
         free = self._root.T @ self.applied(bodies, self.parts(x)[3], ends)
-        r = self.rank if rank is None else rank
-        if not r:
+        if not self.rank:
             return SolvedState(self._root @ free, np.zeros(len(rows.C)), bodies, ends, rows)
-        locked, back = self._split(rows.C, r)
+        locked, back = self._split(rows.C)
         normal = -back @ rows.drift - locked @ free  # what the constraints change in their own subspace
         return SolvedState(self._root @ (free + locked.T @ normal), back.T @ normal, bodies, ends, rows)
 
-    def _split(self, C: Array, rank: int) -> tuple[Array, Array]:
+    def _split(self, C: Array) -> tuple[Array, Array]:
         """Unit vectors of the constrained subspace, (rank, 6 bodies), and what takes values of rows to them."""
         from scipy.linalg.lapack import dgesdd  # here: whoever runs a ball need not wait for it
 
         U, S, Vt, failed = dgesdd(C @ self._root, full_matrices=0)
         if failed:
             raise np.linalg.LinAlgError("the singular values were not found")
-        return Vt[:rank], U[:, :rank].T / S[:rank, None]
+        r = self.rank
+        return Vt[:r], U[:, :r].T / S[:r, None]
 
     def rates(self, x: Array) -> Array:
         """ẋ."""
@@ -128,15 +130,14 @@ class DependentCoordinates:
         x = self._with_unit_quaternions(x)
         if not self.rank:
             return x
-        bodies = self.bodies(x)
-        rows = self.connections.rows(bodies, self.connections.ends(bodies))
-        locked, back = self._split(rows.C, self.rank)
+        residual, C = self._residual_and_rows(x)
+        locked, back = self._split(C)
         into = self._root @ locked.T
         r, q, v, w = self.parts(x)
         u = np.concatenate([v, w], axis=1).ravel()
-        u = (u - into @ (back @ (rows.C @ u))).reshape(self._count, 6)
+        u = (u - into @ (back @ (C @ u))).reshape(self._count, 6)
         return self._moved(
-            np.concatenate([r.ravel(), q.ravel(), u[:, :3].ravel(), u[:, 3:].ravel()]), -into @ (back @ rows.residual)
+            np.concatenate([r.ravel(), q.ravel(), u[:, :3].ravel(), u[:, 3:].ravel()]), -into @ (back @ residual)
         )
 
     def accept(self, x: Array) -> None:
@@ -157,18 +158,6 @@ class DependentCoordinates:
         q += quaternion_rates(q, step[:, 3:])
         r += step[:, :3]
         return self._with_unit_quaternions(x)
-
-    def _nearby(self) -> Array:
-        """Rows at a pose near the start that the constraints allow and that no symmetry distinguishes."""
-        x = self.start.copy()
-        C = self.solve(x, rank=0).rows.C
-        direction = 1.0 + np.modf(np.arange(1, C.shape[1] + 1) * 0.6180339887498949)[0]  # golden ratio: no two alike
-        direction -= np.linalg.pinv(C, 1e-8) @ (C @ direction)
-        x = self._moved(x, _NEARBY * direction / max(np.abs(direction).max(), 1e-300))
-        for _ in range(10):  # Newton's method doubles the digits; four rounds do from so near
-            rows = self.solve(x, rank=0).rows
-            x = self._moved(x, -np.linalg.pinv(rows.C, 1e-8) @ rows.residual)
-        return self.solve(x, rank=0).rows.C
 
 
 def rotations(q: Array) -> Array:

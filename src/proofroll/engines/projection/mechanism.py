@@ -11,7 +11,6 @@ from proofroll.core.arrays import cross
 from proofroll.core.engine import Sample
 from proofroll.core.errors import Diverged, Refused
 from proofroll.core.integrators import INTEGRATORS
-from proofroll.elements.mechanism import Mechanism
 from proofroll.elements.mechanism.capabilities import ALL_JOINTS, ALL_LOOPS, FORCES, MechanismCapability, require
 from proofroll.elements.mechanism.rotations import Array
 from proofroll.elements.mechanism.sampling import WITH_AXIS, MechanismBuilt, independent, mechanism_of
@@ -28,7 +27,8 @@ LACKING: Mapping[str, str] = {
 class ProjectionMechanism:
     """See :class:`proofroll.core.engine.Engine` for the methods."""
 
-    def __init__(self, mechanism: Mechanism, settings: ProjectionSettings) -> None:
+    def __init__(self, scene: Any, settings: ProjectionSettings) -> None:
+        mechanism = mechanism_of(scene)
         require(mechanism, PROVIDES, LACKING)
         for body in mechanism.bodies:
             if not body.mass or np.linalg.eigvalsh(body.inertia)[0] <= 0:
@@ -41,11 +41,6 @@ class ProjectionMechanism:
         resolution = float(getattr(settings, settings.resolution))
         integrator = INTEGRATORS[settings.integrator]
         self._motion = integrator(self._equations.rates, self._accepted, start, np.ones(len(start)), resolution)
-
-    @classmethod
-    def build(cls, scene: Any, settings: ProjectionSettings) -> ProjectionMechanism:
-        """See :class:`proofroll.core.engine.Engine`; ``scene`` may be a mechanism."""
-        return cls(mechanism_of(scene), settings)
 
     def _accepted(self, t: float, x: Array) -> Array:
         if not np.isfinite(x.sum()):

@@ -33,9 +33,10 @@ def source(body: RollingBall, settings: PinocchioSettings) -> str:
         if math.isfinite(body.contact.mu_static):
             raise Refused("the loop that switches between stick and slip around Pinocchio's terms is proofroll's")
         mechanism = RowsRun(body, settings).mechanism
-        formulation = composite if settings.formulation == "composite" else free_flyer
-        numbers = stepping.numbers(mechanism, settings) + formulation.numbers(body)
-        parts = [formulation.SOURCE, stepping.source(settings)]
+        numbers, program = stepping.numbers(mechanism, settings), free_flyer.SOURCE
+        if settings.formulation == "composite":
+            numbers, program = numbers + composite.numbers(body), composite.SOURCE
+        parts = [program, stepping.source(settings)]
         imports = "import numpy as np\nimport pinocchio as pin\n"
         imports += ("from scipy.integrate import DOP853\n" if settings.integrator == "dop853" else "") + "\n"
     return "".join(

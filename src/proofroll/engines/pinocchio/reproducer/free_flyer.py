@@ -1,9 +1,5 @@
 """Text of formulation ``free_flyer``."""
 
-from __future__ import annotations
-
-from proofroll.elements.ball_on_surface.model import RollingBall
-
 SOURCE = '''
 model = pin.Model()
 model.gravity.linear = np.array(GRAVITY)
@@ -58,8 +54,3 @@ def project(q, v):
     q[:3] += gap(q[:3]) * frame(q[:3])[0]
     return q, np.array(pin.impulseDynamics(model, data, v, rows_at(q, v)[0]))
 '''
-
-
-def numbers(body: RollingBall) -> str:  # noqa: ARG001 -- as the other formulation's
-    """Assignments that this formulation alone needs: none."""
-    return ""
