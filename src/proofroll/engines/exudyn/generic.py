@@ -67,6 +67,7 @@ class Generic:
         if self.friction is None:
             self.integration = Integration(self.system, settings)
         else:
+            # Whether the contact depends on the coordinates themselves, and not on their rates alone.
             self.place_matters = weight_turns(body, self.local)
             self._needed, self._local_gravity = needed_function(body), weight_function(body, self.local, np.eye(3))
             self._tangents: tuple[float, ...] = tuple(self.local.tangents[1:].ravel().tolist())
@@ -166,14 +167,14 @@ class Generic:
         )
 
     def needed(self, q: FloatArray, q_t: FloatArray) -> tuple[float, float, float]:
-        """See :class:`Switched`."""
+        """N, and the friction along e2 and e3 that it takes to roll on [N]; as in :meth:`touch`."""
         _, rate1, rate2, w1, _, _ = q_t.tolist()
         t2u, t2v, t3u, t3v = self._tangents
         g1, g2, g3 = self._local_gravity(q)[:3]
         return self._needed(t2u * rate1 + t2v * rate2, t3u * rate1 + t3v * rate2, w1, g1, g2, g3)
 
     def touch(self, q: FloatArray, q_t: FloatArray) -> Touch:
-        """See :class:`Switched`."""
+        """The contact in the state of these coordinates and rates."""
         _, rate1, rate2, _, w2, w3 = q_t.tolist()
         (t2u, t2v, t3u, t3v), radius = self._tangents, self._body.ball.radius
         slip2 = t2u * rate1 + t2v * rate2 + radius * w3
@@ -181,19 +182,19 @@ class Generic:
         return Touch(*self.needed(q, q_t), slip2, slip3)
 
     def hold(self, direction: tuple[float, float] | None) -> None:
-        """See :class:`Switched`."""
+        """From now on slips along the unit ``direction`` (e2, e3), or rolls where there is none."""
         assert self.friction is not None
         if (direction is None) != (self.friction.direction is None):
             self.system.SetObjectParameter(self.rolling, "activeConnector", direction is None)
         self.friction.direction = direction
 
     def reached(self) -> None:
-        """See :class:`Switched`."""
+        """The present state was computed with what is held now."""
         assert self.friction is not None
         self.friction.applied = self.friction.direction
 
     def without_slip(self, q_t: FloatArray) -> FloatArray:
-        """See :class:`Switched`. The impulse is that of the constraint itself, through the mass matrix."""
+        """The rates after the impulse that ends the slip: that of the constraint, through the mass matrix."""
         rows = self._rows()
         by_impulse = np.linalg.solve(self._mass_matrix(), rows.T)
         return np.asarray(q_t - by_impulse @ np.linalg.solve(rows @ by_impulse, rows @ q_t))

@@ -9,7 +9,7 @@ from __future__ import annotations
 
 import dataclasses
 import math
-from typing import Any, NamedTuple, Protocol
+from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
 
@@ -24,35 +24,13 @@ from proofroll.engines.exudyn.integration import Integration
 from proofroll.engines.exudyn.native import exu
 from proofroll.engines.exudyn.settings import ExudynSettings
 
+if TYPE_CHECKING:  # which drives itself by what is here
+    from proofroll.engines.exudyn.generic import Generic
+
 # An event is located to this part of a step, far below what one step of the integrator is wrong by.
 LOCATED = 1e-6
 # A ball that friction would stop within this part of a step is at rest.
 AT_REST = 1e-2
-
-
-class Switched(Protocol):
-    """A model with a rolling constraint that can be switched off."""
-
-    system: Any
-
-    @property
-    def place_matters(self) -> bool:
-        """Whether the contact depends on the coordinates themselves, and not on their rates alone."""
-
-    def needed(self, q: FloatArray, q_t: FloatArray) -> tuple[float, float, float]:
-        """N, and the friction along e2 and e3 that it takes to roll on [N]; as in :meth:`touch`."""
-
-    def touch(self, q: FloatArray, q_t: FloatArray) -> Touch:
-        """The contact in the state of these coordinates and rates."""
-
-    def hold(self, direction: tuple[float, float] | None) -> None:
-        """From now on slips along the unit ``direction`` (e2, e3), or rolls where there is none."""
-
-    def reached(self) -> None:
-        """The present state was computed with what is held now."""
-
-    def without_slip(self, q_t: FloatArray) -> FloatArray:
-        """The rates after the impulse at the contact that ends the slip."""
 
 
 class ContactState(NamedTuple):
@@ -64,7 +42,7 @@ class ContactState(NamedTuple):
 
 
 class SwitchedIntegration:
-    """Drives a :class:`Switched` model; stands in for :class:`Integration`.
+    """Drives :class:`~proofroll.engines.exudyn.generic.Generic`; stands in for :class:`Integration`.
 
     Attributes:
         t: present time [s].
@@ -73,7 +51,7 @@ class SwitchedIntegration:
         events: so far.
     """
 
-    def __init__(self, model: Switched, body: RollingBall, settings: ExudynSettings) -> None:
+    def __init__(self, model: Generic, body: RollingBall, settings: ExudynSettings) -> None:
         """At time 0, in the state of the system's initial configuration."""
         self.model, self.system, self.settings = model, model.system, settings
         data = self.system.systemData
