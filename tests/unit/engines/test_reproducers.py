@@ -102,6 +102,26 @@ def test_the_same_motion(
 
 
 @pytest.mark.parametrize(
+    ("engine", "formulation", "preset"),
+    [("exudyn", formulation, "matched") for formulation in ("generic", "carrier", "rolling_disc", "contact")]
+    + [("mujoco", "free", "matched"), ("mujoco", "free", "tuned"), ("mujoco", "chart", "matched")],
+)
+def test_a_ball_that_stops(engine: str, formulation: str, preset: str) -> None:
+    """Where rolling resistance ends the motion the program goes on as the adapter does, and its ball stays at rest."""
+    scene = load_scene(PLANE, tilt=0.0, speed=0.02, cross_speed=0.01, normal_spin=0.0, rolling_resistance=1e-3)
+    kind = kind_of(engine)
+    settings = resolve_settings(kind, {"formulation": formulation, "preset": preset, "dt": 1e-3})
+    times = [0.01 * step for step in range(21)]
+    centres = np.array([state[0] for state in program(engine, settings, scene)["run"](times)])
+    adapter, expected = kind.build(scene, settings), []
+    for t in times:
+        adapter.advance(t)
+        expected.append(adapter.sample().p_WB)
+    np.testing.assert_allclose(centres, expected, rtol=1e-8, atol=1e-10)
+    np.testing.assert_allclose(centres[-1], centres[-5], rtol=0, atol=1e-10)
+
+
+@pytest.mark.parametrize(
     ("engine", "options", "parameters", "words"),
     [
         ("mujoco", {"formulation": "chart"}, {"mu_static": 0.3, "mu_kinetic": 0.2}, "one coefficient"),

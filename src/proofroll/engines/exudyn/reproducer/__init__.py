@@ -28,6 +28,7 @@ from proofroll.engines.exudyn.reproducer.text import (
     RUN,
     SETTINGS,
 )
+from proofroll.engines.exudyn.resistance import slow
 from proofroll.engines.exudyn.rolling_disc import RollingDisc
 from proofroll.engines.exudyn.settings import ExudynSettings
 from proofroll.engines.exudyn.world_coordinates import WorldCoordinates
@@ -52,7 +53,7 @@ def source(model: Any, body: RollingBall, settings: ExudynSettings) -> str:
     if generic and math.isfinite(body.contact.mu_static):
         raise Refused("the loop that switches Exudyn's constraint of rolling off while the ball slips is proofroll's")
     numbers = ball_numbers(body) | ({} if generic else {"START_SPIN": _start_spin(model)})
-    numbers |= {"LEVER": body.contact.rolling_resistance}
+    numbers |= {"LEVER": body.contact.rolling_resistance} | ({"SLOW": slow(body)} if resists else {})
     numbers |= {"CURVATURE": curvature(body.surface, body.u0)} if resists and not generic else {}
     numbers |= {"STEP_SIZE": settings.dt, "NEWTON_TOLERANCE": settings.newton_tolerance}
     start = _start(model)

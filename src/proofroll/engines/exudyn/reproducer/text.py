@@ -17,12 +17,15 @@ mbs.AddLoad(items.LoadMassProportional(markerNumber=weight, loadVector=GRAVITY))
 RESISTANCE = """
 
 def resistance(mbs, t, load):
-    \"\"\"Moment of rolling resistance: the normal force, which follows from the path, acts LEVER further on.\"\"\"
+    \"\"\"Moment of rolling resistance: the normal force, which follows from the path, acts LEVER further on.
+
+    It rises with the speed up to SLOW: Newton's method does not pass its jump at rest.
+    \"\"\"
     p = mbs.GetNodeOutput(node, exu.OutputVariableType.Position)
     axes = frame(p)
     along = axes[1:] @ mbs.GetNodeOutput(node, exu.OutputVariableType.Velocity)
     N = MASS * (along @ np.array(CURVATURE) @ along + axes[0] @ np.array(GRAVITY))
-    speed = np.hypot(*along)
+    speed = max(np.hypot(*along), SLOW)
     return (LEVER * N / speed * (np.array([-along[1], along[0]]) @ axes[1:])).tolist() if speed else [0.0] * 3
 
 
@@ -135,7 +138,7 @@ def force(mbs, t, item, q, rates):
         result[row] += factor * rates[i] * rates[j]
     if LEVER:  # rolling resistance; along the distance nothing accelerates, so the force there is N
         v2, v3 = (float(np.dot(row, rates[1:3])) for row in TANGENTS[1:])
-        moment = LEVER * result[0] / np.hypot(v2, v3) if v2 or v3 else 0.0
+        moment = LEVER * result[0] / (max(np.hypot(v2, v3), SLOW) or 1.0)
         result[4] -= moment * v3
         result[5] += moment * v2
     return result

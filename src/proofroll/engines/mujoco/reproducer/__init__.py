@@ -13,6 +13,7 @@ from proofroll.core.arrays import FloatArray
 from proofroll.core.errors import Refused
 from proofroll.elements.ball_on_surface.model import RollingBall
 from proofroll.elements.ball_on_surface.reproducer_source import assigned, ball_numbers, normal_rate_source, wall_source
+from proofroll.engines.mujoco.contact import Resistance
 from proofroll.engines.mujoco.friction import NEAR_CONE, corrects
 from proofroll.engines.mujoco.reproducer import text
 from proofroll.engines.mujoco.settings import PRELOAD, MujocoSettings, normal_lead, own_share, velocity_lag
@@ -39,7 +40,10 @@ def source(xml: str, model: Any, data: Any, body: RollingBall, settings: MujocoS
     if edits and settings.cone != "elliptic":
         raise Refused("the program corrects the elliptic cone alone")
     resists = contact.rolling_resistance > 0
-    values = {"LEVER": contact.rolling_resistance} if resists else {}
+    values: dict[str, Any] = {}
+    if resists:
+        law = Resistance.of(body, settings.dt)
+        values = {"LEVER": law.f, "STOPPING": law.stopping, "PULL": np.array(law.pull)}
     steps = {
         "free": text.free(resists=resists, curvature=settings.curvature, corrects=edits),
         "chart": text.chart(resists=resists, corrects=edits),

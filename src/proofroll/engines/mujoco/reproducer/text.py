@@ -13,10 +13,17 @@ def foreseen(d, N):
     return max(N + slope * (t - last), 0.0)
 
 
-def resist(d, N, e1, v):
-    """Moment of rolling resistance: the normal force acts LEVER further on. MuJoCo's condim 6 is another law."""
-    speed = np.linalg.norm(v)
-    d.xfrc_applied[BALL, 3:] = LEVER * N / speed * np.cross(e1, v) if speed else 0.0
+def resist(d, N, e1, v, began=None):
+    """Moment of rolling resistance: the normal force acts LEVER further on. MuJoCo's condim 6 is another law.
+
+    It does no more than stop a ball within the step that began with the velocity v, or the one given.
+    """
+    moment, speed = LEVER * N, np.linalg.norm(v)
+    if STOPPING * speed <= moment:
+        v = (v if began is None else began) + PULL - np.dot(PULL, e1) * e1
+        speed = np.linalg.norm(v)
+        moment = min(moment, STOPPING * speed)
+    d.xfrc_applied[BALL, 3:] = moment / speed * np.cross(e1, v) if speed else 0.0
 '''
 
 CORRECT = '''
@@ -117,10 +124,7 @@ def step():
     mujoco.mj_step2(model, data)
 '''
 
-_PREPARED_RESIST = """    N_now = foreseen(d, N)
-    if LAG and np.linalg.norm(rates[:3]) < 1e-6 * LAG * np.linalg.norm(trend[:3]):
-        rates[:3] = 0.0  # at rest: round-off has no direction
-    resist(d, N_now, e1, rates[:3])
+_PREPARED_RESIST = """    resist(d, foreseen(d, N), e1, rates[:3], d.qvel[:3])
 """
 
 _CHART = '''
