@@ -7,10 +7,10 @@ from collections.abc import Sequence
 from proofroll.core.comparison import Tolerance
 from proofroll.core.engine_abilities import Level
 from proofroll.report.comparison_records import ReportedComparison
-from proofroll.report.labels import SYMBOLS, caveat_lines, number, verdict_text
+from proofroll.report.labels import SYMBOLS, caveat_lines, name_of, number, verdict_text
 from proofroll.report.tables import remarks
 from proofroll.report.terminal import columns, step
-from proofroll.report.tradeoff_tables import name_of, step_of
+from proofroll.report.tradeoff_tables import step_of
 from proofroll.studies.recommend import recommend
 from proofroll.studies.tradeoff_records import MeasuredPoint, TradeoffStudy
 from proofroll.studies.wish import Wish

@@ -160,7 +160,7 @@ def test_all_that_is_claimed_of_a_row_is_said() -> None:
     assert expectations([entry])[0].further == (
         "N within 0.1 % of its scale",
         "order of z 1.9 to 2.1",
-        "limit of γ within 1e-06 rad",
+        "limit of γ within 1e-6 rad",
         "converges or differs at speed=2 or 4",
         "run only at tilt=0.1",
     )

@@ -77,15 +77,12 @@ def _file(content: dict[str, Any], out: Path) -> Path:
 
 
 def _keep(content: dict[str, Any], page: str, out: Path) -> None:
-    import json
-
-    from proofroll.files.json_data import plain
     from proofroll.running.store import write_text
 
     out.mkdir(parents=True, exist_ok=True)
     file = _file(content, out)
     write_text(file.with_name(f"{file.name}.html"), page)
-    write_text(file.with_name(f"{file.name}.json"), json.dumps(plain(content), indent=1, ensure_ascii=False))
+    write_text(file.with_name(f"{file.name}.json"), options.json_text(content))
 
 
 def _place(engine: str, text: str) -> str:

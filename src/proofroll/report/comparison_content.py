@@ -3,7 +3,8 @@
 from __future__ import annotations
 
 import dataclasses
-from typing import Any
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
 
 from proofroll.core.plugins import parse_engine
 from proofroll.core.verdict import Judgement, Verdict
@@ -17,12 +18,15 @@ from proofroll.report.comparison_records import (
     ShownObservable,
     WorstJudgement,
 )
-from proofroll.report.evidence import Claims, Cost
+from proofroll.report.evidence import Claims, Cost, in_words
 from proofroll.running.case import Status
 from proofroll.running.environments import shown_name
 from proofroll.studies.hosts import hosts
 from proofroll.studies.outcome import SEVERITY, Outcome, Run
 from proofroll.studies.planning import point_name
+
+if TYPE_CHECKING:
+    from proofroll.running.store import Store
 
 
 def outcome_content(outcome: Outcome) -> ReportedComparison:
@@ -47,9 +51,7 @@ def outcome_content(outcome: Outcome) -> ReportedComparison:
         as_expected=not outcome.contradictions,
         contradictions=outcome.contradictions,
         tolerances={
-            name: ShownBand(
-                band.because, {key: _tolerance(bound.value, bound.relative) for key, bound in band.bounds.items()}
-            )
+            name: ShownBand(band.because, {key: in_words(bound) for key, bound in band.bounds.items()})
             for name, band in comparison.bands.items()
         },
         rows=[_row(runs) for runs in rows.values()],
@@ -58,16 +60,22 @@ def outcome_content(outcome: Outcome) -> ReportedComparison:
     )
 
 
+def runs_at(outcome: Outcome, point: str, store: Store) -> list[tuple[int, Run, Path]]:
+    """Number of the row, run and trajectory of every run at a point that has one."""
+    found = []
+    for number, runs in enumerate(by_row(outcome).values()):
+        for run in runs:
+            if point_name(run.parameters) == point and run.case is not None and run.result.trajectory is not None:
+                found.append((number, run, store.trajectory(run.case)))
+    return [(number, run, path) for number, run, path in found if path.is_file()]
+
+
 def by_row(outcome: Outcome) -> dict[int, list[Run]]:
     """The runs of each row of the comparison file, in the file's order."""
     rows: dict[int, list[Run]] = {}
     for run in outcome.runs:
         rows.setdefault(id(run.row), []).append(run)
     return rows
-
-
-def _tolerance(value: float, relative: bool) -> str:
-    return f"{100 * value:g} % of its scale" if relative else f"{value:g}"
 
 
 def _row(runs: list[Run]) -> ReportedRow:

@@ -6,6 +6,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 from proofroll.core.comparison import ExceptAt, Row, Tolerance
+from proofroll.report.labels import number, unit
 from proofroll.running.timing import Timing
 
 
@@ -43,9 +44,12 @@ class Claims:
     @classmethod
     def of(cls, row: Row) -> Claims:
         """Those of a row of a comparison file."""
-        bound, limit = ({name: _text(item) for name, item in found.items()} for found in (row.bound, row.limit))
+        bound, limit = ({name: in_words(item) for name, item in found.items()} for found in (row.bound, row.limit))
         return cls(bound, row.order, limit, row.except_at, row.only)
 
 
-def _text(bound: Tolerance) -> str:
-    return f"{100 * bound.value:g} % of its scale" if bound.relative else f"{bound.value:g} {bound.unit}"
+def in_words(bound: Tolerance) -> str:
+    """A tolerance with its unit: ``1e-3 m``, ``0.1 % of its scale``."""
+    if bound.relative:
+        return f"{100 * bound.value:g} % of its scale"
+    return f"{number(bound.value, 6)} {unit(bound.unit)}".strip()

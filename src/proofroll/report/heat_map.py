@@ -5,9 +5,8 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
-from proofroll.report.labels import number, unit
+from proofroll.report.labels import name_of, number, unit
 from proofroll.report.stability_map import LETTERS, cell
-from proofroll.report.stability_tables import label
 
 if TYPE_CHECKING:
     from proofroll.studies.stability_records import BoundaryPoint, StabilityStudy
@@ -86,17 +85,12 @@ def table(study: StabilityStudy, prefix: str) -> HeatMap:
         cells.setdefault(point.curve, {})[point.axis, point.value] = _cell(point, f"{prefix}{index}")
     groups: dict[str, list[HeatLine]] = {}
     for point in {point.curve: point for point in study.points}.values():
-        line = HeatLine(_rest(point), [cells[point.curve].get(column) for column in columns])
+        rest = name_of(point).removeprefix(point.engine).strip() or point.curve
+        line = HeatLine(rest, [cells[point.curve].get(column) for column in columns])
         groups.setdefault(point.engine, []).append(line)
     seen = {point.failure for point in study.points}
-    listed = [ListedPoint(f"{prefix}{index}", label(point), point) for index, point in enumerate(study.points)]
+    listed = [ListedPoint(f"{prefix}{index}", name_of(point), point) for index, point in enumerate(study.points)]
     return HeatMap(axes, groups, {letter: kind for kind, letter in LETTERS.items() if kind in seen}, listed)
-
-
-def _rest(point: BoundaryPoint) -> str:
-    """Formulation and preset."""
-    settings = point.settings
-    return " ".join(filter(None, (settings.get("formulation"), settings.get("preset")))) or str(point.curve)
 
 
 def told(point: BoundaryPoint) -> str:
@@ -108,7 +102,7 @@ def told(point: BoundaryPoint) -> str:
 
 def _cell(point: BoundaryPoint, href: str) -> HeatCell:
     text, shade = cell(point)
-    words = [f"{label(point)} at {point.axis} = {point.value:g}"]
+    words = [f"{name_of(point)} at {point.axis} = {point.value:g}"]
     if point.problem:
         words.append("there is no truth")
     elif point.largest_accurate is None:

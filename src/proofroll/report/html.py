@@ -20,7 +20,6 @@ from proofroll.report.kinds import ReportKind, kind_of, report_kinds
 from proofroll.report.pages import environment, packed, rendered
 from proofroll.report.study_parts import Part, part_kinds
 from proofroll.report.styles import OUTLINES, styles
-from proofroll.report.tradeoff_tables import name_of
 from proofroll.studies.hosts import said_of
 
 if TYPE_CHECKING:
@@ -105,7 +104,7 @@ def templates() -> jinja2.Environment:
         "unit": labels.unit,
         "values": labels.values,
         "settings": labels.settings_text,
-        "name_of": name_of,
+        "name_of": labels.name_of,
         "unbroken": _unbroken,
         "plain": plain,
     }

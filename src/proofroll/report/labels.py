@@ -10,6 +10,8 @@ from typing import TYPE_CHECKING, Any
 if TYPE_CHECKING:
     from proofroll.core.verdict import Judgement
     from proofroll.report.comparison_records import ReportedComparison, ReportedRow, ReportedRun, Setting
+    from proofroll.studies.stability_records import BoundaryPoint
+    from proofroll.studies.tradeoff_records import MeasuredPoint
 
 SYMBOLS = {
     "agrees": "✓",
@@ -118,6 +120,12 @@ def names(rows: Sequence[Setting]) -> list[str]:
         words = [row.name, row.formulation, row.setting]
         short.append(" ".join([*(str(word) for word in words if word), *([f"({step(row)})"] if step(row) else [])]))
     return [name if short.count(name) == 1 else str(row.engine) for name, row in zip(short, rows, strict=True)]
+
+
+def name_of(point: BoundaryPoint | MeasuredPoint) -> str:
+    """Engine, formulation and preset of a point of a study."""
+    settings = point.settings
+    return " ".join(filter(None, (point.engine, settings.get("formulation"), settings.get("preset"))))
 
 
 def with_caveat(name: str, caveat: str) -> str:

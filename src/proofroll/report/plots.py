@@ -15,10 +15,10 @@ from proofroll.core.observable import Observable, Role
 from proofroll.files.json_data import OPTIONAL
 from proofroll.files.netcdf import read, read_some
 from proofroll.files.scene_file import load_scene
+from proofroll.report.comparison_content import runs_at
 from proofroll.report.kinds import kind_of
 from proofroll.report.labels import symbol, unit
 from proofroll.studies.outcome import Outcome, Run
-from proofroll.studies.planning import point_name
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -111,7 +111,7 @@ def point_curves(outcome: Outcome, store: Store) -> list[PointCurves]:
         further = {item.name: item for item in kind.curves(scene, truth)} if kind is not None else {}
         known = scene.observables | further
         drawn = {key: item for key, item in known.items() if item.role in _DRAWN and _curve(truth, key)}
-        engines = _engines(outcome, store, name, list(drawn))
+        engines = [(row, run, read_some(file, list(drawn))) for row, run, file in runs_at(outcome, name, store)]
         entries.append(
             PointCurves(
                 name,
@@ -145,25 +145,9 @@ def kept(curves: list[FloatArray], most: int = MOST_POINTS) -> np.typing.NDArray
     return np.unique(np.concatenate([M4Downsampler().downsample(np.ascontiguousarray(c), n_out=most) for c in curves]))
 
 
-def _engines(outcome: Outcome, store: Store, point: str, drawn: list[str]) -> list[tuple[int, Run, Curves]]:
-    """Row number, run and curves of every run at a point that has a trajectory."""
-    numbers: dict[int, int] = {}
-    found = []
-    for run in outcome.runs:
-        number = numbers.setdefault(id(run.row), len(numbers))
-        if point_name(run.parameters) == point and _has_trajectory(run, store):
-            assert run.case is not None  # it has a trajectory
-            found.append((number, run, read_some(store.trajectory(run.case), drawn)))
-    return found
-
-
 def _curve(truth: xr.Dataset, name: str) -> bool:
     """Whether a variable is one curve over time; those of several, such as all reactions, are judged and not drawn."""
     return name in truth and truth[name].dims == ("time",)
-
-
-def _has_trajectory(run: Run, store: Store) -> bool:
-    return run.case is not None and run.result.trajectory is not None and store.trajectory(run.case).is_file()
 
 
 def _observable(

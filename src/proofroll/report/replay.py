@@ -11,7 +11,7 @@ import numpy as np
 from proofroll.core.arrays import FloatArray
 from proofroll.files.netcdf import read_some
 from proofroll.files.scene_file import load_scene
-from proofroll.report.comparison_content import by_row, outcome_content
+from proofroll.report.comparison_content import outcome_content, runs_at
 from proofroll.report.labels import names
 from proofroll.report.pages import packed
 from proofroll.report.replay_library import three
@@ -55,11 +55,11 @@ def replay_content(outcomes: list[Outcome], store: Store, kind: ReplayKind) -> R
         ghosts = [
             ghost
             for outcome, point in shared
-            for ghost in _ghosts(_runs(outcome, point, store), looks[id(outcome)], true, store)
+            for ghost in _ghosts(runs_at(outcome, point, store), looks[id(outcome)], true)
         ]
         ghosts = _chosen(ghosts, kind.seen(scene))
         # The comparison that has most to show at this point names the case.
-        title = max(shared, key=lambda pair: len(_runs(pair[0], pair[1], store)))[0].comparison.title
+        title = max(shared, key=lambda pair: len(runs_at(pair[0], pair[1], store)))[0].comparison.title
         replayed = Replayed(scene, store.trajectory(case), ghosts, title, point_name(case.parameters) or scene.title)
         content, packed_numbers = case_content(replayed, kind, lambda file: f"{store.folder.name}/{file.name}")
         cases.append(content)
@@ -126,28 +126,17 @@ def distance(path: FloatArray, true: FloatArray) -> float:
     return float(np.linalg.norm(path[:count] - true[:count], axis=-1).max())
 
 
-def _runs(outcome: Outcome, point: str, store: Store) -> list[tuple[int, Run]]:
-    """Number of the row and the run, for all runs at a point that have a trajectory."""
-    return [
-        (number, run)
-        for number, runs in enumerate(by_row(outcome).values())
-        for run in runs
-        if point_name(run.parameters) == point and run.result.trajectory is not None and _file(run, store).is_file()
-    ]
-
-
 def _looks(outcome: Outcome) -> list[tuple[str, int]]:
     """Name and colour of each row, as in the comparison's figures."""
     rows = outcome_content(outcome).rows
     return [(name, style.colour) for name, style in zip(names(rows), styles(rows), strict=True)]
 
 
-def _ghosts(runs: list[tuple[int, Run]], looks: list[tuple[str, int]], true: FloatArray, store: Store) -> list[Ghost]:
+def _ghosts(runs: list[tuple[int, Run, Path]], looks: list[tuple[str, int]], true: FloatArray) -> list[Ghost]:
     ghosts = []
-    for number, run in runs:
+    for number, run, file in runs:
         assert run.case is not None  # it has a trajectory
-        engine, file = run.case.engine, _file(run, store)
-        away = distance(read_some(file, ["p_WB"])["p_WB"], true)
+        engine, away = run.case.engine, distance(read_some(file, ["p_WB"])["p_WB"], true)
         message = "" if run.result.status == Status.DONE else run.result.message
         ghosts.append(Ghost(run.case.key, engine.name, engine.settings, *looks[number], away, file, message))
     return ghosts
@@ -166,8 +155,3 @@ def _chosen(ghosts: list[Ghost], seen: float) -> list[Ghost]:
         other = [ghost for ghost in own if not ghost.default][:1]
         chosen += default + [ghost for ghost in other if ghost.distance > seen or not default]
     return chosen
-
-
-def _file(run: Run, store: Store) -> Path:
-    assert run.case is not None  # it has a trajectory
-    return store.trajectory(run.case)

@@ -2,20 +2,19 @@
 
 from __future__ import annotations
 
-import io
 import itertools
 import math
 import textwrap
-from collections.abc import Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from proofroll.core.errors import Missing
-from proofroll.files.atomic import replacing
-from proofroll.report.labels import number
-from proofroll.report.stability_tables import label
+from proofroll.report.figure import svg_text
+from proofroll.report.labels import name_of, number
+from proofroll.running.store import write_text
 
 if TYPE_CHECKING:
+    from matplotlib.figure import Figure
+
     from proofroll.studies.axes import Axis
     from proofroll.studies.stability_records import BoundaryPoint, StabilityStudy
 
@@ -46,19 +45,16 @@ def draw(study: StabilityStudy, path: Path) -> None:
     Raises:
         Missing: matplotlib is not installed.
     """
-    text = svg(study)
-    with replacing(path) as temporary:
-        temporary.write_text(text, encoding="utf-8")
+    write_text(path, svg(study))
 
 
 def svg(study: StabilityStudy) -> str:
-    """All heat maps as one SVG text.
+    """All heat maps as one SVG text; texts stay texts, which a page can scale, search and read out.
 
     Raises:
         Missing: matplotlib is not installed.
     """
-    axes = _axes(study)
-    return _drawn(study, axes, columns=min(2, len(axes)) or 1)
+    return svg_text({"svg.fonttype": "none", "font.size": 8.0}, lambda: _drawn(study))
 
 
 def legend(study: StabilityStudy) -> list[str]:
@@ -71,42 +67,30 @@ def legend(study: StabilityStudy) -> list[str]:
     ]
 
 
-def _axes(study: StabilityStudy) -> list[Axis]:
-    """Those that have points."""
-    return [axis for axis in study.axes if any(point.axis == axis.name for point in study.points)]
+def _drawn(study: StabilityStudy) -> Figure:
+    """A panel for each axis that has points, row by row."""
+    import matplotlib as mpl
+    from matplotlib.figure import Figure
 
-
-def _drawn(study: StabilityStudy, axes: Sequence[Axis], columns: int) -> str:
-    """Panels of these axes, row by row; texts stay texts, which a page can scale, search and read out."""
-    try:
-        import matplotlib as mpl
-        from matplotlib.figure import Figure
-    except ModuleNotFoundError:
-        raise Missing("matplotlib is not installed: pip install 'proofroll[report]'") from None
+    axes = [axis for axis in study.axes if any(point.axis == axis.name for point in study.points)]
+    columns = min(2, len(axes)) or 1
     rows = math.ceil(len(axes) / columns) or 1
-    settings: Any = {"svg.hashsalt": "proofroll", "svg.fonttype": "none", "font.size": 8.0}
-    with mpl.rc_context(settings):
-        names = list(dict.fromkeys(point.curve for point in study.points))
-        of_axes = {axis.name for axis in axes}
-        curves = [n for n in names if any(p.curve == n and p.axis in of_axes for p in study.points)]
-        height = rows * (0.9 + 0.24 * len(curves)) + 1.0
-        figure = Figure(figsize=(7.2 * columns, height), layout="constrained")
-        panels = figure.subplots(rows, columns, squeeze=False).ravel()
-        for panel, axis in zip(panels, axes, strict=False):
-            _panel(panel, study, axis, curves, mpl.colormaps["cividis_r"])
-        for panel in panels[len(axes) :]:
-            panel.set_visible(False)
-        text = "\n".join(textwrap.fill(sentence, _LETTERS_PER_PANEL * columns) for sentence in legend(study))
-        figure.suptitle(text, fontsize=8, x=0.01, ha="left")
-        out = io.StringIO()
-        figure.savefig(out, format="svg", metadata={"Date": None})
-    return out.getvalue()
+    curves = list(dict.fromkeys(point.curve for point in study.points))
+    figure = Figure(figsize=(7.2 * columns, rows * (0.9 + 0.24 * len(curves)) + 1.0), layout="constrained")
+    panels = figure.subplots(rows, columns, squeeze=False).ravel()
+    for panel, axis in zip(panels, axes, strict=False):
+        _panel(panel, study, axis, curves, mpl.colormaps["cividis_r"])
+    for panel in panels[len(axes) :]:
+        panel.set_visible(False)
+    text = "\n".join(textwrap.fill(sentence, _LETTERS_PER_PANEL * columns) for sentence in legend(study))
+    figure.suptitle(text, fontsize=8, x=0.01, ha="left")
+    return figure
 
 
 def _panel(panel: Any, study: StabilityStudy, axis: Axis, curves: list[str], colours: Any) -> None:
     points = [point for point in study.points if point.axis == axis.name]
     values = list(dict.fromkeys(point.value for point in points))
-    names = {point.curve: label(point) for point in study.points}
+    names = {point.curve: name_of(point) for point in study.points}
     for point in points:
         x, y = values.index(point.value), curves.index(point.curve)
         text, shade = cell(point)

@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING
 from rich.table import Table
 from rich.text import Text
 
-from proofroll.report.labels import number, with_caveat
+from proofroll.report.labels import name_of, number, with_caveat
 from proofroll.report.screen import numeric, plain_table, unbroken
 from proofroll.studies.hosts import said_of
 from proofroll.studies.stability_content import silent_ranking
@@ -68,7 +68,7 @@ def boundary_table(study: StabilityStudy) -> Table:
     explained = {(e.curve, e.axis): e for e in study.explanations if e.boundary == "accurate"}
     before = ""
     for (curve, axis), points in grouped(study).items():
-        name = label(points[0])
+        name = name_of(points[0])
         kinds = Counter(point.failure for point in points if point.failure)
         silent = sum(point.silent for point in points)
         common = kinds.most_common(1)
@@ -91,12 +91,6 @@ def grouped(study: StabilityStudy) -> dict[tuple[str, str], list[BoundaryPoint]]
     for point in study.points:
         found.setdefault((point.curve, point.axis), []).append(point)
     return found
-
-
-def label(point: BoundaryPoint) -> str:
-    """Engine, formulation and preset."""
-    settings = point.settings
-    return " ".join(filter(None, (point.engine, settings.get("formulation"), settings.get("preset"))))
 
 
 def size(point: BoundaryPoint, side: str) -> float | None:
@@ -142,5 +136,5 @@ def silent_lines(study: StabilityStudy) -> Iterator[str]:
             step = f"at every {point.resolution} down to {number(point.finest)}"
         else:
             step = f"just beyond {point.resolution} {number(side.largest)}"
-        where = f"{with_caveat(label(point), point.caveat)} at {point.axis} = {number(point.value)}"
+        where = f"{with_caveat(name_of(point), point.caveat)} at {point.axis} = {number(point.value)}"
         yield f"{where}: {point.failure} {step}{wrong}"

@@ -5,9 +5,9 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
-from proofroll.report.labels import error, number, symbol, unit
+from proofroll.report.labels import error, name_of, number, symbol, unit
 from proofroll.report.tables import Column
-from proofroll.report.tradeoff_tables import cost_of, name_of, step_of
+from proofroll.report.tradeoff_tables import cost_of, step_of
 
 if TYPE_CHECKING:
     from proofroll.report.tradeoff_part import Advice, TradeoffEntry

@@ -7,9 +7,9 @@ from collections import Counter
 from collections.abc import Mapping, Sequence
 from typing import TYPE_CHECKING, Any
 
-from proofroll.report.labels import names, number, symbol, unit, with_caveat
+from proofroll.report.labels import name_of, names, number, symbol, unit, with_caveat
 from proofroll.report.scores import EVERYDAY, cheapest, scores
-from proofroll.report.tradeoff_tables import name_of, step_of
+from proofroll.report.tradeoff_tables import step_of
 
 if TYPE_CHECKING:
     from proofroll.report.comparison_records import ReportedComparison

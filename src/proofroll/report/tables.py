@@ -59,9 +59,9 @@ def expectations(rows: Sequence[ReportedRow]) -> list[Expectation]:
 
 def _further(claims: Claims) -> list[str]:
     """A row's claims besides its verdict, as sentences without a full stop."""
-    said = [f"{symbol(name)} within {unit(bound)}" for name, bound in claims.bound.items()]
+    said = [f"{symbol(name)} within {bound}" for name, bound in claims.bound.items()]
     said += [f"order of {symbol(name)} {low:g} to {high:g}" for name, (low, high) in claims.order.items()]
-    said += [f"limit of {symbol(name)} within {unit(bound)}" for name, bound in claims.limit.items()]
+    said += [f"limit of {symbol(name)} within {bound}" for name, bound in claims.limit.items()]
     said += [f"{' or '.join(item.expect)} at {_where(item.where)}" for item in claims.except_at]
     return [*said, f"run only at {_where(claims.only)}"] if claims.only else said
 
@@ -105,17 +105,9 @@ def reasons(certificate: Iterable[Mapping[str, Any]]) -> dict[str, list[str]]:
     return found
 
 
-def bounds(content: ReportedComparison, band: ShownBand) -> list[str]:
-    """The tolerances of a band, with symbols and units."""
-    units = {column.name: column.unit for column in observables(content)}
-    found = []
-    for name, bound in band.bounds.items():
-        try:
-            text = f"{number(float(bound))} {units.get(name, '')}"
-        except ValueError:
-            text = bound  # relative, and says so
-        found.append(f"{symbol(name)} {text}".strip())
-    return found
+def bounds(band: ShownBand) -> list[str]:
+    """The tolerances of a band, with symbols."""
+    return [f"{symbol(name)} {bound}" for name, bound in band.bounds.items()]
 
 
 @dataclass(frozen=True)

@@ -7,10 +7,11 @@ from collections.abc import Collection, Iterator, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from rich.table import Table
+from rich.table import Column, Table
 from rich.text import Text
 
-from proofroll.report.labels import error, number, with_caveat
+from proofroll.report.labels import error, name_of, number, with_caveat
+from proofroll.report.screen import numeric, plain_table, unbroken
 from proofroll.running.timing import CONFIDENCE
 from proofroll.studies.pareto import tied
 
@@ -24,12 +25,6 @@ def default_quantities(study: TradeoffStudy) -> list[str]:
     """Path, reaction, onset and energy, as far as the scene has them."""
     wanted = [study.quantity, "N", "F3", "first_slip", "energy_balance"]
     return [name for name in dict.fromkeys(wanted) if name in study.quantities][:4]
-
-
-def name_of(point: MeasuredPoint) -> str:
-    """Engine, formulation and preset of a point."""
-    settings = point.settings
-    return " ".join(filter(None, (point.engine, settings.get("formulation"), settings.get("preset"))))
 
 
 def step_of(point: MeasuredPoint) -> str:
@@ -100,19 +95,9 @@ def point_table(
     caption = Text("cost: wall seconds per simulated second through this adapter")
     if ties:
         caption += Text("; ≈ a tie: the cost cannot be told from that of the next line, which is more accurate")
-    table = Table(
-        title=Text(title),
-        title_justify="left",
-        caption=caption,
-        caption_justify="left",
-        box=None,
-        padding=(0, 1, 0, 0),
-    )
-    for column in ("engine formulation setting", "step", "cost s/s"):
-        table.add_column(column, no_wrap=True)
-    for name in quantities:
-        unit = study.quantities[name].unit
-        table.add_column(Text(f"{_SHORT.get(name, name)} [{unit}]"), justify="right", no_wrap=True)
+    errors = numeric(*(f"{_SHORT.get(name, name)} [{study.quantities[name].unit}]" for name in quantities))
+    table = plain_table(*unbroken("engine formulation setting", "step", "cost s/s"), *errors, title=title)
+    table.caption, table.caption_justify = caption, "left"
     for point in points:
         shown = [error(point.error.get(name)) if name in point.error else "–" for name in quantities]
         if point.status != "done":
@@ -141,17 +126,9 @@ def _front(study: TradeoffStudy, points: Sequence[MeasuredPoint], quantities: Se
 def corner_table(study: TradeoffStudy, quantity: str) -> Table:
     """For every point that was run over the range: its error here, and the worst at the corners and where."""
     over = ", ".join(f"{name} {number(min(v))} to {number(max(v))}" for name, v in study.over.items())
-    table = Table(
-        title=Text(f"Over {over}: error of {quantity} [{study.quantities[quantity].unit}]"),
-        title_justify="left",
-        box=None,
-        padding=(0, 1, 0, 0),
-    )
-    for column in ("engine formulation setting", "step"):
-        table.add_column(column, no_wrap=True)
-    for column in ("here", "worst"):
-        table.add_column(column, justify="right", no_wrap=True)
-    table.add_column("where")
+    title = f"Over {over}: error of {quantity} [{study.quantities[quantity].unit}]"
+    columns = [*unbroken("engine formulation setting", "step"), *numeric("here", "worst"), Column("where")]
+    table = plain_table(*columns, title=title)
     checked = [p for p in study.points if p.corners and quantity in p.error]
     for point in sorted(checked, key=lambda p: p.seconds_per_second or 0.0):
         worst, where = _worst(point.corners or [], quantity)
@@ -177,13 +154,12 @@ def budget_table(study: TradeoffStudy, quantity: str) -> Table:
     """For every curve, what its error consists of and what dominates at either end."""
     unit = study.quantities[quantity].unit
     title = f"What the error of {quantity} consists of [{unit}]: the coarse end, then the fine end"
-    table = Table(title=Text(title), title_justify="left", box=None, padding=(0, 1, 0, 0))
-    table.add_column("engine formulation setting", no_wrap=True)
-    table.add_column("order (declared)", no_wrap=True)
-    table.add_column("at steps [s]", no_wrap=True)
-    for column in ("limit off", "known to", "floor"):
-        table.add_column(column, justify="right", no_wrap=True)
-    table.add_column("dominated by", no_wrap=True)
+    table = plain_table(
+        *unbroken("engine formulation setting", "order (declared)", "at steps [s]"),
+        *numeric("limit off", "known to", "floor"),
+        *unbroken("dominated by"),
+        title=title,
+    )
     first = {point.curve: point for point in study.points}
     for item in study.budgets:
         if item.quantity != quantity:

@@ -2,18 +2,19 @@
 
 from __future__ import annotations
 
-import io
 import math
 from collections.abc import Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from proofroll.core.errors import Missing
-from proofroll.files.atomic import replacing
+from proofroll.report.figure import svg_text
 from proofroll.report.labels import symbol
 from proofroll.report.labels import unit as shown_unit
+from proofroll.running.store import write_text
 
 if TYPE_CHECKING:
+    from matplotlib.figure import Figure
+
     from proofroll.studies.tradeoff_records import MeasuredPoint, TradeoffStudy
 
 # One colour per engine, one dash and marker per formulation: a curve is told apart without colour too.
@@ -32,9 +33,7 @@ def draw(study: TradeoffStudy, quantities: Sequence[str], path: Path) -> None:
     Raises:
         Missing: matplotlib is not installed.
     """
-    text = svg(study, quantities)
-    with replacing(path) as temporary:
-        temporary.write_text(text, encoding="utf-8")
+    write_text(path, svg(study, quantities))
 
 
 def svg(study: TradeoffStudy, quantities: Sequence[str]) -> str:
@@ -43,30 +42,27 @@ def svg(study: TradeoffStudy, quantities: Sequence[str]) -> str:
     Raises:
         Missing: matplotlib is not installed.
     """
-    try:
-        import matplotlib as mpl
-        from matplotlib.figure import Figure
-    except ModuleNotFoundError:
-        raise Missing("matplotlib is not installed: pip install 'proofroll[report]'") from None
+    return svg_text({"font.size": 9}, lambda: _drawn(study, quantities))
+
+
+def _drawn(study: TradeoffStudy, quantities: Sequence[str]) -> Figure:
+    from matplotlib.figure import Figure
+
     curves = {point.curve for point in study.points}
     columns = min(2, len(quantities))
     rows = math.ceil(len(quantities) / columns)
-    with mpl.rc_context({"svg.hashsalt": "proofroll", "font.size": 9}):
-        figure = Figure(
-            figsize=(5.2 * columns + 2.6, max(3.9 * rows + 0.4, _LINE * len(curves) + 1.0)), layout="constrained"
-        )
-        panels = figure.subplots(rows, columns, squeeze=False).ravel()
-        for panel, quantity in zip(panels, quantities, strict=False):
-            _panel(panel, study, quantity)
-        for panel in panels[len(quantities) :]:
-            panel.set_visible(False)
-        at = ", ".join(f"{name} = {value:g}" for name, value in study.parameters.items()) or "default parameters"
-        figure.suptitle(f"{study.scene}, {at}, over {study.until:g} s", fontsize=9)
-        handles, labels = panels[0].get_legend_handles_labels()
-        figure.legend(handles, labels, loc="outside right upper", frameon=False, fontsize=7)
-        out = io.StringIO()
-        figure.savefig(out, format="svg", metadata={"Date": None})
-    return out.getvalue()
+    size = (5.2 * columns + 2.6, max(3.9 * rows + 0.4, _LINE * len(curves) + 1.0))
+    figure = Figure(figsize=size, layout="constrained")
+    panels = figure.subplots(rows, columns, squeeze=False).ravel()
+    for panel, quantity in zip(panels, quantities, strict=False):
+        _panel(panel, study, quantity)
+    for panel in panels[len(quantities) :]:
+        panel.set_visible(False)
+    at = ", ".join(f"{name} = {value:g}" for name, value in study.parameters.items()) or "default parameters"
+    figure.suptitle(f"{study.scene}, {at}, over {study.until:g} s", fontsize=9)
+    handles, labels = panels[0].get_legend_handles_labels()
+    figure.legend(handles, labels, loc="outside right upper", frameon=False, fontsize=7)
+    return figure
 
 
 def _panel(panel: Any, study: TradeoffStudy, quantity: str) -> None:

@@ -36,14 +36,11 @@ def check(
             file, engine or (), base=base, states=states, seed=seed, time_limit=time_limit, progress=advance
         )
     if out is not None:
-        import json
-
-        from proofroll.files.json_data import plain
         from proofroll.robots.page import page
         from proofroll.running.store import write_text
 
         write_text(out / "check.html", page(content))
-        write_text(out / "check.json", json.dumps(plain(content), indent=1, ensure_ascii=False))
+        write_text(out / "check.json", options.json_text(content))
     options.show(content, as_json, lambda: check_parts(content), widest=WIDTH)
     if any(row.differs for row in content.engines):
         raise typer.Exit(options.CONTRADICTED)
