@@ -45,6 +45,22 @@ class Diverged(ProofrollError):  # noqa: N818 -- a finding about the engine
     """The engine gave up or produced a state that is not finite; the text says when."""
 
 
+def refuse_first(engine: str, settings: object, rules: Iterable[tuple[bool, str, str]]) -> None:
+    """Refuses settings for the first rule that they break.
+
+    Args:
+        engine: its name.
+        settings: of the engine.
+        rules: of each whether it is broken, the name of the setting, and what is wrong and what to do instead.
+
+    Raises:
+        InputError: a rule is broken.
+    """
+    for broken, name, advice in rules:
+        if broken:
+            raise InputError(f"{engine}: {name}", getattr(settings, name), advice)
+
+
 def place(error: BaseException) -> str:
     """Where in an adapter an exception arose, as ``file:line in function``; empty if it did not arise in one.
 

@@ -12,7 +12,7 @@ from proofroll.core.arrays import FloatArray
 from proofroll.core.errors import Refused
 from proofroll.elements.ball_on_surface.model import RollingBall
 from proofroll.elements.ball_on_surface.surfaces import Generator
-from proofroll.engines.pinocchio.mechanism import BallWithRows, SlidingContact
+from proofroll.engines.pinocchio.ball_with_rows import BallWithRows, SlidingContact
 from proofroll.engines.pinocchio.rows import (
     BallTerms,
     ball_terms,
@@ -59,7 +59,7 @@ class Composite(BallWithRows):
     """
 
     def __init__(self, body: RollingBall, orientation: bool) -> None:
-        """See :class:`~proofroll.engines.pinocchio.mechanism.BallWithRows`.
+        """See :class:`~proofroll.engines.pinocchio.ball_with_rows.BallWithRows`.
 
         Raises:
             Refused: the surface has no generators.
@@ -136,7 +136,7 @@ class Composite(BallWithRows):
         return -float(e1.dot(data.oMi[self.ball].rotation.dot(data.f[self.ball].linear)))
 
     def accelerate(self, data: Any, q: FloatArray, v: FloatArray) -> FloatArray:
-        """See :class:`~proofroll.engines.pinocchio.mechanism.BallWithRows`; the multipliers are F2, F3."""
+        """See :class:`~proofroll.engines.pinocchio.ball_with_rows.BallWithRows`; the multipliers are F2, F3."""
         if self._own is not None:
             return self._accelerate_along(self._own, data, q, v)
         terms, frame, rows, drift = self._rows(data, q, v)
@@ -147,7 +147,7 @@ class Composite(BallWithRows):
         return pin.forwardDynamics(self.model, data, torque, rows, drift)  # type: ignore[no-any-return]  # it is an array
 
     def normal_force(self, data: Any) -> float:
-        """See :class:`~proofroll.engines.pinocchio.mechanism.BallWithRows`: forwardDynamics keeps the bias."""
+        """See :class:`~proofroll.engines.pinocchio.ball_with_rows.BallWithRows`: forwardDynamics keeps the bias."""
         if self._own is not None:
             if data is not self._read:
                 # Pinocchio's memory, looked up once: that takes as long as the dynamics.
@@ -157,13 +157,13 @@ class Composite(BallWithRows):
 
     def reaction(self, data: Any, q: FloatArray, v: FloatArray) -> tuple[FloatArray, FloatArray]:
         """Joint acceleration, and the wall's force: N from the joint's wrench, F2 and F3 from the multipliers."""
-        acceleration, friction = self.respond(data, q, v)
+        acceleration, friction = np.array(self.accelerate(data, q, v)), np.array(data.lambda_c)
         frame = data.oMi[self._carriage].rotation @ self._frame0
         pin.rnea(self.model, data, q, v, acceleration)
         return acceleration, frame @ np.array([-self._transmitted(data, frame[:, 0]), *friction])
 
     def slide(self, data: Any, q: FloatArray, v: FloatArray, direction: FloatArray) -> SlidingContact:
-        """See :class:`~proofroll.engines.pinocchio.mechanism.BallWithRows`; the friction is put to the joints."""
+        """See :class:`~proofroll.engines.pinocchio.ball_with_rows.BallWithRows`; the friction is put to the joints."""
         terms, frame, rows, drift = self._rows(data, q, v)
         e1, along = frame[:, 0], frame[:, 1:]
         # Friction along the wall cannot change N, no more than the joints can.
@@ -179,14 +179,14 @@ class Composite(BallWithRows):
     def sliding_reaction(
         self, data: Any, q: FloatArray, v: FloatArray, direction: FloatArray
     ) -> tuple[FloatArray, FloatArray]:
-        """See :class:`~proofroll.engines.pinocchio.mechanism.BallWithRows`; N from the joint's wrench."""
+        """See :class:`~proofroll.engines.pinocchio.ball_with_rows.BallWithRows`; N from the joint's wrench."""
         sliding = self.slide(data, q, v, direction)
         pin.rnea(self.model, data, q, v, sliding.acceleration)
         force = sliding.friction - self._transmitted(data, sliding.e1) * sliding.e1
         return sliding.acceleration, np.asarray(force)
 
     def project_sliding(self, data: Any, q: FloatArray, v: FloatArray) -> tuple[FloatArray, FloatArray]:  # noqa: ARG002 -- the protocol's
-        """See :class:`~proofroll.engines.pinocchio.mechanism.BallWithRows`: the joints hold the ball on the surface."""
+        """See :class:`~proofroll.engines.pinocchio.ball_with_rows.BallWithRows`: the joints hold the ball there."""
         return q, v
 
 

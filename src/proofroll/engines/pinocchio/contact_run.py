@@ -56,7 +56,7 @@ class ContactRun:
         )
 
     def built(self) -> Built:
-        """See :class:`engine.Engine`: from the model, and from its contact and torques at the state now."""
+        """See :class:`proofroll.core.engine.Engine`; from the model, its contact and its torques now."""
         steps = self.steps
         contact, kick = steps.contact, steps.kick()
         inertia, point, pose = contact.model.inertias[contact.ball], contact.point, contact.data.oMi[contact.ball]

@@ -11,7 +11,7 @@ import pinocchio as pin
 
 from proofroll.core.arrays import FloatArray, cross
 from proofroll.elements.ball_on_surface.model import RollingBall
-from proofroll.engines.pinocchio.mechanism import BallWithRows, SlidingContact
+from proofroll.engines.pinocchio.ball_with_rows import BallWithRows, SlidingContact
 from proofroll.engines.pinocchio.rows import BallTerms, ball_terms, own_bias, resistance, rolling_rows
 
 
@@ -23,7 +23,7 @@ class FreeFlyer(BallWithRows):
     """
 
     def __init__(self, body: RollingBall, orientation: bool) -> None:
-        """See :class:`~proofroll.engines.pinocchio.mechanism.BallWithRows`."""
+        """See :class:`~proofroll.engines.pinocchio.ball_with_rows.BallWithRows`."""
         super().__init__(body)
         self._surface, self._wall_rate = body.surface, body.wall_rate
         self._orientation = orientation
@@ -58,7 +58,7 @@ class FreeFlyer(BallWithRows):
         return cross(W, np.asarray(v) + self._radius * np.asarray(e1_rate))
 
     def project(self, data: Any, q: FloatArray, v: FloatArray) -> tuple[FloatArray, FloatArray]:
-        """See :class:`~proofroll.engines.pinocchio.mechanism.BallWithRows`.
+        """See :class:`~proofroll.engines.pinocchio.ball_with_rows.BallWithRows`.
 
         A ball that the wall carried along as if it were part of it would not slip: what is projected is the rest.
         """
@@ -135,7 +135,7 @@ class FreeFlyer(BallWithRows):
         return solution[:6]
 
     def accelerate(self, data: Any, q: FloatArray, v: FloatArray) -> FloatArray:
-        """See :class:`~proofroll.engines.pinocchio.mechanism.BallWithRows`.
+        """See :class:`~proofroll.engines.pinocchio.ball_with_rows.BallWithRows`.
 
         Without orientation the acceleration is that of world components: the joint accelerates in the ball's axes,
         which turn with ω, and axes that are held fixed do not.
@@ -152,7 +152,7 @@ class FreeFlyer(BallWithRows):
         return acceleration
 
     def normal_force(self, data: Any) -> float:
-        """See :class:`~proofroll.engines.pinocchio.mechanism.BallWithRows`."""
+        """See :class:`~proofroll.engines.pinocchio.ball_with_rows.BallWithRows`."""
         return -float(data.lambda_c[0])
 
     def reaction(self, data: Any, q: FloatArray, v: FloatArray) -> tuple[FloatArray, FloatArray]:
@@ -193,21 +193,21 @@ class FreeFlyer(BallWithRows):
         return SlidingContact(acceleration, normal_force, along @ (rows[1:] @ v), slip_rate, friction, e1)
 
     def slide(self, data: Any, q: FloatArray, v: FloatArray, direction: FloatArray) -> SlidingContact:
-        """See :class:`~proofroll.engines.pinocchio.mechanism.BallWithRows`."""
+        """See :class:`~proofroll.engines.pinocchio.ball_with_rows.BallWithRows`."""
         sliding = self._slide(data, q, v, direction)
-        if not self._orientation:  # as in respond
+        if not self._orientation:  # as in accelerate
             sliding.acceleration[:3] += pin.skew(v[3:]) @ v[:3]
         return sliding
 
     def sliding_reaction(
         self, data: Any, q: FloatArray, v: FloatArray, direction: FloatArray
     ) -> tuple[FloatArray, FloatArray]:
-        """See :class:`~proofroll.engines.pinocchio.mechanism.BallWithRows`; N is the multiplier."""
+        """See :class:`~proofroll.engines.pinocchio.ball_with_rows.BallWithRows`; N is the multiplier."""
         sliding = self._slide(data, q, v, direction)
         return sliding.acceleration, np.asarray(sliding.friction - sliding.normal_force * sliding.e1)
 
     def project_sliding(self, data: Any, q: FloatArray, v: FloatArray) -> tuple[FloatArray, FloatArray]:
-        """See :class:`~proofroll.engines.pinocchio.mechanism.BallWithRows`."""
+        """See :class:`~proofroll.engines.pinocchio.ball_with_rows.BallWithRows`."""
         q = self.on_surface(q)
         rows = self._rows(data, q, v)[2]
         return q, np.array(pin.impulseDynamics(self.model, data, v, rows[:1]))

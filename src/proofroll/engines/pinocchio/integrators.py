@@ -11,7 +11,7 @@ from proofroll.core.arrays import FloatArray
 from proofroll.core.engine import whole_steps
 from proofroll.core.errors import Diverged, Refused
 from proofroll.core.events import Event
-from proofroll.engines.pinocchio.mechanism import BallWithRows, left_the_wall
+from proofroll.engines.pinocchio.ball_with_rows import BallWithRows, left_the_wall
 from proofroll.engines.pinocchio.settings import PinocchioSettings
 
 
@@ -91,7 +91,7 @@ class FixedStep(TangentIntegrator):
         return acceleration
 
     def _acceleration(self, q: FloatArray, v: FloatArray) -> FloatArray:
-        return self._mechanism.respond(self._data, q, v)[0]
+        return np.array(self._mechanism.accelerate(self._data, q, v))
 
     def _step(self, h: float, acceleration: FloatArray) -> None:
         """One step of ``h`` [s]; the acceleration is that at its start."""

@@ -13,7 +13,7 @@ from typing import Any
 import numpy as np
 import pinocchio as pin
 
-from proofroll.elements.mechanism import WORLD, Joint, Mechanism
+from proofroll.elements.mechanism import WORLD, Joint, Loop, Mechanism, Spring
 from proofroll.elements.mechanism.capabilities import ALL_JOINTS, ALL_LOOPS, FORCES, MechanismCapability
 from proofroll.elements.mechanism.rotations import Array
 
@@ -63,21 +63,8 @@ class JointTree:
             self.at_joint.append(self._frame(f"joint {joint.name}", index, on_child))
             self.joint.append(index)
         self.body = [frames[body.name] for body in mechanism.bodies]
-        self.loops = [
-            (
-                self._attached(carried, f"{loop.name} a", loop.body_a, loop.position_a, loop.frame_a),
-                self._attached(carried, f"{loop.name} b", loop.body_b, loop.position_b, loop.frame_b),
-            )
-            for loop in mechanism.loops
-        ]
-        self.springs = [
-            (
-                spring,
-                self._attached(carried, f"{spring.name} a", spring.body_a, spring.position_a, np.eye(3)),
-                self._attached(carried, f"{spring.name} b", spring.body_b, spring.position_b, np.eye(3)),
-            )
-            for spring in mechanism.springs
-        ]
+        self.loops = [self._ends(carried, loop, loop.frame_a, loop.frame_b) for loop in mechanism.loops]
+        self.springs = [(spring, *self._ends(carried, spring, np.eye(3), np.eye(3))) for spring in mechanism.springs]
         self.q0, self.v0 = self._start()
         self._laws()
 
@@ -86,9 +73,13 @@ class JointTree:
         frame = pin.Frame(name, joint, 0, place, pin.FrameType.OP_FRAME, carried)
         return int(self.model.addFrame(frame, inertia is not None))
 
-    def _attached(self, carried: Any, name: str, body: str, position: Any, axes: Array) -> int:
-        joint, pose = carried[body]
-        return self._frame(name, joint, pose * pin.SE3(axes, np.array(position)))
+    def _ends(self, carried: Any, item: Loop | Spring, A: Array, B: Array) -> tuple[int, int]:
+        """Frames at both ends of a loop or a spring, with these axes in the bodies."""
+        (on_a, at_a), (on_b, at_b) = carried[item.body_a], carried[item.body_b]
+        return (
+            self._frame(f"{item.name} a", on_a, at_a * pin.SE3(A, np.array(item.position_a))),
+            self._frame(f"{item.name} b", on_b, at_b * pin.SE3(B, np.array(item.position_b))),
+        )
 
     def _start(self) -> tuple[Array, Array]:
         q, v = self.mechanism.start()

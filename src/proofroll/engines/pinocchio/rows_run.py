@@ -12,10 +12,10 @@ from proofroll.core.arrays import FloatArray
 from proofroll.core.engine import Built, Sample
 from proofroll.core.events import Event
 from proofroll.elements.ball_on_surface.model import BallCapability, RollingBall
+from proofroll.engines.pinocchio.ball_with_rows import BallWithRows
 from proofroll.engines.pinocchio.composite import Composite
 from proofroll.engines.pinocchio.free_flyer import FreeFlyer
 from proofroll.engines.pinocchio.integrators import Adaptive, SemiImplicitEuler, TangentIntegrator, TangentRungeKutta4
-from proofroll.engines.pinocchio.mechanism import BallWithRows
 from proofroll.engines.pinocchio.settings import PinocchioSettings
 from proofroll.engines.pinocchio.stick_slip import AdaptiveStickSlip
 from proofroll.engines.pinocchio.stick_slip_steps import StickSlipEuler, StickSlipRungeKutta4

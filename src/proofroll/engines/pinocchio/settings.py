@@ -2,14 +2,14 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
 from typing import Annotated, Literal
 
 import numpy as np
 from annotated_types import Ge, Gt
 
-from proofroll.core.errors import InputError
+from proofroll.core.errors import refuse_first
 from proofroll.elements.ball_on_surface.model import BallCapability
 
 # scipy raises anything below 100 machine epsilons to it, with no more than a warning.
@@ -65,59 +65,35 @@ class PinocchioSettings:
         Raises:
             InputError: a setting does not go with another.
         """
-        self._check_formulation()
-        self._check_mechanism()
-        self._check_resolution()
+        refuse_first("pinocchio", self, self._rules())
 
-    def _check_formulation(self) -> None:
+    def _rules(self) -> Iterator[tuple[bool, str, str]]:
+        contact, integrator = self.formulation == "contact", self.integrator
         for name in ("solver", "solver_tolerance"):
-            value = getattr(self, name)
-            if self.formulation != "contact" and value is not None:
-                advice = f"{self.formulation} has no contact solver; leave it out, or take formulation=contact"
-                raise InputError(f"pinocchio: {name}", value, advice)
-            if self.formulation == "contact" and value is None:
-                raise InputError(f"pinocchio: {name}", value, "contact needs one; its presets have one")
-        if (self.formulation == "contact") != (self.integrator in _OF_CONTACT) and (
-            self.formulation == "contact" or self.integrator == "leapfrog"
-        ):
-            advice = (
-                f"contact has {' and '.join(_OF_CONTACT)}" if self.formulation == "contact" else "only contact has it"
-            )
-            raise InputError("pinocchio: integrator", self.integrator, advice)
-        if self.formulation == "contact" and self.projection:
-            raise InputError(
-                "pinocchio: projection", self.projection, "contact is put back by its solver; leave it out"
-            )
-        if self.formulation == "contact" and self.orientation is False:
-            raise InputError("pinocchio: orientation", self.orientation, "contact always turns the ball; leave it out")
-
-    def _check_mechanism(self) -> None:
-        if self.formulation in OF_MECHANISMS:
-            if self.orientation is not None:
-                advice = "a mechanism always has its orientations; leave it out"
-                raise InputError("pinocchio: orientation", self.orientation, advice)
-            if self.integrator not in {"rk4", "dop853"}:
-                raise InputError("pinocchio: integrator", self.integrator, "mechanisms have rk4 and dop853")
-        if (self.formulation == "constraint_dynamics") != (self.proximal is not None):
-            advice = "constraint_dynamics needs a number, and nothing else has one"
-            raise InputError("pinocchio: proximal", self.proximal, advice)
-
-    def _check_resolution(self) -> None:
-        """A fixed step has dt and no rtol, an adaptive one rtol and no dt."""
-        if self.integrator == "dop853":
-            if self.dt is not None:
-                advice = "dop853 chooses its steps; set rtol instead, or take the fixed steps of preset=default"
-                raise InputError("pinocchio: dt", self.dt, advice)
-            if self.rtol is None:
-                advice = "dop853 needs rtol, e.g. 1e-10; preset=matched has one"
-                raise InputError("pinocchio: integrator", self.integrator, advice)
+            given = getattr(self, name) is not None
+            advice = f"{self.formulation} has no contact solver; leave it out, or take formulation=contact"
+            yield given and not contact, name, advice
+            yield contact and not given, name, "contact needs one; its presets have one"
+        if contact:
+            yield integrator not in _OF_CONTACT, "integrator", f"contact has {' and '.join(_OF_CONTACT)}"
+            yield self.projection, "projection", "contact is put back by its solver; leave it out"
+            yield self.orientation is False, "orientation", "contact always turns the ball; leave it out"
         else:
-            if self.rtol is not None:
-                advice = f"{self.integrator} has a fixed step; start from preset=default and set dt"
-                raise InputError("pinocchio: rtol", self.rtol, advice)
-            if self.dt is None:
-                advice = "a fixed step needs dt, e.g. 1e-3; preset=default has one"
-                raise InputError("pinocchio: integrator", self.integrator, advice)
+            yield integrator == "leapfrog", "integrator", "only contact has it"
+        if self.formulation in OF_MECHANISMS:
+            advice = "a mechanism always has its orientations; leave it out"
+            yield self.orientation is not None, "orientation", advice
+            yield integrator not in {"rk4", "dop853"}, "integrator", "mechanisms have rk4 and dop853"
+        advice = "constraint_dynamics needs a number, and nothing else has one"
+        yield (self.formulation == "constraint_dynamics") != (self.proximal is not None), "proximal", advice
+        # A fixed step has dt and no rtol, an adaptive one rtol and no dt.
+        if integrator == "dop853":
+            advice = "dop853 chooses its steps; set rtol instead, or take the fixed steps of preset=default"
+            yield self.dt is not None, "dt", advice
+            yield self.rtol is None, "integrator", "dop853 needs rtol, e.g. 1e-10; preset=matched has one"
+        else:
+            yield self.rtol is not None, "rtol", f"{integrator} has a fixed step; start from preset=default and set dt"
+            yield self.dt is None, "integrator", "a fixed step needs dt, e.g. 1e-3; preset=default has one"
 
     @property
     def resolution(self) -> str:

@@ -7,7 +7,7 @@ import sys
 from typing import Any
 
 from proofroll.core.arrays import FloatArray
-from proofroll.engines.pinocchio.mechanism import BallWithRows
+from proofroll.engines.pinocchio.ball_with_rows import BallWithRows
 
 # Friction relative to the normal force, and excess of it, that is round-off.
 NOISE = 1e-13
@@ -24,14 +24,15 @@ def excess(mechanism: BallWithRows, data: Any, q: FloatArray, v: FloatArray, mu_
 
     Slip begins where the first is positive.
     """
-    needed, normal_force = mechanism.needed(data, q, v)
-    return relative_excess(needed, normal_force, mu_static), normal_force
+    mechanism.accelerate(data, q, v)
+    return last_excess(mechanism, data, mu_static)
 
 
-def relative_excess(needed: float, normal_force: float, mu_static: float) -> float:
-    """(needed - available) / (needed + available) [-] for a needed friction and a normal force [N]."""
+def last_excess(mechanism: BallWithRows, data: Any, mu_static: float) -> tuple[float, float]:
+    """The same at the state of the last :meth:`BallWithRows.accelerate`."""
+    needed, normal_force = mechanism.friction_force(data), mechanism.normal_force(data)
     available = mu_static * normal_force
     # A friction of round-off is needed even where none is: it must not count as more than none (mu_static = 0).
     noise = NOISE * abs(normal_force)
     size = max(needed + abs(available) + noise, sys.float_info.min)
-    return (needed - available - noise) / size
+    return (needed - available - noise) / size, normal_force

@@ -20,11 +20,11 @@ from proofroll.core.errors import Diverged
 from proofroll.core.events import Event
 from proofroll.elements.ball_on_surface.events import EventKind
 from proofroll.elements.ball_on_surface.model import Contact
+from proofroll.engines.pinocchio.ball_with_rows import BallWithRows, SlidingContact, left_the_wall
 from proofroll.engines.pinocchio.crossing import located
 from proofroll.engines.pinocchio.integrators import Adaptive
-from proofroll.engines.pinocchio.mechanism import BallWithRows, SlidingContact, left_the_wall
 from proofroll.engines.pinocchio.settings import PinocchioSettings
-from proofroll.engines.pinocchio.slip_excess import NOISE, excess, relative_excess, unit
+from proofroll.engines.pinocchio.slip_excess import NOISE, excess, last_excess, unit
 
 # |u| at which creeping ends, relative to |b|/ω_b: what is left out of the direction goes with its square.
 _HANDOVER = 1e-4
@@ -129,9 +129,8 @@ class AdaptiveStickSlip(Adaptive):
         sliding = self._mechanism.slide(data, q, v, direction)
         return self._moved(q, v, sliding.acceleration), sliding
 
-    def _law(self, t: float, y: FloatArray) -> FloatArray:
-        if self._mode is FrictionLaw.STICKING:
-            return self._rates(t, y)
+    def _law(self, _: float, y: FloatArray) -> FloatArray:
+        """Rates while the ball does not stick."""
         return self._sliding_rates(self._data, y, self._direction(self._data, y))[0]
 
     def _speed(self, y: FloatArray) -> tuple[float, float, float]:
@@ -184,9 +183,8 @@ class AdaptiveStickSlip(Adaptive):
         if self._mode is not FrictionLaw.STICKING:
             return self._speed(solver.y)
         # The rates that were found last are those at the end of the step, with projection or without.
-        data, mechanism = self._data, self._mechanism
-        needed, normal_force = mechanism.friction_force(data), mechanism.normal_force(data)
-        return relative_excess(needed, normal_force, self.mu_static), 0.0, normal_force
+        beyond, normal_force = last_excess(self._mechanism, self._data, self.mu_static)
+        return beyond, 0.0, normal_force
 
     def _put_back(self, solver: Any) -> None:
         if self._mode is FrictionLaw.STICKING:

@@ -10,8 +10,8 @@ import numpy as np
 from proofroll.core.arrays import FloatArray
 from proofroll.core.events import Event
 from proofroll.elements.ball_on_surface.model import Contact
+from proofroll.engines.pinocchio.ball_with_rows import BallWithRows, SlidingContact, left_the_wall
 from proofroll.engines.pinocchio.integrators import FixedStep, SemiImplicitEuler, TangentRungeKutta4
-from proofroll.engines.pinocchio.mechanism import BallWithRows, SlidingContact, left_the_wall
 from proofroll.engines.pinocchio.settings import PinocchioSettings
 from proofroll.engines.pinocchio.slip_excess import excess, unit
 
@@ -81,10 +81,9 @@ class FixedStickSlip(FixedStep):
     def _stick_if_it_can(self, time: float) -> None:
         """Sticks if friction can bring the contact point to rest within the step and keep it so."""
         free = self._free
-        along = unit(free.slip + self._dt * free.slip_rate)
-        # what friction takes from the slip velocity in a step if it acts along that velocity
-        taken = free.slip_rate - self._mechanism.slide(self._data, self.q, self.v, along).slip_rate
         ahead = free.slip + self._dt * free.slip_rate
+        # what friction takes from the slip velocity in a step if it acts along that velocity
+        taken = free.slip_rate - self._mechanism.slide(self._data, self.q, self.v, unit(ahead)).slip_rate
         if math.sqrt(ahead @ ahead) > self._dt * math.sqrt(taken @ taken):
             return
         q, v = self._mechanism.project(self._data, self.q, self.v)

@@ -37,7 +37,11 @@ class Applied:
         self._weight = self._mass[:, None] * np.array(mechanism.gravity)
         self._laws = [law for number, joint in enumerate(mechanism.joints) for law in _laws(number, joint)]
         self._angles = {law: _start(law, mechanism.joints[law.connection]) for law in self._laws if law.stiffness}
-        self._balls = [(n, joint.damping) for n, joint in enumerate(mechanism.joints) if _damped_ball(joint)]
+        self._balls = [
+            (n, joint.damping)
+            for n, joint in enumerate(mechanism.joints)
+            if joint.kind == "spherical" and joint.damping
+        ]
         com = np.array([*(body.com for body in mechanism.bodies), (0.0, 0.0, 0.0)])
         self._springs = [
             (spring, (a, np.array(spring.position_a) - com[a]), (b, np.array(spring.position_b) - com[b]))
@@ -130,7 +134,3 @@ def _laws(number: int, joint: Joint) -> list[_Law]:
 def _start(law: _Law, joint: Joint) -> float:
     """Coordinate of a law at time 0."""
     return joint.q0[1 if law.axis == "x" else 0]
-
-
-def _damped_ball(joint: Joint) -> bool:
-    return joint.kind == "spherical" and joint.damping > 0

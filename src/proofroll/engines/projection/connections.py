@@ -59,6 +59,11 @@ def turned(R: Array, a: Array) -> Array:
     return found
 
 
+def _dot(a: Array, b: Array) -> Array:
+    """Products of two lists of vectors."""
+    return np.asarray((a * b).sum(1))
+
+
 class ProjectedConnections:
     """All joints, then all loops, of a mechanism.
 
@@ -110,24 +115,16 @@ class ProjectedConnections:
         d = ends.d[i]
         n = np.where(moving > 0, ends.A[i, :, self._axis], np.eye(3)[self._axis])
         n_rate = moving * cross(w_a[i], n)
-        residual = [(n * d).sum(1)]
-        drift = [
-            (n * bent[i]).sum(1) + 2 * (n_rate * ends.d_rate[i]).sum(1) + (moving * cross(w_a[i], n_rate) * d).sum(1)
-        ]
-        m_a, m_b = [cross(ends.arm_a[i] + moving * d, n)], [cross(ends.arm_b[i], n)]
+        bending = _dot(n, bent[i]) + 2 * _dot(n_rate, ends.d_rate[i]) + _dot(moving * cross(w_a[i], n_rate), d)
         j = self._angle
         x, y = ends.A[j, :, self._x], ends.B[j, :, self._y]
         x_rate, y_rate, t = cross(w_a[j], x), cross(w_b[j], y), cross(y, x)
-        residual.append((x * y).sum(1))
-        drift.append(
-            (cross(w_a[j], x_rate) * y).sum(1) + 2 * (x_rate * y_rate).sum(1) + (x * cross(w_b[j], y_rate)).sum(1)
-        )
-        m_a.append(t)
-        m_b.append(t)
-        nothing_t, nothing_n = np.zeros((len(i), 3)), np.zeros((len(j), 3))
-        force, torque = np.concatenate([n, nothing_n]), np.concatenate([nothing_t, t])
-        C = self.spread(bodies, self.owner, force, np.concatenate(m_a), np.concatenate(m_b))
-        return ConnectionRows(np.concatenate(residual), C, np.concatenate(drift), force, torque)
+        turning = _dot(cross(w_a[j], x_rate), y) + 2 * _dot(x_rate, y_rate) + _dot(x, cross(w_b[j], y_rate))
+        m_a = np.concatenate([cross(ends.arm_a[i] + moving * d, n), t])
+        m_b = np.concatenate([cross(ends.arm_b[i], n), t])
+        force, torque = np.concatenate([n, np.zeros_like(t)]), np.concatenate([np.zeros_like(n), t])
+        residual, drift = np.concatenate([_dot(n, d), _dot(x, y)]), np.concatenate([bending, turning])
+        return ConnectionRows(residual, self.spread(bodies, self.owner, force, m_a, m_b), drift, force, torque)
 
     def spread(self, bodies: Bodies, connection: NDArray[np.intp], n: Array, m_a: Array, m_b: Array) -> Array:
         """n·(v_b − v_a) + m_b·ω_b − m_a·ω_a on the dependent velocities of all bodies, shape (rows, 6 bodies)."""

@@ -68,7 +68,7 @@ class DependentCoordinates:
         quaternions = np.array([to_quaternion(rotation) for rotation in R])
         v = motion.v_WB[: self._count] + cross(w, arm)
         r = motion.p_WB[: self._count] + arm
-        return np.concatenate([r.ravel(), quaternions.ravel(), v.ravel(), np.einsum("nji,nj->ni", R, w).ravel()])
+        return _joined(r, quaternions, v, np.einsum("nji,nj->ni", R, w))
 
     def parts(self, x: Array) -> tuple[Array, Array, Array, Array]:
         """r, quaternions, v and ω (own axes) of a state, (bodies, …)."""
@@ -122,8 +122,7 @@ class DependentCoordinates:
         """ẋ."""
         _, q, v, w = self.parts(x)
         acceleration = self.solve(x).acceleration.reshape(self._count, 6)
-        turning = quaternion_rates(q, w)
-        return np.concatenate((v.ravel(), turning.ravel(), acceleration[:, :3].ravel(), acceleration[:, 3:].ravel()))
+        return _joined(v, quaternion_rates(q, w), acceleration[:, :3], acceleration[:, 3:])
 
     def eliminated(self, x: Array) -> Array:
         """The state with its violations taken away within the constrained subspace; quaternions of unit length."""
@@ -136,9 +135,7 @@ class DependentCoordinates:
         r, q, v, w = self.parts(x)
         u = np.concatenate([v, w], axis=1).ravel()
         u = (u - into @ (back @ (C @ u))).reshape(self._count, 6)
-        return self._moved(
-            np.concatenate([r.ravel(), q.ravel(), u[:, :3].ravel(), u[:, 3:].ravel()]), -into @ (back @ residual)
-        )
+        return self._moved(_joined(r, q, u[:, :3], u[:, 3:]), -into @ (back @ residual))
 
     def accept(self, x: Array) -> None:
         """Tells the forces that the motion goes on from a state."""
@@ -158,6 +155,11 @@ class DependentCoordinates:
         q += quaternion_rates(q, step[:, 3:])
         r += step[:, :3]
         return self._with_unit_quaternions(x)
+
+
+def _joined(*parts: Array) -> Array:
+    """A state, or its rates, from r, quaternions, v and ω."""
+    return np.concatenate([part.ravel() for part in parts])
 
 
 def rotations(q: Array) -> Array:

@@ -2,13 +2,13 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
 from typing import Annotated, Literal
 
 from annotated_types import Gt
 
-from proofroll.core.errors import InputError
+from proofroll.core.errors import refuse_first
 from proofroll.core.integrators import INTEGRATORS, TIGHTEST
 from proofroll.elements.ball_on_surface.compiled import library
 
@@ -48,29 +48,27 @@ class ProjectionSettings:
     equations: Literal["written_out", "projected"] = "written_out"
 
     def __post_init__(self) -> None:
-        tightest = library.TIGHTEST if self.integrator == "taylor" else TIGHTEST
-        if self.rtol < tightest:
-            raise InputError("projection: rtol", self.rtol, f"double precision allows no less than {tightest:.3g}")
-        # A setting that would be ignored is an error: a user who writes dt=1e-4 believes that it does something.
-        if self.resolution == "rtol" and self.dt != _DT:
-            raise InputError(
-                "projection: dt", self.dt, f"{self.integrator} chooses its own steps; set rtol, or add integrator=rk4"
-            )
-        if self.resolution == "dt" and self.rtol != TIGHTEST:
-            raise InputError(
-                "projection: rtol", self.rtol, f"{self.integrator} has a fixed step; set dt, or add integrator=dop853"
-            )
+        refuse_first("projection", self, self._rules())
 
-        if self.formulation == "dependent" and self.integrator == "taylor":
-            raise InputError("projection: integrator", self.integrator, "dependent has rk4 and dop853")
-        if self.equations == "projected" and self.formulation == "dependent":
-            raise InputError("projection: equations", self.equations, "dependent always projects; leave it out")
-        if self.equations == "projected" and self.integrator == "taylor":
-            advice = "taylor compiles its own equations; leave it out, or take integrator=dop853"
-            raise InputError("projection: equations", self.equations, advice)
-        if self.singularity == "stop" and self.formulation != "euler":
-            advice = f"{self.formulation} has no angles, hence no singularity; leave it out, or take formulation=euler"
-            raise InputError("projection: singularity", self.singularity, advice)
+    def _rules(self) -> Iterator[tuple[bool, str, str]]:
+        taylor, dependent, projected = (
+            self.integrator == "taylor",
+            self.formulation == "dependent",
+            self.equations == "projected",
+        )
+        tightest = library.TIGHTEST if taylor else TIGHTEST
+        yield self.rtol < tightest, "rtol", f"double precision allows no less than {tightest:.3g}"
+        # A setting that would be ignored is an error: a user who writes dt=1e-4 believes that it does something.
+        advice = f"{self.integrator} chooses its own steps; set rtol, or add integrator=rk4"
+        yield self.resolution == "rtol" and self.dt != _DT, "dt", advice
+        advice = f"{self.integrator} has a fixed step; set dt, or add integrator=dop853"
+        yield self.resolution == "dt" and self.rtol != TIGHTEST, "rtol", advice
+        yield dependent and taylor, "integrator", "dependent has rk4 and dop853"
+        yield dependent and projected, "equations", "dependent always projects; leave it out"
+        advice = "taylor compiles its own equations; leave it out, or take integrator=dop853"
+        yield taylor and projected, "equations", advice
+        advice = f"{self.formulation} has no angles, hence no singularity; leave it out, or take formulation=euler"
+        yield self.singularity == "stop" and self.formulation != "euler", "singularity", advice
 
     @property
     def eliminates(self) -> bool:

@@ -39,7 +39,7 @@ class TaylorSeries:
             x: initial state.
             rtol: relative tolerance of a step [-].
             check: called with the time [s] and state after each step; raises Diverged if it is not to be trusted.
-            accepted: the state from which the motion goes on, see :data:`series.Renewed`.
+            accepted: the state from which the motion goes on, see ``Renewed`` of :mod:`compiled.series`.
 
         Raises:
             Refused: heyoka is missing, or the scene is not one of its equations.

@@ -49,8 +49,7 @@ class ClosedFormModel:
     def __init__(self, body: RollingBall) -> None:
         if body.contact.rolling_resistance > 0:
             raise Refused("there is no closed form with rolling resistance; take formulation=equations")
-        self._body, self._t = body, 0.0
-        found = self._at(0.0)
+        self._body, found = body, closed_form(body, np.zeros(1))
         if found is None:
             raise Refused(
                 "closed forms are known on a plane and in a cylinder along whose axis gravity points, not here; "
@@ -58,12 +57,9 @@ class ClosedFormModel:
             )
         self._motion = found
 
-    def _at(self, t: float) -> BallMotion | None:
-        return closed_form(self._body, np.array([t]))
-
     def advance(self, t: float) -> None:
         """See :class:`ReducedModel`."""
-        found = self._at(t)
+        found = closed_form(self._body, np.array([t]))
         assert found is not None  # whether there is one does not depend on time
         self._motion = found
 

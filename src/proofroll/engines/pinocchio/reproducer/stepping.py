@@ -3,8 +3,8 @@
 from __future__ import annotations
 
 from proofroll.elements.ball_on_surface.reproducer_source import assigned
+from proofroll.engines.pinocchio.ball_with_rows import BallWithRows
 from proofroll.engines.pinocchio.integrators import PATIENCE, SHORT
-from proofroll.engines.pinocchio.mechanism import BallWithRows
 from proofroll.engines.pinocchio.settings import PinocchioSettings
 
 _FIXED = '''

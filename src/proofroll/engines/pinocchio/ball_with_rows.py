@@ -91,10 +91,6 @@ class BallWithRows(ABC):
     def accelerate(self, data: Any, q: FloatArray, v: FloatArray) -> FloatArray:
         """Joint acceleration, shape (nv,), which the next call may overwrite; leaves the reactions in ``data``."""
 
-    def respond(self, data: Any, q: FloatArray, v: FloatArray) -> tuple[FloatArray, FloatArray]:
-        """Joint acceleration, shape (nv,), and multipliers of the rows [N]."""
-        return np.array(self.accelerate(data, q, v)), np.array(data.lambda_c)
-
     @abstractmethod
     def normal_force(self, data: Any) -> float:
         """N [N] that the last :meth:`accelerate` left in ``data``."""
@@ -107,11 +103,6 @@ class BallWithRows(ABC):
     @abstractmethod
     def reaction(self, data: Any, q: FloatArray, v: FloatArray) -> tuple[FloatArray, FloatArray]:
         """Joint acceleration, shape (nv,), and force of the wall on the ball in the world [N], shape (3,)."""
-
-    def needed(self, data: Any, q: FloatArray, v: FloatArray) -> tuple[float, float]:
-        """Friction that it takes to keep the slip velocity as it is [N], and N [N]."""
-        self.accelerate(data, q, v)
-        return self.friction_force(data), self.normal_force(data)
 
     @abstractmethod
     def slide(self, data: Any, q: FloatArray, v: FloatArray, direction: FloatArray) -> SlidingContact:
