@@ -13,7 +13,9 @@ import pytest
 from other_pythons import seeing
 
 from proofroll.core.plugins import load_engine, release
+from proofroll.files.json_data import record
 from proofroll.report.versions_content import answer, lines, page, table
+from proofroll.studies.versions import VersionsStudy
 
 Proofroll = Callable[..., tuple[int, str, str]]
 ROOT = Path(__file__).resolve().parents[1]
@@ -82,11 +84,12 @@ def test_what_changed_is_shown(versions: Callable[..., tuple[int, str, str]], tm
     assert {"name": "iterations", "old": 50, "new": 100} in found["defaults"]
     kept = json.loads((tmp_path / "out" / "versions-aged-1.0-2.0.json").read_text(encoding="utf-8"))
     assert kept == found
-    html = page(found)
+    study = record(VersionsStudy, found)
+    html = page(study)
     assert (tmp_path / "out" / "versions-aged-1.0-2.0.html").read_text(encoding="utf-8") == html
-    assert answer(found).split("; ")[-1] in html
-    assert any(line.startswith("default iterations: 50 → 100") for line in lines(found))
-    assert table(found).row_count == 2
+    assert answer(study).split("; ")[-1] in html
+    assert any(line.startswith("default iterations: 50 → 100") for line in lines(study))
+    assert table(study).row_count == 2
 
 
 def test_versions_that_do_the_same(versions: Callable[..., tuple[int, str, str]]) -> None:

@@ -26,7 +26,7 @@ MAY: dict[str, set[str]] = {
     "elements": {"core", "files", "elements"},
     "truth": {"core", "elements", "truth"},
     "engines": {"core", "elements", "engines", "robots"},  # the protocol of robot readers
-    "robots": {"core", "files", "running", "report", "cli", "robots", "elements"},  # a robot is a mechanism to be run
+    "robots": {"core", "files", "running", "studies", "report", "cli", "robots", "elements"},  # a mechanism to be run
 }
 # A kind's own studies, commands and parts of the report stand on the harness, as a plug-in of somebody else would.
 PLUGIN_PARTS = {"report", "onset_study", "regimes_study", "commands"}

@@ -8,12 +8,15 @@ import re
 from collections.abc import Callable
 from importlib.metadata import entry_points
 from pathlib import Path
-from typing import Annotated, Any
+from typing import TYPE_CHECKING, Annotated
 
 import typer
 
 from proofroll.cli import options
 from proofroll.core.errors import InputError, ProofrollError
+
+if TYPE_CHECKING:
+    from proofroll.studies.versions import VersionsStudy
 
 # What else than a scene or a comparison can be held against two versions, by the ending of its file.
 SUBJECTS = "proofroll.version_subjects"
@@ -54,7 +57,7 @@ def versions(
         raise InputError("new", new, f"both are {sides[0]}; name two versions")
     if robot is not None:
         with options.spinner(f"{engine} {old} and {new}"):
-            content: dict[str, Any] = robot.load()(subject, *sides)
+            content: VersionsStudy = robot.load()(subject, *sides)
     else:
         from proofroll.studies.versions import compared
 
@@ -65,18 +68,18 @@ def versions(
     made = table if robot is None else robot_table
     where = f"The page is in {_file(content, out)}.html."
     options.show(content, as_json, lambda: [heading(content), made(content), *lines(content), where], widest=80)
-    if content["lost"]:
+    if content.lost:
         raise typer.Exit(options.ENGINE)
-    raise typer.Exit(options.CONTRADICTED if content["changed"] else options.OK)
+    raise typer.Exit(options.CONTRADICTED if content.changed else options.OK)
 
 
-def _file(content: dict[str, Any], out: Path) -> Path:
+def _file(content: VersionsStudy, out: Path) -> Path:
     """Where page and document are kept, without an ending."""
-    words = ["versions", content["engine"], content["old"]["version"], content["new"]["version"]]
+    words = ["versions", content.engine, content.old.version, content.new.version]
     return out / re.sub(r"[^\w.+-]", "_", "-".join(map(str, words)))
 
 
-def _keep(content: dict[str, Any], page: str, out: Path) -> None:
+def _keep(content: VersionsStudy, page: str, out: Path) -> None:
     from proofroll.running.store import write_text
 
     out.mkdir(parents=True, exist_ok=True)

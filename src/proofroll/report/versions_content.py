@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterator, Mapping
-from typing import Any
+from typing import TYPE_CHECKING
 
 from rich.table import Column, Table
 from rich.text import Text
@@ -12,37 +12,41 @@ from proofroll.report.labels import SYMBOLS, number
 from proofroll.report.pages import environment, rendered
 from proofroll.report.screen import plain_table, unbroken
 from proofroll.studies.hosts import said_of
+from proofroll.studies.version_difference import NumberKind
+
+if TYPE_CHECKING:
+    from proofroll.studies.versions import SettingDifference, VersionsStudy
 
 _MOST = 12  # sentences of a kind on the terminal; the JSON document has all
 
 
-def heading(content: Mapping[str, Any]) -> str:
+def heading(content: VersionsStudy) -> str:
     """What is compared, in one line."""
-    old, new = content["old"]["version"], content["new"]["version"]
-    return f"{content['engine']} {old} → {new}: {', '.join(content['comparisons'])}"
+    old, new = content.old.version, content.new.version
+    return f"{content.engine} {old} → {new}: {', '.join(content.comparisons)}"
 
 
-def answer(content: Mapping[str, Any]) -> str:
+def answer(content: VersionsStudy) -> str:
     """What changed, in one sentence."""
-    if content["robot"] is not None:
-        said = f"{len(content['changed'])} changes in how they hold {content['robot']['file']}"
-        return said if content["changed"] else f"Both hold {content['robot']['file']} alike."
-    cases = content["cases"]
-    changed = sum(bool(case["changed"]) for case in cases)
-    kinds = [case["numbers"]["kind"] for case in cases if case["numbers"]]
+    if content.robot is not None:
+        said = f"{len(content.changed)} changes in how they hold {content.robot.file}"
+        return said if content.changed else f"Both hold {content.robot.file} alike."
+    cases = content.cases
+    changed = sum(bool(case.changed) for case in cases)
+    kinds = [case.numbers.kind for case in cases if case.numbers]
     parts = [f"{count} with {what}" for what, count in (
-        ("the same bits", kinds.count("same bits")),
-        ("differences of round-off", kinds.count("round-off")),
-        ("other numbers", kinds.count("changed")),
+        ("the same bits", kinds.count(NumberKind.SAME_BITS)),
+        ("differences of round-off", kinds.count(NumberKind.ROUND_OFF)),
+        ("other numbers", kinds.count(NumberKind.CHANGED)),
         ("no numbers in one or both", len(cases) - len(kinds)),
     ) if count]  # fmt: skip
     verdicts = f"{changed} of {len(cases)} cases have another verdict" if changed else "no verdict changed"
     return f"{len(cases)} cases: {', '.join(parts)}; {verdicts}."
 
 
-def verdicts_text(row: Mapping[str, Any]) -> str:
+def verdicts_text(row: SettingDifference) -> str:
     """How many cases had which verdict, then and now."""
-    before, after = (_counts(row["verdicts"][side]) for side in ("old", "new"))
+    before, after = (_counts(row.verdicts[side]) for side in ("old", "new"))
     return before if before == after else f"{before} → {after}"
 
 
@@ -50,51 +54,51 @@ def _counts(verdicts: Mapping[str, int]) -> str:
     return " ".join(f"{SYMBOLS[word]}{verdicts[word]}" for word in SYMBOLS if word in verdicts)
 
 
-def numbers_text(row: Mapping[str, Any]) -> str:
+def numbers_text(row: SettingDifference) -> str:
     """The largest difference of any case."""
-    found = row["numbers"]
+    found = row.numbers
     if found is None:
         return "–"
-    return "same" if found["kind"] == "same bits" else f"{number(found['relative'])} {found['quantity']}"
+    return "same" if found.kind == NumberKind.SAME_BITS else f"{number(found.relative)} {found.quantity}"
 
 
-def order_text(row: Mapping[str, Any]) -> str:
+def order_text(row: SettingDifference) -> str:
     """The declared orders of all points, then and now."""
-    old, new = (", ".join(map(str, row["declared_order"][side])) or "–" for side in ("old", "new"))
+    old, new = (", ".join(map(str, row.declared_order[side])) or "–" for side in ("old", "new"))
     return old if old == new else f"{old} → {new}"
 
 
-def speed_text(row: Mapping[str, Any]) -> str:
+def speed_text(row: SettingDifference) -> str:
     """Time of the new version over that of the old one, with its interval."""
-    found = row["speed"]
-    return "" if found is None else f"{found['value']:.2f} [{found['low']:.2f}, {found['high']:.2f}]"
+    found = row.speed
+    return "" if found is None else f"{found.value:.2f} [{found.low:.2f}, {found.high:.2f}]"
 
 
-def table(content: Mapping[str, Any]) -> Table:
+def table(content: VersionsStudy) -> Table:
     """One line for each setting of each comparison."""
     made = plain_table(
         Column("setting", overflow="fold", min_width=16),
         Column("verdicts"),
         Column("numbers", justify="right"),
-        *unbroken("declared\norder", *(["time"] if any(row["speed"] for row in content["rows"]) else [])),
+        *unbroken("declared\norder", *(["time"] if any(row.speed for row in content.rows) else [])),
     )
     before = ""
-    for row in content["rows"]:
-        if row["comparison"] != before and len(content["comparisons"]) > 1:
-            made.add_row(Text(row["comparison"], style="bold"))
-        before = row["comparison"]
-        style = "red" if row["changed"] else "yellow" if (row["numbers"] or {}).get("kind") == "changed" else ""
-        cells = [short(row["setting"]), verdicts_text(row), numbers_text(row), order_text(row), speed_text(row)]
+    for row in content.rows:
+        if row.comparison != before and len(content.comparisons) > 1:
+            made.add_row(Text(row.comparison, style="bold"))
+        before = row.comparison
+        style = "red" if row.changed else "yellow" if row.numbers and row.numbers.kind == NumberKind.CHANGED else ""
+        cells = [short(row.setting), verdicts_text(row), numbers_text(row), order_text(row), speed_text(row)]
         made.add_row(*(Text(cell, style=style) for cell in cells[: len(made.columns)]))
     return made
 
 
-def robot_table(content: Mapping[str, Any]) -> Table:
+def robot_table(content: VersionsStudy) -> Table:
     """One line for each layer of a robot's check."""
-    made = plain_table(*map(Column, ("layer", content["old"]["version"], content["new"]["version"])))
-    for layer in content["robot"]["layers"]:
-        shown = ["–" if layer[side] is None else layer[side] for side in ("old", "new")]
-        made.add_row(Text(layer["layer"], style="red" if layer["changed"] else ""), *shown)
+    made = plain_table(*map(Column, ("layer", content.old.version, content.new.version)))
+    for layer in content.robot.layers:
+        shown = ["–" if found is None else found for found in (layer.old, layer.new)]
+        made.add_row(Text(layer.layer, style="red" if layer.changed else ""), *shown)
     return made
 
 
@@ -104,34 +108,33 @@ def short(setting: str) -> str:
     return " ".join(part[-1] if part[0] in {"formulation", "preset"} else "=".join(part) for part in parts)
 
 
-def lines(content: Mapping[str, Any], most: int | None = _MOST) -> Iterator[str]:
+def lines(content: VersionsStudy, most: int | None = _MOST) -> Iterator[str]:
     """What changed, in sentences; ``!!`` before those that decide the exit code."""
     yield from _some([f"!! {sentence}" for sentence in _changes(content)], most)
     orders = [
-        f"{row['comparison']}: {short(row['setting'])}: observed order of {order['quantity']} "
-        f"{order['old']:.2f} → {order['new']:.2f}"
-        for row in content["rows"]
-        for order in row["orders"][:1]
+        f"{row.comparison}: {short(row.setting)}: observed order of {order.quantity} {order.old:.2f} → {order.new:.2f}"
+        for row in content.rows
+        for order in row.orders[:1]
     ]
     yield from _some(orders, most)
-    came, went = ([item for item in content["defaults"] if item[side] is None] for side in ("old", "new"))
-    stayed = [item for item in content["defaults"] if item not in came and item not in went]
-    yield from _some([f"default {item['name']}: {item['old']} → {item['new']}" for item in stayed], most)
+    came, went = ([item for item in content.defaults if getattr(item, side) is None] for side in ("old", "new"))
+    stayed = [item for item in content.defaults if item not in came and item not in went]
+    yield from _some([f"default {item.name}: {item.old} → {item.new}" for item in stayed], most)
     if came or went:
         yield f"{len(came)} options are new and {len(went)} are gone, renamed ones among them."
-    yield from (f"?? {sentence}" for sentence in content["lost"])
-    yield from said_of(content["hosts"])
+    yield from (f"?? {sentence}" for sentence in content.lost)
+    yield from said_of(content.hosts)
     yield answer(content)
 
 
-def _changes(content: Mapping[str, Any]) -> list[str]:
+def _changes(content: VersionsStudy) -> list[str]:
     """What changed of verdicts, each said once with the points at which it did."""
-    if content["robot"] is not None:
-        return list(content["changed"])
+    if content.robot is not None:
+        return list(content.changed)
     points: dict[tuple[str, str, str], list[str]] = {}
-    for case in content["cases"]:
-        for sentence in case["changed"]:
-            points.setdefault((case["comparison"], short(case["setting"]), sentence), []).append(case["point"])
+    for case in content.cases:
+        for sentence in case.changed:
+            points.setdefault((case.comparison, short(case.setting), sentence), []).append(case.point)
     return [
         f"{comparison}: {setting}: {what}"
         + (f", at {len(at)} points" if len(at) > 1 else f", at {at[0]}" * bool(at[0]))
@@ -145,11 +148,11 @@ def _some(sentences: list[str], most: int | None) -> Iterator[str]:
         yield f"   and {len(sentences) - most} more"
 
 
-def page(content: Mapping[str, Any]) -> str:
+def page(content: VersionsStudy) -> str:
     """The HTML page; everything from engines and files is escaped."""
     cells = [
-        (row, [short(row["setting"]), verdicts_text(row), numbers_text(row), order_text(row), speed_text(row)])
-        for row in content["rows"]
+        (row, [short(row.setting), verdicts_text(row), numbers_text(row), order_text(row), speed_text(row)])
+        for row in content.rows
     ]
     return rendered(
         environment(),

@@ -2,17 +2,38 @@
 
 from __future__ import annotations
 
+from dataclasses import dataclass
 from pathlib import Path
-from typing import Any
 
 from proofroll.core.plugins import plain_name
 from proofroll.robots.check import check
 from proofroll.robots.records import ImporterRow
 from proofroll.robots.terminal import amount
 from proofroll.running.asking import describe
+from proofroll.studies.versions import EngineVersion, VersionsStudy
 
 
-def between(file: str, old: str, new: str) -> dict[str, Any]:
+@dataclass(frozen=True)
+class LayerVersions:
+    """A layer of the check: what was found in both versions (None: not offered), and whether another verdict."""
+
+    layer: str
+    old: str | None
+    new: str | None
+    changed: bool
+
+
+@dataclass(frozen=True)
+class RobotVersions:
+    """A robot file in both versions, by layer and as each check found it."""
+
+    file: str
+    layers: list[LayerVersions]
+    old: ImporterRow
+    new: ImporterRow
+
+
+def between(file: str, old: str, new: str) -> VersionsStudy:
     """How two versions hold a robot, as the content of `proofroll versions`.
 
     Args:
@@ -29,30 +50,26 @@ def between(file: str, old: str, new: str) -> dict[str, Any]:
         found = [row.layers.get(layer) for row in rows]
         held = [None if item is None else item.holds for item in found]
         shown = [None if item is None else "holds" if item.holds else amount(item.difference) for item in found]
-        layers.append({"layer": layer, "old": shown[0], "new": shown[1], "changed": held[0] != held[1]})
+        layers.append(LayerVersions(layer, shown[0], shown[1], held[0] != held[1]))
         if held[0] != held[1]:
             changed.append(f"{layer}: {shown[0] or 'not offered'} → {shown[1] or 'not offered'}")
     if rows[0].status != rows[1].status:
         changed.insert(0, f"the robot: {_does(rows[0])} → {_does(rows[1])}")
     elif _causes(rows[0]) != _causes(rows[1]):
         changed.insert(0, f"causes: {_causes(rows[0]) or 'none'} → {_causes(rows[1]) or 'none'}")
-    return {
-        "engine": plain_name(old),
-        "old": _side(old, rows[0]),
-        "new": _side(new, rows[1]),
-        "comparisons": [Path(file).name],
-        "rows": [],
-        "cases": [],
-        "defaults": [],
-        "hosts": {},
-        "robot": {"file": file, "layers": layers, "old": rows[0], "new": rows[1]},
-        "changed": changed,
-        "lost": [f"{row.engine}: {row.refused}" for row in rows if row.status == "missing"],
-    }
+    return VersionsStudy(
+        engine=plain_name(old),
+        old=_side(old, rows[0]),
+        new=_side(new, rows[1]),
+        comparisons=[Path(file).name],
+        robot=RobotVersions(file, layers, *rows),
+        changed=changed,
+        lost=[f"{row.engine}: {row.refused}" for row in rows if row.status == "missing"],
+    )
 
 
-def _side(name: str, row: ImporterRow) -> dict[str, Any]:
-    return {"name": name, "version": row.version or "", "interpreter": describe(name).interpreter}
+def _side(name: str, row: ImporterRow) -> EngineVersion:
+    return EngineVersion(name, row.version or "", describe(name).interpreter)
 
 
 def _causes(row: ImporterRow) -> str:

@@ -5,11 +5,11 @@ from __future__ import annotations
 import dataclasses
 from collections import Counter
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from typing import Any
 
 from proofroll.core.comparison import Comparison
-from proofroll.core.plugins import parse_engine
+from proofroll.core.plugins import parse_engine, plain_name
 from proofroll.running.asking import describe
 from proofroll.running.case import EngineDescription, Status
 from proofroll.running.runner import Runner
@@ -60,14 +60,62 @@ class SettingDifference:
     speed: Interval | None
 
 
+@dataclass(frozen=True)
+class EngineVersion:
+    """One of the versions: the engine as ``--engine`` takes it, its version, and the path of its Python."""
+
+    name: str
+    version: str
+    interpreter: str
+
+
+@dataclass(frozen=True)
+class ChangedDefault:
+    """What the engine takes where nobody chooses, or a formulation provides, in both versions; None: nothing."""
+
+    name: str
+    old: Any
+    new: Any
+
+
+@dataclass(frozen=True, kw_only=True)
+class VersionsStudy:
+    """One engine in two versions.
+
+    Attributes:
+        engine: its name.
+        old, new: the versions.
+        comparisons: names of what was run; of a robot its file.
+        rows: what changed by comparison and setting.
+        cases: what changed by case.
+        defaults: what changed of the engine's own choices.
+        hosts: machine of a cluster -> how many of the results it made.
+        robot: of a robot file: its ``file``, ``layers``, and rows ``old`` and ``new``; else None.
+        changed: sentences about verdicts that changed.
+        lost: sentences about runs whose engine is missing.
+    """
+
+    engine: str
+    old: EngineVersion
+    new: EngineVersion
+    comparisons: list[str]
+    rows: list[SettingDifference] = field(default_factory=list)
+    cases: list[CaseDifference] = field(default_factory=list)
+    defaults: list[ChangedDefault] = field(default_factory=list)
+    hosts: dict[str, int] = field(default_factory=dict)
+    robot: Any = None
+    changed: list[str]
+    lost: list[str]
+
+
 def compared(
     sides: tuple[str, str],
     comparisons: Sequence[Comparison],
     runner: Runner,
     rounds: int = ROUNDS,
     progress: Progress | None = None,
-) -> dict[str, Any]:
-    """The same cases in two versions of an engine, and what changed, as plain data.
+) -> VersionsStudy:
+    """The same cases in two versions of an engine, and what changed.
 
     Args:
         sides: the engine twice, ``NAME`` or ``NAME@PLACE``: the old version and the new one.
@@ -91,32 +139,28 @@ def compared(
         found += [(item, before, after) for before, after in zip(one, other, strict=True)]
     differences = [case_difference(item, before, after, results, runner) for item, before, after in found]
     speeds = _speeds(found, runner, rounds, progress) if rounds else {}
-    return {
-        "engine": parse_engine(sides[0]).name.partition("@")[0],
-        "old": _side(sides[0], told[0]),
-        "new": _side(sides[1], told[1]),
-        "comparisons": [item.name for item in comparisons],
-        "rows": [dataclasses.asdict(row) for row in _rows(differences, speeds)],
-        "cases": [dataclasses.asdict(case) for case in differences],
-        "defaults": _defaults(*told),
-        "hosts": hosts(run.result for _, *pair in found for run in pair),
-        "robot": None,
-        "changed": [f"{_where(case)}: {what}" for case in differences for what in case.changed],
-        "lost": [
+    old, new = (EngineVersion(name, its.version, its.interpreter) for name, its in zip(sides, told, strict=True))
+    return VersionsStudy(
+        engine=plain_name(parse_engine(sides[0]).name),
+        old=old,
+        new=new,
+        comparisons=[item.name for item in comparisons],
+        rows=_rows(differences, speeds),
+        cases=differences,
+        defaults=_defaults(*told),
+        hosts=hosts(run.result for _, *pair in found for run in pair),
+        changed=[f"{_where(case)}: {what}" for case in differences for what in case.changed],
+        lost=[
             f"{name} {_where(case)}: {side.message}"
             for case in differences
             for name, side in (("old", case.old), ("new", case.new))
             if side.status == Status.MISSING
         ],
-    }
+    )
 
 
 def _where(case: CaseDifference) -> str:
     return f"{case.comparison}: {case.setting}" + (f" at {case.point}" if case.point else "")
-
-
-def _side(name: str, told: EngineDescription) -> dict[str, Any]:
-    return {"name": name, "version": told.version, "interpreter": told.interpreter}
 
 
 def _rows(cases: Sequence[CaseDifference], speeds: Mapping[tuple[str, str], Interval]) -> list[SettingDifference]:
@@ -171,11 +215,15 @@ def _speeds(
     return speeds
 
 
-def _defaults(old: EngineDescription, new: EngineDescription) -> list[dict[str, Any]]:
+def _defaults(old: EngineDescription, new: EngineDescription) -> list[ChangedDefault]:
     """What the engine itself takes where nobody chooses, and what formulations can represent, if that changed."""
-    found = []
-    for one, other in ((old.defaults, new.defaults), (old.provides, new.provides)):
-        for name in sorted(one.keys() | other.keys()):
-            if one.get(name) != other.get(name):
-                found.append({"name": name, "old": one.get(name), "new": other.get(name)})
-    return found
+    both: tuple[tuple[dict[str, Any], dict[str, Any]], ...] = (
+        (old.defaults, new.defaults),
+        (old.provides, new.provides),
+    )
+    return [
+        ChangedDefault(name, one.get(name), other.get(name))
+        for one, other in both
+        for name in sorted(one.keys() | other.keys())
+        if one.get(name) != other.get(name)
+    ]
