@@ -45,6 +45,9 @@ stopwatch.SECONDS = 0.002
 # The finest steps of a curve take as long as all others together; tests/unit/studies/test_sweep.py has them.
 tradeoff.FINER = ()
 
+# Each core has a pytest process (``make test``): more worker processes at once would be more to start, and no faster.
+os.cpu_count = lambda: 1
+
 # Tests of Ctrl-C mean nothing where SIGINT was ignored when pytest began (nohup, a shell's "&"); children inherit that.
 if signal.getsignal(signal.SIGINT) is signal.SIG_IGN:
     signal.signal(signal.SIGINT, signal.default_int_handler)
@@ -194,7 +197,7 @@ def proofroll(
     install_engines: Callable[[Mapping[str, str]], None],
 ) -> Proofroll:
     """As ``command_line``, with engines besides that misbehave."""
-    install_engines(ENTRY_POINTS | {"broken": "broken:Broken", "laddered": "laddered:Laddered"})
+    install_engines(ENTRY_POINTS)
     return command_line
 
 

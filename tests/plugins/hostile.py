@@ -255,7 +255,8 @@ class Commands(Oracle):
         raise Diverged("\x1b]0;owned\x07\x9b2J it stopped")
 
 
-# Entry points of all of them; "absent" needs a module that nobody has.
+# Entry points of all of them, and of two that are wrong without harm, so that tests of either share worker processes;
+# "absent" needs a module that nobody has.
 ENTRY_POINTS = {
     kind.name: f"hostile:{kind.__name__}"
     for kind in (
@@ -276,4 +277,9 @@ ENTRY_POINTS = {
         Interrupted,
         Commands,
     )
-} | {"absent": "no_such_module_anywhere:Engine", "misspelt": "hostile:NoSuchClass"}
+} | {
+    "broken": "broken:Broken",
+    "laddered": "laddered:Laddered",
+    "absent": "no_such_module_anywhere:Engine",
+    "misspelt": "hostile:NoSuchClass",
+}

@@ -1,8 +1,9 @@
 """Worker processes that all tests of a pytest process share: to start one costs more than most of what it is asked.
 
 A worker is lent again where everything is as it was when it started: the engine that it has loaded, the memory that it
-may have, and the environment; to the folder of a test it goes by itself. Tests of the processes themselves are marked
-``own_workers`` and share none.
+may have, and the environment; to the folder of a test it goes by itself. The engines of ``hostile.py`` load no library
+that another of them does not, so one worker serves them all until one of them ends it. Tests of the processes themselves
+are marked ``own_workers`` and share none.
 """
 
 from __future__ import annotations
@@ -15,6 +16,7 @@ from pathlib import Path
 from weakref import WeakKeyDictionary
 
 import pytest
+from hostile import ENTRY_POINTS
 
 from proofroll.running.process import Worker
 from proofroll.running.worker_pool import Workers
@@ -28,6 +30,10 @@ _PASSING = {"PYTEST_CURRENT_TEST", "COLUMNS"}
 _FOLLOW = Path(__file__).with_name("follow.py")
 
 _Place = tuple[str, float | None, str, frozenset[tuple[str, str]]]
+
+
+def _loaded(engine: str) -> str:
+    return "hostile" if engine in ENTRY_POINTS else engine
 
 
 def _follow(worker: Worker) -> None:
@@ -50,11 +56,12 @@ class WarmWorkers:
 
         def warm(workers: Workers, engine: str) -> Worker:
             environment = frozenset(item for item in os.environ.items() if item[0] not in _PASSING)
-            place = (engine, workers._memory, os.getcwd() if "@" in engine else "", environment)
-            found = None if engine in dict(workers._idle) else self._take(place)
+            place = (_loaded(engine), workers._memory, os.getcwd() if "@" in engine else "", environment)
+            idle = next((name for name, _ in workers._idle if _loaded(name) == place[0]), None)
+            found = self._take(place) if idle is None else None
             if found and "@" not in engine:
                 _follow(found)
-            worker = found or take(workers, engine)
+            worker = found or take(workers, idle or engine)
             self._began.setdefault(worker, place)
             return worker
 
@@ -78,7 +85,7 @@ class WarmWorkers:
 
     def _keep(self, engine: str, worker: Worker) -> None:
         place = self._began.get(worker)
-        if place is None or place[0] != engine or worker._ended():
+        if place is None or place[0] != _loaded(engine) or worker._ended():
             worker.close()
             return
         with self._lock:
