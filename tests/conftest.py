@@ -7,6 +7,7 @@ import os
 import signal
 import sys
 from collections.abc import Callable, Iterator, Mapping
+from contextlib import nullcontext
 from functools import cache
 from pathlib import Path
 from typing import Any
@@ -102,22 +103,19 @@ def scene(request: pytest.FixtureRequest) -> Scene:
     return load_scene(name, **parameters)
 
 
-@pytest.fixture(scope="session")
-def warm_workers() -> Iterator[WarmWorkers]:
-    """The worker processes of this pytest process."""
-    workers = WarmWorkers()
-    yield workers
-    workers.close()
+_WARM_WORKERS = WarmWorkers()
 
 
-@pytest.fixture(autouse=True)
-def share_workers(request: pytest.FixtureRequest, warm_workers: WarmWorkers) -> Iterator[None]:
-    """Tests share worker processes, unless they are about these."""
-    if request.node.get_closest_marker("own_workers"):
-        yield
-    else:
-        with warm_workers.lent():
-            yield
+@pytest.hookimpl(wrapper=True)
+def pytest_runtest_protocol(item: pytest.Item) -> Iterator[None]:
+    """Tests and the fixtures that they are the first to need share worker processes, unless they are about these."""
+    with nullcontext() if item.get_closest_marker("own_workers") else _WARM_WORKERS.lent():
+        return (yield)
+
+
+def pytest_unconfigure() -> None:
+    """Ends them."""
+    _WARM_WORKERS.close()
 
 
 @pytest.fixture(autouse=True)

@@ -255,8 +255,8 @@ class Commands(Oracle):
         raise Diverged("\x1b]0;owned\x07\x9b2J it stopped")
 
 
-# Entry points of all of them, and of two that are wrong without harm, so that tests of either share worker processes;
-# "absent" needs a module that nobody has.
+# Entry points of all of them, and of some that do no harm, so that tests of either share worker processes; "absent"
+# needs a module that nobody has.
 ENTRY_POINTS = {
     kind.name: f"hostile:{kind.__name__}"
     for kind in (
@@ -280,6 +280,7 @@ ENTRY_POINTS = {
 } | {
     "broken": "broken:Broken",
     "laddered": "laddered:Laddered",
+    "tiny": "tiny:Tiny",
     "absent": "no_such_module_anywhere:Engine",
     "misspelt": "hostile:NoSuchClass",
 }

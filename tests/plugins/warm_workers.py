@@ -1,9 +1,9 @@
 """Worker processes that all tests of a pytest process share: to start one costs more than most of what it is asked.
 
 A worker is lent again where everything is as it was when it started: the engine that it has loaded, the memory that it
-may have, and the environment; to the folder of a test it goes by itself. The engines of ``hostile.py`` load no library
-that another of them does not, so one worker serves them all until one of them ends it. Tests of the processes themselves
-are marked ``own_workers`` and share none.
+may have, and the environment; to the folder of a test it goes by itself. Engines of ``ENTRY_POINTS`` load no library
+that another of them does not, so one worker serves them all until one of them ends it. Tests of the processes
+themselves are marked ``own_workers`` and share none.
 """
 
 from __future__ import annotations

@@ -8,6 +8,7 @@ from pathlib import Path
 from typing import Any
 
 import pytest
+from hostile import ENTRY_POINTS
 
 from proofroll.core.engine_abilities import Level
 from proofroll.core.errors import InputError
@@ -22,13 +23,12 @@ from proofroll.running.store import Store
 from proofroll.studies.ladder import Ladder
 
 UNTIL = 0.2
-INSTALLED = {"laddered": "laddered:Laddered", "tiny": "tiny:Tiny", "absent": "no_such_module_anywhere:Engine"}
 
 
 @pytest.fixture
 def climb(tmp_path: Path, install_engines: Callable[[Mapping[str, str]], None]) -> Callable[..., LadderContent]:
     """Studies the engines of ``tests/plugins``; results go to ``tmp_path``."""
-    install_engines(INSTALLED)
+    install_engines(ENTRY_POINTS)
 
     def run(parameters: Mapping[str, float] = {}, **options: Any) -> LadderContent:
         runner = Runner(Store(tmp_path), jobs=1)
