@@ -62,6 +62,21 @@ class Visit:
         return self.page.evaluate("([which, patience]) => reading.undrawn(which, patience)", [which, 1000 * patience])
 
 
+@dataclass
+class Drawn:
+    """A page in which everything was unfolded and every figure was drawn, once for all tests.
+
+    Attributes:
+        seen: the page.
+        at_first: how many pictures its last figure had before.
+        empty: captions of figures that stayed empty.
+    """
+
+    seen: Visit
+    at_first: int
+    empty: list[str]
+
+
 @contextmanager
 def launched() -> Iterator[Any]:
     """Headless Chromium of the system; the test is skipped where there is none."""

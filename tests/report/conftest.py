@@ -15,7 +15,7 @@ from typing import Any
 
 import numpy as np
 import pytest
-from browsing import Visit, launched, visiting
+from browsing import Drawn, Visit, launched, visiting
 from invented import figures_part, further, regimes_part
 
 from proofroll.core.comparison import Band, Comparison, Row, Tolerance
@@ -233,3 +233,12 @@ def visit() -> Iterator[Callable[..., AbstractContextManager[Visit]]]:
     """Opens a file in a browser, as a context; one browser serves all tests of a process."""
     with launched() as browser:
         yield partial(visiting, browser)
+
+
+@pytest.fixture(scope="session")
+def drawn_page(report_page: Path, visit: Callable[..., AbstractContextManager[Visit]]) -> Iterator[Drawn]:
+    """The page that has every part of a report, as a reader has it at its end."""
+    with visit(report_page) as seen:
+        at_first = seen.page.locator("figure[data-o]").last.locator("svg").count()
+        seen.unfold()
+        yield Drawn(seen, at_first, seen.draw())

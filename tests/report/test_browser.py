@@ -5,10 +5,9 @@ from __future__ import annotations
 from collections.abc import Callable
 from contextlib import AbstractContextManager
 from pathlib import Path
-from typing import Any
 
 import pytest
-from browsing import UNDRAWN, Visit
+from browsing import UNDRAWN, Drawn, Visit
 
 Visiting = Callable[..., AbstractContextManager[Visit]]
 
@@ -27,7 +26,7 @@ def test_requests_and_errors_would_be_seen(tmp_path: Path, visit: Visiting) -> N
 
 def test_every_section_says_something(report_page: Path, visit: Visiting) -> None:
     """No section is a bare heading; one that is emptied is found."""
-    with visit(report_page) as seen:
+    with visit(report_page, before=UNDRAWN) as seen:
         seen.unfold()
         ids = seen.page.evaluate("[...document.querySelectorAll('section[id]')].map((section) => section.id)")
         assert {"verdicts", "findings", "c0"} <= set(ids)
@@ -50,22 +49,22 @@ def test_a_table_with_rows_below_says_so(report_page: Path, visit: Visiting) -> 
         assert table.evaluate(says) == "none"
 
 
-def test_figures_are_drawn_when_they_come_into_view(report_page: Path, visit: Visiting) -> None:
+def test_figures_are_drawn_when_they_come_into_view(report_page: Path, drawn_page: Drawn) -> None:
     """None far below before, each after a reader has scrolled to it, one that is not there is missed.
 
     Read to its end like that, the page has made one request, its own, and the console is silent.
     """
-    with visit(report_page) as seen:
-        figures = seen.page.locator("figure[data-o]")
-        assert figures.last.locator("svg").count() == 0, "not before it is needed"
-        seen.unfold()
-        assert figures.count() == 12, "six quantities at two points"
-        assert seen.draw() == []
-        assert seen.page.locator("figure[data-o] .main-svg").count() >= figures.count()
-        assert seen.requested == [report_page.as_uri()]
-        assert seen.messages == []
-        seen.page.evaluate("document.querySelector('main').insertAdjacentHTML('beforeend', '<figure>none</figure>')")
-        assert seen.draw(patience=0.1) == ["none"]
+    seen = drawn_page.seen
+    figures = seen.page.locator("figure[data-o]")
+    assert drawn_page.at_first == 0, "not before it is needed"
+    assert figures.count() == 12, "six quantities at two points"
+    assert drawn_page.empty == []
+    assert seen.page.locator("figure[data-o] .main-svg").count() >= figures.count()
+    assert seen.requested == [report_page.as_uri()]
+    assert seen.messages == []
+    seen.page.evaluate("document.querySelector('main').insertAdjacentHTML('beforeend', '<figure>none</figure>')")
+    assert seen.draw(patience=0.1) == ["none"]
+    seen.page.evaluate("document.querySelector('main').lastElementChild.remove()")
 
 
 def test_links_lead_to_evidence_that_opens(report_page: Path, visit: Visiting) -> None:
@@ -88,19 +87,18 @@ def test_an_address_with_a_fragment_opens_its_evidence(report_page: Path, visit:
 
 
 @pytest.fixture(scope="module")
-def drawn(report_page: Path, visit: Visiting) -> Any:
-    """The page with the figures of its first point drawn, and where the middle of the first figure's truth is."""
-    with visit(report_page) as seen:
-        assert seen.draw() == []
-        seen.page.locator("figure[data-o]").first.scroll_into_view_if_needed()
-        seen.page.evaluate(
-            """() => {
-              window.drawn = [...document.querySelectorAll('figure[data-p="0"] .canvas')];
-              window.told = 0;
-              drawn.forEach((element) => element.on("plotly_relayout", () => ++told));
-            }"""
-        )
-        yield seen
+def drawn(drawn_page: Drawn) -> Visit:
+    """The page, in which ``drawn`` are the figures of its first point and ``told`` counts the zooms told to these."""
+    seen = drawn_page.seen
+    seen.page.locator("figure[data-o]").first.scroll_into_view_if_needed()
+    seen.page.evaluate(
+        """() => {
+          window.drawn = [...document.querySelectorAll('figure[data-p="0"] .canvas')];
+          window.told = 0;
+          drawn.forEach((element) => element.on("plotly_relayout", () => ++told));
+        }"""
+    )
+    return seen
 
 
 def place(seen: Visit, share: float, figure: int = 0) -> tuple[float, float]:

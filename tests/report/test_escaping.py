@@ -4,20 +4,19 @@ from __future__ import annotations
 
 import dataclasses
 import html
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
 from contextlib import AbstractContextManager
 from pathlib import Path
 from typing import Any
 
 import pytest
-from browsing import Visit
+from browsing import Drawn, Visit
 from poison import Poison
 
 from proofroll.report.labels import symbol
 
 Visiting = Callable[..., AbstractContextManager[Visit]]
 
-FIRST = "figure[data-o='0'][data-p='0']"
 PHONE = {"viewport": {"width": 390, "height": 844}, "is_mobile": True, "has_touch": True}
 # What became of poison: whose ran, elements made of it, scripts, and attributes that would run.
 HARM = """() => {
@@ -52,32 +51,37 @@ def poisoned_page(everything: Any, poison: Poison, tmp_path_factory: pytest.Temp
     return bad.write(tmp_path_factory.mktemp("poisoned") / "report.html")
 
 
-def test_nothing_that_others_write_runs(report_page: Path, poisoned_page: Path, visit: Visiting) -> None:
+@pytest.fixture(scope="module")
+def poisoned(poisoned_page: Path, visit: Visiting) -> Iterator[Visit]:
+    """That page, unfolded and drawn."""
+    with visit(poisoned_page) as seen:
+        seen.unfold()
+        assert seen.draw() == []
+        yield seen
+
+
+def test_nothing_that_others_write_runs(drawn_page: Drawn, poisoned_page: Path, poisoned: Visit) -> None:
     """Read to its end, unfolded, drawn, pointed at and clicked through: no script, element or handler of theirs.
 
     The label at the pointer, which plotly writes with markup of its own, shows the poison as text.
     """
-    with visit(report_page) as clean:
-        assert clean.draw(FIRST) == []
-        scripts = clean.page.evaluate(HARM)[2]
-    with visit(poisoned_page) as seen:
-        seen.unfold()
-        assert seen.draw() == []
-        for number in range(3):
-            seen.page.locator(".legend button").nth(number).click()
-        seen.page.evaluate(
-            """() => {
-              const element = document.querySelector("figure[data-o] .canvas");
-              Plotly.Fx.hover(element, [{ curveNumber: 1, pointNumber: 9 }]);
-            }"""
-        )
-        label = seen.page.locator("figure[data-o] .hovertext").first
-        assert "</script></style></title></textarea><script>(window.poisoned" in label.text_content()
-        assert "&amp;&lt;%{y}{{7*7}}" in label.text_content()
-        assert seen.page.evaluate(HARM) == [[], 0, scripts, 0]
-        assert seen.requested == [poisoned_page.as_uri()]
-        spoilt = "> attribute "  # numbers of a drawing that poison made none of: left out by the browser, which says so
-        assert [message for message in seen.messages if spoilt not in message] == []
+    page = poisoned.page
+    scripts = drawn_page.seen.page.evaluate(HARM)[2]
+    for number in range(3):
+        page.locator(".legend button").nth(number).click()
+    page.evaluate(
+        """() => {
+          const element = document.querySelector("figure[data-o] .canvas");
+          Plotly.Fx.hover(element, [{ curveNumber: 1, pointNumber: 9 }]);
+        }"""
+    )
+    label = page.locator("figure[data-o] .hovertext").first
+    assert "</script></style></title></textarea><script>(window.poisoned" in label.text_content()
+    assert "&amp;&lt;%{y}{{7*7}}" in label.text_content()
+    assert page.evaluate(HARM) == [[], 0, scripts, 0]
+    assert poisoned.requested == [poisoned_page.as_uri()]
+    spoilt = "> attribute "  # numbers of a drawing that poison made none of: left out by the browser, which says so
+    assert [message for message in poisoned.messages if spoilt not in message] == []
 
 
 def test_poison_would_be_felt(poisoned_page: Path, poison: Poison, tmp_path: Path, visit: Visiting) -> None:
@@ -97,14 +101,10 @@ def test_poison_would_be_felt(poisoned_page: Path, poison: Poison, tmp_path: Pat
 
 
 def test_everything_that_others_write_is_shown_as_it_is_written(
-    report_page: Path, poisoned_page: Path, poison: Poison, visit: Visiting
+    drawn_page: Drawn, poisoned: Visit, poison: Poison
 ) -> None:
     """Each string that the page shows is shown with its poison, letter by letter; none is dropped or read as markup."""
-    texts = []
-    for file in (report_page, poisoned_page):
-        with visit(file) as seen:
-            texts.append(" ".join(seen.page.evaluate(TEXT).split()))
-    clean, bad = texts
+    clean, bad = (" ".join(seen.page.evaluate(TEXT).split()) for seen in (drawn_page.seen, poisoned))
     # Shown instead of a name, where the page does not know the quantity: it has the poison of that name.
     instead = {symbol(name) for name in poison.doses if symbol(name) != name}
     found = [text for text in poison.said - instead if len(text) > 9 and text in clean]

@@ -124,16 +124,3 @@ def test_colours_follow_the_screen_while_it_is_open_and_paper_is_white(seen: Vis
     assert seen.page.evaluate(INK) == light[0]
     seen.page.evaluate("dispatchEvent(new Event('afterprint'))")
     assert seen.page.evaluate(INK) == dark
-
-
-def test_what_was_never_looked_at_is_drawn_for_paper_once_the_parts_are_here(
-    limits_page: Path, visit: Visiting
-) -> None:
-    """A figure far below the screen has no picture until the page is printed."""
-    with visit(limits_page, viewport={"width": 900, "height": 300}) as seen:
-        seen.page.locator(".plots figure").first.scroll_into_view_if_needed()
-        seen.wait("document.querySelector('.plots .canvas').data !== undefined")
-        drawn = "[...document.querySelectorAll('figure[data-p=\"0\"] .canvas')].filter((e) => e.data).length"
-        assert seen.page.evaluate(drawn) < 6
-        seen.page.evaluate("dispatchEvent(new Event('beforeprint'))")
-        assert seen.page.evaluate(drawn) == 6

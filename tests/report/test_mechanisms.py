@@ -35,6 +35,14 @@ def compared(tmp_path_factory: pytest.TempPathFactory) -> tuple[Outcome, Store, 
     return outcome, store, folder
 
 
+@pytest.fixture(scope="module")
+def report(compared: tuple[Outcome, Store, Path]) -> Path:
+    """The folder of its report."""
+    outcome, store, folder = compared
+    write_report([outcome], store, folder, "proofroll report slider_crank")
+    return folder
+
+
 @pytest.mark.slow
 def test_only_single_curves_are_drawn(compared: tuple[Outcome, Store, Path]) -> None:
     """Coordinates of points and joints and determinate reactions have curves; an array of many components has none."""
@@ -51,12 +59,10 @@ def test_only_single_curves_are_drawn(compared: tuple[Outcome, Store, Path]) -> 
 
 
 @pytest.mark.slow
-def test_the_page_shows_the_mechanism(compared: tuple[Outcome, Store, Path]) -> None:
+def test_the_page_shows_the_mechanism(report: Path) -> None:
     """The scene's drawing is on the page with its own caption, and nothing speaks of balls."""
-    outcome, store, folder = compared
-    write_report([outcome], store, folder, "proofroll report slider_crank")
-    content = json.loads((folder / "report.json").read_text())
-    page = (folder / "report.html").read_text()
+    content = json.loads((report / "report.json").read_text())
+    page = (report / "report.html").read_text()
     (sheet,) = (item["sheet"] for item in content["comparisons"])
     assert sheet["undrawn"] == ""
     assert f'aria-label="{sheet["title"]}, at the start"' in page
@@ -69,12 +75,11 @@ def test_the_page_shows_the_mechanism(compared: tuple[Outcome, Store, Path]) -> 
 
 @pytest.mark.slow
 def test_a_mechanism_is_replayed(
-    compared: tuple[Outcome, Store, Path], visit: Callable[..., AbstractContextManager[Visit]]
+    compared: tuple[Outcome, Store, Path], report: Path, visit: Callable[..., AbstractContextManager[Visit]]
 ) -> None:
     """In a browser the picture moves with the time, and the values beside it are those of the stored truth."""
-    outcome, store, folder = compared
-    write_report([outcome], store, folder, "proofroll report slider_crank")
-    with visit(folder / "report.html") as opened:
+    outcome, store, _ = compared
+    with visit(report / "report.html") as opened:
         opened.page.evaluate("document.querySelector('.replay').scrollIntoView()")
         opened.page.wait_for_selector(".replay[data-ready]")
         canvas, line = (opened.page.locator(f'.replay [data-part="{name}"]') for name in ("canvas", "time"))

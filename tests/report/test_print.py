@@ -10,7 +10,7 @@ from contextlib import AbstractContextManager
 from pathlib import Path
 
 import pytest
-from browsing import Visit
+from browsing import UNDRAWN, Visit
 from pypdf import PdfReader
 
 Visiting = Callable[..., AbstractContextManager[Visit]]
@@ -30,35 +30,48 @@ WIDEN = """(more) => {
 }"""
 
 
+FIRST_POINT = "[...document.querySelectorAll('figure[data-p=\"0\"] .canvas')].filter((e) => e.data).length"
 COLOURS = """() => [getComputedStyle(document.body).backgroundColor,
   getComputedStyle(document.querySelector("figure[data-o] .xtick text")).fill]"""
 
 
 @pytest.fixture(scope="module")
-def on_paper(report_page: Path, visit: Visiting) -> tuple[PdfReader, list[list[str]]]:
-    """The page as a PDF, printed in the dark, and its colours before, on paper and afterwards."""
-    with visit(report_page, color_scheme="dark") as seen:
+def on_paper(report_page: Path, visit: Visiting) -> tuple[PdfReader, list[list[str]], list[int]]:
+    """The page as a PDF, printed in the dark; its colours before, on paper and afterwards; figures before and on it."""
+    with visit(report_page, color_scheme="dark", viewport={"width": 900, "height": 300}) as seen:
         assert seen.draw("figure[data-o='0'][data-p='0']") == []
         colours = [seen.page.evaluate(COLOURS)]
-        seen.page.evaluate(f"addEventListener('beforeprint', () => {{ window.onPaper = ({COLOURS})(); }})")
+        figures = [seen.page.evaluate(FIRST_POINT)]
+        noted = f"window.onPaper = ({COLOURS})(); window.figures = {FIRST_POINT};"
+        seen.page.evaluate(f"addEventListener('beforeprint', () => {{ {noted} }})")
         content = seen.page.pdf(
             format="A4", prefer_css_page_size=True, print_background=True, tagged=True, outline=True
         )
         assert seen.messages == []
         colours += [seen.page.evaluate("onPaper"), seen.page.evaluate(COLOURS)]
-    return PdfReader(io.BytesIO(content)), colours
+        figures += [seen.page.evaluate("figures")]
+    return PdfReader(io.BytesIO(content)), colours, figures
 
 
 @pytest.fixture(scope="module")
-def printed(on_paper: tuple[PdfReader, list[list[str]]]) -> PdfReader:
+def printed(on_paper: tuple[PdfReader, list[list[str]], list[int]]) -> PdfReader:
     """The page as a PDF."""
     return on_paper[0]
 
 
 def test_nothing_is_cut_off_at_the_edge_of_the_paper(report_page: Path, visit: Visiting) -> None:
-    """Every table is as wide as it is and no wider than the paper; a table too wide would be found."""
-    with visit(report_page, viewport=PAPER) as seen:
+    """Every table is as wide as it is and no wider than the paper; a table too wide would be found.
+
+    Verdicts of every point are there, folded or not; contents and buttons are not.
+    """
+    with visit(report_page, viewport=PAPER, before=UNDRAWN) as seen:
+        matrices = seen.page.locator(".matrix")
+        assert not matrices.nth(2).is_visible(), "folded on the screen"
         seen.page.emulate_media(media="print")
+        assert matrices.count() == 3
+        assert all(matrices.nth(number).is_visible() for number in range(3))
+        for control in ("nav", ".skip", "button[data-all]"):
+            assert not seen.page.locator(control).first.is_visible()
         assert seen.page.evaluate(WIDEN, 4) == 11
         assert seen.page.evaluate("reading.cut()") == [[], []]
         seen.page.add_style_tag(
@@ -67,18 +80,6 @@ def test_nothing_is_cut_off_at_the_edge_of_the_paper(report_page: Path, visit: V
         wide, hidden = seen.page.evaluate("reading.cut()")
         assert any("matrix" in name for name in wide)
         assert any(name.startswith("H1") for name in hidden)
-
-
-def test_paper_has_the_tables_and_nothing_to_click(report_page: Path, visit: Visiting) -> None:
-    """Verdicts of every point are there, folded or not; contents and buttons are not."""
-    with visit(report_page) as seen:
-        matrices = seen.page.locator(".matrix")
-        assert not matrices.nth(2).is_visible(), "folded on the screen"
-        seen.page.emulate_media(media="print")
-        assert matrices.count() == 3
-        assert all(matrices.nth(number).is_visible() for number in range(3))
-        for control in ("nav", ".skip", "button[data-all]"):
-            assert not seen.page.locator(control).first.is_visible()
 
 
 def test_pdf_holds_the_verdicts_and_is_short(printed: PdfReader) -> None:
@@ -102,7 +103,13 @@ def test_pdf_has_bookmarks_and_a_title(printed: PdfReader) -> None:
     assert printed.metadata.title == "proofroll: which engine can be trusted"
 
 
-def test_paper_is_white_in_the_dark(on_paper: tuple[PdfReader, list[list[str]]]) -> None:
+def test_what_was_never_looked_at_is_drawn_for_paper(on_paper: tuple[PdfReader, list[list[str]], list[int]]) -> None:
+    """A figure far below the screen has no picture until the page is printed, once its parts are here."""
+    before, printed = on_paper[2]
+    assert before < printed == 6
+
+
+def test_paper_is_white_in_the_dark(on_paper: tuple[PdfReader, list[list[str]], list[int]]) -> None:
     """Who reads on a dark screen prints dark on white, the figures too, and then has their dark screen back."""
     before, (ground, ink), after = on_paper[1]
     assert ground == "rgb(255, 255, 255)"
