@@ -89,25 +89,23 @@ def test_page_escapes(proofroll: Proofroll, tmp_path: Path) -> None:
     assert "//" not in page
 
 
-@pytest.mark.parametrize(
-    ("reader", "status", "said"),
-    [
-        ("Crashing", "crashed", "SIGABRT"),
-        ("Raising", "refused", "RuntimeError: cannot <b>read</b> [bold]this[/bold]"),
-        ("Broken", "crashed", "the reader of bad failed"),
-    ],
-)
-def test_bad_readers(
-    proofroll: Proofroll, install_readers: Install, arm: Path, reader: str, status: str, said: str
-) -> None:
+BAD_READERS = {
+    "Crashing": ("crashed", "SIGABRT"),
+    "Raising": ("refused", "RuntimeError: cannot <b>read</b> [bold]this[/bold]"),
+    "Broken": ("crashed", "the reader of broken failed"),
+}
+
+
+def test_bad_readers(proofroll: Proofroll, install_readers: Install, arm: Path) -> None:
     """An importer that crashes, raises or is mistaken is a row beside the others."""
-    install_readers({"bad": reader})
-    arguments = ("check", str(arm), "--engine", "bad", "--engine", "pinocchio", "--states", "2")
-    code, out, _ = proofroll(*arguments, "--json")
-    bad, good = json.loads(out)["engines"]
+    install_readers({name.lower(): name for name in BAD_READERS})
+    asked = [word for name in (*BAD_READERS, "pinocchio") for word in ("--engine", name.lower())]
+    code, out, _ = proofroll("check", str(arm), *asked, "--states", "2", "--json")
+    *rows, good = json.loads(out)["engines"]
     assert code == 1
-    assert bad["status"] == status
-    assert said in bad["refused"]
+    for row, (status, said) in zip(rows, BAD_READERS.values(), strict=True):
+        assert row["status"] == status
+        assert said in row["refused"]
     assert good["status"] == "holds"
 
 

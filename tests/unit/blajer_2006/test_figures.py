@@ -44,7 +44,7 @@ def only(whole: Figures, *runs: str, **changes: Any) -> Figures:
 @pytest.fixture(scope="module")
 def runner(tmp_path_factory: pytest.TempPathFactory) -> Runner:
     """A store of this module's own."""
-    return Runner(Store(tmp_path_factory.mktemp("cases")), jobs=2)
+    return Runner(Store(tmp_path_factory.mktemp("cases")), jobs=1)
 
 
 @pytest.fixture(scope="module")
