@@ -27,7 +27,7 @@ def mujoco_steps(scene: Scene, settings: Any) -> Bare:
 
     from proofroll.engines.mujoco.mechanism import MujocoMechanism
 
-    model, data = MujocoMechanism.build(scene, settings).native
+    model, data = MujocoMechanism(scene, settings).native
     model.opt.disableflags |= int(mujoco.mjtDisableBit.mjDSBL_SENSOR)
     bodies = [model.body(body.name).id for body in mechanism_of(scene).bodies]
     bad = mujoco.mjtWarning.mjWARN_BADQACC

@@ -12,9 +12,9 @@ import numpy as np
 from proofroll.core.arrays import FloatArray
 from proofroll.core.engine import Built, Sample
 from proofroll.elements.ball_on_surface.model import BallCapability, RollingBall
+from proofroll.engines.exudyn.friction import slow
 from proofroll.engines.exudyn.local_frame import curvature
 from proofroll.engines.exudyn.native import Output, add_rigid_body, items, loads, rigid_body
-from proofroll.engines.exudyn.resistance import slow
 
 
 @dataclass(frozen=True)

@@ -1,4 +1,4 @@
-"""Coulomb friction of a ball in the wall's local frame: what it needs to roll, and where it points while slipping.
+"""Rolling resistance and Coulomb friction in the wall's local frame: what a ball needs to roll, and what it slips with.
 
 Two components along e2 and e3 everywhere. While the ball slips, the force is -μk N d with a unit direction d that is
 held over one step, so that Newton's method never meets the kink of the law at rest.
@@ -11,15 +11,19 @@ from collections.abc import Callable
 from dataclasses import dataclass
 from typing import NamedTuple
 
+import numpy as np
+
 from proofroll.elements.ball_on_surface.model import RollingBall
 from proofroll.engines.exudyn.local_frame import curvature
-from proofroll.engines.exudyn.resistance import resistance_moment, slow
 
 # A slip that the needed friction would change within this part of a step is the round-off of a rolling constraint.
 AT_REST = 1e-6
 ROUND_OFF = 1e-12  # of a slip velocity [m/s]
 # Cosine below which a predicted direction is no longer that of a slip which goes on.
 ACROSS = 0.1
+# Part of the speed of a fall by the radius below which the moment falls to zero with the speed: Newton's method does
+# not pass the jump of its direction at rest. A ball that stops from that speed goes the square of it, 4e-6, too far.
+_SLOW = 2e-3
 
 
 class Touch(NamedTuple):
@@ -70,6 +74,24 @@ class KineticFriction:
 
 # (velocity of the centre along e2 and e3, spin about e1, gravity along e1, e2, e3) -> N, need2, need3 of Touch
 NeededAt = Callable[[float, float, float, float, float, float], tuple[float, float, float]]
+
+
+def slow(body: RollingBall) -> float:
+    """Speed of the centre [m/s] below which the rolling resistance grows with it."""
+    return _SLOW * math.sqrt(body.ball.radius * float(np.linalg.norm(body.gravity)))
+
+
+def resistance_moment(f: float, N: float, v2: float, v3: float, slow: float) -> tuple[float, float]:
+    """Moment about the centre along e2 and e3 [N m]: that of -N e1 shifted by ``f`` [m] along the velocity [m/s].
+
+    :func:`mechanics.resistance_moment` in the local frame and as plain floats: it runs for every residual. For ``slow``
+    see there.
+    """
+    speed = max(math.hypot(v2, v3), slow)
+    if not speed:
+        return 0.0, 0.0
+    factor = f * N / speed
+    return -factor * v3, factor * v2
 
 
 def mobility(body: RollingBall) -> float:

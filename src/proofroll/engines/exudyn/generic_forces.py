@@ -10,9 +10,8 @@ import numpy as np
 from proofroll.core.arrays import FloatArray
 from proofroll.core.errors import Refused
 from proofroll.elements.ball_on_surface.model import RollingBall
-from proofroll.engines.exudyn.friction import KineticFriction
+from proofroll.engines.exudyn.friction import KineticFriction, resistance_moment, slow
 from proofroll.engines.exudyn.local_frame import LocalGeometry
-from proofroll.engines.exudyn.resistance import resistance_moment, slow
 
 # The distance towards the wall, its two coordinates, and three whose rates are the spin.
 SIZE = 6

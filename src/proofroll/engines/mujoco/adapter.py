@@ -118,7 +118,7 @@ class Mujoco(SteppedModel):
     def build(cls, scene: Scene, settings: MujocoSettings) -> Self | MujocoMechanism:
         """See :class:`proofroll.core.engine.Engine`; what ``joints`` builds is a run of a mechanism."""
         if settings.formulation == "joints":
-            return MujocoMechanism.build(scene, settings)
+            return MujocoMechanism(scene, settings)
         return cls._build_ball(scene, settings)
 
     @classmethod
@@ -137,7 +137,7 @@ class Mujoco(SteppedModel):
     def model_file(cls, scene: Scene, settings: MujocoSettings) -> str:
         """MJCF, whose keyframe ``start`` is time 0; see :class:`proofroll.core.engine_abilities.WritesModels`."""
         if settings.formulation == "joints":
-            return MujocoMechanism.model_file(scene, settings)
+            return MujocoMechanism(scene, settings).model_file()
         engine, spec = cls._build_ball(scene, settings), _spec(scene, rolling_ball(scene), settings)
         for key in list(spec.keys):
             spec.delete(key)
@@ -155,7 +155,7 @@ class Mujoco(SteppedModel):
         if settings.formulation == "joints":
             from proofroll.engines.mujoco.reproducer import mechanism
 
-            return mechanism.source(MujocoMechanism.model_file(scene, settings), mechanism_of(scene))
+            return mechanism.source(MujocoMechanism(scene, settings).model_file(), mechanism_of(scene))
         built, spec = cls._build_ball(scene, settings), _spec(scene, rolling_ball(scene), settings)
         compiled(spec)
         return source(spec.to_xml(), built._model, built._data, built._body, settings)

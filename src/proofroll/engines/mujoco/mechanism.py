@@ -11,7 +11,7 @@ import numpy as np
 from proofroll.core.arrays import cross
 from proofroll.core.engine import Sample
 from proofroll.core.errors import InputError, Refused
-from proofroll.elements.mechanism import Joint, Mechanism
+from proofroll.elements.mechanism import Joint
 from proofroll.elements.mechanism.capabilities import ALL_JOINTS, FORCES, MechanismCapability, require
 from proofroll.elements.mechanism.joint_motion import placed
 from proofroll.elements.mechanism.rotations import Array, to_quaternion
@@ -40,7 +40,9 @@ LACKING: Mapping[str, str] = {
 class MujocoMechanism(SteppedModel):
     """See :class:`proofroll.core.engine.Engine` for the methods."""
 
-    def __init__(self, mechanism: Mechanism, settings: MujocoSettings) -> None:
+    def __init__(self, scene: Any, settings: MujocoSettings) -> None:
+        check(settings)
+        mechanism = mechanism_of(scene)
         require(mechanism, PROVIDES, LACKING)
         forget_callbacks()
         super().__init__(compiled(mechanism_model.write(mechanism, settings)), settings)
@@ -54,25 +56,17 @@ class MujocoMechanism(SteppedModel):
         with silent():
             mujoco.mj_forward(self._model, self._data)
 
-    @classmethod
-    def build(cls, scene: Any, settings: MujocoSettings) -> MujocoMechanism:
-        """See :class:`proofroll.core.engine.Engine`; ``scene`` may be a mechanism."""
-        check(settings)
-        return cls(mechanism_of(scene), settings)
-
-    @classmethod
-    def model_file(cls, scene: Any, settings: MujocoSettings) -> str:
+    def model_file(self) -> str:
         """MJCF, whose keyframe ``start`` is time 0.
 
         Raises:
             Refused: a joint has a constant drive, which is no part of a model but of its state.
         """
-        run, mechanism = cls.build(scene, settings), mechanism_of(scene)
-        driven = [joint.name for joint in mechanism.joints if joint.torque]
+        driven = [joint.name for joint in self._mechanism.joints if joint.torque]
         if driven:
             raise Refused(f"the constant drive of {driven[0]} is set from outside in every step, and in no MJCF")
-        spec = mechanism_model.write(mechanism, settings)
-        spec.add_key(name="start", qpos=run._data.qpos, qvel=run._data.qvel)
+        spec = mechanism_model.write(self._mechanism, self._settings)
+        spec.add_key(name="start", qpos=self._data.qpos, qvel=self._data.qvel)
         compiled(spec)
         return str(spec.to_xml())
 

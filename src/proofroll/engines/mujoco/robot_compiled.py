@@ -107,11 +107,11 @@ def _joint(
 
 def _mimics(model: Any) -> tuple[Mimic, ...]:
     """Linear couplings of joints; others are constraints that the comparison leaves out."""
-    found = []
+    found, coupling = [], int(mujoco.mjtEq.mjEQ_JOINT)
     for index in range(model.neq):
         first, other = int(model.eq_obj1id[index]), int(model.eq_obj2id[index])
         factors = model.eq_data[index][:5]
-        if int(model.eq_type[index]) == 2 and other >= 0 and model.eq_active0[index] and not np.any(factors[2:]):
+        if model.eq_type[index] == coupling and other >= 0 and model.eq_active0[index] and not np.any(factors[2:]):
             found.append(Mimic(model.joint(first).name, model.joint(other).name, float(factors[1]), float(factors[0])))
     return tuple(found)
 

@@ -12,6 +12,7 @@ from proofroll.elements.ball_on_surface.model import RollingBall
 from proofroll.elements.ball_on_surface.reproducer_source import assigned, ball_numbers, wall_source
 from proofroll.engines.exudyn.carrier import Carrier
 from proofroll.engines.exudyn.contact import SURELY, PenaltyContact
+from proofroll.engines.exudyn.friction import slow
 from proofroll.engines.exudyn.generic import Generic
 from proofroll.engines.exudyn.local_frame import curvature
 from proofroll.engines.exudyn.native import exu
@@ -28,10 +29,8 @@ from proofroll.engines.exudyn.reproducer.text import (
     RUN,
     SETTINGS,
 )
-from proofroll.engines.exudyn.resistance import slow
 from proofroll.engines.exudyn.rolling_disc import RollingDisc
 from proofroll.engines.exudyn.settings import ExudynSettings
-from proofroll.engines.exudyn.world_coordinates import WorldCoordinates
 
 
 def source(model: Any, body: RollingBall, settings: ExudynSettings) -> str:
@@ -45,8 +44,7 @@ def source(model: Any, body: RollingBall, settings: ExudynSettings) -> str:
     Raises:
         Refused: the scene has a term that the program has not.
     """
-    if isinstance(model, WorldCoordinates):
-        raise Refused("there is no program for generic on such a wall yet; rolling_disc has one")
+    wall = wall_source(body)
     if body.flies:
         raise Refused("there is no program with impacts yet")
     generic, resists = isinstance(model, Generic), body.contact.rolling_resistance > 0
@@ -72,7 +70,7 @@ def source(model: Any, body: RollingBall, settings: ExudynSettings) -> str:
         + assigned(**numbers)
         + "\n".join(lines)
         + "\n"
-        + wall_source(body)
+        + wall
         + "\nexu.config.printToConsole = False\nmbs = exu.SystemContainer().AddSystem()\n"
         + ("" if generic else BALL + (RESISTANCE if resists else ""))
         + parts[type(model)]
