@@ -49,11 +49,7 @@ _FINALISTS = 3
 
 
 def reference(rounds: int, progress: Callable[[str], None]) -> dict[str, Any]:
-    """Everything that is measured, ready for JSON.
-
-    Args:
-        rounds: measurements of each.
-        progress: called with a sentence about what is done next.
+    """Everything that is measured, ready for JSON; ``progress`` is told what is done next.
 
     Raises:
         Refused: heyoka is missing.

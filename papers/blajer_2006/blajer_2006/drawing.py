@@ -45,12 +45,7 @@ def looks() -> Iterator[None]:
 
 
 def picture(wanted: Figure, study: FigureRuns, form: str) -> bytes:
-    """A figure with panels as the content of a file.
-
-    Args:
-        wanted: the figure.
-        study: all runs.
-        form: one of :data:`FORMATS`.
+    """A figure with panels as the content of a file, in one of :data:`FORMATS`.
 
     Raises:
         InputError: some text of the figure is no mathematics that can be drawn.

@@ -6,8 +6,8 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
 
-from proofroll.report.labels import names, number, symbol, unit, unjudged, with_caveat
-from proofroll.report.scores import EVERYDAY, RowAdvice, Score, cheapest, recommendation, scores
+from proofroll.report.labels import names, number, off_by, unjudged, with_caveat
+from proofroll.report.scores import EVERYDAY, RowAdvice, Score, cheapest, closest, furthest_off, recommendation, scores
 
 if TYPE_CHECKING:
     from proofroll.report.comparison_records import ReportedComparison
@@ -29,8 +29,7 @@ def findings(content: ReportedComparison, truths: Sequence[Any], kind: type[Repo
     return Findings(
         _answer(content, found),
         [
-            # Who rests on the truth's own equations is close to it whatever they are.
-            _closest([score for score in found if not content.rows[score.index].shared]),
+            _closest(content),
             _obvious(content, found),
             *_order(content),
             *(kind.sentences(truths) if kind is not None else ()),
@@ -76,12 +75,11 @@ def _joined(parts: list[str]) -> str:
     return parts[0] if len(parts) == 1 else ", ".join(parts[:-1]) + " and " + parts[-1]
 
 
-def _closest(found: list[Score]) -> str:
+def _closest(content: ReportedComparison) -> str:
     """What agrees best."""
-    complete = [(score.worst, score) for score in found if score.worst is not None]
-    if not complete:
+    best = closest(content)
+    if best is None:
         return "No setting gave motion and forces in every case, so none can be called the closest to the truth."
-    best = min(complete, key=lambda pair: pair[0])[1]
     cost = "" if best.seconds is None else f", for {number(best.seconds)} s of computing per simulated second"
     return (
         f"Closest to the truth is {best.name}: its motion stays within {number(best.motion)} of each coordinate's "
@@ -114,19 +112,12 @@ def _obvious(content: ReportedComparison, found: list[Score]) -> str:
         return "What the obvious model costs cannot be said: no default setting stands beside another one." + failed
     factor, score, best = worst
     blamed = with_caveat(score.name, rows[score.index].caveat)
+    off = furthest_off(content, content.runs_of(score.index))
+    assert off is not None  # its motion was scored
     return (
-        f"The obvious model costs most with {blamed}: {_off(content, score.index)}, which relative to the range is "
+        f"The obvious model costs most with {blamed}: {off_by(off)}, which relative to the range is "
         f"{number(factor, 1)} times the error of {best.name}.{failed}"
     )
-
-
-def _off(content: ReportedComparison, index: int) -> str:
-    """A row's largest error of a coordinate, in its unit, where it can be judged."""
-    judged = [judgement for run in content.runs_of(index) for judgement in run.judgements]
-    motion = content.headlines("motion")
-    errors = [j for j in judged if j.observable in motion and j.verdict != "ill-posed"]
-    worst = max(errors, key=lambda judgement: judgement.error / judgement.scale)
-    return f"its {symbol(worst.observable)} is off by {number(worst.error)} {unit(worst.unit)}".rstrip()
 
 
 def _order(content: ReportedComparison) -> list[str]:

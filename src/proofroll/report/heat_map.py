@@ -65,12 +65,7 @@ class HeatMap:
 
 
 def table(study: StabilityStudy, prefix: str) -> HeatMap:
-    """The map and the list of its points.
-
-    Args:
-        study: of a scene.
-        prefix: of the points' ids.
-    """
+    """The map and the list of its points, whose ids begin with ``prefix``."""
     valued = {
         axis.name: list(dict.fromkeys(p.value for p in study.points if p.axis == axis.name)) for axis in study.axes
     }

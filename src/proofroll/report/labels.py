@@ -100,6 +100,11 @@ def symbol(name: str) -> str:
         return name.replace("_", " ")
 
 
+def off_by(judgement: Judgement) -> str:
+    """An error in its unit: ``its γ is off by 0.1 rad``."""
+    return f"its {symbol(judgement.observable)} is off by {number(judgement.error)} {unit(judgement.unit)}".rstrip()
+
+
 def step(row: Setting) -> str:
     """The setting that trades speed for accuracy, e.g. ``dt 1e-3``."""
     value = row.resolution_value
@@ -144,8 +149,8 @@ def caveat_lines(rows: Sequence[Setting]) -> list[str]:
 
 
 def settings_text(settings: dict[str, Any]) -> str:
-    """Complete settings in one line."""
-    return ", ".join(f"{key}={value}" for key, value in settings.items())
+    """Complete settings in one line, without those that are left to the engine."""
+    return ", ".join(f"{key}={value}" for key, value in settings.items() if value is not None)
 
 
 def values(found: list[float | None]) -> str:

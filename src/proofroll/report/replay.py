@@ -31,16 +31,11 @@ SMOOTH_TURN, WIDEST_TURN = 1.2, 2.5
 
 
 def replay_content(outcomes: list[Outcome], store: Store, kind: ReplayKind) -> Replay:
-    """Everything that the replay draws.
+    """Everything that the replay draws of comparisons, all of scenes of one kind.
 
     There is one case for each truth of the comparisons. Its ghosts are what the engines make of it with ``default``
     settings, and of each engine the other setting whose bodies are furthest from the true ones, if that is seen. At
     first, of each engine the ``default`` one is shown that is furthest off.
-
-    Args:
-        outcomes: comparisons of scenes of one kind.
-        store: with their trajectories.
-        kind: of these scenes.
     """
     found: dict[str, tuple[Case, list[tuple[Outcome, str]]]] = {}
     for outcome in outcomes:
@@ -93,10 +88,7 @@ def frame_times(until: float, fastest: float) -> FloatArray:
 def case_content(replayed: Replayed, kind: ReplayKind, named: Callable[[Path], str]) -> tuple[ReplayCase, str]:
     """A truth and its ghosts in words, with what is drawn of them; and the numbers, packed.
 
-    Args:
-        replayed: what is shown.
-        kind: how.
-        named: what the page calls a file.
+    ``named`` gives what the page calls a file.
     """
     own, frames, drawn = kind.draw(replayed)
     first = {ghost.engine: ghost for ghost in reversed(replayed.ghosts)}  # the one furthest off comes first

@@ -11,6 +11,7 @@ from proofroll.core.events import Event, events_of
 from proofroll.files.json_data import OPTIONAL
 from proofroll.files.netcdf import read
 from proofroll.files.scene_file import load_scene
+from proofroll.report.labels import settings_text
 from proofroll.running.case import Case, Result
 
 _EVENTS = 8  # of so many the terminal tells; the JSON document has all
@@ -94,7 +95,7 @@ def run_lines(content: RunContent) -> list[Any]:
     from rich.table import Table
     from rich.text import Text
 
-    settings = ", ".join(f"{key}={value}" for key, value in content.settings.items())
+    settings = settings_text(content.settings)
     lines: list[Any] = [Text(f"{content.scene} in {content.engine}" + (f" ({settings})" if settings else ""))]
     lines.append(Text(f"{content.status}: {content.message}"))
     lines += [Text(f"  {cause.sentence}") for cause in content.diagnosis]

@@ -53,11 +53,7 @@ def _is_number(item: xr.DataArray) -> bool:
 
 
 def draw_run(dataset: xr.Dataset, path: Path) -> None:
-    """Draws every curve of a run in a panel of its own, over one axis of time.
-
-    Args:
-        dataset: the run.
-        path: the file; its ending says which kind.
+    """Draws every curve of a run in a panel of its own, over one axis of time; the file's ending says which kind.
 
     Raises:
         Missing: what draws it is not installed.

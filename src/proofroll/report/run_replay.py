@@ -26,11 +26,7 @@ _WRITES = "proofroll run … --out writes such a file"
 
 
 def replay_page(path: Path, run: xr.Dataset) -> str:
-    """The page: the truth of the run's scene, solid, and the run, translucent.
-
-    Args:
-        path: of the run's file.
-        run: what it holds.
+    """The page of what a file holds: the truth of the run's scene, solid, and the run, translucent.
 
     Raises:
         InputError: it does not say of what it is a run, the scene is another by now, or nothing draws such scenes.
@@ -65,8 +61,7 @@ def _said(run: xr.Dataset) -> str:
     engine = str(run.attrs["engine"])
     if engine == "truth":
         return "The truth."
-    given = json.loads(run.attrs["settings"])
-    settings = settings_text({name: value for name, value in given.items() if value is not None})
+    settings = settings_text(json.loads(run.attrs["settings"]))
     return f"The truth, solid, and {engine} ({settings}), translucent; where it agrees it is hidden in the truth."
 
 

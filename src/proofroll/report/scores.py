@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING
 from proofroll.report.labels import names
 
 if TYPE_CHECKING:
+    from proofroll.core.verdict import Judgement
     from proofroll.report.comparison_records import ReportedComparison, ReportedRun
 
 DECADES = range(1, 14)
@@ -104,6 +105,20 @@ def cheapest(found: list[Score], key: str, bound: float) -> CheapestRow | None:
         if score.seconds is not None and (error := getattr(score, key)) is not None and error <= bound
     ]
     return min(good, key=lambda row: row.seconds_per_second, default=None)
+
+
+def closest(content: ReportedComparison) -> Score | None:
+    """The row nearest to the truth in motion and forces; without those that rest on the truth's own equations."""
+    found = [score for score in scores(content) if score.worst is not None and not content.rows[score.index].shared]
+    return min(found, key=lambda score: score.worst or 0.0, default=None)
+
+
+def furthest_off(content: ReportedComparison, runs: Sequence[ReportedRun]) -> Judgement | None:
+    """The largest error of a coordinate in parts of its scale, where it can be judged and is finite."""
+    motion = content.headlines("motion")
+    judged = (judgement for run in runs for judgement in run.judgements if judgement.observable in motion)
+    finite = [item for item in judged if item.verdict != "ill-posed" and math.isfinite(item.error)]
+    return max(finite, key=lambda item: item.error / item.scale, default=None)
 
 
 def _judged(content: ReportedComparison) -> list[str]:

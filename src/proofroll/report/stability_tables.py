@@ -20,12 +20,7 @@ if TYPE_CHECKING:
 
 
 def stability_parts(study: StabilityStudy, path: Path) -> Iterator[Table | str]:
-    """A map: its boundaries, the worst silent cases, and what else is to be known.
-
-    Args:
-        study: stored in ``path``, its drawing beside it.
-        path: see there.
-    """
+    """A map that is kept in ``path``: its boundaries, the worst silent cases, and what else is to be known."""
     yield from (headline(study), "", boundary_table(study), "")
     silent = list(silent_lines(study))
     if silent:

@@ -150,12 +150,7 @@ def all_parts(engines: Sequence[str], out: Path) -> list[Part]:
 
 
 def attempt(part: Part, action: Callable[[], PartEntry | None]) -> PartEntry | None:
-    """What an action on a part gives; whatever happens in it, a report goes on: the entry then says what.
-
-    Args:
-        part: the action is on.
-        action: gives the part's entry, or None.
-    """
+    """What an action on a part gives; whatever happens in it, a report goes on: the entry then says what."""
     try:
         return action()
     except ProofrollError as error:

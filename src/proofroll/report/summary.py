@@ -2,13 +2,12 @@
 
 from __future__ import annotations
 
-import math
 from collections import Counter
 from collections.abc import Mapping, Sequence
 from typing import TYPE_CHECKING, Any
 
-from proofroll.report.labels import name_of, names, number, symbol, unit, with_caveat
-from proofroll.report.scores import EVERYDAY, cheapest, scores
+from proofroll.report.labels import name_of, names, number, off_by, symbol, unit, with_caveat
+from proofroll.report.scores import EVERYDAY, cheapest, closest, furthest_off, scores
 from proofroll.report.tradeoff_tables import step_of
 
 if TYPE_CHECKING:
@@ -46,14 +45,10 @@ def _agrees(comparisons: Sequence[ReportedComparison]) -> str:
     parts = [f"{counts[verdict]} {words}" for verdict, words in rest.items() if counts[verdict]]
     if parts:
         said += f", {' and '.join(parts)}"
-    first_rows = comparisons[0].rows
-    # Who rests on the truth's own equations is close to it whatever they are.
-    others = [score for score in scores(comparisons[0]) if not first_rows[score.index].shared]
-    complete = [score for score in others if score.worst is not None]
-    if not complete:
+    best = closest(comparisons[0])
+    if best is None:
         return f"{said}; none gave motion and forces in every case of the first comparison."
     first = " in the first" if len(comparisons) > 1 else ""
-    best = min(complete, key=lambda score: score.worst or 0.0)
     return (
         f"{said}; closest{first} is {best.name}, whose motion stays within {number(best.motion)} of its range and "
         f"whose forces within {number(best.forces)} of the largest."
@@ -87,19 +82,9 @@ def _wrong(comparison: ReportedComparison) -> list[tuple[float, str, str]]:
         runs = comparison.runs_of(index)
         if row.verdict != "differs" or any(run.status != "done" for run in runs):
             continue
-        judged = [
-            (judgement.error / judgement.scale, judgement)
-            for run in runs
-            for judgement in run.judgements
-            if judgement.observable in comparison.headlines("motion")
-            and judgement.verdict != "ill-posed"
-            and math.isfinite(judgement.error)
-        ]
-        relative, worst = max(judged, key=lambda pair: pair[0], default=(0.0, None))
-        text = "a reaction or an event is wrong"
-        if worst is not None:
-            size = f"{number(worst.error)} {unit(worst.unit)}".strip()
-            text = f"its {symbol(worst.observable)} is off by {size}"
+        worst = furthest_off(comparison, runs)
+        relative = 0.0 if worst is None else worst.error / worst.scale
+        text = "a reaction or an event is wrong" if worst is None else off_by(worst)
         found.append((relative, with_caveat(name, row.caveat), text))
     return found
 

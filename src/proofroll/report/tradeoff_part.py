@@ -116,12 +116,7 @@ class TradeoffPart(Part):
 
 
 def wishes(study: TradeoffStudy, claims: TradeoffClaims | None) -> list[Wish]:
-    """What a report asks of a trade-off.
-
-    Args:
-        study: as :func:`proofroll.studies.tradeoff_content.tradeoff_study` makes it.
-        claims: their tolerances are those of the study's own quantity.
-    """
+    """What a report asks of a trade-off: of the study's own quantity the tolerances of its claims, if there are any."""
     own = list({claim.tolerance.value: claim.tolerance for claim in claims.cheapest}.values()) if claims else []
     found = []
     for name in default_quantities(study):

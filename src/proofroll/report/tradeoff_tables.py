@@ -58,7 +58,7 @@ def tradeoff_parts(
         study: stored in ``path``, its diagram beside it.
         shown: quantities with a column; the last tables are about the first of them.
         path: see there.
-        every_point: whether all points are listed, and errors told in sentences too.
+        every_point: all points are listed, and errors told in sentences too.
     """
     if every_point:
         yield point_table(study, study.points, shown, "Every point")
@@ -85,12 +85,7 @@ def point_table(
 ) -> Table:
     """One line per point: what it costs, and its error in each quantity.
 
-    Args:
-        study: stored.
-        points: of it.
-        quantities: to show.
-        title: of the table.
-        ties: numbers of points on a front whose cost cannot be told from that of the next.
+    ``ties`` are the numbers of points on a front whose cost cannot be told from that of the next.
     """
     caption = Text("cost: wall seconds per simulated second through this adapter")
     if ties:

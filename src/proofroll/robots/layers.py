@@ -45,13 +45,7 @@ class RobotTruth:
 
     @classmethod
     def of(cls, robot: Robot, states: RobotStates, like: RobotTruth | None = None) -> RobotTruth:
-        """Evaluated by the first formulation.
-
-        Args:
-            robot: what is evaluated.
-            states: where.
-            like: whose sizes make differences relative; by default its own.
-        """
+        """Evaluated by the first formulation; differences are relative to the sizes of ``like``, or its own."""
         return cls(robot, states, world_jacobians(robot, states), passive(robot, states), like)
 
     @cached_property
@@ -101,10 +95,7 @@ class RobotTruth:
 def differences(truth: RobotTruth, torques: dict[str, Array], reading: Reading) -> dict[str, float]:
     """How far an engine is off, by layer; a layer that the engine does not offer is left out.
 
-    Args:
-        truth: what the engine is held against.
-        torques: by joint, that the engine was asked the forward dynamics for.
-        reading: what the engine holds.
+    ``torques`` by joint are those that the engine was asked the forward dynamics for.
     """
     robot, d = truth.robot, truth.dynamics
     dofs = dict(zip(reading.joints, reading.dofs, strict=True))

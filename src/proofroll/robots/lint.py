@@ -24,12 +24,7 @@ _KNOWN = {
 
 
 def lint(file: RobotFile, robot: Robot) -> list[LintFinding]:
-    """Everything that is noticed, errors first.
-
-    Args:
-        file: what was read.
-        robot: what it means.
-    """
+    """Everything that is noticed in a file and in what it means, errors first."""
     own = _urdf(file, robot) if file.kind == "urdf" else _mjcf(file)
     found = [LintFinding(*noticed) for noticed in (*own, *_bodies(file, robot), *_joints(robot))]
     return sorted(found, key=lambda finding: ("error", "warning", "note").index(finding.level))

@@ -34,12 +34,7 @@ class RobotVersions:
 
 
 def between(file: str, old: str, new: str) -> VersionsStudy:
-    """How two versions hold a robot, as the content of `proofroll versions`.
-
-    Args:
-        file: path of a URDF or MJCF.
-        old: the engine, ``NAME`` or ``NAME@PLACE``.
-        new: likewise.
+    """How two versions, ``NAME`` or ``NAME@PLACE``, hold a robot file, as the content of `proofroll versions`.
 
     Raises:
         InputError, Missing: see :func:`proofroll.robots.check.check`.

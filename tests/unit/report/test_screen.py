@@ -6,6 +6,7 @@ import json
 import pytest
 from rich.table import Table
 
+from proofroll.report.labels import settings_text
 from proofroll.report.screen import Screen, escaped, printable
 from proofroll.report.terminal import console, step
 
@@ -85,3 +86,8 @@ def test_a_pipe_has_the_width_that_it_is_given(monkeypatch: pytest.MonkeyPatch) 
 def test_a_step_is_shown_as_it_is(resolution: str | None, value: float | None, shown: str) -> None:
     """A step keeps its digits, a tolerance its order of magnitude."""
     assert step(resolution, value) == shown
+
+
+def test_settings_that_are_left_to_the_engine_are_not_listed() -> None:
+    """A setting without a value is no text that a person could give."""
+    assert settings_text({"dt": 1e-3, "elimination": None}) == "dt=0.001"

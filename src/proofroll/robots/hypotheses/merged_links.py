@@ -66,12 +66,7 @@ def _principal(inertia: Array) -> tuple[Array, Array]:
 
 
 def _misplaced(evidence: RobotEvidence, *, turned: bool) -> Robot | None:
-    """The robot with such links.
-
-    Args:
-        evidence: what is known.
-        turned: whether the principal axes are turned with the link, Q R, or stay Q.
-    """
+    """The robot with such links, whose principal axes are turned with the link, Q R, or stay Q."""
     robot, bodies = evidence.robot, []
     for joint in robot.joints:
         home, p, R = robot.welded[joint.child]
