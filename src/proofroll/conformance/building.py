@@ -17,6 +17,7 @@ from proofroll.core.engine import Sample
 from proofroll.core.engine_abilities import require_provided
 from proofroll.core.errors import Refused
 from proofroll.core.scene import Scene
+from proofroll.core.several import OPTIONAL, SAMPLED
 
 
 def builds_or_refuses(subject: Subject) -> None:
@@ -119,9 +120,9 @@ def samples_are_well_formed(subject: Subject) -> None:
 def _well_formed(sample: Sample, bodies: int, when: str) -> None:
     require(isinstance(sample, Sample), f"sample() gave {type(sample).__name__} instead of Sample {when}")
     one = bodies == 1 and np.ndim(sample.p_WB) == np.ndim(sample.v_WB) == 1  # of one body the index may be left out
-    for name, size in (("p_WB", 3), ("v_WB", 3), ("w_WB", 3), ("q_WB", 4), ("force", 3)):
+    for name, size in SAMPLED.items():
         value = getattr(sample, name)
-        if value is None and name in {"q_WB", "force"}:
+        if value is None and name in OPTIONAL:
             continue
         require(isinstance(value, np.ndarray), f"{name} is {type(value).__name__} instead of an array {when}")
         shape = (size,) if one else (bodies, size)

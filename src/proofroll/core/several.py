@@ -22,7 +22,7 @@ AnySample = Sample | Mapping[str, Sample]
 
 # Arrays of a sample with the numbers that each has for a body; an engine need not give the last two.
 SAMPLED = {"p_WB": 3, "v_WB": 3, "w_WB": 3, "q_WB": 4, "force": 3}
-_OPTIONAL = frozenset({"q_WB", "force"})
+OPTIONAL = frozenset({"q_WB", "force"})
 
 
 class EachAlone:
@@ -103,7 +103,7 @@ def arrays(scene: Scene, sample: AnySample, t: float) -> Iterator[tuple[str, Flo
         own, bodies = sample_of(scene, element, sample), len(element.bodies)
         for name, width in SAMPLED.items():
             given = getattr(own, name)
-            if given is None and name in _OPTIONAL:
+            if given is None and name in OPTIONAL:
                 continue
             try:
                 values = np.asarray(given, dtype=np.float64)

@@ -73,6 +73,22 @@ def resolve(
     return found
 
 
+def resolve_with_truth(
+    engines: Sequence[tuple[str, Mapping[str, Any]]],
+    workers: Workers | None = None,
+    requires: Collection[str] = (),
+) -> tuple[list[EngineFacts | ProofrollError], EngineFacts]:
+    """As :func:`resolve`, and what the truth says of itself.
+
+    Raises:
+        ProofrollError: the truth cannot be asked.
+    """
+    *found, truth = resolve([*engines, ("truth", {})], workers, requires)
+    if not isinstance(truth, EngineFacts):
+        raise truth
+    return found, truth
+
+
 def prepare(engine: str, workers: Workers) -> None:
     """Starts an engine's process and lets it import what a run needs, while the caller has other things to do.
 

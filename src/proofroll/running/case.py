@@ -92,6 +92,11 @@ class EngineFacts:
     caveat: str = ""
     libraries: dict[str, str] = field(default_factory=dict)
 
+    @property
+    def step(self) -> float | None:
+        """The fixed step [s]; None: it adapts, or there is none."""
+        return float(self.settings["dt"]) if self.resolution == "dt" else None
+
     def on(self, requires: Collection[str]) -> EngineFacts:
         """The same, with the order for a scene that requires this."""
         return replace(self, order=lowest(self.order, self.lowered, requires), lowered={})

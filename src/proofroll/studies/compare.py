@@ -72,7 +72,7 @@ def evaluate(planned: Plan, results: dict[str, Result], runner: Runner) -> Outco
                 result.certificate,
                 trajectories[1.0],
                 references[name].dataset,
-                _step(run.facts),
+                run.facts.step,
                 judgements,
             )
             found = replace(found, diagnosis=causes)
@@ -107,7 +107,7 @@ def _failed(run: Planned, facts: EngineFacts, result: Result) -> Run:
     at = f" at {point_name(run.parameters)}" if run.parameters else ""
     sentence = f"{run.row.engine}{at} {result.status}: {result.message}"
     scene = load_scene(run.ladder[1.0].scene, **run.parameters)
-    causes = diagnosed(scene, result.certificate, step=_step(facts))
+    causes = diagnosed(scene, result.certificate, step=facts.step)
     said = [] if expected else [sentence]
     return Run(run.row, run.parameters, facts, result, [], said, run.ladder[1.0], diagnosis=causes)
 
@@ -182,11 +182,6 @@ def _lost(run: Planned, results: dict[str, Result]) -> str:
         if result.status != Status.DONE and name is not None:
             return f"{name} {case.engine.settings[name]:g} {result.status}: {result.message}"
     return ""
-
-
-def _step(facts: EngineFacts) -> float | None:
-    """The step of an engine with a fixed one [s], or None."""
-    return float(facts.settings["dt"]) if facts.resolution == "dt" else None
 
 
 def _has_ladder(run: Planned, curve: FloatArray) -> bool:

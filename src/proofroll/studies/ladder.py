@@ -16,7 +16,7 @@ from proofroll.core.scene import Scene
 from proofroll.core.time_grid import time_grid
 from proofroll.files.netcdf import read
 from proofroll.files.scene_file import load_scene
-from proofroll.running.asking import resolve
+from proofroll.running.asking import resolve, resolve_with_truth
 from proofroll.running.case import Case, EngineFacts, Result, Status
 from proofroll.running.process import WorkerDied
 from proofroll.running.runner import Runner
@@ -31,7 +31,6 @@ if TYPE_CHECKING:
 
 _EVERY = 0.02  # interval between samples [s], as in the comparison files
 _TIME_LIMIT = 60.0  # wall seconds for one case
-# Observables that are not one curve over the samples.
 
 
 @dataclass(frozen=True)
@@ -115,10 +114,7 @@ class Ladder:
         for error in self.engines.values():
             if isinstance(error, InputError):
                 raise error
-        truth = resolve([("truth", {})], runner.workers)[0]
-        if not isinstance(truth, EngineFacts):
-            raise truth
-        self._truth_facts = truth
+        _, self._truth_facts = resolve_with_truth([], runner.workers)
         self.truths: dict[str, LadderTruth] = {}
         self.answers: dict[str, ModelAnswer] = {}
         self.ladder: list[Rung] = rungs(self.engines, self.scene.requires)
@@ -169,14 +165,11 @@ class Ladder:
     def _scene_at(self, point: Mapping[str, float]) -> Scene:
         return load_scene(self._name, **(self._given | dict(point)))
 
-    def _curve(self, point: Mapping[str, float], dataset: xr.Dataset) -> FloatArray | None:
-        """The quantity of a run of the scene with these parameters."""
-        return observe(self._scene_at(point), dataset).get(self.quantity)
-
     def _answer(self, model: LadderModel, case: Case, result: Result) -> ModelAnswer:
         if result.status != Status.DONE:
             return ModelAnswer(case, result)
-        return ModelAnswer(case, result, self._curve(model.parameters, read(self._runner.store.trajectory(case))))
+        curves = observe(self._scene_at(model.parameters), read(self._runner.store.trajectory(case)))
+        return ModelAnswer(case, result, curves.get(self.quantity))
 
     def error(self, model: LadderModel, point: dict[str, float]) -> float | None:
         """Largest distance from the truth of the scene with these parameters; None: no answer."""

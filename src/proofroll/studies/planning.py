@@ -13,7 +13,7 @@ from proofroll.core.plugins import parse_engine, place_of, plain_name
 from proofroll.core.scene import Scene
 from proofroll.core.truth import edge_between
 from proofroll.files.scene_file import load_scene
-from proofroll.running.asking import resolve
+from proofroll.running.asking import resolve, resolve_with_truth
 from proofroll.running.case import Case, EngineFacts
 from proofroll.running.worker_pool import Workers
 from proofroll.studies.cases import case_of
@@ -113,10 +113,7 @@ def row_facts(
         InputError: an engine or setting that does not exist.
     """
     specs = [parse_engine(row.engine) for _, row in rows]
-    resolved = resolve([(spec.name, spec.options) for spec in specs] + [("truth", {})], workers, requires)
-    truth = resolved.pop()
-    if not isinstance(truth, EngineFacts):
-        raise truth
+    resolved, truth = resolve_with_truth([(spec.name, spec.options) for spec in specs], workers, requires)
     for (index, row), facts in zip(rows, resolved, strict=True):
         if isinstance(facts, InputError):
             raise facts.within(f"{comparison.name}.toml: rows.{index}.engine", row.engine)

@@ -50,5 +50,5 @@ def single_case(
     if until is None:
         until = min(USUAL, read_scene_file(scene).duration or USUAL)
     if every is None:
-        every = sampling_interval(facts.settings["dt"] if facts.resolution == "dt" else None)
+        every = sampling_interval(facts.step)
     return case_of(scene, loaded, parameters, facts, until, every, time_limit=time_limit)

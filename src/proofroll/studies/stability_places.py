@@ -9,7 +9,7 @@ from proofroll.core.errors import ProofrollError
 from proofroll.core.scene import Scene
 from proofroll.files.netcdf import read
 from proofroll.files.scene_file import load_scene
-from proofroll.running.asking import resolve
+from proofroll.running.asking import resolve_with_truth
 from proofroll.running.case import Case, EngineFacts, Status
 from proofroll.running.runner import Runner
 from proofroll.studies.axes import Axis, thinned
@@ -109,9 +109,7 @@ def places_of(name: str, axes: Sequence[Axis], effort: Effort) -> list[Place]:
 
 def measure(name: str, places: Sequence[Place], runner: Runner, tell: Callable[[], None]) -> None:
     """The truth of every place, or why there is none."""
-    (facts,) = resolve([("truth", {})], runner.workers)
-    if not isinstance(facts, EngineFacts):
-        raise facts
+    _, facts = resolve_with_truth([], runner.workers)
     cases = {id(place): case_at(name, place, facts, _TRUTH_LIMIT) for place in places if place.scene is not None}
     results = runner.run(cases.values(), lambda *_: tell())
     for place in places:

@@ -9,7 +9,7 @@ import numpy as np
 
 from proofroll.core.engine import whole_steps
 from proofroll.core.errors import InputError, ProofrollError
-from proofroll.running.asking import resolve
+from proofroll.running.asking import resolve_with_truth
 from proofroll.running.case import Case, EngineFacts, Result, Status
 from proofroll.running.runner import Runner
 from proofroll.studies.curve import Curve, CurvePoint, Question
@@ -115,24 +115,19 @@ def _run(
     for index, value in wanted:
         facts = curves[index].facts
         options.append((facts.name, facts.settings | ({facts.resolution: value} if facts.resolution else {})))
-    resolved = resolve([*options, ("truth", {})], runner.workers)
-    truth_facts = resolved.pop()
-    if not isinstance(truth_facts, EngineFacts):
-        raise truth_facts
+    resolved, truth_facts = resolve_with_truth(options, runner.workers)
     cases: list[tuple[int, tuple[Case, ...]]] = []
     for (index, value), found in zip(wanted, resolved, strict=True):
         if not isinstance(found, EngineFacts):
             curves[index].dropped[value] = str(found)
             continue
-        facts = found
-        every = max(question.every, value) if facts.resolution == "dt" else question.every
         try:
-            if facts.resolution == "dt":
-                whole_steps(0.0, question.until, value)
+            if found.step is not None:
+                whole_steps(0.0, question.until, found.step)
         except InputError as error:
             curves[index].dropped[value] = str(error)
             continue
-        cases.append((index, question.cases(scene, facts, every)))
+        cases.append((index, question.cases(scene, found, max(question.every, found.step or 0.0))))
     intervals = {question.every, *(case.every for _, both in cases for case in both)} - references.keys()
     truths = {every: question.case(scene, truth_facts, every) for every in intervals}
     results = runner.run([*truths.values(), *(case for _, both in cases for case in both)], progress)

@@ -16,6 +16,7 @@ from pathlib import Path
 
 import numpy as np
 
+from proofroll.running.asking import resolve_with_truth
 from proofroll.running.case import Case, Result, Status
 from proofroll.running.runner import Runner
 from proofroll.running.stopwatch import Stopwatch
@@ -129,11 +130,7 @@ def tradeoff(
 
 
 def _truth_case(question: Question, references: Mapping[float, Reference], runner: Runner) -> Case:
-    from proofroll.running.asking import resolve
-    from proofroll.running.case import EngineFacts
-
-    (facts,) = resolve([("truth", {})], runner.workers)
-    assert isinstance(facts, EngineFacts)  # the sweep has run with it
+    _, facts = resolve_with_truth([], runner.workers)
     return question.case(references[question.every].scene, facts, question.every)
 
 
