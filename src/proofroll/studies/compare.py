@@ -19,7 +19,6 @@ from proofroll.files.scene_file import load_scene
 from proofroll.running.case import LASTING, Case, EngineFacts, Result, Status
 from proofroll.running.process import WorkerDied
 from proofroll.running.runner import Runner
-from proofroll.studies.common_span import common_span
 from proofroll.studies.expectations import contradictions_of
 from proofroll.studies.outcome import Outcome, Run
 from proofroll.studies.planning import Plan, Planned, plan, point_name
@@ -133,7 +132,7 @@ def _of_another_scene(run: Planned, facts: EngineFacts, result: Result, sentence
 def _judgements(
     run: Planned, band: Band, reference: Reference, trajectories: dict[float, xr.Dataset], lost: str
 ) -> list[Judgement]:
-    reference, trajectories = common_span(reference, trajectories)
+    reference, trajectories = reference.common_span(trajectories)
     curves = {factor: reference.observed(dataset) for factor, dataset in trajectories.items()}
     main = curves[1.0]
     judgements = []

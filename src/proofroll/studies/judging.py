@@ -20,7 +20,6 @@ from proofroll.core.truth import truth
 from proofroll.core.verdict import Doubt, Judgement, Verdict
 from proofroll.core.verdict import judge as judge_curve
 from proofroll.files.scene_file import load_scene
-from proofroll.studies.common_span import common_span
 from proofroll.studies.reference import Reference
 
 if TYPE_CHECKING:
@@ -124,7 +123,7 @@ def judge(
     reference = Reference.of(scene, _truth(scene, dataset["time"].to_numpy()))
     observed: dict[str, FloatArray] = {}
     if "scene_digest" in dataset.attrs:  # all variables of a run
-        reference, cut = common_span(reference, {0: dataset})
+        reference, cut = reference.common_span({0: dataset})
         dataset, observed = cut[0], reference.observed(cut[0])
     bounds = _bounds(tolerance, reference, observed, [str(name) for name in dataset.data_vars])
     compared = [_compared(name, bound, reference, observed, dataset) for name, bound in bounds.items()]

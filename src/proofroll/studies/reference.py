@@ -4,16 +4,16 @@ from __future__ import annotations
 
 import itertools
 import re
-from collections.abc import Collection, Mapping, Sequence
-from dataclasses import dataclass
+from collections.abc import Collection, Hashable, Mapping, Sequence
+from dataclasses import dataclass, replace
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, Self
+from typing import TYPE_CHECKING, Any, Self, TypeVar
 
 import numpy as np
 
 from proofroll.core.arrays import FloatArray
 from proofroll.core.dataset import observe, part, scales
-from proofroll.core.element_abilities import KnowsAnotherScene
+from proofroll.core.element_abilities import KnowsAnotherScene, WatchesRuns
 from proofroll.core.events import Event, events_of
 from proofroll.core.observable import Role
 from proofroll.core.scene import Scene
@@ -22,6 +22,8 @@ from proofroll.files.netcdf import read
 
 if TYPE_CHECKING:
     import xarray as xr
+
+Key = TypeVar("Key", bound=Hashable)
 
 
 @dataclass(frozen=True)
@@ -49,6 +51,16 @@ class Reference:
     def of(cls, scene: Scene, dataset: xr.Dataset) -> Self:
         """From a trajectory of the truth."""
         return cls(scene, dataset, observe(scene, dataset), scales(scene, dataset))
+
+    def common_span(self, trajectories: Mapping[Key, xr.Dataset]) -> tuple[Reference, dict[Key, xr.Dataset]]:
+        """The truth and runs as far as they are comparable, where a model ends before the scene does (WatchesRuns)."""
+        first = self.scene.elements[0]
+        if len(self.scene.elements) > 1 or not isinstance(first, WatchesRuns):
+            return self, dict(trajectories)
+        truth, runs = first.common_span(self.dataset, trajectories)
+        if truth is self.dataset:
+            return self, runs
+        return replace(self, dataset=truth, curves=observe(self.scene, truth)), runs
 
     def another_scene(self, lines: Sequence[Mapping[str, Any]]) -> str | None:
         """Why a model with this certificate is of another kind than the scene, as one clause; None: it is not."""

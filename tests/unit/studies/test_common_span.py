@@ -16,7 +16,6 @@ from proofroll.core.truth import truth
 from proofroll.elements.ball_on_surface.element import changed
 from proofroll.running.recording import record
 from proofroll.running.simulation import build
-from proofroll.studies.common_span import common_span
 from proofroll.studies.reference import Reference
 
 TIMES = time_grid(0.4, 5e-3)
@@ -45,7 +44,7 @@ def test_who_leaves_the_wall_is_judged_up_to_there(engine: str) -> None:
     scene = lying()
     whole = reference(scene)
     run = record(build(scene, engine), scene, TIMES).dataset
-    held, cut = common_span(whole, {1.0: run})
+    held, cut = whole.common_span({1.0: run})
     curves = held.observed(cut[1.0])
     for name in ("gamma", "z", "N", "F2", "F3", "gap", "slip", "event_times", "event_order"):
         true, _ = held.true(name, curves[name])
@@ -60,7 +59,7 @@ def test_who_ends_too_early_is_not_excused() -> None:
     """A run that ends well before the truth's ball leaves the wall stays too short to agree."""
     scene = lying()
     short = record(build(scene, "reduced"), scene, TIMES).dataset.isel(time=slice(30))
-    held, cut = common_span(reference(scene), {1.0: short})
+    held, cut = reference(scene).common_span({1.0: short})
     curve = held.observed(cut[1.0])["gamma"]
     assert curve.shape != held.true("gamma", curve)[0].shape
 
@@ -70,6 +69,6 @@ def test_without_lift_off_nothing_changes() -> None:
     scene = load_scene("sphere_in_cylinder")
     whole = reference(scene)
     run = record(build(scene, "reduced"), scene, TIMES).dataset
-    held, cut = common_span(whole, {1.0: run})
+    held, cut = whole.common_span({1.0: run})
     assert held is whole
     assert cut[1.0] is run
