@@ -169,21 +169,6 @@ def test_joint_transmits_what_the_multipliers_say() -> None:
     np.testing.assert_allclose(wrench.linear, force, rtol=0, atol=1e-13 * np.linalg.norm(force))
 
 
-def test_model_is_only_what_the_scene_requires() -> None:
-    """No torque without rolling resistance, no mass but the ball's, no freedom but those needed."""
-    for formulation, freedoms in (("composite", 5), ("free_flyer", 6)):
-        engine = build(cylinder(), "pinocchio", formulation=formulation)
-        mechanism = engine._run.mechanism
-        data = mechanism.model.createData()
-        assert mechanism.resistance(data, mechanism.q0, mechanism.v0) is None
-        assert engine.built().rolling_resistance == 0.0
-        assert mechanism.model.nv == freedoms
-        assert [float(inertia.mass) for inertia in mechanism.model.inertias if inertia.mass > 0] == [0.517]
-        assert build(cylinder(rolling_resistance=RESISTANCE), "pinocchio").built().rolling_resistance == pytest.approx(
-            RESISTANCE, rel=1e-14
-        )
-
-
 @pytest.mark.parametrize("formulation", FORMULATIONS)
 @pytest.mark.parametrize("scene", [cylinder(), plane(speed=4)], ids=["cylinder", "plane"])
 def test_orientation_follows_the_spin(scene: Scene, formulation: str) -> None:

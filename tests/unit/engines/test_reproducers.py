@@ -2,15 +2,18 @@
 
 from __future__ import annotations
 
+import dataclasses
 from typing import Any
 
 import numpy as np
 import pytest
+from scipy.spatial.transform import Rotation
 
 from proofroll.core.engine_abilities import Reproduces
 from proofroll.core.errors import Refused
 from proofroll.core.plugins import load_engine, resolve_settings
-from proofroll.elements.ball_on_surface.element import rolling_ball
+from proofroll.elements.ball_on_surface.element import changed, rolling_ball
+from proofroll.elements.mechanism.sampling import mechanism_of
 from proofroll.files.scene_file import load_scene
 
 CYLINDER, PLANE = "sphere_in_cylinder", "inclined_plane"
@@ -119,6 +122,34 @@ def test_a_ball_that_stops(engine: str, formulation: str, preset: str) -> None:
         expected.append(adapter.sample().p_WB)
     np.testing.assert_allclose(centres, expected, rtol=1e-8, atol=1e-10)
     np.testing.assert_allclose(centres[-1], centres[-5], rtol=0, atol=1e-10)
+
+
+@pytest.mark.parametrize("formulation", ["composite", "free_flyer"])
+@pytest.mark.parametrize("preset", ["default", "tuned"])
+def test_the_program_ends_where_the_wall_would_pull(formulation: str, preset: str) -> None:
+    """With fixed and with adaptive steps the program looks after each step whether the wall presses."""
+    scene = load_scene(CYLINDER, speed=2)
+    scene = changed(scene, surface=dataclasses.replace(scene.elements[0].surface, tilt=1.2))
+    settings = resolve_settings(kind_of("pinocchio"), {"formulation": formulation, "preset": preset})
+    with pytest.raises(RuntimeError, match="would have to pull"):
+        list(program("pinocchio", settings, scene)["run"]([0.1, 0.4]))
+
+
+@pytest.mark.parametrize("options", [{"preset": "matched"}, {"preset": "tuned", "rtol": 1e-6}], ids=name_of)
+@pytest.mark.parametrize("formulation", ["null_space", "constraint_dynamics"])
+def test_a_mechanism_moves_as_in_the_adapter(formulation: str, options: dict[str, Any]) -> None:
+    """Its points are where the adapter has them, and after each step its loop is closed."""
+    kind, scene = kind_of("pinocchio"), load_scene("four_bar")
+    settings = resolve_settings(kind, {"formulation": formulation, **options})
+    ((places, _, opened),) = program("pinocchio", settings, scene)["run"]([1.0])
+    adapter, mechanism = kind.build(scene, settings), mechanism_of(scene)
+    adapter.advance(1.0)
+    sample = adapter.sample()
+    turned = Rotation.from_quat(sample.q_WB, scalar_first=True)
+    for point, found in zip(mechanism.points, places, strict=True):
+        body = mechanism.body_index[point.body]
+        np.testing.assert_allclose(found, sample.p_WB[body] + turned[body].apply(point.position), rtol=0, atol=1e-9)
+    assert opened < 1e-14  # 2e-12 without
 
 
 @pytest.mark.parametrize(

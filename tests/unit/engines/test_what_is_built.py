@@ -81,10 +81,11 @@ def test_the_orientation_in_the_rotating_frame_is_a_quadrature() -> None:
 
 @pytest.mark.parametrize(("formulation", "joints", "freedoms"), [("composite", 4, 5), ("free_flyer", 2, 6)])
 def test_pinocchio(formulation: str, joints: int, freedoms: int) -> None:
-    """No joint but those needed, no torque without f, and an orientation that stays where it was unless asked for."""
+    """No joint and no mass but those needed, no torque without f, an orientation that stays unless asked for."""
     engine = build(scene(), "pinocchio", formulation=formulation)
     mechanism, motion = engine._run.mechanism, engine._run.motion
     assert (mechanism.model.njoints, mechanism.model.nv) == (joints, freedoms)
+    assert [float(inertia.mass) for inertia in mechanism.model.inertias if inertia.mass > 0] == [0.517]
     assert mechanism.resistance(mechanism.model.createData(), mechanism.q0, mechanism.v0) is None
     assert motion.mu_static is None
     engine.advance(0.01)

@@ -17,8 +17,6 @@ from proofroll.elements.mechanism.capabilities import ALL_LOOPS, MechanismCapabi
 from proofroll.elements.mechanism.loop_points import held_points
 from proofroll.elements.mechanism.rotations import Array
 from proofroll.engines.pinocchio.joint_tree import LACKING, PROVIDES, JointTree
-from proofroll.engines.pinocchio.loop_rows import LoopRows
-from proofroll.engines.pinocchio.settings import PinocchioSettings
 
 _POINTS = {MechanismCapability.SPHERICAL_LOOP, MechanismCapability.REVOLUTE_LOOP}
 _NO_ROWS = "Pinocchio's rigid constraints hold points or whole frames together, and no single angle or direction"
@@ -37,10 +35,10 @@ class ConstraintDynamics:
     provides: ClassVar[frozenset[str]] = frozenset(PROVIDES - ALL_LOOPS | _POINTS)
     lacking: ClassVar[Mapping[str, str]] = {**LACKING, **dict.fromkeys(ALL_LOOPS - _POINTS, _NO_ROWS)}
 
-    def __init__(self, tree: JointTree, rows: LoopRows, settings: PinocchioSettings) -> None:  # noqa: ARG002 -- as others
+    def __init__(self, tree: JointTree, proximal: float) -> None:
+        """With the term μ of the proximal method."""
         self._tree, self._model = tree, tree.model
-        assert settings.proximal is not None  # see the settings
-        self.proximal = _ACCURACY, settings.proximal, _ITERATIONS
+        self.proximal = _ACCURACY, proximal, _ITERATIONS
         self._proximal = pin.ProximalSettings(*self.proximal)
         self.constraints, self._loops = pin.StdVec_RigidConstraintModel(), []
         for number, (loop, (a, b)) in enumerate(zip(tree.mechanism.loops, tree.loops, strict=True)):

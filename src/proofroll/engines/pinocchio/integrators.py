@@ -77,7 +77,7 @@ class FixedStep(TangentIntegrator):
             raise Diverged(f"the equations became singular between {start:g} s and {end:g} s ({error})") from None
 
     def _advance_one(self, time: float) -> None:
-        self._step(self._dt, self._pressed(time) if self._start is None else self._start)
+        self._step(self._pressed(time) if self._start is None else self._start)
         if self._settings.projection:
             self.q, self.v = self._mechanism.project(self._data, self.q, self.v)
         self._start = self._pressed(time + self._dt)
@@ -93,17 +93,17 @@ class FixedStep(TangentIntegrator):
     def _acceleration(self, q: FloatArray, v: FloatArray) -> FloatArray:
         return np.array(self._mechanism.accelerate(self._data, q, v))
 
-    def _step(self, h: float, acceleration: FloatArray) -> None:
-        """One step of ``h`` [s]; the acceleration is that at its start."""
+    def _step(self, acceleration: FloatArray) -> None:
+        """One step; the acceleration is that at its start."""
         raise NotImplementedError
 
 
 class SemiImplicitEuler(FixedStep):
     """Velocity first, then the configuration with the new velocity."""
 
-    def _step(self, h: float, acceleration: FloatArray) -> None:
-        self.v = self.v + h * acceleration
-        self.q = pin.integrate(self._model, self.q, h * self._moving * self.v)
+    def _step(self, acceleration: FloatArray) -> None:
+        self.v = self.v + self._dt * acceleration
+        self.q = pin.integrate(self._model, self.q, self._dt * self._moving * self.v)
 
 
 class TangentRungeKutta4(FixedStep):
@@ -121,8 +121,8 @@ class TangentRungeKutta4(FixedStep):
         dexp = pin.dIntegrate(self._model, self.q, displacement, pin.ARG1)
         return np.asarray(np.linalg.solve(dexp, moving))
 
-    def _step(self, h: float, acceleration: FloatArray) -> None:
-        rates, accelerations = [self._moving * self.v], [acceleration]
+    def _step(self, acceleration: FloatArray) -> None:
+        h, rates, accelerations = self._dt, [self._moving * self.v], [acceleration]
         for reach in (0.5 * h, 0.5 * h, h):
             displacement = reach * rates[-1]
             q = pin.integrate(self._model, self.q, displacement)

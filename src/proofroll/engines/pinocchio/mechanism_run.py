@@ -26,13 +26,17 @@ class MechanismRun:
 
     def __init__(self, scene: Any, settings: PinocchioSettings) -> None:
         self._mechanism = mechanism = mechanism_of(scene)
-        kind = NullSpace if settings.formulation == "null_space" else ConstraintDynamics
+        kind = NullSpace if settings.proximal is None else ConstraintDynamics  # the one that has a proximal term
         require(mechanism, kind.provides, kind.lacking)
         self.tree = JointTree(mechanism)
         self._model, self._data = self.tree.model, self.tree.model.createData()
         self._nq = self._model.nq
         rows = LoopRows(self.tree)
-        self.dynamics: NullSpace | ConstraintDynamics = kind(self.tree, rows, settings)
+        self.dynamics: NullSpace | ConstraintDynamics
+        if settings.proximal is None:
+            self.dynamics = NullSpace(self.tree, rows)
+        else:
+            self.dynamics = ConstraintDynamics(self.tree, settings.proximal)
         self._rows, self.rank = rows, rows.rank
         self._turns = self._nq != self._model.nv  # configurations hold quaternions
         if self._turns:

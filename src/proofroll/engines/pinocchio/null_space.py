@@ -11,7 +11,6 @@ import pinocchio as pin
 from proofroll.elements.mechanism.rotations import Array
 from proofroll.engines.pinocchio.joint_tree import LACKING, PROVIDES, JointTree
 from proofroll.engines.pinocchio.loop_rows import LoopRows, RowsAtState
-from proofroll.engines.pinocchio.settings import PinocchioSettings
 
 
 class NullSpace:
@@ -20,7 +19,7 @@ class NullSpace:
     provides: ClassVar[frozenset[str]] = frozenset(PROVIDES)
     lacking: ClassVar[Mapping[str, str]] = LACKING
 
-    def __init__(self, tree: JointTree, rows: LoopRows, settings: PinocchioSettings) -> None:  # noqa: ARG002 -- as others
+    def __init__(self, tree: JointTree, rows: LoopRows) -> None:
         self._tree, self._model, self._rows = tree, tree.model, rows
         self._rest = np.zeros(tree.model.nv)
 

@@ -44,7 +44,7 @@ class FixedStickSlip(FixedStep):
     def _advance_one(self, time: float) -> None:
         if not self.sticking:
             self._stick_if_it_can(time)
-        self._step(self._dt, self._acceleration(self.q, self.v))
+        self._step(self._acceleration(self.q, self.v))
         if self._settings.projection:
             put_back = self._mechanism.project if self.sticking else self._mechanism.project_sliding
             self.q, self.v = put_back(self._data, self.q, self.v)

@@ -36,7 +36,8 @@ class Applied:
         self._inertia = np.array([body.inertia for body in mechanism.bodies])
         self._weight = self._mass[:, None] * np.array(mechanism.gravity)
         self._laws = [law for number, joint in enumerate(mechanism.joints) for law in _laws(number, joint)]
-        self._angles = {law: _start(law, mechanism.joints[law.connection]) for law in self._laws if law.stiffness}
+        start = ((law, mechanism.joints[law.connection].q0) for law in self._laws if law.stiffness)
+        self._angles = {law: q0[1 if law.axis == "x" else 0] for law, q0 in start}
         self._balls = [
             (n, joint.damping)
             for n, joint in enumerate(mechanism.joints)
@@ -129,8 +130,3 @@ def _laws(number: int, joint: Joint) -> list[_Law]:
         return []
     axes = {"revolute": ("z",), "prismatic": ("slide",), "universal": ("z", "x")}[joint.kind]
     return [_Law(number, axis, joint.stiffness, joint.rest, joint.damping, joint.torque) for axis in axes]
-
-
-def _start(law: _Law, joint: Joint) -> float:
-    """Coordinate of a law at time 0."""
-    return joint.q0[1 if law.axis == "x" else 0]
