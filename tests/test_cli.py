@@ -8,6 +8,7 @@ import re
 import subprocess
 import sys
 from collections.abc import Callable
+from importlib.util import find_spec
 from pathlib import Path
 from typing import Any
 
@@ -460,12 +461,40 @@ def test_help_is_light() -> None:
 
 def test_describing_an_engine_is_light() -> None:
     """What an engine is is told without scipy, xarray and pandas, which take longer to load than all the rest."""
-    for name in ("exudyn", "mujoco"):
-        pytest.importorskip(name)
-    engines = ["exudyn", "mujoco", "projection", "reduced"]
+    engines = ["projection", "reduced", *(name for name in ("exudyn", "mujoco") if find_spec(name))]
     found = fresh(f"from proofroll.running.identity import describe\nfor name in {engines}:\n    describe(name)")
     assert {f"proofroll.engines.{name}" for name in engines} <= found
     assert {"xarray", "pandas", "scipy.integrate", "scipy.spatial", "scipy.optimize"} & found == set()
+
+
+RUN = """
+import dataclasses
+from proofroll.files.scene_file import load_scene
+from proofroll.running.case import EngineFacts
+from proofroll.running.identity import resolve
+from proofroll.running.run_case import run
+from proofroll.studies.cases import case_of
+
+facts = EngineFacts(**resolve("reduced", {}))
+case = case_of("inclined_plane", load_scene("inclined_plane"), {}, facts, 0.1, 0.01)
+assert run(dataclasses.asdict(case), "run.nc")["status"] == "done"
+"""
+COMMAND = """
+import sys
+from proofroll.cli import main
+sys.argv = "proofroll run inclined_plane --engine reduced --until 0.1".split()
+try:
+    main()
+except SystemExit as end:
+    assert not end.code
+"""
+
+
+@pytest.mark.parametrize("code", [RUN, COMMAND], ids=["worker", "command"])
+def test_a_run_is_light(code: str, monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> None:
+    """A run is made, written, read and shown without xarray and pandas, half of what it would import with them."""
+    monkeypatch.chdir(tmp_path)
+    assert {"xarray", "pandas"} & fresh(code) == set()
 
 
 @pytest.mark.own_workers

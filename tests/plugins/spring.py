@@ -14,6 +14,7 @@ from tiny import TinySettings
 
 from proofroll.core.arrays import FloatArray
 from proofroll.core.certificate import Line
+from proofroll.core.columns import Column, Columns
 from proofroll.core.element import Element, FirstMotion, OptionalTerm, Sign, StepNumber
 from proofroll.core.engine import Sample, whole_steps
 from proofroll.core.engine_abilities import Level, Term
@@ -80,14 +81,14 @@ class Spring:
         """The phase of a step."""
         return (StepNumber("phase", "ωh", "angle of the oscillation in a step", self.rate * h),)
 
-    def dataset(self, times: FloatArray, samples: Sequence[Sample], between: Mapping[float, Sample]) -> xr.Dataset:
+    def variables(self, times: FloatArray, samples: Sequence[Sample], between: Mapping[float, Sample]) -> Columns:
         """Elongation, speed, pull and energy."""
         x, v = (np.array([getattr(s, key)[..., 0] for s in samples]).reshape(-1) for key in ("p_WB", "v_WB"))
         energy = 0.5 * self.mass * v**2 + 0.5 * self.stiffness * x**2
         columns = {"x": (x, "m"), "v": (v, "m/s"), "pull": (-self.stiffness * x, "N")}
         columns["energy_error"] = (energy - energy[0], "J")
-        variables = {k: ("time", values, {"units": u, "long_name": k}) for k, (values, u) in columns.items()}
-        return xr.Dataset(variables, {"time": ("time", times, {"units": "s"})})
+        variables = {k: Column(("time",), values, {"units": u, "long_name": k}) for k, (values, u) in columns.items()}
+        return Columns(variables | {"time": Column(("time",), times, {"units": "s"})})
 
     def lacks(self, samples: Sequence[Sample], asks: Sequence[str]) -> str | None:
         """Nothing."""
@@ -156,7 +157,7 @@ class SpringTruth:
         w, A = element.rate, np.array([[0, 1], [-element.stiffness / element.mass, 0]])
         first = [(element.x0 * np.cos(w * t), -element.x0 * w * np.sin(w * t)) for t in times]
         second = [tuple(expm(A * t) @ [element.x0, 0.0]) for t in times]
-        one, two = (element.dataset(times, [at(*state) for state in states], {}) for states in (first, second))
+        one, two = (element.variables(times, [at(*s) for s in states], {}).dataset() for states in (first, second))
         for name in one.data_vars:
             one[name].attrs["error_bar"] = 3 * float(np.max(np.abs(one[name] - two[name]))) + 1e-15
         return one.assign_attrs(route="cosine", second_route="exponential of the matrix")

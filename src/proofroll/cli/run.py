@@ -37,12 +37,11 @@ def run(
     from proofroll.running.worker_pool import Workers
 
     workers = Workers()  # the process that tells the settings also makes the run
-    # It imports the engine while this process imports what reads scenes and results: each takes half a second.
+    # It imports the engine while this process imports what reads scenes and results.
     preparing = threading.Thread(target=prepare, args=(engine, workers), daemon=True)
     preparing.start()
 
     from proofroll.core.time_grid import EVERY, time_grid
-    from proofroll.files.netcdf import import_xarray
     from proofroll.report.run import run_content, run_lines
     from proofroll.report.run_plot import require_ending
     from proofroll.running.runner import run_one
@@ -55,7 +54,6 @@ def run(
             options.require_writable(file)
     if plot is not None:
         require_ending(plot)
-    import_xarray()
     preparing.join()
     case = single_case(
         scene,

@@ -1,16 +1,17 @@
-"""The result of a run: one xarray.Dataset with units on every variable, made of the parts that its elements give."""
+"""The result of a run: all variables with their units, made of the parts that its elements give."""
 
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from types import MappingProxyType
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
 from proofroll.core.arrays import FloatArray
+from proofroll.core.columns import Column, Columns
 from proofroll.core.element import Element
-from proofroll.core.events import Event, with_events
+from proofroll.core.events import Event, event_columns
 from proofroll.core.scene import Scene
 from proofroll.core.several import AnySample, sample_of
 
@@ -21,12 +22,17 @@ if TYPE_CHECKING:
 _SHARED = frozenset({"time", "xyz", "wxyz"})
 
 
-def from_samples(
+def from_samples(scene: Scene, times: FloatArray, samples: Sequence[AnySample]) -> xr.Dataset:
+    """The trajectory of a run, see :func:`columns_of`, as a dataset."""
+    return columns_of(scene, times, samples).dataset()
+
+
+def columns_of(
     scene: Scene,
     times: FloatArray,
     samples: Sequence[AnySample],
     between: Mapping[float, AnySample] = MappingProxyType({}),
-) -> xr.Dataset:
+) -> Columns:
     """The trajectory of a run.
 
     Args:
@@ -37,7 +43,7 @@ def from_samples(
     """
     reached = np.asarray(times[: len(samples)], dtype=np.float64)
     parts = {
-        element.name: element.dataset(
+        element.name: element.variables(
             reached,
             [sample_of(scene, element, sample) for sample in samples],
             {time: sample_of(scene, element, sample) for time, sample in between.items()},
@@ -47,26 +53,31 @@ def from_samples(
     return joined(scene, parts)
 
 
-def joined(scene: Scene, parts: Mapping[str, xr.Dataset]) -> xr.Dataset:
-    """One dataset of those of the scene's elements, by their names."""
-    import xarray as xr
-
-    named = []
+def joined(scene: Scene, parts: Mapping[str, Columns]) -> Columns:
+    """The variables of all elements of the scene, by the elements' names; said of all is what no two say otherwise."""
+    found: dict[str, Column] = {}
+    said: dict[str, Any] = {}
     for element in scene.elements:
-        part = parts[element.name]
-        own = [name for name in (*part.variables, *part.dims) if name not in _SHARED]
-        named.append(part.rename({name: scene.label(element, str(name)) for name in dict.fromkeys(own)}))
-    whole = xr.merge(named, combine_attrs="drop_conflicts") if len(named) > 1 else named[0]
-    return whole.assign_attrs(scene=scene.name, scene_digest=scene.digest)
+        found |= _labelled(scene, element, parts[element.name].variables)
+    for key in dict.fromkeys(key for part in parts.values() for key in part.attrs):
+        values = [part.attrs[key] for part in parts.values() if key in part.attrs]
+        if all(np.array_equal(value, values[0]) for value in values):
+            said[key] = values[0]
+    return Columns(found, {**said, "scene": scene.name, "scene_digest": scene.digest})
 
 
-def add_events(scene: Scene, element: Element, dataset: xr.Dataset, events: Sequence[Event]) -> xr.Dataset:
-    """The dataset with the events of an element."""
-    import xarray as xr
+def _labelled(scene: Scene, element: Element, variables: Mapping[str, Column]) -> dict[str, Column]:
+    """The variables, and their dimensions, under their names in the scene."""
 
-    made = with_events(xr.Dataset(), events)
-    named = made.rename({name: scene.label(element, str(name)) for name in (*made.data_vars, *made.dims)})
-    return dataset.assign(named.variables)
+    def name(own: str) -> str:
+        return own if own in _SHARED else scene.label(element, own)
+
+    return {name(own): item._replace(dims=tuple(map(name, item.dims))) for own, item in variables.items()}
+
+
+def add_events(scene: Scene, element: Element, columns: Columns, events: Sequence[Event]) -> Columns:
+    """The columns with the events of an element."""
+    return Columns({**columns.variables, **_labelled(scene, element, event_columns(events))}, columns.attrs)
 
 
 def part(scene: Scene, element: Element, dataset: xr.Dataset) -> xr.Dataset:

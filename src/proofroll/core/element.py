@@ -15,6 +15,7 @@ import numpy as np
 import numpy.typing as npt
 
 from proofroll.core.arrays import FloatArray
+from proofroll.core.columns import Columns
 from proofroll.core.gravity import Gravity
 from proofroll.core.numbers import Numbers
 from proofroll.core.observable import Observable
@@ -144,7 +145,7 @@ class Element(Protocol):
     def softened(self) -> frozenset[str]:
         """Quantities of the certificate by whose softness an engine's first steps may differ."""
 
-    def dataset(self, times: FloatArray, samples: Sequence[Sample], between: Mapping[float, Sample]) -> xr.Dataset:
+    def variables(self, times: FloatArray, samples: Sequence[Sample], between: Mapping[float, Sample]) -> Columns:
         """All variables of a run, with ``units`` and ``long_name``.
 
         Args:

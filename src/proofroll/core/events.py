@@ -8,6 +8,8 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from proofroll.core.columns import Column, Columns
+
 if TYPE_CHECKING:
     import xarray as xr
 
@@ -28,24 +30,26 @@ class Event:
     time_high: float
 
 
-def with_events(dataset: xr.Dataset, events: Sequence[Event]) -> xr.Dataset:
-    """The dataset with ``event_kind`` and ``event_time``, ``event_low``, ``event_high`` [s] along ``event``."""
+def event_columns(events: Sequence[Event]) -> dict[str, Column]:
+    """``event_kind`` and ``event_time``, ``event_low``, ``event_high`` [s] along ``event``."""
     columns = {
         "event_time": ("when it happened", [event.time for event in events]),
         "event_low": ("not before", [event.time_low for event in events]),
         "event_high": ("not after", [event.time_high for event in events]),
     }
     kinds = np.array([event.kind for event in events], dtype=str) if events else np.zeros(0, dtype="<U1")
-    result = dataset.assign(event_kind=("event", kinds, {"units": "1", "long_name": "what happened"}))
-    return result.assign(
-        {
-            name: ("event", np.array(values, dtype=np.float64), {"units": "s", "long_name": meaning})
-            for name, (meaning, values) in columns.items()
-        }
-    )
+    return {"event_kind": Column(("event",), kinds, {"units": "1", "long_name": "what happened"})} | {
+        name: Column(("event",), np.array(values, dtype=np.float64), {"units": "s", "long_name": meaning})
+        for name, (meaning, values) in columns.items()
+    }
 
 
-def events_of(dataset: xr.Dataset) -> list[Event]:
+def with_events(dataset: xr.Dataset, events: Sequence[Event]) -> xr.Dataset:
+    """The dataset with the events, see :func:`event_columns`."""
+    return dataset.assign(event_columns(events))
+
+
+def events_of(dataset: xr.Dataset | Columns) -> list[Event]:
     """The events that :func:`with_events` stored; none if there are no such variables."""
     if "event_kind" not in dataset:
         return []

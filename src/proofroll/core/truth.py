@@ -8,6 +8,7 @@ from importlib.metadata import entry_points
 from typing import TYPE_CHECKING, Protocol, runtime_checkable
 
 from proofroll.core.arrays import FloatArray
+from proofroll.core.columns import Columns
 from proofroll.core.dataset import joined
 from proofroll.core.element import Element
 from proofroll.core.errors import InputError, Refused
@@ -78,7 +79,7 @@ def truth(scene: Scene, times: FloatArray) -> xr.Dataset:
         Diverged: two routes disagree.
     """
     parts = {element.name: _of_element(element, times, scene.asks) for element in scene.elements}
-    whole = joined(scene, parts)
+    whole = joined(scene, {name: Columns.of(part) for name, part in parts.items()}).dataset()
     for name in ("route", "second_route", "ill_posed"):
         said = dict.fromkeys(str(part.attrs[name]) for part in parts.values() if part.attrs.get(name))
         if said:

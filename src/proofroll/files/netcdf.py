@@ -5,13 +5,14 @@ from __future__ import annotations
 import contextlib
 import io
 import sys
-from collections.abc import Iterator, Sequence
+from collections.abc import Collection, Iterator, Mapping
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 import numpy.typing as npt
 
+from proofroll.core.columns import Column, Columns
 from proofroll.files.atomic import ordinary_content, replacing
 
 if TYPE_CHECKING:
@@ -24,11 +25,17 @@ def import_xarray() -> None:
     At its first array xarray imports all of dask, half of what a run of a second costs; no array of ours is dask's.
     """
     with _dask_aside():
-        import scipy.io
         import xarray as xr
 
         xr.Variable((), 0.0)
-        assert scipy.io.netcdf_file  # the backend of read and write, which would import it at the first file
+    import_backend()
+
+
+def import_backend() -> None:
+    """Imports the library that reads and writes the files, which would otherwise be imported at the first one."""
+    import scipy.io
+
+    assert scipy.io.netcdf_file
 
 
 @contextlib.contextmanager
@@ -44,21 +51,71 @@ def _dask_aside() -> Iterator[None]:
             sys.modules.pop("dask", None)
 
 
-def write(dataset: xr.Dataset, path: Path) -> None:
+def write(dataset: xr.Dataset | Columns, path: Path) -> None:
     """Writes netCDF-3 so that the file is either whole or not there.
 
-    The format has no truth values, no text of variable length and no integers beyond 32 bits; xarray keeps the first
-    as 0 and 1, the second as characters, and refuses a number that does not fit. Numbers of 64 bits stay as they are.
+    The format has no truth values, no text of variable length and no integers beyond 32 bits; the first are kept as 0
+    and 1, the second as characters, as xarray does, and a number that does not fit is refused. Numbers of 64 bits stay
+    as they are.
 
     Raises:
         ProofrollError: the place cannot be written.
     """
-    plain: dict[Any, dict[str, Any]] = {name: {"_FillValue": None} for name in dataset.variables}
+    columns = dataset if isinstance(dataset, Columns) else Columns.of(dataset)
     # Made in memory first: a disk that fills meanwhile gives one reason, and no half of a file.
-    with _dask_aside():  # of which xarray would import the scheduler to learn that it writes nothing
-        made = dataset.to_netcdf(None, engine="scipy", encoding=plain)
+    made = _encoded(columns)
     with replacing(path) as temporary:
         temporary.write_bytes(made)
+
+
+def _encoded(columns: Columns) -> bytes:
+    """The file, byte for byte as xarray makes it by the same library, without the half second that it imports."""
+    from scipy.io import netcdf_file
+
+    buffer = io.BytesIO()
+    file = netcdf_file(buffer, "w", version=2)
+    for key, value in columns.attrs.items():
+        setattr(file, key, _attribute(value))
+    made = {name: _stored(*column) for name, column in columns.variables.items()}
+    for dims, values, _ in made.values():
+        for dim, length in zip(dims, values.shape, strict=True):
+            if dim not in file.dimensions:
+                file.createDimension(dim, length)
+    for name, (dims, values, attrs) in made.items():
+        variable = file.createVariable(name, values.dtype, dims)
+        variable[slice(None) if dims else ...] = values  # of no length the library takes no ellipsis
+        for key, value in attrs.items():
+            setattr(variable, key, _attribute(value))
+    file.flush()
+    written = buffer.getvalue()
+    buffer.close()  # or the file would write itself once more when it is collected
+    return written
+
+
+def _stored(dims: tuple[str, ...], values: npt.NDArray[Any], attrs: Mapping[str, Any]) -> Column:
+    """A variable as the format can hold it: text becomes characters, in one more dimension."""
+    if values.dtype.kind != "U":
+        return Column(dims, _narrow(values), {**attrs, "dtype": "bool"} if values.dtype == bool else attrs)
+    texts = np.array([text.encode() for text in values.ravel()], dtype=bytes)
+    letters = texts.view("S1").reshape(*values.shape, texts.itemsize)
+    return Column((*dims, f"string{texts.itemsize}"), letters, {**attrs, "_Encoding": "utf-8"})
+
+
+def _attribute(value: Any) -> bytes | npt.NDArray[Any]:
+    return value.encode() if isinstance(value, str) else _narrow(np.atleast_1d(value))
+
+
+def _narrow(values: npt.NDArray[Any]) -> npt.NDArray[Any]:
+    """In a type that the format has.
+
+    Raises:
+        ValueError: an integer does not fit.
+    """
+    narrow = {"int64": "int32", "bool": "int8"}.get(str(values.dtype))
+    found = values if narrow is None else values.astype(narrow)
+    if not np.array_equal(found, values, equal_nan=True):
+        raise ValueError(f"{values.dtype} does not fit into {narrow}, the widest of netCDF-3")
+    return found
 
 
 def read(path: Path) -> xr.Dataset:
@@ -79,15 +136,41 @@ def read(path: Path) -> xr.Dataset:
     return found.assign({name: item.astype(str) for name, item in found.variables.items() if item.dtype == object})
 
 
-def read_some(path: Path, names: Sequence[str]) -> dict[str, npt.NDArray[Any]]:
-    """Some variables of a trajectory, those that there are: a tenth of the time that :func:`read` takes."""
+def read_columns(path: Path, names: Collection[str] | None = None) -> Columns:
+    """A trajectory that :func:`write` made, or those of its variables that are named: a tenth of :func:`read`'s time.
+
+    Raises:
+        OSError, ValueError: it cannot be read, or is no netCDF-3.
+    """
     from scipy.io import netcdf_file
 
-    with netcdf_file(io.BytesIO(ordinary_content(path)), mmap=False) as file:
-        found = {name: file.variables[name][...] for name in names if name in file.variables}
-    return {
-        name: values.astype(values.dtype.newbyteorder("="))
-        if values.dtype.kind != "S"
-        else np.array([b"".join(letters).decode() for letters in values], dtype=str)
-        for name, values in found.items()
+    try:
+        file = netcdf_file(io.BytesIO(ordinary_content(path)), mmap=False)
+    except TypeError:
+        raise ValueError(f"{path} is no netCDF-3") from None
+    found = {
+        name: _read(item.dimensions, item[...], _said(item))
+        for name, item in file.variables.items()
+        if names is None or name in names
     }
+    return Columns(found, _said(file))
+
+
+def read_some(path: Path, names: Collection[str]) -> dict[str, npt.NDArray[Any]]:
+    """The values of some variables of a trajectory, those that there are; see :func:`read_columns`."""
+    return {name: column.values for name, column in read_columns(path, names).variables.items()}
+
+
+def _said(item: Any) -> dict[str, Any]:
+    attrs = item._attributes
+    return {key: value.decode() if isinstance(value, bytes) else value for key, value in attrs.items()}
+
+
+def _read(dims: tuple[str, ...], values: npt.NDArray[Any], attrs: dict[str, Any]) -> Column:
+    """A variable as it was before :func:`_stored`."""
+    if values.dtype.kind != "S":
+        own = bool if attrs.pop("dtype", None) == "bool" else values.dtype.newbyteorder("=")
+        return Column(dims, values.astype(own), attrs)
+    del attrs["_Encoding"]
+    texts = [b"".join(letters).decode() for letters in values.reshape(-1, values.shape[-1])]
+    return Column(dims[:-1], np.array(texts, dtype=str).reshape(values.shape[:-1]), attrs)

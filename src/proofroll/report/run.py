@@ -9,7 +9,7 @@ from typing import Any
 from proofroll.core.diagnosis.of_scene import Diagnosis, diagnosed
 from proofroll.core.events import Event, events_of
 from proofroll.files.json_data import OPTIONAL
-from proofroll.files.netcdf import read
+from proofroll.files.netcdf import read_columns
 from proofroll.files.scene_file import load_scene
 from proofroll.report.labels import settings_text
 from proofroll.running.case import Case, Result
@@ -71,15 +71,15 @@ def run_content(case: Case, result: Result, trajectory: Path) -> RunContent:
     )
     if result.trajectory is None:
         return content
-    dataset = read(trajectory)
-    curves = {str(name): variable for name, variable in dataset.data_vars.items() if variable.dims == ("time",)}
-    smallest = dataset.attrs.get("smallest_N")
+    columns = read_columns(trajectory)
+    curves = {key: item for key, item in columns.variables.items() if item.dims == ("time",) and key != "time"}
+    smallest = columns.attrs.get("smallest_N")
     return replace(
         content,
-        final={"time": float(dataset["time"][-1])} | {name: float(curve[-1]) for name, curve in curves.items()},
+        final={"time": float(columns["time"].values[-1])} | {name: float(c.values[-1]) for name, c in curves.items()},
         units={"time": "s"} | {name: curve.attrs["units"] for name, curve in curves.items()},
         absent={name: str(curve.attrs["absent"]) for name, curve in curves.items() if "absent" in curve.attrs},
-        events=events_of(dataset),
+        events=events_of(columns),
         smallest_N=None if smallest is None else float(smallest),
         error_bars={name: float(c.attrs["error_bar"]) for name, c in curves.items() if "error_bar" in c.attrs} or None,
     )

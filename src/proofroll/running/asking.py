@@ -96,7 +96,8 @@ def prepare(engine: str, workers: Workers) -> None:
     """
     with contextlib.suppress(ProofrollError), workers.lend(parse_engine(engine).name) as worker:
         worker.request({"do": "resolve", "engine": parse_engine(engine).name, "options": {}}, _START_UP_SECONDS)
-        importing = {"function": "proofroll.files.netcdf:import_xarray", "arguments": {}}
+        name = "import_xarray" if parse_engine(engine).name == "truth" else "import_backend"
+        importing = {"function": f"proofroll.files.netcdf:{name}", "arguments": {}}
         worker.request({"do": "call", **importing}, _START_UP_SECONDS)
 
 

@@ -11,7 +11,8 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from proofroll.core.arrays import FloatArray
-from proofroll.core.dataset import add_events, from_samples
+from proofroll.core.columns import Columns
+from proofroll.core.dataset import add_events, columns_of
 from proofroll.core.element import Element
 from proofroll.core.element_abilities import WatchesRuns
 from proofroll.core.engine_abilities import TellsRemarks
@@ -60,7 +61,7 @@ class Recording:
     """What a run gave before it ended.
 
     Attributes:
-        dataset: the trajectory up to the last finite sample.
+        columns: the trajectory up to the last finite sample.
         failure: one sentence if it failed early, else None.
         ended: one sentence if it ended where the ball leaves the wall, for the model holds the ball there, else None.
         wall_seconds: spent inside ``advance`` [s].
@@ -69,13 +70,18 @@ class Recording:
         remarks: of the engine about a run that went well (:class:`proofroll.core.engine_abilities.TellsRemarks`).
     """
 
-    dataset: xr.Dataset
+    columns: Columns
     failure: str | None
     wall_seconds: float
     advancing: tuple[float, float] = (0.0, 0.0)
     sampling: tuple[float, float] = (0.0, 0.0)
     remarks: tuple[str, ...] = ()
     ended: str | None = None
+
+    @property
+    def dataset(self) -> xr.Dataset:
+        """The trajectory as a dataset."""
+        return self.columns.dataset()
 
     def message(self, until: float) -> str:
         """One sentence: why it ended early, or that it reached ``until`` [s] and what is to be said about that."""
@@ -135,11 +141,11 @@ def record(engine: Any, scene: Scene, times: FloatArray, probes: Iterable[float]
     )
     failure = failure or next(filter(None, lacking), None)
     last = times[len(samples) - 1]
-    dataset = from_samples(scene, times, samples, {at: sample for at, sample in between.items() if at < last})
+    columns = columns_of(scene, times, samples, {at: sample for at, sample in between.items() if at < last})
     for owner, found in events:
-        dataset = add_events(scene, owner, dataset, found)
+        columns = add_events(scene, owner, columns, found)
     remarks = tuple(engine.remarks()) if isinstance(engine, TellsRemarks) else ()
-    return Recording(dataset, failure, wall, (wall, inside), sampling, remarks, ended)
+    return Recording(columns, failure, wall, (wall, inside), sampling, remarks, ended)
 
 
 _NOT_FINITE = "is not finite (NaN or overflow)"

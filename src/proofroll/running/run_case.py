@@ -21,10 +21,7 @@ from proofroll.running.time_case import clean_runs
 
 def run(case: dict[str, Any], out: str) -> dict[str, Any]:
     """Runs a case and writes its trajectory to ``out``; everything the case says comes back as a result."""
-    from proofroll.files.netcdf import import_xarray
-
     spent = TimeAccounts()
-    import_xarray()
     try:
         answer = dataclasses.asdict(_run(Case.from_dict(case), Path(out), spent)) | {"interpreter": sys.executable}
     finally:
@@ -67,8 +64,9 @@ def _run(case: Case, out: Path, spent: TimeAccounts) -> Result:
     except (Refused, Diverged) as error:
         return _answer(error, versions)
     timings: list[float] = []
-    if recording.failure is None and case.timed and recording.dataset.sizes["time"] > 1:
-        timings, inside = clean_runs(kind, scene, settings, times[: recording.dataset.sizes["time"]])
+    reached = recording.columns["time"].values
+    if recording.failure is None and case.timed and len(reached) > 1:
+        timings, inside = clean_runs(kind, scene, settings, reached)
         spent.on("building", clean_runs=inside)
     result = Result(
         status=Status.DONE if recording.failure is None else Status.DIVERGED,
@@ -82,7 +80,7 @@ def _run(case: Case, out: Path, spent: TimeAccounts) -> Result:
     )
     said = {"status": result.status.value, "message": result.message, "wall_seconds": result.wall_seconds}
     said |= manifest(case.engine.name, case.engine.settings, scene, versions, found)
-    write(recording.dataset.assign_attrs(said), out)
+    write(recording.columns.assign(**said), out)
     spent.on("writing")
     return result
 
@@ -101,7 +99,9 @@ def _answer(error: Refused | Diverged, versions: dict[str, str]) -> Result:
 
 def _run_truth(scene: Any, times: Any, out: Path, versions: dict[str, str]) -> Result:
     from proofroll.core.truth import truth
-    from proofroll.files.netcdf import write
+    from proofroll.files.netcdf import import_xarray, write
+
+    import_xarray()
 
     start = time.perf_counter()
     try:

@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from proofroll.core.arrays import FloatArray
+from proofroll.core.columns import Column, Columns, axes
 from proofroll.core.engine import Sample
 from proofroll.elements.ball_on_surface.mechanics import energy, slip_velocity, wall_velocity
 from proofroll.elements.ball_on_surface.model import RollingBall
@@ -19,7 +20,7 @@ if TYPE_CHECKING:
 
 def from_samples(
     body: RollingBall, times: FloatArray, samples: Sequence[Sample], between: Mapping[float, Sample]
-) -> xr.Dataset:
+) -> Columns:
     """The variables of a run, from one sample per time [s] and some between them; a force missing at time 0 is NaN."""
 
     def stacked(values: list[FloatArray | None]) -> FloatArray | None:
@@ -29,7 +30,7 @@ def from_samples(
     if len(forces) > 1 and forces[0] is None:
         forces[0] = np.full(3, np.nan)
     p, v, w = (np.array([np.reshape(getattr(s, key), 3) for s in samples]) for key in ("p_WB", "v_WB", "w_WB"))
-    dataset = variables(
+    made = columns(
         body,
         times,
         p,
@@ -38,23 +39,24 @@ def from_samples(
         force=stacked(forces),
         q_WB=stacked([s.q_WB for s in samples]),
     )
-    dataset = with_samples_between(dataset, between)
-    if any(s.sticking is None for s in samples):
-        return dataset
-    sticking = np.array([s.sticking for s in samples], dtype=np.int8)  # netCDF has no boolean
-    return dataset.assign(sticking=("time", sticking, {"units": "1", "long_name": "1 sticks, 0 slips"}))
+    found = {**made.variables, **samples_between(between)}
+    if all(s.sticking is not None for s in samples):
+        sticking = np.array([s.sticking for s in samples], dtype=np.int8)  # netCDF has no boolean
+        found["sticking"] = Column(("time",), sticking, {"units": "1", "long_name": "1 sticks, 0 slips"})
+    return Columns(found, made.attrs)
 
 
-def with_samples_between(dataset: xr.Dataset, samples: Mapping[float, Sample]) -> xr.Dataset:
-    """The trajectory with samples off its grid, by time [s]: ``p_between`` [m] and ``v_between`` [m/s]."""
+def samples_between(samples: Mapping[float, Sample]) -> dict[str, Column]:
+    """Samples off the grid, by time [s]: ``p_between`` [m] and ``v_between`` [m/s] along ``between`` [s]; if any."""
     if not samples:
-        return dataset
+        return {}
     p, v = (np.array([np.reshape(getattr(s, name), 3) for s in samples.values()]) for name in ("p_WB", "v_WB"))
     of = "off the grid, in the world"
-    return dataset.assign(
-        p_between=(("between", "xyz"), p, {"units": "m", "long_name": f"centre of the ball {of}"}),
-        v_between=(("between", "xyz"), v, {"units": "m/s", "long_name": f"velocity of the centre {of}"}),
-    ).assign_coords(between=("between", list(samples), {"units": "s"}))
+    return {
+        "p_between": Column(("between", "xyz"), p, {"units": "m", "long_name": f"centre of the ball {of}"}),
+        "v_between": Column(("between", "xyz"), v, {"units": "m/s", "long_name": f"velocity of the centre {of}"}),
+        "between": Column(("between",), np.array(list(samples)), {"units": "s"}),
+    }
 
 
 def variables(
@@ -67,15 +69,27 @@ def variables(
     force: FloatArray | None = None,
     q_WB: FloatArray | None = None,
 ) -> xr.Dataset:
-    """Everything that follows from the state and the contact force, as one Dataset.
+    """See :func:`columns`, as a dataset."""
+    return columns(body, times, p_WB, v_WB, w_WB, force=force, q_WB=q_WB).dataset()
+
+
+def columns(
+    body: RollingBall,
+    times: FloatArray,
+    p_WB: FloatArray,
+    v_WB: FloatArray,
+    w_WB: FloatArray,
+    *,
+    force: FloatArray | None = None,
+    q_WB: FloatArray | None = None,
+) -> Columns:
+    """Everything that follows from the state and the contact force.
 
     Variables: ``p_WB`` [m], ``v_WB`` [m/s], ``w_WB`` [rad/s] with dims (time, xyz), ``q_WB`` (time, wxyz);
     the surface's coordinates (``gamma``, unwrapped, and ``z`` on a cylinder) and their rates; ``omega1..3`` [rad/s],
     ``slip2``, ``slip3`` [m/s] and ``N``, ``F2``, ``F3`` [N] in the local frame e1, e2, e3; ``needed_friction``
     |F|/N [-]; ``gap`` [m]; ``energy`` [J]. What the engine cannot say is absent.
     """
-    import xarray as xr
-
     surface = body.surface
     rates = _coordinate_rates(surface, p_WB, v_WB)
     u = _unwrapped(body, times, surface.locate(p_WB), rates)
@@ -85,10 +99,10 @@ def variables(
     sliding = slip_velocity(body.ball.radius, e1, v_WB, w_WB) - wall_velocity(body, p_WB, e1)
     slip = np.einsum("tij,ti->tj", frame, sliding)
 
-    found: dict[str, tuple[tuple[str, ...], FloatArray, dict[str, str]]] = {}
+    found: dict[str, Column] = {}
 
     def put(name: str, values: FloatArray, units: str, meaning: str, *dims: str) -> None:
-        found[name] = (("time", *dims), values, {"units": units, "long_name": meaning})
+        found[name] = Column(("time", *dims), values, {"units": units, "long_name": meaning})
 
     put("p_WB", p_WB, "m", "centre of the ball in the world", "xyz")
     put("v_WB", v_WB, "m/s", "velocity of the centre in the world", "xyz")
@@ -112,14 +126,10 @@ def variables(
             put("needed_friction", np.hypot(local[:, 1], local[:, 2]) / -local[:, 0], "1", "friction needed, |F|/N")
     put("gap", surface.gap(p_WB), "m", "distance of the ball from the wall")
     put("energy", energy(body, p_WB, v_WB, w_WB), "J", "kinetic plus potential energy")
-    return xr.Dataset(
-        found,
-        coords={"time": ("time", times, {"units": "s"}), "xyz": ["x", "y", "z"], "wxyz": ["w", "x", "y", "z"]},
-        attrs=_smallest(found),
-    )
+    return Columns(found | axes(times), _smallest(found))
 
 
-def _smallest(variables: Mapping[str, tuple[tuple[str, ...], FloatArray, dict[str, str]]]) -> dict[str, float]:
+def _smallest(variables: Mapping[str, Column]) -> dict[str, float]:
     """``smallest_N``, the least normal force at the samples [N], without time 0 (where several engines know none)."""
     found = variables["N"][1] if "N" in variables else np.zeros(0)
     return {"smallest_N": float(np.min(found[1:] if len(found) > 1 else found))} if len(found) else {}

@@ -12,6 +12,7 @@ from typing import TYPE_CHECKING, Any, ClassVar
 import numpy as np
 
 from proofroll.core.arrays import FloatArray
+from proofroll.core.columns import Columns
 from proofroll.core.element import FirstMotion, OptionalTerm, Sign, StepNumber
 from proofroll.core.element_abilities import RunWatch
 from proofroll.core.engine import Sample
@@ -188,7 +189,7 @@ class BallOnSurface:
         friction = truth["needed_friction"].to_numpy()
         return another_scene(lines, float(np.max(friction[np.isfinite(friction)], initial=0.0)))
 
-    def dataset(self, times: FloatArray, samples: Sequence[Sample], between: Mapping[float, Sample]) -> xr.Dataset:
+    def variables(self, times: FloatArray, samples: Sequence[Sample], between: Mapping[float, Sample]) -> Columns:
         """See the protocol; the variables are those of :func:`proofroll.elements.ball_on_surface.dataset.variables`."""
         from proofroll.elements.ball_on_surface.dataset import from_samples
 

@@ -8,19 +8,18 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from proofroll.core.arrays import FloatArray
+from proofroll.core.columns import Column, Columns, axes
 from proofroll.core.engine import Sample
 from proofroll.elements.mechanism.placed import Placed
 
 if TYPE_CHECKING:
-    import xarray as xr
-
     from proofroll.elements.mechanism.element import MechanismElement
 
 # Why a variable has no value.
 UNDETERMINED, UNSAID = "not determined by the equations", "not given by the engine"
 
 
-def from_samples(element: MechanismElement, times: FloatArray, samples: Sequence[Sample]) -> xr.Dataset:
+def from_samples(element: MechanismElement, times: FloatArray, samples: Sequence[Sample]) -> Columns:
     """The variables of a run, from one sample per time [s]."""
     count = len(element.bodies)
 
@@ -32,10 +31,10 @@ def from_samples(element: MechanismElement, times: FloatArray, samples: Sequence
     rows = len(element.analysis.determinate)
     force, torque = stacked("joint_force", 3, rows), stacked("joint_torque", 3, rows)
     p, v, w = (stacked(name, 3, count) for name in ("p_WB", "v_WB", "w_WB"))
-    return variables(element, times, p, v, w, stacked("q_WB", 4, count), force, torque)
+    return columns(element, times, p, v, w, stacked("q_WB", 4, count), force, torque)
 
 
-def variables(
+def columns(
     element: MechanismElement,
     times: FloatArray,
     p_WB: FloatArray,
@@ -44,8 +43,8 @@ def variables(
     q_WB: FloatArray,
     force: FloatArray,
     torque: FloatArray,
-) -> xr.Dataset:
-    """Everything that follows from the motion of the bodies and the wrenches, as one Dataset.
+) -> Columns:
+    """Everything that follows from the motion of the bodies and the wrenches.
 
     Variables: ``p_WB`` [m], ``v_WB`` [m/s], ``w_WB`` [rad/s] over (time, body, xyz), ``q_WB`` over (time, body, wxyz);
     ``positions`` [m] of the tracked points; ``q.<joint>``, ``v.<joint>`` of joints with one coordinate;
@@ -53,15 +52,13 @@ def variables(
     world axes, NaN where the attribute ``absent`` says why; ``forces``, ``torques``: the
     determinate components of all; ``energy`` [J], ``energy_error`` [J], ``drift`` [m].
     """
-    import xarray as xr
-
     mechanism, determinate = element.mechanism, element.analysis.determinate
     placed = Placed(mechanism, times, p_WB, v_WB, w_WB, _continuous(q_WB, element.start.q_WB[0]))
-    found: dict[str, tuple[tuple[str, ...], FloatArray, dict[str, str]]] = {}
+    found: dict[str, Column] = {}
 
     def put(name: str, values: FloatArray, unit: str, meaning: str, *dims: str, absent: str = "") -> None:
         attributes = {"units": unit, "long_name": meaning} | ({"absent": absent} if absent else {})
-        found[name] = (("time", *dims), values, attributes)
+        found[name] = Column(("time", *dims), values, attributes)
 
     put("p_WB", p_WB, "m", "origin of each body's frame in the world", "body", "xyz")
     put("v_WB", v_WB, "m/s", "velocity of that origin in the world", "body", "xyz")
@@ -96,8 +93,7 @@ def variables(
     put("energy", energy, "J", "kinetic and potential energy")
     put("energy_error", energy - energy[0], "J", "energy now minus energy at the start")
     put("drift", placed.drift(), "m", "how far joints and loops are open")
-    coordinates = {"time": ("time", times, {"units": "s"}), "xyz": ["x", "y", "z"], "wxyz": ["w", "x", "y", "z"]}
-    return xr.Dataset(found, coordinates | {"body": list(element.bodies)})
+    return Columns(found | axes(times) | {"body": Column(("body",), np.array(element.bodies, dtype=str))})
 
 
 def _continuous(q_WB: FloatArray, start: FloatArray) -> FloatArray:

@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from proofroll.core.arrays import FloatArray
+from proofroll.core.columns import Columns
 from proofroll.core.element import FirstMotion, OptionalTerm, Sign, StepNumber
 from proofroll.core.engine import Sample
 from proofroll.core.failed_run import FailedRun
@@ -207,7 +208,7 @@ class MechanismElement:
         """See the protocol."""
         return frozenset({"acceleration", "angular acceleration", "forces", "torques"})
 
-    def dataset(self, times: FloatArray, samples: Sequence[Sample], between: Mapping[float, Sample]) -> xr.Dataset:  # noqa: ARG002 -- the grid hides nothing here: positions are held against the truth
+    def variables(self, times: FloatArray, samples: Sequence[Sample], between: Mapping[float, Sample]) -> Columns:  # noqa: ARG002 -- the grid hides nothing here: positions are held against the truth
         """See the protocol; the variables are those of :mod:`proofroll.elements.mechanism.dataset`."""
         from proofroll.elements.mechanism.dataset import from_samples
 

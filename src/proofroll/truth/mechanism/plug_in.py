@@ -9,7 +9,7 @@ import numpy as np
 
 from proofroll.core.arrays import FloatArray
 from proofroll.core.element import Element
-from proofroll.elements.mechanism.dataset import variables
+from proofroll.elements.mechanism.dataset import columns
 from proofroll.elements.mechanism.element import MechanismElement
 from proofroll.truth.mechanism.two_routes import find_truth
 
@@ -39,7 +39,7 @@ class MechanismTruth:
         found = find_truth(element.mechanism, times)
         record = found.record
         force, torque = record.wrench[..., :3], record.wrench[..., 3:]
-        dataset = variables(
+        dataset = columns(
             element,
             np.asarray(times, dtype=np.float64),
             record.p_WB,
@@ -48,7 +48,7 @@ class MechanismTruth:
             record.q_WB,
             force,
             torque,
-        )
+        ).dataset()
         points = [point.name for point in element.mechanism.points]
         for name, variable in dataset.data_vars.items():
             field = _BARS.get(str(name)) or next((v for k, v in _PREFIXES.items() if str(name).startswith(k)), None)

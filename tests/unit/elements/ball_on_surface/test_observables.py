@@ -13,7 +13,7 @@ from scipy.spatial.transform import Rotation
 from proofroll.core.dataset import from_samples, observe, scales
 from proofroll.core.engine import Sample
 from proofroll.core.scene import Scene
-from proofroll.elements.ball_on_surface.dataset import variables, with_samples_between
+from proofroll.elements.ball_on_surface.dataset import samples_between, variables
 from proofroll.elements.ball_on_surface.element import rolling_ball
 from proofroll.elements.ball_on_surface.motion import BallMotion
 from proofroll.elements.ball_on_surface.observables import energy_balance, force_audit, rate_audit
@@ -112,7 +112,7 @@ def test_rate_audit_sees_an_error_with_the_period_of_the_grid() -> None:
             index = int(np.searchsorted(both, t))
             beat = np.array([0, 0, size * np.sin(200 * np.pi * t)])
             samples[t] = Sample(probed.p_WB[index] + beat, probed.v_WB[index], probed.w_WB[index])
-        return with_samples_between(dataset, samples)
+        return dataset.assign(samples_between(samples))
 
     assert largest(rate_audit(rolling_ball(scene), with_beat(0.0))) < 1e-7
     assert largest(rate_audit(rolling_ball(scene), with_beat(1e-5))) > 1e-5 / 0.005 / 2

@@ -1,0 +1,73 @@
+"""The variables of a run as plain arrays: to import xarray for them is half of what a short run costs."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+from typing import TYPE_CHECKING, Any, NamedTuple
+
+import numpy as np
+import numpy.typing as npt
+
+if TYPE_CHECKING:
+    import xarray as xr
+
+
+class Column(NamedTuple):
+    """One variable, in the order in which xarray takes one.
+
+    Attributes:
+        dims: names of the dimensions; a variable named as its only dimension is that dimension's coordinate.
+        values: in the unit ``attrs["units"]``.
+        attrs: ``units``, ``long_name`` and what else there is to say.
+    """
+
+    dims: tuple[str, ...]
+    values: npt.NDArray[Any]
+    attrs: Mapping[str, Any] = {}
+
+    def to_numpy(self) -> npt.NDArray[Any]:
+        """The values, as an xarray variable gives them."""
+        return self.values
+
+
+@dataclass(frozen=True)
+class Columns:
+    """What an ``xarray.Dataset`` is made of.
+
+    Attributes:
+        variables: by name, those of the dimensions among them.
+        attrs: what is said of all.
+    """
+
+    variables: Mapping[str, Column]
+    attrs: Mapping[str, Any] = field(default_factory=dict)
+
+    @classmethod
+    def of(cls, dataset: xr.Dataset) -> Columns:
+        """Those of a dataset."""
+        found = dataset.variables.items()
+        columns = {str(name): Column(tuple(map(str, v.dims)), v.to_numpy(), v.attrs) for name, v in found}
+        return cls(columns, {str(key): value for key, value in dataset.attrs.items()})
+
+    def __contains__(self, name: object) -> bool:
+        return name in self.variables
+
+    def __getitem__(self, name: str) -> Column:
+        return self.variables[name]
+
+    def assign(self, **said: Any) -> Columns:
+        """With more said of all."""
+        return Columns(self.variables, {**self.attrs, **said})
+
+    def dataset(self) -> xr.Dataset:
+        """As what everybody else reads."""
+        import xarray as xr
+
+        return xr.Dataset(self.variables, attrs=self.attrs)
+
+
+def axes(times: npt.NDArray[np.float64]) -> dict[str, Column]:
+    """The coordinates of what depends on the time [s] and on components in the world."""
+    components = {name: Column((name,), np.array(list(name))) for name in ("xyz", "wxyz")}
+    return {"time": Column(("time",), times, {"units": "s"})} | components
