@@ -5,10 +5,9 @@ from __future__ import annotations
 from dataclasses import dataclass, field
 from typing import Literal
 
-from pydantic import ConfigDict
-
 from blajer_2006.measures import Measure
 from blajer_2006.quantities import ANGLES, TIME
+from proofroll.files.validation import strict
 
 CRITERIA = ("stated", "at_most", "below", "above", "order", "events")
 
@@ -174,5 +173,4 @@ class Figures:
         return bool((drawn | {item.of for item in self.statements}) & set(ANGLES))
 
 
-for _typed in (Figures, Figure, Panel, HorizontalLine, PlannedRun, Statement):
-    setattr(_typed, "__pydantic_config__", ConfigDict(extra="forbid"))  # noqa: B010 -- the name is pydantic's, not the class's
+strict(Figures, Figure, Panel, HorizontalLine, PlannedRun, Statement)

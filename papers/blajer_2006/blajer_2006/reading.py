@@ -5,8 +5,6 @@ from __future__ import annotations
 import re
 from decimal import Decimal, InvalidOperation
 
-from pydantic import TypeAdapter, ValidationError
-
 from blajer_2006.definition import CRITERIA, Figure, Figures, Statement
 from blajer_2006.quantities import known
 from proofroll.core.errors import InputError
@@ -15,7 +13,7 @@ from proofroll.elements.ball_on_surface.element import rolling_ball
 from proofroll.elements.ball_on_surface.regimes_study import load_regimes
 from proofroll.files.scene_file import load_scene
 from proofroll.files.toml import study_file
-from proofroll.files.validation import first_problem
+from proofroll.files.validation import validated
 
 STUDY = "figures"
 
@@ -27,10 +25,7 @@ def load_figures(name: str) -> Figures:
         InputError: there is none, it is broken, or it is about something else.
     """
     path, content = study_file(name, STUDY)
-    try:
-        found = TypeAdapter(Figures).validate_python({**content, "name": path.stem})
-    except ValidationError as error:
-        raise first_problem(error, path.name) from None
+    found = validated(Figures, {**content, "name": path.stem}, path.name)
     _check(path.name, found)
     return found
 

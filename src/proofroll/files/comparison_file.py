@@ -8,8 +8,6 @@ from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
 
-from pydantic import ConfigDict, TypeAdapter, ValidationError
-
 from proofroll.core.comparison import Band, Comparison, ExceptAt, Row, Tolerance
 from proofroll.core.errors import InputError
 from proofroll.core.observable import Observable
@@ -19,7 +17,7 @@ from proofroll.core.verdict import Verdict
 from proofroll.files.data_folders import study_folders
 from proofroll.files.scene_file import load_scene
 from proofroll.files.toml import named_file, read_toml, study_of
-from proofroll.files.validation import first_problem
+from proofroll.files.validation import strict, validated
 
 _LADDER_RUNGS = 3
 # A run for each combination of parameters takes a second: more than these are a mistake.
@@ -70,12 +68,9 @@ def _comparison(path: Path, content: dict[str, Any]) -> Comparison:
     if not isinstance(given, list) or not given:
         raise InputError(f"{where}: rows", given, "give at least one engine; write [[rows]] before each")
     rows = [_prepared(f"{where}: rows.{index}", row) for index, row in enumerate(given)]
-    try:
-        comparison = TypeAdapter(Comparison).validate_python(
-            {**content, "name": path.stem, "bands": bands, "rows": rows, "left_out": 0}
-        )
-    except ValidationError as error:
-        raise first_problem(error, where) from None
+    comparison = validated(
+        Comparison, {**content, "name": path.stem, "bands": bands, "rows": rows, "left_out": 0}, where
+    )
     if math.prod(map(len, comparison.vary.values())) + len(comparison.points) > _MOST_POINTS:
         raise InputError(f"{where}: vary", list(comparison.vary), f"that is more than {_MOST_POINTS} points; vary less")
     known = load_scene(comparison.scene).observables
@@ -212,5 +207,4 @@ def _check_bounds(where: str, known: Mapping[str, Observable], bounds: Mapping[s
             raise InputError(f"{where}: {name}", bound.unit, f"its unit is {known[name].unit}")
 
 
-for _typed in (Comparison, Row, ExceptAt):
-    setattr(_typed, "__pydantic_config__", ConfigDict(extra="forbid"))  # noqa: B010 -- the name is pydantic's, not the class's
+strict(Comparison, Row, ExceptAt)

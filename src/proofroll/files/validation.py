@@ -30,7 +30,7 @@ def validated(kind: type[_T], content: object, where: str) -> _T:
         found: _T = _adapter(kind).validate_python(content)  # type: ignore[arg-type]  # any class can be hashed
         return found
     except ValidationError as error:
-        raise first_problem(error, where) from None
+        raise _first_problem(error, where) from None
 
 
 @cache
@@ -39,7 +39,7 @@ def _adapter(kind: type) -> TypeAdapter[Any]:
     return TypeAdapter(kind)
 
 
-def first_problem(error: ValidationError, where: str) -> InputError:
+def _first_problem(error: ValidationError, where: str) -> InputError:
     """One line about the first thing that pydantic found wrong in ``where``."""
     problem = error.errors()[0]
     location = ".".join(str(part) for part in problem["loc"])

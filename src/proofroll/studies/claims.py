@@ -6,13 +6,11 @@ from dataclasses import dataclass, field
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from pydantic import ConfigDict, TypeAdapter, ValidationError
-
 from proofroll.core.comparison import Tolerance
 from proofroll.core.errors import InputError
 from proofroll.files.scene_file import load_scene
 from proofroll.files.toml import read_toml, study_files
-from proofroll.files.validation import first_problem
+from proofroll.files.validation import strict, validated
 from proofroll.studies.claimed import Cheapest, ClaimJudgement, Converges, Holds
 from proofroll.studies.curve import Question
 
@@ -98,10 +96,7 @@ def _claims(path: Path, content: dict[str, Any]) -> TradeoffClaims:
                 claim["tolerance"] = Tolerance.parse(f"{where}: {kind}.{index}.tolerance", claim.get("tolerance"))
                 if kind == "cheapest" and isinstance(claim.get("engine"), str):
                     claim["engine"] = [claim["engine"]]
-    try:
-        found = TypeAdapter(TradeoffClaims).validate_python({**given, "name": path.stem})
-    except ValidationError as error:
-        raise first_problem(error, where) from None
+    found = validated(TradeoffClaims, {**given, "name": path.stem}, where)
     _check(where, found)
     return found
 
@@ -124,5 +119,4 @@ def _check(where: str, found: TradeoffClaims) -> None:
             load_scene(found.scene, **{**found.parameters, name: value})
 
 
-for _typed in (TradeoffClaims, Cheapest, Holds, Converges):
-    setattr(_typed, "__pydantic_config__", ConfigDict(extra="forbid"))  # noqa: B010 -- the name is pydantic's, not the class's
+strict(TradeoffClaims, Cheapest, Holds, Converges)

@@ -7,13 +7,11 @@ from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Literal
 
-from pydantic import ConfigDict, TypeAdapter, ValidationError
-
 from proofroll.core.errors import InputError
 from proofroll.core.plugins import parse_engine
 from proofroll.files.scene_file import load_scene, read_scene_file
 from proofroll.files.toml import read_toml, study_files
-from proofroll.files.validation import first_problem
+from proofroll.files.validation import strict, validated
 from proofroll.studies.axes import Axis, AxisTerm
 from proofroll.studies.failure import meanings
 from proofroll.studies.first_look import axes_of
@@ -171,10 +169,7 @@ def _load(path: Path) -> StabilityFile:
     content = read_toml(path)
     if content.pop("study", None) != STUDY:
         raise InputError(str(path), "study", f'only a file with study = "{STUDY}" asks for a stability map')
-    try:
-        found = TypeAdapter(StabilityFile).validate_python({**content, "name": path.stem})
-    except ValidationError as error:
-        raise first_problem(error, where) from None
+    found = validated(StabilityFile, {**content, "name": path.stem}, where)
     _check(where, found)
     return found
 
@@ -207,5 +202,4 @@ def _check(where: str, found: StabilityFile) -> None:
                 raise InputError(f"{at}.{name}", pair, "write [low, high]")
 
 
-for _typed in (StabilityFile, Claim, Axis, AxisTerm):
-    setattr(_typed, "__pydantic_config__", ConfigDict(extra="forbid"))  # noqa: B010 -- the name is pydantic's, not the class's
+strict(StabilityFile, Claim, Axis, AxisTerm)

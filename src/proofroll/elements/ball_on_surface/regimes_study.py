@@ -9,7 +9,6 @@ from functools import partial
 from typing import TYPE_CHECKING
 
 import numpy as np
-from pydantic import ConfigDict, TypeAdapter, ValidationError
 
 from proofroll.core.arrays import FloatArray
 from proofroll.core.errors import InputError
@@ -18,7 +17,7 @@ from proofroll.elements.ball_on_surface.element import rolling_ball
 from proofroll.elements.ball_on_surface.model import RollingBall
 from proofroll.files.scene_file import load_scene
 from proofroll.files.toml import study_file
-from proofroll.files.validation import first_problem
+from proofroll.files.validation import strict, validated
 from proofroll.running.in_processes import in_processes
 from proofroll.truth.regimes import Regime, analytic_boundaries, classify
 from proofroll.truth.variants import at_speed, with_contact
@@ -96,10 +95,7 @@ def load_regimes(name: str) -> RegimesStudy:
         InputError: there is none, it is broken, or its numbers make no sense.
     """
     path, content = study_file(name, STUDY)
-    try:
-        found = TypeAdapter(RegimesStudy).validate_python({**content, "name": path.stem})
-    except ValidationError as error:
-        raise first_problem(error, path.name) from None
+    found = validated(RegimesStudy, {**content, "name": path.stem}, path.name)
     if not (math.isfinite(found.until) and found.until > 0):
         raise InputError(f"{path.name}: until", found.until, "give a positive, finite time in s")
     if not found.rolling_resistance:
@@ -205,5 +201,4 @@ def _row(body: RollingBall, mus: FloatArray, until: float, speed: float) -> list
     return [classify(with_contact(here, mu_static=float(mu)), until) for mu in mus]
 
 
-for _typed in (RegimesStudy, EvenValues):
-    setattr(_typed, "__pydantic_config__", ConfigDict(extra="forbid"))  # noqa: B010 -- the name is pydantic's, not the class's
+strict(RegimesStudy, EvenValues)
