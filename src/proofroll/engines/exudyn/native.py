@@ -74,6 +74,8 @@ def add_kinematic_tree(
     [kg m²], and where that is [m]; ``others`` are arguments of the object that are plain lists.
     """
     size = len(turns)
+    # all at full length, or Exudyn ignores them
+    laws = dict.fromkeys(("Force", "PControl", "DControl", "PositionOffset", "VelocityOffset"), [0.0] * size)
     node = system.AddNode(
         items.NodeGenericODE2(
             referenceCoordinates=np.zeros(size),
@@ -89,7 +91,7 @@ def add_kinematic_tree(
             jointOffsets=exu.Vector3DList(list(offsets)),
             linkInertiasCOM=exu.Matrix3DList(list(inertias)),
             linkCOMs=exu.Vector3DList(list(coms)),
-            **others,
+            **{f"joint{name}Vector": numbers for name, numbers in laws.items()} | others,
         )
     )
 

@@ -10,6 +10,7 @@ import numpy as np
 from scipy.spatial.transform import Rotation
 
 from proofroll.core.errors import Refused
+from proofroll.engines.exudyn.integration import new_system
 from proofroll.engines.exudyn.native import Output, add_kinematic_tree, exu, items, new_settings
 from proofroll.robots.model import WORLD, Array, RobotJoint
 from proofroll.robots.protocol import AtState, Reading, Request, evaluate
@@ -23,7 +24,6 @@ class ExudynRobots:
 
     kinds: ClassVar[tuple[str, ...]] = ("urdf", "mjcf")
     options: ClassVar[Mapping[str, str]] = {}
-    # A free base has the rates of Euler angles, whose matrix near its singularity costs three digits.
     tolerances: ClassVar[Mapping[str, float]] = {}
     says: ClassVar[str] = "fed from our reading of the file: it has no importer of its own, so this checks its dynamics"
 
@@ -82,15 +82,13 @@ class _Tree:
         self.link: dict[str, int] = {}
         rows = [row for joint in self.robot.moving for row in self._rows(joint)]
         kinds, parents, turns, offsets, masses, coms, inertias = zip(*rows, strict=True)
-        self.container = exu.SystemContainer()
-        self.mbs = self.container.AddSystem()
+        self.container, self.mbs = new_system()
         zeros = [0.0] * len(rows)
         self.tree = add_kinematic_tree(
             self.mbs, zeros, zeros, turns=turns, offsets=offsets, inertias=inertias, coms=coms,
             jointTypes=[getattr(exu.JointType, f"{kind.capitalize()}{axis}") for kind, axis in kinds],
             linkParents=list(parents), linkMasses=list(masses), gravity=list(self.robot.gravity),
-            jointForceVector=zeros, jointPControlVector=zeros, jointDControlVector=list(self.damping),
-            jointPositionOffsetVector=zeros, jointVelocityOffsetVector=zeros,
+            jointDControlVector=list(self.damping),
         )  # fmt: skip
         self.markers = {
             joint.name: self.mbs.AddMarker(

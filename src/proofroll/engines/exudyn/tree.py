@@ -80,11 +80,9 @@ class KinematicTree:
             linkMasses=[data[joint.child].mass for joint in joints],
             gravity=list(mechanism.gravity),
             jointForceVector=[joint.torque for joint in joints],
-            # all four at full length, or Exudyn ignores them
             jointPControlVector=[joint.stiffness for joint in joints],
             jointDControlVector=[joint.damping for joint in joints],
             jointPositionOffsetVector=[joint.rest for joint in joints],
-            jointVelocityOffsetVector=[0.0] * len(joints),
         )
 
     def _in_link(self, body: str, position: Array) -> list[float]:
