@@ -73,7 +73,9 @@ class _TogetherWhatShares(LoadScopeScheduling):
         # A browser and pages are shared by a whole folder, truths by the rows of a comparison and by the engines that
         # are held against them; the many other checks of conformance share nothing dear.
         check = nodeid.rpartition("-")[2] if "moves_as_the_truth" in nodeid else nodeid
-        return {"report": folder, "agreement": nodeid.partition("-")[0], "conformance": check}.get(folder, path)
+        # The comparison accuracy runs many cases of the paper's, which are stored by then.
+        rows = nodeid.partition("-")[0].replace("[accuracy", "[paper")
+        return {"report": folder, "agreement": rows, "conformance": check}.get(folder, path)
 
 
 @pytest.hookimpl(optionalhook=True)

@@ -51,7 +51,7 @@ def test_every_mutant_is_detected_and_most_are_named() -> None:
         ("sphere_in_cylinder", {}, 0.3),
         ("sphere_in_cylinder", {"mu_static": 0.2, "mu_kinetic": 0.15}, 0.4),
         ("double_pendulum", {}, 0.3),
-        ("slider_crank", {}, 0.3),
+        ("slider_crank", {}, 0.2),
     ],
 )
 def test_small_errors_of_an_honest_engine_have_no_cause(scene: str, parameters: dict[str, float], until: float) -> None:

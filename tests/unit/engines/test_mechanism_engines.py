@@ -127,27 +127,20 @@ def test_a_loop_holds_as_the_joint_does(formulation, kind):
         assert np.abs(found - truth.wrench[-1, 1]).max() < force
 
 
-# Largest over a grid of times: positions [m], determinate reactions [N, N m].
+# Largest over a grid of times: positions [m], determinate reactions [N, N m]. What the comparisons slider_crank and
+# bricard bound as closely is not repeated.
 BOUNDS = [
     ("joints", "pendulum", 1.0, {"dt": 1e-3}, 1e-11, 1e-9),
     ("joints", "chain", 0.1, {"dt": 1e-3}, 1e-8, 1e-4),
-    ("joints", "slider_crank", 0.3, {"dt": 1e-3}, 2e-7, 0.1),
-    ("joints", "slider_crank", 0.3, {"dt": 1e-4, "time_constant": 10.0}, 1e-8, 1e-3),
-    ("joints", "bricard", 0.5, {"dt": 1e-3}, 1e-7, 1e-3),
     ("joints", "gyroscope_cart", 0.1, {"dt": 1e-4}, 1e-11, 1e-8),
-    ("redundant", "slider_crank", 0.3, {"dt": 1e-3}, 2e-5, 5e-3),
-    ("redundant", "bricard", 0.5, {"dt": 1e-3}, 1e-6, 1e-5),
     ("redundant", "oscillators", 0.5, {"dt": 1e-3}, 5e-6, 1e-3),
     ("redundant", "andrews_squeezer", 0.002, {"dt": 1e-5}, 2e-6, 0.02),
     ("tree", "chain", 0.1, {"dt": 1e-3}, 1e-11, None),
     ("tree", "oscillators", 0.5, {"dt": 1e-3}, 1e-13, None),
-    ("null_space", "slider_crank", 0.3, {}, 1e-11, 1e-9),
     ("null_space", "bricard", 0.5, {}, 1e-11, 1e-9),
     ("null_space", "gyroscope_cart", 0.1, {}, 1e-11, 1e-9),
     ("null_space", "free_body", 1.0, {}, 1e-11, 1e-9),
-    ("constraint_dynamics", "slider_crank", 0.3, {}, 1e-11, 1e-9),
     ("constraint_dynamics", "bricard", 0.5, {}, 1e-11, 1e-9),
-    ("dependent", "slider_crank", 0.3, {}, 1e-11, 1e-9),
     ("dependent", "bricard", 0.5, {}, 1e-11, 1e-9),
     ("dependent", "gyroscope_cart", 0.1, {}, 1e-11, 1e-9),
     ("dependent", "free_body", 1.0, {}, 1e-11, 1e-9),

@@ -202,5 +202,6 @@ class Tree:
 
 def _crosses(a: Array, columns: Array) -> Array:
     """A × each column."""
+    a0, a1, a2 = a.tolist()
     x, y, z = columns
-    return np.array([a[1] * z - a[2] * y, a[2] * x - a[0] * z, a[0] * y - a[1] * x])
+    return np.array([a1 * z - a2 * y, a2 * x - a0 * z, a0 * y - a1 * x])

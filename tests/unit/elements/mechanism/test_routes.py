@@ -7,7 +7,7 @@ import mechanism_examples
 import numpy as np
 import pytest
 
-from proofroll.core.errors import Diverged, Refused
+from proofroll.core.errors import Refused
 from proofroll.elements.mechanism import Body, Joint, Loop, Mechanism, Tree
 from proofroll.elements.mechanism.analysis import analysed
 from proofroll.elements.mechanism.assembly import check_start
@@ -50,18 +50,14 @@ def apart(one, two, mask):
     return np.abs(one.p_WB - two.p_WB).max(), attitude.max(), wrench.max()
 
 
-# Short, so that the slow route stays fast; the reactions scale with the forces of each scene.
+# A tree in space, each way to close loops, many bodies, and what is nearly singular; other scenes' routes are held
+# against each other wherever their truth is found. Short, so that the slow route stays fast; the reactions scale with
+# the forces of each scene.
 SHORT = {
-    "pendulum": (1.0, 1e-10),
-    "double_pendulum": (0.5, 1e-9),
-    "free_body": (2.0, 1e-12),
     "heavy_top": (0.2, 1e-10),
     "slider_crank": (0.2, 1e-10),
-    "four_bar": (0.1, 1e-10),
     "bricard": (0.3, 1e-9),
-    "andrews_squeezer": (0.003, 1e-8),
     "chain": (0.1, 1e-10),
-    "oscillators": (0.5, 1e-11),
     "gyroscope_cart": (0.1, 1e-10),
 }
 
@@ -126,7 +122,7 @@ def test_routes_agree_on_every_kind_of_loop(kind):
     )
     mechanism = replace(still, loops=(loop,))
     check_start(mechanism)
-    times = np.array([0.0, 0.02])
+    times = np.array([0.0, 0.005])
     one, two = JointCoordinates(mechanism).run(times), MaximalCoordinates(mechanism).run_dop853(times)
     place, attitude, wrench = apart(one, two, analysed(mechanism).determinate)
     assert max(place, attitude) < 1e-12
@@ -183,13 +179,6 @@ def test_dry_friction_is_refused():
         JointCoordinates(mechanism).run(np.array([0.1]))
     with pytest.raises(Refused, match="joint j has dry friction"):
         MaximalCoordinates(mechanism)
-
-
-def test_a_singular_pose_stops_error_control_in_time(scene):
-    """DOP853 says where it stalls instead of shrinking its steps for ever."""
-    mechanism = scene("four_bar", windows=1)
-    with pytest.raises(Diverged, match="stalls at t = "):
-        JointCoordinates(mechanism).run(np.array([3.0]))
 
 
 def test_steps_of_many_bodies_do_not_chase_round_off(scene, monkeypatch):
