@@ -7,9 +7,9 @@ from typing import Any
 
 from proofroll.core.engine_abilities import WritesModels
 from proofroll.core.errors import Refused
+from proofroll.running.asking import lent_workers
 from proofroll.running.case import Case
 from proofroll.running.loading import loaded, scene_of
-from proofroll.running.worker_pool import Workers
 
 _SECONDS = 300.0
 
@@ -20,14 +20,9 @@ def model_file(case: Case) -> str:
     Raises:
         Refused: the engine writes none, or none of this scene.
     """
-    workers = Workers()
-    try:
-        with workers.lend(case.engine.name) as worker:
-            arguments = {"case": dataclasses.asdict(case)}
-            request = {"do": "call", "function": f"{__name__}:written", "arguments": arguments}
-            answer = worker.request(request, _SECONDS)
-    finally:
-        workers.close()
+    arguments = {"case": dataclasses.asdict(case)}
+    with lent_workers(None) as lent, lent.lend(case.engine.name) as worker:
+        answer = worker.request({"do": "call", "function": f"{__name__}:written", "arguments": arguments}, _SECONDS)
     if "text" not in answer:
         raise Refused(f"{case.engine.name}: {answer['message']}")
     return str(answer["text"])
