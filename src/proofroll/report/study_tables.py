@@ -6,7 +6,7 @@ from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
 from proofroll.report.labels import error, name_of, number, symbol, unit
-from proofroll.report.tables import Column
+from proofroll.report.tables import QuantityColumn
 from proofroll.report.tradeoff_tables import cost_of, step_of
 
 if TYPE_CHECKING:
@@ -134,10 +134,10 @@ def budgets(entry: TradeoffEntry, quantity: str) -> list[BudgetLine]:
     ]
 
 
-def quantities(entry: TradeoffEntry) -> list[Column]:
+def quantities(entry: TradeoffEntry) -> list[QuantityColumn]:
     """The shown quantities with symbol and unit."""
     known = entry.study.quantities
-    return [Column(name, symbol(name), unit(known[name].unit if name in known else "")) for name in entry.shown]
+    return [QuantityColumn(name, symbol(name), unit(known[name].unit if name in known else "")) for name in entry.shown]
 
 
 def effort(study: TradeoffStudy) -> str:

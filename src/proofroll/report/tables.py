@@ -18,7 +18,7 @@ if TYPE_CHECKING:
 
 
 @dataclass(frozen=True)
-class Column:
+class QuantityColumn:
     """A judged observable: its name, its symbol and its unit as they are shown."""
 
     name: str
@@ -26,13 +26,13 @@ class Column:
     unit: str
 
 
-def observables(content: ReportedComparison) -> list[Column]:
+def observables(content: ReportedComparison) -> list[QuantityColumn]:
     """The judged observables in the order of the first row that has them all."""
     units: dict[str, str] = {}
     for row in sorted(content.rows, key=lambda row: -len(row.observables)):
         for name, judgement in row.observables.items():
             units.setdefault(name, judgement.unit)
-    return [Column(name, symbol(name), unit(text)) for name, text in units.items()]
+    return [QuantityColumn(name, symbol(name), unit(text)) for name, text in units.items()]
 
 
 @dataclass(frozen=True)

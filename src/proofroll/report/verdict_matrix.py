@@ -6,7 +6,7 @@ from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
 from proofroll.report.labels import SYMBOLS, detail, error, number, setting, step, symbol, unit, unjudged, verdict_text
-from proofroll.report.tables import Column, cost_title, observables
+from proofroll.report.tables import QuantityColumn, cost_title, observables
 
 if TYPE_CHECKING:
     from collections.abc import Mapping
@@ -51,7 +51,7 @@ class MatrixLine:
 class Matrix:
     """Rows by engine."""
 
-    columns: list[Column]
+    columns: list[QuantityColumn]
     groups: dict[str, list[MatrixLine]]
 
 
@@ -118,7 +118,7 @@ def _cell(judgement: Judgement, href: str, point: str = "") -> Cell:
 
 def _line(
     of: ReportedRow | ReportedRun,
-    columns: list[Column],
+    columns: list[QuantityColumn],
     judged: Mapping[str, Cell],
     text: str,
     href: str,
@@ -131,7 +131,7 @@ def _line(
     return MatrixLine(of.engine, of.name, setting(of), step(of), of.verdict, SYMBOLS[of.verdict], *said, cells)
 
 
-def _matrix(columns: list[Column], lines: list[MatrixLine]) -> Matrix:
+def _matrix(columns: list[QuantityColumn], lines: list[MatrixLine]) -> Matrix:
     """The lines grouped by engine."""
     groups: dict[str, list[MatrixLine]] = {}
     for line in lines:
