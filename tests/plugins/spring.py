@@ -14,7 +14,7 @@ from tiny import TinySettings
 
 from proofroll.core.arrays import FloatArray
 from proofroll.core.certificate import Line
-from proofroll.core.columns import Column, Columns
+from proofroll.core.columns import Columns, Variable
 from proofroll.core.element import Element, FirstMotion, OptionalTerm, Sign, StepNumber
 from proofroll.core.engine import Sample, whole_steps
 from proofroll.core.engine_abilities import Level, Term
@@ -87,8 +87,8 @@ class Spring:
         energy = 0.5 * self.mass * v**2 + 0.5 * self.stiffness * x**2
         columns = {"x": (x, "m"), "v": (v, "m/s"), "pull": (-self.stiffness * x, "N")}
         columns["energy_error"] = (energy - energy[0], "J")
-        variables = {k: Column(("time",), values, {"units": u, "long_name": k}) for k, (values, u) in columns.items()}
-        return Columns(variables | {"time": Column(("time",), times, {"units": "s"})})
+        variables = {k: Variable(("time",), values, {"units": u, "long_name": k}) for k, (values, u) in columns.items()}
+        return Columns(variables | {"time": Variable(("time",), times, {"units": "s"})})
 
     def lacks(self, samples: Sequence[Sample], asks: Sequence[str]) -> str | None:
         """Nothing."""

@@ -13,7 +13,7 @@ if TYPE_CHECKING:
     import xarray as xr
 
 
-class Column(NamedTuple):
+class Variable(NamedTuple):
     """One variable, in the order in which xarray takes one.
 
     Attributes:
@@ -40,20 +40,20 @@ class Columns:
         attrs: what is said of all.
     """
 
-    variables: Mapping[str, Column]
+    variables: Mapping[str, Variable]
     attrs: Mapping[str, Any] = field(default_factory=dict)
 
     @classmethod
     def of(cls, dataset: xr.Dataset) -> Columns:
         """Those of a dataset."""
         found = dataset.variables.items()
-        columns = {str(name): Column(tuple(map(str, v.dims)), v.to_numpy(), v.attrs) for name, v in found}
+        columns = {str(name): Variable(tuple(map(str, v.dims)), v.to_numpy(), v.attrs) for name, v in found}
         return cls(columns, {str(key): value for key, value in dataset.attrs.items()})
 
     def __contains__(self, name: object) -> bool:
         return name in self.variables
 
-    def __getitem__(self, name: str) -> Column:
+    def __getitem__(self, name: str) -> Variable:
         return self.variables[name]
 
     def assign(self, **said: Any) -> Columns:
@@ -67,7 +67,7 @@ class Columns:
         return xr.Dataset(self.variables, attrs=self.attrs)
 
 
-def axes(times: npt.NDArray[np.float64]) -> dict[str, Column]:
+def axes(times: npt.NDArray[np.float64]) -> dict[str, Variable]:
     """The coordinates of what depends on the time [s] and on components in the world."""
-    components = {name: Column((name,), np.array(list(name))) for name in ("xyz", "wxyz")}
-    return {"time": Column(("time",), times, {"units": "s"})} | components
+    components = {name: Variable((name,), np.array(list(name))) for name in ("xyz", "wxyz")}
+    return {"time": Variable(("time",), times, {"units": "s"})} | components

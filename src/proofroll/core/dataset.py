@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from proofroll.core.arrays import FloatArray
-from proofroll.core.columns import Column, Columns
+from proofroll.core.columns import Columns, Variable
 from proofroll.core.element import Element
 from proofroll.core.events import Event, event_columns
 from proofroll.core.scene import Scene
@@ -55,7 +55,7 @@ def columns_of(
 
 def joined(scene: Scene, parts: Mapping[str, Columns]) -> Columns:
     """The variables of all elements of the scene, by the elements' names; said of all is what no two say otherwise."""
-    found: dict[str, Column] = {}
+    found: dict[str, Variable] = {}
     said: dict[str, Any] = {}
     for element in scene.elements:
         found |= _labelled(scene, element, parts[element.name].variables)
@@ -66,7 +66,7 @@ def joined(scene: Scene, parts: Mapping[str, Columns]) -> Columns:
     return Columns(found, {**said, "scene": scene.name, "scene_digest": scene.digest})
 
 
-def _labelled(scene: Scene, element: Element, variables: Mapping[str, Column]) -> dict[str, Column]:
+def _labelled(scene: Scene, element: Element, variables: Mapping[str, Variable]) -> dict[str, Variable]:
     """The variables, and their dimensions, under their names in the scene."""
 
     def name(own: str) -> str:

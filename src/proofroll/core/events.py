@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from proofroll.core.columns import Column, Columns
+from proofroll.core.columns import Columns, Variable
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -30,7 +30,7 @@ class Event:
     time_high: float
 
 
-def event_columns(events: Sequence[Event]) -> dict[str, Column]:
+def event_columns(events: Sequence[Event]) -> dict[str, Variable]:
     """``event_kind`` and ``event_time``, ``event_low``, ``event_high`` [s] along ``event``."""
     columns = {
         "event_time": ("when it happened", [event.time for event in events]),
@@ -38,8 +38,8 @@ def event_columns(events: Sequence[Event]) -> dict[str, Column]:
         "event_high": ("not after", [event.time_high for event in events]),
     }
     kinds = np.array([event.kind for event in events], dtype=str) if events else np.zeros(0, dtype="<U1")
-    return {"event_kind": Column(("event",), kinds, {"units": "1", "long_name": "what happened"})} | {
-        name: Column(("event",), np.array(values, dtype=np.float64), {"units": "s", "long_name": meaning})
+    return {"event_kind": Variable(("event",), kinds, {"units": "1", "long_name": "what happened"})} | {
+        name: Variable(("event",), np.array(values, dtype=np.float64), {"units": "s", "long_name": meaning})
         for name, (meaning, values) in columns.items()
     }
 

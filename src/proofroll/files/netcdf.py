@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 import numpy.typing as npt
 
-from proofroll.core.columns import Column, Columns
+from proofroll.core.columns import Columns, Variable
 from proofroll.files.atomic import ordinary_content, replacing
 
 if TYPE_CHECKING:
@@ -92,13 +92,13 @@ def _encoded(columns: Columns) -> bytes:
     return written
 
 
-def _stored(dims: tuple[str, ...], values: npt.NDArray[Any], attrs: Mapping[str, Any]) -> Column:
+def _stored(dims: tuple[str, ...], values: npt.NDArray[Any], attrs: Mapping[str, Any]) -> Variable:
     """A variable as the format can hold it: text becomes characters, in one more dimension."""
     if values.dtype.kind != "U":
-        return Column(dims, _narrow(values), {**attrs, "dtype": "bool"} if values.dtype == bool else attrs)
+        return Variable(dims, _narrow(values), {**attrs, "dtype": "bool"} if values.dtype == bool else attrs)
     texts = np.array([text.encode() for text in values.ravel()], dtype=bytes)
     letters = texts.view("S1").reshape(*values.shape, texts.itemsize)
-    return Column((*dims, f"string{texts.itemsize}"), letters, {**attrs, "_Encoding": "utf-8"})
+    return Variable((*dims, f"string{texts.itemsize}"), letters, {**attrs, "_Encoding": "utf-8"})
 
 
 def _attribute(value: Any) -> bytes | npt.NDArray[Any]:
@@ -166,11 +166,11 @@ def _said(item: Any) -> dict[str, Any]:
     return {key: value.decode() if isinstance(value, bytes) else value for key, value in attrs.items()}
 
 
-def _read(dims: tuple[str, ...], values: npt.NDArray[Any], attrs: dict[str, Any]) -> Column:
+def _read(dims: tuple[str, ...], values: npt.NDArray[Any], attrs: dict[str, Any]) -> Variable:
     """A variable as it was before :func:`_stored`."""
     if values.dtype.kind != "S":
         own = bool if attrs.pop("dtype", None) == "bool" else values.dtype.newbyteorder("=")
-        return Column(dims, values.astype(own), attrs)
+        return Variable(dims, values.astype(own), attrs)
     del attrs["_Encoding"]
     texts = [b"".join(letters).decode() for letters in values.reshape(-1, values.shape[-1])]
-    return Column(dims[:-1], np.array(texts, dtype=str).reshape(values.shape[:-1]), attrs)
+    return Variable(dims[:-1], np.array(texts, dtype=str).reshape(values.shape[:-1]), attrs)

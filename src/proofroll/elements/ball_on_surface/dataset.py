@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from proofroll.core.arrays import FloatArray
-from proofroll.core.columns import Column, Columns, axes
+from proofroll.core.columns import Columns, Variable, axes
 from proofroll.core.engine import Sample
 from proofroll.elements.ball_on_surface.mechanics import energy, slip_velocity, wall_velocity
 from proofroll.elements.ball_on_surface.model import RollingBall
@@ -42,20 +42,20 @@ def from_samples(
     found = {**made.variables, **samples_between(between)}
     if all(s.sticking is not None for s in samples):
         sticking = np.array([s.sticking for s in samples], dtype=np.int8)  # netCDF has no boolean
-        found["sticking"] = Column(("time",), sticking, {"units": "1", "long_name": "1 sticks, 0 slips"})
+        found["sticking"] = Variable(("time",), sticking, {"units": "1", "long_name": "1 sticks, 0 slips"})
     return Columns(found, made.attrs)
 
 
-def samples_between(samples: Mapping[float, Sample]) -> dict[str, Column]:
+def samples_between(samples: Mapping[float, Sample]) -> dict[str, Variable]:
     """Samples off the grid, by time [s]: ``p_between`` [m] and ``v_between`` [m/s] along ``between`` [s]; if any."""
     if not samples:
         return {}
     p, v = (np.array([np.reshape(getattr(s, name), 3) for s in samples.values()]) for name in ("p_WB", "v_WB"))
     of = "off the grid, in the world"
     return {
-        "p_between": Column(("between", "xyz"), p, {"units": "m", "long_name": f"centre of the ball {of}"}),
-        "v_between": Column(("between", "xyz"), v, {"units": "m/s", "long_name": f"velocity of the centre {of}"}),
-        "between": Column(("between",), np.array(list(samples)), {"units": "s"}),
+        "p_between": Variable(("between", "xyz"), p, {"units": "m", "long_name": f"centre of the ball {of}"}),
+        "v_between": Variable(("between", "xyz"), v, {"units": "m/s", "long_name": f"velocity of the centre {of}"}),
+        "between": Variable(("between",), np.array(list(samples)), {"units": "s"}),
     }
 
 
@@ -99,10 +99,10 @@ def columns(
     sliding = slip_velocity(body.ball.radius, e1, v_WB, w_WB) - wall_velocity(body, p_WB, e1)
     slip = np.einsum("tij,ti->tj", frame, sliding)
 
-    found: dict[str, Column] = {}
+    found: dict[str, Variable] = {}
 
     def put(name: str, values: FloatArray, units: str, meaning: str, *dims: str) -> None:
-        found[name] = Column(("time", *dims), values, {"units": units, "long_name": meaning})
+        found[name] = Variable(("time", *dims), values, {"units": units, "long_name": meaning})
 
     put("p_WB", p_WB, "m", "centre of the ball in the world", "xyz")
     put("v_WB", v_WB, "m/s", "velocity of the centre in the world", "xyz")
@@ -129,7 +129,7 @@ def columns(
     return Columns(found | axes(times), _smallest(found))
 
 
-def _smallest(variables: Mapping[str, Column]) -> dict[str, float]:
+def _smallest(variables: Mapping[str, Variable]) -> dict[str, float]:
     """``smallest_N``, the least normal force at the samples [N], without time 0 (where several engines know none)."""
     found = variables["N"][1] if "N" in variables else np.zeros(0)
     return {"smallest_N": float(np.min(found[1:] if len(found) > 1 else found))} if len(found) else {}

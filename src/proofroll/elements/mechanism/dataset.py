@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from proofroll.core.arrays import FloatArray
-from proofroll.core.columns import Column, Columns, axes
+from proofroll.core.columns import Columns, Variable, axes
 from proofroll.core.engine import Sample
 from proofroll.elements.mechanism.placed import Placed
 
@@ -54,11 +54,11 @@ def columns(
     """
     mechanism, determinate = element.mechanism, element.analysis.determinate
     placed = Placed(mechanism, times, p_WB, v_WB, w_WB, _continuous(q_WB, element.start.q_WB[0]))
-    found: dict[str, Column] = {}
+    found: dict[str, Variable] = {}
 
     def put(name: str, values: FloatArray, unit: str, meaning: str, *dims: str, absent: str = "") -> None:
         attributes = {"units": unit, "long_name": meaning} | ({"absent": absent} if absent else {})
-        found[name] = Column(("time", *dims), values, attributes)
+        found[name] = Variable(("time", *dims), values, attributes)
 
     put("p_WB", p_WB, "m", "origin of each body's frame in the world", "body", "xyz")
     put("v_WB", v_WB, "m/s", "velocity of that origin in the world", "body", "xyz")
@@ -93,7 +93,7 @@ def columns(
     put("energy", energy, "J", "kinetic and potential energy")
     put("energy_error", energy - energy[0], "J", "energy now minus energy at the start")
     put("drift", placed.drift(), "m", "how far joints and loops are open")
-    return Columns(found | axes(times) | {"body": Column(("body",), np.array(element.bodies, dtype=str))})
+    return Columns(found | axes(times) | {"body": Variable(("body",), np.array(element.bodies, dtype=str))})
 
 
 def _continuous(q_WB: FloatArray, start: FloatArray) -> FloatArray:
