@@ -13,7 +13,7 @@ from proofroll.core.events import Event, events_of
 from proofroll.core.plugins import engine_names, parse_engine
 from proofroll.core.scene import Scene
 from proofroll.elements.ball_on_surface.model import BallCapability
-from proofroll.files.netcdf import read
+from proofroll.files.netcdf import read_columns
 from proofroll.files.scene_file import load_scene
 from proofroll.running.asking import describe, resolve
 from proofroll.running.case import Case, EngineFacts, Result, Status
@@ -169,7 +169,7 @@ def _soon(truth: Onset, until: float) -> float:
 def _first_slip(runner: Runner, case: Case, result: Result) -> Event | None:
     if result.trajectory is None:
         return None
-    events = events_of(read(runner.store.trajectory(case)))
+    events = events_of(read_columns(runner.store.trajectory(case)))
     return next((event for event in events if event.kind == "slip"), None)
 
 
