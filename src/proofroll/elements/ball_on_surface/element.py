@@ -21,13 +21,11 @@ from proofroll.core.failed_run import FailedRun
 from proofroll.core.gravity import Gravity
 from proofroll.core.observable import Observable
 from proofroll.core.scene import Scene
-from proofroll.elements.ball_on_surface.model import (
-    Ball,
-    BallCapability,
-    Contact,
-    InitialMotion,
-    RollingBall,
-)
+from proofroll.elements.ball_on_surface import certificate, events, failure, natural, observables
+from proofroll.elements.ball_on_surface.dataset import from_samples
+from proofroll.elements.ball_on_surface.failure_program import program
+from proofroll.elements.ball_on_surface.model import Ball, BallCapability, Contact, InitialMotion, RollingBall
+from proofroll.elements.ball_on_surface.optional_terms import optional_terms
 from proofroll.elements.ball_on_surface.surfaces import Surface
 
 if TYPE_CHECKING:
@@ -146,9 +144,7 @@ class BallOnSurface:
     @cached_property
     def observables(self) -> tuple[Observable, ...]:
         """See the protocol."""
-        from proofroll.elements.ball_on_surface.observables import table
-
-        return table(self.rolling)
+        return observables.table(self.rolling)
 
     @property
     def length(self) -> float:
@@ -158,56 +154,40 @@ class BallOnSurface:
     @property
     def natural_time(self) -> float:
         """See the protocol."""
-        from proofroll.elements.ball_on_surface.natural import natural_time
-
-        return natural_time(self.rolling)
+        return natural.natural_time(self.rolling)
 
     def step_numbers(self, h: float, truth: xr.Dataset | None) -> Sequence[StepNumber]:
         """See the protocol."""
-        from proofroll.elements.ball_on_surface.natural import step_numbers
-
-        return step_numbers(self.rolling, h, truth)
+        return natural.step_numbers(self.rolling, h, truth)
 
     @cached_property
     def first_motion(self) -> FirstMotion | None:
         """See the protocol; None for a ball at rest under rolling resistance, which has no direction yet."""
-        from proofroll.elements.ball_on_surface.natural import first_motion
-
-        return first_motion(self.rolling)
+        return natural.first_motion(self.rolling)
 
     @property
     def softened(self) -> frozenset[str]:
         """See the protocol."""
-        from proofroll.elements.ball_on_surface.certificate import CAPS
-
-        return frozenset(name for name in CAPS if not name.startswith("1 / "))
+        return frozenset(name for name in certificate.CAPS if not name.startswith("1 / "))
 
     def another_scene(self, lines: Sequence[Mapping[str, Any]], truth: xr.Dataset) -> str | None:
         """See :class:`proofroll.core.element_abilities.KnowsAnotherScene`."""
-        from proofroll.elements.ball_on_surface.certificate import another_scene
-
         friction = truth["needed_friction"].to_numpy()
-        return another_scene(lines, float(np.max(friction[np.isfinite(friction)], initial=0.0)))
+        return certificate.another_scene(lines, float(np.max(friction[np.isfinite(friction)], initial=0.0)))
 
     def variables(self, times: FloatArray, samples: Sequence[Sample], between: Mapping[float, Sample]) -> Columns:
         """See the protocol; the variables are those of :func:`proofroll.elements.ball_on_surface.dataset.variables`."""
-        from proofroll.elements.ball_on_surface.dataset import from_samples
-
         return from_samples(self.rolling, times, samples, between)
 
     def watch(self, asks: Sequence[str]) -> RunWatch:  # noqa: ARG002 -- the protocol's
         """See :class:`proofroll.core.element_abilities.WatchesRuns`."""
-        from proofroll.elements.ball_on_surface.events import Watch
-
-        return Watch(self.rolling)
+        return events.Watch(self.rolling)
 
     def common_span(
         self, truth: xr.Dataset, runs: Mapping[Any, xr.Dataset]
     ) -> tuple[xr.Dataset, dict[Any, xr.Dataset]]:
         """See :class:`proofroll.core.element_abilities.WatchesRuns`."""
-        from proofroll.elements.ball_on_surface.events import common_span
-
-        return common_span(truth, runs)
+        return events.common_span(truth, runs)
 
     def lacks(self, samples: Sequence[Sample], asks: Sequence[str]) -> str | None:
         """See the protocol."""
@@ -219,58 +199,40 @@ class BallOnSurface:
 
     def observe(self, dataset: xr.Dataset) -> dict[str, FloatArray]:
         """See the protocol."""
-        from proofroll.elements.ball_on_surface.observables import observe
-
-        return observe(self.rolling, dataset)
+        return observables.observe(self.rolling, dataset)
 
     def scales(self, truth: xr.Dataset) -> dict[str, float]:
         """See the protocol."""
-        from proofroll.elements.ball_on_surface.observables import scales
-
-        return scales(self.rolling, truth)
+        return observables.scales(self.rolling, truth)
 
     def certify(self, built: Any, sample: Sample) -> list[Line]:
         """See the protocol."""
-        from proofroll.elements.ball_on_surface.certificate import certify
-
-        return certify(self.rolling, built, sample)
+        return certificate.certify(self.rolling, built, sample)
 
     @property
     def failures(self) -> Mapping[str, str]:
         """See the protocol."""
-        from proofroll.elements.ball_on_surface.failure import MEANINGS
-
-        return MEANINGS
+        return failure.MEANINGS
 
     @property
     def failing_events(self) -> Mapping[str, str]:
         """See the protocol."""
-        from proofroll.elements.ball_on_surface.failure import LEFT
-
-        return {"lift_off": LEFT}
+        return {"lift_off": failure.LEFT}
 
     def signs(self, dataset: xr.Dataset, truth: xr.Dataset | None) -> list[Sign]:
         """See the protocol."""
-        from proofroll.elements.ball_on_surface.failure import signs
-
-        return signs(self.rolling, dataset, truth)
+        return failure.signs(self.rolling, dataset, truth)
 
     def cause(self, dataset: xr.Dataset, error: float) -> str | None:
         """See :class:`proofroll.core.element_abilities.ExplainsErrors`."""
-        from proofroll.elements.ball_on_surface.failure import cause
-
-        return cause(self.rolling, dataset, error)
+        return failure.cause(self.rolling, dataset, error)
 
     def failure_program(self, failed: FailedRun, engine: str | None) -> str:
         """See :class:`proofroll.core.element_abilities.WritesPrograms`."""
-        from proofroll.elements.ball_on_surface.failure_program import program
-
         return program(self.rolling, failed, engine)
 
     def optional_terms(self, parameters: Mapping[str, float], truth: xr.Dataset) -> list[OptionalTerm]:
         """See the protocol: rolling resistance, bounded friction and orientation."""
-        from proofroll.elements.ball_on_surface.optional_terms import optional_terms
-
         return optional_terms(self, parameters, truth)
 
 

@@ -5,7 +5,6 @@ Everything here sees a trajectory and the scene's ball, never an engine.
 
 from __future__ import annotations
 
-import itertools
 import math
 from collections.abc import Iterable
 from typing import TYPE_CHECKING
@@ -17,18 +16,14 @@ from proofroll.core.events import events_of
 from proofroll.core.observable import Observable, Role
 from proofroll.elements.ball_on_surface.mechanics import natural_acceleration, resistance_moment, wall_velocity
 from proofroll.elements.ball_on_surface.model import RollingBall
+from proofroll.elements.ball_on_surface.stretches import DEGREE, ENDS, accelerations, carried, stretches
 
 if TYPE_CHECKING:
     import xarray as xr
 
-# Degree of the splines through the samples. Sampled twenty times per oscillation of z, a derivative of degree 7 is
-# good to about 1e-6 of its size; what is left is measured on the truth and reported as the error bar.
-_DEGREE = 7
 # Least size of an observable over its natural one: a ball that moves by less than a hundredth of its radius (0.25 mm
 # inside the cylinder) stands still to the eye, and a range made of round-off is no size.
 _LEAST = 1e-2
-# The ends of an interpolating spline's derivative are worse than its middle; the audit leaves them out.
-_ENDS = 5
 # Steps in which the turning from one sample to the next is integrated.
 _SUBSTEPS = 16
 
@@ -106,7 +101,7 @@ def observe(body: RollingBall, dataset: xr.Dataset) -> dict[str, FloatArray]:
         curves |= {name: dataset[name].to_numpy()[1:] for name in ("N", "F2", "F3", "needed_friction")}
     curves["gap"] = dataset["gap"].to_numpy()
     curves["slip"] = dataset["slip"].to_numpy()
-    if dataset.sizes["time"] > 2 * (_DEGREE + 1) + 2 * _ENDS:
+    if dataset.sizes["time"] > 2 * (DEGREE + 1) + 2 * ENDS:
         # What impacts take of the energy nobody tells.
         told = "N" in dataset or not (body.contact.rolling_resistance or body.wall_rate is not None)
         if told and not body.flies:
@@ -177,7 +172,7 @@ def energy_balance(body: RollingBall, dataset: xr.Dataset) -> FloatArray:
         from scipy.interpolate import make_interp_spline
 
         # The power has kinks where slip begins and ends and where the ball stops, at which a smooth spline would ring.
-        work = make_interp_spline(t, power, k=1 if bounded or rests else _DEGREE).antiderivative()
+        work = make_interp_spline(t, power, k=1 if bounded or rests else DEGREE).antiderivative()
         balance = balance + work(t) - work(t[0])
     return np.asarray(balance)
 
@@ -190,7 +185,7 @@ def force_audit(body: RollingBall, dataset: xr.Dataset) -> FloatArray:
     where slip begins or ends, so each stretch between events is taken by itself, without its first and last samples;
     stretches of few samples are left out. That the rates are those of the positions, :func:`rate_audit` says.
     """
-    return _joined(_audited(body, stretch) for stretch in _stretches(_with_forces(dataset)))
+    return _joined(_audited(body, stretch) for stretch in stretches(_with_forces(dataset)))
 
 
 def rate_audit(body: RollingBall, dataset: xr.Dataset) -> FloatArray:
@@ -200,7 +195,7 @@ def rate_audit(body: RollingBall, dataset: xr.Dataset) -> FloatArray:
     against its rate; at samples off the grid (:func:`recording.off_grid`) their velocity and, over the time
     from the nearest sample, their position against the curve through the samples on it.
     """
-    return _joined(_rates_audited(body, stretch) for stretch in _stretches(dataset))
+    return _joined(_rates_audited(body, stretch) for stretch in stretches(dataset))
 
 
 def _with_forces(dataset: xr.Dataset) -> xr.Dataset:
@@ -213,29 +208,13 @@ def _joined(audited: Iterable[FloatArray]) -> FloatArray:
     return np.concatenate([np.zeros(0), *audited])
 
 
-def _stretches(dataset: xr.Dataset) -> list[xr.Dataset]:
-    """The samples between events, where they are enough for the splines."""
-    t = dataset["time"].to_numpy()
-    inner = [event.time for event in events_of(dataset)]
-    cuts = [0, *np.searchsorted(t, inner).tolist(), len(t)]
-    stretches = [dataset.isel(time=slice(start, end)) for start, end in itertools.pairwise(cuts)]
-    return [stretch for stretch in stretches if stretch.sizes["time"] > _DEGREE + 2 * _ENDS]
-
-
 def _audited(body: RollingBall, dataset: xr.Dataset) -> FloatArray:
     """The audit of a stretch without events, shape (time - 10,)."""
-    from scipy.interpolate import make_interp_spline
-
-    surface, t = body.surface, dataset["time"].to_numpy()
-    u = np.stack([dataset[name].to_numpy() for name in surface.coordinates], axis=-1)
-    rates = np.stack([dataset[f"{name}_rate"].to_numpy() for name in surface.coordinates], axis=-1)
-    second = make_interp_spline(t, rates, k=_DEGREE).derivative()(t)
-    acceleration = np.einsum("tij,tj->ti", surface.tangents(u), second)
-    acceleration += np.einsum("tijk,tj,tk->ti", surface.second(u), rates, rates)
+    u, acceleration = accelerations(body.surface, dataset)
     force = body.ball.mass * (acceleration - body.gravity)
-    local = np.einsum("tij,ti->tj", surface.frame(u), force) * [-1.0, 1.0, 1.0]
+    local = np.einsum("tij,ti->tj", body.surface.frame(u), force) * [-1.0, 1.0, 1.0]
     reported = np.stack([dataset[name].to_numpy() for name in ("N", "F2", "F3")], axis=-1)
-    return np.asarray(np.max(np.abs(reported - local), axis=-1)[_ENDS:-_ENDS])
+    return np.asarray(np.max(np.abs(reported - local), axis=-1)[ENDS:-ENDS])
 
 
 def _rates_audited(body: RollingBall, dataset: xr.Dataset) -> FloatArray:
@@ -244,7 +223,7 @@ def _rates_audited(body: RollingBall, dataset: xr.Dataset) -> FloatArray:
 
     surface, t = body.surface, dataset["time"].to_numpy()
     u = np.stack([dataset[name].to_numpy() for name in surface.coordinates], axis=-1)
-    curve = make_interp_spline(t, u, k=_DEGREE)
+    curve = make_interp_spline(t, u, k=DEGREE)
     rate = curve.derivative()
 
     def apart(times: FloatArray, v_WB: FloatArray) -> FloatArray:
@@ -252,14 +231,14 @@ def _rates_audited(body: RollingBall, dataset: xr.Dataset) -> FloatArray:
         along = np.einsum("tij,ti->tj", surface.frame(curve(times))[..., 1:], v_WB - moving)
         return np.asarray(np.linalg.norm(along, axis=-1))
 
-    found = apart(t, dataset["v_WB"].to_numpy())[_ENDS:-_ENDS]
+    found = apart(t, dataset["v_WB"].to_numpy())[ENDS:-ENDS]
     if "q_WB" in dataset:
         turned = body.ball.radius * _turning_apart(t, dataset["q_WB"].to_numpy(), dataset["w_WB"].to_numpy())
-        found = np.maximum(found, turned[_ENDS : len(t) - _ENDS])
+        found = np.maximum(found, turned[ENDS : len(t) - ENDS])
     if "between" not in dataset:
         return found
     between = dataset["between"].to_numpy()
-    inside = (between > t[_ENDS]) & (between < t[-1 - _ENDS])
+    inside = (between > t[ENDS]) & (between < t[-1 - ENDS])
     times, p, v = between[inside], dataset["p_between"].to_numpy()[inside], dataset["v_between"].to_numpy()[inside]
     # Along the wall: how far off it the ball is, is the gap's business.
     away = surface.position(surface.locate(p)) - surface.position(curve(times))
@@ -268,18 +247,9 @@ def _rates_audited(body: RollingBall, dataset: xr.Dataset) -> FloatArray:
 
 
 def _turning_apart(t: FloatArray, q_WB: FloatArray, w_WB: FloatArray) -> FloatArray:
-    """Mean difference of ω and the rate of the orientation between each two samples [rad/s], shape (time - 1,).
-
-    The ball may turn more than once from sample to sample, so ω is integrated, by Magnus steps of fourth order
-    (Blanes, Casas, Oteo & Ros, Phys. Rep. 470, 2009, section 5.4).
-    """
-    from scipy.interpolate import make_interp_spline
+    """Mean difference of ω and the rate of the orientation between each two samples [rad/s], shape (time - 1,)."""
     from scipy.spatial.transform import Rotation
 
-    spin, h = make_interp_spline(t, w_WB, k=_DEGREE), np.diff(t)[:, None] / _SUBSTEPS
     attitude = Rotation.from_quat(q_WB, scalar_first=True)
-    turned = attitude[:-1]
-    for step in range(_SUBSTEPS):
-        one, two = (spin(t[:-1] + ((step + 0.5 + side / math.sqrt(12)) * h[:, 0])) for side in (-1, 1))
-        turned = Rotation.from_rotvec(h * (one + two) / 2 - math.sqrt(3) / 12 * h**2 * np.cross(one, two)) * turned
+    turned = carried(attitude[:-1], t, w_WB, _SUBSTEPS)
     return np.asarray((attitude[1:] * turned.inv()).magnitude() / np.diff(t))

@@ -6,6 +6,7 @@ from collections.abc import Collection, Mapping
 from enum import StrEnum
 
 from proofroll.core.errors import Refused
+from proofroll.elements.mechanism.joint import FACTS
 from proofroll.elements.mechanism.model import Mechanism
 
 
@@ -32,17 +33,7 @@ class MechanismCapability(StrEnum):
     ARMATURE = "inertia of drives"
 
 
-ALL_JOINTS = frozenset(
-    {
-        MechanismCapability.FIXED,
-        MechanismCapability.REVOLUTE,
-        MechanismCapability.PRISMATIC,
-        MechanismCapability.UNIVERSAL,
-        MechanismCapability.SPHERICAL,
-        MechanismCapability.PLANAR,
-        MechanismCapability.FREE,
-    }
-)
+ALL_JOINTS = frozenset(MechanismCapability[kind.upper()] for kind in FACTS)
 ALL_LOOPS = frozenset(item for item in MechanismCapability if item.name.endswith("_LOOP"))
 FORCES = frozenset({MechanismCapability.SPRINGS, MechanismCapability.JOINT_SPRINGS})
 

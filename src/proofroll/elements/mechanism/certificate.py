@@ -7,8 +7,10 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from proofroll.core.arrays import FloatArray
 from proofroll.core.certificate import Line
 from proofroll.core.engine import Regularised, Sample
+from proofroll.elements.mechanism.joint import WITH_AXIS, Joint
 from proofroll.elements.mechanism.sampling import MechanismBuilt
 
 if TYPE_CHECKING:
@@ -27,7 +29,7 @@ _FROM_ACCELERATIONS = ("acceleration", "angular acceleration", "forces", "torque
 CAPS: Mapping[str, Regularised] = {
     # with all of it allowed, a mechanism that does not set off at all would pass
     name: Regularised(0.5, "a loop that is held by a stiff spring pulls by what it is open")
-    for name in ("acceleration", "angular acceleration", "forces", "torques")
+    for name in _FROM_ACCELERATIONS
 }
 
 
@@ -108,12 +110,12 @@ def _turning(element: MechanismElement, soft: bool) -> float:
     return max(float(np.max(np.abs(found.angular_acceleration))), least)
 
 
-def _axis(element: MechanismElement, joint: Any) -> Any:
+def _axis(element: MechanismElement, joint: Joint) -> FloatArray:
     """The axis of a joint in the world at the start; NaN where it has none."""
-    if joint.kind not in {"revolute", "prismatic", "universal", "planar"}:
+    if joint.kind not in WITH_AXIS:
         return np.full(3, np.nan)
     parent = element.mechanism.body_index[joint.parent]
-    return element.start.R_WB[0, parent] @ joint.parent_frame[:, 2]
+    return np.asarray(element.start.R_WB[0, parent] @ joint.parent_frame[:, 2])
 
 
 def _allowed(quantity: str, regularised: Mapping[str, Regularised]) -> tuple[float, str]:

@@ -73,19 +73,18 @@ def columns(
     for index, point in enumerate(mechanism.points):
         for axis, letter in enumerate("xyz"):
             put(f"{point.name}.{letter}", placed.points[:, index, axis], "m", f"{letter} of the point {point.name}")
-    names = [joint.name for joint in mechanism.joints] + [loop.name for loop in mechanism.loops]
     for kind, unit, values, known in (
         ("force", "N", force, determinate[:, :3]),
         ("torque", "N m", torque, determinate[:, 3:]),
     ):
         masked = np.where(known, values, np.nan)
-        for index, name in enumerate(names):
+        for index, connection in enumerate(mechanism.connections):
             for axis, letter in enumerate("xyz"):
-                meaning = f"{kind} on the child of {name}"
+                meaning = f"{kind} on the child of {connection.name}"
                 component = masked[:, index, axis]
                 absent = "" if known[index, axis] else UNDETERMINED
                 absent = absent or (UNSAID if np.all(np.isnan(component)) else "")
-                put(f"{kind}.{name}.{letter}", component, unit, meaning, absent=absent)
+                put(f"{kind}.{connection.name}.{letter}", component, unit, meaning, absent=absent)
         if np.any(known):
             meaning = f"determinate components of the {kind}s on children"
             put(f"{kind}s", values[:, known], unit, meaning, f"{kind}_component")

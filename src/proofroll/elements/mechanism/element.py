@@ -17,6 +17,9 @@ from proofroll.core.failed_run import FailedRun
 from proofroll.core.observable import Observable, Role
 from proofroll.elements.mechanism.analysis import Analysis, analysed
 from proofroll.elements.mechanism.capabilities import MechanismCapability, required
+from proofroll.elements.mechanism.certificate import certify
+from proofroll.elements.mechanism.dataset import from_samples
+from proofroll.elements.mechanism.failure_program import program
 from proofroll.elements.mechanism.joint_coordinates import JointCoordinates, Solution
 from proofroll.elements.mechanism.model import Mechanism
 from proofroll.elements.mechanism.placed import Placed
@@ -210,8 +213,6 @@ class MechanismElement:
 
     def variables(self, times: FloatArray, samples: Sequence[Sample], between: Mapping[float, Sample]) -> Columns:  # noqa: ARG002 -- the grid hides nothing here: positions are held against the truth
         """See the protocol; the variables are those of :mod:`proofroll.elements.mechanism.dataset`."""
-        from proofroll.elements.mechanism.dataset import from_samples
-
         return from_samples(self, times, samples)
 
     def lacks(self, samples: Sequence[Sample], asks: Sequence[str]) -> str | None:  # noqa: ARG002 -- the protocol's
@@ -245,8 +246,6 @@ class MechanismElement:
 
     def certify(self, built: Any, sample: Sample) -> list[Line]:
         """See the protocol."""
-        from proofroll.elements.mechanism.certificate import certify
-
         return certify(self, built, sample)
 
     @property
@@ -272,8 +271,6 @@ class MechanismElement:
 
     def failure_program(self, failed: FailedRun, engine: str | None) -> str:
         """See :class:`proofroll.core.element_abilities.WritesPrograms`."""
-        from proofroll.elements.mechanism.failure_program import program
-
         gain = GAIN * self._force * self.length if self.conservative else 0.0
         return program(self, failed, engine, gain, OPEN * self.length)
 

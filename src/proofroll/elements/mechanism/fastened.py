@@ -12,13 +12,10 @@ def fastened(mechanism: Mechanism) -> dict[str, list[Vector]]:
     A free joint fastens nothing.
     """
     found: dict[str, list[Vector]] = {name: [] for name in [*(body.name for body in mechanism.bodies), WORLD]}
-    for joint in mechanism.joints:
-        if joint.kind != "free":
-            found[joint.parent].append(joint.position)
-            found[joint.child].append(joint.child_position)
-    for loop in mechanism.loops:
-        found[loop.body_a].append(loop.position_a)
-        found[loop.body_b].append(loop.position_b)
+    for connection in mechanism.connections:
+        if connection.kind != "free":
+            found[connection.a].append(connection.position_a)
+            found[connection.b].append(connection.position_b)
     for spring in mechanism.springs:
         found[spring.body_a].append(spring.position_a)
         found[spring.body_b].append(spring.position_b)

@@ -10,7 +10,7 @@ from collections.abc import Iterable
 from dataclasses import dataclass
 from functools import cached_property
 from itertools import pairwise
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 
@@ -21,6 +21,19 @@ from proofroll.elements.mechanism.joint import Joint
 from proofroll.elements.mechanism.parts import Body, Loop, Point, Spring
 from proofroll.elements.mechanism.rotations import Array
 from proofroll.elements.mechanism.tree import check_masses, depth_first
+
+
+class JointOrLoop(NamedTuple):
+    """What connects bodies a and b, the child of a joint: places [m] and frames, as columns, in their own axes."""
+
+    name: str
+    kind: str
+    a: str
+    position_a: Vector
+    frame_a: Array
+    b: str
+    position_b: Vector
+    frame_b: Array
 
 
 @dataclass(frozen=True)
@@ -63,6 +76,22 @@ class Mechanism:
     def body_index(self) -> dict[str, int]:
         """Position of each body in :attr:`bodies`; the world is at -1."""
         return {WORLD: -1} | {body.name: index for index, body in enumerate(self.bodies)}
+
+    @cached_property
+    def connections(self) -> tuple[JointOrLoop, ...]:
+        """The joints, then the loops: arrays of forces and moments have this order."""
+        return (
+            *(
+                JointOrLoop(
+                    j.name, j.kind, j.parent, j.position, j.parent_frame, j.child, j.child_position, j.child_frame
+                )
+                for j in self.joints
+            ),
+            *(
+                JointOrLoop(k.name, k.kind, k.body_a, k.position_a, k.frame_a, k.body_b, k.position_b, k.frame_b)
+                for k in self.loops
+            ),
+        )
 
     @property
     def nq(self) -> int:

@@ -111,14 +111,7 @@ class Placed:
     def drift(self) -> FloatArray:
         """Largest separation [m] or cosine [1] that a joint or a loop should not have, shape (time,)."""
         worst = np.zeros(len(self.time))
-        joints = [
-            (j.kind, j.parent, j.position, j.parent_frame, j.child, j.child_position, j.child_frame)
-            for j in self.mechanism.joints
-        ]
-        loops = [
-            (k.kind, k.body_a, k.position_a, k.frame_a, k.body_b, k.position_b, k.frame_b) for k in self.mechanism.loops
-        ]
-        for kind, a, at_a, frame_a, b, at_b, frame_b in [*joints, *loops]:
+        for _, kind, a, at_a, frame_a, b, at_b, frame_b in self.mechanism.connections:
             A = self.R_WB[:, self.mechanism.body_index[a]] @ frame_a
             B = self.R_WB[:, self.mechanism.body_index[b]] @ frame_b
             apart = self.point(b, at_b) - self.point(a, at_a)

@@ -15,6 +15,7 @@ import numpy as np
 
 from proofroll.core.engine import Regularised
 from proofroll.core.errors import Refused
+from proofroll.elements.mechanism import joint
 from proofroll.elements.mechanism.model import Mechanism
 from proofroll.elements.mechanism.rotations import Array
 
@@ -23,7 +24,7 @@ from proofroll.elements.mechanism.rotations import Array
 DEPENDENT = 1e-9
 _NEARBY = 0.05  # rad or m: far enough from a singular start to see the rank that holds in general
 State = TypeVar("State")
-WITH_AXIS = ("revolute", "prismatic", "universal", "planar")
+WITH_AXIS = joint.WITH_AXIS
 
 
 @dataclass(frozen=True)

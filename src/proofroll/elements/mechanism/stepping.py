@@ -12,6 +12,7 @@ from proofroll.elements.mechanism.rotations import Array
 # So many steps in a row, so small against the largest: no smooth motion needs them. A slide of a million times the
 # crank's mass drives the crank through its dead point in a thousandth of the usual time, and is smooth.
 _STALLED, _STALLED_STEPS = 1e-7, 20
+_MOST_STEPS = 200_000  # of the whole way
 
 
 def integrated(
@@ -20,7 +21,6 @@ def integrated(
     times: Array,
     tolerance: float,
     corrected: Callable[[Array], Array] | None = None,
-    most_steps: int = 200_000,
     least: Array | None = None,
 ) -> Iterator[Array]:
     """The state at each time; the solver steps exactly onto it, for its interpolation is of lower order.
@@ -34,7 +34,6 @@ def integrated(
         times: growing, s; the first may be 0.
         tolerance: absolute and relative, of each step.
         corrected: puts a state back on its constraints; applied after every step.
-        most_steps: that the whole way may take.
         least: absolute tolerance of each component; None: ``tolerance``.
 
     Raises:
@@ -64,8 +63,8 @@ def integrated(
             small = 0 if landing or solver.step_size > _STALLED * largest else small + 1
             if small > _STALLED_STEPS:
                 raise Diverged(f"DOP853 stalls at t = {solver.t:.6g} s: its steps shrink, as at a singular pose")
-            if steps > most_steps:
-                raise Diverged(f"DOP853 needs more than {most_steps} steps; it reached t = {solver.t:.6g} s")
+            if steps > _MOST_STEPS:
+                raise Diverged(f"DOP853 needs more than {_MOST_STEPS} steps; it reached t = {solver.t:.6g} s")
             if landing:
                 solver.h_abs = max(solver.h_abs, usual)
             if corrected is not None:

@@ -98,11 +98,8 @@ class MaximalEquations:
         index = mechanism.body_index
         self._com = {WORLD: np.zeros(3)} | {body.name: np.array(body.com) for body in mechanism.bodies}
         self.connections = [
-            self._connection(j.kind, j.parent, j.child, j.position, j.child_position, j.parent_frame, j.child_frame)
-            for j in mechanism.joints
-        ] + [
-            self._connection(c.kind, c.body_a, c.body_b, c.position_a, c.position_b, c.frame_a, c.frame_b)
-            for c in mechanism.loops
+            self._connection(c.kind, c.a, c.b, c.position_a, c.position_b, c.frame_a, c.frame_b)
+            for c in mechanism.connections
         ]
         self._rolling = dict(enumerate(rolling, len(self.connections)))
         self.connections += [

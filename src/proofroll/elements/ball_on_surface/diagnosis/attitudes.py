@@ -5,11 +5,11 @@ from __future__ import annotations
 from typing import TYPE_CHECKING
 
 import numpy as np
-from scipy.interpolate import make_interp_spline
 from scipy.spatial.transform import Rotation
 
 from proofroll.core.arrays import FloatArray
 from proofroll.elements.ball_on_surface.model import RollingBall
+from proofroll.elements.ball_on_surface.stretches import carried
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -28,13 +28,8 @@ def attitudes(time: FloatArray, w_WB: FloatArray) -> FloatArray:
     """Rotations of the body from its true angular velocity; the identity at time 0, shape (time, 3, 3)."""
     if len(time) < 2:
         return np.eye(3)[None]
-    spin, h = make_interp_spline(time, w_WB, k=min(7, len(time) - 1)), np.diff(time) / _SUBSTEPS
-    turned, found = Rotation.identity(len(h)), [np.eye(3)]
-    for step in range(_SUBSTEPS):
-        one, two = (spin(time[:-1] + (step + 0.5 + side / np.sqrt(12)) * h) for side in (-1, 1))
-        bent = h[:, None] * (one + two) / 2 - np.sqrt(3) / 12 * h[:, None] ** 2 * np.cross(one, two)
-        turned = Rotation.from_rotvec(bent) * turned
-    for rotation in turned.as_matrix():
+    found = [np.eye(3)]
+    for rotation in carried(Rotation.identity(len(time) - 1), time, w_WB, _SUBSTEPS).as_matrix():
         found.append(rotation @ found[-1])
     return np.array(found)
 

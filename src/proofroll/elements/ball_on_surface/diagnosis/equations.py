@@ -7,7 +7,6 @@ however far the path has gone from the true one.
 from __future__ import annotations
 
 import dataclasses
-import itertools
 from collections.abc import Callable
 from dataclasses import dataclass
 from typing import TYPE_CHECKING
@@ -16,14 +15,14 @@ import numpy as np
 from scipy.interpolate import make_interp_spline
 
 from proofroll.core.arrays import FloatArray, cross
-from proofroll.core.events import events_of
 from proofroll.elements.ball_on_surface.mechanics import resistance_moment, slip_velocity
 from proofroll.elements.ball_on_surface.model import RollingBall
+from proofroll.elements.ball_on_surface.stretches import DEGREE, ENDS, accelerations, stretches
 
 if TYPE_CHECKING:
     import xarray as xr
 
-_DEGREE, _ENDS, _SAMPLES = 7, 5, 24
+_SAMPLES = 24
 
 
 @dataclass(frozen=True)
@@ -69,10 +68,7 @@ class Law:
 
 def states(body: RollingBall, dataset: xr.Dataset) -> BallStates | None:
     """The run at its samples; None: too few of them lie between events."""
-    t = dataset["time"].to_numpy()
-    cuts = [0, *np.searchsorted(t, [event.time for event in events_of(dataset)]).tolist(), len(t)]
-    parts = [dataset.isel(time=slice(a, b)) for a, b in itertools.pairwise(cuts)]
-    found = [_states(body, part) for part in parts if part.sizes["time"] > _DEGREE + 2 * _ENDS]
+    found = [_states(body, part) for part in stretches(dataset)]
     if not found:
         return None
     columns = zip(*(dataclasses.astuple(part) for part in found), strict=True)
@@ -82,18 +78,14 @@ def states(body: RollingBall, dataset: xr.Dataset) -> BallStates | None:
 
 
 def _states(body: RollingBall, part: xr.Dataset) -> BallStates:
-    surface, t, inner = body.surface, part["time"].to_numpy(), slice(_ENDS, -_ENDS)
-    u = np.stack([part[name].to_numpy() for name in surface.coordinates], axis=-1)
-    rates = np.stack([part[f"{name}_rate"].to_numpy() for name in surface.coordinates], axis=-1)
-    second = make_interp_spline(t, rates, k=_DEGREE).derivative()(t)
-    a = np.einsum("tij,tj->ti", surface.tangents(u), second)
-    a += np.einsum("tijk,tj,tk->ti", surface.second(u), rates, rates)
+    t, inner = part["time"].to_numpy(), slice(ENDS, -ENDS)
+    u, a = accelerations(body.surface, part)
     w = part["w_WB"].to_numpy()
-    alpha = make_interp_spline(t, w, k=_DEGREE).derivative()(t)
+    alpha = make_interp_spline(t, w, k=DEGREE).derivative()(t)
     force = None
     if "N" in part:
         local = np.stack([-part["N"].to_numpy(), part["F2"].to_numpy(), part["F3"].to_numpy()], axis=-1)
-        force = np.einsum("tij,tj->ti", surface.frame(u), local)
+        force = np.einsum("tij,tj->ti", body.surface.frame(u), local)
         force = force[inner] if np.all(np.isfinite(force[inner])) else None
     sticks = part["sticking"].to_numpy() if "sticking" in part else np.ones(len(t))
     p, v = part["p_WB"].to_numpy(), part["v_WB"].to_numpy()

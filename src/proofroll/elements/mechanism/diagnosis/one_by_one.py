@@ -77,9 +77,9 @@ class OfEachBody:
         remedy = "the scene's inertia is about the centre of mass, in the body's axes"
         for sign, words in ((1.0, "with Steiner's part added once more"), (-1.0, "with Steiner's part taken away")):
             says = f"the inertia is about the wrong point: that about the centre of mass {words}"
-            for count, which in ((0, np.ones(len(mass))), *((0, row) for row in np.eye(len(mass)))):
+            for which in (np.ones(len(mass)), *np.eye(len(mass))):
                 change = Change(mechanism, inertia=inertia + sign * which[:, None, None] * steiner)
-                yield held.cause("point of inertia", says, change, remedy, count)
+                yield held.cause("point of inertia", says, change, remedy, 0)
         says = "the weights act at the origins of the bodies' frames, not at the centres of mass"
         yield held.cause(
             "place of weight", says, Change(mechanism, weight_at_origin=True), "put the weight at the centre of mass", 0
@@ -103,14 +103,8 @@ class OfEachJoint:
         for held in held_against(evidence):
             if held.alone:
                 continue
-            rows = [
-                (joint.name, np.arange(mechanism.nv), at)
-                for joint, at in zip(mechanism.joints, mechanism.v_slices, strict=True)
-            ]
-            each = [
-                (f"the joint {name}", ((all_v >= at.start) & (all_v < at.stop)).astype(float))
-                for name, all_v, at in rows
-            ]
+            joints = zip(mechanism.joints, mechanism.v_slices, strict=True)
+            each = [(f"the joint {joint.name}", np.eye(mechanism.nv)[at].sum(axis=0)) for joint, at in joints]
             if len(each) > 1:
                 each = [("every joint", np.ones(mechanism.nv)), *each]
             for where, which in each:

@@ -33,8 +33,7 @@ class Reactions:
         run, truth = found
         mechanism = evidence.element.mechanism
         placed = placed_of(mechanism, truth)
-        ends = [(joint.name, joint.parent, joint.child, joint.child_position) for joint in mechanism.joints]
-        ends += [(loop.name, loop.body_a, loop.body_b, loop.position_b) for loop in mechanism.loops]
+        ends = [(each.name, each.a, each.b, each.position_b) for each in mechanism.connections]
         for kind, unit in (("force", "N"), ("torque", "N m")):
             whole = [end for end in ends if all(_known(run, truth, f"{kind}.{end[0]}.{axis}") for axis in "xyz")]
             if not whole:

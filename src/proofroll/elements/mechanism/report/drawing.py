@@ -7,7 +7,6 @@ import numpy as np
 from proofroll.core.arrays import FloatArray
 from proofroll.elements.mechanism.element import MechanismElement
 from proofroll.elements.mechanism.fastened import fastened
-from proofroll.elements.mechanism.joint import WITH_AXIS
 from proofroll.report.pen import Drawing, View, beyond
 
 _SIZE = 240.0  # of the mechanism in the picture [px]
@@ -26,8 +25,6 @@ def drawn(element: MechanismElement) -> Drawing:
     def place(body: str, position: tuple[float, ...]) -> FloatArray:
         return np.asarray(start.point(body, position)[0])
 
-    joints = [(j.name, j.kind, j.parent, j.position, j.child, j.child_position) for j in mechanism.joints]
-    loops = [(k.name, k.kind, k.body_a, k.position_a, k.body_b, k.position_b) for k in mechanism.loops]
     for spring in mechanism.springs:
         ends = place(spring.body_a, spring.position_a), place(spring.body_b, spring.position_b)
         picture.path(_zigzag(at(np.stack(ends))), "thin")
@@ -38,16 +35,16 @@ def drawn(element: MechanismElement) -> Drawing:
             picture.path(at(np.stack([com, place(body.name, end)])), "line")
         picture.disc(at(com).tolist(), _MASS, "ball")
     named: dict[tuple[int, ...], list[str]] = {}
-    for number, (name, kind, a, at_a, b, at_b) in enumerate([*joints, *loops]):
-        if kind == "free":
+    for number, each in enumerate(mechanism.connections):
+        if each.kind == "free":
             continue
-        here, there = place(a, at_a), place(b, at_b)
-        if kind == "prismatic":  # the line on which the child slides
+        here, there = place(each.a, each.position_a), place(each.b, each.position_b)
+        if each.kind == "prismatic":  # the line on which the child slides
             way = there - here if np.linalg.norm(there - here) else 0.2 * element.length * _axis(element, number)
             picture.path(at(np.stack([here - 0.3 * way, there + 0.3 * way])), "axis")
-        picture.disc(at(there).tolist(), _JOINT, "ghost" if number >= len(joints) else "wall")
-        named.setdefault(tuple(np.round(at(there)).astype(int).tolist()), []).append(name)
-    for (x, y), names in named.items() if len(joints) + len(loops) <= _MOST_NAMES else ():
+        picture.disc(at(there).tolist(), _JOINT, "ghost" if number >= len(mechanism.joints) else "wall")
+        named.setdefault(tuple(np.round(at(there)).astype(int).tolist()), []).append(each.name)
+    for (x, y), names in named.items() if len(mechanism.connections) <= _MOST_NAMES else ():
         _name(picture, np.array([x, y]), ", ".join(names), "letter", (0.0, -9.0))
     for point in mechanism.points:
         here = at(place(point.body, point.position))
@@ -85,16 +82,10 @@ def _turned(direction: FloatArray, up: FloatArray) -> FloatArray:
 
 
 def _axis(element: MechanismElement, number: int) -> FloatArray:
-    """The axis of a joint, or of a loop after them, in the world at the start."""
-    mechanism, count = element.mechanism, len(element.mechanism.joints)
-    if number < count:
-        joint = mechanism.joints[number]
-        assert joint.kind in WITH_AXIS  # the others are not asked
-        body, frame = joint.parent, joint.parent_frame
-    else:
-        loop = mechanism.loops[number - count]
-        body, frame = loop.body_a, loop.frame_a
-    return np.asarray(element.start.R_WB[0, mechanism.body_index[body]] @ frame[:, 2])
+    """The axis of a joint that has one, or of a loop after them, in the world at the start."""
+    connection = element.mechanism.connections[number]
+    body = element.mechanism.body_index[connection.a]
+    return np.asarray(element.start.R_WB[0, body] @ connection.frame_a[:, 2])
 
 
 def _zigzag(ends: FloatArray) -> FloatArray:

@@ -25,8 +25,7 @@ def reactions(element: MechanismElement, truth: xr.Dataset) -> list[Observable]:
         element: the mechanism.
         truth: its true motion, with the variables of :mod:`proofroll.elements.mechanism.dataset`.
     """
-    mechanism = element.mechanism
-    names = [joint.name for joint in mechanism.joints] + [loop.name for loop in mechanism.loops]
+    names = [connection.name for connection in element.mechanism.connections]
     found = []
     for kind, unit in (("force", "N"), ("torque", "N m")):
         components = [truth[f"{kind}.{name}.{axis}"] for name in names for axis in "xyz"]

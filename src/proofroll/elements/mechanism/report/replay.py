@@ -48,8 +48,7 @@ def drawn(replayed: Replayed) -> tuple[dict[str, Any], list[int], PackedNumbers]
     element = _element(replayed.scene)
     mechanism, length = element.mechanism, element.length
     bodies, skeleton = [*element.bodies, WORLD], fastened(mechanism)
-    joints = [(joint.name, joint.child, joint.child_position) for joint in mechanism.joints if joint.kind != "free"]
-    joints += [(loop.name, loop.body_b, loop.position_b) for loop in mechanism.loops]
+    joints = [(each.name, each.b, each.position_b) for each in mechanism.connections if each.kind != "free"]
     names = [f"force.{name}.{axis}" for name, *_ in joints for axis in "xyz"]
     readings = _readings(element)
     true = read_some(replayed.file, [*_MOTION, *names, *(name for name, _ in readings)])
