@@ -16,7 +16,7 @@ from proofroll.core.arrays import FloatArray
 from proofroll.core.errors import Diverged
 from proofroll.elements.ball_on_surface.model import RollingBall
 from proofroll.elements.ball_on_surface.motion import BallMotion, world_motion
-from proofroll.elements.ball_on_surface.rolling_equations import reduced_rates
+from proofroll.elements.ball_on_surface.rolling_equations import reduced_rates, start
 from proofroll.truth.assemble import classic_step, joined
 from proofroll.truth.explicit import Piece, Rates, at_clock, read, steps, stop
 from proofroll.truth.impact import by_coefficients
@@ -61,8 +61,7 @@ class Polar:
 
     def start(self) -> FloatArray:
         """See :class:`Route`."""
-        body = self._body
-        return np.concatenate([body.u0, body.udot0, [body.w0 @ body.surface.normal(body.p0)]])
+        return start(self._body)
 
     def at(self, p_WB: FloatArray, v_WB: FloatArray, w_WB: FloatArray) -> FloatArray:
         """See :class:`Route`."""

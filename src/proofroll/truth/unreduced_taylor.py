@@ -160,9 +160,7 @@ def _compiled(surface: Declared | type[Surface], moves: bool, bounded: bool) -> 
         e1_rate = [0.0, 0.0, 0.0]
     turning = cross(w, e1_rate)
     driven = [-a * ti for ti in turning]
-    first = (
-        {Cylinder: 9, Plane: 8}.get(surface, 5) if isinstance(surface, type) else 5
-    )  # parameter that is not taken yet
+    first = 9 if surface is Cylinder else 8 if surface is Plane else 5  # parameter that is not taken yet
     if moves:  # the wall's velocity W × (p + a e1) grows at this rate
         gained = cross([hy.par[first + i] for i in range(3)], [x + a * y for x, y in zip(v, e1_rate, strict=True)])
         driven = [x + y for x, y in zip(driven, gained, strict=True)]

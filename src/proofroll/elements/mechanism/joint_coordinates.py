@@ -24,6 +24,7 @@ from proofroll.elements.mechanism.rotations import Array, skews, to_quaternion
 from proofroll.elements.mechanism.stepping import integrated
 
 _NEAR = 1e-7  # m, 1: how far coordinates are moved to see how accelerations hang on them
+_EQUAL_STEP = 2e-3  # s
 _STEP = 0.05  # of DOP853, over the time in which the fastest mode turns by 1 rad; chains of 5 to 80 links need no less
 
 
@@ -148,16 +149,16 @@ class JointCoordinates:
         q, v = y[: self.mechanism.nq], y[self.mechanism.nq :]
         return np.concatenate([self.tree.rate(q, v), self.solve(q, v).acceleration])
 
-    def run_rk4(self, times: Array, step: float = 2e-3) -> Record:
-        """The motion at the given times, s, by Runge-Kutta 4 in equal steps of at most ``step``, s.
+    def run_rk4(self, times: Array) -> Record:
+        """The motion at the given times, s, by Runge-Kutta 4 in equal steps of at most 2 ms.
 
         Equal steps pass singular poses, before which an error control shrinks its steps for ever.
         """
         nq = self.mechanism.nq
-        return gathered(times, [self.sample(y[:nq], y[nq:]) for y in self.rk4_states(times, step)])
+        return gathered(times, [self.sample(y[:nq], y[nq:]) for y in self.rk4_states(times, _EQUAL_STEP)])
 
     def rk4_states(self, times: Array, step: float) -> Iterator[Array]:
-        """The states (q, v) of :meth:`run_rk4`."""
+        """The states (q, v) at the given times, s, by Runge-Kutta 4 in equal steps of at most ``step``, s."""
         y, now = np.concatenate(self.mechanism.start()), 0.0
         for time in times:
             steps = int(np.ceil((time - now) / step - 1e-9))

@@ -119,12 +119,12 @@ class Planar:
         self.heavy = bool(mass > 0 and moment > _LIGHT * np.abs(inertia).max())
         self.mass_matrix = np.diag([mass, mass, moment])
         self.plane = plane
-        self._columns = [_clean(column) for column in plane.T]
-        self._height = _clean(normal * (normal @ com))
+        self._columns = [clean(column) for column in plane.T]
+        self._height = clean(normal * (normal @ com))
         matrix, along = R.as_matrix(), np.outer(normal, normal) @ R.as_matrix()
         around = np.cross(normal, np.eye(3)).T  # normal × each column
         self._parts = [
-            [_clean(row) for row in part] for part in (matrix - along @ matrix, around @ matrix, along @ matrix)
+            [clean(row) for row in part] for part in (matrix - along @ matrix, around @ matrix, along @ matrix)
         ]
 
     def start(self, placed: BodyStart, com: Array) -> tuple[list[float], list[float]]:
@@ -231,6 +231,6 @@ def _plane(mechanism: Mechanism) -> Array | None:
     return frame_of_axis(normal)
 
 
-def _clean(vector: Any) -> list[float]:
+def clean(vector: Any) -> list[float]:
     """Plain floats, with the round-off of a rotation removed from zeros and ones, so that they fold."""
     return [float(round(x)) if abs(x - round(x)) < 1e-15 else float(x) for x in vector]

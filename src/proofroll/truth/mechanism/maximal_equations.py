@@ -19,7 +19,7 @@ from proofroll.elements.mechanism.checks import WORLD
 from proofroll.elements.mechanism.model import Mechanism
 from proofroll.elements.mechanism.rotations import Array
 from proofroll.truth.mechanism.constraint_rows import Connection, ConstraintRow, ConstraintRows, columns, speed_at
-from proofroll.truth.mechanism.maximal_bodies import GROUND, BodyInScalars, made_bodies, placed_bodies
+from proofroll.truth.mechanism.maximal_bodies import GROUND, BodyInScalars, clean, made_bodies, placed_bodies
 from proofroll.truth.mechanism.rolling_rows import RollingContact
 from proofroll.truth.mechanism.scalars import (
     Scalar,
@@ -178,7 +178,8 @@ class MaximalEquations:
     ) -> Connection:
         index = self.mechanism.body_index
         places = (self._place(a, at_a), self._place(b, at_b))
-        return Connection(kind, index[a], index[b], *places, _rows(frame_a), _rows(frame_b))
+        frames = ([clean(row) for row in frame] for frame in (frame_a, frame_b))
+        return Connection(kind, index[a], index[b], *places, *frames)
 
     def _place(self, body: str, position: Sequence[float]) -> list[float]:
         return [float(value) for value in np.array(position) - self._com[body]]
@@ -235,10 +236,6 @@ def _along(joint: Any, q: Scalar, speed: Scalar) -> Scalar:
     """A joint's own force along its coordinate."""
     spring = mul(-joint.stiffness, sub(q, float(joint.rest))) if joint.stiffness else 0.0
     return add(float(joint.torque), spring, mul(-joint.damping, speed) if joint.damping else 0.0)
-
-
-def _rows(matrix: Array) -> list[list[float]]:
-    return [[float(round(x)) if abs(x - round(x)) < 1e-15 else float(x) for x in row] for row in matrix]
 
 
 def _slices(counts: Sequence[int]) -> list[slice]:

@@ -13,13 +13,8 @@ from proofroll.report.kinds import ReportKind
 if TYPE_CHECKING:
     import xarray as xr
 
-    from proofroll.report.comparison_records import ReportedComparison
     from proofroll.report.pen import Picture
-    from proofroll.report.plots import PointCurves
     from proofroll.report.replay_records import ReplayKind
-    from proofroll.report.report_content import ReportedTruth
-    from proofroll.running.store import Store
-    from proofroll.studies.outcome import Run
 
 
 class BallReport(ReportKind):
@@ -53,20 +48,9 @@ class BallReport(ReportKind):
         """Its slips."""
         return onsets.truth_facts(dataset, scene)
 
-    @staticmethod
-    def run_facts(truths: Sequence[ReportedTruth], runs: Sequence[Run], store: Store) -> list[onsets.RunSlips]:
-        """Their slips."""
-        return onsets.run_facts(truths, runs, store)
-
-    @staticmethod
-    def sentences(truths: Sequence[ReportedTruth]) -> Sequence[str]:
-        """Where the first slip is ill-posed."""
-        return onsets.ill_posed(truths)
-
-    @staticmethod
-    def mark(content: ReportedComparison, curves: Sequence[PointCurves]) -> Sequence[PointCurves]:
-        """First slips on the curve of needed friction."""
-        return onsets.mark(content, curves)
+    run_facts = staticmethod(onsets.run_facts)
+    sentences = staticmethod(onsets.ill_posed)
+    mark = staticmethod(onsets.mark)
 
     @staticmethod
     def replay() -> ReplayKind:
