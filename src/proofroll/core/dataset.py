@@ -90,6 +90,15 @@ def part(scene: Scene, element: Element, dataset: xr.Dataset) -> xr.Dataset:
     return found.rename({name: str(name).removesuffix(ending) for name in (*own, *found.dims) if name not in _SHARED})
 
 
+def with_part(scene: Scene, element: Element, dataset: xr.Dataset, own: xr.Dataset) -> xr.Dataset:
+    """The dataset with the variables of one element as they are in ``own``, which is of :func:`part`."""
+    if len(scene.elements) == 1:
+        return own
+    names = [*own.data_vars, *own.dims]
+    labelled = own.rename({name: scene.label(element, str(name)) for name in names if name not in _SHARED})
+    return dataset.drop_vars(list(labelled.data_vars)).assign(labelled.data_vars)
+
+
 def observe(scene: Scene, dataset: xr.Dataset) -> dict[str, FloatArray]:
     """Values of every observable that the run allows, by name in the scene."""
     return {

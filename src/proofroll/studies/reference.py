@@ -12,8 +12,9 @@ from typing import TYPE_CHECKING, Any, Self, TypeVar
 import numpy as np
 
 from proofroll.core.arrays import FloatArray
+from proofroll.core.common_span import common_span
 from proofroll.core.dataset import observe, part, scales
-from proofroll.core.element_abilities import KnowsAnotherScene, WatchesRuns
+from proofroll.core.element_abilities import KnowsAnotherScene
 from proofroll.core.events import Event, events_of
 from proofroll.core.observable import Role
 from proofroll.core.scene import Scene
@@ -54,10 +55,7 @@ class Reference:
 
     def common_span(self, trajectories: Mapping[Key, xr.Dataset]) -> tuple[Reference, dict[Key, xr.Dataset]]:
         """The truth and runs as far as they are comparable, where a model ends before the scene does (WatchesRuns)."""
-        first = self.scene.elements[0]
-        if len(self.scene.elements) > 1 or not isinstance(first, WatchesRuns):
-            return self, dict(trajectories)
-        truth, runs = first.common_span(self.dataset, trajectories)
+        truth, runs = common_span(self.scene, self.dataset, trajectories)
         if truth is self.dataset:
             return self, runs
         return replace(self, dataset=truth, curves=observe(self.scene, truth)), runs

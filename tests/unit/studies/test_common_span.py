@@ -72,3 +72,27 @@ def test_without_lift_off_nothing_changes() -> None:
     held, cut = whole.common_span({1.0: run})
     assert held is whole
     assert cut[1.0] is run
+
+
+@pytest.mark.parametrize("other", ["pendulum", "inclined_plane", "faster"])
+def test_a_ball_that_leaves_cuts_what_is_beside_it(other: str) -> None:
+    """A run ends for all elements where one of them leaves the wall; all are judged up to there, also their events."""
+    first = lying()
+    ball = replace(first.elements[0].ball, name="second")
+    if other == "faster":  # leaves the wall too, after the run has ended
+        beside = changed(first, ball=ball, start=replace(first.elements[0].start, velocity=(2.72, 0.0)))
+    else:
+        beside = load_scene(other) if other == "pendulum" else changed(load_scene(other), ball=ball)
+    scene = replace(first, elements=(first.elements[0], beside.elements[0]))
+    whole = reference(scene)
+    assert ("lift_off" in whole.dataset.get("event_kind.second", [])) == (other == "faster")
+    run = record(build(scene, "projection"), scene, TIMES).dataset
+    held, cut = whole.common_span({1.0: run})
+    assert len(held.dataset.time) == len(run.time) < len(TIMES)
+    curves = held.observed(cut[1.0])
+    judged = {"gamma", "z", "N", "F2", "F3", "event_times", "event_order", "down", "across", "q", "tip"}
+    for name in [name for name in curves if name.split(".")[0] in judged]:
+        true, _ = held.true(name, curves[name])
+        assert curves[name].shape == true.shape, name
+        size = max(held.sizes.get(name, 1.0), 1e-9)
+        assert np.max(np.abs(curves[name] - true), initial=0.0) < 5e-3 * size, name

@@ -7,9 +7,9 @@ from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
 
+from proofroll.core.common_span import common_span
 from proofroll.core.dataset import part
 from proofroll.core.diagnosis import Cause, Evidence, diagnose, hypotheses_of
-from proofroll.core.element_abilities import WatchesRuns
 from proofroll.core.observable import Role
 from proofroll.core.scene import Scene
 from proofroll.core.verdict import Judgement, Verdict
@@ -67,6 +67,9 @@ def diagnosed(
     """
     if run is None and all(line["holds"] for line in lines):
         return []
+    if run is not None and truth is not None:
+        truth, shorter = common_span(scene, truth, {0: run})
+        run = shorter[0]
     found, seen = [], what_is_right(scene, judgements)
     for element in scene.elements:
         ending = f".{element.name}" if len(scene.elements) > 1 else ""
@@ -77,9 +80,6 @@ def diagnosed(
         ]
         ran = None if run is None else part(scene, element, run)
         true = None if truth is None else part(scene, element, truth)
-        if ran is not None and true is not None and isinstance(element, WatchesRuns):
-            true, shorter = element.common_span(true, {0: ran})
-            ran = shorter[0]
         evidence = Evidence(element, own, ran, true, step)
         found += [Diagnosis(element.name, cause, seen) for cause in diagnose(evidence, hypotheses_of(element))[:_MOST]]
     return found
