@@ -467,7 +467,7 @@ def test_describing_an_engine_is_light() -> None:
     assert {"xarray", "pandas", "scipy.integrate", "scipy.spatial", "scipy.optimize"} & found == set()
 
 
-RUN = """
+WORKER = """
 import dataclasses
 from proofroll.files.scene_file import load_scene
 from proofroll.running.case import EngineFacts
@@ -490,7 +490,7 @@ except SystemExit as end:
 """
 
 
-@pytest.mark.parametrize("code", [RUN, COMMAND], ids=["worker", "command"])
+@pytest.mark.parametrize("code", [WORKER, COMMAND], ids=["worker", "command"])
 def test_a_run_is_light(code: str, monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> None:
     """A run is made, written, read and shown without xarray and pandas, half of what it would import with them."""
     monkeypatch.chdir(tmp_path)

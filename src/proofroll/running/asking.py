@@ -5,7 +5,7 @@ from __future__ import annotations
 import contextlib
 import dataclasses
 import os
-from collections.abc import Collection, Iterator, Mapping, Sequence
+from collections.abc import Collection, Iterable, Iterator, Mapping, Sequence
 from concurrent.futures import ThreadPoolExecutor
 from typing import Any
 
@@ -28,6 +28,20 @@ def describe(engine: str, workers: Workers | None = None) -> EngineDescription:
     with lent_workers(workers) as lent, lent.lend(engine) as worker:
         told = worker.request({"do": "describe", "engine": engine}, _START_UP_SECONDS)
     return EngineDescription(**{**told, "terms": [Term(**term) for term in told["terms"]]})
+
+
+def described(engines: Iterable[str], workers: Workers | None = None) -> dict[str, EngineDescription | ProofrollError]:
+    """What each engine tells of itself, or why it cannot be asked; their processes start together."""
+    names = list(dict.fromkeys(engines))
+
+    def ask(name: str, lent: Workers) -> EngineDescription | ProofrollError:
+        try:
+            return describe(name, lent)
+        except ProofrollError as error:
+            return error
+
+    with lent_workers(workers) as lent, ThreadPoolExecutor(os.cpu_count() or 1) as pool:
+        return dict(zip(names, pool.map(lambda name: ask(name, lent), names), strict=True))
 
 
 def resolve(

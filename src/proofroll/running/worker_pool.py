@@ -7,6 +7,7 @@ import weakref
 from collections.abc import Iterator
 from contextlib import contextmanager
 
+from proofroll.core.errors import InputError, Missing
 from proofroll.running.interpreters import start
 from proofroll.running.process import Worker
 
@@ -54,10 +55,13 @@ class Workers:
 
     @contextmanager
     def lend(self, engine: str) -> Iterator[Worker]:
-        """A worker for this engine; it is kept unless something went wrong."""
+        """A worker for this engine; it is kept if it has answered, be it with what is wrong or missing."""
         worker = self.take(engine)
         try:
             yield worker
+        except (InputError, Missing):
+            self.keep(engine, worker)
+            raise
         except BaseException:
             worker.close()
             raise

@@ -6,7 +6,7 @@ from collections.abc import Iterable
 
 from proofroll.core.errors import InputError, ProofrollError
 from proofroll.core.plugins import EngineSpec, engine_names, parse_engine
-from proofroll.running.asking import describe, resolve
+from proofroll.running.asking import described, resolve
 from proofroll.running.case import EngineDescription, EngineFacts
 from proofroll.running.worker_pool import Workers
 from proofroll.studies.curve import Curve
@@ -24,23 +24,23 @@ def curves_of(
     """
     wanted: list[tuple[str, str | None]] = []
     absent: dict[str, str] = {}
-    for text in list(engines) or engine_names():
-        spec = parse_engine(text)
-        try:
-            described = describe(spec.name, workers)
-        except InputError:
-            raise
-        except ProofrollError as error:
-            absent[spec.name] = str(error)
+    asked = [(text, parse_engine(text)) for text in list(engines) or engine_names()]
+    told = described((spec.name for _, spec in asked), workers)
+    for text, spec in asked:
+        answer = told[spec.name]
+        if isinstance(answer, InputError):
+            raise answer
+        if isinstance(answer, ProofrollError):
+            absent[spec.name] = str(answer)
             continue
-        chosen, foreign = _chosen(spec, described, requires)
+        chosen, foreign = _chosen(spec, answer, requires)
         if foreign:
             absent.setdefault(spec.name, "none of its formulations is for scenes of this kind")
         wanted += chosen
         if any(parse_engine(name).name == spec.name for name, _ in wanted):
             absent.pop(spec.name, None)
         elif spec.name not in absent:
-            raise InputError("engine", text, f"{spec.name} has {', '.join(described.presets)}")
+            raise InputError("engine", text, f"{spec.name} has {', '.join(answer.presets)}")
     specs = [parse_engine(name) for name, _ in wanted]
     curves = []
     resolved = resolve([(spec.name, spec.options) for spec in specs], workers)

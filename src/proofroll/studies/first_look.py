@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import contextlib
 from collections.abc import Collection, Iterator, Mapping
 from typing import Any
 
@@ -13,6 +12,8 @@ from proofroll.core.plugins import engine_names
 from proofroll.core.scene import Scene
 from proofroll.core.verdict import Verdict
 from proofroll.files.scene_file import load_scene, read_scene_file
+from proofroll.running.asking import described
+from proofroll.running.case import EngineDescription
 from proofroll.studies.axes import Axis, AxisTerm
 
 _UNTIL, _SAMPLES = 1.0, 50
@@ -73,11 +74,9 @@ def able(scene: Scene, *, first: bool = False) -> list[str]:
 
 def _provided() -> Iterator[tuple[str, Mapping[str, Collection[str]]]]:
     """What the formulations of each installed engine provide."""
-    from proofroll.running.asking import describe
-
-    for engine in engine_names():
-        with contextlib.suppress(ProofrollError):
-            yield engine, describe(engine).provides
+    for engine, told in described(engine_names()).items():
+        if isinstance(told, EngineDescription):
+            yield engine, told.provides
 
 
 def _lacking(scene: Scene) -> list[str]:

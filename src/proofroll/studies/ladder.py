@@ -12,18 +12,19 @@ from proofroll.core.arrays import FloatArray, largest_difference
 from proofroll.core.dataset import observe
 from proofroll.core.errors import InputError, ProofrollError, Refused
 from proofroll.core.observable import Role
+from proofroll.core.plugins import engine_names
 from proofroll.core.scene import Scene
 from proofroll.core.time_grid import time_grid
 from proofroll.files.netcdf import read
 from proofroll.files.scene_file import load_scene
-from proofroll.running.asking import resolve, resolve_with_truth
+from proofroll.running.asking import described, resolve, resolve_with_truth
 from proofroll.running.case import Case, EngineFacts, Result, Status
 from proofroll.running.process import WorkerDied
 from proofroll.running.runner import Runner
 from proofroll.running.stopwatch import Stopwatch
 from proofroll.running.timing import ROUNDS, Timing, interleaved
 from proofroll.studies.cases import case_of
-from proofroll.studies.ladder_models import LadderModel, Rung, Switch, described, rungs, switches
+from proofroll.studies.ladder_models import LadderModel, Rung, Switch, rungs, switches
 from proofroll.studies.reference import Reference
 
 if TYPE_CHECKING:
@@ -110,7 +111,7 @@ class Ladder:
         if self.quantity not in curves:
             raise InputError("quantity", self.quantity, f"choose one of {', '.join(curves)}")
         self.unit = self.scene.observables[self.quantity].unit
-        self.engines = described(engines)
+        self.engines = described(engines or engine_names(), runner.workers)
         for error in self.engines.values():
             if isinstance(error, InputError):
                 raise error

@@ -9,9 +9,7 @@ from typing import TYPE_CHECKING, Any
 from proofroll.core.dataset import part
 from proofroll.core.engine_abilities import Level
 from proofroll.core.errors import ProofrollError
-from proofroll.core.plugins import engine_names
 from proofroll.core.scene import Scene
-from proofroll.running.asking import describe
 from proofroll.running.case import EngineDescription
 
 if TYPE_CHECKING:
@@ -75,17 +73,6 @@ class Switch:
     on: LadderModel | None
     off: LadderModel | None
     because: str
-
-
-def described(engines: Sequence[str]) -> dict[str, EngineDescription | ProofrollError]:
-    """What every engine tells of itself, or why it cannot; all that are announced if none is named."""
-    found: dict[str, EngineDescription | ProofrollError] = {}
-    for name in engines or engine_names():
-        try:
-            found[name] = describe(name)
-        except ProofrollError as error:
-            found[name] = error
-    return found
 
 
 def rungs(engines: Mapping[str, EngineDescription | ProofrollError], requires: frozenset[str]) -> list[Rung]:

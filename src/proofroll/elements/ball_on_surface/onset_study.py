@@ -5,6 +5,7 @@ from __future__ import annotations
 import dataclasses
 import math
 from collections.abc import Callable, Sequence
+from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
 
@@ -15,7 +16,7 @@ from proofroll.core.scene import Scene
 from proofroll.elements.ball_on_surface.model import BallCapability
 from proofroll.files.netcdf import read_columns
 from proofroll.files.scene_file import load_scene
-from proofroll.running.asking import describe, resolve
+from proofroll.running.asking import described, resolve
 from proofroll.running.case import Case, EngineFacts, Result, Status
 from proofroll.running.process import WorkerDied
 from proofroll.running.runner import Runner
@@ -86,13 +87,11 @@ class OnsetStudy:
 def default_engines(workers: Workers | None = None) -> list[str]:
     """Every formulation of every installed engine that provides bounded friction, with its matched settings."""
     found: list[str] = []
-    for name in engine_names():
-        try:
-            described = describe(name, workers)
-        except ProofrollError:
+    for name, told in described(engine_names(), workers).items():
+        if isinstance(told, ProofrollError):
             found.append(name)  # the row says why it cannot run
             continue
-        provided = described.provides.items()
+        provided = told.provides.items()
         found += [f"{name}[formulation={key}]" for key, texts in provided if BallCapability.BOUNDED_FRICTION in texts]
     return found
 
@@ -126,8 +125,10 @@ def onset_study(
     loaded = load_scene(scene, **parameters)
     if BallCapability.BOUNDED_FRICTION not in loaded.requires:
         raise InputError("mu_static", "inf", "without bounded friction the ball never slips; give --set mu_static=…")
-    truth = onset(loaded, until, uncertainty)
-    names = list(engines) or default_engines(runner.workers)
+    with ThreadPoolExecutor(1) as pool:  # engines start while the truth is worked out
+        able = None if engines else pool.submit(default_engines, runner.workers)
+        truth = onset(loaded, until, uncertainty)
+        names = list(engines) if able is None else able.result()
     specs = [parse_engine(name) for name in names]
     facts = resolve([(spec.name, spec.options) for spec in specs], runner.workers)
     for found in facts:

@@ -106,7 +106,7 @@ class OneStepBehind(Mutant):
 
     def __init__(self, scene: Scene, settings: Any) -> None:
         super().__init__(scene, settings)
-        self.behind: Any = type(self.inner).build(scene, settings)
+        self.behind: Any = Projection.build(scene, settings)
 
     def advance(self, t: float) -> None:
         """Both."""
