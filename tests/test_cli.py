@@ -289,6 +289,17 @@ def test_compare_restricted_to_an_engine(proofroll: Proofroll, tmp_path: Path) -
     assert "claim compares oracle" in err
 
 
+@pytest.mark.parametrize("command", ["compare", "report"])
+def test_an_engine_of_which_there_is_no_row(proofroll: Proofroll, tmp_path: Path, command: str) -> None:
+    """Beside an engine that has rows, one that has none is named once; what was asked for is run."""
+    (tmp_path / "claim.toml").write_text(COMPARISON.replace("ENGINE", "oracle"))
+    engines = ["--engine", "mujoco", "--engine", "oracle"]
+    code, out, err = proofroll(command, str(tmp_path / "claim.toml"), *engines, "--out", str(tmp_path))
+    assert code == 0
+    assert "oracle" in out
+    assert err.count("proofroll: mujoco is left out of claim: no row is of it\n") == 1
+
+
 # The paper's case, and one that slips early, in an engine that locates its events.
 PAPER = ["--set", "rolling_resistance=5e-4", "--set", "mu_static=0.35"]
 EARLY = ["onset", "sphere_in_cylinder", "--set", "mu_static=0.12", "--until", "0.2"]

@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
+from itertools import chain
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
 
@@ -38,6 +39,7 @@ def compare(
     from proofroll.report.terminal import verdict_parts
 
     loaded = asked(comparison, options.assignments(settings))
+    tell_left_out([loaded], engine or [])
     outcomes = outcomes_of([loaded], engine or [], options.new_runner(out, fresh, jobs, scheduler))
     content = outcome_content(outcomes[0])
     options.show(content, as_json, lambda: verdict_parts(content))
@@ -63,6 +65,19 @@ def asked(name: str, parameters: Mapping[str, str]) -> Comparison:
     if parameters:
         raise InputError("--set", next(iter(parameters)), "a comparison file has its own points; name a scene instead")
     return load_comparison(name)
+
+
+def tell_left_out(comparisons: Sequence[Comparison], engines: Sequence[str]) -> None:
+    """One line on standard error for each of ``engines`` that some of the comparisons, which have others, lack."""
+    from proofroll.core.plugins import parse_engine, plain_name
+
+    rows = {item.name: {parse_engine(row.engine).name for row in item.rows} for item in comparisons}
+    asked_for = {name: {name, plain_name(name)} for name in engines}
+    wanted = set(chain(*asked_for.values()))  # who has none of them has an error of its own
+    for name, either in asked_for.items():
+        without = [found for found, known in rows.items() if known & wanted and not known & either]
+        if without:
+            options.complain(f"{name} is left out of {', '.join(without)}: no row is of it")
 
 
 def outcomes_of(comparisons: list[Any], engines: list[str], runner: Runner, stage: str = "") -> list[Outcome]:

@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Annotated
 import typer
 
 from proofroll.cli import options
-from proofroll.cli.comparing import asked, exit_code, outcomes_of
+from proofroll.cli.comparing import asked, exit_code, outcomes_of, tell_left_out
 
 if TYPE_CHECKING:
     from collections.abc import Iterator
@@ -51,6 +51,7 @@ def report(
         loaded = [item.briefly() for item in loaded]
     options.require_pages()
     runner = options.new_runner(out, fresh, jobs, scheduler)
+    tell_left_out(loaded, engine or [])
     keys = list(dict.fromkeys(part.key for part in parts))
     stages = _Stages(len(keys) + bool(loaded))
     command = _command(studies or [], engine or [], out)
