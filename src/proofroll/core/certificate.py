@@ -10,6 +10,7 @@ from typing import Any
 
 import numpy as np
 
+from proofroll.core.errors import Diverged
 from proofroll.core.scene import Scene
 from proofroll.core.several import sample_of, shaped
 
@@ -69,7 +70,7 @@ def certify(engine: Any, scene: Scene) -> list[Line]:
     """Compares a freshly built engine with the scene: the lines of all its elements.
 
     Raises:
-        Diverged: what it samples has another shape than the scene's bodies.
+        Diverged: what it samples or says that it built has another shape than the scene's bodies.
     """
     built, sample = engine.built(), shaped(scene, engine.sample(), 0.0)
     lines: list[Line] = []
@@ -78,6 +79,34 @@ def certify(engine: Any, scene: Scene) -> list[Line]:
         for line in element.certify(own, sample_of(scene, element, sample)):
             lines.append(replace(line, quantity=scene.label(element, line.quantity)))
     return lines
+
+
+def require_shapes(built: Any, shapes: Mapping[str, tuple[tuple[int, ...], ...]]) -> None:
+    """Looks at the numbers that an engine built, before they are compared.
+
+    Args:
+        built: what the engine says; fields that are None are no matter.
+        shapes: by name of a field, those that it may have; -1 is any length.
+
+    Raises:
+        Diverged: one is not of numbers, or has another shape.
+    """
+    for name, allowed in shapes.items():
+        given = getattr(built, name)
+        if given is None:
+            continue
+        try:
+            shape = np.asarray(given, dtype=np.float64).shape
+        except (TypeError, ValueError):
+            raise Diverged(f"the engine's built() gave {name} that is no array of numbers") from None
+        if not any(
+            len(shape) == len(one) and all(n in {m, -1} for n, m in zip(one, shape, strict=True)) for one in allowed
+        ):
+            raise Diverged(f"the engine's built() gave {name} with shape {shape} instead of {_shape(allowed[0])}")
+
+
+def _shape(shape: tuple[int, ...]) -> str:
+    return str(shape).replace("-1", "n")
 
 
 def first_difference(lines: list[Line]) -> str | None:

@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 
 from proofroll.core.arrays import FloatArray
-from proofroll.core.certificate import EXACT, Line
+from proofroll.core.certificate import EXACT, Line, require_shapes
 from proofroll.core.engine import Built, Regularised, Sample
 from proofroll.elements.ball_on_surface.mechanics import (
     initial_angular_acceleration,
@@ -40,6 +40,12 @@ CAPS: Mapping[str, Regularised] = {
     **dict.fromkeys(_DYNAMICS, Regularised(1.0, _UNLOADED)),
     **dict.fromkeys(("1 / static friction", "1 / kinetic friction"), Regularised(float("inf"), _NUMBER)),
 }
+# Of what an engine built; of numbers also lists of one.
+_SHAPES = {
+    **dict.fromkeys(("gravity", "acceleration", "angular_acceleration"), ((3,),)),
+    "inertia": ((3,), (-1,)),  # fewer or more than three differ in a line of their own
+    **dict.fromkeys(("mass", "ball_radius", "rolling_resistance", "mu_static", "mu_kinetic", "gap"), ((), (1,))),
+}
 
 
 def certify(body: RollingBall, built: Built, sample: Sample) -> list[Line]:
@@ -48,6 +54,7 @@ def certify(body: RollingBall, built: Built, sample: Sample) -> list[Line]:
     Quantities about which the engine is silent have a line that says so, except those that the scene requires it to
     have, rolling resistance and bounded friction: there silence is a difference.
     """
+    require_shapes(built, _SHAPES)
     acceleration, force, turning = _expected(body, built)
     natural = natural_acceleration(body)
     frame = body.surface.frame(body.u0)

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from proofroll.core.arrays import FloatArray
-from proofroll.core.certificate import Line
+from proofroll.core.certificate import Line, require_shapes
 from proofroll.core.engine import Regularised, Sample
 from proofroll.elements.mechanism.joint import WITH_AXIS, Joint
 from proofroll.elements.mechanism.sampling import MechanismBuilt
@@ -31,10 +31,19 @@ CAPS: Mapping[str, Regularised] = {
     name: Regularised(0.5, "a loop that is held by a stiff spring pulls by what it is open")
     for name in _FROM_ACCELERATIONS
 }
+# Of what an engine built, which may have lost bodies or joints; of one body the index may be left out.
+_SHAPES = {
+    "mass": ((-1,), ()),
+    **dict.fromkeys(("com", "acceleration", "angular_acceleration", "joint_position", "joint_axis"), ((-1, 3), (3,))),
+    "inertia": ((-1, 3, 3), (3, 3)),
+    "gravity": ((3,), (1, 3)),
+    **dict.fromkeys(("rows", "rank", "mobility", "mass_matrix_error"), ((), (1,))),
+}
 
 
 def certify(element: MechanismElement, built: MechanismBuilt, sample: Sample) -> list[Line]:
     """Compares what was built, and the sample at time 0, with the mechanism; silence has a line that says so."""
+    require_shapes(built, _SHAPES)
     mechanism, start, found = element.mechanism, element.start, element.first_motion
     assert found is not None  # a mechanism always knows how it sets off
     lines: list[Line] = []

@@ -8,6 +8,7 @@ import pytest
 
 from proofroll.core.certificate import EXACT, Line, Standing, certify, first_difference, not_reported
 from proofroll.core.engine import Built, Regularised, Sample
+from proofroll.core.errors import Diverged
 from proofroll.core.scene import Scene
 from proofroll.elements.ball_on_surface.certificate import CAPS, another_scene
 from proofroll.elements.ball_on_surface.element import rolling_ball
@@ -258,3 +259,14 @@ def test_a_ball_that_only_a_pull_would_hold_falls() -> None:
     acceleration, force = initial_response(body)
     assert acceleration == pytest.approx(body.gravity)
     assert not np.any(force)
+
+
+@pytest.mark.parametrize("wrong", [np.zeros((2, 3)), "heavy", [1.0, [2.0]]], ids=["shape", "text", "ragged"])
+@pytest.mark.parametrize(
+    "name", [item.name for item in dataclasses.fields(Built) if item.name not in {"terms", "regularised"}]
+)
+def test_what_is_built_of_another_shape_is_named(name: str, wrong: Any) -> None:
+    """Whatever an engine says that it built is of the shape that the protocol says, or the field is named."""
+    scene = load_scene("inclined_plane")
+    with pytest.raises(Diverged, match=rf"^the engine's built\(\) gave {name} (with shape|that is no array)"):
+        certify(Stub(scene, **{name: wrong}), scene)

@@ -8,7 +8,7 @@ import pytest
 
 from proofroll.core.element import FirstMotion
 from proofroll.core.engine import Sample
-from proofroll.core.errors import InputError
+from proofroll.core.errors import Diverged, InputError
 from proofroll.core.observable import Role
 from proofroll.elements.mechanism.dataset import UNDETERMINED, UNSAID
 from proofroll.elements.mechanism.element import ENERGY_GAIN, OPENED, MechanismElement
@@ -111,6 +111,17 @@ def test_a_wrong_model_is_noticed(changed, quantity: str) -> None:
     element = element_of("slider_crank")
     built = right(element)
     assert noticed(element, dataclasses.replace(built, **changed(built))) == {quantity}
+
+
+@pytest.mark.parametrize("wrong", [np.zeros((2, 5)), "heavy"], ids=["shape", "text"])
+@pytest.mark.parametrize(
+    "name", [item.name for item in dataclasses.fields(MechanismBuilt) if item.name != "regularised"]
+)
+def test_what_is_built_of_another_shape_is_named(name: str, wrong: object) -> None:
+    """Whatever an engine says that it built is of the shape that the protocol says, or the field is named."""
+    element = element_of("slider_crank")
+    with pytest.raises(Diverged, match=rf"^the engine's built\(\) gave {name} (with shape|that is no array)"):
+        noticed(element, dataclasses.replace(right(element), **{name: wrong}))
 
 
 def test_a_wrong_start_is_noticed() -> None:
