@@ -12,7 +12,7 @@ from robot_templates import inertial, urdf
 
 from proofroll.robots.layers import LAYERS
 from proofroll.robots.records import DrawnRobot, HeldLayer, ImporterRow, RobotCheck, UsedTruth
-from proofroll.robots.terminal import WIDTH, table
+from proofroll.robots.terminal import WIDTH, lines, table
 
 Proofroll = Callable[..., tuple[int, str, str]]
 Install = Callable[[Mapping[str, str]], None]
@@ -67,11 +67,19 @@ def test_wide_table(tmp_path: Path) -> None:
     with (tmp_path / "table.txt").open("w+") as text:
         Console(file=text, width=WIDTH).print(table(content))
         text.seek(0)
-        lines = text.read().splitlines()
-    assert max(map(len, lines)) <= 80
-    assert lines[1].count("e-") == len(LAYERS)
-    assert lines[1].count("…") == 1
-    assert "!" in lines[2]
+        shown = text.read().splitlines()
+    assert max(map(len, shown)) <= 80
+    assert shown[1].count("e-") == len(LAYERS)
+    assert shown[1].count("…") == 1
+    assert "!" in shown[2]
+
+
+@pytest.mark.parametrize(("count", "said"), [(1, "1 velocity, 1 state"), (6, "6 velocities, 6 states")])
+def test_one_is_not_many(count: int, said: str) -> None:
+    """What was read is counted in words that fit the number."""
+    truth = UsedTruth("us", 0.0, count, 0, count)
+    content = RobotCheck("robot.urdf", "urdf", "fixed", [], truth, LAYERS, [], DrawnRobot("robot", [], {}))
+    assert next(lines(content)) == f"robot.urdf: URDF, fixed base, {said}"
 
 
 def test_page_escapes(proofroll: Proofroll, tmp_path: Path) -> None:

@@ -125,6 +125,8 @@ def _made(engine: str, version: str) -> str:
     try:
         with options.spinner(f"{engine} {version}") as say:
             tell(say)
+    except InputError:  # it would be none by hand either
+        raise
     except ProofrollError as error:
         raise ProofrollError(f"{error}; when that is mended, or with more requirements: {by_hand}") from None
     return f"{engine}@{version}"

@@ -64,7 +64,9 @@ def lines(content: RobotCheck) -> Iterator[str]:
     """What was read, what is wrong with the file, and every engine's causes, in lines of at most 80 characters."""
     truth = content.truth
     base = f", {content.base} base" if content.kind == "urdf" else ""
-    said = f"{content.file}: {content.kind.upper()}{base}, {truth.velocities} velocities, {truth.states} states"
+    moves = f"{truth.velocities} {'velocity' if truth.velocities == 1 else 'velocities'}"
+    states = f"{truth.states} {'state' if truth.states == 1 else 'states'}"
+    said = f"{content.file}: {content.kind.upper()}{base}, {moves}, {states}"
     yield from wrapped(said)
     yield from wrapped(f"true is {truth.by}; its two formulations differ by {amount(truth.difference)}")
     for finding in content.lint:

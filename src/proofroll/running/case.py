@@ -48,6 +48,7 @@ class EngineDescription:
         terms: what can be switched on and off.
         inherent: formulation -> what is always in its model -> why.
         defaults: what it takes where nobody chooses.
+        oldest: version from which on its adapter supports it; empty: it does not tell.
     """
 
     name: str
@@ -60,6 +61,7 @@ class EngineDescription:
     terms: list[Term]
     inherent: dict[str, dict[str, str]]
     defaults: dict[str, Any]
+    oldest: str = ""
 
 
 @dataclass(frozen=True)

@@ -39,7 +39,7 @@ ASIDE = frozenset(
 
 def describe(engine: str) -> dict[str, Any]:
     """What an engine is and provides, and where its formulations stand on the ladder of models."""
-    from proofroll.core.engine_abilities import CannotLeaveOut, TellsDefaults, TellsLevels
+    from proofroll.core.engine_abilities import CannotLeaveOut, SupportsFrom, TellsDefaults, TellsLevels
     from proofroll.running.loading import load
 
     kind = load(engine)
@@ -59,6 +59,7 @@ def describe(engine: str) -> dict[str, Any]:
         terms=list(kind.terms) if isinstance(kind, TellsLevels) else [],
         inherent={key: dict(terms) for key, terms in inherent},
         defaults=plain(dict(kind.defaults())) if isinstance(kind, TellsDefaults) else {},
+        oldest=kind.oldest if isinstance(kind, SupportsFrom) else "",
     )
     return dataclasses.asdict(found)
 

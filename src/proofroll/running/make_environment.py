@@ -76,6 +76,8 @@ def add(
     if taken is not None:
         advice = f"it is there already ({', '.join(taken.requirements)}); proofroll engines remove {name}@{label} first"
         raise InputError("label", label, advice)
+    if pinned == label:
+        _require_supported(name, requirements[0], pinned)
     base = _interpreter(python)
     with environments.making(folder):
         environments.delete(folder)  # a half that an interrupted process left
@@ -99,6 +101,20 @@ def package_of(engine: str) -> str:
             if re.search(rf"extra\s*==\s*['\"]{re.escape(engine)}['\"]", text):
                 return re.split(r"[\s;<>=!~\[(]", text, maxsplit=1)[0]
     return ""
+
+
+def _require_supported(name: str, requirement: str, version: str) -> None:
+    """Asks the engine that is installed here, if any, from which version on its adapter supports it.
+
+    Raises:
+        InputError: this version is older.
+    """
+    oldest = ""
+    with contextlib.suppress(ProofrollError):  # nobody is here to be asked
+        oldest = describe(name).oldest
+    if oldest and release(version) < release(oldest):
+        advice = f"the adapter of {name} supports {oldest} and later; nothing was installed"
+        raise InputError("--requirement", requirement, advice)
 
 
 def _made(

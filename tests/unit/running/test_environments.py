@@ -68,6 +68,15 @@ def test_an_environment_is_made_remembered_and_removed(wheels: Path, proofroll: 
     assert wheels.is_dir()
 
 
+def test_a_version_that_is_too_old_is_not_installed(wheels: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """From which version on an adapter supports its engine is said before anything is made, where it is installed."""
+    pytest.importorskip("mujoco")
+    monkeypatch.setattr(make_environment, "_made", lambda *_: pytest.fail("made"))
+    with pytest.raises(InputError, match=r"the adapter of mujoco supports 3\.5 and later"):
+        make_environment.add("mujoco", ["mujoco==3"])
+    assert not list(wheels.parent.glob("engines/*"))
+
+
 @pytest.mark.parametrize(
     ("requirements", "options", "says"),
     [
