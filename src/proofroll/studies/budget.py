@@ -67,7 +67,7 @@ class Budget:
             order is not claimed.
         declared: order that the engine declares.
         floor: how far the finest runs scatter, where refining them no longer helps; None: not reached.
-        truth: error bar of the truth.
+        truth: error bar of the truth; None: it is not finite.
         coarse, fine: what dominates at either end.
         coarse_step, fine_step: those ends.
         fine_error: error at the fine end.
@@ -81,7 +81,7 @@ class Budget:
     order_high: float | None
     declared: int | None
     floor: float | None
-    truth: float
+    truth: float | None
     coarse: str
     fine: str
     coarse_step: float | None = None
@@ -112,7 +112,9 @@ def budget(curve: Curve, quantity: str, every: float, true: FloatArray) -> Budge
     declared = curve.facts.order
     if len(used) < 3:
         nothing = "too few runs reached the end" if curve.facts.resolution else NOTHING
-        return Budget(quantity, None, None, None, None, None, declared, None, _bar(used, quantity), nothing, nothing)
+        return Budget(
+            quantity, None, None, None, None, None, declared, None, _known(_bar(used, quantity)), nothing, nothing
+        )
     values = [point.curves[quantity] for point in used]
     steps = [point.step or 0.0 for point in used]
     differences = [size(a - b) for a, b in itertools.pairwise(values)]
@@ -142,7 +144,7 @@ def budget(curve: Curve, quantity: str, every: float, true: FloatArray) -> Budge
         order.high,
         declared,
         floor,
-        bar,
+        _known(bar),
         coarse,
         TRUTH if error <= bar else fine,
         first.step or 0.0,
@@ -197,6 +199,10 @@ def _stretch(local: Sequence[float]) -> tuple[int, int]:
     return best
 
 
+def _known(bar: float) -> float | None:
+    return bar if np.isfinite(bar) else None
+
+
 def _bar(points: Sequence[CurvePoint], quantity: str) -> float:
     return max((point.bars.get(quantity, 0.0) for point in points), default=0.0)
 
@@ -236,7 +242,9 @@ def sentence(found: Budget, unit: str, resolution: str) -> str:
     said = f"At {resolution} {found.coarse_step:.3g}{step} the {coarse} dominates{_order(found)}; "
     said += f"at {found.fine_step:.3g}{step}, with an error of {found.fine_error:.2g} {unit}, "
     said += "still it does" if fine == coarse else f"the {fine}"
-    if found.model_form > found.model_form_bar + found.truth:
+    if found.truth is None:
+        said += ". Nothing is known of the model itself: the truth's error bar is not finite"
+    elif found.model_form > found.model_form_bar + found.truth:
         said += (
             f". In the limit of small steps {found.model_form:.2g} {unit} remain (known to {found.model_form_bar:.1g})"
         )

@@ -2,9 +2,12 @@
 
 from __future__ import annotations
 
+import json
+
 import numpy as np
 import pytest
 
+from proofroll.files.json_data import plain, record
 from proofroll.running.case import Case, EngineFacts, Result, Status
 from proofroll.studies.budget import FLOOR, MODEL_FORM, TIME_STEP, TRUTH, Budget, Order, budget, order_of, sentence
 from proofroll.studies.curve import Curve, CurvePoint
@@ -99,6 +102,14 @@ def test_floor_where_refining_no_longer_helps() -> None:
 def test_the_truth_limits_what_can_be_said() -> None:
     """A fine run that is nearer to the truth than the truth is known is limited by the truth."""
     assert made(order=2, bar=1e-4).fine == TRUTH
+
+
+def test_a_truth_without_a_finite_bar_can_be_kept() -> None:
+    """A bar that is not finite is none in the budget, which says so, and is read back from JSON as it was."""
+    found = made(order=2, bar=np.inf)
+    assert (found.truth, found.fine) == (None, TRUTH)
+    assert "the truth's error bar is not finite" in sentence(found, "m", "dt")
+    assert record(Budget, json.loads(json.dumps(plain(found), allow_nan=False))) == found
 
 
 def test_an_adaptive_curve_has_no_order() -> None:
