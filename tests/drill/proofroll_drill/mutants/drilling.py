@@ -107,9 +107,9 @@ def tried(kind: type[Mutant]) -> Mutated:
             recording = record(engine, scene, reference.dataset["time"].to_numpy())
         except Diverged as error:
             return Mutated(kind.fault, kind.__name__, scene.name, True, str(error), False, "")
-        wrong = [item for item in judged(reference, recording.dataset) if item.verdict == Verdict.DIFFERS]
-        by = recording.failure or "; ".join(f"{item.observable} {item.reason.partition(';')[0]}" for item in wrong[:2])
         judgements = judged(reference, recording.dataset)
+        wrong = [item for item in judgements if item.verdict == Verdict.DIFFERS]
+        by = recording.failure or "; ".join(f"{item.observable} {item.reason.partition(';')[0]}" for item in wrong[:2])
         causes = diagnosed(scene, lines, recording.dataset, reference.dataset, STEP, judgements) if by else []
     said = "; ".join(item.sentence for item in causes)
     # The first cause, and what looks the same from outside, are the answer; what is said after it does not count.
