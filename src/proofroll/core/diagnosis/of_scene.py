@@ -19,6 +19,7 @@ if TYPE_CHECKING:
 
 # So many causes are told; where more close something, the first ones do it best.
 _MOST = 3
+_WRONG = frozenset({Verdict.DIFFERS, Verdict.CONVERGES})
 
 
 @dataclass(frozen=True)
@@ -63,14 +64,17 @@ def diagnosed(
         run: the engine's trajectory, or None.
         truth: at the same times, or None.
         step: of the engine [s], or None.
-        judgements: of the run's observables, for what is right in it.
+        judgements: of the run's observables, for what is right in it; where there are any, an element of which all is
+            right is not looked at: what is left of it are round-off and truncation, which any fault may seem to close.
     """
     if run is None and all(line["holds"] for line in lines):
         return []
     if run is not None and truth is not None:
         truth, shorter = common_span(scene, truth, {0: run})
         run = shorter[0]
-    found, seen = [], what_is_right(scene, judgements)
+    judged = list(judgements)
+    wrong = [item.observable for item in judged if item.verdict in _WRONG]
+    found, seen = [], what_is_right(scene, judged)
     for element in scene.elements:
         ending = f".{element.name}" if len(scene.elements) > 1 else ""
         own = [
@@ -78,6 +82,8 @@ def diagnosed(
             for line in lines
             if str(line["quantity"]).endswith(ending)
         ]
+        if judged and all(line["holds"] for line in own) and not any(name.endswith(ending) for name in wrong):
+            continue
         ran = None if run is None else part(scene, element, run)
         true = None if truth is None else part(scene, element, truth)
         evidence = Evidence(element, own, ran, true, step)
@@ -97,7 +103,7 @@ def what_is_right(scene: Scene, judgements: Iterable[Judgement]) -> str:
             continue
         if item.verdict in {Verdict.AGREES, Verdict.UNCONFIRMED}:
             right.append(known)
-        elif item.verdict in {Verdict.DIFFERS, Verdict.CONVERGES}:
+        elif item.verdict in _WRONG:
             wrong.append(known)
     decided = [item for item in right if item.decides]
     if not decided or not wrong:

@@ -1,0 +1,40 @@
+"""Which elements of a scene are asked for a cause."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import pytest
+
+from proofroll.core.diagnosis.of_scene import diagnosed
+from proofroll.core.time_grid import time_grid
+from proofroll.core.truth import truth
+from proofroll.core.verdict import Judgement, Verdict
+from proofroll.files.scene_file import load_scene
+from proofroll.running.recording import record
+from proofroll.running.simulation import build
+
+TIMES = time_grid(0.2, 5e-3)
+
+
+@pytest.mark.parametrize("wrong", [0, None], ids=["ball", "neither"])
+def test_an_element_that_is_right_is_not_accused(wrong: int | None) -> None:
+    """What is left of an honest element is round-off, which a fault may close by chance; only a wrong one is asked."""
+    elements = (load_scene("inclined_plane").elements[0], load_scene("pendulum").elements[0])
+    scene = replace(load_scene("inclined_plane"), elements=elements)
+    run = record(build(scene, "projection"), scene, TIMES).dataset
+    judged = [
+        Judgement(
+            observable=name,
+            unit=item.unit,
+            error=0.0,
+            truth_error_bar=0.0,
+            tolerance=1e-9,
+            scale=1.0,
+            verdict=Verdict.DIFFERS if wrong is not None and name.endswith(elements[wrong].name) else Verdict.AGREES,
+        )
+        for name, item in scene.observables.items()
+    ]
+    accused = {item.element for item in diagnosed(scene, [], run, truth(scene, TIMES), judgements=judged)}
+    assert accused <= ({elements[wrong].name} if wrong is not None else set())
+    assert {item.element for item in diagnosed(scene, [], run, truth(scene, TIMES))} - accused, "nothing to hold back"
