@@ -2,6 +2,8 @@
 PYTHON ?= python3
 BIN := .venv/bin
 OUT ?= out
+# A worker process that finds no bytecode compiles the package anew, which is a quarter of its start.
+unexport PYTHONDONTWRITEBYTECODE
 
 .PHONY: install report tradeoff test check format readme docs gallery clean
 

@@ -19,8 +19,8 @@ from proofroll.core.plugins import load_element_kinds
 from proofroll.core.scene import Scene
 from proofroll.core.several import build
 
-# Simulated time of a check of the motion [s]: the ball goes a twelfth of a turn round the cylinder.
-_SPAN = 0.025
+# Simulated time of a check of the motion [s]: the ball goes a sixth of a turn round the cylinder.
+_SPAN = 0.05
 
 
 def scenes() -> dict[str, Scene]:
