@@ -2,12 +2,14 @@
 
 from __future__ import annotations
 
+import re
 from collections.abc import Callable
 from contextlib import AbstractContextManager
 from pathlib import Path
 
 import pytest
 from browsing import UNDRAWN, Drawn, Visit
+from playwright.sync_api import expect
 
 Visiting = Callable[..., AbstractContextManager[Visit]]
 
@@ -42,10 +44,10 @@ def test_a_table_with_rows_below_says_so(report_page: Path, visit: Visiting) -> 
         seen.page.set_viewport_size({"width": 1280, "height": 420})
         table = seen.page.locator(".scroll:has(.matrix)").first
         table.evaluate("(table) => { table.style.maxHeight = '9rem'; }")
-        seen.page.wait_for_function("document.querySelector('.scroll.more') !== null")
+        expect(table).to_have_class(re.compile(r"\bmore\b"))
         assert "more rows" in table.evaluate(says)
         table.evaluate("(table) => { table.scrollTop = table.scrollHeight; }")
-        seen.page.wait_for_function("!document.querySelector('.scroll:has(.matrix)').classList.contains('more')")
+        expect(table).not_to_have_class(re.compile(r"\bmore\b"))
         assert table.evaluate(says) == "none"
 
 
