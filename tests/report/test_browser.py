@@ -9,7 +9,6 @@ from pathlib import Path
 
 import pytest
 from browsing import UNDRAWN, Drawn, Visit
-from playwright.sync_api import expect
 
 Visiting = Callable[..., AbstractContextManager[Visit]]
 
@@ -39,6 +38,8 @@ def test_every_section_says_something(report_page: Path, visit: Visiting) -> Non
 
 def test_a_table_with_rows_below_says_so(report_page: Path, visit: Visiting) -> None:
     """A table that shows not all of its rows says that there are more, until the last one has been in sight."""
+    from playwright.sync_api import expect
+
     says = "(table) => getComputedStyle(table, '::after').content"
     with visit(report_page) as seen:
         seen.page.set_viewport_size({"width": 1280, "height": 420})
