@@ -281,6 +281,7 @@ ENTRY_POINTS = {
     "broken": "broken:Broken",
     "laddered": "laddered:Laddered",
     "tiny": "tiny:Tiny",
+    "grown": "tiny:Grown",
     "absent": "no_such_module_anywhere:Engine",
     "misspelt": "hostile:NoSuchClass",
 }

@@ -101,3 +101,15 @@ class Sleepy(Tiny):
         """See :class:`proofroll.core.engine.Engine`."""
         time.sleep(max(t - self.t, 0.0))
         super().advance(t)
+
+
+class Grown(Tiny):
+    """An engine of which its adapter supports no version before 2.5."""
+
+    name: ClassVar[str] = "grown"
+    oldest: ClassVar[str] = "2.5"
+
+    @staticmethod
+    def version() -> str:
+        """See :class:`proofroll.core.engine.Engine`."""
+        return "3.0"

@@ -12,6 +12,7 @@ from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
+import hostile
 import pytest
 from other_pythons import PLUGINS, script, seen_line
 
@@ -68,13 +69,17 @@ def test_an_environment_is_made_remembered_and_removed(wheels: Path, proofroll: 
     assert wheels.is_dir()
 
 
-def test_a_version_that_is_too_old_is_not_installed(wheels: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_a_version_that_is_too_old_is_not_installed(
+    wheels: Path, install_engines: Callable[[dict[str, str]], None], monkeypatch: pytest.MonkeyPatch
+) -> None:
     """From which version on an adapter supports its engine is said before anything is made, where it is installed."""
-    pytest.importorskip("mujoco")
+    install_engines(hostile.ENTRY_POINTS)
     monkeypatch.setattr(make_environment, "_made", lambda *_: pytest.fail("made"))
-    with pytest.raises(InputError, match=r"the adapter of mujoco supports 3\.5 and later"):
-        make_environment.add("mujoco", ["mujoco==3"])
+    with pytest.raises(InputError, match=r"the adapter of grown supports 2\.5 and later; nothing was installed"):
+        make_environment.add("grown", ["grown==2"])
     assert not list(wheels.parent.glob("engines/*"))
+    with pytest.raises(pytest.fail.Exception, match="made"):
+        make_environment.add("grown", ["grown==2.5"])
 
 
 @pytest.mark.parametrize(
