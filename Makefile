@@ -9,9 +9,11 @@ unexport PYTHONDONTWRITEBYTECODE
 
 install: .venv/.installed
 
+# Bytecode is compiled on all cores, where pip would use one, and not for the thousands of modules that nobody imports.
 .venv/.installed: pyproject.toml constraints.txt benchmarks/pyproject.toml papers/blajer_2006/pyproject.toml tests/drill/pyproject.toml
 	$(PYTHON) -m venv .venv
-	PIP_CONSTRAINT=constraints.txt $(BIN)/python -m pip install --quiet --editable ".[dev]" --editable ./benchmarks --editable ./papers/blajer_2006 --editable ./tests/drill
+	PIP_CONSTRAINT=constraints.txt $(BIN)/python -m pip install --quiet --no-compile --editable ".[dev]" --editable ./benchmarks --editable ./papers/blajer_2006 --editable ./tests/drill
+	-$(BIN)/python -m compileall -q -j 0 -x '/(OpenGL|tests)/' .venv/lib >/dev/null
 	touch $@
 
 report: install
