@@ -4,11 +4,16 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass, field
-from typing import Any
+from typing import Annotated, Any
+
+from pydantic import BeforeValidator
 
 from proofroll.running.case import Status
 from proofroll.studies.budget import Budget
 from proofroll.studies.study_identity import Measured
+
+# JSON has no infinity, which a parameter may be (friction without a bound): there it is null.
+Parameter = Annotated[float, BeforeValidator(lambda value: math.inf if value is None else value)]
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -63,7 +68,7 @@ class Corner:
         message: how the run ended.
     """
 
-    parameters: dict[str, float]
+    parameters: dict[str, Parameter]
     errors: dict[str, float]
     relative: dict[str, float]
     message: str
@@ -178,7 +183,7 @@ class TradeoffStudy:
 
     study: str = "tradeoff"
     scene: str
-    parameters: dict[str, float]
+    parameters: dict[str, Parameter]
     until: float
     every: float
     quantity: str
@@ -190,7 +195,7 @@ class TradeoffStudy:
     pareto: dict[str, list[int]]
     pareto_engines: dict[str, list[int]]
     truth: TruthCost
-    over: dict[str, list[float]]
+    over: dict[str, list[Parameter]]
     findings: list[str]
     brief: bool
     measured: Measured

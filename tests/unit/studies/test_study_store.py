@@ -3,15 +3,18 @@
 from __future__ import annotations
 
 import dataclasses
+import math
 from pathlib import Path
 from typing import Any
 
 import pytest
+from invented import invented_study, measured_point
 
 from proofroll.studies import study_identity
 from proofroll.studies.stability_claims import file_for
 from proofroll.studies.stability_places import QUICK, Effort
 from proofroll.studies.study_store import keep, kept, stability_path
+from proofroll.studies.tradeoff_records import Corner, TradeoffStudy
 
 
 @dataclasses.dataclass
@@ -43,6 +46,15 @@ def test_a_study_of_this_code_on_this_machine_holds(path: Path) -> None:
     study, reasons = kept(path, Study)
     assert study is not None
     assert (study.points, reasons) == ([1], [])
+
+
+def test_parameters_without_a_bound_come_back(tmp_path: Path) -> None:
+    """Friction that nothing exceeds is no number of JSON, and yet a parameter that somebody may set."""
+    unbounded = {"mu_static": math.inf}
+    point = measured_point(corners=[Corner(unbounded, {}, {}, "it fell")])
+    study = invented_study(point, parameters=unbounded, over={"mu_static": [0.3, math.inf]})
+    keep(study, tmp_path / "study.json")
+    assert kept(tmp_path / "study.json", TradeoffStudy) == (study, [])
 
 
 @pytest.mark.parametrize(
