@@ -7,12 +7,12 @@ from collections.abc import Callable, Mapping
 from pathlib import Path
 
 import pytest
-from rich.console import Console
 from robot_templates import inertial, urdf
 
+from proofroll.report.terminal import console
 from proofroll.robots.layers import LAYERS
 from proofroll.robots.records import DrawnRobot, HeldLayer, ImporterRow, RobotCheck, UsedTruth
-from proofroll.robots.terminal import WIDTH, lines, table
+from proofroll.robots.terminal import SHORT, WIDTH, lines, table
 
 Proofroll = Callable[..., tuple[int, str, str]]
 Install = Callable[[Mapping[str, str]], None]
@@ -54,8 +54,8 @@ def test_a_difference(proofroll: Proofroll, tmp_path: Path) -> None:
     assert cause["after"] < 1e-10
 
 
-def test_wide_table(tmp_path: Path) -> None:
-    """A row in which every layer fails, and a long name, fit into 80 columns without a number cut off."""
+def test_wide_table(monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]) -> None:
+    """A row in which every layer fails, and a long name, fit into 80 columns without a number cut off or put below."""
     layers = {layer: HeldLayer(1.234e-12 * 7**n, 0.0, False) for n, layer in enumerate(LAYERS)}
     name = "pybullet[inertia_from_file=false]"
     rows = [
@@ -64,13 +64,14 @@ def test_wide_table(tmp_path: Path) -> None:
     ]
     truth, robot = UsedTruth("us", 0.0, 1, 0, 1), DrawnRobot("robot", [], {})
     content = RobotCheck("robot.urdf", "urdf", "fixed", [], truth, LAYERS, rows, robot)
-    with (tmp_path / "table.txt").open("w+") as text:
-        Console(file=text, width=WIDTH).print(table(content))
-        text.seek(0)
-        shown = text.read().splitlines()
-    assert max(map(len, shown)) <= 80
-    assert shown[1].count("e-") == len(LAYERS)
-    assert shown[1].count("…") == 1
+    monkeypatch.setenv("COLUMNS", str(WIDTH))
+    console().print(table(content))
+    heading, *shown = capsys.readouterr().out.splitlines()
+    assert max(map(len, (heading, *shown))) <= 80
+    assert heading.split() == ["engine", *SHORT.values()]
+    assert shown[0].count("e-") == len(LAYERS)
+    assert shown[0].count("…") == 1
+    assert shown[1].strip() == "3.2.7"
     assert "!" in shown[2]
 
 

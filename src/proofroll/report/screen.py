@@ -93,9 +93,13 @@ def fitted(table: Table, console: Console) -> list[Table]:
 
 
 def _size(column: Column, console: Console, most: int) -> Measurement:
-    """The least width at which no word of a column is cut (where lines do not break: no line), and the natural one."""
+    """The least width at which no word of a column is cut (where lines do not break: no line), and the natural one.
+
+    A column that has a greatest width takes no more, but for a word that is longer; of lines that do not break the
+    rest is left out.
+    """
     wide = console.options.update(width=_WIDEST)
     found = [Measurement.get(console, wide, cell) for cell in (column.header, *column.cells)]
-    natural = max(item.maximum for item in found)
+    natural = min(max(item.maximum for item in found), column.max_width or _WIDEST)
     least = natural if column.no_wrap else max(*(item.minimum for item in found), min(column.min_width or 0, natural))
-    return Measurement(min(least, most), min(natural, most))
+    return Measurement(min(least, most), min(max(least, natural), most))
