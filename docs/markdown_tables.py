@@ -7,10 +7,9 @@ from collections.abc import Sequence
 from proofroll.core.comparison import Tolerance
 from proofroll.core.engine_abilities import Level
 from proofroll.report.comparison_records import ReportedComparison
-from proofroll.report.labels import SYMBOLS, caveat_lines, name_of, number, verdict_text
+from proofroll.report.labels import SYMBOLS, caveat_lines, name_of, number, step, verdict_text
 from proofroll.report.tables import remarks
-from proofroll.report.terminal import columns, step
-from proofroll.report.tradeoff_tables import step_of
+from proofroll.report.terminal import columns
 from proofroll.studies.recommend import recommend
 from proofroll.studies.tradeoff_records import MeasuredPoint, TradeoffStudy
 from proofroll.studies.wish import Wish
@@ -64,4 +63,4 @@ def cheapest_table(study: TradeoffStudy, tolerances: Sequence[float]) -> str:
 
 
 def _cell(choice: MeasuredPoint) -> str:
-    return f"{name_of(choice)}, {step_of(choice)}: {number(choice.seconds_per_second)} s/s"
+    return f"{name_of(choice)}, {step(choice.resolution, choice.step)}: {number(choice.seconds_per_second)} s/s"

@@ -5,12 +5,50 @@ from __future__ import annotations
 import json
 import re
 from collections.abc import Callable, Mapping
+from dataclasses import fields as fields_of
 from pathlib import Path
 
 import pytest
 from robot_templates import urdf
 
-TEXT = (Path(__file__).resolve().parents[1] / "docs" / "json.md").read_text(encoding="utf-8")
+from proofroll.robots.explain import RobotCause
+from proofroll.robots.records import (
+    DrawnBody,
+    DrawnJoint,
+    DrawnRobot,
+    GalleryReading,
+    GalleryRow,
+    HeldLayer,
+    ImporterRow,
+    RobotCheck,
+    UsedTruth,
+)
+from proofroll.robots.robot_file import LintFinding
+from proofroll.studies.axes import Axis
+from proofroll.studies.stability_places import Effort
+from proofroll.studies.stability_records import (
+    Boundary,
+    BoundaryPoint,
+    ExplainedBoundary,
+    MapClaims,
+    MappedPlace,
+    StabilityStudy,
+)
+from proofroll.studies.study_identity import Measured
+from proofroll.studies.tradeoff_records import (
+    Corner,
+    CurveBudget,
+    DroppedStep,
+    MeasuredPoint,
+    MeasuredQuantity,
+    SparseRun,
+    TradeoffJudged,
+    TradeoffStudy,
+    TruthCost,
+)
+
+DOCS = Path(__file__).resolve().parents[1] / "docs"
+TEXT = (DOCS / "json.md").read_text(encoding="utf-8")
 Proofroll = Callable[..., tuple[int, str, str]]
 RUN = ["--engine", "oracle", "--until", "0.1", "--every", "0.05"]
 CLAIM = """title = "A claim"
@@ -28,11 +66,16 @@ tolerance = "close"
 """
 
 
+def section(title: str, text: str = TEXT) -> str:
+    """What stands below a title."""
+    found = re.search(rf"^## {re.escape(title)}\n(.*?)(?=^## |\Z)", text, flags=re.DOTALL | re.MULTILINE)
+    assert found is not None
+    return found[1]
+
+
 def fields(title: str) -> set[str]:
     """Fields that a section of the document has."""
-    section = re.search(rf"^## {re.escape(title)}\n(.*?)(?=^## |\Z)", TEXT, flags=re.DOTALL | re.MULTILINE)
-    assert section is not None
-    return set(re.findall(r"^\| `(\w+)` \|", section[1], flags=re.MULTILINE))
+    return set(re.findall(r"^\| `(\w+)` \|", section(title), flags=re.MULTILINE))
 
 
 @pytest.mark.parametrize(
@@ -77,3 +120,27 @@ def test_a_robot_file(proofroll: Proofroll, tmp_path: Path) -> None:
     robot.write_text(urdf(), encoding="utf-8")
     _, out, _ = proofroll("check", str(robot), "--engine", "mujoco", "--states", "1", "--json")
     assert set(json.loads(out)) == fields("`check --json` of a robot file")
+
+
+ROBOT = (RobotCheck, LintFinding, UsedTruth, ImporterRow, HeldLayer, RobotCause, DrawnRobot, DrawnBody, DrawnJoint)
+MAP = (StabilityStudy, Axis, BoundaryPoint, Boundary, ExplainedBoundary, MappedPlace, Effort, Measured, MapClaims)
+TRADEOFF = (
+    TradeoffStudy, MeasuredQuantity, MeasuredPoint, SparseRun, Corner, DroppedStep, CurveBudget, TruthCost, Measured,
+    TradeoffJudged,
+)  # fmt: skip
+
+
+@pytest.mark.parametrize(
+    ("page", "title", "records"),
+    [
+        ("json.md", "`check --json` of a robot file", (*ROBOT, GalleryRow, GalleryReading)),
+        ("json.md", "`stability --json`", MAP),
+        ("tradeoff.md", "JSON", TRADEOFF),
+    ],
+    ids=["robots", "stability", "tradeoff"],
+)
+def test_fields_of_records(page: str, title: str, records: tuple[type, ...]) -> None:
+    """Each field of what a command prints as records is named where its JSON is described."""
+    named = set(re.findall(r"`(\w+)`", section(title, (DOCS / page).read_text(encoding="utf-8"))))
+    missing = {kind.__name__: {item.name for item in fields_of(kind)} - named for kind in records}
+    assert {name: found for name, found in missing.items() if found} == {}

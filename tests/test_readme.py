@@ -18,8 +18,7 @@ from PIL import Image
 
 from proofroll.core.plugins import parse_engine
 from proofroll.files.comparison_file import load_comparison
-from proofroll.report.labels import number
-from proofroll.report.terminal import step
+from proofroll.report.labels import number, step
 from proofroll.running.case import EngineFacts
 from proofroll.studies.claims import claims_for
 
@@ -181,7 +180,7 @@ def test_the_verdict_table_is_of_today() -> None:
     first = table.splitlines(keepends=True)[2]
     for old, new in (
         (first, ""),
-        ("| 1e-3 s |", "| 2e-3 s |"),
+        ("| dt 1e-3 s |", "| dt 2e-3 s |"),
         ("✗ differs", "✓ agrees"),
         (f"made-from {now}", "made-from 0"),
         (f"<!-- verdicts:made-from {now} -->", ""),

@@ -5,7 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
-from proofroll.report.labels import name_of, number, unit
+from proofroll.report.labels import name_of, step, unit
 from proofroll.report.stability_map import LETTERS, cell
 
 if TYPE_CHECKING:
@@ -103,7 +103,7 @@ def _cell(point: BoundaryPoint, href: str) -> HeatCell:
     elif point.largest_accurate is None:
         words.append("no affordable step or tolerance holds 1 %")
     else:
-        words.append(f"1 % up to {point.resolution} {number(point.largest_accurate)}")
+        words.append(f"1 % up to {step(point.resolution, point.largest_accurate)}")
     if point.failure:
         words.append(f"beyond: {point.failure}, {told(point)}")
     return HeatCell(

@@ -105,12 +105,11 @@ def off_by(judgement: Judgement) -> str:
     return f"its {symbol(judgement.observable)} is off by {number(judgement.error)} {unit(judgement.unit)}".rstrip()
 
 
-def step(row: Setting) -> str:
-    """The setting that trades speed for accuracy, e.g. ``dt 1e-3``."""
-    value = row.resolution_value
-    if not row.resolution:
+def step(resolution: str | None, value: float | None) -> str:
+    """The setting that trades speed for accuracy: ``dt 2.5e-3 s``, ``rtol 2.2e-14``; nothing where there is none."""
+    if not resolution or value is None:
         return ""
-    return f"{row.resolution} {number(value) if isinstance(value, (int, float)) else value}"
+    return f"dt {number(value, 3)} s" if resolution == "dt" else f"{resolution} {number(value)}"
 
 
 def setting(row: Setting) -> str:
@@ -122,8 +121,9 @@ def names(rows: Sequence[Setting]) -> list[str]:
     """A short name for each row, unlike that of any other row: the comparison file's text where need be."""
     short = []
     for row in rows:
-        words = [row.name, row.formulation, row.setting]
-        short.append(" ".join([*(str(word) for word in words if word), *([f"({step(row)})"] if step(row) else [])]))
+        words = [str(word) for word in (row.name, row.formulation, row.setting) if word]
+        size = step(row.resolution, row.resolution_value)
+        short.append(" ".join([*words, f"({size})"] if size else words))
     return [name if short.count(name) == 1 else str(row.engine) for name, row in zip(short, rows, strict=True)]
 
 

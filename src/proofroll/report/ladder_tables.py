@@ -5,10 +5,9 @@ from __future__ import annotations
 from rich.table import Column, Table
 from rich.text import Text
 
-from proofroll.report.labels import number
+from proofroll.report.labels import number, step
 from proofroll.report.ladder import LadderContent, label
 from proofroll.report.screen import numeric, plain_table, unbroken
-from proofroll.report.terminal import step
 from proofroll.studies.term_worth import Worth
 
 _SHORT = {Worth.NOT_NEEDED: "not needed"}

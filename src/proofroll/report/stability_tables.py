@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING
 from rich.table import Table
 from rich.text import Text
 
-from proofroll.report.labels import name_of, number, with_caveat
+from proofroll.report.labels import name_of, number, step, with_caveat
 from proofroll.report.screen import numeric, plain_table, unbroken
 from proofroll.studies.hosts import said_of
 from proofroll.studies.stability_content import silent_ranking
@@ -124,12 +124,13 @@ def silent_lines(study: StabilityStudy) -> Iterator[str]:
             continue
         seen.add((point.curve, point.axis))
         side = point.shown
-        wrong = "" if side.error is None else f", off by {number(100 * side.error)} % of the range"
-        if side.largest is None and point.cut:
-            step = f"down to {point.resolution} {number(point.finest)}, finer ones have too many steps"
-        elif side.largest is None:
-            step = f"at every {point.resolution} down to {number(point.finest)}"
+        wrong = "" if side.error is None else f", off by {number(100 * side.error, 3)} % of the range"
+        finest = step(point.resolution, point.finest)
+        if side.largest is not None:
+            beyond = f"just beyond {step(point.resolution, side.largest)}"
+        elif point.cut:
+            beyond = f"down to {finest}, finer ones have too many steps"
         else:
-            step = f"just beyond {point.resolution} {number(side.largest)}"
-        where = f"{with_caveat(name_of(point), point.caveat)} at {point.axis} = {number(point.value)}"
-        yield f"{where}: {point.failure} {step}{wrong}"
+            beyond = f"at every {'step' if point.resolution == 'dt' else 'tolerance'} down to {finest}"
+        where = f"{with_caveat(name_of(point), point.caveat)} at {point.axis} = {point.value:g}"
+        yield f"{where}: {point.failure} {beyond}{wrong}"

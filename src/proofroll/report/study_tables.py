@@ -5,9 +5,9 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
-from proofroll.report.labels import error, name_of, number, symbol, unit
+from proofroll.report.labels import error, name_of, number, step, symbol, unit
 from proofroll.report.tables import QuantityColumn
-from proofroll.report.tradeoff_tables import cost_of, step_of
+from proofroll.report.tradeoff_tables import cost_of
 
 if TYPE_CHECKING:
     from proofroll.report.tradeoff_part import Advice, TradeoffEntry
@@ -105,7 +105,7 @@ def front(entry: TradeoffEntry, key: str = "pareto_engines") -> list[FrontLine]:
     return [
         FrontLine(
             name_of(point),
-            step_of(point),
+            step(point.resolution, point.step),
             cost_of(point),
             [error(point.error.get(name)) if name in point.error else "–" for name in entry.shown],
         )
@@ -168,4 +168,5 @@ def _told(choice: Choice | None, of: str) -> ShownChoice | None:
     if choice is None:
         return None
     point, off = choice.point, f"{error(choice.error)} {of}".strip()
-    return ShownChoice(name_of(point), point.caveat, step_of(point), cost_of(point), off, choice.reason)
+    size = step(point.resolution, point.step)
+    return ShownChoice(name_of(point), point.caveat, size, cost_of(point), off, choice.reason)

@@ -6,9 +6,8 @@ from collections import Counter
 from collections.abc import Mapping, Sequence
 from typing import TYPE_CHECKING, Any
 
-from proofroll.report.labels import name_of, names, number, off_by, symbol, unit, with_caveat
+from proofroll.report.labels import name_of, names, number, off_by, step, symbol, unit, with_caveat
 from proofroll.report.scores import EVERYDAY, cheapest, closest, furthest_off, scores
-from proofroll.report.tradeoff_tables import step_of
 
 if TYPE_CHECKING:
     from proofroll.report.comparison_records import ReportedComparison
@@ -99,9 +98,8 @@ def _use(comparisons: Sequence[ReportedComparison], tradeoffs: Sequence[Any]) ->
         if answer is not None:
             choice, least = answer.choice.point, answer.least_model
             wanted = f"{symbol(answer.quantity)} to {number(answer.tolerance)} {unit(answer.unit)}".strip()
-            said = f"For {wanted} use {with_caveat(name_of(choice), choice.caveat)}" + (
-                f" at {step_of(choice)}" if step_of(choice) else ""
-            )
+            size = step(choice.resolution, choice.step)
+            said = f"For {wanted} use {with_caveat(name_of(choice), choice.caveat)}{f' at {size}' if size else ''}"
             said += f", at {number(choice.seconds_per_second)} s of computing per simulated second"
             if least:
                 said += (

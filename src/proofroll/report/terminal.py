@@ -10,7 +10,7 @@ from rich.table import Column, Table
 from rich.text import Text
 
 from proofroll.core.verdict import Verdict
-from proofroll.report.labels import SYMBOLS, caveat_lines, names, number, unjudged, verdict_text
+from proofroll.report.labels import SYMBOLS, caveat_lines, names, number, step, unjudged, verdict_text
 from proofroll.report.screen import Screen, numeric, plain_table, unbroken
 from proofroll.report.study_parts import part_kinds
 from proofroll.studies.hosts import said_of
@@ -82,13 +82,6 @@ def verdict_table(content: ReportedComparison) -> Table:
 def _beyond(item: WorstJudgement) -> float:
     """How often an error holds its tolerance; what is not finite is shown as such, and not the first to be read."""
     return item.error / item.tolerance if math.isfinite(item.error) else 0.0
-
-
-def step(resolution: str | None, value: float | None) -> str:
-    """A resolution in few characters: ``2.5e-3 s``, or ``tol 2e-14``; nothing where there is none."""
-    if not resolution:
-        return ""
-    return f"{number(value)} s" if resolution == "dt" else f"tol {number(value, 1)}"
 
 
 def columns(content: ReportedComparison) -> list[tuple[str, str]]:

@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING
 from rich.table import Column, Table
 from rich.text import Text
 
-from proofroll.report.labels import error, name_of, number, with_caveat
+from proofroll.report.labels import error, name_of, number, step, with_caveat
 from proofroll.report.screen import numeric, plain_table, unbroken
 from proofroll.running.timing import CONFIDENCE
 from proofroll.studies.pareto import tied
@@ -25,13 +25,6 @@ def default_quantities(study: TradeoffStudy) -> list[str]:
     """Path, reaction, onset and energy, as far as the scene has them."""
     wanted = [study.quantity, "N", "F3", "first_slip", "energy_balance"]
     return [name for name in dict.fromkeys(wanted) if name in study.quantities][:4]
-
-
-def step_of(point: MeasuredPoint) -> str:
-    """Its step or tolerance."""
-    if point.step is None:
-        return ""
-    return f"{point.resolution} {number(point.step)}" + (" s" if point.resolution == "dt" else "")
 
 
 def cost_of(point: MeasuredPoint) -> str:
@@ -98,7 +91,7 @@ def point_table(
         if point.status != "done":
             shown = [str(point.status), *[""] * (len(quantities) - 1)]
         mark = " ≈" if point.id in ties else ""
-        table.add_row(Text(name_of(point)), step_of(point), cost_of(point) + mark, *shown)
+        table.add_row(Text(name_of(point)), step(point.resolution, point.step), cost_of(point) + mark, *shown)
     return table
 
 
@@ -120,14 +113,15 @@ def _front(study: TradeoffStudy, points: Sequence[MeasuredPoint], quantities: Se
 
 def corner_table(study: TradeoffStudy, quantity: str) -> Table:
     """For every point that was run over the range: its error here, and the worst at the corners and where."""
-    over = ", ".join(f"{name} {number(min(v))} to {number(max(v))}" for name, v in study.over.items())
+    over = ", ".join(f"{name} {min(v):g} to {max(v):g}" for name, v in study.over.items())
     title = f"Over {over}: error of {quantity} [{study.quantities[quantity].unit}]"
     columns = [*unbroken("engine formulation setting", "step"), *numeric("here", "worst"), Column("where")]
     table = plain_table(*columns, title=title)
     checked = [p for p in study.points if p.corners and quantity in p.error]
     for point in sorted(checked, key=lambda p: p.seconds_per_second or 0.0):
         worst, where = _worst(point.corners or [], quantity)
-        table.add_row(Text(name_of(point)), step_of(point), error(point.error[quantity]), worst, Text(where))
+        here, size = error(point.error[quantity]), step(point.resolution, point.step)
+        table.add_row(Text(name_of(point)), size, here, worst, Text(where))
     return table
 
 
@@ -142,7 +136,7 @@ def _worst(corners: Sequence[Corner], quantity: str) -> tuple[str, str]:
 
 
 def _place(corner: Corner) -> str:
-    return ", ".join(f"{name} = {number(value)}" for name, value in corner.parameters.items())
+    return ", ".join(f"{name} = {value:g}" for name, value in corner.parameters.items())
 
 
 def budget_table(study: TradeoffStudy, quantity: str) -> Table:
@@ -237,7 +231,7 @@ def answer_lines(found: Recommendation) -> Iterator[str]:
 
 def _line(choice: Choice, of: str) -> str:
     point = choice.point
-    said = ", ".join(filter(None, (name_of(point), step_of(point))))
+    said = ", ".join(filter(None, (name_of(point), step(point.resolution, point.step))))
     said += f": error {error(choice.error)} {of}, cost {cost_of(point)} s/s"
     return with_caveat(f"{said}; {choice.reason}", point.caveat) + "."
 

@@ -128,7 +128,8 @@ def _line(
 ) -> MatrixLine:
     cells = [judged.get(column.name) for column in columns]
     said = (text, detail(of), href, message, as_expected, of.seconds_per_second, cost_title(cost) if cost else "")
-    return MatrixLine(of.engine, of.name, setting(of), step(of), of.verdict, SYMBOLS[of.verdict], *said, cells)
+    size = step(of.resolution, of.resolution_value)
+    return MatrixLine(of.engine, of.name, setting(of), size, of.verdict, SYMBOLS[of.verdict], *said, cells)
 
 
 def _matrix(columns: list[QuantityColumn], lines: list[MatrixLine]) -> Matrix:

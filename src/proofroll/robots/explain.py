@@ -23,7 +23,7 @@ class RobotCause:
     """A cause with its proof.
 
     Attributes:
-        id: module of the hypothesis.
+        id: function of the hypothesis.
         name: what the engine does.
         layer: the first at which it shows.
         before, after: difference at that layer without and with the hypothesis.

@@ -6,9 +6,9 @@ import json
 import pytest
 from rich.table import Table
 
-from proofroll.report.labels import settings_text
+from proofroll.report.labels import settings_text, step
 from proofroll.report.screen import Screen, escaped, printable
-from proofroll.report.terminal import console, step
+from proofroll.report.terminal import console
 
 COMMANDS = "\x1b]0;title\x07\x1b[2J\x9b31m\x00\x08\r\x7f\u202e\u2028"
 
@@ -81,10 +81,17 @@ def test_a_pipe_has_the_width_that_it_is_given(monkeypatch: pytest.MonkeyPatch) 
 
 @pytest.mark.parametrize(
     ("resolution", "value", "shown"),
-    [("dt", 1e-3, "1e-3 s"), ("dt", 2.5e-3, "2.5e-3 s"), ("rtol", 2.2e-14, "tol 2e-14"), (None, None, "")],
+    [
+        ("dt", 1e-3, "dt 1e-3 s"),
+        ("dt", 1.25e-4, "dt 1.25e-4 s"),
+        ("dt", 0.125, "dt 0.125 s"),
+        ("rtol", 2.2e-14, "rtol 2.2e-14"),
+        ("dt", None, ""),
+        (None, None, ""),
+    ],
 )
 def test_a_step_is_shown_as_it_is(resolution: str | None, value: float | None, shown: str) -> None:
-    """A step keeps its digits, a tolerance its order of magnitude."""
+    """A step has its name, its digits and its unit, a tolerance its name and two digits."""
     assert step(resolution, value) == shown
 
 

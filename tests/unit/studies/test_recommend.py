@@ -11,7 +11,7 @@ from invented import invented_budget, invented_study, measured_point, timed
 from proofroll.core.comparison import Tolerance
 from proofroll.core.errors import InputError
 from proofroll.files.json_data import plain
-from proofroll.report.tradeoff_tables import answer_lines, front_tables
+from proofroll.report.tradeoff_tables import answer_lines, corner_table, front_tables
 from proofroll.studies.recommend import covers
 from proofroll.studies.recommend import recommend as recommended
 from proofroll.studies.tradeoff_records import Corner, MeasuredPoint, MeasuredQuantity, SparseRun, TradeoffStudy
@@ -97,6 +97,14 @@ def test_costs_that_cannot_be_told_apart_are_ties() -> None:
     assert answer["ties"][0]["reason"]
     assert recommend(study(FAST, SLOW), wish(1e-3))["ties"] == []
     assert any("tie" in line and "near only" in line for line in answer_lines(recommended(measured, wish(1e-3))))
+
+
+def test_the_range_is_shown_with_its_digits() -> None:
+    """Parameters of a corner are those that a person would type."""
+    there = replace(corner(1e-3), parameters={"speed": 6.125})
+    table = corner_table(study(replace(FAST, corners=[there]), over={"speed": [2.125, 6.125]}), "z")
+    assert str(table.title) == "Over speed 2.125 to 6.125: error of z [m]"
+    assert [str(cell) for cell in table.columns[4].cells] == ["speed = 6.125"]
 
 
 def test_a_percentage_is_of_the_scale() -> None:

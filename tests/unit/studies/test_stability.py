@@ -14,6 +14,7 @@ from typing import Any
 
 import pytest
 from invented import boundary_point
+from invented import stability_study as invented_map
 
 from proofroll.core.errors import InputError
 from proofroll.files.json_data import plain, record
@@ -153,6 +154,22 @@ def test_reports_of_a_map(small: Any) -> None:
     assert "projection rotating_frame default" in picture, "texts stay texts"
     assert all(f"{letter} {kind}" in " ".join(legend(study)) for kind, letter in LETTERS.items())
     assert set(LETTERS) == set(meanings(load_scene("sphere_in_cylinder")))
+
+
+@pytest.mark.parametrize(
+    ("more", "said"),
+    [
+        ({}, "good only tuned at V0 = 200: sank in at every step down to dt 1.25e-4 s, off by 150 % of the range"),
+        ({"too_slow": 1e-5}, "sank in down to dt 1.25e-4 s, finer ones have too many steps"),
+        ({"resolution": "rtol", "finest": 1e-9}, "sank in at every tolerance down to rtol 1e-9"),
+        ({"sides": {"stable": Boundary(1e-3, True, {}, 2e-3, "", True, None, None, None)}}, "just beyond dt 1e-3 s"),
+    ],
+)
+def test_the_worst_case_says_where_and_up_to_which_step(more: dict[str, Any], said: str) -> None:
+    """Values of an axis keep their digits, and a step has its name, digits and unit."""
+    point = boundary_point(**({"value": 200.0, "finest": 1.25e-4} | more))
+    (line,) = silent_lines(dataclasses.replace(invented_map(), points=[point]))
+    assert said in line
 
 
 @pytest.fixture(scope="module")
