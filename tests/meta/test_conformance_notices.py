@@ -6,14 +6,19 @@ import dataclasses
 import subprocess
 import sys
 from collections.abc import Callable, Mapping
+from dataclasses import dataclass
+from typing import Any, ClassVar, Self
 from unittest import SkipTest
 
+import numpy as np
 import pytest
-from nonconforming import FAILS, Forgetful, Heavy
-from tiny import Tiny
+from nonconforming import FAILS, Damped, Forgetful, Heavy
+from tiny import Tiny, TinySettings
 
 from proofroll.conformance import Check, checks, run_check
 from proofroll.core.engine import Sample
+from proofroll.core.errors import InputError, Refused
+from proofroll.core.scene import Scene
 
 
 @pytest.fixture(autouse=True)
@@ -115,3 +120,72 @@ def test_names_that_fit_nothing() -> None:
         checks(Tiny, {"versoin": "misspelt"})
     with pytest.raises(ValueError, match="has no check"):
         run_check(Tiny, "versoin")
+
+
+class Weary(Damped):
+    """Damped, and gives up with an error of its own where it runs for longer than the checks do."""
+
+    def advance(self, t: float) -> None:
+        """No further than a fiftieth of a second."""
+        if t > 0.02:
+            raise RuntimeError("the licence has run out")
+        super().advance(t)
+
+
+def test_an_engine_that_fails_where_the_cause_is_looked_for() -> None:
+    """What the check has found is told, and how to run it alone, with what came in between of the cause."""
+    found = failures(Weary, "first_steps_fit_the_scene")
+    assert found
+    for text in found:
+        assert text.startswith("the engine's model differs from the scene: acceleration of the first steps")
+        assert "no cause was found: RuntimeError: the licence has run out" in text
+        assert "To reproduce:" in text
+
+
+_COARSE = 2.5e-3
+
+
+@dataclass(frozen=True)
+class BoundedSettings(TinySettings):
+    """Steps up to 2.5 ms."""
+
+    def __post_init__(self) -> None:
+        if self.dt > _COARSE:
+            raise InputError("bounded: dt", self.dt, "at most 2.5 ms")
+
+
+class Bounded(Tiny):
+    """Takes no coarser step."""
+
+    settings = BoundedSettings
+    presets: ClassVar[Mapping[str, Mapping[str, Any]]] = {"midpoint": {"matched": BoundedSettings()}}
+
+
+class Refusing(Tiny):
+    """Builds nothing with a coarser step."""
+
+    @classmethod
+    def build(cls, scene: Scene, settings: Any) -> Self:
+        """Refuses it."""
+        if settings.dt > _COARSE:
+            raise Refused("this step is too coarse")
+        return super().build(scene, settings)
+
+
+class Exploding(Tiny):
+    """Loses its state with a coarser step, and says nothing."""
+
+    def advance(self, t: float) -> None:
+        """No number is left of it."""
+        super().advance(t)
+        if self.dt > _COARSE:
+            self.x = np.full(5, np.nan)
+
+
+@pytest.mark.parametrize("engine", [Bounded, Refusing, Exploding])
+def test_the_order_of_an_engine_that_takes_no_coarse_steps(engine: type[Tiny]) -> None:
+    """Where there are no steps coarser than the preset's the order is seen with finer ones, and a wrong one too."""
+    assert failures(engine, "order_is_as_declared") == []
+    wrong = type(f"{engine.__name__}Settings", (engine.settings,), {"order": 4})
+    liar = type(engine.__name__, (engine,), {"settings": wrong, "presets": {"midpoint": {"matched": wrong()}}})
+    assert "the observed one 1.9" in "".join(failures(liar, "order_is_as_declared"))

@@ -46,4 +46,6 @@ def explained(error: UnlikeSceneError) -> str:
             causes = diagnosed(scene, lines, from_samples(scene, times, samples), truth(scene, times), step)
     except (Diverged, Refused, InputError):
         return sentence  # the check has said what it found; there is no run that tells more
+    except Exception as behind:  # anybody's engine, on a longer run than the check made
+        return f"{sentence}\nno cause was found: {type(behind).__name__}: {behind}"
     return "\n".join([sentence, *(f"cause: {item.sentence}: {item.cause.remedy}" for item in causes)])

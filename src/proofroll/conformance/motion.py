@@ -12,7 +12,7 @@ from scipy.spatial.transform import Rotation
 from proofroll.conformance.subject import Subject, bits, require
 from proofroll.core.arrays import FloatArray
 from proofroll.core.engine_abilities import declared_order
-from proofroll.core.errors import Diverged
+from proofroll.core.errors import Diverged, InputError
 from proofroll.files.scene_file import load_scene
 
 # Below this relative difference two states differ by little more than accumulated round-off.
@@ -152,7 +152,8 @@ class _Ends:
 
     def orders(self, factor: float) -> tuple[float, float]:
         """Orders from the steps 2h, h, h/2 and h, h/2, h/4, with h so many steps; NaN where round-off hides them."""
-        t = self._subject.finer(2 * factor).span(1, _ORDER_SPAN)
+        coarsest = 2 * factor * self._subject.settings.dt
+        t = math.ceil(_ORDER_SPAN / coarsest) * coarsest
         states = []
         for part in (2.0, 1.0, 0.5, 0.25):
             state = self._end(part * factor, t)
@@ -165,12 +166,17 @@ class _Ends:
         return math.log2(changes[0] / changes[1]), math.log2(changes[1] / changes[2])
 
     def _end(self, factor: float, t: float) -> FloatArray | None:
-        """The state at time ``t`` [s], none where the run diverges."""
+        """The state at time ``t`` [s]; none where it is not finite, or the engine takes no step so coarse."""
         if (factor, t) not in self._known:
-            rung = self._subject.finer(factor)
             try:
-                self._known[factor, t] = rung.scaled(rung.at(t).sample())
+                rung = self._subject.finer(factor)
+                state = rung.scaled(rung.at(t).sample())
+                self._known[factor, t] = state if np.all(np.isfinite(state)) else None
             except Diverged:
+                self._known[factor, t] = None
+            except (InputError, SkipTest):  # its settings refuse the step, or it refuses to build with it
+                if factor <= 1:
+                    raise
                 self._known[factor, t] = None
         return self._known[factor, t]
 
