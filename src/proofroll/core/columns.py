@@ -38,10 +38,24 @@ class Columns:
     Attributes:
         variables: by name, those of the dimensions among them.
         attrs: what is said of all.
+
+    Raises:
+        ValueError: variables have other lengths along one dimension, which a file would hide where one of them is 1.
     """
 
     variables: Mapping[str, Variable]
     attrs: Mapping[str, Any] = field(default_factory=dict)
+
+    def __post_init__(self) -> None:
+        lengths: dict[str, int] = {}
+        for name, (dims, values, _) in self.variables.items():
+            shape = np.shape(values)
+            if len(shape) != len(dims):
+                said = f"the dimensions {', '.join(dims)}" if dims else "no dimension"
+                raise ValueError(f"{name} has the shape {shape}, and {said}")
+            for dim, length in zip(dims, shape, strict=True):
+                if lengths.setdefault(dim, length) != length:
+                    raise ValueError(f"{name} has {length} values along {dim}, and others have {lengths[dim]}")
 
     @classmethod
     def of(cls, dataset: xr.Dataset) -> Columns:

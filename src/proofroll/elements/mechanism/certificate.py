@@ -10,6 +10,7 @@ import numpy as np
 from proofroll.core.arrays import FloatArray
 from proofroll.core.certificate import Line, require_shapes
 from proofroll.core.engine import Regularised, Sample
+from proofroll.elements.mechanism.dataset import reactions
 from proofroll.elements.mechanism.joint import WITH_AXIS, Joint
 from proofroll.elements.mechanism.sampling import MechanismBuilt
 
@@ -107,8 +108,8 @@ def _compare_reactions(
     natural = sum(body.mass for body in element.mechanism.bodies) * found.scale
     force = max(float(np.nanmax(np.abs(wrench[:, :3]), initial=0.0)), natural)
     torque = max(float(np.nanmax(np.abs(wrench[:, 3:]), initial=0.0)), force * element.length)
-    compare("forces", "N", wrench[:, :3], np.reshape(sample.joint_force, (-1, 3)), force)
-    compare("torques", "N m", wrench[:, 3:], np.reshape(sample.joint_torque, (-1, 3)), torque)
+    compare("forces", "N", wrench[:, :3], reactions(element, sample, "joint_force"), force)
+    compare("torques", "N m", wrench[:, 3:], reactions(element, sample, "joint_torque"), torque)
 
 
 def _turning(element: MechanismElement, soft: bool) -> float:

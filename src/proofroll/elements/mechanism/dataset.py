@@ -10,6 +10,7 @@ import numpy as np
 from proofroll.core.arrays import FloatArray
 from proofroll.core.columns import Columns, Variable, axes
 from proofroll.core.engine import Sample
+from proofroll.core.errors import Diverged
 from proofroll.elements.mechanism.placed import Placed
 
 if TYPE_CHECKING:
@@ -28,10 +29,29 @@ def from_samples(element: MechanismElement, times: FloatArray, samples: Sequence
         given = [getattr(sample, name) for sample in samples]
         return np.array([empty if value is None else np.reshape(value, (rows, width)) for value in given])
 
-    rows = len(element.analysis.determinate)
-    force, torque = stacked("joint_force", 3, rows), stacked("joint_torque", 3, rows)
+    force, torque = (
+        np.array([reactions(element, sample, name) for sample in samples]) for name in ("joint_force", "joint_torque")
+    )
     p, v, w = (stacked(name, 3, count) for name in ("p_WB", "v_WB", "w_WB"))
     return columns(element, times, p, v, w, stacked("q_WB", 4, count), force, torque)
+
+
+def reactions(element: MechanismElement, sample: Sample, name: str) -> FloatArray:
+    """``joint_force`` [N] or ``joint_torque`` [N m] of a sample, shape (joints + loops, 3); NaN where it is None.
+
+    Raises:
+        Diverged: it is not of numbers, or has another shape; one after the other in a row they may be.
+    """
+    shape, given = (len(element.mechanism.connections), 3), getattr(sample, name)
+    if given is None:
+        return np.full(shape, np.nan)
+    try:
+        values = np.asarray(given, dtype=np.float64)
+    except (TypeError, ValueError):
+        raise Diverged(f"the engine gave {name} that is no array of numbers") from None
+    if values.shape not in {shape, (3 * shape[0],)}:
+        raise Diverged(f"the engine gave {name} with shape {values.shape} instead of {shape}")
+    return values.reshape(shape)
 
 
 def columns(

@@ -124,6 +124,28 @@ def test_what_is_built_of_another_shape_is_named(name: str, wrong: object) -> No
         noticed(element, dataclasses.replace(right(element), **{name: wrong}))
 
 
+@pytest.mark.parametrize(
+    ("wrong", "words"),
+    [
+        (np.zeros((3, 2)), r"with shape \(3, 2\) instead of \(2, 3\)"),
+        (np.zeros((3, 3)), r"with shape \(3, 3\) instead of \(2, 3\)"),
+        ("heavy", "that is no array of numbers"),
+    ],
+)
+@pytest.mark.parametrize("name", ["joint_force", "joint_torque"])
+def test_reactions_of_another_shape_are_named(name: str, wrong: object, words: str) -> None:
+    """A row for each joint: of the transposed array the numbers would go to other joints and axes without a word."""
+    element = element_of("double_pendulum")
+    zeros = np.zeros((2, 3))
+    sample = at_start(element, **({"joint_force": zeros, "joint_torque": zeros} | {name: wrong}))
+    for read in (
+        lambda: element.certify(right(element), sample),
+        lambda: element.variables(np.zeros(1), [sample], {}),
+    ):
+        with pytest.raises(Diverged, match=f"^the engine gave {name} {words}"):
+            read()
+
+
 def test_a_wrong_start_is_noticed() -> None:
     """Other velocities of the bodies fail; a quaternion of the other sign is the same orientation."""
     element = element_of("slider_crank")
