@@ -14,7 +14,7 @@ from hypothesis import strategies as st
 
 from proofroll.core.certificate import certify, first_difference
 from proofroll.core.scene import Scene
-from proofroll.elements.ball_on_surface.dataset import variables
+from proofroll.elements.ball_on_surface.dataset import columns
 from proofroll.elements.ball_on_surface.element import changed, rolling_ball
 from proofroll.elements.ball_on_surface.observables import energy_balance
 from proofroll.files.scene_file import load_scene
@@ -43,7 +43,7 @@ def solve(way: str, scene: Scene, until: float, samples: int = 3) -> xr.Dataset:
     times = np.linspace(0, until, samples)
     if way in routes:
         motion = routes[way](rolling_ball(scene), times)
-        return variables(rolling_ball(scene), times, motion.p_WB, motion.v_WB, motion.w_WB, force=motion.force)
+        return columns(rolling_ball(scene), times, motion.p_WB, motion.v_WB, motion.w_WB, force=motion.force).dataset()
     return simulate(scene, way, until=until, every=until / (samples - 1))
 
 

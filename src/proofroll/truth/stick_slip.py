@@ -10,7 +10,7 @@ from proofroll.core.arrays import FloatArray
 from proofroll.core.errors import Refused
 from proofroll.core.events import Event
 from proofroll.core.scene import Scene
-from proofroll.elements.ball_on_surface.dataset import variables
+from proofroll.elements.ball_on_surface.dataset import columns
 from proofroll.elements.ball_on_surface.element import rolling_ball
 from proofroll.elements.ball_on_surface.events import EventKind
 from proofroll.elements.ball_on_surface.model import BallCapability, RollingBall
@@ -110,6 +110,6 @@ def _dataset(scene: Scene, times: FloatArray, path: Path[FloatArray], route: str
     if BallCapability.ORIENTATION in scene.requires:
         q_WB = orientation(lambda at: path.motion(at, route)[0].w_WB, times, [leg.end for leg in path.legs], quadrature)
     body = rolling_ball(scene)
-    result = variables(body, times, motion.p_WB, motion.v_WB, motion.w_WB, force=motion.force, q_WB=q_WB)
+    result = columns(body, times, motion.p_WB, motion.v_WB, motion.w_WB, force=motion.force, q_WB=q_WB).dataset()
     attributes = {"units": "1", "long_name": "whether the ball sticks (rolls without slip)"}
     return result.assign(sticking=("time", sticking, attributes))

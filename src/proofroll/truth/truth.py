@@ -11,7 +11,7 @@ from proofroll.core.arrays import FloatArray
 from proofroll.core.events import with_events
 from proofroll.core.scene import Scene
 from proofroll.elements.ball_on_surface.closed_form import closed_form
-from proofroll.elements.ball_on_surface.dataset import variables
+from proofroll.elements.ball_on_surface.dataset import columns
 from proofroll.elements.ball_on_surface.element import rolling_ball
 from proofroll.elements.ball_on_surface.mechanics import always_pressed
 from proofroll.elements.ball_on_surface.model import BallCapability, RollingBall
@@ -91,5 +91,5 @@ def _dataset(scene: Scene, times: FloatArray, route: Route, spin: Spin, quadratu
             return spin(body, at) if at[0] == 0 else spin(body, np.append(0.0, at))[1:]
 
         q_WB = orientation(from_start, times, (), quadrature)
-    result = variables(body, times, found.p_WB, found.v_WB, found.w_WB, force=found.force, q_WB=q_WB)
+    result = columns(body, times, found.p_WB, found.v_WB, found.w_WB, force=found.force, q_WB=q_WB).dataset()
     return result.assign_attrs(route=found.route)

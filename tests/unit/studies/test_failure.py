@@ -10,7 +10,7 @@ import pytest
 
 from proofroll.core.events import Event, with_events
 from proofroll.core.truth import truth
-from proofroll.elements.ball_on_surface.dataset import variables
+from proofroll.elements.ball_on_surface.dataset import columns
 from proofroll.elements.ball_on_surface.element import rolling_ball
 from proofroll.elements.ball_on_surface.natural import natural_time
 from proofroll.files.scene_file import load_scene
@@ -28,7 +28,7 @@ LATE = (np.arange(len(TIMES)) >= 12)[:, None]
 
 def run(p: Any = P, v: Any = V, w: Any = W, upto: int = 25) -> Any:
     """A trajectory of these states."""
-    return variables(rolling_ball(SCENE), TIMES[:upto], p[:upto], v[:upto], w[:upto])
+    return columns(rolling_ball(SCENE), TIMES[:upto], p[:upto], v[:upto], w[:upto]).dataset()
 
 
 def drifting(speed: float) -> Any:
@@ -136,7 +136,7 @@ def rolling_down(after_rest: float) -> tuple[Any, Yardstick]:
         way = np.concatenate([[0.0], np.cumsum((slowing[1:] + slowing[:-1]) / 2 * np.diff(times))])
         v = slowing[:, None] * along
         w = -np.cross(body.surface.normal(body.p0), v) / body.ball.radius
-        return variables(rolling_ball(RESISTED), times, body.p0 + way[:, None] * along, v, w)
+        return columns(rolling_ball(RESISTED), times, body.p0 + way[:, None] * along, v, w).dataset()
 
     return path(after_rest), Yardstick.of(RESISTED, path(0.0))
 

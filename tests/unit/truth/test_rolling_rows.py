@@ -11,7 +11,7 @@ import xarray as xr
 from proofroll.core.errors import Refused
 from proofroll.core.scene import Scene
 from proofroll.core.truth import truth
-from proofroll.elements.ball_on_surface.dataset import variables
+from proofroll.elements.ball_on_surface.dataset import columns
 from proofroll.elements.ball_on_surface.element import BallOnSurface
 from proofroll.files.scene_file import load_scene
 from proofroll.truth.mechanism.maximal_coordinates import MaximalCoordinates
@@ -41,7 +41,7 @@ def witnessed(scene: Scene, element: BallOnSurface, method: str = "run_taylor") 
     ball = mechanism.body_index[element.name]
     contact = len(mechanism.joints) + len(mechanism.loops) + [one.body for one in rolling].index(element.name)
     motion = record.p_WB[:, ball], record.v_WB[:, ball], record.w_WB[:, ball]
-    return variables(element.rolling, TIMES, *motion, force=record.wrench[:, contact, :3])
+    return columns(element.rolling, TIMES, *motion, force=record.wrench[:, contact, :3]).dataset()
 
 
 @pytest.mark.parametrize("name", ["sphere_in_cylinder", "inclined_plane", "bowl"])

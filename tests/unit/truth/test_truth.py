@@ -11,7 +11,7 @@ from proofroll.core.errors import Diverged
 from proofroll.core.scene import Scene
 from proofroll.core.truth import truth
 from proofroll.elements.ball_on_surface.closed_form import closed_form
-from proofroll.elements.ball_on_surface.dataset import variables
+from proofroll.elements.ball_on_surface.dataset import columns
 from proofroll.elements.ball_on_surface.element import changed, rolling_ball
 from proofroll.elements.ball_on_surface.model import Ball
 from proofroll.elements.ball_on_surface.motion import BallMotion
@@ -43,7 +43,7 @@ def test_closed_form_of_the_paper(speed: float) -> None:
     t = np.linspace(0, 2, 41)
     motion = closed_form(rolling_ball(scene), t)
     assert motion is not None
-    found = variables(rolling_ball(scene), t, motion.p_WB, motion.v_WB, motion.w_WB, force=motion.force)
+    found = columns(rolling_ball(scene), t, motion.p_WB, motion.v_WB, motion.w_WB, force=motion.force).dataset()
     rate = speed / C
     nu = np.sqrt(2 / 7) * abs(rate)
     z = -5 * G / (2 * rate**2) * (1 - np.cos(nu * t))

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from typing import TYPE_CHECKING
 
 import numpy as np
 
@@ -13,9 +12,6 @@ from proofroll.core.engine import Sample
 from proofroll.elements.ball_on_surface.mechanics import energy, slip_velocity, wall_velocity
 from proofroll.elements.ball_on_surface.model import RollingBall
 from proofroll.elements.ball_on_surface.surfaces import Surface
-
-if TYPE_CHECKING:
-    import xarray as xr
 
 
 def from_samples(
@@ -57,20 +53,6 @@ def samples_between(samples: Mapping[float, Sample]) -> dict[str, Variable]:
         "v_between": Variable(("between", "xyz"), v, {"units": "m/s", "long_name": f"velocity of the centre {of}"}),
         "between": Variable(("between",), np.array(list(samples)), {"units": "s"}),
     }
-
-
-def variables(
-    body: RollingBall,
-    times: FloatArray,
-    p_WB: FloatArray,
-    v_WB: FloatArray,
-    w_WB: FloatArray,
-    *,
-    force: FloatArray | None = None,
-    q_WB: FloatArray | None = None,
-) -> xr.Dataset:
-    """See :func:`columns`, as a dataset."""
-    return columns(body, times, p_WB, v_WB, w_WB, force=force, q_WB=q_WB).dataset()
 
 
 def columns(

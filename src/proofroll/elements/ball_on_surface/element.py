@@ -176,7 +176,7 @@ class BallOnSurface:
         return certificate.another_scene(lines, float(np.max(friction[np.isfinite(friction)], initial=0.0)))
 
     def variables(self, times: FloatArray, samples: Sequence[Sample], between: Mapping[float, Sample]) -> Columns:
-        """See the protocol; the variables are those of :func:`proofroll.elements.ball_on_surface.dataset.variables`."""
+        """See the protocol; the variables are those of :func:`proofroll.elements.ball_on_surface.dataset.columns`."""
         return from_samples(self.rolling, times, samples, between)
 
     def watch(self, asks: Sequence[str]) -> RunWatch:  # noqa: ARG002 -- the protocol's

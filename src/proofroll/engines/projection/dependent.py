@@ -58,7 +58,6 @@ class DependentCoordinates:
             self._root[at[0], at[0]] = np.eye(3) / np.sqrt(self.mass[i])
             self._root[at[1], at[1]] = np.linalg.inv(np.linalg.cholesky(self.inertia[i])).T
         self.start = self._start(mechanism)
-        self.rank = 0
         self.rank = independent_anywhere(self.start, self._residual_and_rows, self._moved)
 
     def _start(self, mechanism: Mechanism) -> Array:

@@ -13,7 +13,7 @@ from scipy.spatial.transform import Rotation
 from proofroll.core.dataset import from_samples, observe, scales
 from proofroll.core.engine import Sample
 from proofroll.core.scene import Scene
-from proofroll.elements.ball_on_surface.dataset import samples_between, variables
+from proofroll.elements.ball_on_surface.dataset import columns, samples_between
 from proofroll.elements.ball_on_surface.element import rolling_ball
 from proofroll.elements.ball_on_surface.motion import BallMotion
 from proofroll.elements.ball_on_surface.observables import energy_balance, force_audit, rate_audit
@@ -29,7 +29,9 @@ def case() -> tuple[Scene, xr.Dataset]:
     """A run with resistance, general initial motion and nothing wrong."""
     scene = load_scene("sphere_in_cylinder", axial_speed=0.7, radial_spin=12.0, rolling_resistance=5e-4)
     motion = reduced(rolling_ball(scene), TIMES)
-    return scene, variables(rolling_ball(scene), TIMES, motion.p_WB, motion.v_WB, motion.w_WB, force=motion.force)
+    return scene, columns(
+        rolling_ball(scene), TIMES, motion.p_WB, motion.v_WB, motion.w_WB, force=motion.force
+    ).dataset()
 
 
 def largest(values: np.ndarray) -> float:
@@ -104,7 +106,7 @@ def test_rate_audit_sees_an_error_with_the_period_of_the_grid() -> None:
     times = off_grid(TIMES, None)
     both = np.union1d(TIMES, times)
     motion, probed = reduced(rolling_ball(scene), TIMES), reduced(rolling_ball(scene), both)
-    dataset = variables(rolling_ball(scene), TIMES, motion.p_WB, motion.v_WB, motion.w_WB)
+    dataset = columns(rolling_ball(scene), TIMES, motion.p_WB, motion.v_WB, motion.w_WB).dataset()
 
     def with_beat(size: float) -> xr.Dataset:
         samples = {}
@@ -134,7 +136,7 @@ def test_rate_audit_sees_an_orientation_of_its_own() -> None:
         return largest(
             rate_audit(
                 rolling_ball(scene),
-                variables(rolling_ball(scene), TIMES, motion.p_WB, motion.v_WB, motion.w_WB, q_WB=q),
+                columns(rolling_ball(scene), TIMES, motion.p_WB, motion.v_WB, motion.w_WB, q_WB=q).dataset(),
             )
         )
 
@@ -201,7 +203,7 @@ def test_slip_is_the_length_of_the_slip_velocity(case: tuple[Scene, xr.Dataset])
     body = rolling_ball(scene)
     p, v, w = (dataset[name].to_numpy() for name in ("p_WB", "v_WB", "w_WB"))
     frame = body.surface.frame(np.stack([dataset[name] for name in body.surface.coordinates], axis=-1))
-    slipping = variables(body, TIMES, p, v + 0.3 * frame[..., 1] - 0.4 * frame[..., 2], w)
+    slipping = columns(body, TIMES, p, v + 0.3 * frame[..., 1] - 0.4 * frame[..., 2], w).dataset()
     assert observe(scene, slipping)["slip"] == pytest.approx(0.5, abs=1e-12)
 
 
@@ -214,7 +216,9 @@ def test_scales(case: tuple[Scene, xr.Dataset]) -> None:
     assert set(observe(scene, dataset)) <= set(sizes)
     resting = load_scene("inclined_plane", tilt=0.0, speed=0.0, cross_speed=0.0)
     motion = reduced(rolling_ball(resting), TIMES[:3])
-    still = variables(rolling_ball(resting), TIMES[:3], motion.p_WB, motion.v_WB, motion.w_WB, force=motion.force)
+    still = columns(
+        rolling_ball(resting), TIMES[:3], motion.p_WB, motion.v_WB, motion.w_WB, force=motion.force
+    ).dataset()
     assert all(size > 0 for size in scales(resting, still).values())
 
 
@@ -222,7 +226,7 @@ def test_scales_have_floors() -> None:
     """A range of round-off is no size: where nothing moves, a scale is a hundredth of what is natural for the ball."""
     scene = load_scene("inclined_plane", tilt=0.35, cross_speed=0.0)
     body, motion = rolling_ball(scene), reduced(rolling_ball(scene), TIMES)
-    dataset = variables(rolling_ball(scene), TIMES, motion.p_WB, motion.v_WB, motion.w_WB, force=motion.force)
+    dataset = columns(rolling_ball(scene), TIMES, motion.p_WB, motion.v_WB, motion.w_WB, force=motion.force).dataset()
     dataset["across"] = 3.5e-17 * np.sin(dataset["time"])
     dataset["N"], dataset["needed_friction"] = 0 * dataset["N"], np.nan * dataset["N"]
     sizes = scales(scene, dataset)

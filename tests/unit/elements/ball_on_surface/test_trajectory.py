@@ -14,7 +14,7 @@ from proofroll.core.errors import ProofrollError
 from proofroll.core.scene import Scene
 from proofroll.core.truth import truth
 from proofroll.elements.ball_on_surface.closed_form import closed_form
-from proofroll.elements.ball_on_surface.dataset import variables
+from proofroll.elements.ball_on_surface.dataset import columns
 from proofroll.elements.ball_on_surface.element import changed, rolling_ball
 from proofroll.files.netcdf import read, read_some, write
 from proofroll.files.scene_file import load_scene
@@ -24,7 +24,7 @@ def exact(scene: Scene, times: np.ndarray) -> xr.Dataset:
     """The closed form alone, which costs nothing."""
     motion = closed_form(rolling_ball(scene), times)
     assert motion is not None
-    return variables(rolling_ball(scene), times, motion.p_WB, motion.v_WB, motion.w_WB, force=motion.force)
+    return columns(rolling_ball(scene), times, motion.p_WB, motion.v_WB, motion.w_WB, force=motion.force).dataset()
 
 
 @pytest.mark.parametrize("every", [0.01, 0.25, 0.7, 1.3])
@@ -69,7 +69,9 @@ def test_slip_has_sign_and_size() -> None:
     scene = load_scene("sphere_in_cylinder")
     body = rolling_ball(scene)
     surplus = np.array([0.0, 3.0, 2.0])
-    dataset = variables(rolling_ball(scene), np.zeros(1), body.p0[None], body.v0[None], (body.w0 + surplus)[None])
+    dataset = columns(
+        rolling_ball(scene), np.zeros(1), body.p0[None], body.v0[None], (body.w0 + surplus)[None]
+    ).dataset()
     assert float(dataset["slip2"][0]) == pytest.approx(0.025 * 2, rel=1e-12)
     assert float(dataset["slip3"][0]) == pytest.approx(-0.025 * 3, rel=1e-12)
 
