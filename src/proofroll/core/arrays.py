@@ -8,11 +8,13 @@ import numpy.typing as npt
 FloatArray = npt.NDArray[np.float64]
 
 
+_NEXT, _LAST = np.array([1, 2, 0]), np.array([2, 0, 1])
+
+
 def cross(a: FloatArray, b: FloatArray) -> FloatArray:
     """Cross products of two vectors or lists of vectors, (3,) or (n, 3); several times faster than numpy's."""
-    a0, a1, a2 = a.T
-    b0, b1, b2 = b.T
-    return np.array((a1 * b2 - a2 * b1, a2 * b0 - a0 * b2, a0 * b1 - a1 * b0)).T
+    found: FloatArray = a.take(_NEXT, -1) * b.take(_LAST, -1) - a.take(_LAST, -1) * b.take(_NEXT, -1)
+    return found
 
 
 def largest_difference(one: FloatArray, other: FloatArray) -> float:

@@ -33,7 +33,11 @@ class Bodies(NamedTuple):
 
 
 class Ends(NamedTuple):
-    """Connections now, world axes: arms from the centres of mass, d and its rate, axes A and B, (connections, …)."""
+    """Connections now, world axes: arms from the centres of mass, d and its rate, axes A and B, (connections, …).
+
+    ``turning_a`` and ``turning_b`` have axes and arm of an end as columns, then ω × them, then ω × (ω × them),
+    (3, connections, 3, 4).
+    """
 
     arm_a: Array
     arm_b: Array
@@ -41,6 +45,8 @@ class Ends(NamedTuple):
     d_rate: Array
     A: Array
     B: Array
+    turning_a: Array
+    turning_b: Array
 
 
 class ConnectionRows(NamedTuple):
@@ -59,9 +65,8 @@ def turned(R: Array, a: Array) -> Array:
     return found
 
 
-def _dot(a: Array, b: Array) -> Array:
-    """Products of two lists of vectors."""
-    return np.asarray((a * b).sum(1))
+# Matrix of ω × from ω, its nine elements in a row.
+_SKEW = np.array([[0.0, 0, 0, 0, 0, -1, 0, 1, 0], [0.0, 0, 1, 0, 0, 0, -1, 0, 0], [0.0, -1, 0, 1, 0, 0, 0, 0, 0]])
 
 
 class ProjectedConnections:
@@ -85,51 +90,59 @@ class ProjectedConnections:
         ]
         self.a = np.array([index[item[1]] % (count + 1) for item in cut], dtype=np.intp)
         self.b = np.array([index[item[2]] % (count + 1) for item in cut], dtype=np.intp)
-        self._at_a = np.array([item[3] for item in cut]) - com[self.a]
-        self._at_b = np.array([item[4] for item in cut]) - com[self.b]
-        self._A = np.array([item[5] for item in cut])
-        self._B = np.array([item[6] for item in cut])
+        at_a = np.array([item[3] for item in cut]) - com[self.a]
+        at_b = np.array([item[4] for item in cut]) - com[self.b]
+        self._at_a = np.concatenate([np.array([item[5] for item in cut]), at_a[:, :, None]], axis=2)
+        self._at_b = np.concatenate([np.array([item[6] for item in cut]), at_b[:, :, None]], axis=2)
         points = [(number, k) for number, item in enumerate(cut) for k in FACTS[item[0]].translations]
         angles = [(number, *pair) for number, item in enumerate(cut) for pair in FACTS[item[0]].rotations]
         self._point, self._axis = np.array(points, dtype=np.intp).reshape(-1, 2).T
         self._angle, self._x, self._y = np.array(angles, dtype=np.intp).reshape(-1, 3).T
         locked = np.array([len(FACTS[item[0]].translations) for item in cut], dtype=np.intp)
         # whether a row's direction moves with body a
-        self._moving = (locked[self._point] < 3).astype(float)[:, None]
+        self._moves = (locked[self._point] < 3)[:, None]
+        self._moving, self._fixed = self._moves.astype(float), np.eye(3)[self._axis]
         self.owner = np.concatenate([self._point, self._angle])
 
     def ends(self, bodies: Bodies) -> Ends:
-        """Where the connections' ends are."""
+        """Where the connections' ends are, and how they turn."""
         (r, R, v, w), a, b = bodies, self.a, self.b
-        R_a, R_b = R[a], R[b]
-        arm_a, arm_b = turned(R_a, self._at_a), turned(R_b, self._at_b)
+        turning = np.empty((3, *R.shape))
+        spin = (w @ _SKEW).reshape(R.shape)
+        turning[0] = R
+        np.matmul(spin, R, out=turning[1])
+        np.matmul(spin, turning[1], out=turning[2])
+        of_a, of_b = turning[:, a] @ self._at_a, turning[:, b] @ self._at_b
+        arm_a, arm_b = of_a[0, :, :, 3], of_b[0, :, :, 3]
         d = r[b] + arm_b - r[a] - arm_a
-        d_rate = v[b] + cross(w[b], arm_b) - v[a] - cross(w[a], arm_a)
-        return Ends(arm_a, arm_b, d, d_rate, R_a @ self._A, R_b @ self._B)
+        d_rate = v[b] + of_b[1, :, :, 3] - v[a] - of_a[1, :, :, 3]
+        return Ends(arm_a, arm_b, d, d_rate, of_a[0, :, :, :3], of_b[0, :, :, :3], of_a, of_b)
 
     def rows(self, bodies: Bodies, ends: Ends) -> ConnectionRows:
         """The rows of all connections: those of points, then those of angles."""
-        w_a, w_b = bodies.w[self.a], bodies.w[self.b]
-        bent = cross(w_b, cross(w_b, ends.arm_b)) - cross(w_a, cross(w_a, ends.arm_a))
         i, moving = self._point, self._moving
-        d = ends.d[i]
-        n = np.where(moving > 0, ends.A[i, :, self._axis], np.eye(3)[self._axis])
-        n_rate = moving * cross(w_a[i], n)
-        bending = _dot(n, bent[i]) + 2 * _dot(n_rate, ends.d_rate[i]) + _dot(moving * cross(w_a[i], n_rate), d)
+        d, bent = ends.d[i], ends.turning_b[2, i, :, 3] - ends.turning_a[2, i, :, 3]
+        along, along_rate, along_bent = ends.turning_a[:, i, :, self._axis].swapaxes(0, 1)
+        n = np.where(self._moves, along, self._fixed)
+        bending = n * bent + moving * (2 * along_rate * ends.d_rate[i] + along_bent * d)
         j = self._angle
-        x, y = ends.A[j, :, self._x], ends.B[j, :, self._y]
-        x_rate, y_rate, t = cross(w_a[j], x), cross(w_b[j], y), cross(y, x)
-        turning = _dot(cross(w_a[j], x_rate), y) + 2 * _dot(x_rate, y_rate) + _dot(x, cross(w_b[j], y_rate))
-        m_a = np.concatenate([cross(ends.arm_a[i] + moving * d, n), t])
-        m_b = np.concatenate([cross(ends.arm_b[i], n), t])
-        force, torque = np.concatenate([n, np.zeros_like(t)]), np.concatenate([np.zeros_like(n), t])
-        residual, drift = np.concatenate([_dot(n, d), _dot(x, y)]), np.concatenate([bending, turning])
-        return ConnectionRows(residual, self.spread(bodies, self.owner, force, m_a, m_b), drift, force, torque)
+        x, x_rate, x_bent = ends.turning_a[:, j, :, self._x].swapaxes(0, 1)
+        y, y_rate, y_bent = ends.turning_b[:, j, :, self._y].swapaxes(0, 1)
+        turning = x_bent * y + 2 * x_rate * y_rate + x * y_bent
+        arms = np.concatenate([y, ends.arm_b[i], ends.arm_a[i] + moving * d])
+        moments = cross(arms, np.concatenate([x, n, n]))
+        t, m_b, m_a = np.split(moments, [len(x), len(x) + len(n)])
+        none = np.zeros_like(t)
+        force, torque = np.concatenate([n, none]), np.concatenate([np.zeros_like(n), t])
+        residual = np.concatenate([n * d, x * y]).sum(1)
+        drift = np.concatenate([bending, turning]).sum(1)
+        C = self.spread(bodies, self.owner, force, np.concatenate([m_a, t]), np.concatenate([m_b, t]))
+        return ConnectionRows(residual, C, drift, force, torque)
 
     def spread(self, bodies: Bodies, connection: NDArray[np.intp], n: Array, m_a: Array, m_b: Array) -> Array:
         """n·(v_b − v_a) + m_b·ω_b − m_a·ω_a on the dependent velocities of all bodies, shape (rows, 6 bodies)."""
         rows, a, b = np.arange(len(n)), self.a[connection], self.b[connection]
         C = np.zeros((len(n), self._count + 1, 6))
-        C[rows, b, :3], C[rows, b, 3:] = n, np.matmul(m_b[:, None, :], bodies.R[b])[:, 0]
-        C[rows, a, :3], C[rows, a, 3:] = -n, -np.matmul(m_a[:, None, :], bodies.R[a])[:, 0]
+        C[rows, b] = np.concatenate([n, np.matmul(m_b[:, None, :], bodies.R[b])[:, 0]], axis=1)
+        C[rows, a] = -np.concatenate([n, np.matmul(m_a[:, None, :], bodies.R[a])[:, 0]], axis=1)
         return C[:, : self._count].reshape(len(n), 6 * self._count)

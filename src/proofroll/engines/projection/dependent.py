@@ -161,19 +161,34 @@ def _joined(*parts: Array) -> Array:
     return np.concatenate([part.ravel() for part in parts])
 
 
+def _rotation(p: Array, q: Array) -> Array:
+    """Bilinear in lists of quaternions (w, x, y, z): of one with itself its rotation, and its length, both squared."""
+    (a, b, c, d), (w, x, y, z) = p.T, q.T
+    rows = (
+        (a * w + b * x - c * y - d * z, 2 * (b * y - a * z), 2 * (b * z + a * y)),
+        (2 * (b * y + a * z), a * w - b * x + c * y - d * z, 2 * (c * z - a * x)),
+        (2 * (b * z - a * y), 2 * (c * z + a * x), a * w - b * x - c * y + d * z),
+    )
+    return np.array([*rows[0], *rows[1], *rows[2], a * w + b * x + c * y + d * z]).T
+
+
+def _rate(q: Array, w: Array) -> Array:
+    """Bilinear: half the products of quaternions and angular velocities along the bodies' own axes."""
+    (a, b, c, d), (x, y, z) = q.T, 0.5 * w.T
+    return np.array((-b * x - c * y - d * z, a * x + c * z - d * y, a * y + d * x - b * z, a * z + b * y - c * x)).T
+
+
+# Both of all pairs of units: the products of all pairs of elements times these are three calls of numpy, not thirty.
+_ROTATION = _rotation(np.repeat(np.eye(4), 4, axis=0), np.tile(np.eye(4), (4, 1)))
+_RATE = _rate(np.repeat(np.eye(4), 3, axis=0), np.tile(np.eye(3), (4, 1)))
+
+
 def rotations(q: Array) -> Array:
     """Rotation matrices of quaternions (w, x, y, z) of any length but zero, (bodies, 3, 3)."""
-    w, x, y, z = q.T * np.sqrt(2 / (q * q).sum(1))
-    return np.array(
-        (
-            (1 - y * y - z * z, x * y - w * z, x * z + w * y),
-            (x * y + w * z, 1 - x * x - z * z, y * z - w * x),
-            (x * z - w * y, y * z + w * x, 1 - x * x - y * y),
-        )
-    ).transpose(2, 0, 1)
+    found = (q[:, :, None] * q[:, None, :]).reshape(-1, 16) @ _ROTATION
+    return np.asarray((found[:, :9] / found[:, 9:]).reshape(-1, 3, 3))
 
 
 def quaternion_rates(q: Array, w: Array) -> Array:
     """Half the product of quaternions and angular velocities along the bodies' own axes, (bodies, 4)."""
-    (a, b, c, d), (x, y, z) = q.T, 0.5 * w.T
-    return np.array((-b * x - c * y - d * z, a * x + c * z - d * y, a * y + d * x - b * z, a * z + b * y - c * x)).T
+    return np.asarray((q[:, :, None] * w[:, None, :]).reshape(-1, 12) @ _RATE)
