@@ -25,6 +25,8 @@ from proofroll.testing import assert_agrees
 
 Proofroll = Callable[..., tuple[int, str, str]]
 BECAUSE = "a first look"
+STILL = {"time": [0.0, 0.1]} | {name: np.zeros((2, 3)) for name in ("p_WB", "v_WB", "w_WB")}
+STILL["q_WB"] = np.array([[1.0, 0, 0, 0], [1.0, 0, 0, 0]])
 
 
 def swing(gravity: float = 9.81) -> dict[str, np.ndarray]:
@@ -126,6 +128,8 @@ def test_the_state_alone_is_enough() -> None:
         ({"time": [0.1, 0.0], "q.pivot": [0.0, 0.0]}, "rise from 0"),
         ({"time": [0.0, 0.1], "angle": [0.0, 0.0]}, "the truth has none of these; it has .*q.pivot"),
         ("nowhere.nc", "cannot be read"),
+        (STILL | {"p_WB": np.zeros((2, 2))}, "p_WB .*: these are no states of pendulum"),
+        (STILL | {"joint_force": np.zeros((2, 3, 2))}, r"no states of pendulum \(.*joint_force with shape \(3, 2\)"),
     ],
 )
 def test_a_trajectory_that_is_none(run: Any, words: str) -> None:

@@ -13,7 +13,7 @@ from proofroll.core.arrays import FloatArray
 from proofroll.core.comparison import Tolerance
 from proofroll.core.dataset import from_samples
 from proofroll.core.engine import Sample
-from proofroll.core.errors import InputError
+from proofroll.core.errors import Diverged, InputError
 from proofroll.core.observable import Role
 from proofroll.core.scene import Scene
 from proofroll.core.truth import truth
@@ -185,7 +185,7 @@ def _completed(run: xr.Dataset, scene: Scene, times: FloatArray) -> xr.Dataset:
     samples = [Sample(**{name: values[index] for name, values in arrays.items()}) for index in range(len(times))]
     try:
         return from_samples(scene, times, samples)
-    except (ValueError, TypeError) as error:
+    except (ValueError, TypeError, Diverged) as error:
         shapes = ", ".join(f"{name} {values.shape}" for name, values in arrays.items())
         raise InputError("run", shapes, f"these are no states of {scene.name} ({error})") from None
 
