@@ -89,9 +89,11 @@ def require_shapes(built: Any, shapes: Mapping[str, tuple[tuple[int, ...], ...]]
         shapes: by name of a field, those that it may have; -1 is any length.
 
     Raises:
-        Diverged: one is not of numbers, or has another shape.
+        Diverged: one is lacking, is not of numbers, or has another shape.
     """
     for name, allowed in shapes.items():
+        if not hasattr(built, name):
+            raise Diverged(f"the engine's built() gave {type(built).__name__}, which has no {name}")
         given = getattr(built, name)
         if given is None:
             continue

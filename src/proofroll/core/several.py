@@ -86,11 +86,16 @@ def _settings_for(kind: Any, alone: Scene, settings: Any) -> Any:
 
 
 def sample_of(scene: Scene, element: Element, sample: AnySample) -> Sample:
-    """The part of a sample that belongs to one element."""
-    if isinstance(sample, Sample):
-        assert len(scene.elements) == 1  # of several, a sample is a mapping
-        return sample
-    return sample[element.name]
+    """The part of a sample that belongs to one element.
+
+    Raises:
+        Diverged: there is none.
+    """
+    found = sample.get(element.name, sample) if isinstance(sample, Mapping) else sample
+    if not isinstance(found, Sample) or (found is sample and len(scene.elements) > 1):
+        each = " for each element, by its name" if len(scene.elements) > 1 else ""
+        raise Diverged(f"the engine's sample() gave {type(found).__name__} instead of a Sample{each}")
+    return found
 
 
 def arrays(scene: Scene, sample: AnySample, t: float) -> Iterator[tuple[str, FloatArray]]:

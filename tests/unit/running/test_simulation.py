@@ -203,3 +203,19 @@ def test_a_sample_of_a_wrong_shape(wrong: dict[str, Any], words: str) -> None:
 
     with pytest.raises(Diverged, match=words):
         proofroll.simulate("inclined_plane", Misshapen, until=0.05)
+
+
+@pytest.mark.parametrize(
+    ("method", "given", "words"),
+    [
+        ("sample", None, r"sample\(\) gave NoneType instead of a Sample"),
+        ("sample", {"p_WB": np.zeros(3)}, r"sample\(\) gave dict instead of a Sample"),
+        ("built", None, r"built\(\) gave NoneType, which has no "),
+        ("built", {"mass": 1.0}, r"built\(\) gave dict, which has no "),
+    ],
+)
+def test_what_is_no_sample_and_nothing_built(method: str, given: Any, words: str) -> None:
+    """Whoever forgets a return, or gives a dictionary, reads which method gave what."""
+    engine = type("Forgetful", (Tiny,), {method: lambda _: given})
+    with pytest.raises(Diverged, match=words):
+        proofroll.simulate("inclined_plane", engine, until=0.05)
