@@ -82,11 +82,11 @@ class JointCoordinates:
             raise Refused(f"dry friction in joint {self._dry} switches; no route follows it (of robots: friction=0)")
         motion = self.tree.at(q, v)
         J, M, loads = self.inertial(motion)
-        b = self._torque - self._damping * v - np.einsum("nij,ni->j", J, loads)
+        b = self._torque - self._damping * v - loads.ravel() @ J.reshape(-1, len(v))
         for stiffness, rest, at_q, at_v in self._springs:
             b[at_v] -= stiffness * (q[at_q] - rest)
-        for end, position, force in self._spring_forces(motion):
-            b += force @ self.tree.point(motion, end, position)[2]
+        for i, arm, force in self._spring_forces(motion):
+            b += np.concatenate([force, cross(arm, force)]) @ motion.J[i]
         rows = self.tree.loop_rows(motion)
         try:
             into = np.linalg.inv(np.linalg.cholesky(M)).T  # M⁻¹ = into intoᵀ
@@ -205,7 +205,7 @@ class JointCoordinates:
         """Jacobians at the centres of mass, mass matrix, inertial and gravity wrenches at v̇ = 0."""
         n = len(self._mass)
         R, w = motion.R_WB[:n], motion.w_WB[:n]
-        arm = np.einsum("nij,nj->ni", R, self._com)
+        arm = (R @ self._com[:, :, None])[..., 0]
         inertia = R @ self._inertia @ R.transpose(0, 2, 1)
         J = motion.J[:n].copy()
         J[:, :3] -= skews(arm) @ J[:, 3:]
@@ -216,36 +216,36 @@ class JointCoordinates:
 
     def _wrenches(self, acceleration: Array, arm: Array, inertia: Array, w: Array) -> Array:
         """Force and moment about the centre of mass that move each body so, beyond gravity, (bodies, 6)."""
-        alpha = acceleration[:, 3:]
-        at_com = acceleration[:, :3] + cross(alpha, arm) + cross(w, cross(w, arm))
-        force = self._mass[:, None] * (at_com - self._gravity)
-        spin = np.einsum("nij,nj->ni", inertia, w)
-        return np.concatenate([force, np.einsum("nij,nj->ni", inertia, alpha) + cross(w, spin)], axis=1)
+        alpha, turn = acceleration[:, 3:, None], skews(w)
+        at_com = acceleration[:, :3] + (turn @ (turn @ arm[:, :, None]) - skews(arm) @ alpha)[..., 0]
+        moment = inertia @ alpha + turn @ (inertia @ w[:, :, None])
+        return np.concatenate([self._mass[:, None] * (at_com - self._gravity), moment[..., 0]], axis=1)
 
     def _needed(self, found: Solution) -> Array:
         """Wrenches about the world's origin that joints and loops bring to the bodies; the last is the world's."""
         motion, n = found.motion, len(self._mass)
         R = motion.R_WB[:n]
-        arm = np.einsum("nij,nj->ni", R, self._com)
+        arm = (R @ self._com[:, :, None])[..., 0]
         acceleration = motion.J[:n] @ found.acceleration + motion.bias[:n]
         inertia = R @ self._inertia @ R.transpose(0, 2, 1)
         wrenches = self._wrenches(acceleration, arm, inertia, motion.w_WB[:n])
         needed = np.zeros((n + 1, 6))
         needed[:n] = wrenches
         needed[:n, 3:] += cross(motion.p_WB[:n] + arm, wrenches[:, :3])
-        for end, position, force in self._spring_forces(motion):
-            at = self.tree.point(motion, end, position)[0]
-            needed[self.mechanism.body_index[end]] -= np.concatenate([force, cross(at, force)])
+        for i, arm, force in self._spring_forces(motion):
+            needed[i] -= np.concatenate([force, cross(motion.p_WB[i] + arm, force)])
         return needed
 
-    def _spring_forces(self, motion: BodyMotion) -> list[tuple[str, Array, Array]]:
-        """Body, position on it and force, world axes, of each end of each spring."""
-        found = []
+    def _spring_forces(self, motion: BodyMotion) -> list[tuple[int, Array, Array]]:
+        """Of each end of each spring: body, place from its frame's origin and force, world axes."""
+        found, index = [], self.mechanism.body_index
         for spring in self.mechanism.springs:
-            ends = [(spring.body_a, np.array(spring.position_a)), (spring.body_b, np.array(spring.position_b))]
-            (p_a, v_a, *_), (p_b, v_b, *_) = (self.tree.point(motion, body, position) for body, position in ends)
-            length = float(np.linalg.norm(p_b - p_a))
-            along = (p_b - p_a) / length
-            pull = spring.stiffness * (length - spring.length) + spring.damping * (along @ (v_b - v_a))
-            found += [(body, position, s * pull * along) for (body, position), s in zip(ends, (1, -1), strict=True)]
+            a, b = index[spring.body_a], index[spring.body_b]
+            arm_a, arm_b = motion.R_WB[a] @ spring.position_a, motion.R_WB[b] @ spring.position_b
+            d = motion.p_WB[b] + arm_b - motion.p_WB[a] - arm_a
+            slide = motion.v_WB[b] + cross(motion.w_WB[b], arm_b) - motion.v_WB[a] - cross(motion.w_WB[a], arm_a)
+            length = float(np.linalg.norm(d))
+            along = d / length
+            pull = spring.stiffness * (length - spring.length) + spring.damping * (along @ slide)
+            found += [(a, arm_a, pull * along), (b, arm_b, -pull * along)]
         return found

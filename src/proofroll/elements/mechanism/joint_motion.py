@@ -4,14 +4,25 @@ from __future__ import annotations
 
 import numpy as np
 
-from proofroll.elements.mechanism.rotations import Array, about, cross, from_quaternion, quaternion_rate
+from proofroll.elements.mechanism.rotations import Array, about, from_quaternion, quaternion_rate
 
-_O = np.zeros(3)
+_O, _UNIT = np.zeros(3), np.eye(3)
+# Of each velocity: whether its axis is one of B, not of A; which; whether it turns about it; whether the child carries
+# the axis round, not the parent. Of three turns about axes of the child the sum does not turn itself: ω × ω = 0.
+AXES: dict[str, tuple[tuple[bool, int, bool, bool], ...]] = {
+    "fixed": (),
+    "revolute": ((False, 2, True, False),),
+    "prismatic": ((False, 2, False, False),),
+    "universal": ((False, 2, True, False), (True, 0, True, True)),
+    "spherical": tuple((True, axis, True, False) for axis in range(3)),
+    "planar": ((False, 0, False, False), (False, 1, False, False), (False, 2, True, False)),
+    "free": tuple((True, axis, turns, not turns) for turns in (False, True) for axis in range(3)),
+}
 
 
 def placed(kind: str, q: Array) -> tuple[Array, Array]:
     """Where B stands in A: its origin, m, and its rotation."""
-    origin, rotation = _O, np.eye(3)
+    origin, rotation = _O, _UNIT
     if kind == "revolute":
         rotation = about(2, q[0])
     elif kind == "prismatic":
@@ -25,44 +36,6 @@ def placed(kind: str, q: Array) -> tuple[Array, Array]:
     elif kind == "free":
         origin, rotation = q[:3], from_quaternion(q[3:])
     return origin, rotation
-
-
-def subspace(kind: str, A: Array, B: Array, v: Array, w: Array) -> tuple[Array, Array, Array, Array]:
-    """What velocities v do to B against the parent, world axes.
-
-    Args:
-        kind: of the joint.
-        A: its frame on the parent, world axes.
-        B: its frame on the child, world axes.
-        v: its velocities (nv).
-        w: angular velocity of the parent, rad/s.
-
-    Returns:
-        Columns of linear and of angular velocity (3, nv), and the rate of the columns, world axes, times v.
-    """
-    linear, angular = np.zeros((3, len(v))), np.zeros((3, len(v)))
-    linear_bias, angular_bias = _O, _O
-    if kind == "revolute":
-        angular = A[:, 2:]
-        angular_bias = cross(w, A[:, 2]) * v[0]
-    elif kind == "prismatic":
-        linear = A[:, 2:]
-        linear_bias = cross(w, A[:, 2]) * v[0]
-    elif kind == "universal":  # the first axis turns with the parent, the second with the child
-        angular = np.column_stack([A[:, 2], B[:, 0]])
-        first = A[:, 2] * v[0]
-        angular_bias = cross(w, first) + cross(w + first, B[:, 0] * v[1])
-    elif kind == "spherical":
-        angular = B
-        angular_bias = cross(w, B @ v)
-    elif kind == "planar":
-        linear[:, :2], angular[:, 2] = A[:, :2], A[:, 2]
-        linear_bias, angular_bias = cross(w, linear @ v), cross(w, angular @ v)
-    elif kind == "free":
-        linear[:, :3], angular[:, 3:] = B, B
-        turn = angular @ v
-        linear_bias, angular_bias = cross(w + turn, linear @ v), cross(w, turn)
-    return linear, angular, linear_bias, angular_bias
 
 
 def rate(kind: str, q: Array, v: Array) -> Array:

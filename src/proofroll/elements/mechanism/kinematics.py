@@ -14,7 +14,7 @@ from proofroll.elements.mechanism.model import Mechanism
 from proofroll.elements.mechanism.parts import Loop
 from proofroll.elements.mechanism.rotations import Array, cross
 
-_O = np.zeros(3)
+_O, _UNIT = np.zeros(3), np.eye(3)
 
 
 @dataclass(frozen=True)
@@ -70,13 +70,28 @@ class Tree:
 
     def __init__(self, mechanism: Mechanism) -> None:
         self.mechanism = mechanism
-        index = mechanism.body_index
-        self.parents = [index[joint.parent] for joint in mechanism.joints]
-        self.children = [index[joint.child] for joint in mechanism.joints]
+        index, joints, nv = mechanism.body_index, mechanism.joints, mechanism.nv
+        self.parents = [index[joint.parent] for joint in joints]
+        self.children = [index[joint.child] for joint in joints]
         self._static = [
-            (joint, np.array(joint.position), joint.parent_frame, joint.child_frame.T, np.array(joint.child_position))
-            for joint in mechanism.joints
+            (
+                joint.kind,
+                at,
+                np.array(joint.position),
+                joint.parent_frame,
+                joint.child_frame.T,
+                np.array(joint.child_position),
+            )
+            for joint, at in zip(joints, mechanism.q_slices, strict=True)
         ]
+        axes = [(k, *axis) for k, joint in enumerate(joints) for axis in joint_motion.AXES[joint.kind]]
+        self._joint, self._in_child, self._axis, turns, by_child = np.array(axes, dtype=int).reshape(nv, 5).T
+        self._turns = turns.astype(float)
+        self._carrier = np.array([self.parents, self.children])[by_child, self._joint]
+        self._moves = np.zeros((len(mechanism.bodies) + 1, nv))  # 1 where a velocity moves a body
+        for parent, child, at in zip(self.parents, self.children, mechanism.v_slices, strict=True):
+            self._moves[child] = self._moves[parent]
+            self._moves[child, at] = 1.0
 
     def rate(self, q: Array, v: Array) -> Array:
         """Time derivative of the coordinates (nq) for velocities (nv)."""
@@ -102,46 +117,40 @@ class Tree:
 
     def at(self, q: Array, v: Array) -> BodyMotion:
         """Motion of all bodies for coordinates q (nq) and velocities v (nv)."""
-        n, nv, nj = len(self.mechanism.bodies), self.mechanism.nv, len(self._static)
-        p, R, w, vel = np.zeros((n + 1, 3)), np.zeros((n + 1, 3, 3)), np.zeros((n + 1, 3)), np.zeros((n + 1, 3))
-        J, bias = np.zeros((n + 1, 6, nv)), np.zeros((n + 1, 6))
-        p_joint, R_parent, R_child = np.zeros((nj, 3)), np.zeros((nj, 3, 3)), np.zeros((nj, 3, 3))
-        R[n] = np.eye(3)
-        slices = zip(self.mechanism.q_slices, self.mechanism.v_slices, strict=True)
-        for k, ((joint, position, frame, back, child_position), (at_q, at_v)) in enumerate(
-            zip(self._static, slices, strict=True)
-        ):
+        n, nj = len(self.mechanism.bodies), len(self._static)
+        p, R = np.zeros((n + 1, 3)), np.zeros((n + 1, 3, 3))
+        p_joint, frames = np.zeros((nj, 3)), np.zeros((2, nj, 3, 3))
+        R[n] = _UNIT
+        for k, (kind, at, position, frame, back, child_position) in enumerate(self._static):
             i, c = self.parents[k], self.children[k]
             A = R[i] @ frame
-            d, S = joint_motion.placed(joint.kind, q[at_q])
+            d, S = joint_motion.placed(kind, q[at])
             B = A @ S
             R[c] = B @ back
-            r = R[i] @ position + A @ d
-            arm = -(R[c] @ child_position)
-            p_joint[k], R_parent[k], R_child[k] = p[i] + r, A, B
-            p[c] = p_joint[k] + arm
-            linear, angular, linear_bias, angular_bias = joint_motion.subspace(joint.kind, A, B, v[at_v], w[i])
-            # the joint's point of the child, then the origin of the child's frame
-            J[c] = J[i]
-            J[c, :3] -= _crosses(r, J[i, 3:])
-            J[c, 3:, at_v] += angular
-            J[c, :3, at_v] += linear
-            J[c, :3] -= _crosses(arm, J[c, 3:])
-            w[c] = w[i] + angular @ v[at_v]
-            slide = linear @ v[at_v]
-            r_rate = cross(w[i], r) + slide
-            vel[c] = vel[i] + r_rate + cross(w[c], arm)
-            alpha = bias[i, 3:] + angular_bias
-            bias[c, 3:] = alpha
-            bias[c, :3] = (
-                bias[i, :3]
-                + cross(bias[i, 3:], r)
-                + cross(w[i], r_rate)
-                + linear_bias
-                + cross(alpha, arm)
-                + cross(w[c], cross(w[c], arm))
-            )
-        return BodyMotion(p, R, vel, w, J, bias, p_joint, R_parent, R_child)
+            p_joint[k] = p[i] + R[i] @ position + A @ d
+            p[c] = p_joint[k] - R[c] @ child_position
+            frames[0, k], frames[1, k] = A, B
+        axes = frames[self._in_child, self._joint, :, self._axis].T
+        arms = p.T[:, :, None] - p_joint.T[:, None, self._joint]
+        turning = axes * self._turns
+        J = self._twists(axes - turning, turning, _cross(turning, arms))
+        twists = J @ v
+        vel, w = twists[:, :3], twists[:, 3:]
+        v_joint = vel.T[:, self.children] + _cross(w.T[:, self.children], (p_joint - p[self.children]).T)
+        rates = _cross(w[self._carrier].T, axes)
+        turning_rate = rates * self._turns
+        arm_rates = vel.T[:, :, None] - v_joint[:, None, self._joint]
+        turned_rate = _cross(turning_rate, arms) + _cross(turning, arm_rates)
+        J_rate = self._twists(rates - turning_rate, turning_rate, turned_rate)
+        return BodyMotion(p, R, vel, w, J, J_rate @ v, p_joint, *frames)
+
+    def _twists(self, sliding: Array, turning: Array, turned: Array) -> Array:
+        """What each velocity does to each body, (bodies + 1, 6, nv): columns that slide and turn it, ω × arm."""
+        J = np.empty((len(self._moves), 6, len(self._joint)))
+        J[:, :3] = (sliding[:, None] + turned).transpose(1, 0, 2)
+        J[:, 3:] = turning
+        J *= self._moves[:, None]
+        return J
 
     def point(self, motion: BodyMotion, body: str, position: Array) -> tuple[Array, Array, Array, Array]:
         """Position, velocity, derivative of it by v (3, nv) and bias acceleration of a point of a body."""
@@ -150,7 +159,7 @@ class Tree:
         return (
             motion.p_WB[i] + arm,
             motion.v_WB[i] + cross(w, arm),
-            motion.J[i, :3] - _crosses(arm, motion.J[i, 3:]),
+            motion.J[i, :3] + _cross(motion.J[i, 3:], arm),
             motion.bias[i, :3] + cross(motion.bias[i, 3:], arm) + cross(w, cross(w, arm)),
         )
 
@@ -166,42 +175,48 @@ class Tree:
 
     def _rows_of(self, motion: BodyMotion, loop: Loop) -> tuple[Array, Array, Array, Array, Array]:
         a, b = self.mechanism.body_index[loop.body_a], self.mechanism.body_index[loop.body_b]
-        p_a, v_a, J_a, bias_a = self.point(motion, loop.body_a, np.array(loop.position_a))
-        p_b, v_b, J_b, bias_b = self.point(motion, loop.body_b, np.array(loop.position_b))
-        A, B = motion.R_WB[a] @ loop.frame_a, motion.R_WB[b] @ loop.frame_b
-        w_a, w_b = motion.w_WB[a], motion.w_WB[b]
-        turn, turn_bias = motion.J[b, 3:] - motion.J[a, 3:], motion.bias[b, 3:] - motion.bias[a, 3:]
-        d, d_rate = p_b - p_a, v_b - v_a
+        R_a, R_b, w_a, w_b = motion.R_WB[a], motion.R_WB[b], motion.w_WB[a], motion.w_WB[b]
+        arm_a, arm_b = R_a @ loop.position_a, R_b @ loop.position_b
+        slide_a, slide_b = cross(w_a, arm_a), cross(w_b, arm_b)
+        d = motion.p_WB[b] + arm_b - motion.p_WB[a] - arm_a
+        d_rate = motion.v_WB[b] + slide_b - motion.v_WB[a] - slide_a
+        pull = cross(w_b, slide_b) - cross(w_a, slide_a)
+        A, B = R_a @ loop.frame_a, R_b @ loop.frame_b
         facts = FACTS[loop.kind]
-        residual, C, bias, force, torque = [], [], [], [], []
+        # three locked directions hold two points together in the world; fewer hold along axes that move with a
+        moving = len(facts.translations) < 3
+        residual, bias, force, torque, moment_a, moment_b = [], [], [], [], [], []
         for k in facts.translations:
-            # three locked directions hold two points together in the world; fewer hold along axes that move with a
-            fixed = len(facts.translations) == 3
-            n = np.eye(3)[k] if fixed else A[:, k]
-            residual.append(n @ d)
-            row, acceleration = n @ (J_b - J_a), n @ (bias_b - bias_a)
-            if not fixed:
+            n = A[:, k] if moving else _UNIT[k]
+            acceleration = n @ pull
+            if moving:
                 n_rate = cross(w_a, n)
-                row = row - cross(d, n) @ motion.J[a, 3:]
-                acceleration += 2 * n_rate @ d_rate + (cross(motion.bias[a, 3:], n) + cross(w_a, n_rate)) @ d
-            C.append(row)
+                acceleration += 2 * n_rate @ d_rate + cross(w_a, n_rate) @ d
+            residual.append(n @ d)
             bias.append(acceleration)
             force.append(n)
             torque.append(_O)
+            moment_a.append(cross(arm_a + d if moving else arm_a, n))
+            moment_b.append(cross(arm_b, n))
         for k, m in facts.rotations:
             x, y = A[:, k], B[:, m]
             t = cross(y, x)
             x_rate, y_rate = cross(w_a, x), cross(w_b, y)
             residual.append(x @ y)
-            C.append(t @ turn)
-            bias.append(t @ turn_bias + cross(w_a, x_rate) @ y + 2 * x_rate @ y_rate + x @ cross(w_b, y_rate))
+            bias.append(cross(w_a, x_rate) @ y + 2 * x_rate @ y_rate + x @ cross(w_b, y_rate))
             force.append(_O)
             torque.append(t)
-        return np.array(residual), np.array(C), np.array(bias), np.array(force), np.array(torque)
+            moment_a.append(t)
+            moment_b.append(t)
+        # a unit multiplier's force and moment about the origin of each body's frame
+        on_a, on_b = np.hstack([force, moment_a]), np.hstack([force, moment_b])
+        C = on_b @ motion.J[b] - on_a @ motion.J[a]
+        drift = on_b @ motion.bias[b] - on_a @ motion.bias[a]
+        return np.array(residual), C, drift + bias, np.array(force), np.array(torque)
 
 
-def _crosses(a: Array, columns: Array) -> Array:
-    """A × each column."""
-    a0, a1, a2 = a.tolist()
-    x, y, z = columns
-    return np.array([a1 * z - a2 * y, a2 * x - a0 * z, a0 * y - a1 * x])
+def _cross(a: Array, b: Array) -> Array:
+    """Cross products of vectors whose components are the first axis."""
+    a0, a1, a2 = a
+    b0, b1, b2 = b
+    return np.array([a1 * b2 - a2 * b1, a2 * b0 - a0 * b2, a0 * b1 - a1 * b0])

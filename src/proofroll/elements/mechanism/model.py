@@ -93,12 +93,12 @@ class Mechanism:
             ),
         )
 
-    @property
+    @cached_property
     def nq(self) -> int:
         """Number of coordinates of the tree."""
         return sum(joint.nq for joint in self.joints)
 
-    @property
+    @cached_property
     def nv(self) -> int:
         """Number of velocities of the tree."""
         return sum(joint.nv for joint in self.joints)

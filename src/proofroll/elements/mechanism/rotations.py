@@ -9,6 +9,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 Array = NDArray[np.float64]
+_UNIT = np.eye(3)
 
 
 def cross(a: Any, b: Any) -> Array:
@@ -25,11 +26,12 @@ def skew(a: Any) -> Array:
     return np.array([[0.0, -z, y], [z, 0.0, -x], [-y, x, 0.0]])
 
 
+_SKEW = np.array([skew(e) for e in _UNIT]).reshape(3, 9)
+
+
 def skews(a: Array) -> Array:
     """:func:`skew` of each vector of a list, (n, 3, 3)."""
-    matrices = np.zeros((len(a), 3, 3))
-    matrices[:, [2, 0, 1], [1, 2, 0]] = a
-    matrices[:, [1, 2, 0], [2, 0, 1]] = -a
+    matrices: Array = (a @ _SKEW).reshape(-1, 3, 3)
     return matrices
 
 
@@ -37,7 +39,7 @@ def about(axis: int, angle: float) -> Array:
     """Rotation about a coordinate axis (0, 1, 2) by an angle, rad."""
     c, s = math.cos(angle), math.sin(angle)
     i, j = (axis + 1) % 3, (axis + 2) % 3
-    R = np.eye(3)
+    R = _UNIT.copy()
     R[i, i], R[i, j], R[j, i], R[j, j] = c, -s, s, c
     return R
 

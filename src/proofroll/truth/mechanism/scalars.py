@@ -10,7 +10,7 @@ from typing import Any
 
 Scalar = Any
 Vector = Sequence[Scalar]
-_ZERO = 0.0
+_ZERO, _FOLDED = 0.0, (0.0, 1.0)
 
 
 def is_zero(a: Scalar) -> bool:
@@ -20,12 +20,10 @@ def is_zero(a: Scalar) -> bool:
 
 def mul(a: Scalar, b: Scalar) -> Scalar:
     """a·b."""
-    if is_zero(a) or is_zero(b):
-        return _ZERO
-    if type(a) is float and a == 1.0:
-        return b
-    if type(b) is float and b == 1.0:
-        return a
+    if type(a) is float and a in _FOLDED:
+        return b if a else _ZERO
+    if type(b) is float and b in _FOLDED:
+        return a if b else _ZERO
     return a * b
 
 
@@ -33,8 +31,8 @@ def add(*terms: Scalar) -> Scalar:
     """Sum of the terms."""
     total: Scalar = _ZERO
     for term in terms:
-        if not is_zero(term):
-            total = term if is_zero(total) else total + term
+        if type(term) is not float or term:
+            total = term if type(total) is float and not total else total + term
     return total
 
 
@@ -47,7 +45,7 @@ def sub(a: Scalar, b: Scalar) -> Scalar:
 
 def dot(a: Vector, b: Vector) -> Scalar:
     """a·b."""
-    return add(*(mul(x, y) for x, y in zip(a, b, strict=True)))
+    return add(*map(mul, a, b))
 
 
 def cross(a: Vector, b: Vector) -> list[Scalar]:
@@ -57,12 +55,12 @@ def cross(a: Vector, b: Vector) -> list[Scalar]:
 
 def plus(*vectors: Vector) -> list[Scalar]:
     """Sum of vectors."""
-    return [add(*entries) for entries in zip(*vectors, strict=True)]
+    return list(map(add, *vectors))
 
 
 def minus(a: Vector, b: Vector) -> list[Scalar]:
     """A − b."""
-    return [sub(x, y) for x, y in zip(a, b, strict=True)]
+    return list(map(sub, a, b))
 
 
 def scaled(factor: Scalar, a: Vector) -> list[Scalar]:

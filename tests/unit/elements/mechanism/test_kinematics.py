@@ -31,14 +31,6 @@ def test_velocities_are_the_rates_of_positions(tree):
         assert np.abs(w - motion.w_WB[i]).max() < 1e-8
 
 
-def test_velocities_are_linear_in_the_velocities_of_the_tree(tree):
-    """J v gives the velocities of all bodies exactly."""
-    q, v = tree.mechanism.start()
-    motion = tree.at(q, v)
-    twists = np.concatenate([motion.v_WB, motion.w_WB], axis=1)
-    assert np.abs(motion.J @ v - twists).max() < 1e-13
-
-
 def test_accelerations_are_the_rates_of_velocities(tree):
     """J v̇ plus the bias is the central difference of the velocities of all bodies."""
     q, v = tree.mechanism.start()
