@@ -38,7 +38,7 @@ const stored = unpack;
   follow();
 })();
 
-// A table that has more rows than it shows says so, until its last row has been in sight.
+// A table says so while there are rows below those that it shows.
 (() => {
   const regions = [...document.querySelectorAll(".scroll")];
   const look = (region) => region.classList.toggle("more", region.scrollTop + region.clientHeight < region.scrollHeight - 4);
