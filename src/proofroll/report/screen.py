@@ -41,6 +41,8 @@ class Screen(Console):
         if len(objects) == 1 and isinstance(objects[0], Table):
             for part in fitted(objects[0], self):
                 super().print(part, **options)
+            if objects[0].caption:  # the whole line long, however narrow the table
+                super().print(objects[0].caption, style="table.caption")
         else:
             super().print(*objects, **options)
 
@@ -87,7 +89,7 @@ def fitted(table: Table, console: Console) -> list[Table]:
                 dataclasses.replace(table.columns[index], _index=place, width=width, min_width=None, no_wrap=False)
             )
         part.title = table.title if number == 0 else None
-        part.caption = table.caption if number == len(groups) - 1 else None
+        part.caption = None
         parts.append(part)
     return parts
 

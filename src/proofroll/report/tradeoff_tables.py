@@ -85,7 +85,7 @@ def point_table(
         caption += Text("; ≈ a tie: the cost cannot be told from that of the next line, which is more accurate")
     errors = numeric(*(f"{_SHORT.get(name, name)} [{study.quantities[name].unit}]" for name in quantities))
     table = plain_table(*unbroken("engine formulation setting", "step", "cost s/s"), *errors, title=title)
-    table.caption, table.caption_justify = caption, "left"
+    table.caption = caption
     for point in points:
         shown = [error(point.error.get(name)) if name in point.error else "–" for name in quantities]
         if point.status != "done":

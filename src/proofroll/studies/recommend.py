@@ -222,12 +222,18 @@ def _holds(study: TradeoffStudy, point: MeasuredPoint, wish: Wish, absolute: flo
     if not max(held, bar):
         return "no error is seen"
     # Of an error below the truth's error bar no more is known than that.
-    said = f"{'at least ' if held < bar else ''}{absolute / max(held, bar):.3g} times better than asked"
+    said = f"{_times(absolute / max(held, bar), at_least=held < bar)} better than asked"
     if point.corners:
         worst = max(corner.off(wish.tolerance.relative)[wish.quantity] for corner in point.corners)
         there = wish.tolerance.value if wish.tolerance.relative else absolute
-        said += f", and {there / worst:.3g} times at the worst of {len(point.corners)} corners" if worst else ""
+        said += f", and {_times(there / worst)} at the worst of {len(point.corners)} corners" if worst else ""
     return said
+
+
+def _times(ratio: float, *, at_least: bool = False) -> str:
+    if ratio >= 1000:
+        return "more than 1000 times"
+    return f"{'at least ' if at_least else ''}{ratio:.3g} times"
 
 
 def _model(point: MeasuredPoint) -> tuple[str, str | None]:

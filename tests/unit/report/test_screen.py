@@ -71,6 +71,20 @@ def test_a_table_is_never_cut(width: int, monkeypatch: pytest.MonkeyPatch, capsy
     assert out.count("errors") == 1
 
 
+def test_what_is_said_below_a_table_is_as_wide_as_the_screen(
+    monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    """A narrow table, or the narrow last part of a wide one, has its caption once, in lines of the whole width."""
+    monkeypatch.setenv("COLUMNS", "40")
+    said = "wall seconds per simulated second"
+    wide = Table("engine", *(f"a name of column {index}" for index in range(5)), box=None, caption=said)
+    for column in wide.columns:
+        column.no_wrap = True
+    for table in (Table("a", caption=said), wide):
+        console().print(table)
+        assert capsys.readouterr().out.splitlines().count(said) == 1
+
+
 def test_a_pipe_has_the_width_that_it_is_given(monkeypatch: pytest.MonkeyPatch) -> None:
     """In a pipe COLUMNS decides, and 100 where nothing is said."""
     monkeypatch.setenv("COLUMNS", "133")

@@ -99,6 +99,12 @@ def test_costs_that_cannot_be_told_apart_are_ties() -> None:
     assert any("tie" in line and "near only" in line for line in answer_lines(recommended(measured, wish(1e-3))))
 
 
+def test_a_factor_is_a_number_as_a_person_writes_it() -> None:
+    """What holds a tolerance thousands of times over is said without powers of ten."""
+    reason = recommend(study(point(1, "fine", 1e-3, 2.5e-7)), wish(1e-3))["choice"]["reason"]
+    assert reason.startswith("more than 1000 times better than asked, and more than 1000 times at the worst of ")
+
+
 def test_the_range_is_shown_with_its_digits() -> None:
     """Parameters of a corner are those that a person would type."""
     there = replace(corner(1e-3), parameters={"speed": 6.125})
