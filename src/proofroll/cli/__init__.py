@@ -5,6 +5,7 @@ from __future__ import annotations
 import os
 import signal
 import sys
+from functools import cache
 from importlib.metadata import entry_points
 from types import FrameType
 from typing import Annotated, Any
@@ -80,6 +81,10 @@ def _interrupt(number: int, _: FrameType | None) -> None:
     raise KeyboardInterrupt
 
 
+# A call of ``app`` makes all of them again, which takes longer than many a command.
+_commands = cache(lambda: typer.main.get_command(app))
+
+
 def main() -> None:
     """Entry point: every problem is one line on standard error and an exit code."""
     signal.signal(signal.SIGTERM, _interrupt)  # a time limit from outside also ends the workers
@@ -88,7 +93,7 @@ def main() -> None:
     if signal.getsignal(signal.SIGINT) is signal.default_int_handler:  # a shell may have told us to ignore it
         signal.signal(signal.SIGINT, _interrupt)
     try:
-        code = app(standalone_mode=False)
+        code = _commands()(standalone_mode=False)
         sys.stdout.flush()  # a full disk shows here, or nowhere
     except typer.TyperException as error:
         complain(f"{error.format_message()}{_given(error)}")
