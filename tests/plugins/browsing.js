@@ -105,19 +105,23 @@ window.reading = (() => {
     return [beyond.map(named), hidden.map(named)];
   }
 
-  // Everything that a keyboard must reach, numbered in the order of the page; and what has the focus now.
+  // Everything that a keyboard must reach, numbered in the order of the page; and from now on each that gets the focus.
   function reachable() {
     const found = all().filter((element) => element.matches("a[href], button, summary, input, select, [tabindex='0']") && !element.disabled);
     found.forEach((element, number) => { element.dataset.number = number; });
     return found.map(named);
   }
-  function focused() {
-    const element = document.activeElement, style = getComputedStyle(element), { top, bottom } = element.getBoundingClientRect();
-    return {
-      number: Number(element.dataset.number ?? -1),
-      outlined: style.outlineStyle !== "none" && parseFloat(style.outlineWidth) >= 1,
-      seen: bottom > 0 && top < innerHeight,
-    };
+  function visits() {
+    const found = [];
+    addEventListener("focusin", ({ target }) => {
+      const style = getComputedStyle(target), { top, bottom } = target.getBoundingClientRect();
+      found.push({
+        number: Number(target.dataset.number ?? -1),
+        outlined: style.outlineStyle !== "none" && parseFloat(style.outlineWidth) >= 1,
+        seen: bottom > 0 && top < innerHeight,
+      });
+    });
+    return found;
   }
 
   // Whatever moves by itself for longer than a frame.
@@ -126,5 +130,5 @@ window.reading = (() => {
     return parseFloat(transitionDuration) > 0.01 || parseFloat(animationDuration) > 0.01 || scrollBehavior === "smooth";
   }).map(named);
 
-  return { undrawn, empty, lost, faint, wide, cut, reachable, focused, moving };
+  return { undrawn, empty, lost, faint, wide, cut, reachable, visits, moving };
 })();

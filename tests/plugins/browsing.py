@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import shutil
 import time
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping
 from contextlib import contextmanager
 from dataclasses import dataclass, field
 from pathlib import Path
@@ -77,8 +77,44 @@ class Drawn:
     empty: list[str]
 
 
+@dataclass
+class Browser:
+    """A browser and its empty tabs: another page in the process of an earlier one opens in half of the time.
+
+    Attributes:
+        program: playwright's browser.
+        tabs: those that no page is open in, by what they were made with.
+    """
+
+    program: Any
+    tabs: dict[str, list[Any]] = field(default_factory=dict)
+
+    @contextmanager
+    def tab(self, before: str, **options: Any) -> Iterator[Any]:
+        """One that is empty and looks as a new one does; what failed in it takes it along."""
+        idle = self.tabs.setdefault(repr((before, sorted(options.items()))), [])
+        if idle:
+            page = idle.pop()
+        else:
+            context = self.program.new_context(**{"offline": True, "service_workers": "block"} | options)
+            context.add_init_script(path=SCRIPT)
+            if before:
+                context.add_init_script(before)
+            page = context.new_page()
+        try:
+            yield page
+            page.goto("about:blank")
+            page.mouse.move(0, 0)
+            look = {"color_scheme": options.get("color_scheme", "light"), "reduced_motion": "no-preference"}
+            page.emulate_media(media="null", **look)
+        except BaseException:
+            page.context.close()
+            raise
+        idle.append(page)
+
+
 @contextmanager
-def launched() -> Iterator[Any]:
+def launched() -> Iterator[Browser]:
     """Headless Chromium of the system; the test is skipped where there is none."""
     program = next(filter(None, map(shutil.which, BROWSERS)), None)
     if program is None:
@@ -88,12 +124,19 @@ def launched() -> Iterator[Any]:
     with sync_playwright() as playwright:
         # WebGL without a graphics card.
         browser = playwright.chromium.launch(executable_path=program, args=["--enable-unsafe-swiftshader"])
-        yield browser
+        yield Browser(browser)
         browser.close()
 
 
 @contextmanager
-def visiting(browser: Any, file: Path, fragment: str = "", before: str = "", **options: Any) -> Iterator[Visit]:
+def visiting(
+    browser: Browser,
+    file: Path,
+    fragment: str = "",
+    before: str = "",
+    viewport: Mapping[str, int] = WIDE,
+    **options: Any,
+) -> Iterator[Visit]:
     """Opens a file; whatever else it asks for is noted and refused.
 
     Args:
@@ -101,33 +144,40 @@ def visiting(browser: Any, file: Path, fragment: str = "", before: str = "", **o
         file: the page.
         fragment: with ``#``, where to go in it.
         before: a script that runs before those of the page.
-        options: of ``browser.new_context``, e.g. ``color_scheme="dark"``.
+        viewport: size of the screen [CSS px].
+        options: of playwright's ``new_context``, e.g. ``color_scheme="dark"``.
     """
     address = file.resolve().as_uri()
-    context = browser.new_context(**{"viewport": WIDE, "offline": True, "service_workers": "block"} | options)
-    try:
-        context.add_init_script(path=SCRIPT)
-        if before:
-            context.add_init_script(before)
-        page = context.new_page()
+
+    def other(url: str) -> bool:
+        return url.partition("#")[0] != address
+
+    with browser.tab(before, **options) as page:
+        page.set_viewport_size(viewport)
         visit = Visit(page)
-        context.on("request", lambda request: visit.requested.append(request.url))
 
         def hear(message: Any) -> None:
             # Without a graphics card the browser complains to itself that it reads WebGL's picture back.
             if "GL Driver Message" not in message.text:
                 visit.messages.append(f"{message.type}: {message.text}")
 
-        context.on("console", hear)
-        context.on("weberror", lambda error: visit.messages.append(str(error.error)))
-
         def dismiss(dialog: Any) -> None:
             visit.messages.append(f"{dialog.type}: {dialog.message}")
             dialog.dismiss()
 
-        context.on("dialog", dismiss)
-        context.route(lambda url: url.partition("#")[0] != address, lambda route: route.abort())
-        page.goto(address + fragment)
-        yield visit
-    finally:
-        context.close()
+        heard = {
+            "request": lambda request: visit.requested.append(request.url),
+            "console": hear,
+            "weberror": lambda error: visit.messages.append(str(error.error)),
+            "dialog": dismiss,
+        }
+        page.context.route(other, lambda route: route.abort())
+        for event, listener in heard.items():
+            page.context.on(event, listener)
+        try:
+            page.goto(address + fragment)
+            yield visit
+        finally:
+            for event, listener in heard.items():
+                page.context.remove_listener(event, listener)
+            page.context.unroute(other)

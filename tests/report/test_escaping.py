@@ -53,10 +53,10 @@ def poisoned_page(everything: Any, poison: Poison, tmp_path_factory: pytest.Temp
 
 @pytest.fixture(scope="module")
 def poisoned(poisoned_page: Path, visit: Visiting) -> Iterator[Visit]:
-    """That page, unfolded and drawn."""
+    """That page, unfolded and drawn, save figures of its second point: the same strings are on those of the first."""
     with visit(poisoned_page) as seen:
         seen.unfold()
-        assert seen.draw() == []
+        assert seen.draw("figure:not([data-p='1'])") == []
         yield seen
 
 

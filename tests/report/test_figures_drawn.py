@@ -2,41 +2,20 @@
 
 from __future__ import annotations
 
-import copy
-import dataclasses
-from collections.abc import Callable, Iterator
-from contextlib import AbstractContextManager
-from pathlib import Path
 from typing import Any
 
 import pytest
-from browsing import Visit
+from browsing import Drawn, Visit
 
-from proofroll.report.html import page
 from proofroll.report.labels import error
 
-Visiting = Callable[..., AbstractContextManager[Visit]]
 FIGURE = 'figure[data-p="0"][data-o="1"] .canvas'  # z at the first point
 
 
 @pytest.fixture(scope="module")
-def limits_page(everything: Any, tmp_path_factory: pytest.TempPathFactory) -> Path:
-    """A page whose first row has a ladder of steps: for z a limit, for γ one that holds the truth exactly."""
-    curves, change = copy.deepcopy(everything.curves), dataclasses.replace
-    gamma, z = (item.engines for item in curves[0][0].observables[:2])
-    gamma[0] = change(gamma[0], limit=[0.0, 1e-12, None])
-    z[:2] = change(z[0], limit=[3e-7, 1e-7, 2.0]), change(z[1], tolerance=1e-4)
-    file = tmp_path_factory.mktemp("limits") / "report.html"
-    file.write_text(page(everything.content, [*curves], everything.pictures), encoding="utf-8")
-    return file
-
-
-@pytest.fixture(scope="module")
-def seen(limits_page: Path, visit: Visiting) -> Iterator[Visit]:
-    """That page with its figures drawn."""
-    with visit(limits_page) as visited:
-        assert visited.draw() == []
-        yield visited
+def seen(drawn_page: Drawn) -> Visit:
+    """The page with its figures; of its first row γ and z have limits. Each test leaves it as it was."""
+    return drawn_page.seen
 
 
 def traces(seen: Visit, condition: str) -> list[dict[str, Any]]:
@@ -124,3 +103,7 @@ def test_colours_follow_the_screen_while_it_is_open_and_paper_is_white(seen: Vis
     assert seen.page.evaluate(INK) == light[0]
     seen.page.evaluate("dispatchEvent(new Event('afterprint'))")
     assert seen.page.evaluate(INK) == dark
+    seen.page.emulate_media(color_scheme="light")
+    seen.wait(f"{INK} === '{light[0]}'")
+    seen.page.locator(FIGURE).press("0")
+    seen.wait(f"document.querySelector('{FIGURE}').layout.xaxis.range[1] === 1")

@@ -6,7 +6,7 @@ import base64
 import gzip
 import json
 from collections.abc import Callable, Iterator
-from contextlib import AbstractContextManager, ExitStack
+from contextlib import AbstractContextManager
 from dataclasses import replace
 from importlib.metadata import PackageNotFoundError
 from pathlib import Path
@@ -32,7 +32,7 @@ from proofroll.report.html import page
 from proofroll.report.plots import point_curves
 from proofroll.report.replay import WIDEST_TURN, frame_times, replay_content
 from proofroll.report.replay_library import thinned, three
-from proofroll.report.report_content import report_content
+from proofroll.report.report_content import ReportContent, report_content
 
 SPEED, UNTIL, EVERY = 4.0, 1.0, 0.02
 
@@ -298,11 +298,15 @@ def test_what_engines_and_files_say_stays_text(made: Any, parse: Callable[[str],
 # ---- in a browser ----
 
 
-@pytest.fixture
-def open_(visit: Callable[..., AbstractContextManager[Visit]]) -> Iterator[Callable[..., Visit]]:
-    """Opens pages that stay open until the end of a test."""
-    with ExitStack() as pages:
-        yield lambda file, **options: pages.enter_context(visit(file, **options))
+Visiting = Callable[..., AbstractContextManager[Visit]]
+SMALL = {"width": 640, "height": 480}  # a picture that is quickly painted
+
+
+@pytest.fixture(scope="module")
+def replayed(written: Any, visit: Visiting) -> Iterator[Visit]:
+    """The report, in which nothing was looked at yet."""
+    with visit(written[1] / "report.html", viewport=SMALL) as opened:
+        yield opened
 
 
 def part(opened: Visit, name: str) -> Any:
@@ -348,10 +352,9 @@ def passes(opened: Visit, time: float) -> None:
     until(opened, lambda shown: shown > time)
 
 
-def test_the_replay_plays(written: Any, open_: Callable[..., Visit]) -> None:
+def test_the_replay_plays(written: Any, replayed: Visit) -> None:
     """From file:// without network: nothing before it is seen, then time and picture advance; no error, no request."""
-    file = written[1] / "report.html"
-    opened = open_(file)
+    opened = replayed
     assert opened.page.evaluate("typeof THREE") == "undefined"
     assert opened.page.locator(".replay[data-ready]").count() == 0
     ready(opened)
@@ -370,12 +373,12 @@ def test_the_replay_plays(written: Any, open_: Callable[..., Visit]) -> None:
     assert "N" in values
     assert "rolls without slip" in values
     assert opened.messages == []
-    assert opened.requested == [file.as_uri()]
+    assert opened.requested == [(written[1] / "report.html").as_uri()]
 
 
-def test_the_replay_obeys(written: Any, made: Any, open_: Callable[..., Visit]) -> None:
+def test_the_replay_obeys(made: Any, replayed: Visit) -> None:
     """Keys, time line, ghosts, view and the choice of a case each change what is shown; values are the truth's."""
-    opened = open_(written[1] / "report.html")
+    opened = replayed
     ready(opened)
     opened.page.evaluate(
         "() => { const line = document.querySelector('[data-part=time]');"
@@ -415,22 +418,22 @@ def test_the_replay_obeys(written: Any, made: Any, open_: Callable[..., Visit]) 
 
 @pytest.mark.parametrize("lacking", ["WebGL", "three.js"])
 def test_without_a_picture_the_values_follow_the_time(
-    lacking: str, made: Any, tmp_path: Path, open_: Callable[..., Visit]
+    lacking: str, made: Any, content: ReportContent, tmp_path: Path, visit: Visiting
 ) -> None:
     """One sentence says what is missing; time and values run, and nothing fails."""
     replay = replay_content([made[0]], made[1], BallReport.replay())
     if lacking == "three.js":
         replay = replace(replay, library=None)
     file = tmp_path / "report.html"
-    content = report_content([made[0]], made[1], "proofroll report")
-    file.write_text(page(content, [point_curves(*made)], replay=replay), encoding="utf-8")
-    blind = "HTMLCanvasElement.prototype.getContext = () => null;" if lacking == "WebGL" else ""
-    opened = open_(file, before=blind)
-    ready(opened)
-    assert lacking in part(opened, "said").inner_text()
-    part(opened, "play").click()
-    passes(opened, 0.02)
-    assert opened.messages == []
+    file.write_text(page(content, [[]], replay=replay), encoding="utf-8")
+    with visit(file, viewport=SMALL) as opened:
+        if lacking == "WebGL":  # nothing is asked for a picture before the replay is in view
+            opened.page.evaluate("() => { HTMLCanvasElement.prototype.getContext = () => null; }")
+        ready(opened)
+        assert lacking in part(opened, "said").inner_text()
+        part(opened, "play").click()
+        passes(opened, 0.02)
+        assert opened.messages == []
 
 
 def test_a_ball_in_the_air_is_off_the_wall() -> None:

@@ -26,14 +26,20 @@ POISON = "</script><script>alert('poison')</script><img src=x onerror=alert(1)>\
 COMMAND = "proofroll report"
 
 
-@pytest.fixture
+@pytest.fixture(scope="module")
 def report(made: tuple[Outcome, Store]) -> Report:
-    """A report with one comparison, a trade-off and a map."""
+    """A report with one comparison, a trade-off and a map; no test changes it."""
     whole = begun([made[0]], made[1], COMMAND)
     for part in further():
         whole.parts.append(part)
         whole._put(part, part.entry())
     return whole
+
+
+@pytest.fixture(scope="module")
+def written_page(report: Report) -> str:
+    """Its page."""
+    return page(report.content, report.curves, report.pictures)
 
 
 def test_every_part_of_the_default_report_is_found_in_its_order(
@@ -54,9 +60,9 @@ def test_every_part_of_the_default_report_is_found_in_its_order(
         assert [other.head for other in found] == [part.head]
 
 
-def test_sections_answer_in_order(report: Report, parse: Any) -> None:
+def test_sections_answer_in_order(written_page: str, parse: Any) -> None:
     """What agrees, what to use, why; each section is there, has a heading and says something."""
-    elements = parse(page(report.content, report.curves, report.pictures))
+    elements = parse(written_page)
     ids = [attributes["id"] for tag, attributes in elements.tags if tag == "section" and "id" in attributes]
     assert ids == ["verdicts", "use", "findings", "speed0", "stability0", "c0", "made"]
     assert "1 of 2 boundaries are passed in silence" in elements.text
@@ -69,13 +75,13 @@ def test_sections_answer_in_order(report: Report, parse: Any) -> None:
     assert {"stability0-0", "stability0-1"} <= links, "each cell of the map leads to its boundary"
 
 
-def test_the_diagram_is_inline_and_keeps_to_itself(report: Report) -> None:
+def test_the_diagram_is_inline_and_keeps_to_itself(report: Report, written_page: str) -> None:
     """The diagram of the trade-off is an element whose ids are its own and which names no address."""
     picture = report.pictures["tradeoffs0-diagram"]
     assert picture.startswith("<svg")
     assert "http" not in picture
     assert 'id="tradeoffs0-' in picture
-    assert picture in page(report.content, report.curves, report.pictures)
+    assert picture in written_page
 
 
 def test_exactly_three_sentences_from_the_data(report: Report) -> None:
@@ -95,7 +101,9 @@ def test_exactly_three_sentences_from_the_data(report: Report) -> None:
     assert all(sentence.endswith(".") for sentence in nothing)
 
 
-def test_advice_names_the_cheapest_the_runner_up_and_the_first_failure(report: Report, parse: Any) -> None:
+def test_advice_names_the_cheapest_the_runner_up_and_the_first_failure(
+    report: Report, written_page: str, parse: Any
+) -> None:
     """At a millimetre the cheap one fails, with its reason; costs measured once say so."""
     answers = {item.answer.tolerance: item.answer for item in report.content.entries["tradeoffs"][0].advice}
     answer = answers[1e-3]
@@ -103,7 +111,7 @@ def test_advice_names_the_cheapest_the_runner_up_and_the_first_failure(report: R
     assert answer.first_failure.point.engine == "rough"
     assert "off by 0.003 m" in answer.first_failure.reason
     assert answers[1e-2].choice.point.engine == "rough"
-    text = parse(page(report.content, report.curves)).text
+    text = parse(written_page).text
     assert "0.5 (once)" in text
     assert "1e-3 ±10%" in text
 
@@ -119,7 +127,7 @@ def poisoned(value: Any) -> Any:
     return value + POISON if isinstance(value, str) else value
 
 
-def test_nothing_in_a_further_study_becomes_markup(report: Report, parse: Any) -> None:
+def test_nothing_in_a_further_study_becomes_markup(report: Report, written_page: str, parse: Any) -> None:
     """Poison in every string of the trade-off and of the map is text on the page."""
     missing = [absent(report.parts[0], f"broken {POISON}")]
     bad = replace(report.content, entries={**poisoned(report.content.entries), "figures": missing})
@@ -128,7 +136,7 @@ def test_nothing_in_a_further_study_becomes_markup(report: Report, parse: Any) -
     for tag, attributes in elements.tags:
         assert tag != "img"
         assert not any(name.startswith("on") for name in attributes)
-    assert sum(tag == "script" for tag, _ in elements.tags) == len(parse(page(report.content, report.curves)).scripts)
+    assert sum(tag == "script" for tag, _ in elements.tags) == len(parse(written_page).scripts)
 
 
 def test_json_has_no_nan_and_no_path_outside(report: Report, tmp_path: Path) -> None:
