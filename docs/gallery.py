@@ -12,9 +12,9 @@ from proofroll.core.comparison import Comparison
 from proofroll.core.verdict import Verdict
 from proofroll.files.comparison_file import load_comparison
 from proofroll.files.data_folders import data_folder
-from proofroll.files.netcdf import read
 from proofroll.files.scene_file import load_scene, read_scene_file, scene_names
 from proofroll.files.toml import study_of
+from proofroll.files.trajectory_file import read
 from proofroll.report.comparison_content import outcome_content
 from proofroll.report.comparison_records import ReportedComparison
 from proofroll.report.html import templates

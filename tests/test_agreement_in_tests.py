@@ -18,8 +18,8 @@ from tiny import Tiny
 import proofroll
 from proofroll.core.engine import Sample
 from proofroll.core.errors import InputError
-from proofroll.files.netcdf import write
 from proofroll.files.scene_file import load_scene
+from proofroll.files.trajectory_file import write
 from proofroll.running.simulation import build
 from proofroll.testing import assert_agrees
 

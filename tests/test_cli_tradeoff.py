@@ -181,7 +181,7 @@ def test_nothing_is_measured_for_a_question_that_makes_no_sense(
     """A slip of the pen is told before the minutes that --measure takes, not after."""
     code, out, err = proofroll(*asked(tmp_path, "--measure"), *more)
     assert (code, out, err.count("\n")) == (2, "", 1)
-    assert not list(tmp_path.glob("**/*.nc"))
+    assert not list(tmp_path.glob("**/*.npz"))
 
 
 @pytest.mark.parametrize(
@@ -304,7 +304,7 @@ def test_a_trade_off_that_makes_no_sense(proofroll: Proofroll, tmp_path: Path, m
     code, out, err = proofroll("tradeoff", "sphere_in_cylinder", "--out", str(tmp_path), *more)
     assert (code, out, err.count("\n")) == (2, "", 1)
     assert words in err
-    assert not list(tmp_path.glob("**/*.nc"))
+    assert not list(tmp_path.glob("**/*.npz"))
 
 
 def test_the_diagram_says_what_was_run(measured: TradeoffStudy) -> None:

@@ -13,7 +13,7 @@ from proofroll.core.engine_abilities import Level, Term
 from proofroll.core.errors import ProofrollError
 from proofroll.core.plugins import engine_names
 from proofroll.core.scene import Scene
-from proofroll.files.netcdf import read
+from proofroll.files.trajectory_file import read
 from proofroll.running.asking import describe, resolve
 from proofroll.running.case import Case, EngineFacts, Result, Status
 from proofroll.running.runner import Runner

@@ -24,8 +24,8 @@ from proofroll.core.events import Event
 from proofroll.core.truth import truth
 from proofroll.core.verdict import Verdict, judge
 from proofroll.elements.ball_on_surface.report.onsets import RunSlips, TrueSlips
-from proofroll.files.netcdf import write
 from proofroll.files.scene_file import load_scene
+from proofroll.files.trajectory_file import write
 from proofroll.report.growing_report import begun, write_report
 from proofroll.report.html import page
 from proofroll.report.plots import PointCurves

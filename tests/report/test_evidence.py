@@ -16,8 +16,8 @@ from proofroll.core.comparison import ExceptAt, Row, Tolerance
 from proofroll.core.dataset import observe
 from proofroll.core.verdict import Verdict, judge
 from proofroll.files.json_data import plain
-from proofroll.files.netcdf import read, write
 from proofroll.files.scene_file import load_scene
+from proofroll.files.trajectory_file import read, write
 from proofroll.report.evidence import Claims, Cost
 from proofroll.report.html import page
 from proofroll.report.labels import error

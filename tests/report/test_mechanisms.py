@@ -15,7 +15,7 @@ from scipy.spatial.transform import Rotation
 
 from proofroll.elements.mechanism.report.replay import _turned
 from proofroll.files.comparison_file import load_comparison
-from proofroll.files.netcdf import read
+from proofroll.files.trajectory_file import read
 from proofroll.report.growing_report import write_report
 from proofroll.report.plots import point_curves
 from proofroll.running.runner import Runner

@@ -18,8 +18,8 @@ from proofroll.core.verdict import Judgement, Verdict
 from proofroll.elements.ball_on_surface.report.onset_tables import bracket, clock, conditioning, slip_table
 from proofroll.elements.ball_on_surface.report.onsets import CURVE, mark
 from proofroll.files.json_data import plain
-from proofroll.files.netcdf import write
 from proofroll.files.scene_file import load_scene
+from proofroll.files.trajectory_file import write
 from proofroll.report.comparison_records import ReportedRun
 from proofroll.report.growing_report import write_report
 from proofroll.report.html import page

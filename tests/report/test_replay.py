@@ -25,8 +25,8 @@ from proofroll.elements.ball_on_surface.report.poses import AWAY, SLIPS, STICKS,
 from proofroll.elements.ball_on_surface.report.replay import LENGTH
 from proofroll.elements.ball_on_surface.report.wall import middle, wall
 from proofroll.files.json_data import plain
-from proofroll.files.netcdf import read, write
 from proofroll.files.scene_file import load_scene
+from proofroll.files.trajectory_file import read, write
 from proofroll.report import replay_library
 from proofroll.report.html import page
 from proofroll.report.plots import point_curves
@@ -243,7 +243,7 @@ def test_report_json_names_what_is_replayed(written: Any) -> None:
     content = json.loads((written[1] / "report.json").read_text(encoding="utf-8"))
     balls = content["replay"][0]["runs"]
     assert balls[0]["name"] == "truth"
-    assert all(ball["trajectory"].endswith(".nc") for ball in balls)
+    assert all(ball["trajectory"].endswith(".npz") for ball in balls)
     assert all(ball["settings"]["dt"] == 1e-3 for ball in balls[1:])
     assert "arrays" not in content["replay"][0]
 

@@ -13,8 +13,8 @@ from proofroll.core.errors import ProofrollError
 from proofroll.core.plugins import parse_engine
 from proofroll.elements.ball_on_surface.element import ASKED, rolling_ball
 from proofroll.elements.ball_on_surface.model import RollingBall
-from proofroll.files.netcdf import read
 from proofroll.files.scene_file import load_scene
+from proofroll.files.trajectory_file import read
 from proofroll.running.asking import describe, resolve
 from proofroll.running.case import Case, EngineFacts, Result, Status
 from proofroll.running.runner import Runner

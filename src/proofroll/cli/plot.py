@@ -13,7 +13,7 @@ from proofroll.core.errors import InputError
 
 
 def plot(
-    trajectory: Annotated[Path, typer.Argument(help="A netCDF file that proofroll run --out has written.")],
+    trajectory: Annotated[Path, typer.Argument(help="A file of proofroll run --out, or one of a report.")],
     out: Annotated[
         Path | None, typer.Option(help="File to write, by its ending: html, svg, png or pdf; RUN.html by default.")
     ] = None,
@@ -30,7 +30,7 @@ def plot(
 
 
 def replay(
-    trajectory: Annotated[Path, typer.Argument(help="A netCDF file that proofroll run --out has written.")],
+    trajectory: Annotated[Path, typer.Argument(help="A file of proofroll run --out, or one of a report.")],
     out: Annotated[Path | None, typer.Option(help="Page to write; RUN-replay.html by default.")] = None,
 ) -> None:
     """Show a run in motion beside the truth, as a page for a browser."""

@@ -21,7 +21,9 @@ def run(
     every: Annotated[
         float | None, typer.Option(help="Interval between samples [s]; by default 0.01, or near it in whole steps.")
     ] = None,
-    out: Annotated[Path | None, typer.Option(help="Write the trajectory to this netCDF file.")] = None,
+    out: Annotated[
+        Path | None, typer.Option(help="Write the trajectory to this netCDF file, or to numpy's, with the ending npz.")
+    ] = None,
     time_limit: Annotated[float, typer.Option(help="Wall seconds after which the run is ended.")] = 600.0,
     ask: Annotated[list[str] | None, typer.Option(help="What is wanted besides the motion: orientation.")] = None,
     plot: Annotated[
@@ -42,6 +44,7 @@ def run(
     preparing.start()
 
     from proofroll.core.time_grid import EVERY, time_grid
+    from proofroll.files.trajectory_file import STORED, read, write
     from proofroll.report.run import run_content, run_lines
     from proofroll.report.run_plot import require_ending
     from proofroll.running.runner import run_one
@@ -66,20 +69,17 @@ def run(
         workers=workers,
     )
     with tempfile.TemporaryDirectory() as folder:
-        target = Path(folder) / "run.nc"
+        target = Path(folder) / f"run{STORED}"
         with options.spinner(f"{scene} in {case.engine.name}"):
             result = run_one(case, target, workers)
         content = run_content(case, result, target)
         if plot is not None and result.trajectory is not None:
-            from proofroll.files.netcdf import read
             from proofroll.report.run_plot import draw_run
 
             draw_run(read(target), plot)
             content = replace(content, plot=str(plot))
         if out is not None and result.trajectory is not None:
-            from proofroll.running.store import move
-
-            move(target, out)
+            write(read(target), out)
             content = replace(content, trajectory=str(out))
     done = content.status == "done"
     if not done:

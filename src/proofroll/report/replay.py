@@ -9,8 +9,8 @@ from pathlib import Path
 import numpy as np
 
 from proofroll.core.arrays import FloatArray
-from proofroll.files.netcdf import read_some
 from proofroll.files.scene_file import load_scene
+from proofroll.files.trajectory_file import read_some
 from proofroll.report.comparison_content import outcome_content, runs_at
 from proofroll.report.labels import names
 from proofroll.report.pages import packed

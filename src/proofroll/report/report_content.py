@@ -11,8 +11,8 @@ from typing import TYPE_CHECKING, Any
 
 import proofroll
 from proofroll.files.json_data import MERGED, OPTIONAL
-from proofroll.files.netcdf import read
 from proofroll.files.scene_file import load_scene
+from proofroll.files.trajectory_file import read
 from proofroll.report.comparison_content import outcome_content
 from proofroll.report.comparison_records import ReportedComparison
 from proofroll.report.findings import Findings, findings

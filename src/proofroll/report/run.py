@@ -9,8 +9,8 @@ from typing import Any
 from proofroll.core.diagnosis.of_scene import Diagnosis, diagnosed
 from proofroll.core.events import Event, events_of
 from proofroll.files.json_data import OPTIONAL
-from proofroll.files.netcdf import read_columns
 from proofroll.files.scene_file import load_scene
+from proofroll.files.trajectory_file import read_columns
 from proofroll.report.labels import settings_text
 from proofroll.running.case import Case, Result
 

@@ -23,19 +23,19 @@ def require_ending(path: Path) -> None:
 
 
 def read_run(path: Path) -> xr.Dataset:
-    """The run in a netCDF file.
+    """The run in a file.
 
     Raises:
         InputError: there is no such file, or it holds no run.
     """
-    from proofroll.files.netcdf import read
+    from proofroll.files.trajectory_file import read
 
     try:
         dataset = read(path)
     except FileNotFoundError:
         raise InputError("run", str(path), "there is no such file; proofroll run … --out writes one") from None
     except (OSError, ValueError, TypeError, KeyError):
-        raise InputError("run", str(path), "this is no netCDF file; proofroll run … --out writes one") from None
+        raise InputError("run", str(path), "no run in netCDF or npz; proofroll run … --out writes one") from None
     if not curves(dataset):
         raise InputError("run", str(path), "it has no variable over time; proofroll run … --out writes such a file")
     return dataset

@@ -10,8 +10,8 @@ from typing import TYPE_CHECKING, Any
 from proofroll.core.errors import InputError
 from proofroll.core.scene import Scene
 from proofroll.core.truth import truth
-from proofroll.files.netcdf import write
 from proofroll.files.scene_file import load_scene
+from proofroll.files.trajectory_file import STORED, write
 from proofroll.report.kinds import kind_of, report_kinds
 from proofroll.report.labels import settings_text
 from proofroll.report.replay import case_content, distance
@@ -42,10 +42,11 @@ def replay_page(path: Path, run: xr.Dataset) -> str:
     usual = load_scene(str(run.attrs["scene"])).parameters
     label = point_name({name: value for name, value in scene.parameters.items() if value != usual[name]})
     with tempfile.TemporaryDirectory() as folder:
-        file = Path(folder) / "truth.nc"
+        file, own = (Path(folder) / f"{name}{STORED}" for name in ("truth", "run"))
         true = truth(scene, run["time"].to_numpy())
         write(true, file)
-        replayed = Replayed(scene, file, _ghosts(path, run, true), scene.title, label or scene.title)
+        write(run, own)
+        replayed = Replayed(scene, file, _ghosts(own, run, true), scene.title, label or scene.title)
         case, numbers = case_content(replayed, kind.replay(), lambda _: "")
     return rendered(
         templates(),

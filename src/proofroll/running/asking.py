@@ -110,9 +110,9 @@ def prepare(engine: str, workers: Workers) -> None:
     """
     with contextlib.suppress(ProofrollError), workers.lend(parse_engine(engine).name) as worker:
         worker.request({"do": "resolve", "engine": parse_engine(engine).name, "options": {}}, _START_UP_SECONDS)
-        name = "import_xarray" if parse_engine(engine).name == "truth" else "import_backend"
-        importing = {"function": f"proofroll.files.netcdf:{name}", "arguments": {}}
-        worker.request({"do": "call", **importing}, _START_UP_SECONDS)
+        if parse_engine(engine).name == "truth":
+            importing = {"function": "proofroll.files.trajectory_file:import_xarray", "arguments": {}}
+            worker.request({"do": "call", **importing}, _START_UP_SECONDS)
 
 
 def programs(cases: Sequence[Case], workers: Workers | None = None) -> list[tuple[str | None, str]]:

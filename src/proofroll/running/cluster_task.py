@@ -20,6 +20,7 @@ import proofroll
 from proofroll.core.errors import InputError, ProofrollError
 from proofroll.core.plugins import GROUP
 from proofroll.files.scene_file import load_scene
+from proofroll.files.trajectory_file import STORED
 from proofroll.running.asking import resolve
 from proofroll.running.case import Case, EngineFacts
 from proofroll.running.identity import digest
@@ -101,7 +102,7 @@ def run_case(asked: Asked, content: dict[str, Any], files: Mapping[str, bytes]) 
             case = dataclasses.replace(case, scene=str(scene))
         workers = _workers_of(asked)
         _check(asked, case, workers)
-        out = place / "run.nc"
+        out = place / f"run{STORED}"
         try:
             result = run_one(case, out, workers)
         except InputError as error:

@@ -37,7 +37,7 @@ def _run(case: Case, out: Path, spent: TimeAccounts) -> Result:
     from proofroll.core.first_steps import certificate
     from proofroll.core.several import build
     from proofroll.core.time_grid import time_grid
-    from proofroll.files.netcdf import write
+    from proofroll.files.trajectory_file import write
     from proofroll.running.loading import loaded, scene_of
     from proofroll.running.recording import off_grid, record
 
@@ -99,7 +99,7 @@ def _answer(error: Refused | Diverged, versions: dict[str, str]) -> Result:
 
 def _run_truth(scene: Any, times: Any, out: Path, versions: dict[str, str]) -> Result:
     from proofroll.core.truth import truth
-    from proofroll.files.netcdf import import_xarray, write
+    from proofroll.files.trajectory_file import import_xarray, write
 
     import_xarray()
 

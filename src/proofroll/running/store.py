@@ -16,6 +16,7 @@ from pathlib import Path
 
 from proofroll.core.errors import ProofrollError
 from proofroll.files.atomic import ordinary_content, replacing
+from proofroll.files.trajectory_file import STORED
 from proofroll.running.case import LASTING, Case, Result
 
 
@@ -59,7 +60,7 @@ class Store:
 
     def trajectory(self, case: Case) -> Path:
         """File of the case's trajectory."""
-        return self.folder / f"{case.key}.nc"
+        return self.folder / f"{case.key}{STORED}"
 
     @contextlib.contextmanager
     def incoming(self, case: Case) -> Iterator[Path]:
@@ -137,13 +138,3 @@ class Store:
 def _seal(record: object) -> str:
     """Hash of a record, so that one whose numbers were changed is not believed."""
     return hashlib.sha256(json.dumps(record, sort_keys=True).encode()).hexdigest()
-
-
-def move(source: Path, target: Path) -> None:
-    """Puts a finished file in its place, whole or not at all, also across file systems.
-
-    Raises:
-        ProofrollError: the place cannot be written.
-    """
-    with replacing(target) as temporary:
-        temporary.write_bytes(source.read_bytes())

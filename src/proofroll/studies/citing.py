@@ -21,6 +21,7 @@ from proofroll.core.plugins import GROUP, engine_names, parse_engine, plain_name
 from proofroll.files.comparison_file import load_comparison
 from proofroll.files.scene_file import is_scene, read_scene_file, scene_folder
 from proofroll.files.toml import named_file
+from proofroll.files.trajectory_file import STORED, read
 
 FILE = "references.bib"
 TRUTHS = "proofroll.truths"
@@ -76,7 +77,8 @@ def cited(subjects: Iterable[str]) -> list[Cited]:
     """What is behind results, comparisons, scenes or engines; without any, proofroll and its truths alone.
 
     Args:
-        subjects: files of results (``.json`` of a command, ``.nc`` of a run), comparisons, scenes, names of engines.
+        subjects: files of results (``.json`` of a command, ``.nc`` or ``.npz`` of a run), comparisons, scenes, names of
+            engines.
 
     Raises:
         InputError: something is none of these.
@@ -98,7 +100,7 @@ def cited(subjects: Iterable[str]) -> list[Cited]:
 
 def _meet(subject: str, met: _Met) -> None:
     path = Path(subject)
-    if path.suffix in {".json", ".nc"} and path.is_file():
+    if path.suffix in {".json", ".nc", STORED} and path.is_file():
         before = met.count
         _walk(_document(path), met)
         if met.count == before:
@@ -120,8 +122,6 @@ def _document(path: Path) -> object:
     Raises:
         InputError: it cannot be read as its ending says.
     """
-    from proofroll.files.netcdf import read
-
     try:
         if path.suffix == ".json":
             return json.loads(path.read_text(encoding="utf-8"))

@@ -8,7 +8,7 @@ from dataclasses import replace
 import numpy as np
 
 from proofroll.core.arrays import largest_difference
-from proofroll.files.netcdf import read
+from proofroll.files.trajectory_file import read
 from proofroll.running.case import Status
 from proofroll.running.runner import Runner
 from proofroll.studies.curve import CurvePoint

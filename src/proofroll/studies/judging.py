@@ -136,7 +136,7 @@ def _dataset(run: Run, scene: Scene) -> xr.Dataset:
     import xarray as xr
 
     if isinstance(run, str | Path):
-        from proofroll.files.netcdf import read
+        from proofroll.files.trajectory_file import read
 
         try:
             run = read(Path(run))

@@ -15,8 +15,8 @@ from proofroll.core.observable import Role
 from proofroll.core.plugins import engine_names
 from proofroll.core.scene import Scene
 from proofroll.core.time_grid import time_grid
-from proofroll.files.netcdf import read
 from proofroll.files.scene_file import load_scene
+from proofroll.files.trajectory_file import read
 from proofroll.running.asking import described, resolve, resolve_with_truth
 from proofroll.running.case import Case, EngineFacts, Result, Status
 from proofroll.running.process import WorkerDied

@@ -19,7 +19,7 @@ from proofroll.core.events import Event, events_of
 from proofroll.core.observable import Role
 from proofroll.core.scene import Scene
 from proofroll.core.verdict import Doubt
-from proofroll.files.netcdf import read
+from proofroll.files.trajectory_file import read
 
 if TYPE_CHECKING:
     import xarray as xr

@@ -7,8 +7,8 @@ from dataclasses import dataclass
 
 from proofroll.core.errors import ProofrollError
 from proofroll.core.scene import Scene
-from proofroll.files.netcdf import read
 from proofroll.files.scene_file import load_scene
+from proofroll.files.trajectory_file import read
 from proofroll.running.asking import resolve_with_truth
 from proofroll.running.case import Case, EngineFacts, Status
 from proofroll.running.runner import Runner

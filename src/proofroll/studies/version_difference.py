@@ -14,8 +14,8 @@ from proofroll.core.observable import Role
 from proofroll.core.plugins import parse_engine
 from proofroll.core.scene import Scene
 from proofroll.core.verdict import Verdict
-from proofroll.files.netcdf import read
 from proofroll.files.scene_file import load_scene
+from proofroll.files.trajectory_file import read
 from proofroll.running.case import Result, Status
 from proofroll.running.runner import Runner
 from proofroll.studies.outcome import Run

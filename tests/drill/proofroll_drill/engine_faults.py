@@ -135,7 +135,7 @@ def _change_trajectory(path: Path) -> None:
 
 def _take_another(path: Path) -> None:
     other = next(record for record in path.parent.glob("*.json") if record.stem != path.stem)
-    for suffix in (".json", ".nc"):
+    for suffix in (".json", ".npz"):
         shutil.copy(other.with_suffix(suffix), path.with_suffix(suffix))
 
 
@@ -161,16 +161,16 @@ def _put_folder(path: Path) -> None:
 DAMAGES: Mapping[str, tuple[str, Callable[[Path], None]]] = {
     "truncated record": (".json", _cut),
     "tampered record": (".json", _change_record),
-    "truncated trajectory": (".nc", _cut),
-    "tampered trajectory": (".nc", _change_trajectory),
+    "truncated trajectory": (".npz", _cut),
+    "tampered trajectory": (".npz", _change_trajectory),
     "another's result": (".json", _take_another),
     "deeply nested record": (".json", _nest),
     "pipe for a record": (".json", _put_pipe),
-    "pipe for a trajectory": (".nc", _put_pipe),
+    "pipe for a trajectory": (".npz", _put_pipe),
     "device for a record": (".json", _put_device),
-    "device for a trajectory": (".nc", _put_device),
+    "device for a trajectory": (".npz", _put_device),
     "folder for a record": (".json", _put_folder),
-    "folder for a trajectory": (".nc", _put_folder),
+    "folder for a trajectory": (".npz", _put_folder),
 }
 
 

@@ -160,7 +160,7 @@ def contents(store: Path) -> dict[str, str]:
     found: dict[str, str] = {}
     for record in store.glob("[!.]*.json"):
         pair = hashlib.sha256()
-        for path in (record, record.with_suffix(".nc")):
+        for path in (record, record.with_suffix(".npz")):
             with contextlib.suppress(OSError):  # it may be none, or no file
                 pair.update(ordinary_content(path))
         found[record.stem] = pair.hexdigest()
@@ -169,4 +169,4 @@ def contents(store: Path) -> dict[str, str]:
 
 def scraps(store: Path) -> list[str]:
     """What lies in a folder of results without being one."""
-    return [path.name for path in store.iterdir() if path.suffix not in {".json", ".nc"} or path.name.startswith(".")]
+    return [path.name for path in store.iterdir() if path.suffix not in {".json", ".npz"} or path.name.startswith(".")]

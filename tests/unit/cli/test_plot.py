@@ -10,7 +10,7 @@ from pathlib import Path
 import pytest
 import xarray as xr
 
-from proofroll.files.netcdf import read, write
+from proofroll.files.trajectory_file import read, write
 from proofroll.report.run_plot import curves
 
 Proofroll = Callable[..., tuple[int, str, str]]
@@ -54,10 +54,12 @@ def test_json_says_what_was_written(proofroll: Proofroll, tmp_path: Path) -> Non
 
 def test_bad_files(proofroll: Proofroll, tmp_path: Path) -> None:
     """No file, no run in it, or an ending that no picture has: one line, exit code 2, and nothing is written."""
-    (tmp_path / "text.nc").write_text("no netCDF")
+    for name in ("text.nc", "text.npz"):
+        (tmp_path / name).write_text("no run")
     for arguments, word in (
         ([str(tmp_path / "none.nc")], "no such file"),
-        ([str(tmp_path / "text.nc")], "no netCDF"),
+        ([str(tmp_path / "text.nc")], "no run in netCDF"),
+        ([str(tmp_path / "text.npz")], "no run in netCDF"),
         ([str(tmp_path / "text.nc"), "--out", str(tmp_path / "run.gif")], ".html"),
     ):
         code, out, err = proofroll("plot", *arguments)

@@ -5,7 +5,7 @@ import pytest
 import xarray as xr
 
 from proofroll.core.events import Event, events_of, with_events
-from proofroll.files.netcdf import read, write
+from proofroll.files.trajectory_file import read, write
 
 EVENTS = [Event("slip", 1.0, 0.9, 1.1), Event("stick", 2.0, 2.0, 2.0), Event("lift_off", 3.0, 2.5, 3.5)]
 

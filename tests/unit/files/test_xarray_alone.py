@@ -9,13 +9,13 @@ from pathlib import Path
 PROGRAM = """
 import sys
 from pathlib import Path
-from proofroll.files.netcdf import import_xarray, read, write
+from proofroll.files.trajectory_file import import_xarray, read, write
 
 import_xarray()
 import xarray
 
-write(xarray.Dataset({"z": ("time", [1.0])}), Path("run.nc"))
-assert float(read(Path("run.nc")).z[0]) == 1.0
+write(xarray.Dataset({"z": ("time", [1.0])}), Path("run.npz"))
+assert float(read(Path("run.npz")).z[0]) == 1.0
 found = {"dask", "distributed"} & set(sys.modules)
 assert not found, found  # neither imported, nor hidden from whoever wants it
 """

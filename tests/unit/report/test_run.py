@@ -10,7 +10,7 @@ import numpy as np
 import xarray as xr
 from rich.console import Console
 
-from proofroll.files.netcdf import write
+from proofroll.files.trajectory_file import write
 from proofroll.report.run import run_content, run_lines
 from proofroll.running.case import Result, Status
 
@@ -21,11 +21,11 @@ def test_a_variable_without_value_says_why(tmp_path: Path) -> None:
     nothing = ("time", np.full(2, np.nan), units | {"absent": "not determined by the equations"})
     held = {f"force.a_joint_{number}.z": nothing for number in range(9)}
     dataset = xr.Dataset(held | {"x": ("time", np.ones(2), units)}, {"time": ("time", [0.0, 1.0], {"units": "s"})})
-    write(dataset, tmp_path / "run.nc")
+    write(dataset, tmp_path / "run.npz")
     case = SimpleNamespace(scene="s", parameters={}, engine=SimpleNamespace(name="e", settings={}), until=1.0)
-    result = Result(Status.DONE, "reached 1 s", trajectory="run.nc", wall_seconds=0.1)
+    result = Result(Status.DONE, "reached 1 s", trajectory="run.npz", wall_seconds=0.1)
 
-    content = run_content(case, result, tmp_path / "run.nc")
+    content = run_content(case, result, tmp_path / "run.npz")
     shown = Console(file=io.StringIO(), width=80)
     for line in run_lines(content):
         shown.print(line)

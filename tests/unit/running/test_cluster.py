@@ -24,8 +24,8 @@ from robot_templates import urdf
 from proofroll.core.errors import InputError, ProofrollError
 from proofroll.elements.ball_on_surface.regimes_study import regime_map
 from proofroll.files.data_folders import data_folder
-from proofroll.files.netcdf import read
 from proofroll.files.scene_file import load_scene
+from proofroll.files.trajectory_file import read
 from proofroll.running import cluster
 from proofroll.running.case import Case, EngineFacts, Status
 from proofroll.running.cluster import Cluster

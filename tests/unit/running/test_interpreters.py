@@ -102,7 +102,7 @@ def test_an_environment_that_changed_is_a_row(old: Path, tmp_path: Path) -> None
 def test_another_scene_there_is_a_row(old: Path, tmp_path: Path) -> None:
     """A case whose scene reads otherwise where the engine runs is no result."""
     case = Case(**{**vars(case_in(old)), "scene_digest": "other"})
-    result = run_one(case, tmp_path / "run.nc")
+    result = run_one(case, tmp_path / "run.npz")
     assert result.status == Status.CRASHED
     assert "is another scene where" in result.message
 
@@ -120,7 +120,7 @@ def test_a_worker_that_echoes_another_version_is_no_result(old: Path, tmp_path: 
     from proofroll.running import runner
 
     with pytest.raises(WorkerDied, match=r"version 3.0 of aged ran, and 1.0 had answered"):
-        runner._ask(Liar(), case, tmp_path / "run.nc")  # type: ignore[arg-type]
+        runner._ask(Liar(), case, tmp_path / "run.npz")  # type: ignore[arg-type]
 
 
 def writes(text: str) -> Callable[[Path], Path]:

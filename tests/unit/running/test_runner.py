@@ -15,7 +15,7 @@ import pytest
 from hostile import ENTRY_POINTS
 
 from proofroll.core.errors import InputError, Missing
-from proofroll.files.netcdf import read
+from proofroll.files.trajectory_file import read
 from proofroll.running.asking import describe, resolve
 from proofroll.running.case import Case, EngineFacts, Result, Status
 from proofroll.running.process import WorkerDied
@@ -136,7 +136,7 @@ def test_a_case_that_makes_no_sense_costs_only_itself(tmp_path: Path, make_case:
     assert "no such setting" in results[wrong.key].message
     assert results[right.key].status is Status.DONE
     with pytest.raises(InputError, match=r"oracle: speed = .*no such setting"):
-        run_one(wrong, tmp_path / "out.nc")
+        run_one(wrong, tmp_path / "out.npz")
 
 
 def test_an_error_in_progress_ends_the_run(tmp_path: Path, make_case: MakeCase) -> None:
@@ -184,7 +184,7 @@ def test_a_disk_that_is_really_full(tmp_path: Path, make_case: MakeCase) -> None
     """On a full disk what fits is stored, each other row says why not, and running all again loses nothing."""
     cases = [dataclasses.asdict(make_case("oracle", parameters={"speed": speed})) for speed in (3.0, 4.0, 5.0)]
     (tmp_path / "disk").mkdir()
-    mount = 'mount -t tmpfs -o size=20k tmpfs "$1" && shift && exec "$@"'
+    mount = 'mount -t tmpfs -o size=32k tmpfs "$1" && shift && exec "$@"'
     command = ["unshare", "--user", "--map-root-user", "--mount", "sh", "-c", mount, "sh", str(tmp_path / "disk")]
     if not shutil.which("unshare") or subprocess.run([*command, "true"], check=False, capture_output=True).returncode:
         pytest.skip("this system lets nobody mount a small disk")
@@ -201,17 +201,17 @@ def test_a_disk_that_is_really_full(tmp_path: Path, make_case: MakeCase) -> None
 
 def test_timed_runs(tmp_path: Path, make_case: MakeCase) -> None:
     """Speed is measured in runs of their own, at least one, and given per simulated second."""
-    result = run_one(make_case("oracle", timed=True), tmp_path / "run.nc")
+    result = run_one(make_case("oracle", timed=True), tmp_path / "run.npz")
     assert 1 <= len(result.timings) <= 5
     assert result.seconds_per_second == pytest.approx(statistics.median(result.timings))
-    assert run_one(make_case("oracle"), tmp_path / "run.nc").seconds_per_second is None
+    assert run_one(make_case("oracle"), tmp_path / "run.npz").seconds_per_second is None
 
 
 def test_manifest(tmp_path: Path, make_case: MakeCase) -> None:
     """A trajectory says how it was made: engine, settings, parameters, versions, machine."""
     case = make_case("oracle", settings={"dt": 5e-3}, parameters={"speed": 5.0})
-    result = run_one(case, tmp_path / "run.nc")
-    attributes = read(tmp_path / "run.nc").attrs
+    result = run_one(case, tmp_path / "run.npz")
+    attributes = read(tmp_path / "run.npz").attrs
     assert json.loads(attributes["settings"])["dt"] == 5e-3
     assert json.loads(attributes["parameters"])["speed"] == 5.0
     assert json.loads(attributes["versions"]) == result.versions
@@ -226,8 +226,8 @@ def test_manifest_of_the_truth(tmp_path: Path, make_case: MakeCase) -> None:
     facts = resolve([("truth", {})])[0]
     assert isinstance(facts, EngineFacts)
     case = dataclasses.replace(make_case("oracle", parameters={"speed": 5.0}), engine=facts)
-    result = run_one(case, tmp_path / "run.nc")
-    dataset = read(tmp_path / "run.nc")
+    result = run_one(case, tmp_path / "run.npz")
+    dataset = read(tmp_path / "run.npz")
     assert dataset.attrs["engine"] == "truth"
     assert json.loads(dataset.attrs["settings"]) == {}
     assert json.loads(dataset.attrs["parameters"])["speed"] == 5.0
@@ -238,7 +238,7 @@ def test_manifest_of_the_truth(tmp_path: Path, make_case: MakeCase) -> None:
 def test_capabilities_are_checked_before_anything_is_built(tmp_path: Path, make_case: MakeCase) -> None:
     """A scene that needs what the engine does not provide is refused by the words of what is lacking."""
     case = make_case("oracle", parameters={"rolling_resistance": 1e-4, "mu_static": 0.3})
-    result = run_one(case, tmp_path / "run.nc")
+    result = run_one(case, tmp_path / "run.npz")
     assert result.status is Status.REFUSED
     assert result.message == "needs bounded friction (slip), rolling resistance"
 

@@ -61,7 +61,7 @@ def test_a_worker_ends_with_its_parent(
     monkeypatch.setenv("HANGS_ALOUD", str(name))
     pipe = os.open(name, os.O_RDONLY | os.O_NONBLOCK)
     case = json.dumps(dataclasses.asdict(make_case("hangs_aloud", time_limit=600.0)))
-    parent = subprocess.Popen([sys.executable, "-c", PARENT, case, str(tmp_path / "run.nc")])
+    parent = subprocess.Popen([sys.executable, "-c", PARENT, case, str(tmp_path / "run.npz")])
     worker = 0
     try:
         said = read_until(pipe, bool, 300)

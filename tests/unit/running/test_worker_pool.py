@@ -42,9 +42,10 @@ def test_a_prepared_worker_serves_the_engine_and_a_wrong_name_is_left_to_who_ask
     workers = Workers()
     prepare("projection[dt=1e-3", workers)
     prepare("no_such_engine", workers)
-    prepare("projection", workers)
-    with workers.lend("projection") as worker:
-        assert worker._asked == 2  # its settings, and the import
+    for name, asked in (("projection", 1), ("truth", 2)):  # its settings, and of the truth the import of datasets
+        prepare(name, workers)
+        with workers.lend(name) as worker:
+            assert worker._asked == asked
     workers.close()
 
 

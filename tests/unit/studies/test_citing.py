@@ -14,6 +14,7 @@ import yaml
 from proofroll.core.errors import InputError
 from proofroll.core.plugins import engine_names
 from proofroll.files.data_folders import data_folder
+from proofroll.files.trajectory_file import read, write
 from proofroll.studies.citing import cited, entries, fields, sentence
 
 Proofroll = Callable[..., tuple[int, str, str]]
@@ -21,8 +22,8 @@ ROOT = Path(__file__).resolve().parents[3]
 
 
 def test_a_run_is_cited_with_its_versions(proofroll: Proofroll, tmp_path: Path) -> None:
-    """The trajectory and the document of a run name engine with version, scene, truth and suite, as text and BibTeX."""
-    run, document = tmp_path / "run.nc", tmp_path / "run.json"
+    """Trajectory (of both kinds) and document of a run name engine, version, scene, truth and suite; so does BibTeX."""
+    run, stored, document = tmp_path / "run.nc", tmp_path / "run.npz", tmp_path / "run.json"
     words = ("run", "pendulum", "--engine", "projection", "--until", "0.02", "--out", str(run), "--json")
     code, out, err = proofroll(*words)
     assert code == 0, err
@@ -31,9 +32,11 @@ def test_a_run_is_cited_with_its_versions(proofroll: Proofroll, tmp_path: Path) 
     found = {(item.kind, item.name): item for item in cited([str(document)])}
     assert found[("engine", "projection")].versions == [version]
     assert "Whittaker" in found[("scene", "pendulum")].references[0]
-    code, out, _ = proofroll("cite", str(run))
-    assert code == 0
-    assert f"engine projection {version}\n  Wojciech Blajer, Elimination of constraint violation" in out
+    write(read(run), stored)
+    for file in (run, stored):
+        code, out, _ = proofroll("cite", str(file))
+        assert code == 0
+        assert f"engine projection {version}\n  Wojciech Blajer, Elimination of constraint violation" in out
     code, out, _ = proofroll("cite", str(document), "sphere_in_cylinder", "--bibtex")
     keys = re.findall(r"^@\w+\{(\w+),", out, flags=re.MULTILINE)
     assert code == 0

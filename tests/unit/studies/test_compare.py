@@ -18,8 +18,8 @@ from proofroll.core.time_grid import time_grid
 from proofroll.core.truth import truth
 from proofroll.core.verdict import Verdict
 from proofroll.elements.ball_on_surface.model import BallCapability
-from proofroll.files.netcdf import write
 from proofroll.files.scene_file import load_scene
+from proofroll.files.trajectory_file import write
 from proofroll.report.comparison_content import outcome_content
 from proofroll.running.case import Case, EngineFacts, Result, Status
 from proofroll.running.runner import Runner

@@ -37,7 +37,7 @@ def from_samples(
     )
     found = {**made.variables, **samples_between(between)}
     if all(s.sticking is not None for s in samples):
-        sticking = np.array([s.sticking for s in samples], dtype=np.int8)  # netCDF has no boolean
+        sticking = np.array([s.sticking for s in samples], dtype=np.int8)
         found["sticking"] = Variable(("time",), sticking, {"units": "1", "long_name": "1 sticks, 0 slips"})
     return Columns(found, made.attrs)
 

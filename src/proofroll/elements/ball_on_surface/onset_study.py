@@ -14,8 +14,8 @@ from proofroll.core.events import Event, events_of
 from proofroll.core.plugins import engine_names, parse_engine
 from proofroll.core.scene import Scene
 from proofroll.elements.ball_on_surface.model import BallCapability
-from proofroll.files.netcdf import read_columns
 from proofroll.files.scene_file import load_scene
+from proofroll.files.trajectory_file import read_columns
 from proofroll.running.asking import described, resolve
 from proofroll.running.case import Case, EngineFacts, Result, Status
 from proofroll.running.process import WorkerDied

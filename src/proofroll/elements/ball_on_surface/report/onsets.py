@@ -11,7 +11,7 @@ from proofroll.core.events import Event, events_of
 from proofroll.elements.ball_on_surface.element import rolling_ball
 from proofroll.elements.ball_on_surface.onset_study import onset_verdict as judged_onset
 from proofroll.files.json_data import OPTIONAL
-from proofroll.files.netcdf import read_some
+from proofroll.files.trajectory_file import read_some
 from proofroll.report.plots import Bound, Mark, PointCurves
 from proofroll.studies.planning import point_name
 from proofroll.truth.onset import Onset

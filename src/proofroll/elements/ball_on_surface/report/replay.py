@@ -13,7 +13,7 @@ from proofroll.elements.ball_on_surface.model import RollingBall
 from proofroll.elements.ball_on_surface.report.poses import NEEDED, Poses, Sampled, poses
 from proofroll.elements.ball_on_surface.report.wall import middle, wall
 from proofroll.files.json_data import plain
-from proofroll.files.netcdf import read_some
+from proofroll.files.trajectory_file import read_some
 from proofroll.report.labels import symbol, unit
 from proofroll.report.replay import frame_times
 from proofroll.report.replay_records import PackedNumbers, Replayed

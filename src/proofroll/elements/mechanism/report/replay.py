@@ -19,7 +19,7 @@ from proofroll.elements.mechanism.fastened import fastened
 from proofroll.elements.mechanism.placed import Placed
 from proofroll.elements.mechanism.report.drawing import direction
 from proofroll.files.json_data import plain
-from proofroll.files.netcdf import read_some
+from proofroll.files.trajectory_file import read_some
 from proofroll.report.labels import symbol, unit
 from proofroll.report.replay import frame_times
 from proofroll.report.replay_records import SPEEDS, PackedNumbers, Replayed

@@ -1,0 +1,136 @@
+"""Trajectories in files: numpy's ``.npz`` between processes and in the store, netCDF for people and other programs.
+
+numpy is imported anyway; what reads and writes netCDF takes longer to import than a short run to make.
+"""
+
+from __future__ import annotations
+
+import contextlib
+import io
+import json
+import sys
+import zipfile
+import zlib
+from collections.abc import Collection, Iterator
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+import numpy.typing as npt
+
+from proofroll.core.columns import Columns, Variable
+from proofroll.files.atomic import ordinary_content, replacing
+
+if TYPE_CHECKING:
+    import xarray as xr
+
+# Ending of the files in which trajectories are stored; every other is netCDF.
+STORED = ".npz"
+# What is in such a file beside an array for each variable: their dimensions and all attributes.
+_ABOUT = "about.json"
+# What numpy raises where a file is another, or damaged.
+_NO_SUCH_FILE = (zipfile.BadZipFile, zlib.error, EOFError, KeyError, TypeError, ValueError)
+
+
+def import_xarray() -> None:
+    """Imports xarray in a process that is ours alone: from then on it takes no array of dask's.
+
+    At its first array xarray imports all of dask, half of what a run of a second costs; no array of ours is dask's.
+    """
+    with _dask_aside():
+        import xarray as xr
+
+        xr.Variable((), 0.0)
+
+
+@contextlib.contextmanager
+def _dask_aside() -> Iterator[None]:
+    """Meanwhile dask is not found, unless it is imported already."""
+    hidden = "dask" not in sys.modules
+    if hidden:
+        sys.modules["dask"] = None  # type: ignore[assignment]  # what Python documents to make an import fail
+    try:
+        yield
+    finally:
+        if hidden:
+            sys.modules.pop("dask", None)
+
+
+def write(trajectory: xr.Dataset | Columns, path: Path) -> None:
+    """Writes a file, by its ending, so that it is either whole or not there.
+
+    netCDF-3 has no integers beyond 32 bits: a number that does not fit is refused. All others stay as they are.
+
+    Raises:
+        ProofrollError: the place cannot be written.
+        ValueError: the format cannot hold a number.
+    """
+    # Made in memory first: a disk that fills meanwhile gives one reason, and no half of a file.
+    made = _stored(trajectory) if path.suffix == STORED else _netcdf(trajectory)
+    with replacing(path) as temporary:
+        temporary.write_bytes(made)
+
+
+def _stored(trajectory: xr.Dataset | Columns) -> bytes:
+    columns = trajectory if isinstance(trajectory, Columns) else Columns.of(trajectory)
+    said = {name: [item.dims, dict(item.attrs)] for name, item in columns.variables.items()}
+    about = json.dumps([said, dict(columns.attrs)], default=lambda value: value.tolist())  # an array, or one number
+    buffer = io.BytesIO()
+    with zipfile.ZipFile(buffer, "w") as archive:
+        archive.writestr(zipfile.ZipInfo(_ABOUT), about)  # of no date: the same trajectory gives the same file
+        for name, item in columns.variables.items():
+            with archive.open(f"{name}.npy", "w") as entry:
+                np.lib.format.write_array(entry, item.values, allow_pickle=False)
+    return buffer.getvalue()
+
+
+def _netcdf(trajectory: xr.Dataset | Columns) -> bytes:
+    dataset = trajectory.dataset() if isinstance(trajectory, Columns) else trajectory
+    # No number stands for an absent one.
+    plain = {name: {"_FillValue": None} for name in dataset.variables}
+    return bytes(dataset.to_netcdf(None, engine="scipy", encoding=plain))
+
+
+def read(path: Path) -> xr.Dataset:
+    """A trajectory from a file that :func:`write` made, wholly in memory.
+
+    Raises:
+        OSError, ValueError: it cannot be read, or is of another kind than its ending says.
+    """
+    if path.suffix == STORED:
+        return read_columns(path).dataset()
+    import xarray as xr
+
+    # Times stay numbers of seconds, and no number stands for an absent one.
+    try:
+        found = xr.load_dataset(
+            io.BytesIO(ordinary_content(path)), engine="scipy", decode_times=False, mask_and_scale=False
+        )
+    except TypeError:
+        raise ValueError(f"{path} is no netCDF-3") from None
+    return found.assign({name: item.astype(str) for name, item in found.variables.items() if item.dtype == object})
+
+
+def read_columns(path: Path, names: Collection[str] | None = None) -> Columns:
+    """A stored trajectory, or those of its variables that are named, without xarray.
+
+    Raises:
+        OSError, ValueError: it cannot be read, or is no such file.
+    """
+    content = ordinary_content(path)
+    try:
+        with np.load(io.BytesIO(content), allow_pickle=False) as file:
+            said, attrs = json.loads(file[_ABOUT])
+            found = {
+                name: Variable(tuple(dims), file[name], own)
+                for name, (dims, own) in said.items()
+                if names is None or name in names
+            }
+    except _NO_SUCH_FILE as error:
+        raise ValueError(f"{path} is no stored trajectory ({error})") from None
+    return Columns(found, attrs)
+
+
+def read_some(path: Path, names: Collection[str]) -> dict[str, npt.NDArray[Any]]:
+    """The values of some variables of a stored trajectory, those that there are; see :func:`read_columns`."""
+    return {name: column.values for name, column in read_columns(path, names).variables.items()}

@@ -1,0 +1,155 @@
+"""Files of both kinds: what is written comes back, and netCDF as xarray alone makes and reads it."""
+
+from __future__ import annotations
+
+import io
+import zipfile
+from pathlib import Path
+
+import numpy as np
+import pytest
+import xarray as xr
+from scipy.io import netcdf_file
+
+from proofroll.core.columns import Columns
+from proofroll.core.errors import ProofrollError
+from proofroll.core.events import Event, with_events
+from proofroll.files.trajectory_file import read, read_columns, read_some, write
+from proofroll.running.simulation import simulate
+
+VALUES = np.array([5e-324, -0.0, 1.7976931348623157e308, np.nan, -np.inf, 0.1, 9.969209968386869e36])
+ALL_KINDS = xr.Dataset(
+    {
+        "number": ("time", VALUES, {"error_bar": 5e-324, "long_name": "größer"}),
+        "small": ("time", np.linspace(0, 1, 7, dtype=np.float32)),
+        "sticking": ("time", np.ones(7, dtype=np.int8)),
+        "holds": ("time", VALUES > 0),
+        "name": (("body", "time"), [["a", "zwölf", "", "c", "d", "e", "f"]]),
+        "scalar": 3.0,
+    },
+    {"time": ("time", np.arange(7.0), {"units": "s"}), "xyz": ["x", "y", "z"]},
+    {"count": 3, "half": np.float32(0.5), "message": "", "list": np.array([1, 2, 3]), "nothing": np.nan},
+)
+NO_EVENT = with_events(ALL_KINDS, [])
+RUNS = {
+    "kinds": ALL_KINDS,
+    "no event": NO_EVENT,
+    "an event": with_events(ALL_KINDS, [Event("slip", 0.5, 0.4, 0.6)]),
+    "balls": simulate("slide_to_roll", "projection", until=0.3),
+    "mechanisms": simulate("double_pendulum", until=0.1),
+}
+BOTH = pytest.mark.parametrize("ending", [".npz", ".nc"])
+
+
+@BOTH
+@pytest.mark.parametrize("dataset", RUNS.values(), ids=list(RUNS))
+def test_a_run_comes_back(tmp_path: Path, dataset: xr.Dataset, ending: str) -> None:
+    """Numbers, units, texts and truth values come back to the last bit, and the same run gives the same file."""
+    file = tmp_path / "new" / f"run{ending}"
+    contents = set()
+    for given in (dataset, Columns.of(dataset)):
+        write(given, file)
+        xr.testing.assert_identical(read(file), dataset)
+        contents.add(file.read_bytes())
+    assert len(contents) == 1
+    assert [path.name for path in file.parent.iterdir()] == [file.name]
+    for name, item in read(file).variables.items():
+        assert item.to_numpy().tobytes() == dataset[name].to_numpy().tobytes(), name
+        assert item.dtype == dataset[name].dtype
+
+
+def test_some_variables_are_read_as_all_are(tmp_path: Path) -> None:
+    """A part of a stored file is what the whole has there, texts too; what the file has not is left out."""
+    file = tmp_path / "x.npz"
+    write(RUNS["an event"], file)
+    found = read_some(file, ["number", "event_kind", "absent"])
+    assert found.keys() == {"number", "event_kind"}
+    assert all(values.tobytes() == RUNS["an event"][name].to_numpy().tobytes() for name, values in found.items())
+    write(NO_EVENT, file)
+    assert read_some(file, ["event_kind"])["event_kind"].tolist() == []
+
+
+def test_others_read_the_same_from_the_file(tmp_path: Path) -> None:
+    """The numbers in a file, as another reader of netCDF, or numpy, finds them there, are those of the dataset."""
+    dataset = RUNS["balls"]
+    write(dataset, tmp_path / "x.nc")
+    write(dataset, tmp_path / "x.npz")
+    with netcdf_file(tmp_path / "x.nc", mmap=False) as file, np.load(tmp_path / "x.npz") as arrays:
+        for name, item in dataset.variables.items():
+            if item.dtype.kind == "f":
+                for values in (file.variables[name][...].astype(float), arrays[name]):
+                    assert values.tobytes() == item.to_numpy().tobytes(), name
+                assert file.variables[name].units == item.attrs["units"].encode()
+
+
+def test_what_the_format_cannot_hold_is_refused(tmp_path: Path) -> None:
+    """An integer beyond 32 bits is not cut."""
+    with pytest.raises(ValueError, match="int64"):
+        write(xr.Dataset({"count": ("time", [2**40])}), tmp_path / "run.nc")
+    assert list(tmp_path.iterdir()) == []
+
+
+def array_alone() -> bytes:
+    """A file of numpy's with one array."""
+    buffer = io.BytesIO()
+    np.save(buffer, np.zeros(2))
+    return buffer.getvalue()
+
+
+def another_archive() -> bytes:
+    """A file of numpy's that is no run."""
+    buffer = io.BytesIO()
+    np.savez(buffer, time=np.zeros(2))
+    return buffer.getvalue()
+
+
+@BOTH
+@pytest.mark.parametrize("content", [b"", b"something else", array_alone(), another_archive()])
+def test_another_file_is_no_trajectory(tmp_path: Path, content: bytes, ending: str) -> None:
+    """Bytes of another kind are no trajectory."""
+    file = tmp_path / f"run{ending}"
+    file.write_bytes(content)
+    with pytest.raises(ValueError, match="netCDF" if ending == ".nc" else "no stored trajectory"):
+        read(file)
+
+
+def test_a_damaged_file_is_no_trajectory(tmp_path: Path) -> None:
+    """A stored file that was cut anywhere, or of whose arrays a bit was changed, is refused."""
+    file = tmp_path / "run.npz"
+    write(ALL_KINDS, file)
+    whole = file.read_bytes()
+    cuts = [whole[:length] for length in range(0, len(whole), 97)]
+    with zipfile.ZipFile(file) as archive:
+        starts = [(item.header_offset, len(item.filename), item.file_size) for item in archive.infolist()]
+    # An entry is its header of 30 bytes, its name, what else the header says it has, and the array.
+    ends = [at + 30 + name + int.from_bytes(whole[at + 28 : at + 30], "little") + size for at, name, size in starts]
+    changed = [whole[: end - 1] + bytes([whole[end - 1] ^ 1]) + whole[end:] for end in ends]
+    for content in cuts + changed:
+        file.write_bytes(content)
+        with pytest.raises(ValueError, match="no stored trajectory"):
+            read_columns(file)
+
+
+def test_a_write_that_fails_leaves_the_old_file(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """A file is whole or not there: a failure halfway leaves the old one and no scraps."""
+    path = tmp_path / "run.npz"
+    write(ALL_KINDS, path)
+    before = path.read_bytes()
+
+    def half(self: Path, content: bytes) -> None:
+        with self.open("wb") as file:
+            file.write(content[:100])
+        raise OSError(28, "No space left on device")
+
+    monkeypatch.setattr(Path, "write_bytes", half)
+    with pytest.raises(ProofrollError, match="No space left on device"):
+        write(NO_EVENT, path)
+    assert path.read_bytes() == before
+    assert list(tmp_path.iterdir()) == [path]
+
+
+def test_a_place_that_cannot_be_written(tmp_path: Path) -> None:
+    """A folder that cannot be made gives one sentence."""
+    (tmp_path / "file").write_text("")
+    with pytest.raises(ProofrollError, match="cannot be written"):
+        write(ALL_KINDS, tmp_path / "file" / "run.npz")
