@@ -25,6 +25,8 @@ _ROUNDS_OF_SOFT_LAG = 25
 _SOFT = 0.9
 # The correction of a slip has converged when this part of its error is left.
 _SEQUENCE = 1e-10
+# To this part of itself the settled depth is found.
+_DEPTH = 1e-14
 # A start "at depth zero" is this part of the radius inside: at zero, round-off would decide whether there is a contact.
 _TOUCHING = 1e-13
 
@@ -133,6 +135,9 @@ def _settled_depth(model: Any, data: Any, body: RollingBall, evaluate_at: Callab
         if upper > body.ball.radius:
             advice = "take a smaller dt or a larger impedance"
             raise Refused(f"the contact is so soft that the ball would sink into the wall; {advice}")
-    from scipy.optimize import brentq
-
-    return float(brentq(excess, upper / 10, upper, xtol=1e-14 * upper, rtol=1e-14))
+    # By halves, which no switch of the friction between two depths leads astray.
+    low = upper / 10
+    while upper - low > _DEPTH * upper:
+        middle = (low + upper) / 2
+        low, upper = (middle, upper) if excess(middle) > 0 else (low, middle)
+    return upper
