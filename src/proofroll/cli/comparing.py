@@ -73,7 +73,7 @@ def tell_left_out(comparisons: Sequence[Comparison], engines: Sequence[str]) -> 
 
     rows = {item.name: {parse_engine(row.engine).name for row in item.rows} for item in comparisons}
     asked_for = {name: {name, plain_name(name)} for name in engines}
-    wanted = set(chain(*asked_for.values()))  # who has none of them has an error of its own
+    wanted = set(chain(*asked_for.values()))  # a comparison that has none of them is refused elsewhere
     for name, either in asked_for.items():
         without = [found for found, known in rows.items() if known & wanted and not known & either]
         if without:

@@ -125,7 +125,7 @@ def _made(engine: str, version: str) -> str:
     try:
         with options.spinner(f"{engine} {version}") as say:
             tell(say)
-    except InputError:  # it would be none by hand either
+    except InputError:  # what was asked for is wrong, by hand too
         raise
     except ProofrollError as error:
         raise ProofrollError(f"{error}; when that is mended, or with more requirements: {by_hand}") from None

@@ -7,7 +7,7 @@ import sys
 
 import typer
 
-from proofroll.cli.options import CONTRADICTED, OK, Json, Scheduler, new_cluster, progress_bar, write_json
+from proofroll.cli.options import CONTRADICTED, OK, Json, Scheduler, new_cluster, progress_bar, show
 
 drill = typer.Typer(help="Do on purpose what must not break anything.", rich_markup_mode=None)
 
@@ -20,22 +20,14 @@ def start() -> None:
 @drill.command()
 def faults(as_json: Json = False) -> None:
     """Crash, hang, flood, interrupt and damage runs; exit 1 unless each fault costs nothing but its own case."""
-    import dataclasses
-
     from proofroll_drill.faults import fault_drill
+    from proofroll_drill.table import drill_table
 
     with progress_bar("faults") as advance:
         rows = fault_drill(advance)
     contained = sum(row.contained for row in rows)
-    if as_json:
-        content = [dataclasses.asdict(row) for row in rows]
-        write_json({"tried": len(rows), "contained": contained, "faults": content})
-    else:
-        from proofroll.report.terminal import console
-        from proofroll_drill.table import drill_table
-
-        console().print(drill_table(rows))
-        console().print(f"{len(rows)} faults tried, {contained} contained.")
+    content = {"tried": len(rows), "contained": contained, "faults": rows}
+    show(content, as_json, lambda: [drill_table(rows), f"{len(rows)} faults tried, {contained} contained."])
     if any(row.hung for row in rows):  # to end as usual would wait for the thread that hangs
         sys.stdout.flush()
         os._exit(CONTRADICTED)
@@ -45,21 +37,14 @@ def faults(as_json: Json = False) -> None:
 @drill.command()
 def mutants(scheduler: Scheduler = None, as_json: Json = False) -> None:
     """Run engines with one planted fault each; exit 1 unless all are detected and nine of ten named."""
-    import dataclasses
-
     from proofroll_drill.mutants.drilling import ENOUGH, mutant_drill
     from proofroll_drill.mutants.drilling import mutants as all_mutants
+    from proofroll_drill.table import mutant_table
 
     with progress_bar("mutants", total=len(all_mutants())) as advance:
         rows = list(mutant_drill(advance, new_cluster(scheduler)))
     detected, named = sum(row.detected for row in rows), sum(row.named for row in rows)
-    if as_json:
-        content = [dataclasses.asdict(row) for row in rows]
-        write_json({"tried": len(rows), "detected": detected, "named": named, "mutants": content})
-    else:
-        from proofroll.report.terminal import console
-        from proofroll_drill.table import mutant_table
-
-        console().print(mutant_table(rows))
-        console().print(f"{len(rows)} mutants tried, {detected} detected, {named} named.")
+    content = {"tried": len(rows), "detected": detected, "named": named, "mutants": rows}
+    said = f"{len(rows)} mutants tried, {detected} detected, {named} named."
+    show(content, as_json, lambda: [mutant_table(rows), said])
     raise typer.Exit(OK if detected == len(rows) and named >= ENOUGH * len(rows) else CONTRADICTED)

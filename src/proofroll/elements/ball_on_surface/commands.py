@@ -2,82 +2,59 @@
 
 from __future__ import annotations
 
-import json
 import os
+from collections.abc import Iterator, Mapping
 from pathlib import Path
-from typing import Annotated
+from typing import Annotated, Any
 
 import typer
 
-from proofroll.cli.options import (
-    CONTRADICTED,
-    ENGINE,
-    OK,
-    Fresh,
-    Jobs,
-    Json,
-    Out,
-    SceneName,
-    Scheduler,
-    Set,
-    assignments,
-    new_cluster,
-    new_runner,
-    progress_bar,
-    require_pages,
-    write_json,
-)
+from proofroll.cli import options
 
 
 def onset(
-    scene: SceneName,
-    settings: Set = None,
+    scene: options.SceneName,
+    settings: options.Set = None,
     engine: Annotated[list[str] | None, typer.Option(help="Engine with settings; repeat. All that can slip.")] = None,
     until: Annotated[float, typer.Option(help="How long to look for a slip [s].")] = 4.0,
     uncertainty: Annotated[float, typer.Option(help="Relative uncertainty of friction and resistance.")] = 1e-3,
-    out: Out = Path("out"),
-    fresh: Fresh = False,
-    jobs: Jobs = None,
-    scheduler: Scheduler = None,
-    as_json: Json = False,
+    out: options.Out = Path("out"),
+    fresh: options.Fresh = False,
+    jobs: options.Jobs = None,
+    scheduler: options.Scheduler = None,
+    as_json: options.Json = False,
 ) -> None:
     """Say when the ball first slips, in every engine, and how well that is posed."""
     from proofroll.core.time_grid import time_grid
     from proofroll.elements.ball_on_surface.onset_study import onset_study, summary
+    from proofroll.elements.ball_on_surface.report.first_slip_table import onset_table
 
     time_grid(until, 0.01)
-    with progress_bar("runs") as advance:
+    with options.progress_bar("runs") as advance:
         study = onset_study(
             scene,
-            dict(assignments(settings or [])),
-            new_runner(out, fresh, jobs, scheduler),
+            options.assignments(settings),
+            options.new_runner(out, fresh, jobs, scheduler),
             engines=engine or (),
             until=until,
             uncertainty=uncertainty,
             progress=lambda case, _: advance(case.engine.name),
         )
     content = study.content()
-    if as_json:
-        write_json(content)
-    else:
-        from proofroll.elements.ball_on_surface.report.first_slip_table import onset_table
-        from proofroll.report.terminal import console
-
-        console().print(summary(content), markup=False)
-        console().print(onset_table(content))
+    options.show(content, as_json, lambda: [summary(content), onset_table(content)])
     verdicts = {item["verdict"] for item in content["engines"]}
     # A refusal is an answer where nobody asked for that engine in particular.
     if "failed" in verdicts or (engine and "refused" in verdicts):
-        raise typer.Exit(ENGINE)
-    raise typer.Exit(CONTRADICTED if "disagree" in verdicts else OK)
+        raise typer.Exit(options.ENGINE)
+    raise typer.Exit(options.CONTRADICTED if "disagree" in verdicts else options.OK)
 
 
 def regimes(
     study: Annotated[str, typer.Argument(help='A file with study = "regimes", its name, or its scene.')] = "regimes",
-    out: Out = Path("out"),
-    jobs: Jobs = None,
-    scheduler: Scheduler = None,
-    as_json: Json = False,
+    out: options.Out = Path("out"),
+    jobs: options.Jobs = None,
+    scheduler: options.Scheduler = None,
+    as_json: options.Json = False,
 ) -> None:
     """Draw the map over speed and friction: never slips, slips and recovers, falls."""
     from proofroll.elements.ball_on_surface.regimes_study import load_regimes, regime_maps
@@ -85,23 +62,23 @@ def regimes(
     from proofroll.running.store import Store, write_text
 
     loaded = load_regimes(study)
-    require_pages()
+    options.require_pages()
     Store(out)  # fails before the work rather than after it
     words = "runs of the truth"
-    with progress_bar(words, total=loaded.runs) as advance:
-        workers, cluster = jobs or os.cpu_count() or 1, new_cluster(scheduler)
+    with options.progress_bar(words, total=loaded.runs) as advance:
+        workers, cluster = jobs or os.cpu_count() or 1, options.new_cluster(scheduler)
         maps = regime_maps(loaded, workers, lambda count: advance(words, count), cluster)
     content = regime_content(maps)
     draw(maps, out / "regimes.svg")
-    write_text(out / "regimes.json", json.dumps(content, indent=1))
-    if as_json:
-        write_json(content)
-        return
-    from proofroll.report.terminal import console
+    write_text(out / "regimes.json", options.json_text(content))
+    options.show(content, as_json, lambda: _regime_lines(content, out))
 
+
+def _regime_lines(content: Mapping[str, Any], out: Path) -> Iterator[str]:
+    """How many runs of each map became what, and where the maps are."""
     for item in content["maps"]:
         said = ", ".join(f"{count} {name}" for name, count in item["counts"].items())
-        console().print(f"f = {item['rolling_resistance']:g} m, {item['runs']} runs of {item['until']:g} s: {said}.")
+        yield f"f = {item['rolling_resistance']:g} m, {item['runs']} runs of {item['until']:g} s: {said}."
         if item["outside_boundaries"] is not None:
-            console().print(f"  {item['outside_boundaries']} of them on the wrong side of the analytic boundaries.")
-    console().print(f"The map is in {out / 'regimes.svg'}, its numbers in {out / 'regimes.json'}.")
+            yield f"  {item['outside_boundaries']} of them on the wrong side of the analytic boundaries."
+    yield f"The map is in {out / 'regimes.svg'}, its numbers in {out / 'regimes.json'}."
