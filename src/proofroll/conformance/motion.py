@@ -151,7 +151,7 @@ class _Ends:
         self._known: dict[tuple[float, float], FloatArray | None] = {}
 
     def orders(self, factor: float) -> tuple[float, float]:
-        """Orders from the steps 2h, h, h/2 and h, h/2, h/4, with h so many steps; NaN where round-off hides them."""
+        """Orders from the steps 2h, h, h/2 and h, h/2, h/4, h being ``factor`` preset's steps; NaN below round-off."""
         coarsest = 2 * factor * self._subject.settings.dt
         t = math.ceil(_ORDER_SPAN / coarsest) * coarsest
         states = []

@@ -16,12 +16,7 @@ from proofroll.elements.ball_on_surface.model import RollingBall
 from proofroll.engines.mujoco.contact import MEMORY
 from proofroll.engines.mujoco.friction import MEMORY as SLIP_MEMORY
 from proofroll.engines.mujoco.friction import condim, corrects
-from proofroll.engines.mujoco.settings import (
-    MujocoSettings,
-    friction_coefficients,
-    impedance,
-    time_constant,
-)
+from proofroll.engines.mujoco.settings import MujocoSettings, friction_coefficients, impedance, time_constant
 from proofroll.engines.mujoco.written import written
 
 

@@ -1,5 +1,7 @@
 """Balls that roll on surfaces in maximal coordinates: a further witness of scenes with balls, and of those that mix.
 
+Tests hold it against a ball's two routes, with which it shares neither coordinates nor equations; it makes no truth.
+
 A ball is a free body. Its contact point stands still, v + ω × a e1 = 0, in three rows; of these only the distance along
 the normal e1 can be violated by a place, the other two hold velocities alone (Blajer 2006, section 2). Of the surface
 only its distance is used, and its derivatives; neither coordinates nor frames of it.
