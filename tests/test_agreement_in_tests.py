@@ -174,7 +174,10 @@ def test_the_plug_in_costs_nothing_until_it_is_used(tmp_path: Path) -> None:
         "def test_mine(assert_agrees):\n"
         "    assert_agrees('pendulum', 'projection', tolerance='1 %', because='a look', until=0.1)\n"
     )
-    command = [sys.executable, "-m", "pytest", "-q", "-p", "no:cacheprovider", "-p", "no:hypothesispytest", "."]
+    others = [
+        word for name in ("cacheprovider", "hypothesispytest", "xdist", "timeout") for word in ("-p", f"no:{name}")
+    ]
+    command = [sys.executable, "-m", "pytest", "-q", *others, "."]
     done = subprocess.run(command, cwd=tmp_path, capture_output=True, text=True, check=False, timeout=600)
     assert "2 passed" in done.stdout, done.stdout
 

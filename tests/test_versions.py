@@ -7,8 +7,10 @@ import re
 import socket
 import tomllib
 from collections.abc import Callable
+from functools import partial
 from pathlib import Path
 
+import distributed
 import pytest
 from other_pythons import seeing
 
@@ -92,8 +94,12 @@ def test_what_changed_is_shown(versions: Callable[..., tuple[int, str, str]], tm
     assert table(study).row_count == 2
 
 
-def test_versions_that_do_the_same(versions: Callable[..., tuple[int, str, str]]) -> None:
+def test_versions_that_do_the_same(
+    versions: Callable[..., tuple[int, str, str]], monkeypatch: pytest.MonkeyPatch
+) -> None:
     """The same bits are said to be the same, on a cluster as at home, within 80 columns, and nothing is exit code 0."""
+    # Its worker is a thread here: test_cluster.py has processes, which cost seconds.
+    monkeypatch.setattr(distributed, "LocalCluster", partial(distributed.LocalCluster, processes=False))
     code, out, err = versions("2.0", "2.0.1", "--rounds", "0", "--scheduler", "local:1")
     assert code == 0, err
     assert "2 cases: 2 with the same bits; no verdict changed." in out

@@ -2,9 +2,8 @@
 
 from __future__ import annotations
 
-import subprocess
-import sys
 import sysconfig
+import venv
 from pathlib import Path
 
 PLUGINS = Path(__file__).parent
@@ -12,7 +11,7 @@ PLUGINS = Path(__file__).parent
 
 def bare(folder: Path) -> Path:
     """The Python of an environment that has no packages."""
-    subprocess.run([sys.executable, "-m", "venv", "--without-pip", folder], check=True)
+    venv.create(folder, symlinks=True)
     return folder / "bin" / "python"
 
 

@@ -16,6 +16,7 @@ import tempfile
 import zipfile
 from collections.abc import Callable, Sequence
 from importlib import metadata
+from importlib.util import find_spec
 from pathlib import Path
 
 from proofroll.core.errors import InputError, ProofrollError
@@ -135,9 +136,7 @@ def _made(
                 tell(f"{error}; trying pip")
             environments.delete(folder)
             folder.mkdir(parents=True)
-            _call([base, "-m", "venv", venv])
-            tell(f"installing {', '.join(requirements)} and proofroll")
-            _call([venv / "bin" / "python", "-m", "pip", "install", "--quiet", "--only-binary", ":all:", *wanted])
+            _install_by_pip(venv, base, wanted, tell)
     tell(f"importing {name}")
     python = venv / "bin" / "python"
     try:
@@ -147,6 +146,19 @@ def _made(
         raise ProofrollError(f"{name} does not work with {', '.join(requirements)}: {said}") from None
     interpreter, packages = json.loads(_call([python, "-c", _PACKAGES]))
     return Environment(name, label, folder, version, list(requirements), interpreter, packages)
+
+
+def _install_by_pip(venv: Path, base: Path, wanted: Sequence[str], tell: Callable[[str], None]) -> None:
+    """By the pip of this Python, where it may serve: to install another into the environment takes seconds."""
+    target = venv / "bin" / "python"
+    if base == Path(sys.executable) and find_spec("pip"):
+        _call([base, "-m", "venv", "--without-pip", venv])
+        command: list[str | Path] = [base, "-m", "pip", "--python", target]
+    else:  # a pip is made for its own version of Python and older ones
+        _call([base, "-m", "venv", venv])
+        command = [target, "-m", "pip"]
+    tell("installing by pip")
+    _call([*command, "install", "--quiet", "--only-binary", ":all:", *wanted])
 
 
 def _install_by_uv(uv: str, venv: Path, base: Path, wanted: Sequence[str], tell: Callable[[str], None]) -> None:

@@ -34,6 +34,7 @@ from proofroll.running.store import Store
 from proofroll.running.worker_pool import Workers
 from proofroll.studies.run_once import single_case
 from proofroll_benchmarks.cluster import idle
+from proofroll_drill.processes import alive
 
 HOST = socket.gethostname()
 ASKED = Workers()
@@ -62,44 +63,50 @@ def until(ready: Callable[[], object]) -> None:
 
 
 class DaskCluster:
-    """A scheduler and its workers, each a process as a person would start it."""
+    """A scheduler and its workers, each a process as a person would start it, forked from one that has imported Dask.
+
+    Attributes:
+        processes: their numbers, the scheduler's first.
+    """
 
     def __init__(self, folder: Path) -> None:
         self.folder = folder
         self._file = folder / "scheduler.json"
-        self._log = (folder / "dask.log").open("wb")
-        self.processes: list[subprocess.Popen[bytes]] = []
+        with (folder / "dask.log").open("wb") as log:
+            self._forks = subprocess.Popen(
+                [sys.executable, str(PLUGINS / "dask_processes.py")],
+                stdin=subprocess.PIPE,
+                stdout=subprocess.PIPE,
+                stderr=log,
+                text=True,
+            )
+        self.processes: list[int] = []
         self.scheduler = self._start("scheduler", "--port", "0", "--no-dashboard")
         until(self._file.exists)
         self.address = json.loads(self._file.read_text())["address"]
 
-    def worker(self, **environment: str) -> subprocess.Popen[bytes]:
+    def worker(self) -> int:
         """One more worker of one thread."""
-        return self._start("worker", "--nthreads", "1", "--no-nanny", "--no-dashboard", **environment)
+        return self._start("worker", "--nthreads", "1", "--no-nanny", "--no-dashboard")
 
-    def _start(self, *words: str, **environment: str) -> subprocess.Popen[bytes]:
-        command = [sys.executable, "-m", "dask", *words, "--scheduler-file", str(self._file)]
-        process = subprocess.Popen(command, env=os.environ | environment, stdout=self._log, stderr=self._log)
-        self.processes.append(process)
-        return process
+    def _start(self, *words: str) -> int:
+        assert self._forks.stdin
+        assert self._forks.stdout
+        self._forks.stdin.write(json.dumps([*words, "--scheduler-file", str(self._file)]) + "\n")
+        self._forks.stdin.flush()
+        self.processes.append(int(self._forks.stdout.readline()))
+        return self.processes[-1]
 
     def one_worker(self) -> None:
         """At least one worker, whichever tests ran before."""
-        if all(process.poll() is not None for process in self.processes[1:]):
+        if not any(map(alive, self.processes[1:])):
             self.worker()
-
-    def no_workers(self) -> None:
-        """None at all."""
-        for process in self.processes[1:]:
-            process.kill()
-            process.wait()
 
     def close(self) -> None:
         """Ends all of it."""
-        for process in self.processes:
-            process.kill()
-            process.wait()
-        self._log.close()
+        for process in filter(alive, self.processes):
+            os.kill(process, signal.SIGKILL)
+        self._forks.communicate()
 
 
 def announce(site: Path, patch: pytest.MonkeyPatch) -> None:
@@ -129,6 +136,12 @@ def dask(tmp_path_factory: pytest.TempPathFactory) -> Iterator[DaskCluster]:
         ASKED.close()
 
 
+@pytest.fixture(scope="module")
+def shared(dask: DaskCluster) -> Cluster:
+    """One command for several tests: each has processes of its own at every worker, and to start them costs most."""
+    return Cluster(dask.address)
+
+
 @pytest.fixture
 def room(dask: DaskCluster) -> Path:
     """Where :class:`waiting.Waiting` waits, empty."""
@@ -137,47 +150,45 @@ def room(dask: DaskCluster) -> Path:
     return dask.folder
 
 
-def test_a_worker_with_other_engines(dask: DaskCluster, tmp_path: Path) -> None:
+def test_a_worker_with_other_engines(dask: DaskCluster, shared: Cluster, tmp_path: Path) -> None:
     """A worker that has not the same versions and engines is refused, with what both have."""
     other = tmp_path / "other"
     shutil.copytree(dask.folder / "site" / "throwaway-1.0.dist-info", other / "throwaway-2.0.dist-info")
     text = (other / "throwaway-2.0.dist-info" / "METADATA").read_text()
     (other / "throwaway-2.0.dist-info" / "METADATA").write_text(text.replace("Version: 1.0", "Version: 2.0"))
-    dask.no_workers()
-    dask.worker(PYTHONPATH=os.pathsep.join([str(other), os.environ["PYTHONPATH"]]))
-    runner = Runner(Store(tmp_path / "store"), cluster=Cluster(dask.address))
-    with pytest.raises(ProofrollError, match=r"other versions: here throwaway 1\.0; there throwaway 2\.0;"):
-        runner.run([case("oracle")])
+    dask.one_worker()
+    with pytest.MonkeyPatch.context() as patch:
+        patch.syspath_prepend(str(other))
+        runner = Runner(Store(tmp_path / "store"), cluster=Cluster(dask.address))
+        with pytest.raises(ProofrollError, match=r"other versions: here throwaway 2\.0; there throwaway 1\.0;"):
+            runner.run([case("oracle")])
     # The same packages, another code of the adapter: the case would have another key there.
     asked = dataclasses.replace(case("oracle"), engine=dataclasses.replace(case("oracle").engine, code="other"))
-    dask.no_workers()
-    dask.one_worker()
     with pytest.raises(ProofrollError, match=r"here oracle 1 \(code other\); there oracle 1 \(code \w+\)"):
-        Runner(Store(tmp_path / "store"), cluster=Cluster(dask.address)).run([asked])
+        Runner(Store(tmp_path / "store"), cluster=shared).run([asked])
     asked = dataclasses.replace(case("oracle"), scene_digest="other")
     with pytest.raises(ProofrollError, match=r"here scene sphere_in_cylinder other; there scene"):
-        Runner(Store(tmp_path / "store"), cluster=Cluster(dask.address)).run([asked])
+        Runner(Store(tmp_path / "store"), cluster=shared).run([asked])
 
 
-def test_results_are_those_of_home(dask: DaskCluster, tmp_path: Path, room: Path) -> None:
+def test_results_are_those_of_home(dask: DaskCluster, shared: Cluster, tmp_path: Path, room: Path) -> None:
     """One worker, two, and one that is lost in the middle give what home gives, stored once, but for speeds."""
     shutil.copytree(data_folder("models") / "inclined_plane", tmp_path / "mine" / "my_plane")
     own = str(tmp_path / "mine" / "my_plane")
     robot = tmp_path / "arm.urdf"
     robot.write_text(urdf(kinds=("revolute", "fixed", "fixed")), encoding="utf-8")
     some = [case("oracle"), case("exits"), case("oracle", 1.5, own)]
-    some += [single_case(str(robot), {}, "truth", until=0.02, every=0.01, time_limit=60.0, workers=ASKED)]
+    some += [single_case(str(robot), {}, "projection", until=0.02, every=0.01, time_limit=60.0, workers=ASKED)]
     waiting = [case("waiting", speed) for speed in (3.0, 3.5)]
     home, away = Store(tmp_path / "home"), Store(tmp_path / "away")
 
     dask.one_worker()
-    cluster = Cluster(dask.address)
-    first = Runner(away, cluster=cluster).run(some)
+    first = Runner(away, cluster=shared).run(some)
     lost = dask.worker()
-    thread = threading.Thread(target=lambda: first.update(Runner(away, cluster=cluster).run(waiting)))
+    thread = threading.Thread(target=lambda: first.update(Runner(away, cluster=shared).run(waiting)))
     thread.start()
-    until(lambda: list(room.glob(f"begun-{lost.pid}-*")) and len(list(room.glob("begun-*"))) == 2)
-    lost.kill()
+    until(lambda: list(room.glob(f"begun-{lost}-*")) and len(list(room.glob("begun-*"))) == 2)
+    os.kill(lost, signal.SIGKILL)
     (room / "go").touch()
     thread.join()
 
@@ -193,17 +204,17 @@ def test_results_are_those_of_home(dask: DaskCluster, tmp_path: Path, room: Path
     names = [sorted(path.name for path in store.folder.iterdir()) for store in (home, away)]
     assert names[0] == names[1]
 
-    again = Runner(away, cluster=cluster)
+    again = Runner(away, cluster=shared)
     again.run(waiting)
     assert again.reused == len(waiting)
     measured = at_home(away).run([some[0]])[some[0].key]
     assert (measured.host, measured.seconds_per_second is not None) == ("", True)
 
-    assert [found for _, found in cluster.map(partial(np.add, 1), [1, 2, 3])] == [2, 3, 4]
+    assert [found for _, found in shared.map(partial(np.add, 1), [1, 2, 3])] == [2, 3, 4]
     with pytest.raises(ProofrollError, match="ZeroDivisionError"):
-        list(cluster.map(partial(divmod, 1), [1, 0]))
+        list(shared.map(partial(divmod, 1), [1, 0]))
     grid = partial(regime_map, load_scene("sphere_in_cylinder"), [2.0, 4.0], [0.1, 0.9], until=0.2)
-    one, other = grid(), grid(cluster=cluster)
+    one, other = grid(), grid(cluster=shared)
     assert other.equals(one)
     assert (one.attrs["ran_on"], other.attrs["ran_on"]) == ("", HOST)
 
@@ -218,12 +229,12 @@ def test_runs_one_after_another(dask: DaskCluster, tmp_path: Path) -> None:
         assert runner.run(cases).keys() == {case.key for case in cases}
 
 
-def test_a_scheduler_that_ends(dask: DaskCluster, tmp_path: Path, room: Path) -> None:
+def test_a_scheduler_that_ends(dask: DaskCluster, shared: Cluster, tmp_path: Path, room: Path) -> None:
     """One line says so; what was finished is stored, and the next run makes the rest alone."""
     dask.one_worker()
     store = Store(tmp_path / "store")
     done, rest = case("oracle"), case("waiting")
-    runner = Runner(store, cluster=Cluster(dask.address))
+    runner = Runner(store, cluster=shared)
 
     def then(*_: object) -> list[Case]:
         threading.Thread(target=end).start()
@@ -231,7 +242,7 @@ def test_a_scheduler_that_ends(dask: DaskCluster, tmp_path: Path, room: Path) ->
 
     def end() -> None:
         until(lambda: list(room.glob("begun-*")))
-        dask.scheduler.kill()
+        os.kill(dask.scheduler, signal.SIGKILL)
 
     with pytest.raises(ProofrollError, match=r"scheduler at tcp://\S+ is gone; what was finished is kept") as found:
         runner.follow([done], lambda asked, _: then() if asked is done else [])

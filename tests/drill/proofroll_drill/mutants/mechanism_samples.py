@@ -11,7 +11,7 @@ from scipy.spatial.transform import Rotation
 from proofroll.core.engine import Sample
 from proofroll.core.scene import Scene
 from proofroll_drill.mutants.base import STEP, Mutant, OneStepBehind
-from proofroll_drill.mutants.mechanism_models import CRANK, PENDULUM, TOP
+from proofroll_drill.mutants.mechanism_models import CRANK, PENDULUM, TOP, MechanismMutant
 
 
 class ToldMechanism(Mutant):
@@ -19,7 +19,8 @@ class ToldMechanism(Mutant):
 
     formulation: ClassVar[str] = "dependent"
     scene: ClassVar[Any] = PENDULUM
-    until: ClassVar[float] = 0.3
+    until: ClassVar[float] = MechanismMutant.until
+    every: ClassVar[float] = MechanismMutant.every
 
     def __init__(self, scene: Scene, settings: Any) -> None:
         super().__init__(scene, settings)

@@ -66,6 +66,7 @@ class SpringUndamped(MechanismMutant):
 
     fault = "damping of a spring ignored"
     scene: ClassVar[Any] = ("gyroscope_cart", {})
+    until, every = 0.3, 0.01  # what the damping does grows slowly
     named = ("damping of the springs left out",)
 
     def other(self, mechanism: Mechanism) -> Mechanism:
