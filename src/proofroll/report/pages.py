@@ -21,7 +21,7 @@ def environment(*folders: Path) -> jinja2.Environment:
     """The report's templates and those of further folders; everything is escaped, save what they mark as ours."""
     import jinja2
 
-    class Compiled(jinja2.BytecodeCache):
+    class CompiledTemplates(jinja2.BytecodeCache):
         """Each template is compiled once in a process; what it is rendered with is the environment's own."""
 
         def load_bytecode(self, bucket: jinja2.bccache.Bucket) -> None:
@@ -33,7 +33,7 @@ def environment(*folders: Path) -> jinja2.Environment:
 
     return jinja2.Environment(
         loader=jinja2.FileSystemLoader([*dict.fromkeys([Path(__file__).parent / "templates", *folders])]),
-        bytecode_cache=Compiled(),
+        bytecode_cache=CompiledTemplates(),
         autoescape=True,
         undefined=jinja2.StrictUndefined,
         trim_blocks=True,
