@@ -23,7 +23,7 @@ from proofroll.running.case import Status
 from proofroll.running.environments import shown_name
 from proofroll.studies.hosts import hosts
 from proofroll.studies.outcome import SEVERITY, Outcome, Run
-from proofroll.studies.planning import point_name
+from proofroll.studies.planning import at_point, point_name
 
 if TYPE_CHECKING:
     from proofroll.running.store import Store
@@ -116,7 +116,7 @@ def _why(runs: list[Run]) -> tuple[str, str]:
         if run.verdict == worst:
             guilty += [(run, item) for item in run.judgements] or [(run, None)]
     run, judgement = _furthest(guilty)
-    where = f" at {point_name(run.parameters)}" if run.parameters else ""
+    where = at_point(run.parameters)
     limit = judgement.limit.value if judgement else ""
     if worst == Verdict.AGREES:
         return "", limit
@@ -133,7 +133,7 @@ def _remarks(runs: list[Run]) -> list[str]:
     shown = [(run, item) for run in runs for item in run.judgements if item.remarks]
     if shown:
         run, item = max(shown, key=lambda pair: (pair[1].limit_error or 0.0) / pair[1].tolerance)
-        where = f" at {point_name(run.parameters)}" if run.parameters else ""
+        where = at_point(run.parameters)
         found += [f"{item.observable}{where}: {remark}" for remark in item.remarks]
     return found
 

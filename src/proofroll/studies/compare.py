@@ -21,7 +21,7 @@ from proofroll.running.process import WorkerDied
 from proofroll.running.runner import Runner
 from proofroll.studies.expectations import contradictions_of
 from proofroll.studies.outcome import Outcome, Run
-from proofroll.studies.planning import Plan, Planned, plan, point_name
+from proofroll.studies.planning import Plan, Planned, at_point, plan, point_name
 from proofroll.studies.reference import Reference
 
 if TYPE_CHECKING:
@@ -103,8 +103,7 @@ def _absent(run: Planned) -> Run:
 
 def _failed(run: Planned, facts: EngineFacts, result: Result) -> Run:
     expected = Verdict.FAILED in run.row.expected(run.parameters)
-    at = f" at {point_name(run.parameters)}" if run.parameters else ""
-    sentence = f"{run.row.engine}{at} {result.status}: {result.message}"
+    sentence = f"{run.row.engine}{at_point(run.parameters)} {result.status}: {result.message}"
     scene = load_scene(run.ladder[1.0].scene, **run.parameters)
     causes = diagnosed(scene, result.certificate, step=facts.step)
     said = [] if expected else [sentence]
@@ -125,7 +124,7 @@ def _of_another_scene(run: Planned, facts: EngineFacts, result: Result, sentence
     """A row whose engine ran another scene: shown with its trajectory, and not judged."""
     result = replace(result, status=Status.ANOTHER_SCENE, message=sentence)
     expected = {Verdict.ANOTHER_SCENE, Verdict.DIFFERS, Verdict.FAILED} & set(run.row.expected(run.parameters))
-    said = [] if expected else [f"{run.row.engine} at {point_name(run.parameters)}: {sentence}"]
+    said = [] if expected else [f"{run.row.engine}{at_point(run.parameters)}: {sentence}"]
     return Run(run.row, run.parameters, facts, result, [], said, run.ladder[1.0])
 
 

@@ -7,7 +7,7 @@ from collections.abc import Collection
 from proofroll.core.comparison import Comparison
 from proofroll.core.verdict import Judgement, Verdict
 from proofroll.studies.outcome import SEVERITY, worst
-from proofroll.studies.planning import Planned, point_name
+from proofroll.studies.planning import Planned, at_point
 
 # Where nobody can be judged; that contradicts no claim, and is expected of every engine.
 NOBODY = frozenset({Verdict.ILL_POSED, Verdict.NOT_JUDGED, Verdict.ANOTHER_SCENE})
@@ -17,7 +17,7 @@ def contradictions_of(
     comparison: Comparison, run: Planned, judgements: list[Judgement], missing: Collection[str]
 ) -> list[str]:
     """What the claim did not expect, as sentences."""
-    where = f"{run.row.engine} at {point_name(run.parameters)}"
+    where = f"{run.row.engine}{at_point(run.parameters)}"
     found = []
     row, expected = run.row, run.row.expected(run.parameters)
     known = [judgement for judgement in judgements if judgement.verdict not in NOBODY]
@@ -40,17 +40,22 @@ def contradictions_of(
             found.append(f"{where}: {name} {verdict}, expected: {' or '.join(alone)} ({judgement.reason})")
         if name in row.order and not _within(judgement.order, row.order[name]):
             low, high = row.order[name]
-            found.append(f"{where}: order of {name} is {judgement.order}, expected {low:g} to {high:g}")
+            found.append(f"{where}: order of {name} is {_known(judgement.order)}, expected {low:g} to {high:g}")
         if name in row.limit:
             allowed = row.limit[name].absolute(judgement.scale)
             if judgement.limit_error is None or judgement.limit_error > allowed:
-                found.append(f"{where}: limit of {name} is off by {judgement.limit_error}, expected {allowed:.3g}")
+                off = _known(judgement.limit_error)
+                found.append(f"{where}: error of the limit of {name} is {off}, expected at most {allowed:.3g}")
     claimed = {*row.bound, *row.expect_for, *row.order, *row.limit}
     if Verdict.INCOMPLETE not in expected:
         claimed |= {*missing}
     for name in sorted(claimed - {judgement.observable for judgement in judgements}):
         found.append(f"{where}: {name} is not reported, though {comparison.name} makes a claim about it")
     return found
+
+
+def _known(value: float | None) -> str:
+    return "not known" if value is None else f"{value:.3g}"
 
 
 def _within(value: float | None, bounds: tuple[float, float]) -> bool:

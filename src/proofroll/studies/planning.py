@@ -24,6 +24,11 @@ def point_name(parameters: dict[str, float]) -> str:
     return ", ".join(f"{key}={value:.12g}" for key, value in parameters.items())
 
 
+def at_point(parameters: dict[str, float]) -> str:
+    """Where in a sentence, e.g. `` at speed=4``; nothing where a comparison has one point alone."""
+    return f" at {point_name(parameters)}" if parameters else ""
+
+
 @dataclass(frozen=True)
 class Planned:
     """A run with the cases of its ladder by their factor on the step; the run's own case has the factor 1."""

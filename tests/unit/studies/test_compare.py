@@ -16,7 +16,7 @@ from proofroll.core.comparison import Band, Comparison, ExceptAt, Row, Tolerance
 from proofroll.core.scene import Scene
 from proofroll.core.time_grid import time_grid
 from proofroll.core.truth import truth
-from proofroll.core.verdict import Verdict
+from proofroll.core.verdict import Judgement, Verdict
 from proofroll.elements.ball_on_surface.model import BallCapability
 from proofroll.files.scene_file import load_scene
 from proofroll.files.trajectory_file import write
@@ -26,6 +26,7 @@ from proofroll.running.runner import Runner
 from proofroll.running.simulation import simulate
 from proofroll.running.store import Store
 from proofroll.studies.compare import compare, evaluate
+from proofroll.studies.expectations import contradictions_of
 from proofroll.studies.outcome import Outcome
 from proofroll.studies.planning import Plan, Planned, point_name
 from proofroll.truth.onset import onset
@@ -120,6 +121,34 @@ def test_a_claim_about_what_is_not_reported(tmp_path: Path, row: Row, bounds: Ma
     """A claim about an observable that the run does not give is a contradiction, wherever the claim stands."""
     (said,) = judged(tmp_path, claim([row], [4.0], bounds), the_truth).contradictions
     assert said == "alpha at speed=4: first_slip is not reported, though claim makes a claim about it"
+
+
+@pytest.mark.parametrize(
+    ("seen", "said"),
+    [
+        (
+            {"order": 0.123456789, "limit_error": 1.23456789e-3},
+            ["order of z is 0.123, expected 1.9 to 2.1", "error of the limit of z is 0.00123, expected at most 0.001"],
+        ),
+        (
+            {},
+            [
+                "order of z is not known, expected 1.9 to 2.1",
+                "error of the limit of z is not known, expected at most 0.001",
+            ],
+        ),
+    ],
+    ids=["seen", "not seen"],
+)
+def test_orders_and_limits_are_told_in_three_digits(seen: dict[str, float], said: list[str]) -> None:
+    """Numbers of what was not expected are short, one that is not known is no number, and one point has no name."""
+    row = dataclasses.replace(ROW, order={"z": (1.9, 2.1)}, limit={"z": Tolerance(1e-3, False, "m")})
+    right = Judgement(
+        observable="z", unit="m", error=0.0, truth_error_bar=0.0, tolerance=1e-3, scale=1.0, verdict=Verdict.AGREES,
+        **seen,
+    )  # fmt: skip
+    found = contradictions_of(claim([row], []), Planned(row, {}, FACTS), [right], ())
+    assert found == [f"alpha: {sentence}" for sentence in said]
 
 
 def higher(metres: float) -> Answer:
