@@ -120,6 +120,15 @@ def test_the_state_alone_is_enough() -> None:
     assert proofroll.judge(state, "inclined_plane", {"p_WB": "1e-3 m"}).agrees
 
 
+def test_a_file_that_was_cut_off(tmp_path: Path) -> None:
+    """Wherever a file ends before it should, it is told in one line."""
+    write(proofroll.simulate("pendulum", "projection", until=0.1), whole := tmp_path / "whole.nc")
+    for size in (100, 700, 1500):
+        (part := tmp_path / "part.nc").write_bytes(whole.read_bytes()[:size])
+        with pytest.raises(InputError, match="cannot be read"):
+            proofroll.judge(str(part), "pendulum")
+
+
 @pytest.mark.parametrize(
     ("run", "words"),
     [

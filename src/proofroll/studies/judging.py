@@ -140,7 +140,7 @@ def _dataset(run: Run, scene: Scene) -> xr.Dataset:
 
         try:
             run = read(Path(run))
-        except (OSError, ValueError) as error:
+        except (OSError, ValueError, LookupError) as error:  # a file that was cut off ends in any of them
             advice = f"it cannot be read ({error}); xarray writes it by to_netcdf(path, format='NETCDF3_64BIT')"
             raise InputError("run", str(run), advice) from None
     given = {str(name): np.asarray(run[name]) for name in run} if not isinstance(run, xr.Dataset) else None
