@@ -4,14 +4,17 @@ from __future__ import annotations
 
 import itertools
 from collections.abc import Callable, Iterator, Mapping
+from contextlib import suppress
 from dataclasses import dataclass
 from fnmatch import fnmatchcase
+from functools import cached_property
 from typing import Any
 from unittest import SkipTest
 
 from proofroll.conformance import building, declarations, motion, response
 from proofroll.conformance.explaining import UnlikeSceneError, explained
 from proofroll.conformance.subject import Subject, lacking, scenes
+from proofroll.core.scene import Scene
 
 # One per engine.
 _OF_ENGINES: tuple[Callable[[Any], None], ...] = (
@@ -138,8 +141,9 @@ def _runs(engine: Any) -> Iterator[tuple[str, Callable[[], None]]]:
     for formulation, presets in engine.presets.items():
         for preset, settings in presets.items():
             # What hangs on the adapter alone comes first: it is the cause where the motion is wrong too.
+            first = _First(engine, settings)
             for check_preset in _OF_PRESETS:
-                yield f"{check_preset.__name__}[{formulation}-{preset}]", _first(check_preset, engine, settings)
+                yield f"{check_preset.__name__}[{formulation}-{preset}]", first.checked(check_preset)
             for found, of_found in ((scenes(), _OF_SCENES), (response.truth_scenes(), _OF_TRUTHS)):
                 for (name, scene), check_scene in itertools.product(found.items(), of_found):
                     if lacking(engine, formulation, scene):
@@ -152,18 +156,26 @@ def _bound(check: Callable[[Any], None], what: Any) -> Callable[[], None]:
     return lambda: check(what)
 
 
-def _first(check: Callable[[Subject], None], engine: Any, settings: Any) -> Callable[[], None]:
-    """The check on the most demanding scene that the engine builds with these settings."""
+class _First:
+    """The most demanding scene that the engine builds with these settings, looked for once."""
 
-    def run() -> None:
+    def __init__(self, engine: Any, settings: Any) -> None:
+        self._engine, self._settings = engine, settings
+
+    def checked(self, check: Callable[[Subject], None]) -> Callable[[], None]:
+        """The check on that scene."""
+
+        def run() -> None:
+            if self._scene is None:
+                raise SkipTest("every scene is refused")
+            check(Subject(self._engine, self._settings, self._scene))
+
+        return run
+
+    @cached_property
+    def _scene(self) -> Scene | None:
         for scene in scenes().values():
-            subject = Subject(engine, settings, scene)
-            try:
-                subject.build()
-            except SkipTest:
-                continue
-            check(subject)
-            return
-        raise SkipTest("every scene is refused")
-
-    return run
+            with suppress(SkipTest):
+                Subject(self._engine, self._settings, scene).build()
+                return scene
+        return None

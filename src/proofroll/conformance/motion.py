@@ -169,8 +169,7 @@ class _Ends:
         """The state at time ``t`` [s]; none where it is not finite, or the engine takes no step so coarse."""
         if (factor, t) not in self._known:
             try:
-                rung = self._subject.finer(factor)
-                state = rung.scaled(rung.at(t).sample())
+                state = self._subject.scaled(self._subject.finer(factor).at(t).sample())
                 self._known[factor, t] = state if np.all(np.isfinite(state)) else None
             except Diverged:
                 self._known[factor, t] = None

@@ -14,7 +14,7 @@ from proofroll.conformance.explaining import UnlikeSceneError
 from proofroll.conformance.subject import Subject
 from proofroll.core.arrays import FloatArray
 from proofroll.core.certificate import first_difference
-from proofroll.core.dataset import from_samples, scales
+from proofroll.core.dataset import columns_of, scales
 from proofroll.core.first_steps import MOST, first_steps, softness
 from proofroll.core.observable import Role
 from proofroll.core.plugins import load_element_kinds
@@ -26,6 +26,8 @@ if TYPE_CHECKING:
 # Length of the run [s], and parts of it that are no whole number of any interval at which somebody samples.
 _LENGTH = 0.1
 _PARTS = (2**0.5 - 1, (5**0.5 - 1) / 2, np.pi / 4, 1.0)
+# On the grid of this step [s] they are whole numbers of most steps that engines make, so that one truth serves these.
+_STEP = 2e-3
 # Largest difference, relative to what gravity does in that time: more, and the ball goes somewhere else.
 _MOST = 0.1
 # An error is at most twice the change from a step to its half; as much again is spared for the terms beyond the first.
@@ -57,9 +59,7 @@ def first_steps_fit_the_scene(subject: Subject) -> None:
 def moves_as_the_truth(subject: Subject) -> None:
     """A short run ends where the truth does, with its velocities and forces; so it does between any two samples."""
     step = subject.settings.dt if subject.fixed_step else None
-    times = np.array([0.0, *(part * _LENGTH for part in _PARTS)])
-    if step is not None:
-        times = np.unique(np.ceil(times / step - 1e-9)) * step
+    times = _times(step)
     true = _trajectory(subject.scene.digest, tuple(times.tolist()))
     moved = _moved(subject, times, true)
     finer = _moved(subject.finer(0.5), times, true) if step is not None else moved
@@ -77,6 +77,17 @@ def moves_as_the_truth(subject: Subject) -> None:
             raise UnlikeSceneError(subject, f"{name} is off by {error:.2g} {made}, allowed {allowed:.2g}")
 
 
+def _times(step: float | None) -> FloatArray:
+    """Of the samples [s]; whole numbers of steps, if there are any."""
+    times = np.array([0.0, *(part * _LENGTH for part in _PARTS)])
+    if step is None:
+        return times
+    shared = np.ceil(times / _STEP - 1e-9) * _STEP
+    if np.all(np.abs(shared / step - np.round(shared / step)) < 1e-9):
+        return shared
+    return np.unique(np.ceil(times / step - 1e-9)) * step
+
+
 def _moved(subject: Subject, times: FloatArray, true: xr.Dataset) -> dict[str, FloatArray]:
     """State and first reactions of the engine at all times but the first."""
     engine = subject.build()
@@ -84,7 +95,7 @@ def _moved(subject: Subject, times: FloatArray, true: xr.Dataset) -> dict[str, F
     for t in times[1:].tolist():
         engine.advance(t)
         samples.append(engine.sample())
-    found = from_samples(subject.scene, times, samples)
+    found = columns_of(subject.scene, times, samples)
     moved = {name: found[name].to_numpy()[1:] for name in _sizes(subject.scene, times[-1], true) if name in found}
     reactions = {name for name, item in subject.scene.observables.items() if item.role == Role.REACTION}
     return {  # what an engine does not say of reactions is no error

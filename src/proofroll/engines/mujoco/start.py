@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable
+from functools import cache
 from typing import Any
 
 import mujoco
@@ -27,6 +28,8 @@ _SOFT = 0.9
 _SEQUENCE = 1e-10
 # To this part of itself the settled depth is found.
 _DEPTH = 1e-14
+# So many steps of false position are tried for it.
+_FALSE_POSITION = 15
 # A start "at depth zero" is this part of the radius inside: at zero, round-off would decide whether there is a contact.
 _TOUCHING = 1e-13
 
@@ -123,21 +126,35 @@ def _settled_depth(model: Any, data: Any, body: RollingBall, evaluate_at: Callab
     e1 = body.surface.normal(body.p0)
     wanted = -float(body.v0 @ body.surface.normal_gradient(body.p0) @ body.v0)
 
+    @cache
     def excess(depth: float) -> float:
         evaluate_at(depth)
         return float(e1 @ accelerations(model, data)[0]) - wanted
 
-    upper = 1e-12 * body.ball.radius
+    low = upper = 1e-12 * body.ball.radius
     if excess(upper) <= 0:
         return 0.0
     while excess(upper) > 0:
-        upper *= 10
-        if upper > body.ball.radius:
+        if upper >= 0.1 * body.ball.radius:
             advice = "take a smaller dt or a larger impedance"
             raise Refused(f"the contact is so soft that the ball would sink into the wall; {advice}")
-    # By halves, which no switch of the friction between two depths leads astray.
-    low = upper / 10
-    while upper - low > _DEPTH * upper:
-        middle = (low + upper) / 2
-        low, upper = (middle, upper) if excess(middle) > 0 else (low, middle)
+        low, upper = upper, min(1e3 * upper, body.ball.radius)
+    # Nobody can place the ball closer than the numbers of its centre lie.
+    closest = max(_DEPTH * upper, float(np.spacing(np.max(np.abs(body.p0)))))
+    at_low, at_upper, tries = excess(low), excess(upper), 0
+    # It is nearly linear, so by false position (Dowell and Jarratt, BIT 11, 1971: the Illinois method); every third time,
+    # and where that does not converge, by halves, which no switch of the friction between two depths leads astray.
+    before = 0
+    while upper - low > closest and at_upper:
+        tries += 1
+        part = at_low / (at_low - at_upper) if tries % 3 and tries < _FALSE_POSITION else 0.5
+        middle = low + part * (upper - low)
+        if not low < middle < upper:
+            middle = (low + upper) / 2
+        found = excess(middle)
+        if found > 0:
+            low, at_low, at_upper = middle, found, at_upper / (2 if before > 0 else 1)
+        else:
+            upper, at_upper, at_low = middle, found, at_low / (2 if before < 0 else 1)
+        before = 1 if found > 0 else -1
     return upper
