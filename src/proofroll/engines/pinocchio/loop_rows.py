@@ -13,7 +13,7 @@ from typing import Any, NamedTuple
 import numpy as np
 import pinocchio as pin
 from numpy.typing import NDArray
-from scipy.linalg.lapack import dpotrf, dtrtri
+from scipy.linalg.lapack import dgesdd, dpotrf, dtrtri
 
 from proofroll.core.arrays import cross
 from proofroll.elements.mechanism.joint import FACTS
@@ -78,20 +78,25 @@ class LoopRows:
         pin.updateFramePlacements(model, data)
         (p_a, A, J_a, v_a, a_a), (p_b, B, J_b, v_b, a_b) = (self._frames(data, ends) for ends in self._ends)
         J, a, d, w_a, w_b = J_b - J_a, a_b - a_a, p_b - p_a, v_a[:, 3:], v_b[:, 3:]
-        i, turning = self._point, self._turning
+        i, j, turning = self._point, self._angle, self._turning
         n = np.where(turning, A[i, :, self._axis], self._fixed)
-        r, n_rate = turning * cross(d[i], n), turning * cross(w_a[i], n)
+        x, y, first, then = A[j, :, self._x], B[j, :, self._y], len(n), len(n) + len(self._angle)
+        # ω × each direction, and again; the moments d × n and y × x. One call for all costs as much as for one.
+        spins = np.concatenate([w_a[i], w_a[j], w_b[j]])
+        rates = cross(spins, np.concatenate([n, x, y]))
+        bends = cross(spins, rates)
+        moments = cross(np.concatenate([d[i], y]), np.concatenate([n, x]))
+        r, t = turning * moments[:first], moments[first:]
         C = _times(n, J[i, :3]) - _times(r, J_a[i, 3:])
-        drift = _dot(n, a[i, :3]) - _dot(r, a_a[i, 3:]) + 2 * _dot(n_rate, (v_b - v_a)[i, :3])
-        drift += _dot(cross(w_a[i], n_rate), d[i])
-        j = self._angle
-        x, y = A[j, :, self._x], B[j, :, self._y]
-        t, x_rate, y_rate = cross(y, x), cross(w_a[j], x), cross(w_b[j], y)
-        turn = _dot(t, a[j, 3:]) + _dot(cross(w_a[j], x_rate), y) + _dot(x, cross(w_b[j], y_rate))
+        drift = (
+            n * a[i, :3] - r * a_a[i, 3:] + turning * (2 * rates[:first] * (v_b - v_a)[i, :3] + bends[:first] * d[i])
+        )
+        x_rate, y_rate = rates[first:then], rates[then:]
+        turn = t * a[j, 3:] + bends[first:then] * y + x * bends[then:] + 2 * x_rate * y_rate
         return RowsAtState(
-            np.concatenate([_dot(n, d[i]), _dot(x, y)]),
+            np.concatenate([n * d[i], x * y]).sum(1),
             np.concatenate([C, _times(t, J[j, 3:])]),
-            np.concatenate([drift, turn + 2 * _dot(x_rate, y_rate)]),
+            np.concatenate([drift, turn]).sum(1),
             self._loop,
             np.concatenate([n, np.zeros_like(t)]),
             np.concatenate([np.zeros_like(n), t]),
@@ -118,7 +123,9 @@ class LoopRows:
         if failed:
             raise np.linalg.LinAlgError("the mass matrix is not positive definite")
         into = dtrtri(upper, lower=0)[0]
-        U, S, Vt = np.linalg.svd(C @ into, full_matrices=False)
+        U, S, Vt, failed = dgesdd(C @ into, full_matrices=0)
+        if failed:
+            raise np.linalg.LinAlgError("the singular values were not found")
         r = self.rank
         return Split(into, into @ Vt[:r].T, U[:, :r].T / S[:r, None])
 
@@ -128,11 +135,6 @@ class LoopRows:
         split = self.split(pin.crba(self._model, data, q), rows.C)
         v = v - split.locked @ (split.back @ (rows.C @ v))
         return pin.integrate(self._model, q, -split.locked @ (split.back @ rows.residual)), v
-
-
-def _dot(a: Array, b: Array) -> Array:
-    """Products of two lists of vectors."""
-    return np.asarray((a * b).sum(1))
 
 
 def _times(a: Array, J: Array) -> Array:
