@@ -88,9 +88,8 @@ class LoopRows:
         moments = cross(np.concatenate([d[i], y]), np.concatenate([n, x]))
         r, t = turning * moments[:first], moments[first:]
         C = _times(n, J[i, :3]) - _times(r, J_a[i, 3:])
-        drift = (
-            n * a[i, :3] - r * a_a[i, 3:] + turning * (2 * rates[:first] * (v_b - v_a)[i, :3] + bends[:first] * d[i])
-        )
+        along = 2 * rates[:first] * (v_b - v_a)[i, :3] + bends[:first] * d[i]
+        drift = n * a[i, :3] - r * a_a[i, 3:] + turning * along
         x_rate, y_rate = rates[first:then], rates[then:]
         turn = t * a[j, 3:] + bends[first:then] * y + x * bends[then:] + 2 * x_rate * y_rate
         return RowsAtState(
