@@ -142,8 +142,8 @@ def _settled_depth(model: Any, data: Any, body: RollingBall, evaluate_at: Callab
     # Nobody can place the ball closer than the numbers of its centre lie.
     closest = max(_DEPTH * upper, float(np.spacing(np.max(np.abs(body.p0)))))
     at_low, at_upper, tries = excess(low), excess(upper), 0
-    # It is nearly linear, so by false position (the Illinois method: Dowell and Jarratt, BIT 11, 1971); every third
-    # time, and where that does not converge, by halves, which no switch of the friction between two depths leads astray.
+    # It is nearly linear, so by false position (the Illinois method: Dowell and Jarratt, BIT 11, 1971), but by halves
+    # every third time, and where that does not converge: no switch of friction between two depths leads these astray.
     before = 0
     while upper - low > closest and at_upper:
         tries += 1
