@@ -71,10 +71,15 @@ def files(tmp_path: Path, **texts: str) -> list[str]:
     return [str(tmp_path / f"{name}.toml") for name in texts]
 
 
-def test_a_report_of_several_studies(proofroll: Proofroll, tmp_path: Path) -> None:
+@pytest.fixture(scope="module")
+def out(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """Where reports of the same runs are written, one over the other."""
+    return tmp_path_factory.mktemp("out")
+
+
+def test_a_report_of_several_studies(proofroll: Proofroll, tmp_path: Path, out: Path) -> None:
     """Stages on standard error, tables and the place on standard output, and both files with what they name."""
     names = files(tmp_path, claim=COMPARISON, figures=FIGURES.replace("STATED", "-160"))
-    out = tmp_path / "out"
     code, said, err = proofroll("report", *names, "--out", str(out))
     assert code == 0, err
     assert "1 of 2, comparisons" in err
@@ -92,17 +97,17 @@ def test_a_report_of_several_studies(proofroll: Proofroll, tmp_path: Path) -> No
         assert (out / run["trajectory"]).is_file()
 
 
-def test_a_statement_that_does_not_hold_is_a_contradiction(proofroll: Proofroll, tmp_path: Path) -> None:
+def test_a_statement_that_does_not_hold_is_a_contradiction(proofroll: Proofroll, tmp_path: Path, out: Path) -> None:
     """Exit code 1, named in what to look at first, and on the page; a report needs no comparison."""
     names = files(tmp_path, figures=FIGURES.replace("STATED", "-150"))
-    code, said, _ = proofroll("report", *names, "--out", str(tmp_path / "out"))
+    code, said, _ = proofroll("report", *names, "--out", str(out))
     assert code == 1
     assert "Look first at what was not expected (1): ω3 is constant (free)" in said
-    assert "Nothing was compared in this report" in (tmp_path / "out" / "report.html").read_text(encoding="utf-8")
+    assert "Nothing was compared in this report" in (out / "report.html").read_text(encoding="utf-8")
 
 
 def test_a_part_that_fails_does_not_take_the_report_away(
-    proofroll: Proofroll, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+    proofroll: Proofroll, tmp_path: Path, out: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     """Exit code 3 and one line on standard error; the comparison is on the page, and what is missing too."""
     names = files(tmp_path, claim=COMPARISON, speed=TRADEOFF)
@@ -111,12 +116,12 @@ def test_a_part_that_fails_does_not_take_the_report_away(
         raise MemoryError("no memory left")
 
     monkeypatch.setattr("proofroll.studies.study_store.make_tradeoff", fail)
-    code, said, err = proofroll("report", *names, "--out", str(tmp_path / "out"))
+    code, said, err = proofroll("report", *names, "--out", str(out))
     assert code == 3
     assert "no memory left; proofroll tradeoff sphere_in_cylinder makes it." in err
     assert "Traceback" not in err
     assert "Missing (1): Speed" in said
-    html = (tmp_path / "out" / "report.html").read_text(encoding="utf-8")
+    html = (out / "report.html").read_text(encoding="utf-8")
     assert "no memory left" in html
     assert "A claim" in html
 

@@ -270,7 +270,7 @@ def test_onset_to_one_percent(proofroll: Proofroll, tmp_path: Path) -> None:
         "--set",
         "mu_static=0.35",
         "--until",
-        "0.4",
+        "0.25",
         "--out",
         str(tmp_path),
     ]

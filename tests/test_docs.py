@@ -5,7 +5,6 @@ from __future__ import annotations
 import re
 import shlex
 import subprocess
-import sys
 from collections.abc import Callable
 from pathlib import Path
 
@@ -66,7 +65,7 @@ def test_a_page_can_be_followed(
     command_line: Callable[..., tuple[int, str, str]],
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:
-    """Every file, command and snippet of a page works, one after the other; scripts for other systems parse."""
+    """Every file and command of a page works, one after the other; scripts for other systems parse."""
     monkeypatch.chdir(folder)
     monkeypatch.setattr("proofroll.studies.first_look._UNTIL", 0.2)
     for language, text in blocks(page):
@@ -79,9 +78,7 @@ def test_a_page_can_be_followed(
             subprocess.run(["bash", "-n", "-c", text], check=True)
         elif language == "yaml":
             assert yaml.safe_load(text)
-        elif language == "python":
-            subprocess.run([sys.executable, "-c", text], cwd=folder, check=True, capture_output=True)
-        else:
+        elif language != "python":  # which tests/test_snippets.py runs, without what commands leave
             assert language == "", f"nothing executes {language}"
             for words, code in commands(text):
                 assert words[0] == "proofroll"
