@@ -6,7 +6,6 @@ import os
 import signal
 import sys
 from functools import cache
-from importlib.metadata import entry_points
 from types import FrameType
 from typing import Annotated, Any
 
@@ -30,6 +29,7 @@ from proofroll.cli.run import run
 from proofroll.cli.stability import stability
 from proofroll.cli.tradeoff import tradeoff
 from proofroll.cli.versions import versions
+from proofroll.core.announced import announced
 from proofroll.core.errors import InputError, Missing, ProofrollError
 
 app = typer.Typer(
@@ -43,7 +43,7 @@ for _command in (scenes, run, judge, plot, replay, export, findings, cite, *_STU
     app.command()(_command)
 app.add_typer(new, name="new")
 app.add_typer(engines, name="engines")
-for _point in sorted(entry_points(group="proofroll.commands"), key=lambda point: point.name):
+for _point in announced("proofroll.commands"):
     _added = _point.load()
     if isinstance(_added, typer.Typer):
         app.add_typer(_added, name=_point.name)

@@ -5,10 +5,10 @@ from __future__ import annotations
 import dataclasses
 import sys
 from collections.abc import Mapping
-from importlib.metadata import entry_points
 from pathlib import Path
 
 from proofroll.cli import options
+from proofroll.core.announced import announced
 from proofroll.core.errors import InputError, choices
 
 # What reads the files of a study: the name of the entry point is the file's ``study``; it is given the path as text.
@@ -100,7 +100,7 @@ def _comparison(path: Path) -> SoundFile:
 
 
 def _study(path: Path, study: str) -> SoundFile:
-    readers = {point.name: point for point in entry_points(group=READERS)}
+    readers = {point.name: point for point in announced(READERS)}
     if study not in readers:
         raise InputError(f"{path.name}: study", study, f"nothing reads such a file; choose from {choices(readers)}")
     found = readers[study].load()(str(path))

@@ -6,13 +6,13 @@ import contextlib
 import os
 import re
 from collections.abc import Callable
-from importlib.metadata import entry_points
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
 import typer
 
 from proofroll.cli import options
+from proofroll.core.announced import announced
 from proofroll.core.errors import InputError, ProofrollError
 
 if TYPE_CHECKING:
@@ -43,7 +43,7 @@ def versions(
     """
     from proofroll.report.versions_content import heading, lines, page, robot_table, table
 
-    readers = {point.name: point for point in entry_points(group=SUBJECTS)}
+    readers = {point.name: point for point in announced(SUBJECTS)}
     robot = readers.get(Path(subject).suffix.removeprefix("."))
     if robot is not None and scheduler is not None:
         raise InputError("--scheduler", scheduler, "a robot file is checked here; leave the option out")

@@ -6,17 +6,17 @@ import dataclasses
 import json
 import math
 from collections.abc import Mapping
-from importlib.metadata import entry_points
 from typing import Any
 
 from proofroll.conformance.subject import require
+from proofroll.core.announced import announced
 from proofroll.core.errors import InputError
 from proofroll.core.plugins import GROUP, resolve_settings
 
 
 def name_is_the_entry_point(engine: Any) -> None:
     """An installed package announces the engine under its own name."""
-    points = [point for point in entry_points(group=GROUP) if point.name == engine.name]
+    points = [point for point in announced(GROUP) if point.name == engine.name]
     require(points, f"no installed package has the entry point {GROUP}: {engine.name}; add it and install the package")
     found = points[0].load()
     require(found is engine, f"the entry point {engine.name} leads to {found!r} instead of {engine!r}")

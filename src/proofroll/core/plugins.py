@@ -4,14 +4,14 @@ from __future__ import annotations
 
 import dataclasses
 import re
-import sys
 from collections.abc import Collection, Mapping
 from contextlib import suppress
 from functools import cache
-from importlib.metadata import EntryPoint, EntryPoints, PackageNotFoundError, entry_points, version
+from importlib.metadata import EntryPoint, PackageNotFoundError, version
 from importlib.util import find_spec
 from typing import Any
 
+from proofroll.core.announced import announced
 from proofroll.core.element import ElementKind
 from proofroll.core.engine_abilities import SupportsFrom
 from proofroll.core.errors import InputError, Missing, ProofrollError, place
@@ -22,13 +22,7 @@ ELEMENTS = "proofroll.elements"
 
 def engine_names() -> list[str]:
     """Names of all engines that some installed package announces, sorted."""
-    return sorted(_announced(tuple(sys.path)).names)
-
-
-@cache
-def _announced(_path: tuple[str, ...]) -> EntryPoints:
-    """Looked up once for each ``sys.path``: every file of every installed package is read for it."""
-    return entry_points(group=GROUP)
+    return sorted({point.name for point in announced(GROUP)})
 
 
 def plain_name(name: str) -> str:
@@ -109,8 +103,7 @@ def _installed(requirement: str) -> bool:
 @cache
 def load_element_kinds() -> tuple[type[ElementKind], ...]:
     """Every kind of element that some installed package announces, by name."""
-    points = sorted(entry_points(group=ELEMENTS), key=lambda point: point.name)
-    return tuple(point.load() for point in points)
+    return tuple(point.load() for point in announced(ELEMENTS))
 
 
 def require_engine(name: str) -> None:
@@ -123,7 +116,7 @@ def require_engine(name: str) -> None:
 
 
 def _entry_point(name: str) -> EntryPoint:
-    for point in _announced(tuple(sys.path)):
+    for point in announced(GROUP):
         if point.name == name:
             return point
     raise InputError("engine", name, f"there is no such engine; choose one of {', '.join([*engine_names(), 'truth'])}")

@@ -4,9 +4,9 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from functools import cache
-from importlib.metadata import entry_points
 from typing import TYPE_CHECKING, Protocol, runtime_checkable
 
+from proofroll.core.announced import announced
 from proofroll.core.arrays import FloatArray
 from proofroll.core.columns import Columns
 from proofroll.core.dataset import joined
@@ -68,7 +68,7 @@ class FindsEdges(Protocol):
 @cache
 def load_truths() -> tuple[type[ElementTruth], ...]:
     """All that some installed package announces, by name."""
-    return tuple(point.load() for point in sorted(entry_points(group=TRUTHS), key=lambda point: point.name))
+    return tuple(point.load() for point in announced(TRUTHS))
 
 
 def truth(scene: Scene, times: FloatArray) -> xr.Dataset:

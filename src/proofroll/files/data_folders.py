@@ -3,9 +3,9 @@
 from __future__ import annotations
 
 from functools import cache
-from importlib.metadata import entry_points
 from pathlib import Path
 
+from proofroll.core.announced import announced
 from proofroll.core.errors import ProofrollError
 
 STUDY_FOLDERS = "proofroll.study_folders"
@@ -27,5 +27,4 @@ def data_folder(kind: str) -> Path:
 @cache
 def study_folders() -> tuple[Path, ...]:
     """The folders of comparisons and other studies: ``comparisons``, and those of modules that packages announce."""
-    points = sorted(entry_points(group=STUDY_FOLDERS), key=lambda point: point.name)
-    return (data_folder("comparisons"), *(Path(point.load().__file__).parent for point in points))
+    return (data_folder("comparisons"), *(Path(point.load().__file__).parent for point in announced(STUDY_FOLDERS)))

@@ -4,9 +4,10 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from functools import cache
-from importlib.metadata import entry_points
 from pathlib import Path
 from typing import Any, ClassVar, Protocol
+
+from proofroll.core.announced import announced
 
 GROUP = "proofroll.scene_sources"
 
@@ -55,5 +56,5 @@ def source_of(name: str) -> tuple[type[SceneSource], Path] | None:
 
 @cache
 def _sources() -> dict[str, type[SceneSource]]:
-    found = (point.load() for point in entry_points(group=GROUP))
+    found = (point.load() for point in announced(GROUP))
     return {ending: source for source in found for ending in source.endings}

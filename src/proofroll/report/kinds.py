@@ -4,8 +4,9 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from functools import cache
-from importlib.metadata import entry_points
 from typing import TYPE_CHECKING, Any, ClassVar, Protocol
+
+from proofroll.core.announced import announced
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -87,7 +88,7 @@ class ReportKind(Protocol):
 @cache
 def report_kinds() -> tuple[type[ReportKind], ...]:
     """All that some installed package announces, by name."""
-    return tuple(point.load() for point in sorted(entry_points(group=GROUP), key=lambda point: point.name))
+    return tuple(point.load() for point in announced(GROUP))
 
 
 def kind_of(scene: Scene) -> type[ReportKind] | None:

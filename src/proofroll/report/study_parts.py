@@ -9,10 +9,10 @@ import shlex
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from functools import cache
-from importlib.metadata import entry_points
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, ClassVar, Protocol
 
+from proofroll.core.announced import announced
 from proofroll.core.errors import InputError, ProofrollError
 from proofroll.files.scene_sources import source_of
 from proofroll.files.toml import named_file, read_toml, study_files
@@ -110,7 +110,7 @@ class Part(Protocol):
 @cache
 def part_kinds() -> tuple[type[Part], ...]:
     """All that some installed package announces, in the order of a report."""
-    return tuple(sorted((point.load() for point in entry_points(group=GROUP)), key=lambda kind: kind.order))
+    return tuple(sorted((point.load() for point in announced(GROUP)), key=lambda kind: kind.order))
 
 
 def parts_of(names: Sequence[str], engines: Sequence[str]) -> tuple[list[str], list[Part]]:

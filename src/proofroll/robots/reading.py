@@ -6,13 +6,13 @@ import copy
 import dataclasses
 import json
 from collections.abc import Callable, Mapping
-from importlib.metadata import entry_points
 from pathlib import Path
 from typing import Any
 from xml.etree import ElementTree
 
 import numpy as np
 
+from proofroll.core.announced import announced
 from proofroll.core.errors import InputError, Missing, Refused
 from proofroll.files.json_data import plain
 from proofroll.robots.model import Robot
@@ -30,7 +30,7 @@ _ARRAYS = ("M", "g", "h", "inverse", "forward")
 
 def reader_names() -> list[str]:
     """Engines for which an installed package announces a reader, sorted."""
-    return sorted({point.name for point in entry_points(group=GROUP)})
+    return sorted({point.name for point in announced(GROUP)})
 
 
 def load_reader(name: str) -> Any:
@@ -40,7 +40,7 @@ def load_reader(name: str) -> Any:
         InputError: no installed package announces one for this engine.
         Missing: what it needs is not installed.
     """
-    for point in entry_points(group=GROUP):
+    for point in announced(GROUP):
         if point.name == name:
             try:
                 reader = point.load()()

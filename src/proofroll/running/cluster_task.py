@@ -12,11 +12,12 @@ import socket
 import tempfile
 import threading
 from collections.abc import Callable, Mapping
-from importlib.metadata import PackageNotFoundError, entry_points, requires, version
+from importlib.metadata import PackageNotFoundError, requires, version
 from pathlib import Path
 from typing import Any
 
 import proofroll
+from proofroll.core.announced import announced
 from proofroll.core.errors import InputError, ProofrollError
 from proofroll.core.plugins import GROUP
 from proofroll.files.scene_file import load_scene
@@ -62,7 +63,7 @@ def installed() -> dict[str, str]:
 
     It is told from the metadata of packages: no engine is imported.
     """
-    engines = list(entry_points(group=GROUP))
+    engines = announced(GROUP)
     extras = {point.name for point in engines} | {"fast"}
     names = {point.dist.name for point in engines if point.dist is not None}
     for text in [text for name in sorted(names) for text in requires(name) or []]:

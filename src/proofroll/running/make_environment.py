@@ -19,6 +19,7 @@ from importlib import metadata
 from importlib.util import find_spec
 from pathlib import Path
 
+from proofroll.core.announced import announced
 from proofroll.core.errors import InputError, ProofrollError
 from proofroll.core.plugins import GROUP, release
 from proofroll.running import environments
@@ -95,7 +96,7 @@ def add(
 
 def package_of(engine: str) -> str:
     """The package that brings an engine: what the adapter's package requires for the extra of its name, else empty."""
-    for point in metadata.entry_points(group=GROUP):
+    for point in announced(GROUP):
         if point.name != engine or point.dist is None:
             continue
         for text in point.dist.requires or []:
@@ -199,7 +200,7 @@ def _interpreter(python: str) -> Path:
 def _carried(name: str, wheels: Path) -> list[str]:
     """This proofroll and the package of the engine's adapter, as arguments of pip: the same code as here."""
     names = ["proofroll"]
-    for point in metadata.entry_points(group=GROUP):
+    for point in announced(GROUP):
         if point.name == name and point.dist is not None and point.dist.name not in names:
             names.append(point.dist.name)
     return [str(_wheel(metadata.distribution(item), wheels)) for item in names]

@@ -22,6 +22,7 @@ from proofroll.running.time_case import clean_runs
 def run(case: dict[str, Any], out: str) -> dict[str, Any]:
     """Runs a case and writes its trajectory to ``out``; everything the case says comes back as a result."""
     spent = TimeAccounts()
+    gc.freeze()  # what there is by now are modules: to look at each of them after the case costs as much as a short one
     try:
         answer = dataclasses.asdict(_run(Case.from_dict(case), Path(out), spent)) | {"interpreter": sys.executable}
     finally:

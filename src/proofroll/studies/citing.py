@@ -10,12 +10,12 @@ import json
 import re
 from collections.abc import Iterable
 from importlib.machinery import PathFinder
-from importlib.metadata import entry_points
 from importlib.util import find_spec
 from pathlib import Path
 from typing import Any
 
 import proofroll
+from proofroll.core.announced import announced
 from proofroll.core.errors import InputError
 from proofroll.core.plugins import GROUP, engine_names, parse_engine, plain_name
 from proofroll.files.comparison_file import load_comparison
@@ -164,7 +164,7 @@ def _scene(name: str) -> Cited:
 
 def _beside(group: str, name: str = "") -> list[str]:
     """Entries beside the modules that entry points name; the modules are not imported, for an engine may be absent."""
-    folders = [_folder(point.module) for point in entry_points(group=group) if not name or point.name == name]
+    folders = [_folder(point.module) for point in announced(group) if not name or point.name == name]
     return list(dict.fromkeys(entry for folder in folders if folder for entry in entries(folder)))
 
 

@@ -6,10 +6,11 @@ import datetime
 import hashlib
 import re
 from dataclasses import dataclass
-from importlib.metadata import PackageNotFoundError, entry_points, requires, version
+from importlib.metadata import PackageNotFoundError, requires, version
 from pathlib import Path
 
 import proofroll
+from proofroll.core.announced import announced
 from proofroll.core.plugins import GROUP
 from proofroll.running.environments import remembered
 from proofroll.running.timing import machine
@@ -23,7 +24,7 @@ def versions() -> dict[str, str]:
 
     An environment ``NAME@LABEL`` has the hash of all that is installed in it for its version.
     """
-    names = _required() | {point.dist.name for point in entry_points(group=GROUP) if point.dist is not None}
+    names = _required() | {point.dist.name for point in announced(GROUP) if point.dist is not None}
     found = {}
     for name in sorted(names, key=str.lower):
         try:

@@ -3,9 +3,9 @@
 from __future__ import annotations
 
 from functools import cache
-from importlib.metadata import entry_points
 from typing import Any
 
+from proofroll.core.announced import announced
 from proofroll.elements.ball_on_surface.surfaces.bowl import Bowl
 from proofroll.elements.ball_on_surface.surfaces.cylinder import Cylinder
 from proofroll.elements.ball_on_surface.surfaces.plane import Plane
@@ -17,5 +17,4 @@ GROUP = "proofroll.surfaces"
 @cache
 def surface_kinds() -> tuple[type[Any], ...]:
     """The classes: dataclasses that follow :class:`Surface`, most easily by way of :class:`Declared`."""
-    announced = sorted(entry_points(group=GROUP), key=lambda point: point.name)
-    return (Cylinder, Plane, Bowl, Cone, Torus, *(point.load() for point in announced))
+    return (Cylinder, Plane, Bowl, Cone, Torus, *(point.load() for point in announced(GROUP)))
