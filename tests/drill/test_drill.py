@@ -140,7 +140,7 @@ def test_a_safeguard_that_is_taken_out(
     customised.mkdir(exist_ok=True)
     (customised / "sitecustomize.py").write_text(TAKEN_OUT[taken_out])
     monkeypatch.setenv("PYTHONPATH", os.pathsep.join([str(customised), os.environ["PYTHONPATH"]]))
-    monkeypatch.setattr("proofroll_drill.site.GONE", 2.0)
+    monkeypatch.setattr("proofroll_drill.site.GONE", 1.0)
     try:
         row = drill(here, sound)
     finally:

@@ -104,18 +104,6 @@ class Exits(Oracle):
         os._exit(7)
 
 
-class Moody(Oracle):
-    """Ends its process if the ball is at 5 m/s."""
-
-    name = "moody"
-
-    def advance(self, t: float) -> None:
-        """See :class:`proofroll.core.engine.Engine`."""
-        if self.body.v0[1] == 5:
-            os._exit(1)
-        super().advance(t)
-
-
 class Segfaults(Oracle):
     """Dies by a signal."""
 
@@ -263,7 +251,6 @@ ENTRY_POINTS = {
         Oracle,
         Garbage,
         Exits,
-        Moody,
         Segfaults,
         Hangs,
         HangsAloud,

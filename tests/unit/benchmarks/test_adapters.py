@@ -13,8 +13,6 @@ from proofroll_benchmarks import loops
 from proofroll_benchmarks.adapters import GOAL, AdapterRow, bench_adapters, content, measure_adapter
 from proofroll_benchmarks.bare import Bare
 
-pytestmark = pytest.mark.own_workers
-
 
 def test_a_third_party_engine_without_a_bare_loop(
     install_engines: Callable[[Mapping[str, str]], None],

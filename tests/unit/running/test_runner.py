@@ -60,13 +60,6 @@ def test_each_engine_costs_its_own_case_alone(tmp_path: Path, make_case: MakeCas
         assert dataset.sizes["time"] == (3 if results[cases[name].key].status is Status.DONE else 2)
 
 
-def test_a_crash_costs_one_case_of_a_batch(tmp_path: Path, make_case: MakeCase) -> None:
-    """Cases that share a process with one that crashes are served by the next process."""
-    cases = [make_case("moody", parameters={"speed": speed}) for speed in (5.0, 3.0, 4.0)]
-    results = Runner(Store(tmp_path), jobs=1).run(cases)
-    assert [results[case.key].status for case in cases] == [Status.CRASHED, Status.DONE, Status.DONE]
-
-
 def test_stored_results_are_reused(tmp_path: Path, make_case: MakeCase) -> None:
     """What is there is not run again; ``fresh`` runs it again; a crash is never reused."""
     cases = [make_case("oracle"), make_case("refuses"), make_case("exits")]
