@@ -297,3 +297,11 @@ def test_wrong_settings_give_one_clear_line(engine: str, parameters: dict[str, f
         build(load_scene(CYLINDER, **parameters), f"mujoco[{engine}]")
     assert field in caught.value.field
     assert "\n" not in str(caught.value)
+
+
+@pytest.mark.parametrize("engine", TUNED)
+@pytest.mark.parametrize("setting", ["dt=1e-2", "time_constant=20"])
+def test_a_start_that_slips_is_loaded_from_the_first_sample(engine: str, setting: str) -> None:
+    """However soft the contact, a ball that slips from the start presses on the wall as the truth says, at once."""
+    found, true = (simulate("slide_to_roll", name, until=0.02) for name in (f"mujoco[{engine},{setting}]", "truth"))
+    np.testing.assert_allclose(found.N, true.N, rtol=1e-8)
