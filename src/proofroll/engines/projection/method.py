@@ -25,7 +25,7 @@ from proofroll.engines.projection.orientation import EulerAngles, Orientation, R
 from proofroll.engines.projection.uniform import AlongAxes, Closed
 from proofroll.engines.projection.uniform_euler import Euler
 
-_STANDS = np.zeros((2, 3))
+_STANDS, _NONE = np.zeros((2, 3)), np.zeros(0)
 
 
 class Kinematics(NamedTuple):
@@ -181,6 +181,8 @@ class ProjectedBall:
         The rows C are constant along the local axes. So the slip changes by C times the rate of v as seen from the
         turning frame, which is Ḋs less FᵀḞ v, for the translation and the rotation alike.
         """
+        if not len(self.rows):  # the ball slips
+            return _NONE
         own = self.rows @ (kin.drift - (kin.v.reshape(2, 3) @ kin.turning.T).ravel())
         return np.asarray(own - self.rows[:, :3] @ kin.carried[1])
 

@@ -18,6 +18,7 @@ from proofroll.engines.projection.geometry import Geometry
 if TYPE_CHECKING:
     from scipy.spatial.transform import Rotation
 
+_UNIT = np.eye(3)
 # The condition of M̄ grows like 1/sin²θ as θ nears 0 or π. Here, at 30 degrees, nothing is lost yet; the paper's own
 # run, where sin θ stays above 0.75, does not come so far.
 _RENEWED = 0.5
@@ -205,7 +206,7 @@ class RotatingFrame:
         turning: FloatArray,
     ) -> tuple[FloatArray, FloatArray]:
         """See :class:`Orientation`. The axes turn with the frame: F ω' has the rate F (ω̇' + FᵀḞ ω')."""
-        return np.eye(3), turning @ r
+        return _UNIT, turning @ r
 
     def rates(self, u: FloatArray, angles: FloatArray, r: FloatArray) -> FloatArray:  # noqa: ARG002 -- no angles
         """See :class:`Orientation`."""

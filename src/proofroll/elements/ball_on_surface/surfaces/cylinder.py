@@ -16,6 +16,10 @@ from proofroll.core.errors import InputError
 from proofroll.elements.ball_on_surface.surfaces.surface import Generator
 from proofroll.elements.ball_on_surface.surfaces.tilt import components, tilted
 
+# Of places [m] as rows: their part across the axis, and that part turned about it by a quarter.
+_ACROSS = np.array([1.0, 1.0, 0.0])
+_AROUND = np.array([[0.0, 1.0, 0.0], [-1.0, 0.0, 0.0], [0.0, 0.0, 0.0]])
+
 
 @dataclass(frozen=True)
 class Cylinder:
@@ -181,8 +185,7 @@ class Cylinder:
         if np.ndim(p_WB) == 1:
             return np.array(self.nearby(*np.asarray(p_WB).tolist())[1:])
         p = self._local(p_WB)
-        radial = np.stack([p[..., 0], p[..., 1], np.zeros_like(p[..., 0])], axis=-1)
-        return np.asarray(radial / np.linalg.norm(radial, axis=-1, keepdims=True) @ tilted(self.tilt).T)
+        return np.asarray(p * _ACROSS / np.hypot(p[..., 0], p[..., 1])[..., None] @ tilted(self.tilt).T)
 
     def normal_gradient(self, p_WB: npt.ArrayLike) -> FloatArray:
         """See :class:`Surface`."""
@@ -193,7 +196,6 @@ class Cylinder:
             rows = [[ex * ex, ex * ey, ex * ez], [ey * ex, ey * ey, ey * ez], [ez * ex, ez * ey, ez * ez]]
             return np.array(rows) / distance
         p = self._local(p_WB)
-        e1 = self.normal(p_WB)
-        axis = tilted(self.tilt)[:, 2]
-        across = np.eye(3) - np.outer(axis, axis) - e1[..., :, None] * e1[..., None, :]
-        return np.asarray(across / np.hypot(p[..., 0], p[..., 1])[..., None, None])
+        distance = np.hypot(p[..., 0], p[..., 1])[..., None]
+        e2 = p @ _AROUND / distance @ tilted(self.tilt).T  # along which alone the normal turns
+        return np.asarray(e2[..., :, None] * (e2 / distance)[..., None, :])
