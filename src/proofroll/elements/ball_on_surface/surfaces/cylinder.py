@@ -196,6 +196,6 @@ class Cylinder:
             rows = [[ex * ex, ex * ey, ex * ez], [ey * ex, ey * ey, ey * ez], [ez * ex, ez * ey, ez * ez]]
             return np.array(rows) / distance
         p = self._local(p_WB)
-        distance = np.hypot(p[..., 0], p[..., 1])[..., None]
-        e2 = p @ _AROUND / distance @ tilted(self.tilt).T  # along which alone the normal turns
-        return np.asarray(e2[..., :, None] * (e2 / distance)[..., None, :])
+        radial = np.hypot(p[..., 0], p[..., 1])[..., None]
+        e2 = p @ _AROUND / radial @ tilted(self.tilt).T  # along which alone the normal turns
+        return np.asarray(e2[..., :, None] * (e2 / radial)[..., None, :])
