@@ -8,6 +8,7 @@ friction F. In polar form u = |u| (cos φ e2 + sin φ e3), F = -μk N (cos φ, s
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable
 
 import numpy as np
@@ -226,30 +227,33 @@ class Polar:
         body, surface = self._body, self._body.surface
         a, m, kappa, f = body.ball.radius, body.ball.mass, body.ball.inertia_ratio, body.contact.rolling_resistance
         frame, tangents, bending = surface.frame(y[:2]), surface.tangents(y[:2]), surface.second(y[:2]) @ y[2:4]
-        T = frame.T[1:] @ tangents  # tangents along e2, e3
-        inverse = np.array([[T[1, 1], -T[0, 1]], [-T[1, 0], T[0, 0]]]) / (T[0, 0] * T[1, 1] - T[0, 1] * T[1, 0])
-        v = T @ y[2:4]
-        e1_rate = -(frame[:, 0] @ bending) @ inverse  # along e2, e3
-        g1, g2, g3 = frame.T @ body.gravity
-        N = m * (float(e1_rate @ v) + g1)
-        spin, speed = a * y[4], float(np.hypot(v[0], v[1]))
-        ahead = f * N / (kappa * m * a * speed) * v if f and speed > 0 else np.zeros(2)
-        b = np.array([g2 - spin * e1_rate[1], g3 + spin * e1_rate[0]]) + ahead  # e1 × (x, y) = (-y, x)
-        grip = self._mu_k * N
-        c, s = np.cos(phi), np.sin(phi)
-        v_rate = np.array([g2 - grip / m * c, g3 - grip / m * s])
-        u_second = inverse @ (v_rate - frame.T[1:] @ (bending @ y[2:4]))
-        w2, w3 = (v[1] - size * s) / a, (size * c - v[0]) / a  # e1 × (u - v) / a
-        rates = np.array([y[2], y[3], *u_second, w2 * e1_rate[0] + w3 * e1_rate[1]])
-        return rates, b, N, float(frame[:, 2] @ bending[:, 0]) / float(np.hypot(T[0, 0], T[1, 0]))
+        across = frame.T[1:]
+        (t22, t23), (t32, t33) = (across @ tangents).tolist()  # tangents along e2, e3
+        inverse = np.array([[t33, -t23], [-t32, t22]]) / (t22 * t33 - t23 * t32)
+        du2, du3 = y[2:4].tolist()
+        v2, v3 = t22 * du2 + t23 * du3, t32 * du2 + t33 * du3
+        turn2, turn3 = (-(frame[:, 0] @ bending) @ inverse).tolist()  # ė1 along e2, e3
+        g1, g2, g3 = (frame.T @ body.gravity).tolist()
+        N = m * (turn2 * v2 + turn3 * v3 + g1)
+        spin, speed = a * float(y[4]), math.hypot(v2, v3)
+        ahead = f * N / (kappa * m * a * speed) if f and speed > 0 else 0.0
+        b = np.array([g2 - spin * turn3 + ahead * v2, g3 + spin * turn2 + ahead * v3])  # e1 × (x, y) = (-y, x)
+        grip = self._mu_k * N / m
+        c, s = math.cos(phi), math.sin(phi)
+        u_second = inverse @ (np.array([g2 - grip * c, g3 - grip * s]) - across @ (bending @ y[2:4]))
+        w2, w3 = (v3 - size * s) / a, (size * c - v2) / a  # e1 × (u - v) / a
+        rates = np.array([du2, du3, *u_second.tolist(), w2 * turn2 + w3 * turn3])
+        return rates, b, N, float(frame[:, 2] @ bending[:, 0]) / math.hypot(t22, t32)
 
     def _slipping(self, y: FloatArray) -> FloatArray:
         """d/dτ of (u, u̇, ω1, ln|u|, φ, t)."""
-        size, phi = float(np.exp(y[5])), y[6]
+        size, phi = float(np.exp(y[5])), float(y[6])
         rates, b, N, turning = self._with_slip(y, size, phi)
         grip = self._A * self._mu_k * N
-        c, s = np.cos(phi), np.sin(phi)
-        return np.array([*(size * rates), b[0] * c + b[1] * s - grip, b[1] * c - b[0] * s - size * turning, size])
+        c, s = math.cos(phi), math.sin(phi)
+        b2, b3 = b.tolist()
+        along, around = b2 * c + b3 * s - grip, b3 * c - b2 * s - size * turning
+        return np.array([*(size * rates).tolist(), along, around, size])
 
     def _slaved(self, y: FloatArray) -> tuple[FloatArray, float]:
         """Rates of (u, u̇, ω1, |u|) and φ on the slow solution, where φ - φ_b = -|u| φ̇_b / (|b| + d|u|/dt)."""
