@@ -90,7 +90,7 @@ class Browser:
     tabs: dict[str, list[Any]] = field(default_factory=dict)
 
     @contextmanager
-    def tab(self, before: str, **options: Any) -> Iterator[Any]:
+    def tab(self, before: str, color_scheme: str, **options: Any) -> Iterator[Any]:
         """One that is empty and looks as a new one does; what failed in it takes it along."""
         idle = self.tabs.setdefault(repr((before, sorted(options.items()))), [])
         if idle:
@@ -102,11 +102,10 @@ class Browser:
                 context.add_init_script(before)
             page = context.new_page()
         try:
+            page.emulate_media(media="null", color_scheme=color_scheme, reduced_motion="no-preference")
             yield page
             page.goto("about:blank")
             page.mouse.move(0, 0)
-            look = {"color_scheme": options.get("color_scheme", "light"), "reduced_motion": "no-preference"}
-            page.emulate_media(media="null", **look)
         except BaseException:
             page.context.close()
             raise
@@ -135,6 +134,7 @@ def visiting(
     fragment: str = "",
     before: str = "",
     viewport: Mapping[str, int] = WIDE,
+    color_scheme: str = "light",
     **options: Any,
 ) -> Iterator[Visit]:
     """Opens a file; whatever else it asks for is noted and refused.
@@ -145,14 +145,15 @@ def visiting(
         fragment: with ``#``, where to go in it.
         before: a script that runs before those of the page.
         viewport: size of the screen [CSS px].
-        options: of playwright's ``new_context``, e.g. ``color_scheme="dark"``.
+        color_scheme: that a reader prefers, ``light`` or ``dark``.
+        options: of playwright's ``new_context``, e.g. ``is_mobile=True``.
     """
     address = file.resolve().as_uri()
 
     def other(url: str) -> bool:
         return url.partition("#")[0] != address
 
-    with browser.tab(before, **options) as page:
+    with browser.tab(before, color_scheme, **options) as page:
         page.set_viewport_size(viewport)
         visit = Visit(page)
 
