@@ -87,11 +87,12 @@ def test_a_place_is_no_part_of_a_result(old: Path, tmp_path: Path) -> None:
 def test_an_environment_that_changed_is_a_row(old: Path, tmp_path: Path) -> None:
     """An engine upgraded, or deleted, after it was asked fails with both versions; all other rows arrive."""
     upgraded, deleted = (seeing(tmp_path / name, "1.0") for name in ("upgraded", "deleted"))
-    cases = [case_in(upgraded), case_in(deleted), case_in(old)]
+    runner = Runner(Store(tmp_path / "out"), jobs=1)
+    cases = [case_in(upgraded), case_in(deleted), case_in(old, runner.workers)]
     announce(site_of(upgraded), "2.0")
     cases[1] = Case(**{**vars(cases[1]), "until": 0.04})  # or it would be the same as the last one
     shutil.rmtree(tmp_path / "deleted")
-    results = Runner(Store(tmp_path / "out"), jobs=1).run([Case(**{**vars(cases[0]), "until": 0.03}), *cases[1:]])
+    results = runner.run([Case(**{**vars(cases[0]), "until": 0.03}), *cases[1:]])
     first, second, third = results.values()
     by_status = {result.status: result.message for result in (first, second, third)}
     assert by_status.keys() == {Status.CRASHED, Status.MISSING, Status.DONE}
