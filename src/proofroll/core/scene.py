@@ -50,6 +50,8 @@ class Scene:
         for name in names:
             if names.count(name) > 1:
                 raise InputError("scene", name, "two elements have this name; give each its own")
+            if "." in name and len(names) > 1:
+                raise InputError("scene", name, "a dot parts a quantity from its element; name the element without")
         for name in self.asks:
             if not any(element.asked(name) for element in self.elements):
                 known = choices(dict.fromkeys(known for element in self.elements for known in element.askable))

@@ -34,13 +34,14 @@ from importlib.metadata import distributions
 found = sorted({f"{item.name}=={item.version}" for item in distributions()})
 print(json.dumps([platform.python_version(), found]))
 """
+_PINNED = re.compile(r"\s*([\w.-]+)(?:\[[^\]]*\])?\s*==\s*(\w[\w.+-]*)\s*")
 _WORDS = 400  # of what pip says the end is shown [characters]
 
 
 def label_of(requirements: Sequence[str]) -> str:
     """The label where none is given: the version that the first requirement pins; else empty."""
-    pinned = re.fullmatch(r"\s*[\w.-]+(?:\[[^\]]*\])?\s*==\s*(\w[\w.+-]*)\s*", requirements[0])
-    return pinned[1] if pinned else ""
+    pinned = _PINNED.fullmatch(requirements[0])
+    return pinned[2] if pinned else ""
 
 
 def add(
@@ -78,8 +79,7 @@ def add(
     if taken is not None:
         advice = f"it is there already ({', '.join(taken.requirements)}); proofroll engines remove {name}@{label} first"
         raise InputError("label", label, advice)
-    if pinned == label:
-        _require_supported(name, requirements[0], pinned)
+    _require_supported(name, requirements)
     base = _interpreter(python)
     with environments.making(folder):
         environments.delete(folder)  # a half that an interrupted process left
@@ -105,18 +105,21 @@ def package_of(engine: str) -> str:
     return ""
 
 
-def _require_supported(name: str, requirement: str, version: str) -> None:
+def _require_supported(name: str, requirements: Sequence[str]) -> None:
     """Asks the engine that is installed here, if any, from which version on its adapter supports it.
 
     Raises:
-        InputError: this version is older.
+        InputError: the version that is pinned of its package is older.
     """
+    package = package_of(name) or name
+    pinned = [found for text in requirements if (found := _PINNED.fullmatch(text)) and found[1] == package]
     oldest = ""
     with contextlib.suppress(ProofrollError):  # nobody is here to be asked
-        oldest = describe(name).oldest
-    if oldest and release(version) < release(oldest):
-        advice = f"the adapter of {name} supports {oldest} and later; nothing was installed"
-        raise InputError("--requirement", requirement, advice)
+        oldest = describe(name).oldest if pinned else ""
+    for found in pinned:
+        if oldest and release(found[2]) < release(oldest):
+            advice = f"the adapter of {name} supports {oldest} and later; nothing was installed"
+            raise InputError("--requirement", found[0], advice)
 
 
 def _made(

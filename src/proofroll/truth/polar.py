@@ -26,7 +26,6 @@ from proofroll.truth.route import End, Leg
 _FLOOR = 1e-4  # |u| at which the rest of a slip is extrapolated, relative to where it began
 _APPROACH = 0.6  # part of the time left until the centre stands still that one step may take
 _STILL = 1e-9  # time left, relative to the pace of the motion, that is extrapolated
-
 BEGUN = 1e-8  # the same of a slip that does not begin from rest, relative to its initial |u|
 
 
@@ -51,8 +50,7 @@ class Polar:
         ball = body.ball
         self._mu_k = body.contact.mu_kinetic if np.isfinite(body.contact.mu_kinetic) else 0.0  # then it never slips
         self._A = (1 + ball.inertia_ratio) / (ball.inertia_ratio * ball.mass)
-        pace = np.sqrt(ball.radius * np.linalg.norm(body.gravity)) + np.linalg.norm(body.v0)
-        pace = max(float(pace), 1e-300)
+        pace = max(float(np.sqrt(ball.radius * np.linalg.norm(body.gravity)) + np.linalg.norm(body.v0)), 1e-300)
         self._pace = ball.radius / pace
         # Absolute tolerances: round-off in the rates of u, u̇, ω1 (and |u| or ln|u|, φ, t) must not drive the step.
         lengths = np.array(body.surface.length_scales)
@@ -235,10 +233,9 @@ class Polar:
         turn2, turn3 = (-(frame[:, 0] @ bending) @ inverse).tolist()  # ė1 along e2, e3
         g1, g2, g3 = (frame.T @ body.gravity).tolist()
         N = m * (turn2 * v2 + turn3 * v3 + g1)
-        spin, speed = a * float(y[4]), math.hypot(v2, v3)
+        spin, speed, grip = a * float(y[4]), math.hypot(v2, v3), self._mu_k * N / m
         ahead = f * N / (kappa * m * a * speed) if f and speed > 0 else 0.0
         b = np.array([g2 - spin * turn3 + ahead * v2, g3 + spin * turn2 + ahead * v3])  # e1 × (x, y) = (-y, x)
-        grip = self._mu_k * N / m
         c, s = math.cos(phi), math.sin(phi)
         u_second = inverse @ (np.array([g2 - grip * c, g3 - grip * s]) - across @ (bending @ y[2:4]))
         w2, w3 = (v3 - size * s) / a, (size * c - v2) / a  # e1 × (u - v) / a

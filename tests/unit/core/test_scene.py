@@ -114,10 +114,15 @@ def test_two_balls_are_refused_by_name() -> None:
 
 
 def test_elements_have_names_of_their_own() -> None:
-    """A scene needs an element, and two elements of one name are refused: their results could not be told apart."""
+    """A scene needs an element, and two of one name, or of names that end alike, are refused, or they would mix."""
     scene = load_scene("sphere_in_cylinder")
     with pytest.raises(InputError, match="two elements have this name"):
         dataclasses.replace(scene, elements=scene.elements * 2)
+    (one,) = scene.elements
+    dotted = dataclasses.replace(one, ball=dataclasses.replace(one.ball, name=f"my.{one.name}"))
+    assert dataclasses.replace(scene, elements=(dotted,)).elements == (dotted,)
+    with pytest.raises(InputError, match="name the element without"):
+        dataclasses.replace(scene, elements=(one, dotted))
     with pytest.raises(InputError, match="holds no element"):
         dataclasses.replace(scene, elements=())
 

@@ -75,11 +75,12 @@ def test_a_version_that_is_too_old_is_not_installed(
     """From which version on an adapter supports its engine is said before anything is made, where it is installed."""
     install_engines(hostile.ENTRY_POINTS)
     monkeypatch.setattr(make_environment, "_made", lambda *_: pytest.fail("made"))
-    with pytest.raises(InputError, match=r"the adapter of grown supports 2\.5 and later; nothing was installed"):
-        make_environment.add("grown", ["grown==2"])
+    for label in ("", "mine"):
+        with pytest.raises(InputError, match=r"grown==2'?: the adapter of grown supports 2\.5 and later"):
+            make_environment.add("grown", ["numpy==1.26.4", "grown==2"], label)
     assert not list(wheels.parent.glob("engines/*"))
     with pytest.raises(pytest.fail.Exception, match="made"):
-        make_environment.add("grown", ["grown==2.5"])
+        make_environment.add("grown", ["numpy==1.26.4", "grown==2.5"])
 
 
 @pytest.mark.parametrize(
