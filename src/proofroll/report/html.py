@@ -15,7 +15,7 @@ from typing import TYPE_CHECKING
 from proofroll.core.errors import InputError
 from proofroll.files.json_data import plain
 from proofroll.files.scene_file import load_scene
-from proofroll.report import labels, study_tables, tables, verdict_matrix
+from proofroll.report import labels, tables, verdict_matrix
 from proofroll.report.kinds import ReportKind, kind_of, report_kinds
 from proofroll.report.pages import environment, packed, rendered
 from proofroll.report.study_parts import Part, part_kinds
@@ -111,8 +111,8 @@ def templates() -> jinja2.Environment:
     made.globals |= {
         "tables": tables,
         "verdict_matrix": verdict_matrix,
-        "studies": study_tables,
         "names": labels.names,
+        "step": labels.step,
         "detail": labels.detail,
         "caveats": labels.caveat_lines,
         "symbols": labels.SYMBOLS,

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 import unicodedata
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
@@ -131,6 +131,11 @@ def name_of(point: BoundaryPoint | MeasuredPoint) -> str:
     """Engine, formulation and preset of a point of a study."""
     settings = point.settings
     return " ".join(filter(None, (point.engine, settings.get("formulation"), settings.get("preset"))))
+
+
+def listed(parameters: Mapping[str, float]) -> str:
+    """Parameters with their values: ``speed = 2, mass = 0.5``."""
+    return ", ".join(f"{name} = {value:g}" for name, value in parameters.items())
 
 
 def with_caveat(name: str, caveat: str) -> str:

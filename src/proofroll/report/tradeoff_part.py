@@ -2,13 +2,14 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
-from typing import TYPE_CHECKING, ClassVar
+from typing import TYPE_CHECKING, Any, ClassVar
 
 from proofroll.core.comparison import Tolerance
 from proofroll.files.json_data import MERGED
+from proofroll.report import tradeoff_tables
 from proofroll.report.study_parts import Part, PartEntry, head_of, held
 from proofroll.report.tradeoff_tables import default_quantities
 from proofroll.studies.claimed import ClaimJudgement
@@ -55,6 +56,7 @@ class TradeoffPart(Part):
     order: ClassVar[float] = 30
     words: ClassVar[str] = "speed against accuracy"
     template: ClassVar[str] = "tradeoff.html"
+    names: ClassVar[Mapping[str, Any]] = {"tradeoffs": tradeoff_tables}
     asked: TradeoffClaims
     engines: Sequence[str] = ()
     study: TradeoffStudy | None = None

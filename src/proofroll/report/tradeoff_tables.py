@@ -1,4 +1,4 @@
-"""A trade-off and a recommendation on the terminal, within 100 columns."""
+"""A trade-off and a recommendation: on the terminal within 100 columns, and what the page tells of them in words."""
 
 from __future__ import annotations
 
@@ -10,12 +10,13 @@ from typing import TYPE_CHECKING
 from rich.table import Column, Table
 from rich.text import Text
 
-from proofroll.report.labels import error, name_of, number, step, with_caveat
+from proofroll.report.labels import error, listed, name_of, number, step, with_caveat
 from proofroll.report.screen import numeric, plain_table, unbroken
 from proofroll.running.timing import CONFIDENCE
 from proofroll.studies.pareto import tied
 
 if TYPE_CHECKING:
+    from proofroll.report.tradeoff_part import Advice
     from proofroll.studies.recommend import Choice, Recommendation
     from proofroll.studies.study_identity import Measured
     from proofroll.studies.tradeoff_records import Corner, CurveBudget, MeasuredPoint, TradeoffStudy
@@ -40,6 +41,41 @@ def cost_of(point: MeasuredPoint) -> str:
         return f"{number(cost)} (once)"
     spread = max(point.interval[1] - cost, cost - point.interval[0]) / cost
     return f"{number(cost)} ±{100 * spread:.0f}%" + (f" ({100 * confidence:.2g}%)" if confidence < CONFIDENCE else "")
+
+
+def effort(study: TradeoffStudy) -> str:
+    """How well speeds are known and where the choices hold, in a sentence or two."""
+    said = ""
+    if study.brief:
+        said = (
+            "Speeds were measured briefly, twice at most and those of long runs once, and the finest steps were "
+            "left out: they contradict no claim. "
+        )
+    where = f"at {listed(study.parameters) or 'the default parameters'} over {study.until:g} s"
+    if study.over:
+        return f"{said}Every choice holds {where}, and at the corners of {_ranges(study)}; nothing is known beyond."
+    return f"{said}Every choice holds {where}; it was not checked over ranges of the parameters."
+
+
+def advised(advice: Sequence[Advice]) -> dict[str, tuple[str, list[Advice]]]:
+    """Of each quantity what is named for its tolerances, in a few words, and the advice for each."""
+    groups: dict[str, list[Advice]] = {}
+    for item in advice:
+        groups.setdefault(item.answer.quantity, []).append(item)
+    named = {
+        quantity: dict.fromkeys(name_of(item.answer.choice.point) for item in items if item.answer.choice)
+        for quantity, items in groups.items()
+    }
+    return {key: (", then ".join(named[key]) or "nothing holds it", items) for key, items in groups.items()}
+
+
+def curve_names(study: TradeoffStudy) -> dict[str, str]:
+    """Engine, formulation and preset of each curve."""
+    return {point.curve: name_of(point) for point in study.points}
+
+
+def _ranges(study: TradeoffStudy) -> str:
+    return ", ".join(f"{name} {min(values):g} to {max(values):g}" for name, values in study.over.items())
 
 
 def tradeoff_parts(
@@ -113,8 +149,7 @@ def _front(study: TradeoffStudy, points: Sequence[MeasuredPoint], quantities: Se
 
 def corner_table(study: TradeoffStudy, quantity: str) -> Table:
     """For every point that was run over the range: its error here, and the worst at the corners and where."""
-    over = ", ".join(f"{name} {min(v):g} to {max(v):g}" for name, v in study.over.items())
-    title = f"Over {over}: error of {quantity} [{study.quantities[quantity].unit}]"
+    title = f"Over {_ranges(study)}: error of {quantity} [{study.quantities[quantity].unit}]"
     columns = [*unbroken("engine formulation setting", "step"), *numeric("here", "worst"), Column("where")]
     table = plain_table(*columns, title=title)
     checked = [p for p in study.points if p.corners and quantity in p.error]
@@ -130,13 +165,9 @@ def _worst(corners: Sequence[Corner], quantity: str) -> tuple[str, str]:
     missing = [corner for corner in corners if corner.errors.get(quantity) is None]
     if missing:
         more = f" and {len(missing) - 1} more" if len(missing) > 1 else ""
-        return "–", f"{_place(missing[0])}{more}: {missing[0].message}"
+        return "–", f"{listed(missing[0].parameters)}{more}: {missing[0].message}"
     corner = max(corners, key=lambda c: c.errors[quantity])
-    return error(corner.errors[quantity]), _place(corner)
-
-
-def _place(corner: Corner) -> str:
-    return ", ".join(f"{name} = {value:g}" for name, value in corner.parameters.items())
+    return error(corner.errors[quantity]), listed(corner.parameters)
 
 
 def budget_table(study: TradeoffStudy, quantity: str) -> Table:
@@ -149,14 +180,14 @@ def budget_table(study: TradeoffStudy, quantity: str) -> Table:
         *unbroken("dominated by"),
         title=title,
     )
-    first = {point.curve: point for point in study.points}
+    names = curve_names(study)
     for item in study.budgets:
         if item.quantity != quantity:
             continue
         limit = (item.model_form, item.model_form_bar, item.floor)
         ends = [_DOMINANT.get(end, end) for end in (item.coarse, item.fine)]
         table.add_row(
-            Text(name_of(first[item.curve])),
+            Text(names[item.curve]),
             Text(_order(item), style="yellow" if item.contradicts_declaration else ""),
             _steps(item),
             *(number(value) for value in limit),
@@ -238,9 +269,8 @@ def _line(choice: Choice, of: str) -> str:
 
 def _checked(found: Recommendation) -> str:
     checked = found.checked
-    at = ", ".join(f"{name} = {value:g}" for name, value in found.parameters.items()) or "the default parameters"
     over = [f"{name} {low:g} to {high:g}" for name, (low, high) in checked.parameters.items()]
-    said = f"Checked over {checked.until:g} s at {at}"
+    said = f"Checked over {checked.until:g} s at {listed(found.parameters) or 'the default parameters'}"
     if over:
         said += f", and at {checked.corners} corners of {', '.join(over)}"
     return said + "; nothing is known beyond."

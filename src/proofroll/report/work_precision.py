@@ -8,7 +8,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from proofroll.report.figure import svg_text
-from proofroll.report.labels import symbol
+from proofroll.report.labels import listed, symbol
 from proofroll.report.labels import unit as shown_unit
 from proofroll.running.store import write_text
 
@@ -58,7 +58,7 @@ def _drawn(study: TradeoffStudy, quantities: Sequence[str]) -> Figure:
         _panel(panel, study, quantity)
     for panel in panels[len(quantities) :]:
         panel.set_visible(False)
-    at = ", ".join(f"{name} = {value:g}" for name, value in study.parameters.items()) or "default parameters"
+    at = listed(study.parameters) or "default parameters"
     figure.suptitle(f"{study.scene}, {at}, over {study.until:g} s", fontsize=9)
     handles, labels = panels[0].get_legend_handles_labels()
     figure.legend(handles, labels, loc="outside right upper", frameon=False, fontsize=7)
