@@ -20,9 +20,9 @@ from proofroll.files.comparison_file import load_comparison
 from proofroll.files.trajectory_file import read
 from proofroll.report.comparison_content import outcome_content
 from proofroll.report.growing_report import write_report
-from proofroll.report.work_precision import draw as draw_work_precision
+from proofroll.report.work_precision import svg
 from proofroll.running.runner import Runner
-from proofroll.running.store import Store
+from proofroll.running.store import Store, write_text
 from proofroll.studies.claims import claims_for
 from proofroll.studies.compare import compare
 from proofroll.studies.outcome import Outcome
@@ -103,7 +103,7 @@ def main() -> None:
         write_report([outcome], runner.store, Path(folder), "proofroll report paper")
         screenshot(Path(folder) / "report.html", ROOT / "docs" / "report.png")
         study = measured(runner)
-    draw_work_precision(study, [study.quantity], ROOT / "docs" / "work_precision.svg")
+    write_text(ROOT / "docs" / "work_precision.svg", svg(study, [study.quantity]))
     draw_regimes(regime_maps(load_regimes("regimes"), workers=os.cpu_count() or 1), ROOT / "docs" / "regimes.svg")
     target = ROOT / "docs" / "sphere_in_cylinder.md"
     text = target.read_text(encoding="utf-8")

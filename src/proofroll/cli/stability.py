@@ -24,8 +24,9 @@ def stability(
     as_json: options.Json = False,
 ) -> None:
     """Map up to which step or tolerance each engine is stable, and right, along axes of extremes."""
-    from proofroll.report.stability_map import draw
+    from proofroll.report.stability_map import svg
     from proofroll.report.stability_tables import stability_parts
+    from proofroll.running.store import write_text
     from proofroll.studies.axes import chosen
     from proofroll.studies.stability_claims import file_for
     from proofroll.studies.stability_places import QUICK, Effort
@@ -38,7 +39,7 @@ def stability(
     runner = options.new_runner(out, fresh, jobs, scheduler)
     with options.progress_bar("stability", None) as advance:
         study, path = make_stability(asked, axes, runner, out, engines=engine or [], effort=effort, progress=advance)
-    draw(study, path.with_suffix(".svg"))
+    write_text(path.with_suffix(".svg"), svg(study))
     options.show(study, as_json, lambda: stability_parts(study, path))
     if study.absent and not study.points:
         for name, reason in study.absent.items():

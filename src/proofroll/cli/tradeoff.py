@@ -46,7 +46,8 @@ def tradeoff(
 ) -> None:
     """Measure error against cost for every engine, formulation and setting, from coarse to fine."""
     from proofroll.report.tradeoff_tables import default_quantities, tradeoff_parts
-    from proofroll.report.work_precision import draw
+    from proofroll.report.work_precision import svg
+    from proofroll.running.store import write_text
 
     claims, question = question_of(scene, settings, quantity, until)
     require_observables(question, quantity or [])
@@ -54,7 +55,7 @@ def tradeoff(
     options.require_pages()
     study, path = measure(question, engine or [], ranges, claims, options.new_runner(out, fresh, jobs, scheduler), out)
     shown = [name for name in quantity or [] if name in study.quantities] or default_quantities(study)
-    draw(study, shown, path.with_suffix(".svg"))
+    write_text(path.with_suffix(".svg"), svg(study, shown))
     options.show(study, as_json, lambda: tradeoff_parts(study, shown, path, every_point=every_point))
     raise typer.Exit(options.CONTRADICTED if study.claims.contradictions else options.OK)
 

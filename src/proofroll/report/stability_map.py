@@ -1,16 +1,15 @@
-"""The heat maps: engine against the value of an axis, with colour and text that says the same."""
+"""The heat maps as a picture and as a table of a page: colour, and text that says the same."""
 
 from __future__ import annotations
 
 import itertools
 import math
 import textwrap
-from pathlib import Path
+from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING, Any
 
-from proofroll.report.figure import svg_text
-from proofroll.report.labels import name_of, number
-from proofroll.running.store import write_text
+from proofroll.report.figure import panels, svg_text
+from proofroll.report.labels import name_of, number, step
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
@@ -39,15 +38,6 @@ _TOLERANCE_DECADES = 13
 _LETTERS_PER_PANEL = 118
 
 
-def draw(study: StabilityStudy, path: Path) -> None:
-    """Writes the heat maps as one SVG file, a panel per axis.
-
-    Raises:
-        Missing: matplotlib is not installed.
-    """
-    write_text(path, svg(study))
-
-
 def svg(study: StabilityStudy) -> str:
     """All heat maps as one SVG text; texts stay texts, which a page can scale, search and read out.
 
@@ -70,18 +60,13 @@ def legend(study: StabilityStudy) -> list[str]:
 def _drawn(study: StabilityStudy) -> Figure:
     """A panel for each axis that has points, row by row."""
     import matplotlib as mpl
-    from matplotlib.figure import Figure
 
     axes = [axis for axis in study.axes if any(point.axis == axis.name for point in study.points)]
-    columns = min(2, len(axes)) or 1
-    rows = math.ceil(len(axes) / columns) or 1
     curves = list(dict.fromkeys(point.curve for point in study.points))
-    figure = Figure(figsize=(7.2 * columns, rows * (0.9 + 0.24 * len(curves)) + 1.0), layout="constrained")
-    panels = figure.subplots(rows, columns, squeeze=False).ravel()
-    for panel, axis in zip(panels, axes, strict=False):
+    figure, drawn, rows, columns = panels(len(axes))
+    figure.set_size_inches(7.2 * columns, rows * (0.9 + 0.24 * len(curves)) + 1.0)
+    for panel, axis in zip(drawn, axes, strict=True):
         _panel(panel, study, axis, curves, mpl.colormaps["cividis_r"])
-    for panel in panels[len(axes) :]:
-        panel.set_visible(False)
     text = "\n".join(textwrap.fill(sentence, _LETTERS_PER_PANEL * columns) for sentence in legend(study))
     figure.suptitle(text, fontsize=8, x=0.01, ha="left")
     return figure
@@ -130,8 +115,61 @@ def cell(point: BoundaryPoint) -> tuple[str, float | None]:
     if largest is None:
         return f"– {beyond}".strip(), None
     if point.resolution != "dt":
-        shade = -math.log10(largest) / _TOLERANCE_DECADES
-        return f"{number(largest)} {beyond}".strip(), shade
-    steps = point.period / largest
-    shade = math.log(max(steps, _FEWEST) / _FEWEST) / math.log(_MOST / _FEWEST)
-    return f"{steps:.0f} {beyond}".strip(), min(shade, 1.0)
+        text, shade = number(largest), -math.log10(largest) / _TOLERANCE_DECADES
+    else:
+        steps = point.period / largest
+        text, shade = f"{steps:.0f}", math.log(max(steps, _FEWEST) / _FEWEST) / math.log(_MOST / _FEWEST)
+    return f"{text} {beyond}".strip(), min(max(shade, 0.0), 1.0)
+
+
+@dataclass(frozen=True)
+class HeatMap:
+    """A map as a table.
+
+    Attributes:
+        axes: those that have a point, each with the values that have one.
+        groups: by engine the name of each setting, and for each value of each axis the number of its point, or None.
+        letters: those that occur, and what they stand for.
+    """
+
+    axes: list[Axis]
+    groups: dict[str, list[tuple[str, list[int | None]]]]
+    letters: dict[str, str]
+
+
+def heat_map(study: StabilityStudy) -> HeatMap:
+    """The map by engine and axis."""
+    mapped = [
+        replace(axis, values=list(dict.fromkeys(point.value for point in study.points if point.axis == axis.name)))
+        for axis in study.axes
+    ]
+    axes = [axis for axis in mapped if axis.values]
+    columns = [(axis.name, value) for axis in axes for value in axis.values]
+    numbers = {(point.curve, point.axis, point.value): number for number, point in enumerate(study.points)}
+    groups: dict[str, list[tuple[str, list[int | None]]]] = {}
+    for curve, point in {point.curve: point for point in study.points}.items():
+        name = name_of(point).removeprefix(point.engine).strip() or curve
+        groups.setdefault(point.engine, []).append((name, [numbers.get((curve, *column)) for column in columns]))
+    seen = {point.failure for point in study.points}
+    return HeatMap(axes, groups, {letter: kind for kind, letter in LETTERS.items() if kind in seen})
+
+
+def told(point: BoundaryPoint) -> str:
+    """Who was told of a failure: nobody, or before the run, or the engine said so."""
+    if point.failure == "refused":
+        return "before the run"
+    return "silent" if point.silent else "says so"
+
+
+def in_words(point: BoundaryPoint) -> str:
+    """All that a cell stands for."""
+    words = [f"{name_of(point)} at {point.axis} = {point.value:g}"]
+    if point.problem:
+        words.append("there is no truth")
+    elif point.largest_accurate is None:
+        words.append("no affordable step or tolerance holds 1 %")
+    else:
+        words.append(f"1 % up to {step(point.resolution, point.largest_accurate)}")
+    if point.failure:
+        words.append(f"beyond: {point.failure}, {told(point)}")
+    return "; ".join(words)

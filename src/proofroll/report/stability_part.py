@@ -7,7 +7,7 @@ from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, ClassVar
 
-from proofroll.report import heat_map
+from proofroll.report import stability_map
 from proofroll.report.study_parts import Part, PartEntry, head_of, held
 from proofroll.studies.stability_claims import STUDY, Claim, StabilityFile, file_for
 
@@ -47,7 +47,7 @@ class StabilityPart(Part):
     order: ClassVar[float] = 40
     words: ClassVar[str] = "where engines stop being right"
     template: ClassVar[str] = "stability.html"
-    names: ClassVar[Mapping[str, Any]] = {"heat_map": heat_map.table, "told": heat_map.told}
+    names: ClassVar[Mapping[str, Any]] = {"stability_map": stability_map}
     asked: StabilityFile
     engines: Sequence[str] = ()
     study: StabilityStudy | None = None

@@ -2,15 +2,12 @@
 
 from __future__ import annotations
 
-import math
 from collections.abc import Sequence
-from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from proofroll.report.figure import svg_text
+from proofroll.report.figure import panels, svg_text
 from proofroll.report.labels import listed, symbol
 from proofroll.report.labels import unit as shown_unit
-from proofroll.running.store import write_text
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
@@ -27,17 +24,8 @@ _SMALLEST = 1e-17
 _LINE = 0.145
 
 
-def draw(study: TradeoffStudy, quantities: Sequence[str], path: Path) -> None:
-    """Writes the diagram as an SVG file, one panel per quantity.
-
-    Raises:
-        Missing: matplotlib is not installed.
-    """
-    write_text(path, svg(study, quantities))
-
-
 def svg(study: TradeoffStudy, quantities: Sequence[str]) -> str:
-    """The diagram as SVG text.
+    """The diagram as SVG text, one panel per quantity.
 
     Raises:
         Missing: matplotlib is not installed.
@@ -46,21 +34,14 @@ def svg(study: TradeoffStudy, quantities: Sequence[str]) -> str:
 
 
 def _drawn(study: TradeoffStudy, quantities: Sequence[str]) -> Figure:
-    from matplotlib.figure import Figure
-
+    figure, drawn, rows, columns = panels(len(quantities))
     curves = {point.curve for point in study.points}
-    columns = min(2, len(quantities))
-    rows = math.ceil(len(quantities) / columns)
-    size = (5.2 * columns + 2.6, max(3.9 * rows + 0.4, _LINE * len(curves) + 1.0))
-    figure = Figure(figsize=size, layout="constrained")
-    panels = figure.subplots(rows, columns, squeeze=False).ravel()
-    for panel, quantity in zip(panels, quantities, strict=False):
+    figure.set_size_inches(5.2 * columns + 2.6, max(3.9 * rows + 0.4, _LINE * len(curves) + 1.0))
+    for panel, quantity in zip(drawn, quantities, strict=True):
         _panel(panel, study, quantity)
-    for panel in panels[len(quantities) :]:
-        panel.set_visible(False)
     at = listed(study.parameters) or "default parameters"
     figure.suptitle(f"{study.scene}, {at}, over {study.until:g} s", fontsize=9)
-    handles, labels = panels[0].get_legend_handles_labels()
+    handles, labels = drawn[0].get_legend_handles_labels()
     figure.legend(handles, labels, loc="outside right upper", frameon=False, fontsize=7)
     return figure
 

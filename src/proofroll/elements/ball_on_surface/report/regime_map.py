@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import io
 from collections.abc import Sequence
 from fractions import Fraction
 from pathlib import Path
@@ -10,17 +9,18 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from proofroll.files.atomic import replacing
 from proofroll.files.json_data import plain
+from proofroll.report.figure import drawn_file
 from proofroll.report.pages import element
+from proofroll.running.store import write_text
 from proofroll.truth.regimes import Regime
 
 if TYPE_CHECKING:
     import xarray as xr
+    from matplotlib.figure import Figure
 
 # Width of an entry of the legend [inch].
 _ENTRY = 3.4
-_NO_DATE: dict[str, dict[str, Any]] = {"svg": {"Date": None}, "pdf": {"CreationDate": None}}
 _WORDS = {Regime.NEVER_SLIPS: "never slips", Regime.RECOVERS: "slips and recovers", Regime.FALLS: "falls"}
 # From light to dark, so that they differ in grey too.
 _COLOURS = {Regime.NEVER_SLIPS: "#d5e8de", Regime.RECOVERS: "#e8b64c", Regime.FALLS: "#a63c33"}
@@ -83,14 +83,8 @@ def boundaries(item: xr.Dataset) -> dict[str, str]:
 
 
 def draw(maps: Sequence[xr.Dataset], path: Path) -> None:
-    """Writes the maps side by side as an SVG file.
-
-    Raises:
-        Missing: matplotlib is not installed.
-    """
-    text = _svg(maps)
-    with replacing(path) as temporary:
-        temporary.write_text(text, encoding="utf-8")
+    """Writes the maps side by side as an SVG file; raises Missing if matplotlib is not installed."""
+    write_text(path, _svg(maps))
 
 
 def inline(maps: Sequence[xr.Dataset], prefix: str) -> str:
@@ -118,40 +112,36 @@ def picture(maps: Sequence[xr.Dataset], form: str, style: Any, size: tuple[float
     Raises:
         Missing: matplotlib is not installed.
     """
-    from proofroll.core.errors import Missing
+    settings = {"svg.fonttype": "none", **style, "axes.grid": False}
+    return drawn_file(form, settings, lambda: _drawn(maps, size), dpi=300)
 
-    try:
-        import matplotlib as mpl
-        from matplotlib.colors import ListedColormap
-        from matplotlib.figure import Figure
-        from matplotlib.lines import Line2D
-        from matplotlib.patches import Patch
-    except ImportError:
-        raise Missing("drawing needs matplotlib: pip install 'proofroll[report]'") from None
-    with mpl.rc_context({"svg.hashsalt": "proofroll", "svg.fonttype": "none", **style, "axes.grid": False}):
-        figure = Figure(figsize=size, layout="constrained")
-        colours = ListedColormap([_COLOURS[regime] for regime in Regime])
-        for index, item in enumerate(maps):
-            axes = figure.add_subplot(1, len(maps), index + 1)
-            axes.pcolormesh(
-                item["speed"], item["mu_static"], item["regime"].T, cmap=colours, vmin=0, vmax=2, rasterized=True
-            )
-            for name, (dashes, _) in _LINES.items():
-                if name in item:
-                    axes.plot(item["speed"], item[name], color="black", ls=dashes, lw=1)
-            axes.set(
-                xlim=(float(item["speed"].min()), float(item["speed"].max())),
-                ylim=(float(item["mu_static"].min()), float(item["mu_static"].max())),
-                xlabel="initial speed [m/s]",
-                ylabel="static friction [-]",
-                title=f"rolling resistance f = {item.attrs['rolling_resistance']:g} m, {item.attrs['until']:g} s",
-            )
-        handles: list[Any] = [Patch(color=_COLOURS[regime], label=word) for regime, word in _WORDS.items()]
-        for name, formula in next((found for item in maps if (found := boundaries(item))), {}).items():
-            dashes, meaning = _LINES[name]
-            handles.append(Line2D([], [], color="black", ls=dashes, lw=1, label=f"{formula}: {meaning}"))
-        figure.legend(handles=handles, loc="outside lower center", ncols=max(1, int(size[0] / _ENTRY)), frameon=False)
-        content = io.BytesIO()
-        # Equal maps give equal files, so no date; PNG has no such field.
-        figure.savefig(content, format=form, dpi=300, metadata=_NO_DATE.get(form))
-    return content.getvalue()
+
+def _drawn(maps: Sequence[xr.Dataset], size: tuple[float, float]) -> Figure:
+    from matplotlib.colors import ListedColormap
+    from matplotlib.figure import Figure
+    from matplotlib.lines import Line2D
+    from matplotlib.patches import Patch
+
+    figure = Figure(figsize=size, layout="constrained")
+    colours = ListedColormap([_COLOURS[regime] for regime in Regime])
+    for index, item in enumerate(maps):
+        axes = figure.add_subplot(1, len(maps), index + 1)
+        axes.pcolormesh(
+            item["speed"], item["mu_static"], item["regime"].T, cmap=colours, vmin=0, vmax=2, rasterized=True
+        )
+        for name, (dashes, _) in _LINES.items():
+            if name in item:
+                axes.plot(item["speed"], item[name], color="black", ls=dashes, lw=1)
+        axes.set(
+            xlim=(float(item["speed"].min()), float(item["speed"].max())),
+            ylim=(float(item["mu_static"].min()), float(item["mu_static"].max())),
+            xlabel="initial speed [m/s]",
+            ylabel="static friction [-]",
+            title=f"rolling resistance f = {item.attrs['rolling_resistance']:g} m, {item.attrs['until']:g} s",
+        )
+    handles: list[Any] = [Patch(color=_COLOURS[regime], label=word) for regime, word in _WORDS.items()]
+    for name, formula in next((found for item in maps if (found := boundaries(item))), {}).items():
+        dashes, meaning = _LINES[name]
+        handles.append(Line2D([], [], color="black", ls=dashes, lw=1, label=f"{formula}: {meaning}"))
+    figure.legend(handles=handles, loc="outside lower center", ncols=max(1, int(size[0] / _ENTRY)), frameon=False)
+    return figure
