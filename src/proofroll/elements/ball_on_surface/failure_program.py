@@ -14,7 +14,7 @@ from proofroll.elements.ball_on_surface.failure import (
     off_surface,
 )
 from proofroll.elements.ball_on_surface.model import RollingBall
-from proofroll.elements.ball_on_surface.reproducer_source import ball_numbers, literal
+from proofroll.elements.ball_on_surface.reproducer_source import assigned, ball_numbers
 
 _CHECK = '''
 
@@ -98,9 +98,12 @@ def through_proofroll(body: RollingBall, failed: FailedRun) -> str:
     """An engine's part that asks proofroll to run it, where what fails is, in part or as a whole, proofroll's."""
     head = "import numpy as np\nfrom proofroll import load_scene, simulate\n"
     head += "from proofroll.elements.ball_on_surface.element import rolling_ball\n\n"
-    numbers = "".join(f"{name} = {literal(value)}\n" for name, value in ball_numbers(body).items())
     run = {"scene": failed.scene, "parameters": dict(failed.parameters)}
-    return head + numbers + _THROUGH.format(**run, engine=failed.engine, settings=dict(failed.settings))
+    return (
+        head
+        + assigned(**ball_numbers(body))
+        + _THROUGH.format(**run, engine=failed.engine, settings=dict(failed.settings))
+    )
 
 
 def program(body: RollingBall, failed: FailedRun, engine: str | None) -> str:
@@ -111,9 +114,12 @@ def program(body: RollingBall, failed: FailedRun, engine: str | None) -> str:
     true: list[float] = []
     if truth is not None and along is not None and along.kind == "translation":
         true = (truth[body.surface.coordinates[-1]].to_numpy() - body.u0[-1]).tolist()
+    rolls = [] if truth is None or "sticking" not in truth else [int(value) for value in truth["sticking"].to_numpy()]
+    resists = truth is not None and body.contact.rolling_resistance > 0
+    ways = np.round(heading(truth["v_WB"].to_numpy()), 4).tolist() if resists and truth is not None else []
     numbers = {
         "EVERY": failed.every,
-        "STEP": failed.settings[failed.resolution],
+        "STEP": float(failed.settings[failed.resolution]),
         "OFF": off_surface(body),
         "KINETIC": largest_kinetic_energy(body, truth),
         "GAIN": GAIN,
@@ -121,17 +127,14 @@ def program(body: RollingBall, failed: FailedRun, engine: str | None) -> str:
         "BACKWARDS": BACKWARDS,
         "RANGE": failed.scale,
         "ALLOWED": failed.allowed,
+        "SAMPLES": round(failed.until / failed.every),
+        "FAILURE": failed.failure,
+        "ALONG": list(along.axis) if along else [0.0, 0.0, 0.0],
+        "TRUE": true,
+        "ROLLS": rolls,
+        "HEADING": ways,
     }
     head, _, rest = part.partition("\n\n")
     text = ['"""' + "\n".join(failed.lines("A ball rolls on a wall", head)) + '\n"""\n', "import sys\n" + head + "\n"]
-    text += [rest, "\n# What the run is held against.\n"]
-    text += [f"{name} = {literal(value)}\n" for name, value in numbers.items()]
-    text.append(f"SAMPLES = {round(failed.until / failed.every)}\nFAILURE = {failed.failure!r}\n")
-    text.append(f"ALONG = {list(along.axis) if along else [0.0, 0.0, 0.0]!r}\n")
-    text.append(f"TRUE = {true!r}  # by two independent routes\n")
-    rolls = [] if truth is None or "sticking" not in truth else [int(value) for value in truth["sticking"].to_numpy()]
-    text.append(f"ROLLS = {rolls!r}\n")
-    resists = truth is not None and body.contact.rolling_resistance > 0
-    ways = np.round(heading(truth["v_WB"].to_numpy()), 4).tolist() if resists and truth is not None else []
-    text.append(f"HEADING = {ways!r}\n")
-    return "".join(text) + _CHECK
+    text += [rest, "\n# What the run is held against; TRUE is what two independent routes say.\n"]
+    return "".join(text) + assigned(**numbers) + _CHECK

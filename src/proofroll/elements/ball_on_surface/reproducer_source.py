@@ -14,16 +14,10 @@ from proofroll.core.errors import Refused
 from proofroll.elements.ball_on_surface.model import RollingBall
 
 
-def literal(value: Any) -> str:
-    """A number or an array as Python source that keeps every digit."""
-    if isinstance(value, np.ndarray):
-        return repr(value.tolist())
-    return repr(float(value))
-
-
 def assigned(**values: Any) -> str:
-    """One line ``NAME = value`` for each."""
-    return "".join(f"{name} = {literal(value)}\n" for name, value in values.items())
+    """One line ``NAME = value`` for each: plain data, or a number or an array of numpy's, with every digit."""
+    plain = {name: value.tolist() if hasattr(value, "tolist") else value for name, value in values.items()}
+    return "".join(f"{name} = {value!r}\n" for name, value in plain.items())
 
 
 def wall_source(body: RollingBall) -> str:

@@ -105,19 +105,19 @@ class Carrier:
             row.item: np.array([-self._factor(row) * relative @ cross(self.spin, row.axis)]) for row in self.rolling
         }
 
-    def numbers(self) -> list[str]:
-        """Assignments for the program of :mod:`reproducer`: the carrier's start, its joint and the rolling."""
+    def numbers(self) -> dict[str, Any]:
+        """What the program of :mod:`reproducer` assigns: the carrier's start, its joint and the rolling."""
         rolling = [
             (row.generator.kind.capitalize(), list(row.generator.axis), row.axis.tolist(), self._factor(row))
             for row in self.rolling
         ]
-        return [
-            f"CARRIER_VELOCITY = {self.velocity.tolist()!r}",
-            f"CARRIER_SPIN = {self.spin.tolist()!r}",
-            f"JOINT_AXES = {self.axes.tolist()!r}",
-            f"JOINT_CONSTRAINED = {self.constrained!r}",
-            f"ROLLING = {rolling!r}",
-        ]
+        return {
+            "CARRIER_VELOCITY": self.velocity,
+            "CARRIER_SPIN": self.spin,
+            "JOINT_AXES": self.axes,
+            "JOINT_CONSTRAINED": self.constrained,
+            "ROLLING": rolling,
+        }
 
     def sample(self) -> Sample:
         """See :class:`proofroll.core.engine.Engine`. The pivot transmits the whole force of the wall."""

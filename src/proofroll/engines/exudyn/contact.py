@@ -158,6 +158,19 @@ class PenaltyContact:
         force = np.asarray(self.system.GetObjectOutput(self.contact, Output.Force))
         return float(np.linalg.norm(force)) / math.hypot(1.0, self._grip)
 
+    def numbers(self) -> dict[str, Any]:
+        """What the program of :mod:`reproducer` assigns: the contact as Exudyn holds it."""
+        contact = self.system.GetObject(self.contact)
+        return {
+            "RADII": [float(radius) for radius in contact["spheresRadii"]],
+            "CONTACT_STATE": self.system.GetNode(self.data)["initialCoordinates"],
+            "FRICTION": contact["dynamicFriction"],
+            "ZONE": contact["frictionProportionalZone"],
+            "BOUNDED": self.bounded,
+            "SURELY": SURELY,
+            "STIFFNESS": contact["contactStiffness"],
+        }
+
     def sample(self) -> Sample:
         """See :class:`proofroll.core.engine.Engine`. The force is that of the contact."""
         force = self.system.GetObjectOutput(self.contact, Output.Force)

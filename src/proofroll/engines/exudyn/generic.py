@@ -116,8 +116,8 @@ class Generic:
             items.CoordinateVectorConstraint(markerNumbers=all_of, scalingMarker1=rows, velocityLevel=True)
         )
 
-    def numbers(self) -> list[str]:
-        """Assignments for the program of :mod:`reproducer`.
+    def numbers(self) -> dict[str, Any]:
+        """What the program of :mod:`reproducer` assigns.
 
         Raises:
             Refused: the weight turns with the coordinates.
@@ -126,17 +126,16 @@ class Generic:
         if weight_turns(body, self.local):
             raise Refused("the program for this formulation has no gravity across the wall's axis")
         weight = weight_function(body, self.local, body.ball.mass * base(self.local))
-        generators = [(generator.kind, list(generator.axis)) for generator in self.local.generators]
-        return [
-            f"MASS_MATRIX = {self._mass_matrix().tolist()!r}",
-            f"QUADRATIC = {quadratic_terms(body, self.local)!r}",
-            f"WEIGHT = {weight([])!r}",
-            f"ROWS = {self._rows().tolist()!r}",
-            f"COORDINATES = {body.u0.tolist()!r}",
-            f"RATES = {self._rates!r}",
-            f"TANGENTS = {self.local.tangents.tolist()!r}",
-            f"GENERATORS = {generators!r}",
-        ]
+        return {
+            "MASS_MATRIX": self._mass_matrix(),
+            "QUADRATIC": quadratic_terms(body, self.local),
+            "WEIGHT": weight([]),
+            "ROWS": self._rows(),
+            "COORDINATES": body.u0,
+            "RATES": self._rates,
+            "TANGENTS": self.local.tangents,
+            "GENERATORS": [(generator.kind, list(generator.axis)) for generator in self.local.generators],
+        }
 
     def _mass_matrix(self) -> FloatArray:
         """As Exudyn holds it."""

@@ -26,15 +26,7 @@ from proofroll.engines.mujoco.friction import BoundedFriction, check_coefficient
 from proofroll.engines.mujoco.mechanism import MujocoMechanism
 from proofroll.engines.mujoco.model import read_spec, write_physics
 from proofroll.engines.mujoco.running import SteppedModel, compiled, forget_callbacks, silent
-from proofroll.engines.mujoco.settings import (
-    PRESETS,
-    ROLLS,
-    MujocoSettings,
-    check,
-    check_restitution,
-    lowered,
-    velocity_lag,
-)
+from proofroll.engines.mujoco.settings import PRESETS, ROLLS, MujocoSettings, check, check_restitution, lowered
 from proofroll.engines.mujoco.softness import softness
 from proofroll.engines.mujoco.start import EVALUATIONS, accelerations, start
 from proofroll.engines.mujoco.terms import TERMS
@@ -178,7 +170,7 @@ class Mujoco(SteppedModel):
         data = self._evaluated()
         force = contact_force(self._model, data, self._geom)
         sticking = None if self._friction is None else self._friction.holds(data)
-        data.qvel += velocity_lag(self._settings) * data.qacc
+        data.qvel += self._settings.velocity_lag * data.qacc
         mujoco.mj_comVel(self._model, data)
         velocity = np.zeros(6)
         mujoco.mj_objectVelocity(self._model, data, mujoco.mjtObj.mjOBJ_BODY, self._ball, velocity, 0)

@@ -16,7 +16,7 @@ from proofroll.engines.mujoco.contact import foreseen_normal_force
 from proofroll.engines.mujoco.formulation import Formulation
 from proofroll.engines.mujoco.friction import BoundedFriction, corrects
 from proofroll.engines.mujoco.model import pose, quaternion_of, tangent_plane
-from proofroll.engines.mujoco.settings import MujocoSettings, normal_lead, own_share, velocity_lag
+from proofroll.engines.mujoco.settings import MujocoSettings
 
 
 class Free(Formulation):
@@ -36,10 +36,10 @@ class Free(Formulation):
             raise Refused("for MuJoCo a mocap plane has no velocity, so the wall's is added with curvature=true alone")
         self._wall = model.geom("wall").id
         self._curvature = settings.curvature
-        self._half = velocity_lag(settings)
+        self._half = settings.velocity_lag
         # MuJoCo's damping of a velocity that lags by half a step is part of -J̇v; this much is left to add.
-        self._share = 1 - own_share(settings)
-        self._lead = normal_lead(settings)
+        self._share = 1 - settings.own_share
+        self._lead = settings.normal_lead
 
     @staticmethod
     def write(spec: Any, body: RollingBall) -> None:

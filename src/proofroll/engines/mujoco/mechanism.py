@@ -10,7 +10,7 @@ import numpy as np
 
 from proofroll.core.arrays import cross
 from proofroll.core.engine import Sample
-from proofroll.core.errors import InputError, Refused
+from proofroll.core.errors import Refused
 from proofroll.elements.mechanism import Joint
 from proofroll.elements.mechanism.capabilities import ALL_JOINTS, FORCES, MechanismCapability, require
 from proofroll.elements.mechanism.joint_motion import placed
@@ -19,7 +19,7 @@ from proofroll.elements.mechanism.sampling import MechanismBuilt, mechanism_of, 
 from proofroll.engines.mujoco import mechanism_model
 from proofroll.engines.mujoco.mechanism_built import read_back
 from proofroll.engines.mujoco.running import SteppedModel, compiled, forget_callbacks, silent
-from proofroll.engines.mujoco.settings import MujocoSettings, impedance
+from proofroll.engines.mujoco.settings import MujocoSettings, check
 
 _CAPABILITY = MechanismCapability
 _NO_SENSORS = int(mujoco.mjtDisableBit.mjDSBL_SENSOR)
@@ -41,7 +41,7 @@ class MujocoMechanism(SteppedModel):
     """See :class:`proofroll.core.engine.Engine` for the methods."""
 
     def __init__(self, scene: Any, settings: MujocoSettings) -> None:
-        check(settings)
+        check(settings, bounded=False)
         mechanism = mechanism_of(scene)
         require(mechanism, PROVIDES, LACKING)
         forget_callbacks()
@@ -136,22 +136,9 @@ class MujocoMechanism(SteppedModel):
 
     def built(self) -> MechanismBuilt:
         """See :class:`proofroll.core.engine.Engine`."""
-        return read_back(self._model, self._evaluated(), self._mechanism, impedance(self._settings)[0])
+        return read_back(self._model, self._evaluated(), self._mechanism, self._settings.impedances[0])
 
     def _evaluate(self, data: Any) -> None:
         self._model.opt.disableflags &= ~_NO_SENSORS
         super()._evaluate(data)
         self._model.opt.disableflags |= _NO_SENSORS
-
-
-def check(settings: MujocoSettings) -> None:
-    """Rejects options of a contact that was changed, for this formulation has none.
-
-    Raises:
-        InputError: the first of them.
-    """
-    plain = MujocoSettings(settings.formulation)
-    for name in ("cone", "friction", "friction_damping", "start", "curvature", "cone_correction", "condim"):
-        if getattr(settings, name) != getattr(plain, name):
-            advice = "joints has no contact; leave it out"
-            raise InputError(f"mujoco: {name}", getattr(settings, name), advice)

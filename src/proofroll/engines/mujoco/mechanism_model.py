@@ -18,7 +18,7 @@ import numpy as np
 from proofroll.elements.mechanism import WORLD, Body, Joint, Loop, Mechanism
 from proofroll.elements.mechanism.loop_points import held_points
 from proofroll.elements.mechanism.rotations import to_quaternion
-from proofroll.engines.mujoco.settings import MujocoSettings, impedance, time_constant
+from proofroll.engines.mujoco.settings import MujocoSettings
 
 _HINGE, _SLIDE = mujoco.mjtJoint.mjJNT_HINGE, mujoco.mjtJoint.mjJNT_SLIDE
 _BALL, _FREE = mujoco.mjtJoint.mjJNT_BALL, mujoco.mjtJoint.mjJNT_FREE
@@ -116,6 +116,6 @@ def _add_loop(
         added = spec.add_equality(name=f"loop{number}.{point}", type=kind, objtype=mujoco.mjtObj.mjOBJ_SITE)
         added.name1, added.name2 = names
         if settings.time_constant is not None:
-            added.solref = (time_constant(settings), 1.0)
+            added.solref = (settings.contact_time, 1.0)
         if settings.impedance is not None:
-            added.solimp = (*impedance(settings), 1e-3, 0.5, 2.0)
+            added.solimp = (*settings.impedances, 1e-3, 0.5, 2.0)

@@ -16,7 +16,7 @@ from proofroll.elements.ball_on_surface.model import RollingBall
 from proofroll.engines.mujoco.contact import MEMORY
 from proofroll.engines.mujoco.friction import MEMORY as SLIP_MEMORY
 from proofroll.engines.mujoco.friction import condim, corrects
-from proofroll.engines.mujoco.settings import MujocoSettings, friction_coefficients, impedance, time_constant
+from proofroll.engines.mujoco.settings import MujocoSettings
 from proofroll.engines.mujoco.written import written
 
 
@@ -55,10 +55,10 @@ def write_physics(spec: Any, body: RollingBall, settings: MujocoSettings) -> Non
     mu = body.contact.mu_static if math.isfinite(body.contact.mu_static) else settings.friction
     for geom in spec.geoms:
         geom.condim = condim(mu, settings)
-        geom.friction = friction_coefficients(mu, settings)
+        geom.friction = settings.friction_coefficients(mu)
         # MuJoCo's defaults are written too: the file may hold others.
-        geom.solref = [time_constant(settings), 1.0]
-        geom.solimp = [*impedance(settings), 0.001, 0.5, 2.0]
+        geom.solref = [settings.contact_time, 1.0]
+        geom.solimp = [*settings.impedances, 0.001, 0.5, 2.0]
     if settings.friction_damping is not None:
         _write_pair(spec, settings, mu, settings.friction_damping)
     if body.contact.restitution is not None:
@@ -79,7 +79,7 @@ def _write_restitution(spec: Any, body: RollingBall, settings: MujocoSettings, m
 def _write_pair(spec: Any, settings: MujocoSettings, mu: float, damping: float) -> None:
     """The contact as a pair, in place of the one that MuJoCo finds itself: only a pair has ``solreffriction``."""
     pair = spec.add_pair(geomname1="wall", geomname2="ball", condim=condim(mu, settings))
-    sliding, turning, rolling = friction_coefficients(mu, settings)
+    sliding, turning, rolling = settings.friction_coefficients(mu)
     pair.friction = [sliding, sliding, turning, rolling, rolling]
     pair.solref, pair.solimp = spec.geom("ball").solref, spec.geom("ball").solimp
     # Stiffness and damping with the sign that marks the direct format; a slip has no position to be stiff about.

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, replace
 from typing import Annotated, Literal
 
@@ -10,7 +10,7 @@ import mujoco
 from annotated_types import Ge, Gt, Le, Lt
 from pydantic import BeforeValidator
 
-from proofroll.core.errors import InputError, Refused
+from proofroll.core.errors import InputError, Refused, refuse_first
 from proofroll.core.plugins import release
 from proofroll.elements.ball_on_surface.model import BallCapability
 from proofroll.elements.mechanism.capabilities import ALL_LOOPS, MechanismCapability
@@ -37,6 +37,8 @@ POSITIONS_TIME_CONSTANT = 2.25
 # contact by the square of the coefficient: at 100 the ball flies through the wall without a warning.
 UNBOUNDED_FRICTION = 1e3
 LARGEST_PYRAMIDAL_FRICTION = 1.0
+# Settings of a contact, of which a mechanism of joints has none.
+_OF_CONTACT = ("cone", "friction", "friction_damping", "start", "curvature", "cone_correction", "condim")
 # Part of the normal force by which a corrected contact is pressed deeper, so that the next slip does not end it.
 PRELOAD = 0.01
 
@@ -111,6 +113,48 @@ class MujocoSettings:
             return ORDER_OF_TURNING if self.integrator == "RK4" else 1
         return 2 if self.curvature or self.formulation == "chart" else 1
 
+    @property
+    def velocity_lag(self) -> float:
+        """How long before the positions the velocities hold [s].
+
+        An Euler step of MuJoCo moves the position with the new velocity: it is a leapfrog, of second order if
+        velocities are read as those of half a step before. Only a contact with J̇v is exact enough to profit from that.
+        """
+        return self.dt / 2 if self.curvature else 0.0
+
+    @property
+    def contact_time(self) -> float:
+        """First number of the contact's ``solref`` [s]."""
+        return DEFAULT_TIME_CONSTANT if self.time_constant is None else self.time_constant * self.dt
+
+    @property
+    def impedances(self) -> tuple[float, float]:
+        """Impedance of the contact at depth zero and at large depth (dmin, dmax of ``solimp``)."""
+        return DEFAULT_IMPEDANCE if self.impedance is None else (self.impedance, self.impedance)
+
+    @property
+    def own_share(self) -> float:
+        """Part of J̇v that the contact's damping b J v supplies when v lags by half a step: b dt / 2.
+
+        MuJoCo has b = 2 / (dmax tc).
+        """
+        return self.velocity_lag * 2 / (self.impedances[1] * self.contact_time)
+
+    @property
+    def normal_lead(self) -> float:
+        """How long after the positions the bend of the path is needed [s].
+
+        To stay on the wall, a leapfrog step has to take e1·v from +h/2 V²/c at -h/2 to -h/2 V²/c at +h/2. The damping
+        gives ``own_share`` of that, for V at -h/2; the rest is to be added for V this much later than the positions.
+        Without the lead a ball that gets slower or faster along the wall loses contact in turns.
+        """
+        return self.velocity_lag * self.own_share / (1 - self.own_share)
+
+    def friction_coefficients(self, mu: float) -> tuple[float, float, float]:
+        """MuJoCo's coefficients of sliding [-], of turning about the normal [m] and of rolling [m]; 0 where unused."""
+        turning = DEFAULT_TURNING if self.condim >= TURNS else 0.0
+        return mu, turning, DEFAULT_ROLLING if self.condim >= ROLLS else 0.0
+
 
 def lowered(settings: MujocoSettings) -> Mapping[str, int]:
     """See :class:`proofroll.core.engine_abilities.LowersOrder`; measured.
@@ -125,44 +169,6 @@ def lowered(settings: MujocoSettings) -> Mapping[str, int]:
     return turning | dict.fromkeys((*ALL_LOOPS, MechanismCapability.JOINT_FRICTION), 1)
 
 
-def velocity_lag(settings: MujocoSettings) -> float:
-    """How long before the positions the velocities hold [s].
-
-    An Euler step of MuJoCo moves the position with the new velocity: it is a leapfrog, of second order if velocities
-    are read as those of half a step before. Only a contact with J̇v is exact enough to profit from that reading.
-    """
-    return settings.dt / 2 if settings.curvature else 0.0
-
-
-def time_constant(settings: MujocoSettings) -> float:
-    """First number of the contact's ``solref`` [s]."""
-    return DEFAULT_TIME_CONSTANT if settings.time_constant is None else settings.time_constant * settings.dt
-
-
-def impedance(settings: MujocoSettings) -> tuple[float, float]:
-    """Impedance of the contact at depth zero and at large depth (dmin, dmax of ``solimp``)."""
-    return DEFAULT_IMPEDANCE if settings.impedance is None else (settings.impedance, settings.impedance)
-
-
-def own_share(settings: MujocoSettings) -> float:
-    """Part of J̇v that the contact's damping b J v supplies when v lags by half a step: b dt / 2.
-
-    MuJoCo has b = 2 / (dmax tc).
-    """
-    return velocity_lag(settings) * 2 / (impedance(settings)[1] * time_constant(settings))
-
-
-def normal_lead(settings: MujocoSettings) -> float:
-    """How long after the positions the bend of the path is needed [s].
-
-    To stay on the wall, a leapfrog step has to take e1·v from +h/2 V²/c at -h/2 to -h/2 V²/c at +h/2. The damping
-    gives ``own_share`` of that, for V at -h/2; the rest is to be added for V this much later than the positions.
-    Without the lead a ball that gets slower or faster along the wall loses contact in turns.
-    """
-    share = own_share(settings)
-    return velocity_lag(settings) * share / (1 - share)
-
-
 def check(settings: MujocoSettings, *, bounded: bool) -> None:
     """Rejects combinations that MuJoCo would silently ignore or misread.
 
@@ -173,32 +179,47 @@ def check(settings: MujocoSettings, *, bounded: bool) -> None:
     Raises:
         InputError: the first such combination.
     """
-    if settings.cone == "pyramidal" and not bounded and settings.friction > LARGEST_PYRAMIDAL_FRICTION:
-        advice = f"with cone=pyramidal more than {LARGEST_PYRAMIDAL_FRICTION:g} makes the wall soft; set cone=elliptic"
-        raise InputError("mujoco: friction", settings.friction, advice)
-    if settings.cone_correction and settings.formulation == "facets":
-        raise InputError("mujoco: cone_correction", True, "facets does not use it; set formulation=free or chart")
-    if settings.cone_correction and settings.formulation == "free" and settings.integrator != "Euler":
-        # mj_step1 and mj_step2, between which the contact is edited, always make an Euler step.
-        raise InputError("mujoco: integrator", settings.integrator, "cone_correction=true needs integrator=Euler")
-    if settings.friction_damping is not None:
-        _check_friction_damping(settings)
-    if settings.condim > SLIDES:
-        _check_condim(settings, bounded)
-    if not settings.curvature:
-        return
-    if settings.formulation != "free":
-        raise InputError("mujoco: curvature", True, f"{settings.formulation} does not use it; set formulation=free")
-    if settings.integrator != "Euler":
-        raise InputError("mujoco: integrator", settings.integrator, "curvature=true needs integrator=Euler")
-    if settings.cone != "elliptic":
-        # A pyramid's rows are sums of normal and friction; the term belongs to each of them alone.
-        raise InputError("mujoco: cone", settings.cone, "curvature=true needs cone=elliptic")
-    share = own_share(settings)
-    if share >= 1:
+    rules = _rules_of_joints(settings) if settings.formulation == "joints" else _rules_of_contact(settings, bounded)
+    refuse_first("mujoco", settings, rules)
+    if settings.own_share >= 1:
         # MuJoCo's damping would supply all of J̇v or more of it: nothing is left to add.
-        advice = f"curvature=true needs impedance times time_constant above 1, not {1 / share:.4g}"
-        raise InputError("mujoco: impedance", impedance(settings)[1], advice)
+        advice = f"curvature=true needs impedance times time_constant above 1, not {1 / settings.own_share:.4g}"
+        raise InputError("mujoco: impedance", settings.impedances[1], advice)
+
+
+def _rules_of_joints(settings: MujocoSettings) -> Iterator[tuple[bool, str, str]]:
+    plain = MujocoSettings(settings.formulation)
+    for name in _OF_CONTACT:
+        yield getattr(settings, name) != getattr(plain, name), name, "joints has no contact; leave it out"
+
+
+def _rules_of_contact(settings: MujocoSettings, bounded: bool) -> Iterator[tuple[bool, str, str]]:
+    formulation, curvature, corrects = settings.formulation, settings.curvature, settings.cone_correction
+    is_free, is_euler = formulation == "free", settings.integrator == "Euler"
+    pyramidal, unused = settings.cone == "pyramidal", f"{formulation} does not use it; set formulation=free"
+    soft = pyramidal and not bounded and settings.friction > LARGEST_PYRAMIDAL_FRICTION
+    advice = f"with cone=pyramidal more than {LARGEST_PYRAMIDAL_FRICTION:g} makes the wall soft; set cone=elliptic"
+    yield soft, "friction", advice
+    yield corrects and formulation == "facets", "cone_correction", f"{unused} or chart"
+    # mj_step1 and mj_step2, between which the contact is edited, always make an Euler step.
+    yield corrects and is_free and not is_euler, "integrator", "cone_correction=true needs integrator=Euler"
+    if settings.friction_damping is not None:
+        # MuJoCo asks no contact filter about a pair, so the chart's plane would stay; facets has a pair for each box.
+        yield not is_free, "friction_damping", unused
+        # MuJoCo ignores it there, for the pyramid's rows mix normal and friction.
+        yield pyramidal, "friction_damping", "it needs cone=elliptic"
+        # What J̇v leaves to be added is reckoned with the damping of the normal direction.
+        yield curvature, "friction_damping", "curvature=true sets what the slip needs; leave it out"
+    if settings.condim > SLIDES:
+        # All of them share one cone: where its bound is, depends on how the ball turns and rolls.
+        yield bounded, "condim", "with bounded friction stick and slip could not be told apart; set condim=3"
+        yield curvature, "condim", "curvature=true is made for sliding alone; set condim=3"
+        yield corrects, "condim", "cone_correction=true is made for sliding alone; set condim=3"
+    if curvature:
+        yield not is_free, "curvature", unused
+        yield not is_euler, "integrator", "curvature=true needs integrator=Euler"
+        # A pyramid's rows are sums of normal and friction; the term belongs to each of them alone.
+        yield pyramidal, "cone", "curvature=true needs cone=elliptic"
 
 
 def check_restitution(settings: MujocoSettings) -> None:
@@ -212,38 +233,6 @@ def check_restitution(settings: MujocoSettings) -> None:
             "an impact is one step of damping in MuJoCo, which needs integrator=Euler and a contact as MuJoCo has it "
             "(curvature=false, cone_correction=false)"
         )
-
-
-def _check_condim(settings: MujocoSettings, bounded: bool) -> None:
-    """What :func:`check` says about friction of more dimensions than sliding."""
-    if bounded:
-        # All of them share one cone: where its bound is, depends on how the ball turns and rolls.
-        advice = "with bounded friction stick and slip could not be told apart; set condim=3"
-        raise InputError("mujoco: condim", settings.condim, advice)
-    for name in ("curvature", "cone_correction"):
-        if getattr(settings, name):
-            raise InputError("mujoco: condim", settings.condim, f"{name}=true is made for sliding alone; set condim=3")
-
-
-def friction_coefficients(mu: float, settings: MujocoSettings) -> tuple[float, float, float]:
-    """MuJoCo's coefficients of sliding [-], of turning about the normal [m] and of rolling [m]; 0 where unused."""
-    turning = DEFAULT_TURNING if settings.condim >= TURNS else 0.0
-    return mu, turning, DEFAULT_ROLLING if settings.condim >= ROLLS else 0.0
-
-
-def _check_friction_damping(settings: MujocoSettings) -> None:
-    """What :func:`check` says about a damping of its own for the slip."""
-    value = settings.friction_damping
-    if settings.formulation != "free":
-        # MuJoCo asks no contact filter about a pair, so the chart's plane would stay; facets has a pair for each box.
-        advice = f"{settings.formulation} does not use it; set formulation=free"
-        raise InputError("mujoco: friction_damping", value, advice)
-    if settings.cone != "elliptic":
-        # MuJoCo ignores it there, for the pyramid's rows mix normal and friction.
-        raise InputError("mujoco: friction_damping", value, "it needs cone=elliptic")
-    if settings.curvature:
-        # What J̇v leaves to be added is reckoned with the damping of the normal direction.
-        raise InputError("mujoco: friction_damping", value, "curvature=true sets what the slip needs; leave it out")
 
 
 def _obvious(formulation: Literal["chart", "free", "facets"]) -> MujocoSettings:

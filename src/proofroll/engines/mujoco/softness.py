@@ -11,15 +11,7 @@ from proofroll.core.engine import Regularised
 from proofroll.elements.ball_on_surface.mechanics import initial_response, natural_acceleration, newton_euler
 from proofroll.elements.ball_on_surface.model import RollingBall
 from proofroll.engines.mujoco.friction import corrects
-from proofroll.engines.mujoco.settings import (
-    PRELOAD,
-    MujocoSettings,
-    friction_coefficients,
-    impedance,
-    normal_lead,
-    time_constant,
-    velocity_lag,
-)
+from proofroll.engines.mujoco.settings import PRELOAD, MujocoSettings
 
 _FORCES = ("acceleration", "N", "F2", "F3")
 _MORE = "friction against turning or rolling, which the scene does not ask for, turns the ball otherwise"
@@ -41,13 +33,13 @@ def softness(body: RollingBall, settings: MujocoSettings) -> Mapping[str, Regula
     bend = abs(float(e1_rate @ body.v0))
     gravity = float(np.linalg.norm(body.gravity))
     load = bend + gravity
-    least, most = impedance(settings)
+    least, most = settings.impedances
     scale = natural_acceleration(body)
     lacks = settings.formulation != "chart" and not settings.curvature
     # What is missing along the normal at depth zero: the share 1 - d of the load, which the impedance leaves, and the
     # bend of the path where J̇v is missing. Along the wall it is a ω × ė1, divided between motion and friction.
     # How the bend changes until it is needed comes on top.
-    ahead = 2 * normal_lead(settings) * abs(float(e1_rate @ initial_response(body)[0]))
+    ahead = 2 * settings.normal_lead * abs(float(e1_rate @ initial_response(body)[0]))
     pressed = PRELOAD if corrects(body.contact, settings) else 0.0
     missing = (1 - least + pressed) * load + ahead + (bend if lacks else 0.0)
     turning = np.cross(e1, np.cross(body.w0, e1_rate))  # its part along the wall, turned
@@ -67,7 +59,7 @@ def softness(body: RollingBall, settings: MujocoSettings) -> Mapping[str, Regula
         return result | _dynamics(body, settings, soft, why)
     # A settled start has the depth at which the reference acceleration k depth, k = d / (dmax tc)², supplies it as a
     # part d of the acceleration.
-    depth = _MARGIN * missing * (most * time_constant(settings) / least) ** 2 / a
+    depth = _MARGIN * missing * (most * settings.contact_time / least) ** 2 / a
     sunk = f"a soft contact carries the load only at a depth, {depth:.1e} of the radius at most"
     rolls = "MuJoCo's contact point, at which it rolls, lies midway in that depth"
     # A ball that starts slipping may turn faster than it would roll.
@@ -96,7 +88,7 @@ def _dynamics(body: RollingBall, settings: MujocoSettings, soft: float, why: str
     """
     a = body.ball.radius
     turning = soft * (1 + body.contact.rolling_resistance / a) / body.ball.inertia_ratio
-    _, about_normal, rolling = friction_coefficients(1.0, settings)
+    _, about_normal, rolling = settings.friction_coefficients(1.0)
     if about_normal or rolling:
         # Relative to the natural force, which N does not exceed by more than gravity.
         why += "; " + _MORE
@@ -113,7 +105,7 @@ def _computed(body: RollingBall, settings: MujocoSettings) -> Iterator[tuple[str
             yield name, Regularised((1 + _ROUND_OFF) / settings.friction, stands)
     if body.contact.rolling_resistance:
         yield "rolling resistance", Regularised(_SOLVER, "its torque uses the normal force of the evaluation before")
-    if velocity_lag(settings):
+    if settings.velocity_lag:
         # With the correction of a slip, that acceleration is the last of a sequence that converges.
         share = _SEQUENCE if corrects(body.contact, settings) else _SOLVER
         yield "velocity", Regularised(share, "it is MuJoCo's of half a step before plus half a step's acceleration")
@@ -124,7 +116,7 @@ def _lift_of_slip(body: RollingBall, settings: MujocoSettings) -> float:
 
     A correction takes it away, but for what the solver leaves of so large a number.
     """
-    damping = 2 / (impedance(settings)[1] * time_constant(settings))
+    damping = 2 / (settings.impedances[1] * settings.contact_time)
     left = _OF_LIFT if corrects(body.contact, settings) else 1.0
     slip = float(np.linalg.norm(body.slip0))
     return left * (damping * slip * body.contact.mu_kinetic if slip else 0.0)

@@ -15,7 +15,7 @@ from proofroll.core.errors import Refused
 from proofroll.elements.ball_on_surface.model import RollingBall
 from proofroll.engines.mujoco.formulation import Formulation
 from proofroll.engines.mujoco.friction import corrects
-from proofroll.engines.mujoco.settings import MujocoSettings, impedance, time_constant, velocity_lag
+from proofroll.engines.mujoco.settings import MujocoSettings
 
 # The resistance's torque uses the normal force of the evaluation before: at a standstill in time, repeats converge.
 EVALUATIONS = 3
@@ -69,9 +69,9 @@ def start(
     Raises:
         Refused: the contact is too soft for a settled start.
     """
-    lag = velocity_lag(settings)
+    lag = settings.velocity_lag
     # What lags is damped by b = 2 / (d tc), of which a soft contact turns the part d into acceleration.
-    share = 2 * lag / time_constant(settings)
+    share = 2 * lag / settings.contact_time
     rounds = _rounds(body, settings, slips)
 
     def evaluate_at(depth: float) -> None:
@@ -101,8 +101,8 @@ def _rounds(body: RollingBall, settings: MujocoSettings, slips: bool) -> int:
     These are velocities that lag, the resistance's torque and the correction of a slip.
     """
     rounds = EVALUATIONS
-    if velocity_lag(settings):
-        rounds = _ROUNDS_OF_LAG if impedance(settings)[0] >= _SOFT else _ROUNDS_OF_SOFT_LAG
+    if settings.velocity_lag:
+        rounds = _ROUNDS_OF_LAG if settings.impedances[0] >= _SOFT else _ROUNDS_OF_SOFT_LAG
     if slips and corrects(body.contact, settings) and body.contact.mu_kinetic:
         g = body.contact.mu_kinetic**2 * (1 + 1 / body.ball.inertia_ratio)
         rounds += 2 * math.ceil(math.log(_SEQUENCE) / math.log(g / (1 + g)))

@@ -11,7 +11,7 @@ from proofroll.core.errors import Refused
 from proofroll.elements.ball_on_surface.model import RollingBall
 from proofroll.elements.ball_on_surface.reproducer_source import assigned, ball_numbers, wall_source
 from proofroll.engines.exudyn.carrier import Carrier
-from proofroll.engines.exudyn.contact import SURELY, PenaltyContact
+from proofroll.engines.exudyn.contact import PenaltyContact
 from proofroll.engines.exudyn.friction import slow
 from proofroll.engines.exudyn.generic import Generic
 from proofroll.engines.exudyn.local_frame import curvature
@@ -27,7 +27,7 @@ from proofroll.engines.exudyn.reproducer.text import (
     RESISTANCE,
     ROLLING_DISC,
     RUN,
-    SETTINGS,
+    solver_source,
 )
 from proofroll.engines.exudyn.rolling_disc import RollingDisc
 from proofroll.engines.exudyn.settings import ExudynSettings
@@ -50,69 +50,39 @@ def source(model: Any, body: RollingBall, settings: ExudynSettings) -> str:
     generic, resists = isinstance(model, Generic), body.contact.rolling_resistance > 0
     if generic and math.isfinite(body.contact.mu_static):
         raise Refused("the loop that switches Exudyn's constraint of rolling off while the ball slips is proofroll's")
-    numbers = ball_numbers(body) | ({} if generic else {"START_SPIN": _start_spin(model)})
-    numbers |= {"LEVER": body.contact.rolling_resistance} | ({"SLOW": slow(body)} if resists else {})
-    numbers |= {"CURVATURE": curvature(body.surface, body.u0)} if resists and not generic else {}
-    numbers |= {"STEP_SIZE": settings.dt, "NEWTON_TOLERANCE": settings.newton_tolerance}
-    start = _start(model)
-    lines = [
-        f"HALVINGS = {settings.halvings or 0}",
-        f"NEW_JACOBIAN = {settings.jacobian == 'step'}",
-        f"TRAPEZOIDAL = {settings.integrator == 'trapezoidal_index2'}",
-        f"SPECTRAL_RADIUS = {settings.spectral_radius!r}",
-        f"ACCELERATIONS = {start[0]!r}",
-        f"MULTIPLIERS = {start[1]!r}",
-        *_numbers(model, body),
-    ]
+    numbers = ball_numbers(body) | {"LEVER": body.contact.rolling_resistance} | _start(model)
+    numbers |= {} if isinstance(model, RollingDisc) else model.numbers()
+    if resists:
+        numbers |= {"SLOW": slow(body), "CURVATURE": curvature(body.surface, body.u0)}
     parts = {Generic: GENERIC, Carrier: CARRIER, RollingDisc: ROLLING_DISC, PenaltyContact: CONTACT}
-    return (
-        "import exudyn as exu\nimport exudyn.itemInterface as items\nimport numpy as np\n\n"
-        + assigned(**numbers)
-        + "\n".join(lines)
-        + "\n"
-        + wall
-        + "\nexu.config.printToConsole = False\nmbs = exu.SystemContainer().AddSystem()\n"
-        + ("" if generic else BALL + (RESISTANCE if resists else ""))
-        + parts[type(model)]
-        + SETTINGS
-        + CONSISTENT
-        + RUN
-        + (GENERIC_STATE if generic else BALL_STATE)
+    return "".join(
+        [
+            "import exudyn as exu\nimport exudyn.itemInterface as items\nimport numpy as np\n\n",
+            assigned(**numbers),
+            wall,
+            "\nexu.config.printToConsole = False\nmbs = exu.SystemContainer().AddSystem()\n",
+            "" if generic else BALL,
+            RESISTANCE if resists and not generic else "",
+            parts[type(model)],
+            solver_source(settings),
+            CONSISTENT,
+            RUN,
+            GENERIC_STATE if generic else BALL_STATE,
+        ]
     )
 
 
-def _start_spin(model: Any) -> Any:
-    """Angular velocity of the ball in the model [rad/s]; a contact starts with the creep that holds the ball."""
+def _start(model: Any) -> dict[str, Any]:
+    """The ball's spin as the model has it; accelerations and multipliers at time 0 where Exudyn does not find them.
+
+    A contact starts with the creep that holds the ball.
+    """
     data, initial = model.system.systemData, exu.ConfigurationType.Initial
-    # Rates of the Euler parameters of the first node, a body that is not turned, are half of it.
-    return 2 * np.array(data.GetODE2Coordinates_t(initial)[4:7])
-
-
-def _start(model: Any) -> tuple[list[float], list[float]]:
-    """Accelerations and multipliers at time 0, where the adapter gives them; else nothing."""
-    if isinstance(model, (PenaltyContact, Generic)):
-        return [], []  # Exudyn finds them
-    data = model.system.systemData
-    initial = data.GetODE2Coordinates_tt(exu.ConfigurationType.Initial)
-    return np.array(initial).tolist(), np.array(data.GetAECoordinates()).tolist()
-
-
-def _numbers(model: Any, body: RollingBall) -> list[str]:
-    """Assignments that only one formulation needs."""
-    if isinstance(model, (Carrier, Generic)):
-        return model.numbers()
-    if isinstance(model, PenaltyContact):
-        contact = model.system.GetObject(model.contact)
-        state = model.system.GetNode(model.data)["initialCoordinates"]
-        radii = [float(radius) for radius in contact["spheresRadii"]]
-        return [
-            f"HOLLOW = {sum(radii) - body.ball.radius!r}",
-            f"RADII = {radii!r}",
-            f"CONTACT_STATE = {np.array(state).tolist()!r}",
-            f"FRICTION = {float(contact['dynamicFriction'])!r}",
-            f"ZONE = {float(contact['frictionProportionalZone'])!r}",
-            f"BOUNDED = {model.bounded}",
-            f"SURELY = {SURELY!r}",
-            f"STIFFNESS = {float(contact['contactStiffness'])!r}",
-        ]
-    return []
+    found: dict[str, Any] = {"ACCELERATIONS": [], "MULTIPLIERS": []}
+    if not isinstance(model, Generic):
+        # Rates of the Euler parameters of the first node, a body that is not turned, are half of it.
+        found["START_SPIN"] = 2 * np.array(data.GetODE2Coordinates_t(initial)[4:7])
+    if isinstance(model, (Carrier, RollingDisc)):
+        found["ACCELERATIONS"] = data.GetODE2Coordinates_tt(initial)
+        found["MULTIPLIERS"] = data.GetAECoordinates()
+    return found

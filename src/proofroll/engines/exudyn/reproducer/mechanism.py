@@ -8,7 +8,7 @@ import numpy as np
 
 from proofroll.elements.mechanism import Mechanism
 from proofroll.engines.exudyn.native import exu
-from proofroll.engines.exudyn.reproducer.text import RUN, SETTINGS
+from proofroll.engines.exudyn.reproducer.text import RUN, solver_source
 from proofroll.engines.exudyn.settings import EXPLICIT, ExudynSettings
 
 _SYSTEM = """
@@ -84,11 +84,7 @@ def source(model: Any, mechanism: Mechanism, settings: ExudynSettings) -> str:
         lines = "".join(f"    {_literal(_essential(get(number)))},\n" for number in range(count))
         text.append(f"{name.upper()}S = [\n{lines}]\n")
     text.append(f"GRAVITY = {list(mechanism.gravity)!r}\n# Markers of what is followed, and of the centres of mass.\n")
-    text.append(f"PLACES = {places!r}\nCENTRES = {centres!r}\n")
-    radius = settings.spectral_radius
-    text.append(f"STEP_SIZE = {settings.dt!r}\nHALVINGS = 0\nNEWTON_TOLERANCE = {settings.newton_tolerance!r}\n")
-    text.append(f"NEW_JACOBIAN = {settings.jacobian == 'step'}\nSPECTRAL_RADIUS = {radius!r}\n")
-    text.append(f"TRAPEZOIDAL = {settings.integrator == 'trapezoidal_index2'}\n" + _SYSTEM + SETTINGS)
+    text.append(f"PLACES = {places!r}\nCENTRES = {centres!r}\n{_SYSTEM}{solver_source(settings)}")
     if settings.integrator in EXPLICIT:
         text.append(_EXPLICIT.format(kind=settings.integrator.upper()))
     if model.integration.options.linearSolver.ignoreSingularJacobian:

@@ -2,6 +2,9 @@
 
 from __future__ import annotations
 
+from proofroll.elements.ball_on_surface.reproducer_source import assigned
+from proofroll.engines.exudyn.settings import ExudynSettings
+
 BALL = """
 node = mbs.AddNode(items.NodeRigidBodyEP(
     referenceCoordinates=[*POSITION, 1.0, 0.0, 0.0, 0.0],
@@ -81,6 +84,8 @@ mbs.SetPreNewtonResidualUserFunction(aim)
 
 
 CONTACT = """
+HOLLOW = sum(RADII) - RADIUS
+
 
 def hollow_centre(p):
     \"\"\"Centre of a hollow sphere that touches the wall where the ball at p does.\"\"\"
@@ -174,8 +179,7 @@ def seen():
 """
 
 
-SETTINGS = """
-mbs.Assemble()
+_SETTINGS = """mbs.Assemble()
 
 settings = exu.SimulationSettings()
 settings.solution.file.write = False
@@ -238,3 +242,16 @@ def seen():
     kinds = (exu.OutputVariableType.Position, exu.OutputVariableType.Velocity, exu.OutputVariableType.AngularVelocity)
     return tuple(np.array(mbs.GetNodeOutput(node, kind)) for kind in kinds)
 """
+
+
+def solver_source(settings: ExudynSettings) -> str:
+    """Assembles ``mbs`` and makes ``settings`` and ``solver`` for it."""
+    numbers = assigned(
+        STEP_SIZE=settings.dt,
+        HALVINGS=settings.halvings or 0,
+        NEWTON_TOLERANCE=settings.newton_tolerance,
+        NEW_JACOBIAN=settings.jacobian == "step",
+        TRAPEZOIDAL=settings.integrator == "trapezoidal_index2",
+        SPECTRAL_RADIUS=settings.spectral_radius,
+    )
+    return f"\n{numbers}{_SETTINGS}"

@@ -16,7 +16,7 @@ from proofroll.elements.ball_on_surface.reproducer_source import assigned, ball_
 from proofroll.engines.mujoco.contact import Resistance
 from proofroll.engines.mujoco.friction import NEAR_CONE, corrects
 from proofroll.engines.mujoco.reproducer import text
-from proofroll.engines.mujoco.settings import PRELOAD, MujocoSettings, normal_lead, own_share, velocity_lag
+from proofroll.engines.mujoco.settings import PRELOAD, MujocoSettings
 from proofroll.engines.mujoco.start import EVALUATIONS
 
 
@@ -33,58 +33,55 @@ def source(xml: str, model: Any, data: Any, body: RollingBall, settings: MujocoS
     Raises:
         Refused: the scene or the settings have something that the program has not.
     """
-    contact, lags = body.contact, velocity_lag(settings)
+    contact, formulation = body.contact, settings.formulation
     if math.isfinite(contact.mu_static) and contact.mu_static != contact.mu_kinetic:
         raise Refused("the program has one coefficient of friction, as MuJoCo has")
-    edits = corrects(contact, settings)
-    if edits and settings.cone != "elliptic":
+    corrected = corrects(contact, settings)
+    if corrected and settings.cone != "elliptic":
         raise Refused("the program corrects the elliptic cone alone")
-    resists = contact.rolling_resistance > 0
-    values: dict[str, Any] = {}
+    resists, edited = contact.rolling_resistance > 0, settings.curvature or corrected
+    values: dict[str, Any] = {"LEVER": contact.rolling_resistance, "LAG": settings.velocity_lag}
     if resists:
         law = Resistance.of(body, settings.dt)
-        values = {"LEVER": law.f, "STOPPING": law.stopping, "PULL": np.array(law.pull)}
-    steps = {
-        "free": text.free(resists=resists, curvature=settings.curvature, corrects=edits),
-        "chart": text.chart(resists=resists, corrects=edits),
-        "facets": text.facets(resists=resists),
-    }[settings.formulation]
-    if settings.formulation == "free" and (settings.curvature or edits):
-        values["LAG"] = lags
+        values |= {"STOPPING": law.stopping, "PULL": law.pull}
+    if settings.velocity_lag:
+        values["EVALUATIONS"] = EVALUATIONS if resists else 1
     if settings.curvature:
-        values |= {"SHARE": 1 - own_share(settings), "LEAD": normal_lead(settings)}
-    if edits:
+        values |= {"SHARE": 1 - settings.own_share, "LEAD": settings.normal_lead}
+    if corrected:
         values |= {"FRICTION": contact.mu_kinetic, "PRELOAD": PRELOAD / body.ball.mass, "NEAR_CONE": NEAR_CONE}
+    if formulation == "free" and edited:
+        values |= {"CURVED": settings.curvature, "CORRECTED": corrected}
+    if formulation == "chart":
+        values["DEPTH"] = int(model.joint("normal").dofadr[0])
+    # The wall's geom, or the first of its boxes.
+    values["WALL"] = int(model.body("wall").geomadr[0] if formulation == "facets" else model.geom("wall").id)
     xml = textwrap.dedent(xml).strip()
-    exact = _rounded(xml, model)
     state = ("qpos", "qvel", "qacc", "qacc_warmstart", "qfrc_constraint", "geom_xmat", "userdata")
+    steps = {
+        "free": [text.FREE_POSE, text.FREE_EDITED if edited else text.FREE_PLAIN],
+        "chart": [text.CHART, text.CHART_RESIST if resists else "", text.CHART_CORRECT if corrected else ""],
+        "facets": [text.FACETS],
+    }
     return "".join(
         [
             "import mujoco\nimport numpy as np\n\n",
             assigned(**ball_numbers(body), **values),
-            f"EVALUATIONS = {EVALUATIONS if resists else 1}\n" if lags else "",
             wall_source(body),
             normal_rate_source(body) if settings.curvature else "",
             f'\n\nMODEL = """\n{xml}\n"""\nmodel = mujoco.MjModel.from_xml_string(MODEL)\n',
             "# The file rounds to six digits; these are all of them.\n",
-            *(f"model.{name}[:] = {value.tolist()!r}\n" for name, value in exact.items()),
+            *(f"model.{name}[:] = {value.tolist()!r}\n" for name, value in _rounded(xml, model).items()),
             f"model.opt.timestep = {settings.dt!r}\nBALL = model.body('ball').id\n",
-            f"WALL = {_wall(model, settings)}\n",
-            f"DEPTH = {int(model.joint('normal').dofadr[0])}\n" if settings.formulation == "chart" else "",
             "data = mujoco.MjData(model)\n",
             *(f"data.{name}[:] = {getattr(data, name).tolist()!r}\n" for name in state),
             text.RESIST if resists else "",
             text.CURVATURE if settings.curvature else "",
-            text.CORRECT if edits else "",
-            steps,
-            text.run(lags=bool(lags)),
+            text.CORRECT if corrected else "",
+            *steps[formulation],
+            text.RUN,
         ]
     )
-
-
-def _wall(model: Any, settings: MujocoSettings) -> int:
-    """Number of the wall's geom, or of the first of its boxes."""
-    return int(model.body("wall").geomadr[0] if settings.formulation == "facets" else model.geom("wall").id)
 
 
 def _rounded(xml: str, model: Any) -> dict[str, FloatArray]:

@@ -1,4 +1,4 @@
-"""Text of the parts that a program may have: a formulation, rolling resistance, the edits of ``efc_aref``, the run."""
+"""Text of the parts that a program may have: rolling resistance, the edits of ``efc_aref``, a formulation, the run."""
 
 from __future__ import annotations
 
@@ -59,7 +59,7 @@ def add_curvature(d, rates, trend):
     d.efc_aref[contact.efc_address : contact.efc_address + contact.dim] += SHARE * rows[: contact.dim]
 '''
 
-_FREE_POSE = '''
+FREE_POSE = '''
 
 def pose_wall(d):
     """Puts the plane where the ball touches the wall: MuJoCo has no concave cylinder."""
@@ -69,20 +69,19 @@ def pose_wall(d):
     mujoco.mju_quatZ2Vec(d.mocap_quat[0], -e1)
 '''
 
-_FREE_PLAIN = '''
+FREE_PLAIN = '''
 
 def step():
     """One step, after the plane was posed."""
-{resist}    pose_wall(data)
+    if LEVER:
+        e1 = frame(data.qpos[:3])[0]
+        N = float(data.qfrc_constraint[:3] @ data.geom_xmat[WALL, 2::3])  # of the step before
+        resist(data, foreseen(data, N), e1, data.qvel[:3])
+    pose_wall(data)
     mujoco.mj_step(model, data)
 '''
 
-_FREE_RESIST = """    e1 = frame(data.qpos[:3])[0]
-    N = float(data.qfrc_constraint[:3] @ data.geom_xmat[WALL, 2::3])  # of the step before
-    resist(data, foreseen(data, N), e1, data.qvel[:3])
-"""
-
-_FREE_EDITED = '''
+FREE_EDITED = '''
 
 def prepare(d):
     """Poses the plane; rates now, their trend, and the normal force of the evaluation before.
@@ -97,13 +96,18 @@ def prepare(d):
         rates += LAG * trend
         rates[:3] -= (rates[:3] @ e1) * e1
     pose_wall(d)
-{resist}    return rates, trend, N
+    if LEVER:
+        resist(d, foreseen(d, N), e1, rates[:3], d.qvel[:3])
+    return rates, trend, N
 
 
 def edit(d, rates, trend, N):
     """Changes the reference acceleration of the contact."""
-    if d.nefc:
-{edits}
+    if d.nefc and CURVED:
+        add_curvature(d, rates, trend)
+    if d.nefc and CORRECTED:
+        correct(d, N)
+
 
 def evaluate(d):
     """Forces and accelerations of the present state."""
@@ -124,10 +128,7 @@ def step():
     mujoco.mj_step2(model, data)
 '''
 
-_PREPARED_RESIST = """    resist(d, foreseen(d, N), e1, rates[:3], d.qvel[:3])
-"""
-
-_CHART = '''
+CHART = '''
 
 def pose_wall(m, d, geom1, geom2):
     """Called between kinematics and collision at each evaluation: the plane takes the pose of the site."""
@@ -137,14 +138,14 @@ def pose_wall(m, d, geom1, geom2):
 
 
 mujoco.set_mjcb_contactfilter(pose_wall)
-{more}
+
 
 def step():
     """One step."""
     mujoco.mj_step(model, data)
 '''
 
-_CHART_RESIST = '''
+CHART_RESIST = '''
 
 def passive(m, d):
     """Called between velocities and accelerations."""
@@ -155,7 +156,7 @@ def passive(m, d):
 mujoco.set_mjcb_passive(passive)
 '''
 
-_CHART_CORRECT = '''
+CHART_CORRECT = '''
 
 def control(m, d):
     """Called between the reference accelerations and the forces."""
@@ -165,20 +166,19 @@ def control(m, d):
 mujoco.set_mjcb_control(control)
 '''
 
-_FACETS = '''
+FACETS = '''
 
 def step():
     """One step."""
-{resist}    mujoco.mj_step(model, data)
+    if LEVER:
+        e1 = frame(data.qpos[:3])[0]
+        resist(data, -float(data.qfrc_constraint[:3] @ e1), e1, data.qvel[:3])
+    mujoco.mj_step(model, data)
     if abs(frame(np.array(POSITION))[2] @ data.qpos[:3]) > model.geom_size[WALL, 2]:
         raise RuntimeError("the ball has left the ring of boxes")
 '''
 
-_FACETS_RESIST = """    e1 = frame(data.qpos[:3])[0]
-    resist(data, -float(data.qfrc_constraint[:3] @ e1), e1, data.qvel[:3])
-"""
-
-_RUN = '''
+RUN = '''
 
 FATAL = ("mjWARN_BADQPOS", "mjWARN_BADQVEL", "mjWARN_BADQACC", "mjWARN_CONTACTFULL", "mjWARN_CNSTRFULL")
 
@@ -192,40 +192,15 @@ def run(times):
             done += 1
         for name in FATAL:
             if data.warning[getattr(mujoco.mjtWarning, name)].number:
-                raise RuntimeError(f"MuJoCo warns of {{name}} before {{t:g}} s")
+                raise RuntimeError(f"MuJoCo warns of {name} before {t:g} s")
         mujoco.mj_copyData(look, model, data)
-{catch_up}        mujoco.mj_kinematics(model, look)
+        if LAG:
+            for _ in range(EVALUATIONS):
+                evaluate(look)
+            look.qvel += LAG * look.qacc  # velocities are behind the positions
+        mujoco.mj_kinematics(model, look)
         mujoco.mj_comPos(model, look)
         mujoco.mj_comVel(model, look)
         mujoco.mj_objectVelocity(model, look, mujoco.mjtObj.mjOBJ_BODY, BALL, velocity, 0)
         yield look.xpos[BALL].copy(), velocity[3:].copy(), velocity[:3].copy()
 '''
-
-_CATCH_UP = """        for _ in range(EVALUATIONS):
-            evaluate(look)
-        look.qvel += LAG * look.qacc  # velocities are behind the positions
-"""
-
-
-def free(*, resists: bool, curvature: bool, corrects: bool) -> str:
-    """Steps of the free ball."""
-    if not (curvature or corrects):
-        return _FREE_POSE + _FREE_PLAIN.format(resist=_FREE_RESIST if resists else "")
-    edits = "        add_curvature(d, rates, trend)\n" if curvature else ""
-    edits += "        correct(d, N)\n" if corrects else ""
-    return _FREE_POSE + _FREE_EDITED.format(resist=_PREPARED_RESIST if resists else "", edits=edits)
-
-
-def chart(*, resists: bool, corrects: bool) -> str:
-    """Steps in the coordinates of the wall."""
-    return _CHART.format(more=(_CHART_RESIST if resists else "") + (_CHART_CORRECT if corrects else ""))
-
-
-def facets(*, resists: bool) -> str:
-    """Steps in the ring of boxes."""
-    return _FACETS.format(resist=_FACETS_RESIST if resists else "")
-
-
-def run(*, lags: bool) -> str:
-    """The run; ``lags`` if the velocities are behind the positions."""
-    return _RUN.format(catch_up=_CATCH_UP if lags else "")

@@ -61,6 +61,5 @@ def numbers(body: RollingBall) -> str:
     """Assignments that this formulation alone needs: the joints along the wall."""
     generators = [(generator.kind, list(generator.axis)) for generator in body.surface.generators or ()]
     origin = np.zeros(2)
-    return f"GENERATORS = {generators!r}\n" + assigned(
-        CARRIAGE_AXES=body.surface.frame(origin), CARRIAGE_PLACE=body.surface.position(origin)
-    )
+    axes, place = body.surface.frame(origin), body.surface.position(origin)
+    return assigned(GENERATORS=generators, CARRIAGE_AXES=axes, CARRIAGE_PLACE=place)

@@ -124,7 +124,13 @@ def numbers(body: RollingBall, settings: PinocchioSettings) -> str:
     bounded = math.isfinite(body.contact.mu_static)
     unbounded = UNBOUNDED_FRICTION[settings.solver or "pgs"]
     static, kinetic = (body.contact.mu_static, body.contact.mu_kinetic) if bounded else (unbounded, unbounded)
-    values = {"STEP_SIZE": float(settings.dt or 0.0), "FAINT": 1e-9 * weight}
-    values |= {"STATIC": static, "KINETIC": kinetic, "TOLERANCE": float(settings.solver_tolerance or 0.0)}
-    lines = f"SOLVER = {settings.solver!r}\nLEAPFROG = {settings.integrator == 'leapfrog'}\nBOUNDED = {bounded}\n"
-    return assigned(**values) + lines
+    return assigned(
+        STEP_SIZE=settings.dt,
+        FAINT=1e-9 * weight,
+        STATIC=static,
+        KINETIC=kinetic,
+        TOLERANCE=settings.solver_tolerance,
+        SOLVER=settings.solver,
+        LEAPFROG=settings.integrator == "leapfrog",
+        BOUNDED=bounded,
+    )

@@ -136,12 +136,9 @@ def source(settings: PinocchioSettings) -> str:
 
 def numbers(mechanism: BallWithRows, settings: PinocchioSettings) -> str:
     """Assignments: the start, and how it is integrated."""
-    values = {"START_Q": mechanism.q0, "START_V": mechanism.v0, "FAINT": mechanism.faint}
-    lines = f"ORIENTATION = {bool(settings.orientation)}\nPROJECTION = {settings.projection}\n"
+    start = {"START_Q": mechanism.q0, "START_V": mechanism.v0, "FAINT": mechanism.faint}
+    wanted = {"ORIENTATION": bool(settings.orientation), "PROJECTION": settings.projection}
     if settings.integrator == "dop853":
-        values |= {"Q_SCALE": mechanism.q_scale, "V_SCALE": mechanism.v_scale}
-        values |= {"RTOL": float(settings.rtol or 0.0), "SHORT": SHORT, "PATIENCE": PATIENCE}
-    else:
-        values["STEP_SIZE"] = float(settings.dt or 0.0)
-        lines += f"INTEGRATOR = {settings.integrator!r}\n"
-    return assigned(**values) + lines
+        scales = {"Q_SCALE": mechanism.q_scale, "V_SCALE": mechanism.v_scale}
+        return assigned(**start, **wanted, **scales, RTOL=settings.rtol, SHORT=SHORT, PATIENCE=PATIENCE)
+    return assigned(**start, **wanted, STEP_SIZE=settings.dt, INTEGRATOR=settings.integrator)
