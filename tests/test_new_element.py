@@ -6,6 +6,7 @@ import json
 import os
 from collections.abc import Callable, Iterator
 from pathlib import Path
+from unittest import SkipTest
 
 import pytest
 
@@ -166,10 +167,35 @@ def test_report(command_line: Proofroll) -> None:
 
 @pytest.mark.usefixtures("springs")
 def test_conformance() -> None:
-    """Its engine is checked on the scenes of the new kind."""
+    """Every check of its engine holds, on the scenes of the new kind."""
     from spring import Sprung
 
-    from proofroll.conformance import run_check
+    from proofroll.conformance import checks
 
-    for name in ("certificate_holds[midpoint-matched-spring]", "order_is_as_declared[midpoint-matched]"):
-        run_check(Sprung, name)
+    refused = []
+    for check in checks(Sprung):
+        try:
+            check()
+        except SkipTest as skipped:
+            refused.append(str(skipped))
+    assert set(refused) == {"the engine does not say what is in its model", "the step is fixed"}
+
+
+@pytest.mark.usefixtures("springs")
+def test_other_kinds_keep_their_units(command_line: Proofroll, monkeypatch: pytest.MonkeyPatch) -> None:
+    """A kind may write the unit of a number as it likes: scenes of other kinds with such a key still have theirs."""
+    from spring import SpringKind
+
+    monkeypatch.setattr(SpringKind, "units", {**SpringKind.units, "inertia": "kg m²"})
+    code, _, err = command_line("scenes")
+    assert code == 0, err
+
+
+def test_replay_and_judge(command_line: Proofroll, springs: Path) -> None:
+    """A run of a scene that is no scene of the package is held against its truth; who draws no such scene says so."""
+    assert command_line("run", str(springs), "--engine", "sprung", "--until", "1", "--out", "run.nc")[0] == 0
+    code, out, err = command_line("judge", "run.nc", "--scene", str(springs))
+    assert (code, err) == (0, ""), out
+    code, _, err = command_line("replay", "run.nc")
+    assert code == 2
+    assert "nothing that is installed draws the scene A mass on a spring" in err

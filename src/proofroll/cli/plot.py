@@ -32,6 +32,9 @@ def plot(
 def replay(
     trajectory: Annotated[Path, typer.Argument(help="A file of proofroll run --out, or one of a report.")],
     out: Annotated[Path | None, typer.Option(help="Page to write; RUN-replay.html by default.")] = None,
+    scene: Annotated[
+        str | None, typer.Option(help="The scene, or the path of its folder; by default where it lay at the run.")
+    ] = None,
 ) -> None:
     """Show a run in motion beside the truth, as a page for a browser."""
     from proofroll.report.run_plot import read_run
@@ -45,6 +48,6 @@ def replay(
     options.require_pages()
     run = read_run(trajectory)
     with options.spinner("the truth"):
-        text = replay_page(trajectory, run)
+        text = replay_page(trajectory, run, scene)
     write_text(target, text)
     sys.stdout.write(f"The replay is in {target}.\n")

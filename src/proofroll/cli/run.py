@@ -1,4 +1,4 @@
-"""One scene: a run, and the time of the first slip."""
+"""One run of one scene."""
 
 from __future__ import annotations
 
@@ -44,6 +44,7 @@ def run(
     preparing.start()
 
     from proofroll.core.time_grid import EVERY, time_grid
+    from proofroll.files.scene_file import scene_names
     from proofroll.files.trajectory_file import STORED, read, write
     from proofroll.report.run import run_content, run_lines
     from proofroll.report.run_plot import require_ending
@@ -79,7 +80,8 @@ def run(
             draw_run(read(target), plot)
             content = replace(content, plot=str(plot))
         if out is not None and result.trajectory is not None:
-            write(read(target), out)
+            own = {"scene_path": str(Path(scene).resolve())} if scene not in scene_names() else {}
+            write(read(target).assign_attrs(own), out)
             content = replace(content, trajectory=str(out))
     done = content.status == "done"
     if not done:

@@ -17,6 +17,7 @@ from typing import Self
 from proofroll.core.element import Element
 from proofroll.core.errors import InputError, choices
 from proofroll.core.observable import Observable
+from proofroll.core.source_code import code_of
 
 
 @dataclass(frozen=True)
@@ -105,11 +106,16 @@ class Scene:
 
     @cached_property
     def digest(self) -> str:
-        """Hash of everything that decides the result: the elements, what is asked, and the engine-native files."""
+        """Hash of everything that decides the result: the elements, what is asked, and the engine-native files.
+
+        What other packages bring of the elements counts with its code; that of this package counts for every engine.
+        """
         content = [[type(element).__name__, asdict(element)] for element in self.elements]  # type: ignore[call-overload]
-        found = hashlib.sha256(json.dumps([self.name, content, self.asks], sort_keys=True, default=str).encode())
+        code = code_of(self.elements)
+        everything = [self.name, content, self.asks, *([code] if code else [])]
+        found = hashlib.sha256(json.dumps(everything, sort_keys=True, default=str).encode())
         if self.folder != Path():
             for file in sorted(self.folder.iterdir()):
-                if file.is_file() and file.suffix not in {".toml", ".md"}:
+                if file.is_file() and file.suffix not in {".toml", ".md", ".bib"}:
                     found.update(file.name.encode() + file.read_bytes())
         return found.hexdigest()[:16]

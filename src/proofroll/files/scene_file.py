@@ -6,6 +6,7 @@ A file of another format that somebody reads (:mod:`proofroll.files.scene_source
 from __future__ import annotations
 
 import dataclasses
+import itertools
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from functools import cache
@@ -62,12 +63,10 @@ _OWN = frozenset(item.name for item in dataclasses.fields(SceneFile)) - {"tables
 
 
 @cache
-def _units() -> dict[str, str]:
-    """Unit of each number of the mechanics by its key; nothing is converted."""
-    found = dict(units_of(Gravity))
-    for kind in load_element_kinds():
-        found |= kind.units
-    return found
+def _units() -> tuple[str, ...]:
+    """Every unit that some number of a scene has; nothing is converted."""
+    kinds = (kind.units.values() for kind in load_element_kinds())
+    return tuple(dict.fromkeys([*units_of(Gravity).values(), *itertools.chain.from_iterable(kinds), "s", "N"]))
 
 
 def scene_names() -> list[str]:
@@ -190,5 +189,5 @@ def _checked(content: Mapping[str, Any], path: Path) -> SceneFile:
     own = {key: value for key, value in content.items() if key in _OWN}
     tables = {key: value for key, value in content.items() if key not in _OWN}
     file = validated(SceneFile, own | {"tables": tables}, str(path))
-    check_parameters(file.parameters, [*_units().values(), "s", "N"], path)
+    check_parameters(file.parameters, _units(), path)
     return file

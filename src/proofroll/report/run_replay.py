@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Any
 from proofroll.core.errors import InputError
 from proofroll.core.scene import Scene
 from proofroll.core.truth import truth
-from proofroll.files.scene_file import load_scene
+from proofroll.files.scene_file import is_scene, load_scene
 from proofroll.files.trajectory_file import STORED, write
 from proofroll.report.kinds import kind_of, report_kinds
 from proofroll.report.labels import settings_text
@@ -25,8 +25,13 @@ if TYPE_CHECKING:
 _WRITES = "proofroll run … --out writes such a file"
 
 
-def replay_page(path: Path, run: xr.Dataset) -> str:
+def replay_page(path: Path, run: xr.Dataset, scene_of_run: str | None = None) -> str:
     """The page of what a file holds: the truth of the run's scene, solid, and the run, translucent.
+
+    Args:
+        path: of the file, for messages.
+        run: what it holds.
+        scene_of_run: name or path of its scene; None: as the file says.
 
     Raises:
         InputError: it does not say of what it is a run, the scene is another by now, or nothing draws such scenes.
@@ -35,11 +40,12 @@ def replay_page(path: Path, run: xr.Dataset) -> str:
     from proofroll.report.html import templates
     from proofroll.report.pages import rendered
 
-    scene = _scene(path, run)
+    name = scene_of_run or str(run.attrs.get("scene_path", run.attrs.get("scene", "")))
+    scene = _scene(path, run, name)
     kind = kind_of(scene)
     if kind is None or not kind.replay_script:
         raise InputError("run", str(path), f"nothing that is installed draws the scene {scene.title}")
-    usual = load_scene(str(run.attrs["scene"])).parameters
+    usual = load_scene(name).parameters
     label = point_name({name: value for name, value in scene.parameters.items() if value != usual[name]})
     with tempfile.TemporaryDirectory() as folder:
         file, own = (Path(folder) / f"{name}{STORED}" for name in ("truth", "run"))
@@ -66,13 +72,16 @@ def _said(run: xr.Dataset) -> str:
     return f"The truth, solid, and {engine} ({settings}), translucent; where it agrees it is hidden in the truth."
 
 
-def _scene(path: Path, run: xr.Dataset) -> Scene:
+def _scene(path: Path, run: xr.Dataset, name: str) -> Scene:
     """The scene of a run, with all that can be asked of its truth."""
     try:
-        name, digest = str(run.attrs["scene"]), str(run.attrs["scene_digest"])
-        parameters = _parameters(run)
+        digest, parameters = str(run.attrs["scene_digest"]), _parameters(run)
     except (KeyError, ValueError):
-        raise InputError("run", str(path), f"it does not say which scene it is of; {_WRITES}") from None
+        name = ""
+    if not name:
+        raise InputError("run", str(path), f"it does not say which scene it is of; {_WRITES}")
+    if not is_scene(name):
+        raise InputError("scene", name, "the scene of this run is not there; say where it lies by --scene PATH")
     scene = load_scene(name, **parameters)
     if digest not in {scene.digest, scene.fully_asked.digest}:
         raise InputError("run", str(path), f"the scene {name} has changed since this run; run it again")

@@ -38,8 +38,10 @@ def headline(study: StabilityStudy) -> str:
     counts = ", ".join(f"{count} {kind}" for kind, count in sorted(study.failures.items(), key=lambda i: -i[1]))
     said = (
         f"{len(study.points)} points, {study.boundaries} boundaries of which {study.silent} are silent "
-        f"({study.runs} runs). Beyond: {counts}."
+        f"({study.runs} runs)."
     )
+    if counts:
+        said += f" Beyond: {counts}."
     if study.refused:
         said += f" {study.refused} points were refused before the run."
     if study.never_accurate:

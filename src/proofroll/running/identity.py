@@ -4,16 +4,16 @@ from __future__ import annotations
 
 import contextlib
 import dataclasses
-import hashlib
 import inspect
 import sys
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 from importlib import metadata
 from pathlib import Path
 from typing import Any
 
 import proofroll
 from proofroll.core.errors import InputError
+from proofroll.core.source_code import OWN, hash_of, package_of
 from proofroll.core.truth import load_truths
 from proofroll.files.json_data import plain
 from proofroll.running.case import EngineDescription, EngineFacts
@@ -69,7 +69,7 @@ def resolve(engine: str, options: dict[str, Any], requires: Sequence[str] = ()) 
     if engine == "truth":
         if options:
             raise InputError("truth", ", ".join(options), "the truth has no settings; leave them out")
-        code = digest([Path(inspect.getfile(truth)).parent for truth in load_truths()])
+        code = digest(sorted({_of(truth) for truth in load_truths()}))
         return dataclasses.asdict(EngineFacts("truth", truth_version(), code, {}))
     from proofroll.core.engine_abilities import LowersOrder, SharesEquations, TellsCaveats
     from proofroll.core.plugins import resolve_settings
@@ -78,12 +78,10 @@ def resolve(engine: str, options: dict[str, Any], requires: Sequence[str] = ()) 
 
     kind = load(engine)
     settings = resolve_settings(kind, options, requires)
-    source = Path(inspect.getfile(kind))
-    package = (source.parent / "__init__.py").is_file() and source.parent.name != "engines"
     facts = EngineFacts(
         name=engine,
         version=kind.version(),
-        code=digest([source.parent if package else source]),
+        code=digest([_of(kind)]),
         settings=dataclasses.asdict(settings),
         resolution=settings.resolution,
         order=settings.order,
@@ -104,18 +102,18 @@ def truth_version() -> str:
     return ", ".join(found)
 
 
-def digest(sources: list[Path]) -> str:
-    """Hash of the adapter's files and of the folders that every result rests on.
+def digest(sources: Iterable[Path]) -> str:
+    """Hash of the folders that every result rests on, and of what an engine or a truth is itself.
 
-    What only shows results (:data:`ASIDE`), as the bug reports of an adapter do, is left out, and so are modules
-    ``robot_…``, which read robot files: no result hangs on them.
+    What only shows results (:data:`ASIDE`), as the bug reports of an adapter do, is left out.
     """
-    root = Path(proofroll.__file__).parent
-    content = hashlib.sha256()
-    for source in [*(root / name for name in FOUNDATION), *sources]:
-        files = sorted(source.rglob("*.py")) if source.is_dir() else [source]
-        for file in files:
-            aside = file.stem.startswith("robot_") or ASIDE & set(file.relative_to(source.parent).with_suffix("").parts)
-            if not aside:
-                content.update(file.read_bytes())
-    return content.hexdigest()[:16]
+    return hash_of([*(OWN / name for name in FOUNDATION), *sources], ASIDE)
+
+
+def _of(kind: Any) -> Path:
+    """The code of an engine or a truth: of this package its own folder or module, of another one all that it has."""
+    if (whole := package_of(kind)) != OWN:
+        return whole or Path(inspect.getfile(kind))
+    _, *inside = kind.__module__.split(".")
+    place = OWN.joinpath(*inside[: 1 if inside[0] == "truth" else 2])
+    return place if place.is_dir() else place.with_suffix(".py")

@@ -140,6 +140,8 @@ def _dataset(run: Run, scene: Scene) -> xr.Dataset:
 
         try:
             run = read(Path(run))
+        except FileNotFoundError:
+            raise InputError("run", str(run), "there is no such file") from None
         except (OSError, ValueError, LookupError) as error:  # a file that was cut off ends in any of them
             advice = f"it cannot be read ({error}); xarray writes it by to_netcdf(path, format='NETCDF3_64BIT')"
             raise InputError("run", str(run), advice) from None

@@ -7,12 +7,16 @@ import hashlib
 import re
 from dataclasses import dataclass
 from importlib.metadata import PackageNotFoundError, requires, version
+from importlib.util import find_spec
 from pathlib import Path
 
 import proofroll
 from proofroll.core.announced import announced
-from proofroll.core.plugins import GROUP
+from proofroll.core.plugins import ELEMENTS, GROUP
+from proofroll.core.source_code import hash_of
+from proofroll.core.truth import TRUTHS
 from proofroll.running.environments import remembered
+from proofroll.running.identity import ASIDE
 from proofroll.running.timing import machine
 
 # Folders of the package on which no result hangs.
@@ -22,19 +26,32 @@ _ASIDE = frozenset({"cli", "conformance", "report"})
 def versions() -> dict[str, str]:
     """Versions of proofroll, of what it can use, of packages that announce engines, and of remembered environments.
 
-    An environment ``NAME@LABEL`` has the hash of all that is installed in it for its version.
+    An environment ``NAME@LABEL`` has the hash of all that is installed in it for its version, and what announces
+    engines, truths or kinds of elements besides its version a hash of its code.
     """
-    names = _required() | {point.dist.name for point in announced(GROUP) if point.dist is not None}
+    plug_ins = [point for group in (GROUP, ELEMENTS, TRUTHS) for point in announced(group) if point.dist is not None]
+    names = _required() | {point.dist.name for point in plug_ins if point.dist is not None}
     found = {}
     for name in sorted(names, key=str.lower):
         try:
             found[name] = version(name)
         except PackageNotFoundError:
             continue
+    for top in sorted({point.module.partition(".")[0] for point in plug_ins} - {"proofroll"}):
+        found[f"code of {top}"] = _code_of(top)
     for item in remembered():
         content = "\n".join([item.version, item.interpreter, *item.packages])
         found[f"{item.name}@{item.label}"] = hashlib.sha256(content.encode()).hexdigest()[:12]
     return found
+
+
+def _code_of(top: str) -> str:
+    """Hash of a top package or module, which is found but not imported; empty where it lies at several places."""
+    spec = find_spec(top)
+    if spec is None or spec.origin is None:
+        return ""
+    file = Path(spec.origin)
+    return hash_of([file.parent if spec.submodule_search_locations else file], ASIDE)
 
 
 def _required() -> set[str]:

@@ -1,6 +1,7 @@
 from __future__ import annotations
 
 import dataclasses
+import importlib
 import math
 from collections.abc import Callable
 from pathlib import Path
@@ -166,3 +167,21 @@ def test_parts_refuse_what_they_cannot_be(make: Callable[[], object], field: str
     with pytest.raises(InputError) as caught:
         make()
     assert caught.value.field == field
+
+
+def test_code_of_another_package_is_in_the_digest(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """What another package brings, an element or a part of it, decides a result with all its modules."""
+    from proofroll.core.source_code import code_of
+
+    package = tmp_path / "foreign_wall"
+    (package / "inside").mkdir(parents=True)
+    for folder in (package, package / "inside"):
+        (folder / "__init__.py").write_text("")
+    (package / "inside" / "wall.py").write_text("@__import__('dataclasses').dataclass\nclass Wall:\n    x: int = 1\n")
+    monkeypatch.syspath_prepend(str(tmp_path))
+    wall = importlib.import_module("foreign_wall.inside.wall").Wall()
+    before = code_of([{"surface": wall}])
+    (package / "helper.py").write_text("y = 1")
+    assert len(before) == 1
+    assert code_of([{"surface": wall}]) != before
+    assert code_of(load_scene("sphere_in_cylinder").elements) == []

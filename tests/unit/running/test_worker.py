@@ -98,6 +98,25 @@ def test_whatever_a_result_rests_on_decides_its_key() -> None:
     assert missing == {}
 
 
+def test_all_of_an_engines_package_decides_its_key(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """What lies beside the folder of somebody's adapter, in the same package, may be its method."""
+    package = tmp_path / "somebodys"
+    (package / "engines").mkdir(parents=True)
+    for folder in (package, package / "engines"):
+        (folder / "__init__.py").write_text("")
+    (package / "engines" / "adapter.py").write_text(
+        "from tiny import Tiny\n\nclass Theirs(Tiny):\n    name = 'theirs'\n"
+    )
+    info = tmp_path / "theirs-1.0.dist-info"
+    info.mkdir()
+    (info / "METADATA").write_text("Metadata-Version: 2.1\nName: theirs\nVersion: 1.0\n")
+    (info / "entry_points.txt").write_text("[proofroll.engines]\ntheirs = somebodys.engines.adapter:Theirs\n")
+    monkeypatch.syspath_prepend(str(tmp_path))
+    before = identity.resolve("theirs", {})["code"]
+    (package / "method.py").write_text("order = 1")
+    assert identity.resolve("theirs", {})["code"] != before
+
+
 def test_a_program_for_a_bug_report_outdates_no_result(tmp_path: Path) -> None:
     """An adapter's digest changes with its code, but not with that which only writes reproducers."""
     package = tmp_path / "adapter"

@@ -54,3 +54,20 @@ def test_each_change_is_told() -> None:
     text = "; ".join(other)
     for words in ("processor an abacus then", "mujoco absent then", "numpy 1.0 then", "own code has changed"):
         assert words in text
+
+
+def test_code_of_a_plug_in_is_among_the_versions(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """A study does not outlive the code of an engine's package, edited without a new version; nothing imports it."""
+    package = tmp_path / "edited_engine"
+    (package / "inside").mkdir(parents=True)
+    (package / "__init__.py").write_text("raise RuntimeError('imported')")
+    info = tmp_path / "edited-1.0.dist-info"
+    info.mkdir()
+    (info / "METADATA").write_text("Metadata-Version: 2.1\nName: edited\nVersion: 1.0\n")
+    (info / "entry_points.txt").write_text("[proofroll.engines]\nedited = edited_engine.adapter:Engine\n")
+    monkeypatch.syspath_prepend(str(tmp_path))
+    before = study_identity.measured()
+    assert study_identity.changes(before) == []
+    (package / "inside" / "method.py").write_text("order = 1")
+    (change,) = study_identity.changes(before)
+    assert change.startswith("code of edited_engine ")

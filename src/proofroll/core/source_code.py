@@ -1,0 +1,56 @@
+"""Which code a result rests on, so that none outlives a change of it."""
+
+from __future__ import annotations
+
+import dataclasses
+import hashlib
+import sys
+from collections.abc import Iterable, Iterator, Mapping
+from pathlib import Path
+from typing import Any
+
+OWN = Path(__file__).resolve().parents[1]
+
+
+def package_of(kind: type) -> Path | None:
+    """Folder of the whole package that brings a class, or file of a module in none; None: it was typed at a prompt."""
+    name = getattr(sys.modules.get(kind.__module__), "__file__", None)
+    if name is None:
+        return None
+    file = Path(name).resolve()
+    if not (file.parent / "__init__.py").is_file():
+        return file
+    return next(folder for folder in file.parents if not (folder.parent / "__init__.py").is_file())
+
+
+def code_of(item: Any) -> list[str]:
+    """Hash of each package, other than this one, whose dataclasses ``item`` holds at any depth."""
+    places = {package_of(kind) for kind in set(_kinds(item))}
+    return sorted(hash_of([place]) for place in places - {None, OWN} if place is not None)
+
+
+def _kinds(item: Any) -> Iterator[type]:
+    if dataclasses.is_dataclass(item) and not isinstance(item, type):
+        yield type(item)
+        for field in dataclasses.fields(item):
+            yield from _kinds(getattr(item, field.name))
+    elif isinstance(item, Mapping):
+        yield from _kinds(list(item.values()))
+    elif isinstance(item, (list, tuple, set, frozenset)):
+        for part in item:
+            yield from _kinds(part)
+
+
+def hash_of(places: Iterable[Path], aside: frozenset[str] = frozenset()) -> str:
+    """Hash of Python files, and of all that lie in folders.
+
+    Modules and folders called as one of ``aside``, wherever they lie, are left out, and so are modules ``robot_…``,
+    which read robot files: no result hangs on them.
+    """
+    content = hashlib.sha256()
+    for place in places:
+        for file in sorted(place.rglob("*.py")) if place.is_dir() else [place]:
+            named = set(file.relative_to(place.parent).with_suffix("").parts)
+            if not (aside & named or file.stem.startswith("robot_")):
+                content.update(file.read_bytes())
+    return content.hexdigest()[:16]
