@@ -21,7 +21,7 @@ from proofroll.elements.ball_on_surface.model import Ball, Contact, InitialMotio
 from proofroll.elements.ball_on_surface.rolling_equations import reduced_rates, start
 from proofroll.elements.ball_on_surface.surfaces import Bowl, Cone, Plane, Torus
 from proofroll.files.scene_file import load_scene
-from proofroll.truth.truth import truth
+from proofroll.truth.ball_on_surface import truth
 
 G = 9.81
 

@@ -1,12 +1,20 @@
-"""Two routes to one answer: their difference is the answer's error bar."""
+"""What a route says of a ball, and two routes to one answer: their difference is the answer's error bar."""
 
 from __future__ import annotations
 
+from collections.abc import Callable, Iterable
 from typing import TYPE_CHECKING
 
 import numpy as np
 
+from proofroll.core.arrays import FloatArray
 from proofroll.core.errors import Diverged
+from proofroll.core.scene import Scene
+from proofroll.elements.ball_on_surface.dataset import columns
+from proofroll.elements.ball_on_surface.element import rolling_ball
+from proofroll.elements.ball_on_surface.model import BallCapability
+from proofroll.elements.ball_on_surface.motion import BallMotion
+from proofroll.truth.orientation import Quadrature, orientation
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -16,6 +24,24 @@ if TYPE_CHECKING:
 SAFETY = 3.0
 # Where the normal force is this many of its own error bars or less, the friction needed is 0/0.
 _NOTHING = 10.0
+
+
+def dataset_of(
+    scene: Scene,
+    times: FloatArray,
+    found: BallMotion,
+    spin: Callable[[FloatArray], FloatArray],
+    kinks: Iterable[float],
+    quadrature: Quadrature,
+) -> xr.Dataset:
+    """All variables of a route's motion; spin, its kinks and a quadrature are for the orientation, if it is asked for.
+
+    See :func:`proofroll.elements.ball_on_surface.dataset.columns` and :func:`proofroll.truth.orientation.orientation`.
+    """
+    q_WB = orientation(spin, times, kinks, quadrature) if BallCapability.ORIENTATION in scene.requires else None
+    motion = (found.p_WB, found.v_WB, found.w_WB)
+    result = columns(rolling_ball(scene), times, *motion, force=found.force, q_WB=q_WB).dataset()
+    return result.assign_attrs(route=found.route)
 
 
 def put_error_bars(result: xr.Dataset, check: xr.Dataset, floor: float) -> None:

@@ -10,6 +10,7 @@ import numpy as np
 from proofroll.core.arrays import FloatArray
 from proofroll.core.errors import Diverged
 from proofroll.truth.crossing import first_rise
+from proofroll.truth.route import End
 
 _RTOL = 100 * np.finfo(float).eps  # the tightest that scipy accepts
 
@@ -80,23 +81,48 @@ def _integrated(rates: Rates, piece: Piece, time: float) -> FloatArray:
     return last
 
 
-def read(pieces: list[Piece], where: FloatArray, first: FloatArray) -> FloatArray:
-    """States, shape (n, k), at values of the independent variable within the pieces."""
-    if not pieces or not len(where):
-        return np.broadcast_to(first, (len(where), len(first))).copy()
-    index = np.searchsorted([piece.start for piece in pieces], where, side="right") - 1
-    return np.array([pieces[i].between(x) for i, x in zip(index, where, strict=True)])
+class Run:
+    """A run from ``start`` until something ends it; see :class:`proofroll.truth.sliding.Run`.
 
+    Args:
+        rates: of the state.
+        start: of the independent variable.
+        state: there.
+        until: its last value.
+        atol: absolute tolerance of each component.
+        ended: where a step reached what ends the run, with the state there; None: it goes on.
+        cap: longest step after a state.
+    """
 
-def at_clock(pieces: list[Piece], times: FloatArray, first: FloatArray) -> FloatArray:
-    """States of the slip, shape (n, 8), where its clock shows the times: Newton's method for τ."""
-    if not pieces:
-        return np.broadcast_to(first, (len(times), len(first))).copy()
-    ends = np.array([piece.end for piece in pieces])
-    tau = np.interp(times, [first[7], *(piece.last[7] for piece in pieces)], [0.0, *ends])
-    for _ in range(20):
-        y = read(pieces, tau, first)
-        if not len(y) or np.all(np.abs(times - y[:, 7]) <= 4 * np.finfo(float).eps * times):
-            break
-        tau = np.clip(tau + (times - y[:, 7]) / np.exp(y[:, 5]), 0.0, ends[-1])
-    return read(pieces, tau, first)
+    def __init__(
+        self,
+        rates: Rates,
+        start: float,
+        state: FloatArray,
+        until: float,
+        *,
+        atol: FloatArray,
+        ended: Callable[[Piece], tuple[float, FloatArray, End] | None],
+        cap: Callable[[FloatArray], float] | None = None,
+    ) -> None:
+        self._pieces: list[Piece] = []
+        self.end, self.last, self.why = until, state, End.TIME
+        for piece in steps(rates, start, state, until, atol=atol, cap=cap):
+            self._pieces.append(piece)
+            self.last = piece.last
+            if found := ended(piece):
+                self.end, self.last, self.why = found
+                break
+        self._ends = np.array([start, *(piece.end for piece in self._pieces)])
+        self._states = np.array([state, *(piece.last for piece in self._pieces)])
+
+    def steps(self) -> tuple[FloatArray, FloatArray]:
+        """See :class:`proofroll.truth.sliding.Run`."""
+        return self._ends, self._states
+
+    def at(self, where: FloatArray) -> FloatArray:
+        """See :class:`proofroll.truth.sliding.Run`."""
+        if not self._pieces or not len(where):
+            return np.broadcast_to(self._states[0], (len(where), self._states.shape[1])).copy()
+        index = np.searchsorted(self._ends[:-1], where, side="right") - 1
+        return np.array([self._pieces[i].between(x) for i, x in zip(index, where, strict=True)])

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
 from dataclasses import dataclass
 
 import numpy as np
@@ -13,7 +12,7 @@ from proofroll.elements.ball_on_surface.events import EventKind
 from proofroll.elements.ball_on_surface.model import RollingBall
 from proofroll.elements.ball_on_surface.motion import BallMotion
 from proofroll.truth.crossing import first_rise
-from proofroll.truth.route import End, Leg, Route, State
+from proofroll.truth.route import End, Leg, Motion, Route, World
 
 # A ball that leaves the wall is looked for on it from this part of its pace on; its gap has grown from zero till then.
 _LEFT = 1e-3
@@ -41,11 +40,11 @@ class Landed:
     """
 
     time: float
-    world: tuple[FloatArray, FloatArray, FloatArray]
+    world: World
     slip: FloatArray | None
 
 
-def touching(route: Route[State], landed: Landed) -> State:
+def touching(route: Route, landed: Landed) -> FloatArray:
     """The state in which a ball goes on that has landed."""
     state = route.at(*landed.world)
     return state if landed.slip is not None else route.nudged(state, landed.world[1])
@@ -53,11 +52,11 @@ def touching(route: Route[State], landed: Landed) -> State:
 
 def airborne(
     body: RollingBall,
-    route: Route[State],
-    world: tuple[FloatArray, FloatArray, FloatArray],
+    route: Route,
+    world: World,
     time: float,
     until: float,
-    legs: list[Leg[State]],
+    legs: list[Leg],
     events: list[tuple[EventKind, float]],
 ) -> Landed | float | None:
     """Flights and impacts from ``time`` on, added to the legs and events, until the ball stays on the wall.
@@ -86,11 +85,11 @@ def airborne(
         e1 = body.surface.normal(p)
         approach, weight = float(v @ e1), pressed(body, p, v - (v @ e1) * e1)
         if e * approach > _LOW * natural or weight < 0:
-            world = (p, *route.impact(p, v, w, e, e_t))
+            world = (p, *route.impact(body, p, v, w, e, e_t))
             if e * approach > _SEEN * natural:
                 events.append(("bounce", time))
             continue
-        v, w = route.impact(p, v, w, 0.0, 0.0)
+        v, w = route.impact(body, p, v, w, 0.0, 0.0)
         slip = v + body.ball.radius * cross(w, e1)
         slip -= (slip @ e1) * e1
         events.append(("settle", time + 2 * e * approach / ((1 - e) * weight) if e else time))
@@ -98,9 +97,7 @@ def airborne(
         return Landed(time, (p, v, w), slip if size > _STANDS * (natural + np.linalg.norm(v)) else None)
 
 
-def _flight(
-    body: RollingBall, world: tuple[FloatArray, FloatArray, FloatArray], time: float, until: float
-) -> tuple[float | None, Callable[[FloatArray], BallMotion]]:
+def _flight(body: RollingBall, world: World, time: float, until: float) -> tuple[float | None, Motion]:
     """Free fall from ``time`` [s] with constant spin: when the ball is on the wall again (None: not until the end)."""
     p, v, w = world
 

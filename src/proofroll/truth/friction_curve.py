@@ -84,7 +84,7 @@ def friction_curve(body: RollingBall, until: float) -> FrictionCurve:
     """The curve of needed friction from time 0 to ``until`` [s], whatever μ the scene has."""
     endless = with_contact(body, mu_static=_UNREACHABLE, mu_kinetic=_UNREACHABLE)
     fast = taylor.available() and taylor.supports(endless)
-    route: Route[FloatArray] = taylor.SlidingTaylor(endless) if fast else Polar(endless)
+    route: Route = taylor.SlidingTaylor(endless) if fast else Polar(endless)
     leg = route.stick(0.0, route.start(), until)
     # One sample per turn of the ball by about a radian: crests come at the pace of the path, many turns apart.
     pace = body.ball.radius / (np.linalg.norm(body.v0) + np.sqrt(body.ball.radius * np.linalg.norm(body.gravity)))

@@ -14,12 +14,11 @@ from proofroll.elements.ball_on_surface.mechanics import always_pressed
 from proofroll.elements.ball_on_surface.model import RollingBall
 from proofroll.elements.ball_on_surface.motion import BallMotion
 from proofroll.truth import unreduced_taylor
-from proofroll.truth.assemble import classic_step, joined
 from proofroll.truth.collocation import Step, System, next_length, nodes, take
 from proofroll.truth.contact import ContactRates
 from proofroll.truth.crossing import first_rise
 from proofroll.truth.impact import by_equations
-from proofroll.truth.route import End, Leg
+from proofroll.truth.route import End, Leg, Route, World, joined
 
 _TOLERANCE = 1e-13  # of a step, relative to the scale of each variable
 _APPROACH = 0.5  # part of the time left until something stands still that one step may take, while it is far,
@@ -29,7 +28,7 @@ _MANY = 300  # steps of a leg that rolls: the rest of a longer one is left to a 
 _STILL = 1e-9  # time left, relative to the pace of the motion, that is extrapolated
 
 
-class Implicit:
+class Implicit(Route):
     """Route in the state y = (p, ω, u) of :class:`ContactRates`.
 
     Args:
@@ -38,6 +37,7 @@ class Implicit:
     """
 
     name = "world frame by signed distance, implicit collocation"
+    impact = staticmethod(by_equations)
 
     def __init__(self, body: RollingBall, first_step: float = 0.1) -> None:
         self._body = body
@@ -57,22 +57,16 @@ class Implicit:
         slip = v_WB + self._body.ball.radius * cross(w_WB, e1)
         return np.concatenate([p_WB + gap * e1, w_WB, slip - (slip @ e1) * e1])
 
-    def impact(
-        self, p_WB: FloatArray, v_WB: FloatArray, w_WB: FloatArray, e: float, e_t: float
-    ) -> tuple[FloatArray, FloatArray]:
-        """See :class:`Route`."""
-        return by_equations(self._body, p_WB, v_WB, w_WB, e, e_t)
-
-    def excess(self, state: FloatArray) -> float:
-        """See :class:`Route`."""
+    def friction(self, state: FloatArray) -> tuple[float, float]:
+        """See :class:`Route`; [N]."""
         needed, available = (float(x[0]) for x in self._needed_and_available(state[None, :]))
-        return (needed - available) / max(needed + available, np.finfo(float).tiny)
+        return needed, available
 
-    def ahead(self, state: FloatArray, span: float) -> FloatArray:
+    def rates(self, state: FloatArray) -> FloatArray:
         """See :class:`Route`."""
-        return classic_step(lambda y: self._contact.rates(y[None, :], True)[0], state, span)
+        return np.asarray(self._contact.rates(state[None, :], True)[0])
 
-    def world(self, state: FloatArray) -> tuple[FloatArray, FloatArray, FloatArray]:
+    def world(self, state: FloatArray) -> World:
         """See :class:`Route`."""
         return state[:3], self._contact.velocity(state[None, :])[0], state[3:6]
 
@@ -82,7 +76,7 @@ class Implicit:
         w = (state[3:6] @ e1) * e1 - cross(e1, v_WB) / self._body.ball.radius
         return np.concatenate([state[:3], w, np.zeros(3)])
 
-    def stick(self, time: float, state: FloatArray, until: float) -> Leg[FloatArray]:
+    def stick(self, time: float, state: FloatArray, until: float) -> Leg:
         """See :class:`Route`."""
         walk = _Walk(self._contact.system(sticking=True), time, state, until)
         resisted = self._body.contact.rolling_resistance > 0
@@ -93,7 +87,7 @@ class Implicit:
                 return self._rolls_on(walk, until)
             left = self._until_still(walk.state, True) if resisted else np.inf
             if left < _STILL * self._pace:
-                halted = walk.state + left * self._contact.rates(walk.state[None, :], True)[0]
+                halted = walk.state + left * self.rates(walk.state)
                 return walk.leg(self, True, walk.time + left, self.nudged(halted, np.zeros(3)), End.HALT)
             step, length = walk.step(min(length, self._approach(left)))
             ends = [] if self._held else [(End.LIFTOFF, partial(self._pull_along, step, True))]
@@ -104,7 +98,7 @@ class Implicit:
                 return walk.leg(self, True, when, walk.cut(when), why)
         return walk.leg(self, True, until, walk.state, End.TIME)
 
-    def _rolls_on(self, walk: _Walk, until: float) -> Leg[FloatArray]:
+    def _rolls_on(self, walk: _Walk, until: float) -> Leg:
         """The rest of a long leg by Taylor series of the same equations, which take a fraction of the time."""
         y, begun = walk.state, walk.time
         end, slips, states = unreduced_taylor.until_slip(self._body, begun, y[:6], until)
@@ -115,11 +109,11 @@ class Implicit:
         early = walk.leg(self, True, begun, y, End.TIME).motion
 
         def motion(times: FloatArray) -> BallMotion:
-            return joined(times, begun, early, lambda late: self.motion(at(late), True))
+            return joined(times, [(-np.inf, early), (begun, lambda late: self.motion(at(late), True))], self.name)
 
         return Leg(walk.start, end, True, at(np.array([end]))[0], End.CONE if slips else End.TIME, motion)
 
-    def slip(self, time: float, state: FloatArray, until: float, slip: FloatArray | None = None) -> Leg[FloatArray]:
+    def slip(self, time: float, state: FloatArray, until: float, slip: FloatArray | None = None) -> Leg:
         """See :class:`Route`."""
         if slip is not None:
             state = np.concatenate([state[:6], slip])
@@ -254,7 +248,7 @@ class _Walk:
         """State at a time within the last step, shape (9,)."""
         return np.asarray(self.steps[-1](np.array([time]))[0])
 
-    def leg(self, route: Implicit, sticking: bool, end: float, state: FloatArray, why: End) -> Leg[FloatArray]:
+    def leg(self, route: Implicit, sticking: bool, end: float, state: FloatArray, why: End) -> Leg:
         """The leg made of the steps so far."""
         steps, first = self.steps, self._state
         starts = np.array([step.time for step in steps])

@@ -14,39 +14,24 @@ from collections.abc import Callable
 import numpy as np
 
 from proofroll.core.arrays import FloatArray
-from proofroll.core.errors import Diverged
 from proofroll.elements.ball_on_surface.model import RollingBall
 from proofroll.elements.ball_on_surface.motion import BallMotion, world_motion
 from proofroll.elements.ball_on_surface.rolling_equations import reduced_rates, start
-from proofroll.truth.assemble import classic_step, joined
-from proofroll.truth.explicit import Piece, Rates, at_clock, read, steps, stop
-from proofroll.truth.impact import by_coefficients
-from proofroll.truth.route import End, Leg
+from proofroll.truth.explicit import Piece, Rates, Run, stop
+from proofroll.truth.route import End
+from proofroll.truth.sliding import Sliding
 
-_FLOOR = 1e-4  # |u| at which the rest of a slip is extrapolated, relative to where it began
 _APPROACH = 0.6  # part of the time left until the centre stands still that one step may take
 _STILL = 1e-9  # time left, relative to the pace of the motion, that is extrapolated
-BEGUN = 1e-8  # the same of a slip that does not begin from rest, relative to its initial |u|
 
 
-def direction(frame: FloatArray, slip: FloatArray) -> float:
-    """Angle of a slip in the world, shape (3,), from e2 towards e3 in the local frame [rad]."""
-    return float(np.arctan2(slip @ frame[:, 2], slip @ frame[:, 1]))
-
-
-class Polar:
-    """Route in (u, u̇, ω1), joined while slipping by ln|u|, φ and the time t against τ with dt = |u| dτ.
-
-    Args:
-        body: the scene's ball.
-        handover: |u| relative to |b| T, up to which the direction is slaved to b; T = |b|/|ḃ|.
-    """
+class Polar(Sliding):
+    """Route in (u, u̇, ω1); see :class:`Sliding`."""
 
     name = "surface coordinates with direction of slip, DOP853"
 
     def __init__(self, body: RollingBall, handover: float = 1e-5) -> None:
-        self._body = body
-        self._handover = handover
+        super().__init__(body, handover)
         ball = body.ball
         self._mu_k = body.contact.mu_kinetic if np.isfinite(body.contact.mu_kinetic) else 0.0  # then it never slips
         self._A = (1 + ball.inertia_ratio) / (ball.inertia_ratio * ball.mass)
@@ -68,138 +53,81 @@ class Polar:
         udot = np.linalg.pinv(self._body.surface.tangents(u)) @ v_WB
         return np.concatenate([u, udot, [w_WB @ self._body.surface.normal(p_WB)]])
 
-    def impact(
-        self, p_WB: FloatArray, v_WB: FloatArray, w_WB: FloatArray, e: float, e_t: float
-    ) -> tuple[FloatArray, FloatArray]:
-        """See :class:`Route`."""
-        return by_coefficients(self._body, p_WB, v_WB, w_WB, e, e_t)
-
-    def excess(self, state: FloatArray) -> float:
-        """See :class:`Route`."""
-        needed, available = self._needed_and_available(state)
-        return (needed - available) / max(needed + available, np.finfo(float).tiny)
-
-    def _needed_and_available(self, state: FloatArray) -> tuple[float, float]:
+    def friction(self, state: FloatArray) -> tuple[float, float]:
+        """See :class:`Route`; [N]."""
         b, N = self._drive(state)
         return float(np.linalg.norm(b)) / self._A, self._body.contact.mu_static * N
 
     def _missing(self, state: FloatArray) -> float:
         """Friction that is missing to stick [N]: smooth also where a step reaches beyond N = 0."""
-        needed, available = self._needed_and_available(state)
+        needed, available = self.friction(state)
         return needed - available
 
-    def ahead(self, state: FloatArray, span: float) -> FloatArray:
+    def rates(self, state: FloatArray) -> FloatArray:
         """See :class:`Route`."""
-        return classic_step(self._rolling, state, span)
-
-    def world(self, state: FloatArray) -> tuple[FloatArray, FloatArray, FloatArray]:
-        """See :class:`Route`."""
-        motion = self._motion(state[None, :5], np.zeros(1), None)
-        return motion.p_WB[0], motion.v_WB[0], motion.w_WB[0]
+        return reduced_rates(self._body, state)[0]
 
     def nudged(self, state: FloatArray, v_WB: FloatArray) -> FloatArray:
         """See :class:`Route`."""
         udot = np.linalg.pinv(self._body.surface.tangents(state[:2])) @ v_WB
         return np.concatenate([state[:2], udot, state[4:]])
 
-    def stick(self, time: float, state: FloatArray, until: float) -> Leg[FloatArray]:
-        """See :class:`Route`."""
-        pieces: list[Piece] = []
-
-        def leg(end: float, last: FloatArray, why: End) -> Leg[FloatArray]:
-            def motion(times: FloatArray) -> BallMotion:
-                return self._motion(read(pieces, times, state), np.zeros(len(times)), None)
-
-            return Leg(time, end, True, last, why, motion)
-
+    def _stick(self, time: float, state: FloatArray, until: float) -> Run:
         resisted = self._body.contact.rolling_resistance > 0
-        cap = (lambda y: _APPROACH * self._until_halt(y)) if resisted else None
-        for piece in steps(self._rolling, time, state, until, atol=self._atol[:5], cap=cap):
-            pieces.append(piece)
-            if ended := self._ended(piece):
-                return leg(*ended)
-            left = self._until_halt(piece.last) if resisted else np.inf
-            if left < _STILL * self._pace and piece.end < until:
-                halted = piece.last + left * self._rolling(piece.last)
-                return leg(piece.end + left, self.nudged(halted, np.zeros(3)), End.HALT)
-        return leg(until, pieces[-1].last if pieces else state, End.TIME)
 
-    def slip(self, time: float, state: FloatArray, until: float, slip: FloatArray | None = None) -> Leg[FloatArray]:
-        """See :class:`Route`."""
+        def ended(piece: Piece) -> tuple[float, FloatArray, End] | None:
+            if found := self._ended(piece):
+                return found
+            left = self._until_halt(piece.last) if resisted else np.inf
+            if not (left < _STILL * self._pace and piece.end < until):
+                return None
+            halted = piece.last + left * self.rates(piece.last)
+            return piece.end + left, self.nudged(halted, np.zeros(3)), End.HALT
+
+        cap = (lambda y: _APPROACH * self._until_halt(y)) if resisted else None
+        return Run(self.rates, time, state, until, atol=self._atol[:5], ended=ended, cap=cap)
+
+    def _grown(self, time: float, state: FloatArray, until: float) -> float:
         strength, change = self._pull(state)
         pace = min(strength / change if change > 0 else np.inf, until - time, self._turning_back(state))
         # Below the last digits of the time a slip cannot be seen to grow.
-        handover = max(self._handover * strength * pace, 64 * strength * np.spacing(time), np.finfo(float).tiny)
-        lead: list[Piece] = []
-        if slip is None:
-            why, begun, small = self._creep(lead, time, state, until, handover)
-        else:
-            why, begun, small = None, time, np.append(state, np.linalg.norm(slip))
-            handover = max(handover, BEGUN * small[5])
+        return float(max(self._handover * strength * pace, 64 * strength * np.spacing(time), np.finfo(float).tiny))
 
-        def creeping(times: FloatArray) -> BallMotion:
-            y = read(lead, times, np.append(state, 0.0))
-            return self._motion(y[:, :5], y[:, 5], np.array([self._slaved(row)[1] for row in y]))
+    def _creep(self, time: float, state: FloatArray, until: float, handover: float) -> Run:
+        rates: Rates = lambda y: self._following(y)[0]  # noqa: E731 -- one line each for two closures
 
-        if why is not None:
-            return Leg(time, begun, False, small[:5], why, creeping)
-        phi = self._slaved(small)[1] if slip is None else direction(self._body.surface.frame(state[:2]), slip)
-        first = np.array([*small[:5], np.log(small[5]), phi, begun])
-        floor = np.log(_FLOOR * handover)
-        pieces: list[Piece] = []
+        def ended(piece: Piece) -> tuple[float, FloatArray, End] | None:
+            size = piece.last[5]
+            if size >= handover and (grown := stop(rates, piece, lambda y: y[5] - handover)):
+                return *grown, End.GROWN
+            if size <= 0 and (back := stop(rates, piece, lambda y: -y[5])):
+                return *back, End.STILL
+            return None
 
-        def slipping(times: FloatArray) -> BallMotion:
-            y = at_clock(pieces, times, first)
-            return self._motion(y[:, :5], np.exp(y[:, 5]), y[:, 6])
+        return Run(rates, time, np.append(state, 0.0), until, atol=self._atol_slaved, ended=ended)
 
-        def motion(times: FloatArray) -> BallMotion:
-            return joined(times, begun, creeping, slipping)
+    def _slide(self, first: FloatArray, floor: float, until: float) -> Run:
+        stops: tuple[tuple[End, Callable[[FloatArray], float]], ...] = (
+            (End.LIFTOFF, lambda y: -self._drive(y)[1]),
+            (End.TIME, lambda y: y[7] - until),
+            (End.STILL, lambda y: floor - y[5]),
+        )
 
-        def leg(y: FloatArray, end: End) -> Leg[FloatArray]:
-            if end is End.TIME or y[7] >= until:
-                return Leg(time, until, False, y[:5], End.TIME, motion)
-            return Leg(time, float(y[7]), False, y[:5], end, motion)
-
-        for piece in steps(self._slipping, 0.0, first, np.inf, atol=self._atol):
-            pieces.append(piece)
+        def ended(piece: Piece) -> tuple[float, FloatArray, End] | None:
             # Clock and ln|u| pass their limits but once, so the end of a step tells whether one was passed.
-            stops: tuple[tuple[End, Callable[[FloatArray], float]], ...] = (
-                (End.LIFTOFF, lambda y: -self._drive(y)[1]),
-                (End.TIME, lambda y: y[7] - until),
-                (End.STILL, lambda y: floor - y[5]),
-            )
-            stops = tuple(item for item in stops if item[1](piece.last) > 0)
-            found = [(when[0], when[1], end) for end, g in stops if (when := stop(self._slipping, piece, g))]
-            if found:
-                _, y, end = min(found, key=lambda item: item[0])
-                return leg(self._stood_still(y) if end is End.STILL else y, end)
-        raise Diverged(f"the truth (polar) ended without a reason at {time:g} s")
+            passed = [(end, g) for end, g in stops if g(piece.last) > 0]
+            found = [(*when, end) for end, g in passed if (when := stop(self._slipping, piece, g))]
+            return min(found, key=lambda item: item[0], default=None)
 
-    def _creep(
-        self, pieces: list[Piece], time: float, state: FloatArray, until: float, handover: float
-    ) -> tuple[End | None, float, FloatArray]:
-        """The start of a slip, up to |u| = ``handover``; reason (None: handed over), time and (u, u̇, ω1, |u|)."""
-        rates: Rates = lambda y: self._slaved(y)[0]  # noqa: E731 -- one line each for two closures
-        last = np.append(state, 0.0)
-        for piece in steps(rates, time, last, until, atol=self._atol_slaved):
-            pieces.append(piece)
-            last = piece.last
-            if last[5] >= handover and (grown := stop(rates, piece, lambda y: y[5] - handover)):
-                return None, *grown
-            if last[5] <= 0 and (back := stop(rates, piece, lambda y: -y[5])):
-                return End.STILL, *back
-        return End.TIME, until, last
+        return Run(self._slipping, 0.0, first, np.inf, atol=self._atol, ended=ended)
 
     def _drive(self, y: FloatArray) -> tuple[FloatArray, float]:
         """Drive b along e2, e3 [m/s²], shape (2,), and N [N]."""
         return self._with_slip(y, 0.0, 0.0)[1:3]
 
-    def _rolling(self, y: FloatArray) -> FloatArray:
-        return reduced_rates(self._body, y)[0]
-
     def _pull(self, y: FloatArray) -> tuple[float, float]:
         """|b| and |ḃ| while sticking; ḃ by a central difference, for it only sets a scale."""
-        rates = self._rolling(y)
+        rates = self.rates(y)
         span = self._span(y)
         b_rate = (self._drive(y + span * rates)[0] - self._drive(y - span * rates)[0]) / (2 * span)
         return float(np.linalg.norm(self._drive(y)[0])), float(np.linalg.norm(b_rate))
@@ -252,7 +180,10 @@ class Polar:
         along, around = b2 * c + b3 * s - grip, b3 * c - b2 * s - size * turning
         return np.array([*(size * rates).tolist(), along, around, size])
 
-    def _slaved(self, y: FloatArray) -> tuple[FloatArray, float]:
+    def _slaved(self, states: FloatArray) -> FloatArray:
+        return np.array([self._following(y)[1] for y in states])
+
+    def _following(self, y: FloatArray) -> tuple[FloatArray, float]:
         """Rates of (u, u̇, ω1, |u|) and φ on the slow solution, where φ - φ_b = -|u| φ̇_b / (|b| + d|u|/dt)."""
         b, N = self._drive(y)
         grip = self._A * self._body.contact.mu_kinetic * N
@@ -265,10 +196,12 @@ class Polar:
         rates = self._with_slip(y, size, phi + delta)[0]
         return np.append(rates, strength * np.cos(delta) - grip), phi + delta
 
-    def _stood_still(self, y: FloatArray) -> FloatArray:
-        """The state at |u| = 0, linearly from a |u| so small that nothing else is seen."""
-        rates = self._slipping(y)
-        return np.asarray(y + rates / -rates[5])
+    def _stood_still(self, last: FloatArray) -> FloatArray:
+        rates = self._slipping(last)
+        return np.asarray(last + rates / -rates[5])
+
+    def _axes(self, state: FloatArray) -> FloatArray:
+        return self._body.surface.frame(state[:2])
 
     def _until_halt(self, y: FloatArray) -> float:
         _, v, force = reduced_rates(self._body, y[:5])
@@ -282,7 +215,7 @@ class Polar:
         ends: list[tuple[End, Callable[[FloatArray], float]]] = [(End.LIFTOFF, lambda y: -self._drive(y)[1])]
         if np.isfinite(self._body.contact.mu_static):
             ends.append((End.CONE, self._missing))
-        found = [(*when, end) for end, g in ends if (when := stop(self._rolling, piece, g))]
+        found = [(*when, end) for end, g in ends if (when := stop(self.rates, piece, g))]
         return min(found, key=lambda item: item[0], default=None)
 
     def _motion(self, y: FloatArray, size: FloatArray, phi: FloatArray | None) -> BallMotion:

@@ -2,10 +2,11 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from abc import ABC, abstractmethod
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from enum import Enum, auto
-from typing import Generic, Protocol, TypeVar
+from typing import ClassVar
 
 import numpy as np
 
@@ -13,7 +14,10 @@ from proofroll.core.arrays import FloatArray
 from proofroll.elements.ball_on_surface.events import EventKind
 from proofroll.elements.ball_on_surface.motion import BallMotion
 
-State = TypeVar("State")
+# Place [m], velocity [m/s] and spin [rad/s] of a ball in the world, each shape (3,).
+World = tuple[FloatArray, FloatArray, FloatArray]
+# Rising times [s], shape (n,) -> motion at these times.
+Motion = Callable[[FloatArray], BallMotion]
 
 
 class End(Enum):
@@ -24,10 +28,11 @@ class End(Enum):
     STILL = auto()  # slipping: the contact point stands still
     HALT = auto()  # sticking with rolling resistance: the centre stands still
     LIFTOFF = auto()  # the normal force reached zero
+    GROWN = auto()  # of the start of a slip, never of a leg: the slip has a direction of its own
 
 
 @dataclass(frozen=True)
-class Leg(Generic[State]):
+class Leg:
     """One stretch of time in one mode.
 
     Attributes:
@@ -35,59 +40,91 @@ class Leg(Generic[State]):
         sticking: the mode.
         state: at the end; the slip velocity in it is zero unless the ball slips there.
         why: why it ended.
-        motion: times within the leg [s], shape (n,) -> motion at these times.
+        motion: at times within the leg.
     """
 
     start: float
     end: float
     sticking: bool
-    state: State
+    state: FloatArray
     why: End
-    motion: Callable[[FloatArray], BallMotion]
+    motion: Motion
 
 
-class Route(Protocol[State]):
-    """One way of integrating the legs, in state variables of its own."""
+class Route(ABC):
+    """One way of integrating the legs, in state variables of its own.
 
-    @property
-    def name(self) -> str:
-        """How the legs are integrated, for a person."""
+    Attributes:
+        name: how the legs are integrated, for a person.
+        impact: what an impact makes of velocity and spin, a function of :mod:`proofroll.truth.impact`.
+    """
 
-    def start(self) -> State:
+    name: ClassVar[str]
+    impact: ClassVar[staticmethod[..., tuple[FloatArray, FloatArray]]]
+
+    @abstractmethod
+    def start(self) -> FloatArray:
         """State at time 0; that the ball slips there is not part of it."""
 
-    def at(self, p_WB: FloatArray, v_WB: FloatArray, w_WB: FloatArray) -> State:
+    @abstractmethod
+    def at(self, p_WB: FloatArray, v_WB: FloatArray, w_WB: FloatArray) -> FloatArray:
         """State of a ball that touches the wall, with these place [m], velocity [m/s] and spin [rad/s]."""
 
-    def impact(
-        self, p_WB: FloatArray, v_WB: FloatArray, w_WB: FloatArray, e: float, e_t: float
-    ) -> tuple[FloatArray, FloatArray]:
-        """Velocity [m/s] and spin [rad/s] after an impact with these coefficients of restitution."""
+    @abstractmethod
+    def friction(self, state: FloatArray) -> tuple[float, float]:
+        """The friction needed to stick, and μs N, in one unit."""
 
-    def excess(self, state: State) -> float:
-        """(needed - available) / (needed + available) with the friction needed to stick and μs N [-]."""
+    @abstractmethod
+    def rates(self, state: FloatArray) -> FloatArray:
+        """Rates of the state while the ball sticks."""
 
-    def ahead(self, state: State, span: float) -> State:
-        """The state after sticking for a short ``span`` [s], to third order at least."""
-
-    def stick(self, time: float, state: State, until: float) -> Leg[State]:
+    @abstractmethod
+    def stick(self, time: float, state: FloatArray, until: float) -> Leg:
         """Roll without slip from ``time`` to ``until`` at the latest [s]."""
 
-    def slip(self, time: float, state: State, until: float, slip: FloatArray | None = None) -> Leg[State]:
+    @abstractmethod
+    def slip(self, time: float, state: FloatArray, until: float, slip: FloatArray | None = None) -> Leg:
         """Slip from ``time`` to ``until`` at the latest [s].
 
         The contact point starts with the velocity ``slip`` in the world [m/s], shape (3,), or at rest (None).
         """
 
-    def world(self, state: State) -> tuple[FloatArray, FloatArray, FloatArray]:
-        """p_WB [m], v_WB [m/s], w_WB [rad/s] of the state, each shape (3,)."""
+    @abstractmethod
+    def world(self, state: FloatArray) -> World:
+        """What the state means in the world."""
 
-    def nudged(self, state: State, v_WB: FloatArray) -> State:
+    @abstractmethod
+    def nudged(self, state: FloatArray, v_WB: FloatArray) -> FloatArray:
         """The state rolling with the centre's velocity ``v_WB`` [m/s], shape (3,), in place of its own."""
+
+    def excess(self, state: FloatArray) -> float:
+        """(needed - available) / (needed + available) of the friction to stick [-]."""
+        needed, available = self.friction(state)
+        return (needed - available) / max(needed + available, np.finfo(float).tiny)
+
+    def ahead(self, state: FloatArray, span: float) -> FloatArray:
+        """The state after sticking for a short ``span`` [s], by one classic Runge-Kutta step."""
+        k1 = self.rates(state)
+        k2 = self.rates(state + span / 2 * k1)
+        k3 = self.rates(state + span / 2 * k2)
+        k4 = self.rates(state + span * k3)
+        return np.asarray(state + span / 6 * (k1 + 2 * k2 + 2 * k3 + k4))
+
+
+def joined(times: FloatArray, parts: Sequence[tuple[float, Motion]], route: str) -> BallMotion:
+    """Motion at rising times [s], each by the last part that has begun; parts with their beginnings [s]."""
+    index = np.searchsorted([start for start, _ in parts], times, side="right") - 1
+    columns = {key: np.empty((len(times), 3)) for key in ("p_WB", "v_WB", "w_WB", "force")}
+    for number in np.unique(index):
+        here = index == number
+        part = parts[number][1](times[here])
+        for key, column in columns.items():
+            column[here] = getattr(part, key)
+    return BallMotion(**columns, route=route)
 
 
 @dataclass(frozen=True)
-class Path(Generic[State]):
+class Path:
     """The whole sequence.
 
     Attributes:
@@ -96,18 +133,15 @@ class Path(Generic[State]):
         lands: when a ball that has left the wall is back on it [s], where the path ends; None: not until the end.
     """
 
-    legs: list[Leg[State]]
+    legs: list[Leg]
     events: list[tuple[EventKind, float]]
     lands: float | None = None
 
-    def motion(self, times: FloatArray, route: str) -> tuple[BallMotion, np.ndarray[tuple[int], np.dtype[np.bool_]]]:
-        """Motion at ``times`` [s] and whether the ball sticks there; a time of an event belongs to the later leg."""
+    def motion(self, times: FloatArray, route: str) -> BallMotion:
+        """Motion at rising ``times`` [s]; a time of an event belongs to the later leg."""
+        return joined(times, [(leg.start, leg.motion) for leg in self.legs], route)
+
+    def sticking(self, times: FloatArray) -> np.ndarray[tuple[int], np.dtype[np.bool_]]:
+        """Whether the ball sticks at ``times`` [s]."""
         index = np.searchsorted([leg.start for leg in self.legs], times, side="right") - 1
-        columns = {key: np.empty((len(times), 3)) for key in ("p_WB", "v_WB", "w_WB", "force")}
-        for number in np.unique(index):
-            here = index == number
-            part = self.legs[number].motion(times[here])
-            for key, column in columns.items():
-                column[here] = getattr(part, key)
-        sticking = np.array([leg.sticking for leg in self.legs])[index]
-        return BallMotion(**columns, route=route), sticking
+        return np.array([leg.sticking for leg in self.legs])[index]

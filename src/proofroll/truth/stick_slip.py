@@ -10,14 +10,13 @@ from proofroll.core.arrays import FloatArray
 from proofroll.core.errors import Refused
 from proofroll.core.events import Event
 from proofroll.core.scene import Scene
-from proofroll.elements.ball_on_surface.dataset import columns
 from proofroll.elements.ball_on_surface.element import rolling_ball
 from proofroll.elements.ball_on_surface.events import EventKind
-from proofroll.elements.ball_on_surface.model import BallCapability, RollingBall
+from proofroll.elements.ball_on_surface.model import RollingBall
 from proofroll.truth import taylor
-from proofroll.truth.error_bars import SAFETY, put_error_bars
+from proofroll.truth.error_bars import SAFETY, dataset_of, put_error_bars
 from proofroll.truth.implicit import Implicit
-from proofroll.truth.orientation import MATRICES, QUATERNIONS, Quadrature, orientation
+from proofroll.truth.orientation import MATRICES, QUATERNIONS, Quadrature
 from proofroll.truth.polar import Polar
 from proofroll.truth.route import Path, Route
 from proofroll.truth.switching import follow
@@ -29,7 +28,7 @@ if TYPE_CHECKING:
 _FLOOR = 1e-12
 
 
-def first_route(body: RollingBall) -> Route[FloatArray]:
+def first_route(body: RollingBall) -> Route:
     """The route that is taken as the answer: Taylor series where heyoka and the surface allow them, else DOP853."""
     return taylor.SlidingTaylor(body) if taylor.available() and taylor.supports(body) else Polar(body)
 
@@ -60,7 +59,7 @@ def stick_slip(scene: Scene, times: FloatArray) -> tuple[xr.Dataset, list[Event]
     body = rolling_ball(scene)
     times = np.asarray(times, dtype=np.float64)
     until = float(times[-1])
-    routes: tuple[Route[FloatArray], Route[FloatArray]] = (first_route(body), Implicit(body))
+    routes: tuple[Route, Route] = (first_route(body), Implicit(body))
     paths = [follow(body, route, until) for route in routes]
     if paths[0].lands is not None:
         raise Refused(
@@ -73,7 +72,7 @@ def stick_slip(scene: Scene, times: FloatArray) -> tuple[xr.Dataset, list[Event]
         for path, route, quadrature in zip(paths, routes, (QUATERNIONS, MATRICES), strict=True)
     )
     put_error_bars(result, check, _FLOOR)
-    result.attrs["route"], result.attrs["second_route"] = routes[0].name, routes[1].name
+    result.attrs["second_route"] = routes[1].name
     if not common:
         after = events[-1].time if events else 0.0
         result.attrs["ill_posed"] = (
@@ -83,7 +82,7 @@ def stick_slip(scene: Scene, times: FloatArray) -> tuple[xr.Dataset, list[Event]
     return result, events
 
 
-def _events(paths: list[Path[FloatArray]], until: float) -> tuple[list[Event], bool]:
+def _events(paths: list[Path], until: float) -> tuple[list[Event], bool]:
     """The events up to the first about which the routes disagree, and whether there is no such."""
     first, second = (path.events for path in paths)
     # An event at the very end may be in one route and just beyond the end in the other: then it is not an event yet.
@@ -104,12 +103,9 @@ def _without_last(
     return events[:-1] if at_end else events
 
 
-def _dataset(scene: Scene, times: FloatArray, path: Path[FloatArray], route: str, quadrature: Quadrature) -> xr.Dataset:
-    motion, sticking = path.motion(times, route)
-    q_WB = None
-    if BallCapability.ORIENTATION in scene.requires:
-        q_WB = orientation(lambda at: path.motion(at, route)[0].w_WB, times, [leg.end for leg in path.legs], quadrature)
-    body = rolling_ball(scene)
-    result = columns(body, times, motion.p_WB, motion.v_WB, motion.w_WB, force=motion.force, q_WB=q_WB).dataset()
+def _dataset(scene: Scene, times: FloatArray, path: Path, route: str, quadrature: Quadrature) -> xr.Dataset:
+    kinks = [leg.end for leg in path.legs]
+    motion = path.motion(times, route)
+    result = dataset_of(scene, times, motion, lambda at: path.motion(at, route).w_WB, kinks, quadrature)
     attributes = {"units": "1", "long_name": "whether the ball sticks (rolls without slip)"}
-    return result.assign(sticking=("time", sticking, attributes))
+    return result.assign(sticking=("time", path.sticking(times), attributes))

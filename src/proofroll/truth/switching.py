@@ -16,7 +16,7 @@ from proofroll.elements.ball_on_surface.model import RollingBall
 from proofroll.elements.ball_on_surface.motion import BallMotion
 from proofroll.elements.ball_on_surface.resting import setting_off, stands, stays
 from proofroll.truth.flight import Landed, airborne, pressed, touching
-from proofroll.truth.route import End, Leg, Path, Route, State
+from proofroll.truth.route import End, Leg, Path, Route
 
 # Relative distance from the friction cone below which round-off decides on which side a state is.
 _ON_CONE = 1e-13
@@ -30,14 +30,14 @@ _AT_REST = 1e-9
 _REVERSALS = 10
 
 
-def follow(body: RollingBall, route: Route[State], until: float) -> Path[State]:  # noqa: PLR0912, PLR0915 -- one per end
+def follow(body: RollingBall, route: Route, until: float) -> Path:  # noqa: PLR0912, PLR0915 -- one per end
     """Everything from time 0 to ``until`` [s].
 
     Raises:
         Refused: the ball slips to and fro ever faster.
         Diverged: a route makes no progress.
     """
-    legs: list[Leg[State]] = []
+    legs: list[Leg] = []
     reversals = 0
     events: list[tuple[EventKind, float]] = []
     time, state = 0.0, route.start()
@@ -100,7 +100,7 @@ def follow(body: RollingBall, route: Route[State], until: float) -> Path[State]:
         sticking = not must_slip
 
 
-def _must_slip(body: RollingBall, route: Route[State], state: State) -> bool:
+def _must_slip(body: RollingBall, route: Route, state: FloatArray) -> bool:
     """Whether the needed friction is outside the static cone, or on it and about to leave."""
     if not np.isfinite(body.contact.mu_static):
         return False
@@ -112,7 +112,7 @@ def _must_slip(body: RollingBall, route: Route[State], state: State) -> bool:
     return bool(pace > 0 and route.excess(route.ahead(state, 1e-3 * a / pace)) > _ON_CONE)
 
 
-def _comes_to_rest(body: RollingBall, route: Route[State], leg: Leg[State]) -> bool:
+def _comes_to_rest(body: RollingBall, route: Route, leg: Leg) -> bool:
     """Whether the ball stops at the end of a leg and can rest there: its centre, or all but round-off of a slip.
 
     Where resistance slows the rolling faster than friction the centre, the ball slips to a stop, rolls back a part of
@@ -124,7 +124,7 @@ def _comes_to_rest(body: RollingBall, route: Route[State], leg: Leg[State]) -> b
     return body.contact.rolling_resistance > 0 and bool(leg.why is End.HALT or settled) and stays(body, p)
 
 
-def _rest(body: RollingBall, route: Route[State], state: State, time: float, until: float) -> Leg[State]:
+def _rest(body: RollingBall, route: Route, state: FloatArray, time: float, until: float) -> Leg:
     p, _, w = route.world(state)
     e1 = body.surface.normal(p)
     force = -body.ball.mass * body.gravity

@@ -55,7 +55,7 @@ def test_an_error_of_one_quadrature_shows(monkeypatch: pytest.MonkeyPatch) -> No
     """The error bar holds what one quadrature does wrong."""
     scene = load_scene("sphere_in_cylinder", **ASKED)
     coarse: Any = (np.array([0.5]), lambda h, spin: QUATERNIONS[1](h, np.repeat(spin, 8, axis=1)))
-    monkeypatch.setattr("proofroll.truth.truth.QUATERNIONS", coarse)
+    monkeypatch.setattr("proofroll.truth.ball_on_surface.QUATERNIONS", coarse)
     assert truth(scene, np.linspace(0, 1, 11)).q_WB.attrs["error_bar"] > 1e-4
 
 

@@ -14,7 +14,7 @@ from proofroll.core.events import events_of
 from proofroll.elements.ball_on_surface.element import changed
 from proofroll.elements.ball_on_surface.model import InitialMotion
 from proofroll.files.scene_file import load_scene
-from proofroll.truth.truth import truth
+from proofroll.truth.ball_on_surface import truth
 
 G, A = 9.81, 0.025
 SPEEDS = st.floats(-3, 3)

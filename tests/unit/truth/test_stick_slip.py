@@ -77,9 +77,9 @@ def test_start_of_slip_does_not_matter() -> None:
     routes += [Polar(body, handover=1e-4)]
     if taylor.available():
         routes += [taylor.SlidingTaylor(body, handover=size) for size in (1e-7, 1e-6, 1e-5, 1e-4)]
-    paths: list[Path[Any]] = [follow(body, route, 2.5) for route in routes]
+    paths: list[Path] = [follow(body, route, 2.5) for route in routes]
     reference = [time for _, time in paths[0].events]
-    ends = [path.motion(np.array([2.5]), "")[0].p_WB[0] for path in paths]
+    ends = [path.motion(np.array([2.5]), "").p_WB[0] for path in paths]
     for path, end in zip(paths, ends, strict=True):
         assert [time for _, time in path.events] == pytest.approx(reference, abs=1e-10, rel=0)
         assert end == pytest.approx(ends[0], abs=1e-10)
@@ -245,8 +245,8 @@ def test_no_time_at_all() -> None:
 
 def test_disagreement_is_said() -> None:
     """Where the two routes tell different stories, only what happens before that is told."""
-    one: Path[Any] = Path([], [("slip", 1.0), ("stick", 2.0)])
-    other: Path[Any] = Path([], [("slip", 1.0)])
+    one: Path = Path([], [("slip", 1.0), ("stick", 2.0)])
+    other: Path = Path([], [("slip", 1.0)])
     events, common = module._events([one, other], 4.0)
     assert ([event.kind for event in events], common) == (["slip"], False)
     assert len(module._events([one, other], 2.0)[0]) == 1
@@ -311,6 +311,6 @@ def test_a_long_leg_is_handed_to_a_compiled_series(monkeypatch: pytest.MonkeyPat
     assert len(kinds) > 1
     assert again == pytest.approx(found, abs=1e-11, rel=0)
     assert steps[1] < steps[0] - 20
-    whole, handed = (path.motion(times, "")[0] for path in paths)
+    whole, handed = (path.motion(times, "") for path in paths)
     for name in ("p_WB", "v_WB", "w_WB", "force"):
         np.testing.assert_allclose(getattr(handed, name), getattr(whole, name), rtol=1e-10, atol=1e-10)

@@ -10,7 +10,7 @@ from scipy.integrate import quad, solve_ivp
 
 from proofroll.core.events import events_of
 from proofroll.files.scene_file import load_scene
-from proofroll.truth.truth import truth
+from proofroll.truth.ball_on_surface import truth
 
 G, A, C = 9.81, 0.025, 0.2
 

@@ -203,7 +203,8 @@ def test_error_bar_shows_a_wrong_route(monkeypatch: pytest.MonkeyPatch) -> None:
         motion = unreduced(*arguments)
         return dataclasses.replace(motion, p_WB=motion.p_WB + np.array([1e-3, 0, 0]))
 
-    monkeypatch.setattr("proofroll.truth.truth._unreduced", shifted)
+    for module in ("rolling", "unreduced_taylor"):
+        monkeypatch.setattr(f"proofroll.truth.{module}.unreduced", shifted)
     assert truth(scene, t)["down"].attrs["error_bar"] == pytest.approx(3 * 1e-3 * np.cos(0.35), rel=1e-6)
     assert honest < 1e-12
 
