@@ -28,8 +28,8 @@ from proofroll.studies.compare import compare
 from proofroll.studies.outcome import Outcome
 from proofroll.studies.planning import point_name
 from proofroll.studies.tradeoff import tradeoff
-from proofroll.studies.tradeoff_content import tradeoff_study
 from proofroll.studies.tradeoff_records import TradeoffStudy
+from proofroll.studies.tradeoff_study import tradeoff_study
 
 ROOT = Path(__file__).resolve().parents[1]
 TOLERANCES = (1e-2, 1e-3, 1e-4, 1e-6)

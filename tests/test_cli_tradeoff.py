@@ -32,7 +32,7 @@ def measured(tmp_path_factory: pytest.TempPathFactory) -> TradeoffStudy:
     from proofroll.running.runner import Runner
     from proofroll.running.store import Store
     from proofroll.studies.tradeoff import tradeoff
-    from proofroll.studies.tradeoff_content import tradeoff_study
+    from proofroll.studies.tradeoff_study import tradeoff_study
 
     question = Question("sphere_in_cylinder", {"rolling_resistance": 5e-4}, 0.5, "z")
     engines = [ENGINE, "mujoco[formulation=free,preset=default]"]
@@ -239,7 +239,7 @@ def test_an_answer_over_a_range(proofroll: Proofroll, folder: Path, monkeypatch:
         given.append(over)
         raise ProofrollError("enough")
 
-    monkeypatch.setattr("proofroll.studies.tradeoff.tradeoff", measuring)
+    monkeypatch.setattr("proofroll.studies.tradeoff_study.tradeoff", measuring)
     assert "enough" in proofroll(*asked(folder), "--over", "speed=3:4.5", "--measure")[2]
     assert given == [{"speed": [3.0, 4.5]}]
 

@@ -18,8 +18,9 @@ from proofroll.report.study_parts import PartEntry, absent, all_parts, attempt, 
 from proofroll.report.summary import three_sentences
 from proofroll.running.store import Store
 from proofroll.studies.outcome import Outcome
+from proofroll.studies.stability import stability_path
 from proofroll.studies.stability_places import QUICK, Effort
-from proofroll.studies.study_store import keep, stability_path
+from proofroll.studies.study_store import keep
 from proofroll.studies.tradeoff import stored
 
 POISON = "</script><script>alert('poison')</script><img src=x onerror=alert(1)>\"'"
@@ -239,7 +240,7 @@ def test_what_is_kept_is_taken_and_what_is_outdated_is_not(tmp_path: Path) -> No
     assert not tradeoff.keeps(tmp_path)
     assert not stability.keeps(tmp_path)
     axes = stability.asked.axes
-    paths = [stability_path(tmp_path, stability.asked, axes, [], effort) for effort in (QUICK, Effort())]
+    paths = [stability_path(tmp_path, stability.asked.scene, axes, [], effort) for effort in (QUICK, Effort())]
     assert len(set(paths)) == 2, "a quick map does not take the place of the whole one"
     paths[0].parent.mkdir()
     keep(stability_study(), paths[0])

@@ -30,7 +30,7 @@ def stability(
     from proofroll.studies.axes import chosen
     from proofroll.studies.stability_claims import file_for
     from proofroll.studies.stability_places import QUICK, Effort
-    from proofroll.studies.study_store import make_stability
+    from proofroll.studies.stability_study import make_stability
 
     asked = file_for(scene)
     axes = chosen(asked.axes, axis or [])

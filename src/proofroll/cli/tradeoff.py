@@ -119,7 +119,7 @@ def measure(
     out: Path,
 ) -> tuple[TradeoffStudy, Path]:
     """Measures and keeps the curves that a recommendation can be made from, with a progress bar."""
-    from proofroll.studies.study_store import make_tradeoff
+    from proofroll.studies.tradeoff_study import make_tradeoff
 
     with options.progress_bar("runs and timings") as advance:
         return make_tradeoff(question, runner, out, engines=engines, over=over, claims=claims, progress=advance)

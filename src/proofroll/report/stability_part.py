@@ -76,12 +76,13 @@ class StabilityPart(Part):
 
     def keeps(self, out: Path) -> bool:
         """The whole map, or else a quick one, of all axes if there is."""
+        from proofroll.studies.stability import stability_path
         from proofroll.studies.stability_places import QUICK, Effort
         from proofroll.studies.stability_records import StabilityStudy
-        from proofroll.studies.study_store import kept, stability_path
+        from proofroll.studies.study_store import kept
 
         for effort, axes in ((Effort(), self.asked.axes), (QUICK, self.asked.axes), (QUICK, self._quick_axes)):
-            path = stability_path(out, self.asked, axes, self.engines, effort)
+            path = stability_path(out, self.asked.scene, axes, self.engines, effort)
             self.study, _ = kept(path, StabilityStudy)
             if self.study is not None:
                 self.folder = _programs(path)
@@ -91,7 +92,7 @@ class StabilityPart(Part):
     def make(self, runner: Runner, out: Path, tell: Tell) -> None:
         """A quick map."""
         from proofroll.studies.stability_places import QUICK
-        from proofroll.studies.study_store import make_stability
+        from proofroll.studies.stability_study import make_stability
 
         self.study, path = make_stability(
             self.asked, self._quick_axes, runner, out, engines=self.engines, effort=QUICK, progress=tell

@@ -13,7 +13,7 @@ from rich.text import Text
 from proofroll.report.labels import name_of, number, step, with_caveat
 from proofroll.report.screen import numeric, plain_table, unbroken
 from proofroll.studies.hosts import said_of
-from proofroll.studies.stability_content import silent_ranking
+from proofroll.studies.stability_records import silent_ranking
 
 if TYPE_CHECKING:
     from proofroll.studies.stability_records import BoundaryPoint, ExplainedBoundary, StabilityStudy

@@ -88,7 +88,7 @@ class TradeoffPart(Part):
 
     def make(self, runner: Runner, out: Path, tell: Tell) -> None:
         """A brief study, without the runs over ranges of parameters."""
-        from proofroll.studies.study_store import make_tradeoff
+        from proofroll.studies.tradeoff_study import make_tradeoff
 
         self.study, _ = make_tradeoff(
             self.asked.swept, runner, out, engines=self.engines, claims=self.asked, brief=True,

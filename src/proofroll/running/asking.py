@@ -13,10 +13,31 @@ from proofroll.core.engine_abilities import Term
 from proofroll.core.errors import ProofrollError
 from proofroll.core.plugins import parse_engine
 from proofroll.running.case import Case, EngineDescription, EngineFacts
-from proofroll.running.process import WorkerDied
 from proofroll.running.worker_pool import Workers
 
 _START_UP_SECONDS = 60.0
+
+
+def _answers(
+    requests: Sequence[tuple[str, Mapping[str, Any]]], workers: Workers | None
+) -> list[dict[str, Any] | ProofrollError]:
+    """What engines answer to requests, or why they do not, in the order given; their processes start together."""
+    found: dict[int, dict[str, Any] | ProofrollError] = {}
+
+    def ask(engine: str, lent: Workers) -> None:
+        for index, (name, request) in enumerate(requests):
+            if name != engine:
+                continue
+            try:
+                with lent.lend(engine) as worker:
+                    found[index] = worker.request(request, _START_UP_SECONDS)
+            except ProofrollError as error:
+                found[index] = error
+
+    # Most of it is the start of the processes and the import of the engines.
+    with lent_workers(workers) as lent, ThreadPoolExecutor(os.cpu_count() or 1) as pool:
+        list(pool.map(lambda engine: ask(engine, lent), dict.fromkeys(name for name, _ in requests)))
+    return [found[index] for index in range(len(requests))]
 
 
 def describe(engine: str, workers: Workers | None = None) -> EngineDescription:
@@ -25,23 +46,22 @@ def describe(engine: str, workers: Workers | None = None) -> EngineDescription:
     Raises:
         InputError, Missing, WorkerDied: it cannot be asked.
     """
-    with lent_workers(workers) as lent, lent.lend(engine) as worker:
-        told = worker.request({"do": "describe", "engine": engine}, _START_UP_SECONDS)
-    return EngineDescription(**{**told, "terms": [Term(**term) for term in told["terms"]]})
+    told = described([engine], workers)[engine]
+    if isinstance(told, ProofrollError):
+        raise told
+    return told
 
 
 def described(engines: Iterable[str], workers: Workers | None = None) -> dict[str, EngineDescription | ProofrollError]:
-    """What each engine tells of itself, or why it cannot be asked; their processes start together."""
+    """What each engine tells of itself, or why it cannot be asked."""
     names = list(dict.fromkeys(engines))
-
-    def ask(name: str, lent: Workers) -> EngineDescription | ProofrollError:
-        try:
-            return describe(name, lent)
-        except ProofrollError as error:
-            return error
-
-    with lent_workers(workers) as lent, ThreadPoolExecutor(os.cpu_count() or 1) as pool:
-        return dict(zip(names, pool.map(lambda name: ask(name, lent), names), strict=True))
+    found: dict[str, EngineDescription | ProofrollError] = {}
+    for name, told in zip(names, _answers([(n, {"do": "describe", "engine": n}) for n in names], workers), strict=True):
+        if isinstance(told, ProofrollError):
+            found[name] = told
+        else:
+            found[name] = EngineDescription(**{**told, "terms": [Term(**term) for term in told["terms"]]})
+    return found
 
 
 def resolve(
@@ -56,35 +76,10 @@ def resolve(
         workers: processes in which they are asked.
         requires: by the scene, which decides the formulation where none is given.
     """
-    found: list[EngineFacts | ProofrollError] = [ProofrollError("not asked")] * len(engines)
-
-    def ask(name: str, lent: Workers) -> None:
-        for index, (other, options) in enumerate(engines):
-            if other != name:
-                continue
-            request = {"do": "resolve", "engine": name, "options": dict(options), "requires": sorted(requires)}
-            try:
-                worker = lent.take(name)
-            except ProofrollError as error:  # another interpreter that does not serve
-                found[index] = error
-                continue
-            try:
-                found[index] = EngineFacts(**worker.request(request, _START_UP_SECONDS))
-            except WorkerDied as error:
-                found[index] = error
-                worker.close()
-                continue
-            except ProofrollError as error:
-                found[index] = error
-            except BaseException:
-                worker.close()
-                raise
-            lent.keep(name, worker)
-
-    # Most of it is the start of the processes and the import of the engines.
-    with lent_workers(workers) as lent, ThreadPoolExecutor(os.cpu_count() or 1) as pool:
-        list(pool.map(lambda name: ask(name, lent), dict.fromkeys(name for name, _ in engines)))
-    return found
+    common = {"do": "resolve", "requires": sorted(requires)}
+    requests = [(name, {**common, "engine": name, "options": dict(options)}) for name, options in engines]
+    answers = _answers(requests, workers)
+    return [told if isinstance(told, ProofrollError) else EngineFacts(**told) for told in answers]
 
 
 def resolve_with_truth(
@@ -117,17 +112,9 @@ def prepare(engine: str, workers: Workers) -> None:
 
 def programs(cases: Sequence[Case], workers: Workers | None = None) -> list[tuple[str | None, str]]:
     """Engines' programs for cases (:class:`proofroll.core.engine_abilities.Reproduces`), each or None and why not."""
-    found: list[tuple[str | None, str]] = []
-    with lent_workers(workers) as lent:
-        for case in cases:
-            try:
-                with lent.lend(case.engine.name) as worker:
-                    request = {"do": "reproduce", "case": dataclasses.asdict(case)}
-                    answer = worker.request(request, _START_UP_SECONDS)
-                found.append((answer["program"], answer["message"]))
-            except ProofrollError as error:
-                found.append((None, str(error)))
-    return found
+    requests = [(case.engine.name, {"do": "reproduce", "case": dataclasses.asdict(case)}) for case in cases]
+    answers = _answers(requests, workers)
+    return [(None, str(a)) if isinstance(a, ProofrollError) else (a["program"], a["message"]) for a in answers]
 
 
 @contextlib.contextmanager

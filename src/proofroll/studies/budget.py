@@ -9,7 +9,7 @@ from __future__ import annotations
 
 import itertools
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import replace
 from typing import NamedTuple
 
 import numpy as np
@@ -17,6 +17,7 @@ import numpy as np
 from proofroll.core.arrays import FloatArray
 from proofroll.core.convergence import Limit, observed_order, richardson, size, tightest
 from proofroll.studies.curve import Curve, CurvePoint
+from proofroll.studies.tradeoff_records import CurveBudget
 
 # Neighbouring local orders this near to each other belong to one power law.
 _SAME_ORDER = 0.3
@@ -53,52 +54,7 @@ class Order(NamedTuple):
     finest: float | None = None
 
 
-@dataclass(frozen=True)
-class Budget:
-    """What the error of one quantity consists of along a curve; lengths of error in the quantity's unit.
-
-    Attributes:
-        quantity: the observable.
-        model_form: distance of the limit of small steps from the truth; None where too few runs reached the end.
-        model_form_bar: uncertainty of that limit.
-        order: observed order of the time step; None with an adaptive step or where no power law shows.
-        order_low, order_high: its confidence interval of 95 %; None from too few runs.
-        order_from, order_to: coarsest and finest step of the runs that follow that power law [s]; outside them the
-            order is not claimed.
-        declared: order that the engine declares.
-        floor: how far the finest runs scatter, where refining them no longer helps; None: not reached.
-        truth: error bar of the truth; None: it is not finite.
-        coarse, fine: what dominates at either end.
-        coarse_step, fine_step: those ends.
-        fine_error: error at the fine end.
-    """
-
-    quantity: str
-    model_form: float | None
-    model_form_bar: float | None
-    order: float | None
-    order_low: float | None
-    order_high: float | None
-    declared: int | None
-    floor: float | None
-    truth: float | None
-    coarse: str
-    fine: str
-    coarse_step: float | None = None
-    fine_step: float | None = None
-    fine_error: float | None = None
-    order_from: float | None = None
-    order_to: float | None = None
-
-    @property
-    def contradicted(self) -> bool:
-        """Whether the declared order lies outside the interval of the observed one."""
-        if self.declared is None or self.order_low is None or self.order_high is None:
-            return False
-        return not self.order_low - _SLACK <= self.declared <= self.order_high + _SLACK
-
-
-def budget(curve: Curve, quantity: str, every: float, true: FloatArray) -> Budget:
+def budget(curve: Curve, quantity: str, every: float, true: FloatArray, unit: str) -> CurveBudget:
     """The budget of one quantity along a curve.
 
     Args:
@@ -107,19 +63,25 @@ def budget(curve: Curve, quantity: str, every: float, true: FloatArray) -> Budge
         every: sampling interval of the runs from which order and limit come [s]. One with a longer step has fewer
             samples, and only the coarsest of them counts, as the coarse end.
         true: the true values.
+        unit: of the quantity.
     """
     used = [p for p in curve.points if p.case.every == every and np.isfinite(p.errors.get(quantity, np.inf))]
-    declared = curve.facts.order
+    bar = _bar(used, quantity)
+    found = CurveBudget(
+        engine=curve.facts.name,
+        curve=curve.engine,
+        quantity=quantity,
+        declared=curve.facts.order,
+        truth=bar if np.isfinite(bar) else None,
+        coarse="too few runs reached the end" if curve.facts.resolution else NOTHING,
+    )
     if len(used) < 3:
-        nothing = "too few runs reached the end" if curve.facts.resolution else NOTHING
-        return Budget(
-            quantity, None, None, None, None, None, declared, None, _known(_bar(used, quantity)), nothing, nothing
-        )
+        return replace(found, fine=found.coarse, sentence=f"{found.coarse[0].upper()}{found.coarse[1:]}.")
     values = [point.curves[quantity] for point in used]
     steps = [point.step or 0.0 for point in used]
     differences = [size(a - b) for a, b in itertools.pairwise(values)]
     if curve.fixed_step:
-        limit = richardson(values[-3:], steps[-3:], declared)
+        limit = richardson(values[-3:], steps[-3:], curve.facts.order)
         stalled = not observed_order(differences[-2], differences[-1], steps[-3:]) > _STALLED
         seen = differences
         if stalled:  # what lies in the scatter of the finest runs shows no order
@@ -131,28 +93,34 @@ def budget(curve: Curve, quantity: str, every: float, true: FloatArray) -> Budge
         # A tolerance that limits nothing any more gives the same run again; one at the floor gives scatter.
         stalled = differences[-1] >= differences[-2]
     floor = max(differences[-2:]) if stalled else None
-    model_form, bar = size(limit.values - true), _bar(used, quantity)
+    model_form, error = size(limit.values - true), used[-1].errors[quantity]
     first, departure = _coarse_end(curve, quantity, every, limit) or (used[0], values[0] - limit.values)
     coarse, fine = (_dominant(away, limit, model_form, floor, bar) for away in (departure, values[-1] - limit.values))
-    error = used[-1].errors[quantity]
-    return Budget(
-        quantity,
-        model_form,
-        limit.error_bar,
-        order.value,
-        order.low,
-        order.high,
-        declared,
-        floor,
-        _known(bar),
-        coarse,
-        TRUTH if error <= bar else fine,
-        first.step or 0.0,
-        steps[-1],
-        error,
-        order.coarsest,
-        order.finest,
+    found = replace(
+        found,
+        model_form=model_form,
+        model_form_bar=limit.error_bar,
+        order=order.value,
+        order_low=order.low,
+        order_high=order.high,
+        order_from=order.coarsest,
+        order_to=order.finest,
+        contradicts_declaration=_contradicted(order, curve.facts.order),
+        floor=floor,
+        coarse=coarse,
+        coarse_step=first.step or 0.0,
+        fine=TRUTH if error <= bar else fine,
+        fine_step=steps[-1],
+        fine_error=error,
     )
+    return replace(found, sentence=_sentence(found, unit, str(curve.facts.resolution)))
+
+
+def _contradicted(order: Order, declared: int | None) -> bool:
+    """Whether the declared order lies outside the interval of the observed one."""
+    if declared is None or order.low is None or order.high is None:
+        return False
+    return not order.low - _SLACK <= declared <= order.high + _SLACK
 
 
 def order_of(steps: Sequence[float], differences: Sequence[float]) -> Order:
@@ -199,10 +167,6 @@ def _stretch(local: Sequence[float]) -> tuple[int, int]:
     return best
 
 
-def _known(bar: float) -> float | None:
-    return bar if np.isfinite(bar) else None
-
-
 def _bar(points: Sequence[CurvePoint], quantity: str) -> float:
     return max((point.bars.get(quantity, 0.0) for point in points), default=0.0)
 
@@ -231,10 +195,10 @@ def _dominant(departure: FloatArray, limit: Limit, model_form: float, floor: flo
     return max(parts, key=lambda name: parts[name])
 
 
-def sentence(found: Budget, unit: str, resolution: str) -> str:
+def _sentence(found: CurveBudget, unit: str, resolution: str) -> str:
     """What dominates the error at each end, for a person."""
-    if found.model_form is None or found.model_form_bar is None:
-        return f"{found.coarse[0].upper()}{found.coarse[1:]}."
+    assert found.model_form is not None  # there are enough runs
+    assert found.model_form_bar is not None
     step = " s" if resolution == "dt" else ""
     coarse, fine = found.coarse, found.fine
     if resolution != "dt":
@@ -256,7 +220,7 @@ def sentence(found: Budget, unit: str, resolution: str) -> str:
     return said + "."
 
 
-def _order(found: Budget) -> str:
+def _order(found: CurveBudget) -> str:
     if found.order is None:
         return ""
     declared = "" if found.declared is None else f", declared {found.declared}"

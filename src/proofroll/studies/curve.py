@@ -1,26 +1,29 @@
-"""Points and curves of a sweep, and the question that they answer."""
+"""Points and curves of a sweep with their errors, and the question that they answer."""
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field, replace
 
 import numpy as np
 
-from proofroll.core.arrays import FloatArray
+from proofroll.core.arrays import FloatArray, largest_difference
 from proofroll.core.scene import Scene
 from proofroll.files.scene_file import load_scene
-from proofroll.running.case import Case, EngineFacts, Result
+from proofroll.files.trajectory_file import read
+from proofroll.running.case import Case, EngineFacts, Result, Status
+from proofroll.running.runner import Runner
+from proofroll.running.timing import Timing
 from proofroll.studies.cases import case_of
+from proofroll.studies.pareto import envelope
+from proofroll.studies.reference import Reference
+from proofroll.studies.tradeoff_records import Corner
 
 # Samples per run. An oscillation of the founding scene's z has a dozen of them.
 SAMPLES = 40
-
-
 # An adaptive step ends at each sample, so that with many of them no tolerance may be too loose. A run with so few is
 # made besides, and the larger of both errors counts.
 SPARSE = 2
-
-
 # Errors of runs that are the same but for round-off differ by less than this part.
 _SAME = 1e-6
 
@@ -80,6 +83,8 @@ class CurvePoint:
         bars: error bars of the truth, by observable.
         dense: ``errors`` over the many samples alone.
         sparse: the run over few samples, with its errors; None with a fixed step, which samples do not change.
+        timing: of the run, wall seconds per simulated second; None where it is not measured.
+        corners: the runs at the corners of a range of the scene's parameters; None where it was not checked there.
     """
 
     case: Case
@@ -89,6 +94,8 @@ class CurvePoint:
     bars: dict[str, float] = field(default_factory=dict)
     dense: dict[str, float] = field(default_factory=dict)
     sparse: CurvePoint | None = None
+    timing: Timing | None = None
+    corners: list[Corner] | None = None
 
     @property
     def step(self) -> float | None:
@@ -120,6 +127,10 @@ class Curve:
         """Whether it is swept over steps rather than over tolerances."""
         return self.facts.resolution == "dt"
 
+    def envelope(self, quantity: str) -> list[float]:
+        """Of each point's error, see :func:`proofroll.studies.pareto.envelope`."""
+        return envelope([point.errors.get(quantity, np.inf) for point in self.points])
+
     def saturated(self, quantity: str) -> bool:
         """Whether the two loosest tolerances give the same run: something else than they limits its steps.
 
@@ -130,3 +141,35 @@ class Curve:
         loosest, other = (point.errors.get(quantity, np.inf) for point in self.points[:2])
         bar = self.points[0].bars.get(quantity, 0.0)
         return bool(np.isfinite(loosest) and abs(loosest - other) <= max(bar, _SAME * loosest))
+
+
+def judged(points: Sequence[CurvePoint], references: Mapping[float, Reference], runner: Runner) -> CurvePoint:
+    """The point with its observables and their errors, if it has a trajectory that reached the end.
+
+    Args:
+        points: the run, and the one over few samples if there is one.
+        references: the truth by sampling interval.
+        runner: where the trajectories are.
+    """
+    point, *others = (_measured(point, references[point.case.every], runner) for point in points)
+    if not others:
+        return point
+    (sparse,) = others
+    reference = references[sparse.case.every]
+    # What is derived from neighbouring samples, as an audit, is not compared where there are few.
+    errors = {
+        name: max(error, sparse.errors.get(name, np.inf)) if name in reference.dataset else error
+        for name, error in point.errors.items()
+    }
+    return replace(point, errors=errors, dense=point.errors, sparse=sparse)
+
+
+def _measured(point: CurvePoint, reference: Reference, runner: Runner) -> CurvePoint:
+    if point.result.status != Status.DONE:
+        return point
+    curves = reference.observed(read(runner.store.trajectory(point.case)))
+    errors, bars = {}, {}
+    for name, curve in curves.items():
+        true, bar = reference.true(name, curve)
+        errors[name], bars[name] = largest_difference(curve, true), bar
+    return replace(point, curves=curves, errors=errors, bars=bars)

@@ -7,8 +7,11 @@ side, each as fast as its answers come. Every run is a stored case, so an interr
 from __future__ import annotations
 
 import dataclasses
+import hashlib
+import json
 from collections.abc import Callable, Generator, Iterable, Sequence
 from dataclasses import dataclass, field
+from pathlib import Path
 
 from proofroll.files.scene_file import load_scene
 from proofroll.files.trajectory_file import read
@@ -234,3 +237,10 @@ def failure_beyond(point: MapPoint, rung: int | None) -> RunOutcome | None:
         message = "even the coarsest run takes too long"
         return RunOutcome(False, False, TOO_SLOW, False, None, None, message)
     return None
+
+
+def stability_path(folder: Path, scene: str, axes: Sequence[Axis], engines: Sequence[str], effort: Effort) -> Path:
+    """Where a map is kept: a file for each scene, axes with their values, engines and effort."""
+    identity = [load_scene(scene).digest, [dataclasses.asdict(axis) for axis in axes], sorted(engines), repr(effort)]
+    digest = hashlib.sha256(json.dumps(identity).encode()).hexdigest()[:10]
+    return folder / "stability" / f"{Path(scene).name}-{digest}.json"

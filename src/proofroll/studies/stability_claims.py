@@ -15,8 +15,7 @@ from proofroll.files.validation import strict, validated
 from proofroll.studies.axes import Axis, AxisTerm
 from proofroll.studies.failure import meanings
 from proofroll.studies.first_look import axes_of
-from proofroll.studies.stability_content import dependence
-from proofroll.studies.stability_records import Boundary, BoundaryPoint, StabilityStudy
+from proofroll.studies.stability_records import Boundary, BoundaryPoint, StabilityStudy, dependence
 from proofroll.studies.step_numbers import step_numbers
 
 STUDY = "stability"

@@ -1,7 +1,8 @@
-"""What a stability map is kept as, printed as and drawn from."""
+"""What a stability map is kept as, printed as, judged by and drawn from."""
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass, field
 from typing import Any
 
@@ -9,6 +10,10 @@ from proofroll.studies.axes import Axis
 from proofroll.studies.stability_places import Effort
 from proofroll.studies.step_numbers import Explanation
 from proofroll.studies.study_identity import Measured
+
+BOUNDARIES = ("stable", "accurate")
+# Boundaries this factor apart count as the same: two rungs of the ladder of steps, one of that of tolerances.
+_SAME = {True: 2.3, False: 15.0}
 
 
 @dataclass(frozen=True)
@@ -174,3 +179,42 @@ class StabilityStudy:
     effort: Effort
     measured: Measured
     claims: MapClaims | None = None
+
+
+def dependence(points: Sequence[BoundaryPoint], name: str) -> str:
+    """How a boundary, in parts of the natural time, changes along an axis, if it does; else nothing.
+
+    Where the search was cut for its many steps, a boundary that is missing says nothing.
+
+    Args:
+        points: of one curve along one axis.
+        name: of the boundary.
+    """
+    fixed_step = any(point.resolution == "dt" for point in points)
+    sizes = [
+        (largest / point.period if fixed_step else largest, point.value)
+        for point in points
+        if (largest := point.sides[name].largest) is not None
+    ]
+    without = [point for point in points if point.sides[name].largest is None and not point.cut]
+    if not sizes or (not without and max(sizes)[0] <= _SAME[fixed_step] * min(sizes)[0]):
+        return ""
+    what = " of the natural time" if fixed_step else ""
+    said = f"{max(sizes)[0]:.2g}{what} at {max(sizes)[1]:g}"
+    if without:
+        places = ", ".join(f"{point.value:g} ({point.sides[name].failure})" for point in without)
+        return f"{said}, but nowhere at {places}"
+    return f"{said}, but {min(sizes)[0]:.2g}{what} at {min(sizes)[1]:g}"
+
+
+def silent_ranking(study: StabilityStudy) -> list[BoundaryPoint]:
+    """The silent failures, the worst first: wrong at any step, then by how wrong the run beyond the boundary was.
+
+    Searches that were cut because finer runs have too many steps come last: a finer step might have been right.
+    """
+
+    def badness(point: BoundaryPoint) -> tuple[bool, bool, bool, float]:
+        never, error = point.shown.largest is None, point.shown.error
+        return not (never and point.cut), never, point.boundary == "stable", error if error is not None else 0.0
+
+    return sorted((point for point in study.points if point.silent), key=badness, reverse=True)

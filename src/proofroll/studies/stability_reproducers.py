@@ -14,8 +14,7 @@ from proofroll.running.store import write_text
 from proofroll.running.worker_pool import Workers
 from proofroll.studies.failure import ACCURATE, REFUSED, TOO_SLOW, WRONG
 from proofroll.studies.stability import MapPoint, StabilityMap
-from proofroll.studies.stability_content import BOUNDARIES
-from proofroll.studies.stability_records import BoundaryPoint, StabilityStudy
+from proofroll.studies.stability_records import BOUNDARIES, BoundaryPoint, StabilityStudy
 
 # A run that did not begin, and one that nobody waited for, show nothing.
 _NOTHING_TO_SHOW = {

@@ -12,8 +12,7 @@ from proofroll.core.errors import InputError, ProofrollError
 from proofroll.running.asking import resolve_with_truth
 from proofroll.running.case import Case, EngineFacts, Result, Status
 from proofroll.running.runner import Runner
-from proofroll.studies.curve import Curve, CurvePoint, Question
-from proofroll.studies.curve_points import judged
+from proofroll.studies.curve import Curve, CurvePoint, Question, judged
 from proofroll.studies.reference import Reference
 
 # Steps in sampling intervals: those that every curve starts with, and those by which it may be extended.

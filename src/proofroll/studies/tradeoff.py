@@ -17,15 +17,14 @@ from pathlib import Path
 import numpy as np
 
 from proofroll.running.asking import resolve_with_truth
-from proofroll.running.case import Case, Result, Status
+from proofroll.running.case import Case, EngineFacts, Result, Status
 from proofroll.running.runner import Runner
 from proofroll.running.stopwatch import Stopwatch
 from proofroll.running.timing import ROUNDS, Timing, interleaved
 from proofroll.running.worker_pool import Workers
-from proofroll.studies.curve import Curve, CurvePoint, Question
-from proofroll.studies.curve_points import judged
+from proofroll.studies.curve import Curve, CurvePoint, Question, judged
 from proofroll.studies.curves_asked import curves_of
-from proofroll.studies.pareto import envelope, front
+from proofroll.studies.pareto import front
 from proofroll.studies.reference import Reference
 from proofroll.studies.sweep import FINER, GAIN, sweep
 from proofroll.studies.tradeoff_records import Corner
@@ -48,9 +47,7 @@ class Tradeoff:
         curves: with their points.
         absent: engine -> why it has no curve.
         references: the truth by sampling interval.
-        timings: by the key of a case.
         truth_timing: of the truth itself, measured in turns with the points; None if it could not be.
-        corners: by the key of a case: its runs over the range.
         over: parameter -> values; the range over which the best points were checked.
         brief: whether speeds were measured less often, as the option of :func:`tradeoff` says.
     """
@@ -59,9 +56,7 @@ class Tradeoff:
     curves: list[Curve]
     absent: dict[str, str]
     references: dict[float, Reference]
-    timings: dict[str, Timing] = field(default_factory=dict)
     truth_timing: Timing | None = None
-    corners: dict[str, list[Corner]] = field(default_factory=dict)
     over: dict[str, list[float]] = field(default_factory=dict)
     brief: bool = False
 
@@ -77,8 +72,8 @@ class Tradeoff:
 
     @property
     def quantities(self) -> list[str]:
-        """The observables of the truth."""
-        return list(self.reference.curves)
+        """The observables of the truth that a recommendation may be asked for."""
+        return [name for name in self.reference.curves if self.reference.scene.observables[name].asked_for]
 
 
 Progress = Callable[[str], None]
@@ -112,42 +107,40 @@ def tradeoff(
     scene = question.loaded()
     scene.observable(question.quantity)
     curves, absent = curves_of(engines, runner.workers, scene.requires)
+    tell = progress or (lambda _: None)
 
     def told(case: Case, _: Result) -> None:
-        if progress:
-            progress(case.engine.name)
+        tell(case.engine.name)
 
     finer, gain = (BRIEF_FINER, BRIEF_GAIN) if brief else (FINER, GAIN)
     references = sweep(question, curves, runner, told, finer, gain)
-    found = Tradeoff(question, curves, absent, references, brief=brief)
-    truth = _truth_case(question, references, runner)
-    found.timings = _timed(found, truth, runner.workers, rounds, progress)
-    found.truth_timing = found.timings.pop(truth.key, None)
-    if over:
-        found.over = {name: [float(value) for value in values] for name, values in over.items()}
-        found.corners = _checked(found, runner, told)
+    ranges = {name: [float(value) for value in values] for name, values in (over or {}).items()}
+    found = Tradeoff(question, curves, absent, references, over=ranges, brief=brief)
+    _, truth = resolve_with_truth([], runner.workers)
+    _time(found, question.case(found.reference.scene, truth, question.every), runner.workers, rounds, tell)
+    if ranges:
+        _check(found, truth, runner, told)
     return found
 
 
-def _truth_case(question: Question, references: Mapping[float, Reference], runner: Runner) -> Case:
-    _, facts = resolve_with_truth([], runner.workers)
-    return question.case(references[question.every].scene, facts, question.every)
-
-
-def _timed(found: Tradeoff, truth: Case, workers: Workers, rounds: int, progress: Progress | None) -> dict[str, Timing]:
+def _time(found: Tradeoff, truth: Case, workers: Workers, rounds: int, tell: Progress) -> None:
+    """Measures the speed of every point that reached the end, and of the truth."""
     cases = {point.case.key: point.case for point in found.points if point.result.status == Status.DONE}
     cases[truth.key] = truth
     seconds = BRIEF_SECONDS if found.brief else None
     with Stopwatch(workers) as stopwatch:
-        return interleaved(
+        timings = interleaved(
             {key: lambda case=case: stopwatch(case, seconds) for key, case in cases.items()},  # type: ignore[misc]
             min(rounds, BRIEF_ROUNDS) if found.brief else rounds,
             once_above=BRIEF_ONCE if found.brief else np.inf,
-            progress=(lambda key: progress(f"timing {cases[key].engine.name}")) if progress else None,
+            progress=lambda key: tell(f"timing {cases[key].engine.name}"),
         )
+    found.truth_timing = timings.get(truth.key)
+    for point in found.points:
+        point.timing = timings.get(point.case.key)
 
 
-def _checked(found: Tradeoff, runner: Runner, told: Callable[[Case, Result], None]) -> dict[str, list[Corner]]:
+def _check(found: Tradeoff, truth: EngineFacts, runner: Runner, told: Callable[[Case, Result], None]) -> None:
     """Runs the points on any formulation's own Pareto front, for any quantity, at every corner of the range.
 
     Whoever asks for a kind of model must not lose a formulation that another one of the same engine dominates.
@@ -158,18 +151,17 @@ def _checked(found: Tradeoff, runner: Runner, told: Callable[[Case, Result], Non
     chosen = {
         point.case.key: point
         for curves in formulations.values()
-        for quantity in judged_quantities(found)
-        for point in front(pareto_entries(curves, quantity, found.timings))
+        for quantity in found.quantities
+        for point in front(pareto_entries(curves, quantity))
     }
-    base, truth_facts = found.question, _truth_case(found.question, found.references, runner).engine
-    places = [dict(zip(found.over, values, strict=True)) for values in itertools.product(*found.over.values())]
     asked = []
-    for place in places:
-        question = dataclasses.replace(base, parameters={**base.parameters, **place})
+    for values in itertools.product(*found.over.values()):
+        place = dict(zip(found.over, values, strict=True))
+        question = dataclasses.replace(found.question, parameters={**found.question.parameters, **place})
         scene = question.loaded()
         runs = {key: question.cases(scene, point.case.engine, point.case.every) for key, point in chosen.items()}
         intervals = {case.every for both in runs.values() for case in both}
-        truths = {every: question.case(scene, truth_facts, every) for every in intervals}
+        truths = {every: question.case(scene, truth, every) for every in intervals}
         asked.append((place, scene, truths, runs))
     cases = [case for _, _, truths, runs in asked for case in (*truths.values(), *itertools.chain(*runs.values()))]
     results = runner.run(cases, told)
@@ -188,7 +180,8 @@ def _checked(found: Tradeoff, runner: Runner, told: Callable[[Case, Result], Non
             else:
                 said = results[truths[lost].key].message
                 corners[key].append(Corner(place, {}, {}, f"there is no truth: {said}"))
-    return corners
+    for point in found.points:
+        point.corners = corners.get(point.case.key)
 
 
 def _corner(place: dict[str, float], point: CurvePoint, reference: Reference) -> Corner:
@@ -198,22 +191,13 @@ def _corner(place: dict[str, float], point: CurvePoint, reference: Reference) ->
     return Corner(place, errors, relative, (point if not point.errors else ended).result.message)
 
 
-def judged_quantities(found: Tradeoff) -> list[str]:
-    """The observables that a recommendation may be asked for."""
-    return [name for name in found.quantities if found.reference.scene.observables[name].asked_for]
-
-
-def pareto_entries(
-    curves: Iterable[Curve], quantity: str, timings: Mapping[str, Timing]
-) -> list[tuple[CurvePoint, float, float]]:
+def pareto_entries(curves: Iterable[Curve], quantity: str) -> list[tuple[CurvePoint, float, float]]:
     """Every timed point with its cost and the envelope of its error, of which the truth shows no more than its bar."""
     entries = []
     for curve in curves:
-        held = envelope([point.errors.get(quantity, np.inf) for point in curve.points])
-        for point, error in zip(curve.points, held, strict=True):
-            if point.case.key in timings and np.isfinite(error):
-                seen = max(error, point.bars.get(quantity, 0.0))
-                entries.append((point, timings[point.case.key].interval.value, seen))
+        for point, error in zip(curve.points, curve.envelope(quantity), strict=True):
+            if point.timing is not None and np.isfinite(error):
+                entries.append((point, point.timing.interval.value, max(error, point.bars.get(quantity, 0.0))))
     return entries
 
 

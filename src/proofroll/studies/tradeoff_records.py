@@ -9,7 +9,6 @@ from typing import Annotated, Any
 from pydantic import BeforeValidator
 
 from proofroll.running.case import Status
-from proofroll.studies.budget import Budget
 from proofroll.studies.study_identity import Measured
 
 # JSON has no infinity, which a parameter may be (friction without a bound): there it is null.
@@ -134,13 +133,47 @@ class DroppedStep:
 
 
 @dataclass(frozen=True, kw_only=True)
-class CurveBudget(Budget):
-    """The error budget of a curve, whether it contradicts the declared order, and what it says in one sentence."""
+class CurveBudget:
+    """What the error of one quantity consists of along a curve; lengths of error in the quantity's unit.
+
+    Attributes:
+        engine, curve, quantity: which.
+        model_form: distance of the limit of small steps from the truth; None where too few runs reached the end.
+        model_form_bar: uncertainty of that limit.
+        order: observed order of the time step; None with an adaptive step or where no power law shows.
+        order_low, order_high: its confidence interval of 95 %; None from too few runs.
+        order_from, order_to: coarsest and finest step of the runs that follow that power law [s]; outside them the
+            order is not claimed.
+        declared: order that the engine declares.
+        contradicts_declaration: whether that lies outside the interval of the observed one.
+        floor: how far the finest runs scatter, where refining them no longer helps; None: not reached.
+        truth: error bar of the truth; None: it is not finite.
+        coarse, fine: what dominates at either end.
+        coarse_step, fine_step: those ends.
+        fine_error: error at the fine end.
+        sentence: all this in one.
+    """
 
     engine: str
     curve: str
-    contradicts_declaration: bool
-    sentence: str
+    quantity: str
+    model_form: float | None = None
+    model_form_bar: float | None = None
+    order: float | None = None
+    order_low: float | None = None
+    order_high: float | None = None
+    order_from: float | None = None
+    order_to: float | None = None
+    declared: int | None = None
+    contradicts_declaration: bool = False
+    floor: float | None = None
+    truth: float | None = None
+    coarse: str = ""
+    coarse_step: float | None = None
+    fine: str = ""
+    fine_step: float | None = None
+    fine_error: float | None = None
+    sentence: str = ""
 
 
 @dataclass(frozen=True, kw_only=True)

@@ -9,8 +9,9 @@ import pytest
 
 from proofroll.files.json_data import plain, record
 from proofroll.running.case import Case, EngineFacts, Result, Status
-from proofroll.studies.budget import FLOOR, MODEL_FORM, TIME_STEP, TRUTH, Budget, Order, budget, order_of, sentence
+from proofroll.studies.budget import FLOOR, MODEL_FORM, TIME_STEP, TRUTH, Order, budget, order_of
 from proofroll.studies.curve import Curve, CurvePoint
+from proofroll.studies.tradeoff_records import CurveBudget
 
 T = np.linspace(0, 2, 41)
 TRUE = np.sin(3 * T)
@@ -19,7 +20,7 @@ STEPS = (0.05, 0.025, 0.01, 0.005, 0.002, 0.001)
 
 def made(
     *, order: int, model: float = 0.0, floor: float = 0.0, declared: int = 2, resolution: str = "dt", bar: float = 1e-13
-) -> Budget:
+) -> CurveBudget:
     """The budget of runs with errors of known parts."""
     facts = EngineFacts(
         "made", "1", "0", {"dt": 0.1, "rtol": 0.1}, resolution, declared if resolution == "dt" else None
@@ -32,7 +33,7 @@ def made(
         error = float(np.max(np.abs(values - TRUE)))
         case = Case("scene", {}, "0", own, 2.0, 0.05)
         curve.points.append(CurvePoint(case, Result(Status.DONE, "done"), {"z": values}, {"z": error}, {"z": bar}))
-    return budget(curve, "z", 0.05, TRUE)
+    return budget(curve, "z", 0.05, TRUE, "m")
 
 
 @pytest.mark.parametrize("order", [1, 2, 4])
@@ -43,8 +44,8 @@ def test_order_with_its_interval(order: int) -> None:
     assert found.order_low is not None
     assert found.order_high is not None
     assert found.order_low <= order <= found.order_high
-    assert not found.contradicted
-    assert made(order=order, declared=order + 1).contradicted
+    assert not found.contradicts_declaration
+    assert made(order=order, declared=order + 1).contradicts_declaration
     assert found.coarse == found.fine == TIME_STEP
     assert found.floor is None
 
@@ -75,10 +76,10 @@ def test_the_coarse_end_is_that_of_the_whole_curve(start: int) -> None:
         error = float(np.max(np.abs(values - np.sin(3 * t))))
         case = Case("scene", {}, "0", own, 2.0, every)
         curve.points.append(CurvePoint(case, Result(Status.DONE, "done"), {"z": values}, {"z": error}, {"z": 1e-13}))
-    found = budget(curve, "z", 0.05, TRUE[start:])
+    found = budget(curve, "z", 0.05, TRUE[start:], "m")
     assert (found.coarse_step, found.coarse, found.fine) == (0.4, TIME_STEP, MODEL_FORM)
     curve.points[0].curves["z"] = curve.points[0].curves["z"][:-1]
-    assert budget(curve, "z", 0.05, TRUE[start:]).coarse_step == STEPS[0]
+    assert budget(curve, "z", 0.05, TRUE[start:], "m").coarse_step == STEPS[0]
 
 
 def test_no_model_form_where_there_is_none() -> None:
@@ -87,7 +88,7 @@ def test_no_model_form_where_there_is_none() -> None:
     assert found.model_form is not None
     assert found.model_form_bar is not None
     assert found.model_form <= found.model_form_bar + found.truth
-    assert "No error of the model itself is seen" in sentence(found, "m", "dt")
+    assert "No error of the model itself is seen" in found.sentence
 
 
 def test_floor_where_refining_no_longer_helps() -> None:
@@ -108,23 +109,23 @@ def test_a_truth_without_a_finite_bar_can_be_kept() -> None:
     """A bar that is not finite is none in the budget, which says so, and is read back from JSON as it was."""
     found = made(order=2, bar=np.inf)
     assert (found.truth, found.fine) == (None, TRUTH)
-    assert "the truth's error bar is not finite" in sentence(found, "m", "dt")
-    assert record(Budget, json.loads(json.dumps(plain(found), allow_nan=False))) == found
+    assert "the truth's error bar is not finite" in found.sentence
+    assert record(CurveBudget, json.loads(json.dumps(plain(found), allow_nan=False))) == found
 
 
 def test_an_adaptive_curve_has_no_order() -> None:
     """Over tolerances no order is claimed, and the sentence speaks of step control."""
     found = made(order=2, resolution="rtol")
     assert (found.order, found.order_low, found.declared) == (None, None, None)
-    assert "step control" in sentence(found, "m", "rtol")
+    assert "step control" in found.sentence
 
 
 def test_too_few_runs() -> None:
     """From fewer than three runs nothing is concluded."""
     facts = EngineFacts("made", "1", "0", {"dt": 0.1}, "dt", 2)
-    found = budget(Curve("made", facts, None), "z", 0.05, TRUE)
+    found = budget(Curve("made", facts, None), "z", 0.05, TRUE, "m")
     assert found.model_form is None
-    assert "oo few runs" in sentence(found, "m", "dt")
+    assert "oo few runs" in found.sentence
 
 
 def test_order_from_two_differences_has_no_interval() -> None:
@@ -149,4 +150,4 @@ def test_an_order_is_told_with_the_steps_it_holds_on() -> None:
     assert (found.coarsest, found.finest) == (16.0, 1.0)
     swept = made(order=2)
     assert (swept.order_from, swept.order_to) == (STEPS[0], STEPS[-1])
-    assert "from 0.05 s to 0.001 s" in sentence(swept, "m", "dt")
+    assert "from 0.05 s to 0.001 s" in swept.sentence

@@ -28,10 +28,10 @@ from proofroll.studies.axes import Axis, AxisTerm, chosen, thinned
 from proofroll.studies.failure import meanings
 from proofroll.studies.stability import _refused, stability
 from proofroll.studies.stability_claims import Claim, file_for
-from proofroll.studies.stability_content import dependence, stability_study
 from proofroll.studies.stability_places import Effort, places_of
-from proofroll.studies.stability_records import Boundary, BoundaryPoint, StabilityStudy
+from proofroll.studies.stability_records import Boundary, BoundaryPoint, StabilityStudy, dependence
 from proofroll.studies.stability_reproducers import with_programs
+from proofroll.studies.stability_study import stability_study
 from proofroll.studies.step_numbers import OSCILLATION, explanation, values
 
 SPEED = Axis("V0", "m/s", "initial speed", [2.0, 8.0], {"speed": AxisTerm()})

@@ -11,9 +11,10 @@ import pytest
 from invented import invented_study, measured_point
 
 from proofroll.studies import study_identity
+from proofroll.studies.stability import stability_path
 from proofroll.studies.stability_claims import file_for
 from proofroll.studies.stability_places import QUICK, Effort
-from proofroll.studies.study_store import keep, kept, stability_path
+from proofroll.studies.study_store import keep, kept
 from proofroll.studies.tradeoff_records import Corner, TradeoffStudy
 
 
@@ -82,8 +83,8 @@ def test_another_file_has_a_map_of_its_own(tmp_path: Path) -> None:
     """Other values of an axis, though of the same name, are another map."""
     asked = file_for("inclined_plane")
     axes = [dataclasses.replace(axis, values=axis.values[:2]) for axis in asked.axes]
-    first = stability_path(tmp_path, asked, asked.axes, (), Effort())
-    assert stability_path(tmp_path, dataclasses.replace(asked, axes=axes), axes, (), Effort()) != first
+    first = stability_path(tmp_path, asked.scene, asked.axes, (), Effort())
+    assert stability_path(tmp_path, asked.scene, axes, (), Effort()) != first
 
 
 @pytest.mark.parametrize("text", ["", "{", "[]", "{}", '{"measured": 3}'])
@@ -99,10 +100,10 @@ def test_a_part_of_a_map_never_takes_the_place_of_the_whole(tmp_path: Path) -> N
     asked = file_for("inclined_plane")
     efforts = (Effort(), QUICK)
     paths = [
-        stability_path(tmp_path, asked, axes, engines, effort)
+        stability_path(tmp_path, asked.scene, axes, engines, effort)
         for axes in (asked.axes, asked.axes[:1])
         for engines in ((), ("mujoco",))
         for effort in efforts
     ]
     assert len(set(paths)) == len(paths)
-    assert stability_path(tmp_path, asked, list(asked.axes), (), QUICK) == paths[1]
+    assert stability_path(tmp_path, asked.scene, list(asked.axes), (), QUICK) == paths[1]

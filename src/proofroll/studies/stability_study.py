@@ -1,32 +1,68 @@
-"""What is kept of a stability map: counts, boundaries, what explains them, and what depends on what it should not."""
+"""A stability map as it is kept: counts, boundaries, what explains them, and what depends on what it should not."""
 
 from __future__ import annotations
 
 from collections import Counter
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import asdict, replace
+from pathlib import Path
 
 from proofroll.files.scene_file import load_scene
+from proofroll.running.runner import Runner
+from proofroll.studies.axes import Axis
 from proofroll.studies.failure import ACCURATE, REFUSED, RunOutcome, meanings
 from proofroll.studies.hosts import hosts
-from proofroll.studies.stability import MapPoint, StabilityMap, failure_beyond
+from proofroll.studies.stability import MapPoint, Progress, StabilityMap, failure_beyond, stability, stability_path
+from proofroll.studies.stability_claims import StabilityFile
+from proofroll.studies.stability_places import Effort
 from proofroll.studies.stability_records import (
+    BOUNDARIES,
     Boundary,
     BoundaryPoint,
     ExplainedBoundary,
+    MapClaims,
     MappedPlace,
     StabilityStudy,
+    dependence,
 )
+from proofroll.studies.stability_reproducers import with_programs
 from proofroll.studies.step_numbers import explanation, step_numbers, values
 from proofroll.studies.study_identity import measured
+from proofroll.studies.study_store import keep
 
-BOUNDARIES = ("stable", "accurate")
-# Boundaries this factor apart count as the same: two rungs of the ladder of steps, one of that of tolerances.
-_SAME = {True: 2.3, False: 15.0}
 _PASSES: Mapping[str, Callable[[RunOutcome], bool]] = {
     "stable": lambda outcome: outcome.stable,
     "accurate": lambda outcome: outcome.accurate,
 }
+
+
+def make_stability(
+    asked: StabilityFile,
+    axes: Sequence[Axis],
+    runner: Runner,
+    folder: Path,
+    *,
+    engines: Sequence[str] = (),
+    effort: Effort,
+    progress: Progress | None = None,
+) -> tuple[StabilityStudy, Path]:
+    """Maps the boundaries of a scene, see :func:`stability`, and keeps the map with a program for each boundary.
+
+    Both go below the folder of all results; what the file claims is held against the map.
+
+    Returns:
+        the study with ``claims``, and its file.
+
+    Raises:
+        InputError: something that does not exist.
+        ProofrollError: the folder cannot be written.
+    """
+    found = stability(asked.scene, axes, runner, engines=engines, effort=effort, progress=progress)
+    path = stability_path(folder, asked.scene, axes, engines, effort)
+    study = with_programs(found, stability_study(found), path.with_suffix(""), runner.workers)
+    study = replace(study, claims=MapClaims(asked.name, asked.contradictions(study)))
+    keep(study, path)
+    return study, path
 
 
 def stability_study(found: StabilityMap) -> StabilityStudy:
@@ -141,42 +177,3 @@ def _scale_findings(found: StabilityMap, points: Sequence[BoundaryPoint]) -> lis
                 if said:
                     sentences.append(f"{curve} depends on {axis.name}, as it should not: {name} up to {said}")
     return sentences
-
-
-def dependence(points: Sequence[BoundaryPoint], name: str) -> str:
-    """How a boundary, in parts of the natural time, changes along an axis, if it does; else nothing.
-
-    Where the search was cut for its many steps, a boundary that is missing says nothing.
-
-    Args:
-        points: of one curve along one axis.
-        name: of the boundary.
-    """
-    fixed_step = any(point.resolution == "dt" for point in points)
-    sizes = [
-        (largest / point.period if fixed_step else largest, point.value)
-        for point in points
-        if (largest := point.sides[name].largest) is not None
-    ]
-    without = [point for point in points if point.sides[name].largest is None and not point.cut]
-    if not sizes or (not without and max(sizes)[0] <= _SAME[fixed_step] * min(sizes)[0]):
-        return ""
-    what = " of the natural time" if fixed_step else ""
-    said = f"{max(sizes)[0]:.2g}{what} at {max(sizes)[1]:g}"
-    if without:
-        places = ", ".join(f"{point.value:g} ({point.sides[name].failure})" for point in without)
-        return f"{said}, but nowhere at {places}"
-    return f"{said}, but {min(sizes)[0]:.2g}{what} at {min(sizes)[1]:g}"
-
-
-def silent_ranking(study: StabilityStudy) -> list[BoundaryPoint]:
-    """The silent failures, the worst first: wrong at any step, then by how wrong the run beyond the boundary was.
-
-    Searches that were cut because finer runs have too many steps come last: a finer step might have been right.
-    """
-
-    def badness(point: BoundaryPoint) -> tuple[bool, bool, bool, float]:
-        never, error = point.shown.largest is None, point.shown.error
-        return not (never and point.cut), never, point.boundary == "stable", error if error is not None else 0.0
-
-    return sorted((point for point in study.points if point.silent), key=badness, reverse=True)
