@@ -8,7 +8,7 @@ difference; what nobody can prove is not said.
 from __future__ import annotations
 
 import dataclasses
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any, Protocol, runtime_checkable
 
@@ -96,7 +96,7 @@ class Cause:
 
 
 class Hypothesis(Protocol):
-    """A cause that can be tested. A new one is one small class in the element's tuple.
+    """A cause that can be tested. A new one is one function (:func:`hypothesis`) or small class in the element's tuple.
 
     Attributes:
         id: unique within the kind of element.
@@ -113,13 +113,27 @@ class Hypothesis(Protocol):
         """Causes worth looking at; those that do not close the difference are dropped by :func:`diagnose`."""
 
 
+@dataclass(frozen=True)
+class FunctionHypothesis:
+    """See :class:`Hypothesis`."""
+
+    id: str
+    grounds: str
+    test: Callable[[Evidence], Iterable[Cause]]
+
+
+def hypothesis(name: str, grounds: str) -> Callable[[Callable[[Evidence], Iterable[Cause]]], FunctionHypothesis]:
+    """Makes a :class:`Hypothesis` of the function that tests it, with this name as its id."""
+    return lambda test: FunctionHypothesis(name, grounds, test)
+
+
 @runtime_checkable
 class ExplainsRuns(Protocol):
     """What a kind of element (:class:`proofroll.core.element.ElementKind`) has besides, if it can explain its runs."""
 
     @staticmethod
     def hypotheses() -> Sequence[Any]:
-        """Its hypotheses, each a class as :class:`Hypothesis`; those that concern what an engine says come first."""
+        """Its hypotheses, each as :class:`Hypothesis` says; those that concern what an engine says come first."""
 
 
 def diagnose(evidence: Evidence, hypotheses: Sequence[Any]) -> list[Cause]:

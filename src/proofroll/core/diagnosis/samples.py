@@ -7,12 +7,12 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterable, Iterator, Mapping
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Any, ClassVar
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
 from proofroll.core.arrays import FloatArray
-from proofroll.core.diagnosis import Cause, Evidence, above_round_off, apart
+from proofroll.core.diagnosis import Cause, Evidence, above_round_off, apart, hypothesis
 from proofroll.core.diagnosis.clocks import late, said_delay, stretched
 from proofroll.core.diagnosis.lines import single_precision
 from proofroll.core.diagnosis.quaternions import quaternions, rounded
@@ -34,18 +34,12 @@ def both(evidence: Evidence) -> tuple[xr.Dataset, xr.Dataset] | None:
     return run, truth
 
 
-class SinglePrecision:
+@hypothesis("float32", "every number of the run, or each built one that differs, is exactly a float32")
+def single_precision_run(evidence: Evidence) -> Iterator[Cause]:
     """Numbers of 24 bits."""
-
-    id: ClassVar[str] = "float32"
-    grounds: ClassVar[str] = "every number of the run, or each built one that differs, is exactly a float32"
-
-    @staticmethod
-    def test(evidence: Evidence) -> Iterator[Cause]:
-        """See :class:`proofroll.core.diagnosis.Hypothesis`."""
-        yield from single_precision(evidence.lines)
-        if evidence.run is not None and evidence.truth is not None:
-            yield from rounded(evidence.run, evidence.truth, TWIST)
+    yield from single_precision(evidence.lines)
+    if evidence.run is not None and evidence.truth is not None:
+        yield from rounded(evidence.run, evidence.truth, TWIST)
 
 
 @dataclass(frozen=True)

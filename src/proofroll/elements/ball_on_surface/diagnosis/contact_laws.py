@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 
 from proofroll.core.arrays import FloatArray
-from proofroll.core.diagnosis import Cause, Evidence, apart
+from proofroll.core.diagnosis import Cause, Evidence, apart, hypothesis
 from proofroll.core.events import events_of
 from proofroll.elements.ball_on_surface.diagnosis.equations import Law
 from proofroll.elements.ball_on_surface.diagnosis.held import COVERED, has_resistance, held_against, is_bounded
@@ -55,77 +55,69 @@ class OtherLaw:
             yield held.cause(self.id, self.says, best, self.remedy, self.fitted)
 
 
-@dataclass(frozen=True)
-class StartsToSlip:
+@hypothesis(
+    "static friction", "up to the first slip the path is the true one, so the friction that it needs then is the bound"
+)
+def starts_to_slip(evidence: Evidence) -> Iterator[Cause]:
     """The bound of sticking is another than the scene's."""
-
-    id: str = "static friction"
-    grounds: str = "up to the first slip the path is the true one, so the friction that it needs then is the bound"
-
-    def test(self, evidence: Evidence) -> Iterator[Cause]:
-        """See :class:`proofroll.core.diagnosis.Hypothesis`."""
-        run, truth, contact = evidence.run, evidence.truth, evidence.element.contact
-        if run is None or truth is None or not np.isfinite(contact.mu_static) or "sticking" not in truth:
-            return
-        first, true = (
-            next((event.time for event in events_of(data) if event.kind == "slip"), float(data["time"][-1]))
-            for data in (run, truth)
-        )
-        if contact.mu_kinetic >= contact.mu_static or first == true:
-            return
-        time, needed = truth["time"].to_numpy(), truth["needed_friction"].to_numpy()
-        held = (time <= true) & (truth["sticking"].to_numpy() > 0) & np.isfinite(needed)
-        above = np.flatnonzero(held & (needed >= contact.mu_kinetic))
-        if not len(above) or above[0] == 0:
-            return
-        i = int(above[0])
-        share = (contact.mu_kinetic - needed[i - 1]) / (needed[i] - needed[i - 1])
-        crossing = float(time[i - 1] + share * (time[i] - time[i - 1]))
-        both = f"the kinetic friction {contact.mu_kinetic:g}, not at the static {contact.mu_static:g}"
-        says = f"the ball begins to slip at {both}"
-        remedy = "the ball sticks up to the static friction, and only slips at the kinetic one"
-        yield Cause(
-            self.id, says, "first slip", "s", abs(first - true), abs(first - crossing), remedy, 0, ("motion", "force")
-        )
-
-
-@dataclass(frozen=True)
-class PyramidalCone:
-    """Friction depends on the direction of the slip."""
-
-    id: str = "pyramidal cone"
-    grounds: str = (
-        "while it slips, the reported friction is that of a cone of four faces at one angle, sample by sample"
+    run, truth, contact = evidence.run, evidence.truth, evidence.element.contact
+    if run is None or truth is None or not np.isfinite(contact.mu_static) or "sticking" not in truth:
+        return
+    first, true = (
+        next((event.time for event in events_of(data) if event.kind == "slip"), float(data["time"][-1]))
+        for data in (run, truth)
     )
+    if contact.mu_kinetic >= contact.mu_static or first == true:
+        return
+    time, needed = truth["time"].to_numpy(), truth["needed_friction"].to_numpy()
+    held = (time <= true) & (truth["sticking"].to_numpy() > 0) & np.isfinite(needed)
+    above = np.flatnonzero(held & (needed >= contact.mu_kinetic))
+    if not len(above) or above[0] == 0:
+        return
+    i = int(above[0])
+    share = (contact.mu_kinetic - needed[i - 1]) / (needed[i] - needed[i - 1])
+    crossing = float(time[i - 1] + share * (time[i] - time[i - 1]))
+    both = f"the kinetic friction {contact.mu_kinetic:g}, not at the static {contact.mu_static:g}"
+    says = f"the ball begins to slip at {both}"
+    remedy = "the ball sticks up to the static friction, and only slips at the kinetic one"
+    before, after = abs(first - true), abs(first - crossing)
+    yield Cause("static friction", says, "first slip", "s", before, after, remedy, 0, ("motion", "force"))
 
-    def test(self, evidence: Evidence) -> Iterator[Cause]:
-        """See :class:`proofroll.core.diagnosis.Hypothesis`."""
-        run, body = evidence.run, evidence.element.rolling
-        if run is None or "sticking" not in run or "N" not in run or not is_bounded(body):
-            return
-        slips = run["sticking"].to_numpy() == 0
-        slip = np.stack([run[name].to_numpy()[slips] for name in ("slip2", "slip3")], axis=-1)
-        said = np.stack([run[name].to_numpy()[slips] for name in ("F2", "F3")], axis=-1)
-        most = body.contact.mu_kinetic * run["N"].to_numpy()[slips][:, None]
-        sizes = np.linalg.norm(slip, axis=-1, keepdims=True)
-        if len(slip) < _FEWEST or not np.all(sizes > 0) or not np.all(np.isfinite(said)):
-            return
-        if max(np.ptp(np.unwrap(np.arctan2(of[:, 1], of[:, 0]))) for of in (slip, said)) < _TURNS:
-            return
-        before = apart(said, -most * slip / sizes)
-        if not before > _PYRAMID * float(np.max(np.abs(most))):
-            return
-        after = np.inf
-        for angle in np.arange(_ANGLES) * np.pi / 2 / _ANGLES:
-            turn = np.array([[np.cos(angle), -np.sin(angle)], [np.sin(angle), np.cos(angle)]])
-            along = slip @ turn
-            corner = np.abs(along) == np.max(np.abs(along), axis=-1, keepdims=True)
-            for kind in (corner, 1.0):
-                after = min(after, apart(said, -most * (np.sign(along) * kind) @ turn.T))
-        says = "the friction cone is a pyramid: the friction depends on the direction of the slip"
-        remedy = "choose an elliptic (quadratic) cone"
-        covered = ("motion", *COVERED)
-        yield Cause(self.id, says, "friction while slipping", "N", before, after, remedy, 1, covered, closes=_PYRAMID)
+
+@hypothesis(
+    "pyramidal cone",
+    "while it slips, the reported friction is that of a cone of four faces at one angle, sample by sample",
+)
+def pyramidal_cone(evidence: Evidence) -> Iterator[Cause]:
+    """Friction depends on the direction of the slip."""
+    run, body = evidence.run, evidence.element.rolling
+    if run is None or "sticking" not in run or "N" not in run or not is_bounded(body):
+        return
+    slips = run["sticking"].to_numpy() == 0
+    slip = np.stack([run[name].to_numpy()[slips] for name in ("slip2", "slip3")], axis=-1)
+    said = np.stack([run[name].to_numpy()[slips] for name in ("F2", "F3")], axis=-1)
+    most = body.contact.mu_kinetic * run["N"].to_numpy()[slips][:, None]
+    sizes = np.linalg.norm(slip, axis=-1, keepdims=True)
+    if len(slip) < _FEWEST or not np.all(sizes > 0) or not np.all(np.isfinite(said)):
+        return
+    if max(np.ptp(np.unwrap(np.arctan2(of[:, 1], of[:, 0]))) for of in (slip, said)) < _TURNS:
+        return
+    before = apart(said, -most * slip / sizes)
+    if not before > _PYRAMID * float(np.max(np.abs(most))):
+        return
+    after = np.inf
+    for angle in np.arange(_ANGLES) * np.pi / 2 / _ANGLES:
+        turn = np.array([[np.cos(angle), -np.sin(angle)], [np.sin(angle), np.cos(angle)]])
+        along = slip @ turn
+        corner = np.abs(along) == np.max(np.abs(along), axis=-1, keepdims=True)
+        for kind in (corner, 1.0):
+            after = min(after, apart(said, -most * (np.sign(along) * kind) @ turn.T))
+    says = "the friction cone is a pyramid: the friction depends on the direction of the slip"
+    remedy = "choose an elliptic (quadratic) cone"
+    covered = ("motion", *COVERED)
+    yield Cause(
+        "pyramidal cone", says, "friction while slipping", "N", before, after, remedy, 1, covered, closes=_PYRAMID
+    )
 
 
 def _along_spin(body: RollingBall) -> Iterator[Law]:
@@ -173,6 +165,6 @@ CONTACT_LAWS: tuple[Any, ...] = (
         "friction is against v + w x a e1",
         is_bounded,
     ),
-    PyramidalCone(),
-    StartsToSlip(),
+    pyramidal_cone,
+    starts_to_slip,
 )

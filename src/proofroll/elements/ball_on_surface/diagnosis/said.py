@@ -3,18 +3,18 @@
 from __future__ import annotations
 
 from collections.abc import Iterator, Mapping
-from typing import TYPE_CHECKING, Any, ClassVar
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from scipy.spatial.transform import Rotation
 
 from proofroll.core.arrays import FloatArray, cross
-from proofroll.core.diagnosis import Cause, Evidence, above_round_off, apart
+from proofroll.core.diagnosis import Cause, Evidence, above_round_off, apart, hypothesis
 from proofroll.core.diagnosis.at_start import AtStart
 from proofroll.core.diagnosis.clocks import said_delay
 from proofroll.core.diagnosis.fitting import fitted
 from proofroll.core.diagnosis.lines import differing
-from proofroll.core.diagnosis.samples import AnotherClock, Attitudes, ReportedVectors, SinglePrecision, both
+from proofroll.core.diagnosis.samples import AnotherClock, Attitudes, ReportedVectors, both, single_precision_run
 from proofroll.core.diagnosis.vectors import Reported, into
 from proofroll.elements.ball_on_surface.diagnosis.attitudes import SURFACE, attitudes, forces, frames
 
@@ -43,28 +43,22 @@ def _frames(evidence: Evidence) -> dict[str, FloatArray]:
 CLOCK = AnotherClock(_state, ("p_WB", "v_WB", "w_WB", "force", "motion"))
 
 
-class ReportedForce:
+@hypothesis("said force", "the true force with another sign, unit, frame or time is what the engine says")
+def reported_force(evidence: Evidence) -> Iterator[Cause]:
     """The wall's force, and its friction by itself."""
-
-    id: ClassVar[str] = "said force"
-    grounds: ClassVar[str] = "the true force with another sign, unit, frame or time is what the engine says"
-
-    @staticmethod
-    def test(evidence: Evidence) -> Iterator[Cause]:
-        """See :class:`proofroll.core.diagnosis.Hypothesis`."""
-        found, body = both(evidence), evidence.element.rolling
-        if found is None or "N" not in found[0] or "N" not in found[1] or CLOCK.proven(evidence):
-            return
-        if body.flies:  # a force that is there and gone: an impact a moment later is no force that is told late
-            return
-        run, truth = found
-        time, axes = truth["time"].to_numpy(), frames(body, truth)
-        said, true = forces(body, run), forces(body, truth)
-        known = np.all(np.isfinite(said) & np.isfinite(true), axis=-1)
-        own = {name: frame[known] for name, frame in axes.items()}
-        told = Reported.after_start("force", _FORCE, "N", said[known], true[known], time[known], own)
-        yield _friction_reversed(told, own[SURFACE][-len(told.true) :, :, 0])
-        yield from told.causes(evidence.step)
+    found, body = both(evidence), evidence.element.rolling
+    if found is None or "N" not in found[0] or "N" not in found[1] or CLOCK.proven(evidence):
+        return
+    if body.flies:  # a force that is there and gone: an impact a moment later is no force that is told late
+        return
+    run, truth = found
+    time, axes = truth["time"].to_numpy(), frames(body, truth)
+    said, true = forces(body, run), forces(body, truth)
+    known = np.all(np.isfinite(said) & np.isfinite(true), axis=-1)
+    own = {name: frame[known] for name, frame in axes.items()}
+    told = Reported.after_start("force", _FORCE, "N", said[known], true[known], time[known], own)
+    yield _friction_reversed(told, own[SURFACE][-len(told.true) :, :, 0])
+    yield from told.causes(evidence.step)
 
 
 def _friction_reversed(told: Reported, e1: FloatArray) -> Cause:
@@ -74,113 +68,89 @@ def _friction_reversed(told: Reported, e1: FloatArray) -> Cause:
     return told.cause("friction sign", says, 2 * normal - told.true, "give the friction on the ball, not on the wall")
 
 
-class StartsLate:
+@hypothesis("late start", "the position at time 0 is that of the true path at another time, to second order")
+def starts_late(evidence: Evidence) -> Iterator[Cause]:
     """A start that lies on the true path a moment before or after time 0, from the certificate's line alone."""
-
-    id: ClassVar[str] = "late start"
-    grounds: ClassVar[str] = "the position at time 0 is that of the true path at another time, to second order"
-
-    @staticmethod
-    def test(evidence: Evidence) -> Iterator[Cause]:
-        """See :class:`proofroll.core.diagnosis.Hypothesis`."""
-        lines = {line["quantity"]: line for line in differing(evidence.lines)}
-        if evidence.run is not None or "position" not in lines:
-            return
-        v = evidence.element.rolling.v0
-        off = np.subtract(lines["position"]["found"], lines["position"]["expected"])
-        if not v @ v:
-            return
-        ahead = float(off @ v / (v @ v))
-        start = evidence.element.first_motion
-        bend = start.acceleration[0] * ahead**2 / 2 if start is not None else 0.0
-        before, after = float(np.max(np.abs(off))), float(np.max(np.abs(off - v * ahead - bend)))
-        says = f"the start is {said_delay(-ahead, evidence.step)}: the ball has moved before time 0"
-        yield Cause("late", says, "position at time 0", "m", before, after, "sample before the first step", 1)
+    lines = {line["quantity"]: line for line in differing(evidence.lines)}
+    if evidence.run is not None or "position" not in lines:
+        return
+    v = evidence.element.rolling.v0
+    off = np.subtract(lines["position"]["found"], lines["position"]["expected"])
+    if not v @ v:
+        return
+    ahead = float(off @ v / (v @ v))
+    start = evidence.element.first_motion
+    bend = start.acceleration[0] * ahead**2 / 2 if start is not None else 0.0
+    before, after = float(np.max(np.abs(off))), float(np.max(np.abs(off - v * ahead - bend)))
+    says = f"the start is {said_delay(-ahead, evidence.step)}: the ball has moved before time 0"
+    yield Cause("late", says, "position at time 0", "m", before, after, "sample before the first step", 1)
 
 
-class AtTheContact:
+@hypothesis("contact point", "the contact point is at p + a e1, its velocity v + a w x e1, both known from the truth")
+def at_the_contact(evidence: Evidence) -> Iterator[Cause]:
     """What is said of the centre belongs to the contact point, or lacks the turning about the normal."""
-
-    id: ClassVar[str] = "contact point"
-    grounds: ClassVar[str] = "the contact point is at p + a e1, its velocity v + a w x e1, both known from the truth"
-
-    @staticmethod
-    def test(evidence: Evidence) -> Iterator[Cause]:
-        """See :class:`proofroll.core.diagnosis.Hypothesis`."""
-        run, truth, body = evidence.run, evidence.truth, evidence.element.rolling
-        if run is None or truth is None:
-            return
-        p, v, w = (truth[name].to_numpy() for name in ("p_WB", "v_WB", "w_WB"))
-        e1, a = body.surface.normal(p), body.ball.radius
-        spin = np.sum(w * e1, axis=-1, keepdims=True) * e1
-        for name, says, changed in (
-            ("p_WB", "p_WB is the contact point, not the centre", p + a * e1),
-            ("v_WB", "v_WB is the velocity of the contact point, not of the centre", v + a * cross(w, e1)),
-            ("w_WB", "w_WB lacks the spin about the surface's normal", w - spin),
-            ("w_WB", "w_WB is the spin about the surface's normal alone", spin),
-            ("w_WB", "w_WB has the spin about the surface's normal with the wrong sign", w - 2 * spin),
-        ):
-            said, true = run[name].to_numpy(), truth[name].to_numpy()
-            if said.shape == true.shape and len(said) > 1:
-                said, true = said[1:], true[1:]
-                before = apart(said, true)
-                remedy = f"give {name} of the ball's centre, along the axes of the world"
-                yield Cause("contact point", says, name, _UNITS[name][1], before, apart(said, changed[1:]), remedy)
+    run, truth, body = evidence.run, evidence.truth, evidence.element.rolling
+    if run is None or truth is None:
+        return
+    p, v, w = (truth[name].to_numpy() for name in ("p_WB", "v_WB", "w_WB"))
+    e1, a = body.surface.normal(p), body.ball.radius
+    spin = np.sum(w * e1, axis=-1, keepdims=True) * e1
+    for name, says, changed in (
+        ("p_WB", "p_WB is the contact point, not the centre", p + a * e1),
+        ("v_WB", "v_WB is the velocity of the contact point, not of the centre", v + a * cross(w, e1)),
+        ("w_WB", "w_WB lacks the spin about the surface's normal", w - spin),
+        ("w_WB", "w_WB is the spin about the surface's normal alone", spin),
+        ("w_WB", "w_WB has the spin about the surface's normal with the wrong sign", w - 2 * spin),
+    ):
+        said, true = run[name].to_numpy(), truth[name].to_numpy()
+        if said.shape == true.shape and len(said) > 1:
+            said, true = said[1:], true[1:]
+            before = apart(said, true)
+            remedy = f"give {name} of the ball's centre, along the axes of the world"
+            yield Cause("contact point", says, name, _UNITS[name][1], before, apart(said, changed[1:]), remedy)
 
 
-class StaleNormal:
+@hypothesis("stale normal", "N, F2 and F3 of the truth along e1, e2, e3 of one time before give the force that is said")
+def stale_normal(evidence: Evidence) -> Iterator[Cause]:
     """The force has the right components along the axes of another moment."""
+    run, truth, body = evidence.run, evidence.truth, evidence.element.rolling
+    if run is None or truth is None or "N" not in run or "N" not in truth or run.sizes["time"] < 3:
+        return
+    said, true = forces(body, run)[1:], forces(body, truth)[1:]
+    p, v = (truth[name].to_numpy()[1:] for name in ("p_WB", "v_WB"))
+    if (
+        said.shape != true.shape
+        or not np.all(np.isfinite(said))
+        or not above_round_off(apart(said, true), float(np.max(abs(true))))
+    ):
+        return
+    local = into(body.surface.frame(body.surface.locate(p)), true)
 
-    id: ClassVar[str] = "stale normal"
-    grounds: ClassVar[str] = "N, F2 and F3 of the truth along e1, e2, e3 of one time before give the force that is said"
+    def turned(delay: float) -> FloatArray:
+        return np.asarray(np.einsum("tij,tj->ti", body.surface.frame(body.surface.locate(p - delay * v)), local))
 
-    @staticmethod
-    def test(evidence: Evidence) -> Iterator[Cause]:
-        """See :class:`proofroll.core.diagnosis.Hypothesis`."""
-        run, truth, body = evidence.run, evidence.truth, evidence.element.rolling
-        if run is None or truth is None or "N" not in run or "N" not in truth or run.sizes["time"] < 3:
-            return
-        said, true = forces(body, run)[1:], forces(body, truth)[1:]
-        p, v = (truth[name].to_numpy()[1:] for name in ("p_WB", "v_WB"))
-        if (
-            said.shape != true.shape
-            or not np.all(np.isfinite(said))
-            or not above_round_off(apart(said, true), float(np.max(abs(true))))
-        ):
-            return
-        local = into(body.surface.frame(body.surface.locate(p)), true)
-
-        def turned(delay: float) -> FloatArray:
-            return np.asarray(np.einsum("tij,tj->ti", body.surface.frame(body.surface.locate(p - delay * v)), local))
-
-        delay = fitted(lambda x: np.ravel(turned(x) - said), 0.0, evidence.step or 1e-3)
-        moment = said_delay(delay, evidence.step).removesuffix(" late")
-        says = f"the force is along the axes of the normal of {moment} before"
-        after, remedy = apart(said, turned(delay)), "take the normal where the ball is when the force is read"
-        yield Cause("stale normal", says, "force", "N", apart(said, true), after, remedy, 1)
+    delay = fitted(lambda x: np.ravel(turned(x) - said), 0.0, evidence.step or 1e-3)
+    moment = said_delay(delay, evidence.step).removesuffix(" late")
+    says = f"the force is along the axes of the normal of {moment} before"
+    after, remedy = apart(said, turned(delay)), "take the normal where the ball is when the force is read"
+    yield Cause("stale normal", says, "force", "N", apart(said, true), after, remedy, 1)
 
 
-class ForceAtStart:
+@hypothesis("force at time 0", "the scene's own force with another sign, unit or axes is the one of the certificate")
+def force_at_start(evidence: Evidence) -> Iterator[Cause]:
     """The wall's force at time 0, from the certificate."""
-
-    id: ClassVar[str] = "force at time 0"
-    grounds: ClassVar[str] = "the scene's own force with another sign, unit or axes is the one of the certificate"
-
-    @staticmethod
-    def test(evidence: Evidence) -> Iterator[Cause]:
-        """See :class:`proofroll.core.diagnosis.Hypothesis`."""
-        lines, body = {line["quantity"]: line for line in evidence.lines}, evidence.element.rolling
-        wrong, parts = {line["quantity"] for line in differing(evidence.lines)}, ("N", "F2", "F3")
-        if not wrong or not wrong <= set(parts) or not all(lines[name]["found"] for name in parts):
-            return
-        frame = body.surface.frame(body.u0)
-        said, true = (
-            frame @ np.array([-lines["N"][key][0], lines["F2"][key][0], lines["F3"][key][0]])
-            for key in ("found", "expected")
-        )
-        told = Reported("force", _FORCE, "N", said[None], true[None], np.zeros(1), {SURFACE: frame[None]})
-        yield _friction_reversed(told, frame[None, :, 0])
-        yield from told.causes(evidence.step)
+    lines, body = {line["quantity"]: line for line in evidence.lines}, evidence.element.rolling
+    wrong, parts = {line["quantity"] for line in differing(evidence.lines)}, ("N", "F2", "F3")
+    if not wrong or not wrong <= set(parts) or not all(lines[name]["found"] for name in parts):
+        return
+    frame = body.surface.frame(body.u0)
+    said, true = (
+        frame @ np.array([-lines["N"][key][0], lines["F2"][key][0], lines["F3"][key][0]])
+        for key in ("found", "expected")
+    )
+    told = Reported("force", _FORCE, "N", said[None], true[None], np.zeros(1), {SURFACE: frame[None]})
+    yield _friction_reversed(told, frame[None, :, 0])
+    yield from told.causes(evidence.step)
 
 
 def _axes_at_start(element: Any) -> Mapping[str, FloatArray]:
@@ -196,13 +166,13 @@ def _attitudes(evidence: Evidence) -> FloatArray:
 
 SAID: tuple[Any, ...] = (
     CLOCK,
-    StartsLate,
+    starts_late,
     ReportedVectors(_UNITS, _frames, CLOCK),
-    ReportedForce,
-    AtTheContact,
-    StaleNormal,
+    reported_force,
+    at_the_contact,
+    stale_normal,
     AtStart(_axes_at_start, frozenset({"slip", "N", "F2", "F3"})),
-    ForceAtStart,
-    SinglePrecision,
+    force_at_start,
+    single_precision_run,
     Attitudes(_attitudes),
 )

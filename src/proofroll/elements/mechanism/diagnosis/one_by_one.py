@@ -4,13 +4,12 @@ from __future__ import annotations
 
 import itertools
 from collections.abc import Iterator
-from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
 
 from proofroll.core.arrays import FloatArray
-from proofroll.core.diagnosis import Cause, Evidence
+from proofroll.core.diagnosis import Cause, Evidence, hypothesis
 from proofroll.core.diagnosis.fitting import said_factor, telling
 from proofroll.core.diagnosis.held import Held
 from proofroll.elements.mechanism.diagnosis.equations import Change
@@ -18,104 +17,90 @@ from proofroll.elements.mechanism.diagnosis.held import best, held_against
 from proofroll.elements.mechanism.model import Mechanism
 
 
-@dataclass(frozen=True)
-class OfEachBody:
+@hypothesis("body", "as for all bodies, for one")
+def of_each_body(evidence: Evidence) -> Iterator[Cause]:
     """A number of one body times a factor."""
+    mechanism = evidence.element.mechanism
+    mass = np.array([body.mass for body in mechanism.bodies])
+    inertia, com = (np.array([getattr(body, key) for body in mechanism.bodies]) for key in ("inertia", "com"))
+    for held in held_against(evidence):
+        for i, body in enumerate(mechanism.bodies if len(mechanism.bodies) > 1 else ()):
+            one = np.arange(len(mass)) == i
 
-    id: str = "body"
-    grounds: str = "as for all bodies, for one"
+            def heavier(x: float, one: Any = one) -> Change:
+                return Change(mechanism, mass=np.where(one, x, 1.0) * mass)
 
-    def test(self, evidence: Evidence) -> Iterator[Cause]:
-        """See :class:`proofroll.core.diagnosis.Hypothesis`."""
-        mechanism = evidence.element.mechanism
-        mass = np.array([body.mass for body in mechanism.bodies])
-        inertia, com = (np.array([getattr(body, key) for body in mechanism.bodies]) for key in ("inertia", "com"))
-        for held in held_against(evidence):
-            for i, body in enumerate(mechanism.bodies if len(mechanism.bodies) > 1 else ()):
-                one = np.arange(len(mass)) == i
+            def stiffer(x: float, one: Any = one) -> Change:
+                return Change(mechanism, inertia=np.where(one, x, 1.0)[:, None, None] * inertia)
 
-                def heavier(x: float, one: Any = one) -> Change:
-                    return Change(mechanism, mass=np.where(one, x, 1.0) * mass)
-
-                def stiffer(x: float, one: Any = one) -> Change:
-                    return Change(mechanism, inertia=np.where(one, x, 1.0)[:, None, None] * inertia)
-
-                for what, change in (("mass", heavier), ("inertia", stiffer)):
-                    factor, number = best(held, change)
-                    if not telling(factor):
-                        continue
-                    says = f"the engine moves the body {body.name} with its {what} {said_factor(factor)}"
-                    yield held.cause(
-                        f"{what} of {body.name}", says, change(factor), f"give {body.name} its {what} once", number
-                    )
-            yield from self._reordered(held, mechanism, inertia)
-            if np.any(com):
-                yield from self._about_origin(held, mechanism, mass, com, inertia)
-
-    @staticmethod
-    def _reordered(held: Held[Change], mechanism: Mechanism, inertia: FloatArray) -> Iterator[Cause]:
-        """Moments of inertia along other axes, and products of inertia with the other sign."""
-        remedy = "look at the order of moments and products of inertia, and at the sign of the products"
-        for order in list(itertools.permutations(range(3)))[1:]:
-            changed = inertia[:, order][:, :, order]
-            shown = ", ".join("xyz"[k] for k in order)
-            says = f"the moments of inertia are in another order: those about x, y, z are the scene's about {shown}"
-            yield held.cause("order of inertia", says, Change(mechanism, inertia=changed), remedy, 0)
-        mirrored = inertia * (2 * np.eye(3) - 1)
-        if not np.array_equal(mirrored, inertia):
-            says = "the products of inertia have the wrong sign"
-            yield held.cause("order of inertia", says, Change(mechanism, inertia=mirrored), remedy, 0)
-
-    @staticmethod
-    def _about_origin(
-        held: Held[Change], mechanism: Mechanism, mass: FloatArray, com: FloatArray, inertia: FloatArray
-    ) -> Iterator[Cause]:
-        """Steiner's part once too often or once too few, and centres of mass forgotten."""
-        steiner = mass[:, None, None] * (
-            np.einsum("ni,ni->n", com, com)[:, None, None] * np.eye(3) - com[:, :, None] * com[:, None, :]
-        )
-        remedy = "the scene's inertia is about the centre of mass, in the body's axes"
-        for sign, words in ((1.0, "with Steiner's part added once more"), (-1.0, "with Steiner's part taken away")):
-            says = f"the inertia is about the wrong point: that about the centre of mass {words}"
-            for which in (np.ones(len(mass)), *np.eye(len(mass))):
-                change = Change(mechanism, inertia=inertia + sign * which[:, None, None] * steiner)
-                yield held.cause("point of inertia", says, change, remedy, 0)
-        says = "the weights act at the origins of the bodies' frames, not at the centres of mass"
-        yield held.cause(
-            "place of weight", says, Change(mechanism, weight_at_origin=True), "put the weight at the centre of mass", 0
-        )
-        says = "the centres of mass are taken to be at the origins of the bodies' frames"
-        yield held.cause(
-            "centre of mass", says, Change(mechanism, com=np.zeros_like(com)), "give the centres of mass", 0
-        )
+            for what, change in (("mass", heavier), ("inertia", stiffer)):
+                factor, number = best(held, change)
+                if not telling(factor):
+                    continue
+                says = f"the engine moves the body {body.name} with its {what} {said_factor(factor)}"
+                yield held.cause(
+                    f"{what} of {body.name}", says, change(factor), f"give {body.name} its {what} once", number
+                )
+        yield from _reordered(held, mechanism, inertia)
+        if np.any(com):
+            yield from _about_origin(held, mechanism, mass, com, inertia)
 
 
-@dataclass(frozen=True)
-class OfEachJoint:
+def _reordered(held: Held[Change], mechanism: Mechanism, inertia: FloatArray) -> Iterator[Cause]:
+    """Moments of inertia along other axes, and products of inertia with the other sign."""
+    remedy = "look at the order of moments and products of inertia, and at the sign of the products"
+    for order in list(itertools.permutations(range(3)))[1:]:
+        changed = inertia[:, order][:, :, order]
+        shown = ", ".join("xyz"[k] for k in order)
+        says = f"the moments of inertia are in another order: those about x, y, z are the scene's about {shown}"
+        yield held.cause("order of inertia", says, Change(mechanism, inertia=changed), remedy, 0)
+    mirrored = inertia * (2 * np.eye(3) - 1)
+    if not np.array_equal(mirrored, inertia):
+        says = "the products of inertia have the wrong sign"
+        yield held.cause("order of inertia", says, Change(mechanism, inertia=mirrored), remedy, 0)
+
+
+def _about_origin(
+    held: Held[Change], mechanism: Mechanism, mass: FloatArray, com: FloatArray, inertia: FloatArray
+) -> Iterator[Cause]:
+    """Steiner's part once too often or once too few, and centres of mass forgotten."""
+    steiner = mass[:, None, None] * (
+        np.einsum("ni,ni->n", com, com)[:, None, None] * np.eye(3) - com[:, :, None] * com[:, None, :]
+    )
+    remedy = "the scene's inertia is about the centre of mass, in the body's axes"
+    for sign, words in ((1.0, "with Steiner's part added once more"), (-1.0, "with Steiner's part taken away")):
+        says = f"the inertia is about the wrong point: that about the centre of mass {words}"
+        for which in (np.ones(len(mass)), *np.eye(len(mass))):
+            change = Change(mechanism, inertia=inertia + sign * which[:, None, None] * steiner)
+            yield held.cause("point of inertia", says, change, remedy, 0)
+    says = "the weights act at the origins of the bodies' frames, not at the centres of mass"
+    yield held.cause(
+        "place of weight", says, Change(mechanism, weight_at_origin=True), "put the weight at the centre of mass", 0
+    )
+    says = "the centres of mass are taken to be at the origins of the bodies' frames"
+    yield held.cause("centre of mass", says, Change(mechanism, com=np.zeros_like(com)), "give the centres of mass", 0)
+
+
+@hypothesis("joint", "the equations are linear in it: one coefficient balances them at every state of the run")
+def of_each_joint(evidence: Evidence) -> Iterator[Cause]:
     """Damping or armature in one joint or in all, that the scene does not have."""
-
-    id: str = "joint"
-    grounds: str = "the equations are linear in it: one coefficient balances them at every state of the run"
-
-    def test(self, evidence: Evidence) -> Iterator[Cause]:
-        """See :class:`proofroll.core.diagnosis.Hypothesis`."""
-        mechanism = evidence.element.mechanism
-        for held in held_against(evidence):
-            if held.alone:
-                continue
-            joints = zip(mechanism.joints, mechanism.v_slices, strict=True)
-            each = [(f"the joint {joint.name}", np.eye(mechanism.nv)[at].sum(axis=0)) for joint, at in joints]
-            if len(each) > 1:
-                each = [("every joint", np.ones(mechanism.nv)), *each]
-            for where, which in each:
-                for what, key in (("an armature (rotor inertia)", "added_armature"), ("damping", "added_damping")):
-                    at = held.left(Change(mechanism))
-                    slope = held.left(Change(mechanism, **{key: which})) - at
-                    square = float(slope @ slope)
-                    if not square:
-                        continue
-                    value = -float(slope @ at) / square
-                    says = f"{where} has {what} of {value:.4g} more than the scene gives it"
-                    remedy = f"set {key.removeprefix('added_')} of the joints yourself, also where it is zero"
-                    change = Change(mechanism, **{key: value * which})
-                    yield held.cause(f"{what} in {where}", says, change, remedy, 1)
+    mechanism = evidence.element.mechanism
+    for held in held_against(evidence):
+        if held.alone:
+            continue
+        joints = zip(mechanism.joints, mechanism.v_slices, strict=True)
+        each = [(f"the joint {joint.name}", np.eye(mechanism.nv)[at].sum(axis=0)) for joint, at in joints]
+        if len(each) > 1:
+            each = [("every joint", np.ones(mechanism.nv)), *each]
+        for where, which in each:
+            for what, key in (("an armature (rotor inertia)", "added_armature"), ("damping", "added_damping")):
+                at = held.left(Change(mechanism))
+                slope = held.left(Change(mechanism, **{key: which})) - at
+                square = float(slope @ slope)
+                if not square:
+                    continue
+                value = -float(slope @ at) / square
+                says = f"{where} has {what} of {value:.4g} more than the scene gives it"
+                remedy = f"set {key.removeprefix('added_')} of the joints yourself, also where it is zero"
+                change = Change(mechanism, **{key: value * which})
+                yield held.cause(f"{what} in {where}", says, change, remedy, 1)

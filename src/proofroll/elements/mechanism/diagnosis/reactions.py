@@ -3,12 +3,12 @@
 from __future__ import annotations
 
 from collections.abc import Iterator
-from typing import Any, ClassVar
+from typing import Any
 
 import numpy as np
 
 from proofroll.core.arrays import FloatArray
-from proofroll.core.diagnosis import Cause, Evidence, apart
+from proofroll.core.diagnosis import Cause, Evidence, apart, hypothesis
 from proofroll.core.diagnosis.samples import both
 from proofroll.core.diagnosis.vectors import Reported
 from proofroll.elements.mechanism.diagnosis.equations import placed_of
@@ -16,40 +16,35 @@ from proofroll.elements.mechanism.diagnosis.said import BODY, PARENT
 from proofroll.elements.mechanism.placed import Placed
 
 
-class Reactions:
+@hypothesis(
+    "reactions",
+    "the true wrench on the child at the joint with another sign, frame, point, joint or time is what is said",
+)
+def reactions(evidence: Evidence) -> Iterator[Cause]:
     """Forces and moments of joints, of those whose three components are determinate."""
-
-    id: ClassVar[str] = "reactions"
-    grounds: ClassVar[str] = (
-        "the true wrench on the child at the joint with another sign, frame, point, joint or time is what is said"
-    )
-
-    @staticmethod
-    def test(evidence: Evidence) -> Iterator[Cause]:
-        """See :class:`proofroll.core.diagnosis.Hypothesis`."""
-        found = both(evidence)
-        if found is None:
-            return
-        run, truth = found
-        mechanism = evidence.element.mechanism
-        placed = placed_of(mechanism, truth)
-        ends = [(each.name, each.a, each.b, each.position_b) for each in mechanism.connections]
-        for kind, unit in (("force", "N"), ("torque", "N m")):
-            whole = [end for end in ends if all(_known(run, truth, f"{kind}.{end[0]}.{axis}") for axis in "xyz")]
-            if not whole:
-                continue
-            said, true = (_stacked(data, kind, [end[0] for end in whole])[1:] for data in (run, truth))
-            R = placed.R_WB[1:]
-            frames = {
-                BODY: np.stack([R[:, mechanism.body_index[end[2]]] for end in whole], axis=1),
-                PARENT: np.stack([R[:, mechanism.body_index[end[1]]] for end in whole], axis=1),
-            }
-            what = f"the {'force' if kind == 'force' else 'moment'} on the child at the joint"
-            told = Reported(kind, what, unit, said, true, truth["time"].to_numpy()[1:], frames)
-            yield from told.causes(evidence.step)
-            yield from _of_other_joints(told, [end[0] for end in whole])
-            if kind == "torque":
-                yield from _about_centres(told, placed, truth, whole, evidence)
+    found = both(evidence)
+    if found is None:
+        return
+    run, truth = found
+    mechanism = evidence.element.mechanism
+    placed = placed_of(mechanism, truth)
+    ends = [(each.name, each.a, each.b, each.position_b) for each in mechanism.connections]
+    for kind, unit in (("force", "N"), ("torque", "N m")):
+        whole = [end for end in ends if all(_known(run, truth, f"{kind}.{end[0]}.{axis}") for axis in "xyz")]
+        if not whole:
+            continue
+        said, true = (_stacked(data, kind, [end[0] for end in whole])[1:] for data in (run, truth))
+        R = placed.R_WB[1:]
+        frames = {
+            BODY: np.stack([R[:, mechanism.body_index[end[2]]] for end in whole], axis=1),
+            PARENT: np.stack([R[:, mechanism.body_index[end[1]]] for end in whole], axis=1),
+        }
+        what = f"the {'force' if kind == 'force' else 'moment'} on the child at the joint"
+        told = Reported(kind, what, unit, said, true, truth["time"].to_numpy()[1:], frames)
+        yield from told.causes(evidence.step)
+        yield from _of_other_joints(told, [end[0] for end in whole])
+        if kind == "torque":
+            yield from _about_centres(told, placed, truth, whole, evidence)
 
 
 def _known(run: Any, truth: Any, name: str) -> bool:

@@ -10,7 +10,7 @@ import numpy as np
 from proofroll.core.arrays import FloatArray
 from proofroll.core.diagnosis import Cause, Evidence
 from proofroll.core.diagnosis.at_start import AtStart
-from proofroll.core.diagnosis.samples import AnotherClock, Attitudes, ReportedVectors, SinglePrecision
+from proofroll.core.diagnosis.samples import AnotherClock, Attitudes, ReportedVectors, single_precision_run
 from proofroll.core.diagnosis.vectors import Reported
 from proofroll.elements.mechanism.diagnosis.equations import placed_of
 
@@ -70,5 +70,5 @@ SAID: tuple[Any, ...] = (
     ReportedVectors(_UNITS, _frames, CLOCK, _size, _of_centres),
     AtStart(_axes_at_start, frozenset(), rates=False),
     Attitudes(_attitudes),
-    SinglePrecision,
+    single_precision_run,
 )

@@ -3,12 +3,11 @@
 from __future__ import annotations
 
 from collections.abc import Iterator
-from dataclasses import dataclass
 
 import numpy as np
 
 from proofroll.core.arrays import FloatArray
-from proofroll.core.diagnosis import CLOSES, Cause, Evidence
+from proofroll.core.diagnosis import CLOSES, Cause, Evidence, hypothesis
 from proofroll.elements.mechanism.diagnosis.equations import Change, of_run
 from proofroll.elements.mechanism.diagnosis.held import COVERED, held_against
 from proofroll.elements.mechanism.model import Mechanism
@@ -18,29 +17,26 @@ _OPEN = 1e-4
 _BALANCED = 1e-3
 
 
-@dataclass(frozen=True)
-class LostCoupling:
+@hypothesis(
+    "tree out of order",
+    "without the terms that an algorithm loses that expects depth-first order, the equations balance",
+)
+def lost_coupling(evidence: Evidence) -> Iterator[Cause]:
     """Terms of the mass matrix between a body and one that hangs on it are lost."""
-
-    id: str = "tree out of order"
-    grounds: str = "without the terms that an algorithm loses that expects depth-first order, the equations balance"
-
-    def test(self, evidence: Evidence) -> Iterator[Cause]:
-        """See :class:`proofroll.core.diagnosis.Hypothesis`."""
-        mechanism = evidence.element.mechanism
-        pairs = _ancestry(mechanism)
-        if not np.any(pairs):
-            return
-        says = "the mass matrix lacks terms between a body and those that hang on it, as when a tree is not depth-first"
-        remedy = "add bodies depth-first, or take the mass matrix from an algorithm that does not need that order"
-        for held in held_against(evidence):
-            singles = []
-            for row, column in np.argwhere(np.triu(pairs)):
-                single = np.zeros_like(pairs)
-                single[row, column] = single[column, row] = 1.0
-                singles.append(single)
-            for lost in [pairs, *singles]:
-                yield held.cause(self.id, says, Change(mechanism, coupling=lost), remedy, 0)
+    mechanism = evidence.element.mechanism
+    pairs = _ancestry(mechanism)
+    if not np.any(pairs):
+        return
+    says = "the mass matrix lacks terms between a body and those that hang on it, as when a tree is not depth-first"
+    remedy = "add bodies depth-first, or take the mass matrix from an algorithm that does not need that order"
+    for held in held_against(evidence):
+        singles = []
+        for row, column in np.argwhere(np.triu(pairs)):
+            single = np.zeros_like(pairs)
+            single[row, column] = single[column, row] = 1.0
+            singles.append(single)
+        for lost in [pairs, *singles]:
+            yield held.cause("tree out of order", says, Change(mechanism, coupling=lost), remedy, 0)
 
 
 def _ancestry(mechanism: Mechanism) -> FloatArray:
@@ -56,36 +52,31 @@ def _ancestry(mechanism: Mechanism) -> FloatArray:
     return found
 
 
-@dataclass(frozen=True)
-class LoopLacksRow:
+@hypothesis(
+    "missing row",
+    "the loop opens along some of its rows and along no other, and the equations balance along the motions that "
+    "the others allow: nothing pulls it together there, as a stiff spring would",
+)
+def loop_lacks_row(evidence: Evidence) -> Iterator[Cause]:
     """A loop lacks one or more of its rows."""
-
-    id: str = "missing row"
-    grounds: str = (
-        "the loop opens along some of its rows and along no other, and the equations balance along the motions that "
-        "the others allow: nothing pulls it together there, as a stiff spring would"
-    )
-
-    def test(self, evidence: Evidence) -> Iterator[Cause]:
-        """See :class:`proofroll.core.diagnosis.Hypothesis`."""
-        mechanism = evidence.element.mechanism
-        if not mechanism.loops or evidence.run is None:
-            return
-        seen = of_run(mechanism, evidence.run)
-        if seen is None or not seen.consistent:
-            return
-        rows = [seen.tree.loop_rows(state.motion) for state in seen.each]
-        opened = np.max(np.abs([row.residual for row in rows]), axis=0)
-        if np.max(opened) <= _OPEN * evidence.element.length:
-            return
-        for k, loop in enumerate(mechanism.loops):
-            own = rows[0].loop == k
-            lost = np.flatnonzero(own & (opened > CLOSES * np.max(opened)))
-            if not len(lost) or np.max(np.abs(seen.left(Change(mechanism), tuple(lost.tolist())))) > _BALANCED:
-                continue
-            after = float(np.max(np.delete(opened, lost), initial=0.0))
-            many = "a row" if len(lost) == 1 else f"{len(lost)} of its rows"
-            says = f"the loop {loop.name} lacks {many}: it opens there freely, and holds less than a {loop.kind} joint"
-            remedy = f"a {loop.kind} loop has {int(np.sum(own))} rows; a point that is held gives three of them"
-            covered = ("motion", *COVERED)
-            yield Cause(self.id, says, "opening of loops", "m", float(np.max(opened)), after, remedy, 0, covered)
+    mechanism = evidence.element.mechanism
+    if not mechanism.loops or evidence.run is None:
+        return
+    seen = of_run(mechanism, evidence.run)
+    if seen is None or not seen.consistent:
+        return
+    rows = [seen.tree.loop_rows(state.motion) for state in seen.each]
+    opened = np.max(np.abs([row.residual for row in rows]), axis=0)
+    if np.max(opened) <= _OPEN * evidence.element.length:
+        return
+    for k, loop in enumerate(mechanism.loops):
+        own = rows[0].loop == k
+        lost = np.flatnonzero(own & (opened > CLOSES * np.max(opened)))
+        if not len(lost) or np.max(np.abs(seen.left(Change(mechanism), tuple(lost.tolist())))) > _BALANCED:
+            continue
+        after = float(np.max(np.delete(opened, lost), initial=0.0))
+        many = "a row" if len(lost) == 1 else f"{len(lost)} of its rows"
+        says = f"the loop {loop.name} lacks {many}: it opens there freely, and holds less than a {loop.kind} joint"
+        remedy = f"a {loop.kind} loop has {int(np.sum(own))} rows; a point that is held gives three of them"
+        covered = ("motion", *COVERED)
+        yield Cause("missing row", says, "opening of loops", "m", float(np.max(opened)), after, remedy, 0, covered)
