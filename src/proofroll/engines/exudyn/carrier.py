@@ -17,7 +17,7 @@ from proofroll.core.errors import Refused
 from proofroll.elements.ball_on_surface.model import RollingBall
 from proofroll.elements.ball_on_surface.surfaces import Generator
 from proofroll.engines.exudyn.ball import add_ball, add_body
-from proofroll.engines.exudyn.integration import Integration, consistent_start, new_system
+from proofroll.engines.exudyn.integration import Integration, new_system
 from proofroll.engines.exudyn.local_frame import LocalGeometry, local_geometry
 from proofroll.engines.exudyn.native import Output, exu, items
 from proofroll.engines.exudyn.settings import ExudynSettings
@@ -66,8 +66,7 @@ class Carrier:
         )
         self.rolling = self._constrain(body, local)
         self.system.Assemble()
-        start = consistent_start(self.system, settings, self._turning(body))
-        self.integration = Integration(self.system, settings, start)
+        self.integration = Integration(self.system, settings, self._turning(body))
 
     def _constrain(self, body: RollingBall, local: LocalGeometry) -> list[RollingRow]:
         """Rolling along e2 and e3: K u̇ ± a (spin of the ball relative to the carrier) = 0."""

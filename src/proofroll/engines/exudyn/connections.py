@@ -10,8 +10,8 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from proofroll.elements.mechanism import WORLD, Joint, Loop, Mechanism
-from proofroll.elements.mechanism.checks import Vector
+from proofroll.elements.mechanism import WORLD, Joint, Mechanism
+from proofroll.elements.mechanism.model import JointOrLoop
 from proofroll.elements.mechanism.rotations import Array, cross
 from proofroll.engines.exudyn.native import Output, exu, items
 
@@ -30,21 +30,16 @@ _THREE, _TWO = ((2, 1), (2, 0), (0, 1)), ((2, 0), (2, 1))
 _ROWS = {"fixed": _THREE, "prismatic": _THREE, "revolute": _TWO, "planar": _TWO, "universal": (None, (0, 2))}
 
 
-_End = tuple[str, Vector, Array]  # body, position of the joint in its frame, axes of the joint
-
-
 class Connected(NamedTuple):
-    """A joint or loop: Exudyn's constraint, its own spring, its markers and bodies, and their frames of the joint.
+    """A joint or loop, whose frames are as they are, or permuted, in Exudyn; its constraint, own spring and markers.
 
-    ``rows`` are those of :data:`_ROWS`, between the frames as they are, or permuted, in Exudyn.
+    ``rows`` are those of :data:`_ROWS`, between these frames.
     """
 
-    kind: str
+    between: JointOrLoop
     constraint: Any
     spring: Any
     markers: list[Any]
-    bodies: tuple[str, str]
-    frames: tuple[Array, Array]
     rows: tuple[tuple[int, int] | None, ...]
 
 
@@ -63,53 +58,34 @@ def add_springs(system: Any, mechanism: Mechanism, marker: Callable[[str, Any], 
 
 
 class Connections:
-    """Connects the bodies of a system.
-
-    Args:
-        system: Exudyn's.
-        bodies: Exudyn's bodies by name, the world among them.
-        com: centres of mass in the bodies' frames, where Exudyn's bodies have their reference.
-    """
+    """Connects the bodies of a system, by name, the world among them; Exudyn has their reference at ``com``."""
 
     def __init__(self, system: Any, bodies: Mapping[str, Any], com: Mapping[str, Array]) -> None:
         self._system, self._bodies, self._com = system, bodies, com
-
-    def joint(self, joint: Joint) -> Connected:
-        """A joint with its own spring, damper and drive."""
-        made = self._join(
-            joint.kind,
-            (joint.parent, joint.position, joint.parent_frame),
-            (joint.child, joint.child_position, joint.child_frame),
-            flat=False,
-        )
-        return made._replace(spring=self._spring_of(joint, made.markers))
-
-    def loop(self, loop: Loop, *, flat: bool) -> Connected:
-        """A loop; ``flat`` in a planar mechanism."""
-        end_a, end_b = (loop.body_a, loop.position_a, loop.frame_a), (loop.body_b, loop.position_b, loop.frame_b)
-        return self._join(loop.kind, end_a, end_b, flat=flat)
 
     def marker(self, body: str, position: Any, axes: Array) -> Any:
         """A marker on a body, at a place in its frame and with the axes of a joint."""
         place = exu.HT(rotation=axes, translation=np.array(position) - self._com[body])
         return self._system.AddMarker(items.MarkerBodyRigid(bodyNumber=self._bodies[body], localHT=place))
 
-    def _join(self, kind: str, end_a: _End, end_b: _End, *, flat: bool) -> Connected:
-        (a, at_a, A), (b, at_b, B) = end_a, end_b
+    def connect(self, between: JointOrLoop, joint: Joint | None, *, flat: bool) -> Connected:
+        """A joint with its own spring, damper and drive, or a loop; ``flat`` in a planar mechanism."""
+        kind, A, B = between.kind, between.frame_a, between.frame_b
         if kind == "universal":  # Exudyn's row is x of the first to z of the second, ours z to x
             A, B = A[:, [2, 0, 1]], B[:, [1, 2, 0]]
-        markers = [self.marker(a, at_a, A), self.marker(b, at_b, B)]
+        markers = [self.marker(between.a, between.position_a, A), self.marker(between.b, between.position_b, B)]
         made, rows = None, _ROWS.get(kind, ())
         if kind == "spherical":
             made = items.ObjectJointSpherical(markerNumbers=markers)
-        elif kind == "revolute" and flat:
+        elif kind == "revolute" and flat and joint is None:
             made, rows = items.ObjectJointGeneric(constrainedAxes=_IN_PLANE, markerNumbers=markers), ()
         elif kind == "revolute":
             made = items.ObjectJointRevoluteZ(markerNumbers=markers)
         elif kind != "free":
             made = items.ObjectJointGeneric(constrainedAxes=_HELD[kind], markerNumbers=markers)
         constraint = None if made is None else self._system.AddObject(made)
-        return Connected(kind, constraint, None, markers, (a, b), (A, B), rows)
+        spring = None if joint is None else self._spring_of(joint, markers)
+        return Connected(between._replace(frame_a=A, frame_b=B), constraint, spring, markers, rows)
 
     def _spring_of(self, joint: Joint, markers: list[Any]) -> Any:
         """Exudyn's object for the joint's own spring, damper and drive, or None."""
@@ -135,15 +111,15 @@ class Connections:
         """The frames of a joint in the world."""
         R_a, R_b = (
             np.eye(3) if body == WORLD else self.body(body, Output.RotationMatrix, np.zeros(3)).reshape(3, 3)
-            for body in made.bodies
+            for body in (made.between.a, made.between.b)
         )
-        return R_a @ made.frames[0], R_b @ made.frames[1]
+        return R_a @ made.between.frame_a, R_b @ made.between.frame_b
 
     def reaction(self, made: Connected) -> tuple[Array, Array]:
         """Force and moment on the second body at its marker."""
         system, (A, B) = self._system, self.axes(made)
         force, torque = np.zeros(3), np.zeros(3)
-        if made.kind == "spherical":
+        if made.between.kind == "spherical":
             force -= system.GetObjectOutput(made.constraint, Output.Force)
         elif made.constraint is not None:
             force -= A @ system.GetObjectOutput(made.constraint, Output.ForceLocal)
@@ -151,9 +127,9 @@ class Connections:
             for multiplier, row in zip(multipliers, made.rows, strict=False):  # there are always three
                 if row is not None:
                     torque -= multiplier * cross(B[:, row[1]], A[:, row[0]])
-        if made.spring is not None and made.kind == "prismatic":
+        if made.spring is not None and made.between.kind == "prismatic":
             force -= np.ravel(system.GetObjectOutput(made.spring, Output.ForceLocal))[0] * A[:, 2]
-        elif made.spring is not None and made.kind == "revolute":
+        elif made.spring is not None and made.between.kind == "revolute":
             torque -= np.ravel(system.GetObjectOutput(made.spring, Output.TorqueLocal))[0] * A[:, 2]
         elif made.spring is not None:
             torque -= A @ system.GetObjectOutput(made.spring, Output.TorqueLocal)

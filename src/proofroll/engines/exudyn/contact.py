@@ -225,13 +225,8 @@ def _softened(
 ) -> dict[str, Regularised]:
     """What differs at time 0: creep, depth, the bound of friction, and forces in which the contact magnifies round-off.
 
-    Args:
-        body: the scene.
-        settings: of the adapter.
-        creep: slip velocity at time 0 [m/s].
-        press: normal force at time 0 [N].
-        mu: coefficient of friction that is built [-].
-        hollow: radius of the hollow sphere [m].
+    At time 0 the ball slips with ``creep`` [m/s] under the normal force ``press`` [N]; ``mu`` [-] and the radius
+    ``hollow`` [m] of the sphere are those that are built.
     """
     a, m, J = body.ball.radius, body.ball.mass, body.ball.inertia
     stiffness, zone, _ = settings.penalty

@@ -70,22 +70,16 @@ class Integration:
         self,
         system: Any,
         settings: ExudynSettings,
-        start: tuple[FloatArray, FloatArray] | None = None,
+        turning: Mapping[Any, FloatArray] | None = None,
         at: float = 0.0,
         *,
         dependent: bool = False,
         impacts: bool = False,
     ) -> None:
-        """Initialises the solver in the system's initial configuration.
+        """Initialises the solver in the initial configuration of an assembled system, at the time ``at`` [s].
 
-        Args:
-            system: assembled.
-            settings: of the adapter.
-            start: accelerations of the coordinates and multipliers in that configuration, where the engine cannot find
-                them itself; None: the engine solves for them.
-            at: time of that configuration [s].
-            dependent: whether constraints depend on each other.
-            impacts: whether steps may end where contacts close and open.
+        For ``turning`` see :func:`consistent_start`; without it, Exudyn finds the start itself. For ``dependent`` and
+        ``impacts`` see :func:`simulation_settings`.
 
         Raises:
             Refused: the engine does not accept the model.
@@ -97,6 +91,7 @@ class Integration:
         self.system = system
         self.options = simulation_settings(settings, dependent=dependent, impacts=impacts)
         explicit = settings.integrator in EXPLICIT
+        start = None if turning is None else consistent_start(system, settings, turning)
         self.solver = exu.MainSolverExplicit() if explicit else exu.MainSolverImplicitSecondOrder()
         if start is not None:
             self.options.timeIntegration.generalizedAlpha.computeInitialAccelerations = False
@@ -173,26 +168,21 @@ def initial_matrices(
 
 
 def consistent_start(
-    system: Any, settings: ExudynSettings, accelerations: Mapping[Any, FloatArray]
+    system: Any, settings: ExudynSettings, turning: Mapping[Any, FloatArray]
 ) -> tuple[FloatArray, FloatArray]:
-    """Accelerations of the coordinates and multipliers at time 0.
+    """Accelerations of the coordinates and multipliers at time 0 of an assembled system.
 
     Where a constraint at velocity level, C q̇ = 0, changes its direction, its derivative is C q̈ = -Ċ q̇. Exudyn
     leaves the right side out for the constraints used here, and the trapezoidal rule would carry the wrong
     multipliers along as an undamped oscillation. So its own mass matrix, constraint Jacobian, accelerations and
-    multipliers are taken, and corrected by what the right sides add.
-
-    Args:
-        system: assembled.
-        settings: of the adapter.
-        accelerations: constraint -> -Ċ q̇ of its rows.
+    multipliers are taken, and corrected by what the right sides add: ``turning``, -Ċ q̇ of the rows of each constraint.
     """
     mass, jacobian, _ = initial_matrices(system, settings)
     data = system.systemData
     start = np.concatenate([data.GetODE2Coordinates_tt(), data.GetAECoordinates()])
     n = len(mass)
     missing = np.zeros(len(start))
-    for item, expected in accelerations.items():
+    for item, expected in turning.items():
         rows = np.array(data.GetObjectLTGAE(item))
         missing[n + rows] = expected - jacobian[n + rows] @ start
     jacobian[:n, :n] += mass

@@ -19,9 +19,8 @@ ExudynError: Any = getattr(exudyn, "ExudynError", RuntimeError)
 def new_settings(*, dependent: bool, explicit: Any = None) -> Any:
     """Exudyn's simulation settings, by the names of its version: no files, no sensors.
 
-    Args:
-        dependent: whether constraints may depend on each other, which needs a linear solver that looks for it.
-        explicit: type of an explicit solver; None: an implicit one.
+    Constraints that may be ``dependent`` need a linear solver that looks for it; ``explicit`` is the type of an
+    explicit solver.
     """
     found = exu.SimulationSettings()
     renamed = not hasattr(found, "solution")

@@ -6,6 +6,7 @@ Bodies are referenced at their centres of mass.
 from __future__ import annotations
 
 from collections.abc import Mapping
+from itertools import zip_longest
 from typing import Any
 
 import numpy as np
@@ -48,8 +49,10 @@ class Redundant:
         self._add_bodies()
         self._connections = Connections(self.system, self.bodies, self._com)
         flat = is_planar(mechanism)
-        self._joints = [self._connections.joint(joint) for joint in mechanism.joints]
-        self._joints += [self._connections.loop(loop, flat=flat) for loop in mechanism.loops]
+        self._joints = [
+            self._connections.connect(between, joint, flat=flat)
+            for between, joint in zip_longest(mechanism.connections, mechanism.joints)  # loops follow the joints
+        ]
         add_springs(self.system, mechanism, self.marker)
         self.system.Assemble()
         self._rows = self._constraint_rows(settings)

@@ -14,7 +14,7 @@ from proofroll.core.arrays import FloatArray
 from proofroll.core.engine import Built, Sample
 from proofroll.elements.ball_on_surface.model import RollingBall
 from proofroll.engines.exudyn.ball import add_ball
-from proofroll.engines.exudyn.integration import Integration, consistent_start, new_system
+from proofroll.engines.exudyn.integration import Integration, new_system
 from proofroll.engines.exudyn.native import Output, items
 from proofroll.engines.exudyn.settings import ExudynSettings
 
@@ -41,8 +41,7 @@ class RollingDisc:
         # d/dt (v + a ω × e1) = v̇ + a ω̇ × e1 + a ω × ė1, in the directions of the joint's rows; ė1 is the re-aiming,
         # of which Exudyn cannot know.
         turning = body.ball.radius * np.cross(body.w0, body.surface.normal_gradient(body.p0) @ body.v0)
-        start = consistent_start(self.system, settings, {self.joint: -self._directions().T @ turning})
-        self.integration = Integration(self.system, settings, start)
+        self.integration = Integration(self.system, settings, {self.joint: -self._directions().T @ turning})
 
     def _aiming(self, body: RollingBall) -> Any:
         """Turns the joint to the tangent plane below the present iterate; plain floats, it runs at every iterate."""

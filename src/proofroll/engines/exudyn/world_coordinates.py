@@ -19,7 +19,7 @@ from proofroll.core.engine import Built, Sample
 from proofroll.core.errors import Refused
 from proofroll.elements.ball_on_surface.model import BallCapability, RollingBall
 from proofroll.engines.exudyn.ball import resisting
-from proofroll.engines.exudyn.integration import Integration, consistent_start, initial_matrices, new_system
+from proofroll.engines.exudyn.integration import Integration, initial_matrices, new_system
 from proofroll.engines.exudyn.native import Output, items
 from proofroll.engines.exudyn.settings import ExudynSettings
 
@@ -66,11 +66,10 @@ class WorldCoordinates:
         turning = -a * cross(body.w0, e1_rate)
         if body.wall_rate is not None:
             turning += cross(body.wall_rate, body.v0 + a * e1_rate)
-        start = consistent_start(self.system, settings, {self._rolling: turning})
         # Of a ball that turns: the rows are a times a matrix of which two singular values are 1, and one is 0.
         _, jacobian, _ = initial_matrices(self.system, settings)
         self._radius = float(np.linalg.norm(jacobian[6:, 3:6])) / math.sqrt(2)
-        self.integration = Integration(self.system, settings, start)
+        self.integration = Integration(self.system, settings, {self._rolling: turning})
 
     def sample(self) -> Sample:
         """See :class:`proofroll.core.engine.Engine`. The velocity ω is the rate of no orientation."""

@@ -35,11 +35,8 @@ def foreseen_normal_force(data: Any, N: float) -> float:
 
     The torque of the rolling resistance is needed before MuJoCo solves for the forces of the same instant; holding
     the last value would be an error of first order. The memory lies in ``data.userdata``, so that it is copied with
-    the state: time of the evaluation before, time and force of the one before that, slope.
-
-    Args:
-        data: with MEMORY numbers of user data.
-        N: normal force of the evaluation before [N].
+    the state: time of the evaluation before, time and force of the one before that, slope. ``N`` [N] is the normal
+    force of the evaluation before.
     """
     t = float(data.time)
     memory = data.userdata
@@ -88,16 +85,11 @@ class Resistance:
         return self.stopping * speed <= self.f * N
 
     def apply(self, torque: Any, N: float, e1: Sequence[float], v: Sequence[float]) -> None:
-        """Writes the moment -f N (v/V) × e1 [N m] into ``torque``.
+        """Writes the moment -f N (v/V) × e1 [N m] into ``torque``, with the normal force N [N] of MuJoCo's own contact.
 
-        MuJoCo's own rolling friction (condim 6) does not model it: there sliding and rolling share one cone.
-        Scalars, because this runs at each step and numpy's overhead on three numbers would outweigh MuJoCo's work.
-
-        Args:
-            torque: to write to, shape (3,).
-            N: normal force of MuJoCo's own contact [N].
-            e1: unit normal from the ball to the wall.
-            v: velocity of the centre in the world [m/s].
+        ``e1`` points from the ball to the wall, ``v`` [m/s] is the velocity of the centre in the world. MuJoCo's own
+        rolling friction (condim 6) does not model it: there sliding and rolling share one cone. Scalars, because this
+        runs at each step and numpy's overhead on three numbers would outweigh MuJoCo's work.
         """
         v0, v1, v2 = v
         e0, e1_, e2 = e1

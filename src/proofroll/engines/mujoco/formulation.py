@@ -12,13 +12,7 @@ from proofroll.engines.mujoco.settings import MujocoSettings
 
 
 class Formulation(ABC):
-    """One way to present the wall to MuJoCo, and how it is stepped.
-
-    Args:
-        model: compiled.
-        body: the scene's.
-        settings: of the adapter.
-        friction: what watches the contact where friction is bounded.
+    """One way to present the wall to MuJoCo, and how it is stepped; ``friction`` watches one that is bounded.
 
     Attributes:
         resistance: the torque of rolling resistance that its steps apply.

@@ -148,11 +148,7 @@ class BoundedFriction:
         return bool(friction < _ON_CONE * self._mu * N)
 
     def events(self, data: Any) -> list[Event]:
-        """The events so far, each with a bracket of one step.
-
-        Args:
-            data: the present state with its own forces.
-        """
+        """The events so far, each with a bracket of one step; ``data`` is the present state with its own forces."""
         if not self._presses(data) or self.holds(data) == self.sticking:
             return list(self._events)
         slips_since = self._lost if self.sticking and self._lost is not None and not self._flies else self._steps
@@ -176,11 +172,8 @@ class BoundedFriction:
         rate of the evaluation before. Errors of that rate die out as g / (1 + g) per evaluation, g = mu² (1 + m a²/J).
 
         A rigid contact is loaded by a depth of almost nothing, so that the least error of r would end it: a preload of
-        a hundredth of the normal force keeps the contact.
-
-        Args:
-            data: after the reference accelerations, before the forces.
-            N: normal force of the evaluation before [N].
+        a hundredth of the normal force, ``N`` [N] of the evaluation before, keeps the contact. To be called after the
+        reference accelerations and before the forces.
         """
         if not self._corrects or data.nefc == 0 or self._mu == 0:
             return

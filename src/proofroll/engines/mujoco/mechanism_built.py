@@ -19,13 +19,9 @@ _MARGIN = 1.1
 
 
 def read_back(model: Any, data: Any, mechanism: Mechanism, impedance: float) -> MechanismBuilt:
-    """Everything that the certificate asks.
+    """Everything that the certificate asks, from an evaluated state at time 0, which is overwritten.
 
-    Args:
-        model: MuJoCo's.
-        data: of an evaluated state at time 0; it is overwritten.
-        mechanism: what was built.
-        impedance: of the loops at rest.
+    ``impedance`` is that of the loops at rest.
     """
     bodies = [model.body(body.name).id for body in mechanism.bodies]
     axes = np.zeros((len(bodies), 9))

@@ -57,12 +57,7 @@ def _nothing(_: str) -> None:
 
 
 class SteppedModel:
-    """A model that MuJoCo steps, and how its state is looked at without being touched.
-
-    Args:
-        model: compiled.
-        settings: of the adapter.
-    """
+    """A compiled model that MuJoCo steps, and how its state is looked at without being touched."""
 
     def __init__(self, model: Any, settings: MujocoSettings) -> None:
         self._model, self._settings = model, settings

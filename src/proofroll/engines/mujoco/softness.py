@@ -125,10 +125,7 @@ def _lift_of_slip(body: RollingBall, settings: MujocoSettings) -> float:
 def _law_of_friction(body: RollingBall, settings: MujocoSettings, unloaded: float | None) -> float:
     """Error of the acceleration at time 0 from MuJoCo's law of friction, at most [m/s²]; 0 for a ball that holds.
 
-    Args:
-        body: the scene's.
-        settings: the engine's.
-        unloaded: normal force of a contact that is not loaded yet [N]; None if it is.
+    ``unloaded`` is the normal force of a contact that is not loaded yet [N].
     """
     ball, contact = body.ball, body.contact
     bounded = math.isfinite(contact.mu_static)

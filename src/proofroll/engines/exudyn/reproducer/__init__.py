@@ -34,12 +34,7 @@ from proofroll.engines.exudyn.settings import ExudynSettings
 
 
 def source(model: Any, body: RollingBall, settings: ExudynSettings) -> str:
-    """See :class:`proofroll.core.engine_abilities.Reproduces`.
-
-    Args:
-        model: of the formulation, at time 0.
-        body: the scene's.
-        settings: of the adapter.
+    """See :class:`proofroll.core.engine_abilities.Reproduces`; from the formulation's ``model`` at time 0.
 
     Raises:
         Refused: the scene has a term that the program has not.

@@ -64,13 +64,7 @@ def seen():
 
 
 def source(model: Any, mechanism: Mechanism, settings: ExudynSettings) -> str:
-    """The program's part that runs the model.
-
-    Args:
-        model: of the formulation, at time 0; markers are added to its system.
-        mechanism: that it is.
-        settings: of the adapter.
-    """
+    """The program's part that runs the formulation's ``model``, at time 0, to whose system markers are added."""
     followed = [(point.body, point.position) for point in mechanism.points]
     followed = followed or [(body.name, (0.0, 0.0, 0.0)) for body in mechanism.bodies]
     com = {body.name: body.com for body in mechanism.bodies}

@@ -21,14 +21,7 @@ from proofroll.engines.mujoco.start import EVALUATIONS
 
 
 def source(xml: str, model: Any, data: Any, body: RollingBall, settings: MujocoSettings) -> str:
-    """See :class:`proofroll.core.engine_abilities.Reproduces`.
-
-    Args:
-        xml: the model as MuJoCo writes it.
-        model: compiled.
-        data: at time 0.
-        body: the scene's.
-        settings: of the adapter.
+    """See :class:`proofroll.core.engine_abilities.Reproduces`; from the model as MuJoCo writes it, and at time 0.
 
     Raises:
         Refused: the scene or the settings have something that the program has not.

@@ -35,12 +35,7 @@ def run(times):
 
 
 def source(xml: str, mechanism: Mechanism) -> str:
-    """The program's part that runs the model.
-
-    Args:
-        xml: MJCF whose first keyframe is the start.
-        mechanism: that it is.
-    """
+    """The program's part that runs a mechanism, given as MJCF whose first keyframe is the start."""
     places = [(point.body, [float(x) for x in point.position]) for point in mechanism.points]
     places = places or [(body.name, [0.0, 0.0, 0.0]) for body in mechanism.bodies]
     return _SOURCE.format(model=xml, places=places)
