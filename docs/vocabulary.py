@@ -15,7 +15,7 @@ from proofroll.core import comparison
 from proofroll.core.gravity import Gravity
 from proofroll.elements.ball_on_surface import model as balls
 from proofroll.elements.ball_on_surface import regimes_study
-from proofroll.elements.ball_on_surface.surfaces.catalogue import surface_kinds
+from proofroll.elements.ball_on_surface.surfaces import surface_kinds
 from proofroll.elements.mechanism import model as mechanisms
 from proofroll.files.scene_file import SceneFile
 from proofroll.files.scene_parameters import Parameter

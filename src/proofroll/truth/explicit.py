@@ -81,8 +81,8 @@ def _integrated(rates: Rates, piece: Piece, time: float) -> FloatArray:
     return last
 
 
-class Run:
-    """A run from ``start`` until something ends it; see :class:`proofroll.truth.sliding.Run`.
+class ExplicitRun:
+    """A run from ``start`` until something ends it; see :class:`proofroll.truth.sliding.IntegratedRun`.
 
     Args:
         rates: of the state.
@@ -117,11 +117,11 @@ class Run:
         self._states = np.array([state, *(piece.last for piece in self._pieces)])
 
     def steps(self) -> tuple[FloatArray, FloatArray]:
-        """See :class:`proofroll.truth.sliding.Run`."""
+        """See :class:`proofroll.truth.sliding.IntegratedRun`."""
         return self._ends, self._states
 
     def at(self, where: FloatArray) -> FloatArray:
-        """See :class:`proofroll.truth.sliding.Run`."""
+        """See :class:`proofroll.truth.sliding.IntegratedRun`."""
         if not self._pieces or not len(where):
             return np.broadcast_to(self._states[0], (len(where), self._states.shape[1])).copy()
         index = np.searchsorted(self._ends[:-1], where, side="right") - 1

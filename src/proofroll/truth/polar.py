@@ -17,7 +17,7 @@ from proofroll.core.arrays import FloatArray
 from proofroll.elements.ball_on_surface.model import RollingBall
 from proofroll.elements.ball_on_surface.motion import BallMotion, world_motion
 from proofroll.elements.ball_on_surface.rolling_equations import reduced_rates, start
-from proofroll.truth.explicit import Piece, Rates, Run, stop
+from proofroll.truth.explicit import ExplicitRun, Piece, Rates, stop
 from proofroll.truth.route import End
 from proofroll.truth.sliding import Sliding
 
@@ -72,7 +72,7 @@ class Polar(Sliding):
         udot = np.linalg.pinv(self._body.surface.tangents(state[:2])) @ v_WB
         return np.concatenate([state[:2], udot, state[4:]])
 
-    def _stick(self, time: float, state: FloatArray, until: float) -> Run:
+    def _stick(self, time: float, state: FloatArray, until: float) -> ExplicitRun:
         resisted = self._body.contact.rolling_resistance > 0
 
         def ended(piece: Piece) -> tuple[float, FloatArray, End] | None:
@@ -85,7 +85,7 @@ class Polar(Sliding):
             return piece.end + left, self.nudged(halted, np.zeros(3)), End.HALT
 
         cap = (lambda y: _APPROACH * self._until_halt(y)) if resisted else None
-        return Run(self.rates, time, state, until, atol=self._atol[:5], ended=ended, cap=cap)
+        return ExplicitRun(self.rates, time, state, until, atol=self._atol[:5], ended=ended, cap=cap)
 
     def _grown(self, time: float, state: FloatArray, until: float) -> float:
         strength, change = self._pull(state)
@@ -93,7 +93,7 @@ class Polar(Sliding):
         # Below the last digits of the time a slip cannot be seen to grow.
         return float(max(self._handover * strength * pace, 64 * strength * np.spacing(time), np.finfo(float).tiny))
 
-    def _creep(self, time: float, state: FloatArray, until: float, handover: float) -> Run:
+    def _creep(self, time: float, state: FloatArray, until: float, handover: float) -> ExplicitRun:
         rates: Rates = lambda y: self._following(y)[0]  # noqa: E731 -- one line each for two closures
 
         def ended(piece: Piece) -> tuple[float, FloatArray, End] | None:
@@ -104,9 +104,9 @@ class Polar(Sliding):
                 return *back, End.STILL
             return None
 
-        return Run(rates, time, np.append(state, 0.0), until, atol=self._atol_slaved, ended=ended)
+        return ExplicitRun(rates, time, np.append(state, 0.0), until, atol=self._atol_slaved, ended=ended)
 
-    def _slide(self, first: FloatArray, floor: float, until: float) -> Run:
+    def _slide(self, first: FloatArray, floor: float, until: float) -> ExplicitRun:
         stops: tuple[tuple[End, Callable[[FloatArray], float]], ...] = (
             (End.LIFTOFF, lambda y: -self._drive(y)[1]),
             (End.TIME, lambda y: y[7] - until),
@@ -119,7 +119,7 @@ class Polar(Sliding):
             found = [(*when, end) for end, g in passed if (when := stop(self._slipping, piece, g))]
             return min(found, key=lambda item: item[0], default=None)
 
-        return Run(self._slipping, 0.0, first, np.inf, atol=self._atol, ended=ended)
+        return ExplicitRun(self._slipping, 0.0, first, np.inf, atol=self._atol, ended=ended)
 
     def _drive(self, y: FloatArray) -> tuple[FloatArray, float]:
         """Drive b along e2, e3 [m/s²], shape (2,), and N [N]."""

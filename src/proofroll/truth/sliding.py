@@ -18,7 +18,7 @@ _BEGUN = 1e-8  # the same of a slip that does not begin from rest, relative to i
 _ROUNDS = 50  # of Newton's method for the clock
 
 
-class Run(Protocol):
+class IntegratedRun(Protocol):
     """A run of an integrator until something ends it: where, the state there, and the reason."""
 
     end: float
@@ -50,15 +50,15 @@ class Sliding(Route):
         self._body, self._handover = body, handover
 
     @abstractmethod
-    def _stick(self, time: float, state: FloatArray, until: float) -> Run:
+    def _stick(self, time: float, state: FloatArray, until: float) -> IntegratedRun:
         """Rolling without slip."""
 
     @abstractmethod
-    def _creep(self, time: float, state: FloatArray, until: float, handover: float) -> Run:
+    def _creep(self, time: float, state: FloatArray, until: float, handover: float) -> IntegratedRun:
         """The start of a slip, with |u| as sixth state, until that has grown to ``handover`` [m/s]."""
 
     @abstractmethod
-    def _slide(self, first: FloatArray, floor: float, until: float) -> Run:
+    def _slide(self, first: FloatArray, floor: float, until: float) -> IntegratedRun:
         """The slip against τ, of eight states, until ln|u| falls to ``floor``."""
 
     @abstractmethod
@@ -129,7 +129,7 @@ class Sliding(Route):
         return Leg(time, float(y[7]), False, y[:5], run.why, motion)
 
 
-def _at_clock(run: Run, times: FloatArray) -> FloatArray:
+def _at_clock(run: IntegratedRun, times: FloatArray) -> FloatArray:
     """States of a slip, shape (n, 8), where its clock shows the times: Newton's method for τ."""
     knots, states = run.steps()
     tau = np.interp(times, states[:, 7], knots)

@@ -141,7 +141,7 @@ class SlidingTaylor(Sliding):
 class _Run:
     """One run of a compiled integrator to ``until`` or the first event, and again where states between are asked for.
 
-    See :class:`proofroll.truth.sliding.Run`; ``ends`` are the reasons in the order of the integrator's events.
+    See :class:`proofroll.truth.sliding.IntegratedRun`; ``ends`` are the reasons by the integrator's events.
     """
 
     def __init__(
@@ -169,12 +169,12 @@ class _Run:
         return int(result[0])
 
     def steps(self) -> tuple[FloatArray, FloatArray]:
-        """See :class:`proofroll.truth.sliding.Run`."""
+        """See :class:`proofroll.truth.sliding.IntegratedRun`."""
         knots = self._knots()
         return knots, self.at(knots)
 
     def at(self, where: FloatArray) -> FloatArray:
-        """See :class:`proofroll.truth.sliding.Run`."""
+        """See :class:`proofroll.truth.sliding.IntegratedRun`."""
         knots = self._knots()
         if len(knots) < 2 or not len(where):
             return np.broadcast_to(self.last, (len(where), len(self.last))).copy()

@@ -9,7 +9,7 @@ from pathlib import Path
 import pytest
 
 import proofroll.engines
-from proofroll.elements.ball_on_surface.surfaces.catalogue import surface_kinds
+from proofroll.elements.ball_on_surface.surfaces import surface_kinds
 from proofroll.files.scene_file import scene_names
 
 ENGINES = Path(proofroll.engines.__path__[0])

@@ -15,8 +15,7 @@ from proofroll.core.numbers import Numbers
 from proofroll.core.scene import Scene
 from proofroll.elements.ball_on_surface.element import BallOnSurface, changed
 from proofroll.elements.ball_on_surface.model import Ball, Contact, InitialMotion
-from proofroll.elements.ball_on_surface.surfaces import Declared, Surface
-from proofroll.elements.ball_on_surface.surfaces.catalogue import surface_kinds
+from proofroll.elements.ball_on_surface.surfaces import Declared, Surface, surface_kinds
 from proofroll.files.validation import strict, units_of, validated
 
 if TYPE_CHECKING:

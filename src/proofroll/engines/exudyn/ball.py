@@ -117,7 +117,7 @@ def _resistance(rolling: RollingBall, node: Any) -> Any:
     N follows from the state: along e1 the centre accelerates by -v·(∂e1/∂p)v, so that
     N = m (v·(∂e1/∂p)v + e1·g). The last multiplier instead would lag by an iterate and make the moment ring with it.
     """
-    triad, normal_rate = rolling.surface.triad, rolling.surface.normal_rate
+    triad, moving_triad = rolling.surface.triad, rolling.surface.moving_triad
     (k22, k23), (_, k33) = curvature(rolling.surface, rolling.u0).tolist()
     twist, homogeneous = 2 * k23, rolling.surface.generators is not None
     m, least = rolling.ball.mass, slow(rolling)
@@ -128,17 +128,16 @@ def _resistance(rolling: RollingBall, node: Any) -> Any:
         output = system.GetNodeOutput
         x, y, z = output(node, position).tolist()
         vx, vy, vz = output(node, velocity).tolist()
-        x1, y1, z1, x2, y2, z2, x3, y3, z3 = triad(x, y, z)
+        if homogeneous:
+            x1, y1, z1, x2, y2, z2, x3, y3, z3 = triad(x, y, z)
+        else:
+            _, x1, y1, z1, x2, y2, z2, x3, y3, z3, ex, ey, ez = moving_triad(x, y, z, vx, vy, vz)
         v2, v3 = vx * x2 + vy * y2 + vz * z2, vx * x3 + vy * y3 + vz * z3
         speed = max(math.hypot(v2, v3), least)
         if not speed:
             return [0.0, 0.0, 0.0]
         # v·(∂e1/∂p)v, of which a homogeneous surface has the same coefficients everywhere
-        if homogeneous:
-            turning = k22 * v2 * v2 + (twist * v2 + k33 * v3) * v3
-        else:
-            ex, ey, ez = normal_rate((x, y, z), (vx, vy, vz))
-            turning = vx * ex + vy * ey + vz * ez
+        turning = k22 * v2 * v2 + (twist * v2 + k33 * v3) * v3 if homogeneous else vx * ex + vy * ey + vz * ez
         N = m * (turning + x1 * gx + y1 * gy + z1 * gz)
         # as resistance_moment, the call of which would be felt
         factor = load[0] * N / speed

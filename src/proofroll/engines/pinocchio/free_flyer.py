@@ -41,7 +41,8 @@ class FreeFlyer(BallWithRows):
         """Terms of the ball, local frame, rows and drift: first the surface, then the two of rolling."""
         terms = ball_terms(self.model, data, self.ball, q, v, self._rest)
         p, v_WB = q[:3].tolist(), terms.v.tolist()
-        triad, e1_rate = self._surface.triad(*p), self._surface.normal_rate(p, v_WB)
+        _, *moving = self._surface.moving_triad(*p, *v_WB)
+        triad, e1_rate = moving[:9], moving[9:]
         frame = np.array(triad).reshape(3, 3).T
         e1 = frame[:, 0]
         slip_rows, slip_drift = rolling_rows(terms, self._radius, triad, e1_rate)

@@ -188,12 +188,12 @@ def test_one_point_is_as_many(surface: Any) -> None:
         np.testing.assert_allclose(surface.frame(u), surface.frame(u[None])[0], rtol=1e-13, atol=1e-15)
         gap, *e1 = surface.nearby(*p.tolist())
         np.testing.assert_allclose([gap, *e1], [surface.gap(p[None])[0], *surface.normal(p[None])[0]], rtol=1e-12)
-        triad = np.reshape(surface.triad(*p.tolist()), (3, 3)).T
-        np.testing.assert_allclose(triad, surface.frame(surface.locate(p[None]))[0], rtol=1e-12, atol=1e-14)
-        rate = surface.normal_rate(tuple(p.tolist()), tuple(v.tolist()))
-        np.testing.assert_allclose(rate, surface.normal_gradient(p[None])[0] @ v, rtol=1e-12, atol=1e-13)
         together = surface.moving_triad(*p.tolist(), *v.tolist())
-        np.testing.assert_allclose(together, [gap, *triad.T.ravel(), *rate], rtol=1e-12, atol=1e-14)
+        triad, rate = np.reshape(together[1:10], (3, 3)).T, together[10:]
+        np.testing.assert_allclose(surface.triad(*p.tolist()), together[1:10], rtol=1e-12, atol=1e-14)
+        assert together[0] == pytest.approx(gap, rel=1e-12, abs=1e-14)
+        np.testing.assert_allclose(triad, surface.frame(surface.locate(p[None]))[0], rtol=1e-12, atol=1e-14)
+        np.testing.assert_allclose(rate, surface.normal_gradient(p[None])[0] @ v, rtol=1e-12, atol=1e-13)
 
 
 class ConeByProfile(Cone):

@@ -1,5 +1,9 @@
 """Surfaces on which the centre of a ball moves: a file for each, and what they have in common."""
 
+from functools import cache
+from typing import Any
+
+from proofroll.core.announced import announced
 from proofroll.elements.ball_on_surface.surfaces.bowl import Bowl
 from proofroll.elements.ball_on_surface.surfaces.cylinder import Cylinder
 from proofroll.elements.ball_on_surface.surfaces.declared import Declared
@@ -8,3 +12,9 @@ from proofroll.elements.ball_on_surface.surfaces.revolved import Cone, Revolved,
 from proofroll.elements.ball_on_surface.surfaces.surface import Generator, Surface
 
 __all__ = ["Bowl", "Cone", "Cylinder", "Declared", "Generator", "Plane", "Revolved", "Surface", "Torus"]
+
+
+@cache
+def surface_kinds() -> tuple[type[Any], ...]:
+    """All kinds that a scene can name, here and in other packages: dataclasses that follow :class:`Surface`."""
+    return (Cylinder, Plane, Bowl, Cone, Torus, *(point.load() for point in announced("proofroll.surfaces")))

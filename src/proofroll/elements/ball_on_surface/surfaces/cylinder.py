@@ -13,8 +13,7 @@ import numpy.typing as npt
 from proofroll.core.arrays import FloatArray
 from proofroll.core.bounds import bounded
 from proofroll.core.errors import InputError
-from proofroll.elements.ball_on_surface.surfaces.surface import Generator
-from proofroll.elements.ball_on_surface.surfaces.tilt import components, tilted
+from proofroll.elements.ball_on_surface.surfaces.surface import Generator, components, tilted
 
 # Of places [m] as rows: their part across the axis, and that part turned about it by a quarter.
 _ACROSS = np.array([1.0, 1.0, 0.0])
@@ -141,14 +140,6 @@ class Cylinder:
         distance = math.sqrt(x * x + y * y) or math.nan
         cos, sin = x / distance, y / distance
         return across * cos, sin, -down * cos, -across * sin, cos, down * sin, down, 0.0, across
-
-    def normal_rate(self, p: tuple[float, float, float], v: tuple[float, float, float]) -> tuple[float, float, float]:
-        """See :class:`Surface`."""
-        across, down = self._tilted
-        distance, cos, sin = self._around(*p)
-        x, z = -across * sin, down * sin  # with cos, e2: along it alone the normal turns
-        rate = (x * v[0] + cos * v[1] + z * v[2]) / (distance or math.nan)
-        return rate * x, rate * cos, rate * z
 
     def moving_triad(self, x: float, y: float, z: float, vx: float, vy: float, vz: float) -> tuple[float, ...]:
         """See :class:`Surface`."""

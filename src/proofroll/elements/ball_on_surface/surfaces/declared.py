@@ -183,12 +183,6 @@ class Declared:
         """See :class:`Surface`."""
         return self.moving_triad(x, y, z, 0.0, 0.0, 0.0)[1:10]
 
-    def normal_rate(self, p: tuple[float, float, float], v: tuple[float, float, float]) -> tuple[float, float, float]:
-        """See :class:`Surface`."""
-        *_, xx, xy, xz, yy, yz, zz = _field(self)[0](*p)
-        x, y, z = v
-        return -(xx * x + xy * y + xz * z), -(xy * x + yy * y + yz * z), -(xz * x + yz * y + zz * z)
-
     def moving_triad(self, x: float, y: float, z: float, vx: float, vy: float, vz: float) -> tuple[float, ...]:
         """See :class:`Surface`."""
         gap, x1, y1, z1, xx, xy, xz, yy, yz, zz = _field(self)[0](x, y, z)

@@ -3,34 +3,14 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from typing import Any, Protocol
+from typing import Any
 
 import numpy as np
-import numpy.typing as npt
 
-from proofroll.core.arrays import FloatArray
-
-
-class Points(Protocol):
-    """What is asked of the surface: see :class:`proofroll.elements.ball_on_surface.surfaces.Surface`."""
-
-    def locate(self, p_WB: npt.ArrayLike) -> FloatArray:
-        """Coordinates of the nearest point."""
-
-    def position(self, u: npt.ArrayLike) -> FloatArray:
-        """The point."""
-
-    def tangents(self, u: npt.ArrayLike) -> FloatArray:
-        """Its derivatives."""
-
-    def second(self, u: npt.ArrayLike) -> FloatArray:
-        """And theirs."""
-
-    def frame(self, u: npt.ArrayLike) -> FloatArray:
-        """Columns e1, e2, e3."""
+from proofroll.elements.ball_on_surface.surfaces.surface import Surface
 
 
-def distance_by_nearest(surface: Points) -> tuple[Callable[..., Any], Callable[..., Any]]:
+def distance_by_nearest(surface: Surface) -> tuple[Callable[..., Any], Callable[..., Any]]:
     """Distance, gradient and upper half of the Hessian, one after the other: of floats, and of arrays.
 
     With the nearest point x(u), its tangents T, the metric G = TᵀT and B = e1·∂²x/∂u∂u, a place is p = x - d e1, so

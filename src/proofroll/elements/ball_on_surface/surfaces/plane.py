@@ -11,8 +11,7 @@ import numpy.typing as npt
 
 from proofroll.core.arrays import FloatArray
 from proofroll.core.bounds import bounded
-from proofroll.elements.ball_on_surface.surfaces.surface import Generator
-from proofroll.elements.ball_on_surface.surfaces.tilt import components, tilted
+from proofroll.elements.ball_on_surface.surfaces.surface import Generator, components, tilted
 
 
 @dataclass(frozen=True)
@@ -73,30 +72,13 @@ class Plane:
     def _triad(self) -> tuple[float, ...]:
         return tuple(self._axes.T.ravel().tolist())
 
-    def triad(self, x: float, y: float, z: float) -> tuple[float, ...]:  # noqa: ARG002 -- the same everywhere
-        """See :class:`Surface`."""
+    def triad(self, *_: float) -> tuple[float, ...]:
+        """See :class:`Surface`; the same everywhere."""
         return self._triad
 
-    def normal_rate(
-        self,
-        p: tuple[float, float, float],  # noqa: ARG002 -- the same everywhere
-        v: tuple[float, float, float],  # noqa: ARG002 -- whatever the velocity
-    ) -> tuple[float, float, float]:
+    def moving_triad(self, x: float, y: float, z: float, *_: float) -> tuple[float, ...]:
         """See :class:`Surface`."""
-        return 0.0, 0.0, 0.0
-
-    def moving_triad(
-        self,
-        x: float,
-        y: float,
-        z: float,
-        vx: float,  # noqa: ARG002 -- whatever the velocity
-        vy: float,  # noqa: ARG002
-        vz: float,  # noqa: ARG002
-    ) -> tuple[float, ...]:
-        """See :class:`Surface`."""
-        x1, y1, z1 = self._e1
-        return -(x * x1 + y * y1 + z * z1) - self.height, *self._triad, 0.0, 0.0, 0.0
+        return self.nearby(x, y, z)[0], *self._triad, 0.0, 0.0, 0.0
 
     def nearby(self, x: float, y: float, z: float) -> tuple[float, float, float, float]:
         """See :class:`Surface`."""

@@ -13,9 +13,12 @@ Array arguments may carry leading dimensions (``...``), e.g. time.
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass
+from functools import lru_cache
 from typing import Literal, Protocol
 
+import numpy as np
 import numpy.typing as npt
 
 from proofroll.core.arrays import FloatArray
@@ -99,11 +102,22 @@ class Surface(Protocol):
     def nearby(self, x: float, y: float, z: float) -> tuple[float, float, float, float]:
         """Gap [m] and the components of e1 at one point, for loops that call it at every step."""
 
-    def triad(self, x: float, y: float, z: float) -> tuple[float, ...]:
+    def triad(self, x: float, y: float, z: float, /) -> tuple[float, ...]:
         """Components of e1, e2, e3 at one point, one after the other; as :meth:`nearby`."""
 
-    def normal_rate(self, p: tuple[float, float, float], v: tuple[float, float, float]) -> tuple[float, float, float]:
-        """(∂e1/∂p) v at one point p [m], for its velocity v [m/s]; as :meth:`nearby`."""
+    def moving_triad(self, x: float, y: float, z: float, vx: float, vy: float, vz: float, /) -> tuple[float, ...]:
+        """Gap [m], :meth:`triad` and (∂e1/∂p) v [1/s] for a velocity v [m/s]: 13 numbers, one after the other."""
 
-    def moving_triad(self, x: float, y: float, z: float, vx: float, vy: float, vz: float) -> tuple[float, ...]:
-        """Gap [m], :meth:`triad` and :meth:`normal_rate` [1/s] in one call: 13 numbers, one after the other."""
+
+@lru_cache
+def tilted(angle: float) -> FloatArray:
+    """Rotation by ``angle`` [rad] about the world's y axis, read-only, shape (3, 3)."""
+    c, s = math.cos(angle), math.sin(angle)
+    rotation = np.array([[c, 0.0, s], [0.0, 1.0, 0.0], [-s, 0.0, c]])
+    rotation.flags.writeable = False  # every caller shares it
+    return rotation
+
+
+def components(column: FloatArray) -> tuple[float, float, float]:
+    """A vector of shape (3,) as plain floats."""
+    return (float(column[0]), float(column[1]), float(column[2]))
