@@ -169,7 +169,7 @@ def test_the_gap_is_that_of_the_engines_wall() -> None:
     for formulation in ("generic", "carrier", "contact"):
         engine = build(load_scene("sphere_in_cylinder"), "exudyn", formulation=formulation)
         before = engine.built().gap
-        data = engine._model.system.systemData
+        data = engine.system.systemData
         q = np.array(data.GetODE2Coordinates(current))
         q[0] += 1e-6  # towards the wall: the distance of generic, and x of the ball's centre, as γ = 0
         data.SetODE2Coordinates(q, current)

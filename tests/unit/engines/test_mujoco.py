@@ -333,19 +333,6 @@ def test_numbers_in_the_files_are_the_scenes(scene: str, formulation: str, prese
     np.testing.assert_allclose(alone.key_qvel[0], engine._data.qvel, rtol=1e-6, atol=1e-4)
 
 
-def test_model_contains_only_what_the_scene_requires() -> None:
-    """Without rolling resistance there is no torque, no callback for one and no memory; friction has no torsion."""
-    plain = build(load_scene(CYLINDER), "mujoco")
-    plain.advance(0.01)
-    assert not np.any(plain._data.xfrc_applied)
-    assert plain._model.nuserdata == 0
-    assert np.all(plain._model.geom_condim == 3)
-    assert np.all(plain._model.geom_friction[:, 1:] == 0)
-    assert plain._model.njnt == 4
-    resisted = build(load_scene(CYLINDER, rolling_resistance=5e-4), "mujoco")
-    assert np.any(resisted._data.xfrc_applied)
-
-
 @pytest.mark.parametrize("formulation", ["chart", "free"])
 def test_callbacks_of_others_are_forgotten_and_ours_do_not_stay(formulation: str) -> None:
     """Callbacks are global in MuJoCo: one that somebody left changes nothing, and after a run there is none."""

@@ -75,7 +75,7 @@ def test_samples_cost_no_steps() -> None:
     for t in np.linspace(0, 1, 1001)[1:]:
         often.advance(float(t))
     once.advance(1.0)
-    assert often._model._series._integrator.time == once._model._series._integrator.time > 1.0
+    assert often._series._integrator.time == once._series._integrator.time > 1.0
     assert often.sample().p_WB.tobytes() == once.sample().p_WB.tobytes()
 
 
@@ -143,8 +143,7 @@ def test_levels_and_terms() -> None:
 def test_no_resistance_no_term() -> None:
     """Without resistance the compiled equations have no parameter for it, with resistance they do."""
     counts = {
-        name: len(build(SCENES[name], TAYLOR)._model._series._integrator.pars)
-        for name in ("cylinder", "cylinder-resisting")
+        name: len(build(SCENES[name], TAYLOR)._series._integrator.pars) for name in ("cylinder", "cylinder-resisting")
     }
     assert counts["cylinder"] < counts["cylinder-resisting"]
 
@@ -165,6 +164,6 @@ def test_a_loose_tolerance_is_looser_but_not_lost() -> None:
 def test_not_finite_is_noticed() -> None:
     """A state that overflows is reported with its time instead of being sampled."""
     engine = build(SCENES["cylinder"], TAYLOR)
-    engine._model._series._integrator.state[2:] = 1e200
+    engine._series._integrator.state[2:] = 1e200
     with pytest.raises(Diverged, match="not finite"):
         engine.advance(1.0)

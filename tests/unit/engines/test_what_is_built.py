@@ -105,7 +105,7 @@ def test_pinocchio_is_told_to_leave_out_what_is_asked() -> None:
 @pytest.mark.parametrize("formulation", ["carrier", "rolling_disc", "contact"])
 def test_exudyn(formulation: str, f: float, torque: set[str]) -> None:
     """Among Exudyn's loads there is a torque, with a user function, only where the scene has rolling resistance."""
-    system = build(scene(rolling_resistance=f), "exudyn", formulation=formulation)._model.system
+    system = build(scene(rolling_resistance=f), "exudyn", formulation=formulation).system
     found = [system.GetLoad(number) for number in range(system.systemData.NumberOfLoads())]
     assert {load["loadType"] for load in found} == {"MassProportional"} | torque
     assert sum(bool(load.get("loadVectorUserFunction")) for load in found) == (f > 0)
@@ -113,7 +113,7 @@ def test_exudyn(formulation: str, f: float, torque: set[str]) -> None:
 
 def test_exudyn_in_minimal_coordinates() -> None:
     """With unbounded friction nothing switches generic's constraints, and it has no coordinate of orientation."""
-    model = build(scene(), "exudyn[formulation=generic]")._model
+    model = build(scene(), "exudyn[formulation=generic]")
     system = model.system
     kinds = [system.GetObject(number)["objectType"] for number in range(system.systemData.NumberOfObjects())]
     assert kinds == ["GenericODE2", "ConnectorCoordinate", "ConnectorCoordinateVector"]

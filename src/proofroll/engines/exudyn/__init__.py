@@ -13,20 +13,19 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
 from importlib.metadata import version
-from typing import Any, ClassVar, Self
+from typing import Any, ClassVar
 
-from proofroll.core.engine import Built, Sample
 from proofroll.core.engine_abilities import Level, Term
 from proofroll.core.errors import Refused
-from proofroll.core.events import Event
 from proofroll.core.scene import Scene
 from proofroll.elements.ball_on_surface.element import rolling_ball
 from proofroll.elements.ball_on_surface.model import ALL_OF_A_BALL, ROLLS, BallCapability, RollingBall
-from proofroll.elements.mechanism.sampling import MechanismBuilt, mechanism_of
+from proofroll.elements.mechanism.sampling import mechanism_of
 from proofroll.engines.exudyn import redundant, tree
 from proofroll.engines.exudyn.carrier import Carrier
 from proofroll.engines.exudyn.contact import PenaltyContact
 from proofroll.engines.exudyn.generic import Generic
+from proofroll.engines.exudyn.integration import ExudynModel
 from proofroll.engines.exudyn.local_frame import slides
 from proofroll.engines.exudyn.native import exu
 from proofroll.engines.exudyn.redundant import Redundant
@@ -35,15 +34,13 @@ from proofroll.engines.exudyn.settings import PRESETS, ExudynSettings
 from proofroll.engines.exudyn.tree import KinematicTree
 from proofroll.engines.exudyn.world_coordinates import WorldCoordinates
 
-OfBall = Generic | WorldCoordinates | Carrier | RollingDisc | PenaltyContact
-OfMechanism = Redundant | KinematicTree
-OF_BALLS: Mapping[str, Callable[[RollingBall, ExudynSettings], OfBall]] = {
+OF_BALLS: Mapping[str, Callable[[RollingBall, ExudynSettings], ExudynModel]] = {
     "generic": lambda body, settings: (Generic if slides(body) else WorldCoordinates)(body, settings),
     "carrier": Carrier,
     "rolling_disc": RollingDisc,
     "contact": PenaltyContact,
 }
-OF_MECHANISMS: Mapping[str, type[OfMechanism]] = {"redundant": Redundant, "tree": KinematicTree}
+OF_MECHANISMS: Mapping[str, type[Redundant | KinematicTree]] = {"redundant": Redundant, "tree": KinematicTree}
 _HELD = "its constraint holds the ball on the wall; use contact"
 _ROLLS_AT_REST: Mapping[str, str] = {
     BallCapability.IMPACTS: _HELD,
@@ -112,9 +109,6 @@ class Exudyn:
         for formulation in ("carrier", "rolling_disc", "contact")
     }
 
-    def __init__(self, model: OfBall | OfMechanism) -> None:
-        self._model = model
-
     @staticmethod
     def caveat(settings: ExudynSettings) -> str:
         """See :class:`proofroll.core.engine_abilities.TellsCaveats`; a step that halves itself has no order."""
@@ -145,38 +139,22 @@ class Exudyn:
         return found
 
     @classmethod
-    def build(cls, scene: Scene, settings: ExudynSettings) -> Self:
-        """See :class:`proofroll.core.engine.Engine`."""
+    def build(cls, scene: Scene, settings: ExudynSettings) -> ExudynModel:
+        """See :class:`proofroll.core.engine.Engine`; what it builds is a run of a formulation."""
         if settings.formulation in _WITH_FRAMES and not hasattr(exu, "HT"):
             raise Refused(
                 f"{settings.formulation} needs the frames of markers of exudyn 1.13, and this is {cls.version()}"
             )
         if settings.formulation in OF_MECHANISMS:
-            return cls(OF_MECHANISMS[settings.formulation](scene, settings))
-        return cls(OF_BALLS[settings.formulation](rolling_ball(scene), settings))
+            return OF_MECHANISMS[settings.formulation](scene, settings)
+        return OF_BALLS[settings.formulation](rolling_ball(scene), settings)
 
     @classmethod
     def reproducer(cls, scene: Scene, settings: ExudynSettings) -> str:
         """See :class:`proofroll.core.engine_abilities.Reproduces`."""
         from proofroll.engines.exudyn.reproducer import mechanism, source
 
-        model = cls.build(scene, settings)._model
+        model = cls.build(scene, settings)
         if settings.formulation in OF_MECHANISMS:
             return mechanism.source(model, mechanism_of(scene), settings)
         return source(model, rolling_ball(scene), settings)
-
-    def advance(self, t: float) -> None:
-        """See :class:`proofroll.core.engine.Engine`."""
-        self._model.integration.advance(t)
-
-    def sample(self) -> Sample:
-        """See :class:`proofroll.core.engine.Engine`."""
-        return self._model.sample()
-
-    def events(self) -> Sequence[Event]:
-        """See :class:`proofroll.core.engine_abilities.LocatesEvents`."""
-        return list(self._model.integration.events)
-
-    def built(self) -> Built | MechanismBuilt:
-        """See :class:`proofroll.core.engine.Engine`."""
-        return self._model.built()

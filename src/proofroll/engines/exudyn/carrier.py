@@ -17,7 +17,7 @@ from proofroll.core.errors import Refused
 from proofroll.elements.ball_on_surface.model import RollingBall
 from proofroll.elements.ball_on_surface.surfaces import Generator
 from proofroll.engines.exudyn.ball import add_ball, add_body
-from proofroll.engines.exudyn.integration import Integration, new_system
+from proofroll.engines.exudyn.integration import ExudynModel, Integration
 from proofroll.engines.exudyn.local_frame import LocalGeometry, local_geometry
 from proofroll.engines.exudyn.native import Output, exu, items
 from proofroll.engines.exudyn.settings import ExudynSettings
@@ -39,13 +39,13 @@ class RollingRow(NamedTuple):
     axis: FloatArray
 
 
-class Carrier:
+class Carrier(ExudynModel):
     """Ball, carrier, two ``GenericJoint`` and two ``CoordinateConstraint`` at velocity level."""
 
     def __init__(self, body: RollingBall, settings: ExudynSettings) -> None:
         """Builds and initialises; raises Refused if the generators do not fit one joint."""
         local = local_geometry(body.surface, body.u0)
-        self.container, self.system = new_system()
+        super().__init__()
         add_marker, add_object = self.system.AddMarker, self.system.AddObject
         self.ground = add_object(items.ObjectGround())
         self.ball = add_ball(self.system, body)

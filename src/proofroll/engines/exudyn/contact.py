@@ -27,7 +27,7 @@ from proofroll.elements.ball_on_surface.events import EventKind
 from proofroll.elements.ball_on_surface.mechanics import initial_response, natural_acceleration, newton_euler
 from proofroll.elements.ball_on_surface.model import BallCapability, RollingBall
 from proofroll.engines.exudyn.ball import add_ball
-from proofroll.engines.exudyn.integration import Integration, new_system
+from proofroll.engines.exudyn.integration import ExudynModel, Integration
 from proofroll.engines.exudyn.local_frame import curvature
 from proofroll.engines.exudyn.native import Output, items
 from proofroll.engines.exudyn.settings import ExudynSettings
@@ -49,7 +49,7 @@ DEAD = 1e-6
 ROUND_OFF = 1e-12
 
 
-class PenaltyContact:
+class PenaltyContact(ExudynModel):
     """A rigid ball and one ``ObjectContactSphereSphere`` with a hollow sphere; needs no generators of the surface."""
 
     def __init__(self, body: RollingBall, settings: ExudynSettings) -> None:
@@ -77,7 +77,7 @@ class PenaltyContact:
         sunk = N / stiffness
         if sunk >= body.ball.radius:
             raise Refused(f"the load presses the ball {sunk:.3g} m into so soft a wall; use a larger stiffness")
-        self.container, self.system = new_system()
+        super().__init__()
         rolling = dataclasses.replace(body, w0=body.w0 + np.cross(e1, creep) / body.ball.radius)
         self.ball = add_ball(self.system, rolling)
         radius = body.ball.radius

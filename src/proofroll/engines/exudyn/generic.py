@@ -26,21 +26,21 @@ from proofroll.engines.exudyn.generic_forces import (
     weight_function,
     weight_turns,
 )
-from proofroll.engines.exudyn.integration import Integration, initial_matrices, new_system
+from proofroll.engines.exudyn.integration import ExudynModel, Integration, initial_matrices
 from proofroll.engines.exudyn.local_frame import local_geometry
 from proofroll.engines.exudyn.native import exu, items
 from proofroll.engines.exudyn.settings import ExudynSettings
 from proofroll.engines.exudyn.stick_slip import SwitchedIntegration
 
 
-class Generic:
+class Generic(ExudynModel):
     """An ``ObjectGenericODE2`` with velocity-level constraints."""
 
     def __init__(self, body: RollingBall, settings: ExudynSettings) -> None:
         """Builds and initialises; raises Refused if the surface is not homogeneous."""
         self._body = body
         self.local = local_geometry(body.surface, body.u0)
-        self.container, self.system = new_system()
+        super().__init__()
         m, J = body.ball.mass, body.ball.inertia
         frame = body.surface.frame(body.u0)
         self._rates = [0.0, *body.udot0.tolist(), *(frame.T @ body.w0).tolist()]
@@ -63,7 +63,6 @@ class Generic:
         self.rolling = self._constrain(node, body.ball.radius)
         self.system.Assemble()
         self._gravity, self._resistance, self._mu_kinetic = self._probe(settings)
-        self.integration: Integration | SwitchedIntegration
         if self.friction is None:
             self.integration = Integration(self.system, settings)
         else:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from typing import Any
 
 import numpy as np
@@ -24,6 +24,23 @@ def new_system() -> tuple[Any, Any]:
     exu.special.solver.timeout = -1
     container = exu.SystemContainer()
     return container, container.AddSystem()
+
+
+class ExudynModel:
+    """A run of a formulation in a system of its own; see :class:`proofroll.core.engine.Engine` for the methods."""
+
+    integration: Any  # an Integration, or what stands in for one
+
+    def __init__(self) -> None:
+        self.container, self.system = new_system()
+
+    def advance(self, t: float) -> None:
+        """See :class:`proofroll.core.engine.Engine`."""
+        self.integration.advance(t)
+
+    def events(self) -> Sequence[Event]:
+        """See :class:`proofroll.core.engine_abilities.LocatesEvents`."""
+        return list(self.integration.events)
 
 
 def simulation_settings(settings: ExudynSettings, *, dependent: bool = False, impacts: bool = False) -> Any:

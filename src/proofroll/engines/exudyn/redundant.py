@@ -19,7 +19,7 @@ from proofroll.elements.mechanism.loop_points import is_planar
 from proofroll.elements.mechanism.rotations import Array, quaternion_rate, to_quaternion
 from proofroll.elements.mechanism.sampling import WITH_AXIS, MechanismBuilt, independent, mechanism_of, unsaid
 from proofroll.engines.exudyn.connections import Connections, add_springs
-from proofroll.engines.exudyn.integration import Integration, initial_matrices, new_system
+from proofroll.engines.exudyn.integration import ExudynModel, Integration, initial_matrices
 from proofroll.engines.exudyn.native import Output, add_rigid_body, exu, items, rigid_body
 from proofroll.engines.exudyn.settings import ExudynSettings
 
@@ -35,7 +35,7 @@ _DIFFERENCED = Regularised(
 )
 
 
-class Redundant:
+class Redundant(ExudynModel):
     """See :class:`proofroll.core.engine.Engine` for the methods."""
 
     def __init__(self, scene: Any, settings: ExudynSettings) -> None:
@@ -43,7 +43,7 @@ class Redundant:
         require(mechanism, PROVIDES, LACKING)
         _check(mechanism)
         self._mechanism = mechanism
-        self.container, self.system = new_system()
+        super().__init__()
         self.bodies: dict[str, Any] = {WORLD: self.system.CreateGround()}
         self._com = {WORLD: np.zeros(3)} | {body.name: np.array(body.com) for body in mechanism.bodies}
         self._add_bodies()

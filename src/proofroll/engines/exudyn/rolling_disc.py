@@ -14,16 +14,16 @@ from proofroll.core.arrays import FloatArray
 from proofroll.core.engine import Built, Sample
 from proofroll.elements.ball_on_surface.model import RollingBall
 from proofroll.engines.exudyn.ball import add_ball
-from proofroll.engines.exudyn.integration import Integration, new_system
+from proofroll.engines.exudyn.integration import ExudynModel, Integration
 from proofroll.engines.exudyn.native import Output, items
 from proofroll.engines.exudyn.settings import ExudynSettings
 
 
-class RollingDisc:
+class RollingDisc(ExudynModel):
     """A rigid ball and one re-aimed ``ObjectJointRollingDisc``; needs no generators of the surface."""
 
     def __init__(self, body: RollingBall, settings: ExudynSettings) -> None:
-        self.container, self.system = new_system()
+        super().__init__()
         ground = self.system.AddObject(items.ObjectGround())
         self.ball = add_ball(self.system, body)
         plane = self.system.AddMarker(items.MarkerBodyRigid(bodyNumber=ground))

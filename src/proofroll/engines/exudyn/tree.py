@@ -18,7 +18,7 @@ from proofroll.elements.mechanism.capabilities import ALL_JOINTS, ALL_LOOPS, FOR
 from proofroll.elements.mechanism.rotations import Array, to_quaternion
 from proofroll.elements.mechanism.sampling import MechanismBuilt, mechanism_of
 from proofroll.engines.exudyn.connections import add_springs
-from proofroll.engines.exudyn.integration import Integration, new_system
+from proofroll.engines.exudyn.integration import ExudynModel, Integration
 from proofroll.engines.exudyn.native import Output, add_kinematic_tree, exu, items
 from proofroll.engines.exudyn.settings import ExudynSettings
 
@@ -34,14 +34,14 @@ _TYPES = {"revolute": exu.JointType.RevoluteZ, "prismatic": exu.JointType.Prisma
 _READ = ("Position", "Velocity", "AngularVelocity", "RotationMatrix", "Acceleration", "AngularAcceleration")
 
 
-class KinematicTree:
+class KinematicTree(ExudynModel):
     """See :class:`proofroll.core.engine.Engine` for the methods."""
 
     def __init__(self, scene: Any, settings: ExudynSettings) -> None:
         mechanism = mechanism_of(scene)
         require(mechanism, PROVIDES, LACKING)
         self._mechanism = mechanism
-        self.container, self.system = new_system()
+        super().__init__()
         self._link = {joint.child: number for number, joint in enumerate(mechanism.joints)}
         self._frames = {WORLD: (np.eye(3), np.zeros(3))} | {  # each body's frame in that of its link
             joint.child: (joint.child_frame.T, -joint.child_frame.T @ joint.child_position)

@@ -19,12 +19,12 @@ from proofroll.core.engine import Built, Sample
 from proofroll.core.errors import Refused
 from proofroll.elements.ball_on_surface.model import BallCapability, RollingBall
 from proofroll.engines.exudyn.ball import resisting
-from proofroll.engines.exudyn.integration import Integration, initial_matrices, new_system
+from proofroll.engines.exudyn.integration import ExudynModel, Integration, initial_matrices
 from proofroll.engines.exudyn.native import Output, items
 from proofroll.engines.exudyn.settings import ExudynSettings
 
 
-class WorldCoordinates:
+class WorldCoordinates(ExudynModel):
     """Two ``MassPoint`` and a ``CoordinateVectorConstraint`` with user functions; needs no generators of the wall."""
 
     def __init__(self, body: RollingBall, settings: ExudynSettings) -> None:
@@ -34,7 +34,7 @@ class WorldCoordinates:
                 "generic lets a ball slip only on a wall at rest that slides along itself, in whose coordinates its "
                 "friction is built; use contact"
             )
-        self.container, self.system = new_system()
+        super().__init__()
         add = self.system
         m, J = body.ball.mass, body.ball.inertia
         centre, spin = (

@@ -1,15 +1,16 @@
-"""The least models behind one face: a time, and the motion at that time.
+"""The least models behind one face: the motion at a time, and what an engine says of it.
 
 They share their equations with the truth's first route; only its second route checks them.
 """
 
 from __future__ import annotations
 
-from typing import Protocol
+from abc import ABC, abstractmethod
 
 import numpy as np
 
-from proofroll.core.arrays import FloatArray
+from proofroll.core.arrays import FloatArray, cross
+from proofroll.core.engine import Built, Sample
 from proofroll.core.errors import Diverged, Refused
 from proofroll.core.integrators import DormandPrince853
 from proofroll.elements.ball_on_surface.closed_form import closed_form
@@ -18,7 +19,7 @@ from proofroll.elements.ball_on_surface.compiled.rolling import is_uniform, para
 from proofroll.elements.ball_on_surface.compiled.rolling import start as start_along_arc
 from proofroll.elements.ball_on_surface.compiled.series import Series, still_moving
 from proofroll.elements.ball_on_surface.mechanics import natural_speed
-from proofroll.elements.ball_on_surface.model import RollingBall
+from proofroll.elements.ball_on_surface.model import BallCapability, RollingBall
 from proofroll.elements.ball_on_surface.motion import BallMotion, world_motion
 from proofroll.elements.ball_on_surface.rolling_equations import placed, reduced_rates, start
 
@@ -26,30 +27,72 @@ from proofroll.elements.ball_on_surface.rolling_equations import placed, reduced
 _STUCK = 1e-12
 
 
-class ReducedModel(Protocol):
-    """Moves the ball in time."""
+class ReducedModel(ABC):
+    """A run of a model; see :class:`proofroll.core.engine.Engine` for the methods."""
 
+    def __init__(self, body: RollingBall) -> None:
+        self._body = body
+
+    @abstractmethod
     def advance(self, t: float) -> None:
-        """Moves to time t [s].
+        """See :class:`proofroll.core.engine.Engine`."""
 
-        Raises:
-            Diverged: it gave up.
-        """
-
+    @abstractmethod
     def motion(self) -> BallMotion:
         """State and force now, each shape (1, 3)."""
 
     def spin_rate(self) -> float | None:
         """ω̇1 now [rad/s²]; None: the model has no equation for it."""
+        return None
+
+    def sample(self) -> Sample:
+        """See :class:`proofroll.core.engine.Engine`. The orientation is not followed: nothing needs it."""
+        motion = self.motion()
+        return Sample(
+            p_WB=motion.p_WB[0].copy(),
+            v_WB=motion.v_WB[0].copy(),
+            w_WB=motion.w_WB[0].copy(),
+            force=motion.force[0].copy(),
+        )
+
+    def built(self) -> Built:
+        """See :class:`proofroll.core.engine.Engine`."""
+        body, motion = self._body, self.motion()
+        ball, f = body.ball, body.contact.rolling_resistance
+        acceleration = motion.force[0] / ball.mass + body.gravity
+        return Built(
+            mass=ball.mass,
+            inertia=np.full(3, ball.inertia),
+            gravity=body.gravity.copy(),
+            ball_radius=ball.radius,
+            rolling_resistance=f,
+            acceleration=acceleration,
+            angular_acceleration=self._turning(motion.p_WB[0], motion.v_WB[0], motion.w_WB[0], acceleration),
+            terms=frozenset({BallCapability.ROLLING_RESISTANCE} if f else ()),
+        )
+
+    def _turning(self, p: FloatArray, v: FloatArray, w: FloatArray, acceleration: FloatArray) -> FloatArray | None:
+        """ω̇ [rad/s²], shape (3,): rate of ω = ω1 e1 - e1 × v / a."""
+        spin_rate, surface = self.spin_rate(), self._body.surface
+        if spin_rate is None:
+            return None
+        e1 = surface.normal(p)
+        e1_rate, v0 = surface.normal_gradient(p) @ v, v
+        if (W := self._body.wall_rate) is not None:  # the ball rolls on what the wall does not carry along
+            v = v - cross(W, p + self._body.ball.radius * e1)
+            acceleration = acceleration - cross(W, v0 + self._body.ball.radius * e1_rate)
+        swung = cross(e1_rate, v) + cross(e1, acceleration)
+        return np.asarray(spin_rate * e1 + (w @ e1) * e1_rate - swung / self._body.ball.radius)
 
 
-class ClosedFormModel:
+class ClosedFormModel(ReducedModel):
     """The closed form."""
 
     def __init__(self, body: RollingBall) -> None:
         if body.contact.rolling_resistance > 0:
             raise Refused("there is no closed form with rolling resistance; take formulation=equations")
-        self._body, found = body, closed_form(body, np.zeros(1))
+        super().__init__(body)
+        found = closed_form(body, np.zeros(1))
         if found is None:
             raise Refused(
                 "closed forms are known on a plane and in a cylinder along whose axis gravity points, not here; "
@@ -67,16 +110,13 @@ class ClosedFormModel:
         """See :class:`ReducedModel`."""
         return self._motion
 
-    def spin_rate(self) -> float | None:
-        """See :class:`ReducedModel`."""
-        return None
 
-
-class Integrated:
+class Integrated(ReducedModel):
     """The reduced equations by Dormand and Prince's method of order 8; a step ends at each sample."""
 
     def __init__(self, body: RollingBall, rtol: float) -> None:
-        self._body, self._span = body, 0.0
+        super().__init__(body)
+        self._span = 0.0
         speed = natural_speed(body)
         self._scales = np.array(body.surface.length_scales)
         a, per_metre = body.ball.radius, 1 / self._scales
@@ -115,14 +155,15 @@ class Integrated:
         return float(reduced_rates(self._body, self._motion.x)[0][4])
 
 
-class Compiled:
+class Compiled(ReducedModel):
     """The reduced equations on a cylinder or plane by compiled Taylor series."""
 
     def __init__(self, body: RollingBall, rtol: float) -> None:
         if not supports(body):
             raise Refused("integrator=taylor has equations of cylinders and planes only; take integrator=dop853")
         require_heyoka("integrator=taylor")
-        self._body, self._pars = body, parameters(body)
+        super().__init__(body)
+        self._pars = parameters(body)
         self._resistance = body.contact.rolling_resistance > 0
         model = reduced(self._resistance, is_uniform(body), rtol)
         pars = np.array(self._pars[: len(model.integrator.pars)])
