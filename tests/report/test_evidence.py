@@ -18,7 +18,7 @@ from proofroll.core.verdict import Verdict, judge
 from proofroll.files.json_data import plain
 from proofroll.files.scene_file import load_scene
 from proofroll.files.trajectory_file import read, write
-from proofroll.report.evidence import Claims, Cost
+from proofroll.report.comparison_records import Claims, Cost
 from proofroll.report.html import page
 from proofroll.report.labels import error
 from proofroll.report.plots import MOST_POINTS, kept, point_curves

@@ -11,14 +11,16 @@ from proofroll.core.verdict import Judgement, Verdict
 from proofroll.files.scene_file import load_scene
 from proofroll.report.comparison_records import (
     CauseAt,
+    Claims,
+    Cost,
     ReportedComparison,
     ReportedRow,
     ReportedRun,
     ShownBand,
     ShownObservable,
     WorstJudgement,
+    in_words,
 )
-from proofroll.report.evidence import Claims, Cost, in_words
 from proofroll.running.case import Status
 from proofroll.running.environments import shown_name
 from proofroll.studies.hosts import hosts

@@ -114,6 +114,7 @@ def templates() -> jinja2.Environment:
         "names": labels.names,
         "step": labels.step,
         "detail": labels.detail,
+        "setting": labels.setting,
         "caveats": labels.caveat_lines,
         "symbols": labels.SYMBOLS,
         "meanings": labels.MEANINGS,

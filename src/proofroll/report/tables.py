@@ -7,32 +7,29 @@ from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
 
 from proofroll.core.certificate import Standing, not_reported
-from proofroll.report.labels import names, number, symbol, unit
+from proofroll.report.labels import names, number, symbol
 
 if TYPE_CHECKING:
     from collections.abc import Iterable, Mapping, Sequence
 
     from proofroll.core.verdict import Judgement
-    from proofroll.report.comparison_records import ReportedComparison, ReportedRow, ReportedRun, ShownBand
-    from proofroll.report.evidence import Claims, Cost
+    from proofroll.report.comparison_records import (
+        Claims,
+        Cost,
+        ReportedComparison,
+        ReportedRow,
+        ReportedRun,
+        ShownBand,
+    )
 
 
-@dataclass(frozen=True)
-class QuantityColumn:
-    """A judged observable: its name, its symbol and its unit as they are shown."""
-
-    name: str
-    symbol: str
-    unit: str
-
-
-def observables(content: ReportedComparison) -> list[QuantityColumn]:
-    """The judged observables in the order of the first row that has them all."""
+def observables(content: ReportedComparison) -> dict[str, str]:
+    """The judged observables with their units, in the order of the first row that has them all."""
     units: dict[str, str] = {}
     for row in sorted(content.rows, key=lambda row: -len(row.observables)):
         for name, judgement in row.observables.items():
             units.setdefault(name, judgement.unit)
-    return [QuantityColumn(name, symbol(name), unit(text)) for name, text in units.items()]
+    return units
 
 
 @dataclass(frozen=True)

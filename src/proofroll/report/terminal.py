@@ -13,6 +13,7 @@ from proofroll.core.verdict import Verdict
 from proofroll.report.labels import SYMBOLS, caveat_lines, names, number, step, unjudged, verdict_text
 from proofroll.report.screen import Screen, numeric, plain_table, unbroken
 from proofroll.report.study_parts import part_kinds
+from proofroll.report.tables import observables
 from proofroll.studies.hosts import said_of
 
 if TYPE_CHECKING:
@@ -63,15 +64,14 @@ def verdict_table(content: ReportedComparison) -> Table:
         title=content.title,
     )
     for row in content.rows:
-        verdict = row.verdict
-        observables = row.observables
-        shown = [observables[name] for name, _ in names if name in observables]
+        verdict, judged = row.verdict, row.observables
+        shown = [judged[name] for name, _ in names if name in judged]
         worst = max(shown, key=_beyond, default=None)
         table.add_row(
             Text(" ".join(filter(None, (row.name, row.formulation, row.setting)))),
             step(row.resolution, row.resolution_value),
             Text(f"{SYMBOLS[verdict]} {verdict_text(row)}", style=_STYLES[verdict]),
-            *(number(observables[name].error if name in observables else None) for name, _ in names),
+            *(number(judged[name].error if name in judged else None) for name, _ in names),
             number(worst.order if worst else None),
             number(row.seconds_per_second),
             Text("") if row.as_expected else Text("!!", style="bold red"),
@@ -86,10 +86,7 @@ def _beyond(item: WorstJudgement) -> float:
 
 def columns(content: ReportedComparison) -> list[tuple[str, str]]:
     """The observables that fit on the terminal: what moves, and the first reaction."""
-    units: dict[str, str] = {}
-    for row in content.rows:
-        for name, judgement in row.observables.items():
-            units[name] = judgement.unit
+    units = observables(content)
     shown = [name for name in content.headlines("motion") if name in units]
     shown += [name for name in content.headlines("reaction") if name in units][:1]
     return [(name, units[name]) for name in shown]
