@@ -6,10 +6,9 @@ The rates that lie beside the positions say what happened between them.
 
 from __future__ import annotations
 
-import math
 from collections.abc import Mapping
 from dataclasses import dataclass
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 import numpy.typing as npt
@@ -17,6 +16,9 @@ import numpy.typing as npt
 from proofroll.core.arrays import FloatArray
 from proofroll.elements.ball_on_surface.model import RollingBall
 from proofroll.elements.ball_on_surface.surfaces import Surface
+
+if TYPE_CHECKING:
+    from scipy.spatial.transform import Rotation
 
 # Variables of a trajectory, by their names there; "time" among them.
 Sampled = Mapping[str, npt.NDArray[Any]]
@@ -107,6 +109,8 @@ def _state(sampled: Sampled, times: FloatArray, flies: bool) -> npt.NDArray[np.u
 
 
 def _orientation(surface: Surface, sampled: Sampled, times: FloatArray) -> FloatArray | None:
+    from scipy.spatial.transform import Rotation, Slerp
+
     if "q_WB" not in sampled:
         return None
     grid, stored = sampled["time"], sampled["q_WB"]
@@ -116,18 +120,20 @@ def _orientation(surface: Surface, sampled: Sampled, times: FloatArray) -> Float
     # a rotation that stands still in the ball; how it changes is what the spin does not explain, spread evenly.
     everywhere = np.union1d(grid, times)
     carried = _turned(surface, sampled, everywhere)
-    apart = _times(_conjugate(carried[np.searchsorted(everywhere, grid)]), stored)
-    return _times(carried[np.searchsorted(everywhere, times)], _slerp(grid, apart, times))
+    apart = carried[np.searchsorted(everywhere, grid)].inv() * Rotation.from_quat(stored, scalar_first=True)
+    between = Slerp(grid, apart)(np.clip(times, grid[0], grid[-1]))
+    return np.asarray((carried[np.searchsorted(everywhere, times)] * between).as_quat(scalar_first=True))
 
 
-def _turned(surface: Surface, sampled: Sampled, times: FloatArray) -> FloatArray:
-    """Orientation at rising times from 0 [s] by quadrature of the spin, identity at the first, shape (n, 4).
+def _turned(surface: Surface, sampled: Sampled, times: FloatArray) -> Rotation:
+    """Orientations at rising times from 0 [s] by quadrature of the spin, identity at the first.
 
     The components of the spin in the local frame change slowly, those in the world as fast as the ball goes round:
     the former are interpolated. Each step is the fourth-order Magnus step with two Gauss points (Iserles and Norsett
     1999, Phil. Trans. R. Soc. A 357, 983-1019, equation 4.5 with the commutator as a cross product).
     """
     from scipy.interpolate import Akima1DInterpolator, CubicHermiteSpline
+    from scipy.spatial.transform import Rotation
 
     grid = sampled["time"]
     spin = Akima1DInterpolator(grid, np.stack([sampled[f"omega{i}"] for i in (1, 2, 3)], axis=1))
@@ -141,45 +147,10 @@ def _turned(surface: Surface, sampled: Sampled, times: FloatArray) -> FloatArray
     h = np.diff(fine)[:, None]
     middle = fine[:-1, None] + h / 2
     early, late = (world((middle + sign * np.sqrt(3) / 6 * h)[:, 0]) for sign in (-1, 1))
-    steps = _exponential(h / 2 * (early + late) + np.sqrt(3) / 12 * h**2 * np.cross(late, early))
-    between = steps[::_SUBSTEPS]
-    for index in range(1, _SUBSTEPS):
-        between = _times(steps[index::_SUBSTEPS], between)
-    w, x, y, z = 1.0, 0.0, 0.0, 0.0
-    found = [(w, x, y, z)]
-    for a, b, c, d in between.tolist():  # plain numbers: an array operation would cost ten times as much
-        w, x, y, z = (
-            a * w - b * x - c * y - d * z,
-            a * x + b * w + c * z - d * y,
-            a * y - b * z + c * w + d * x,
-            a * z + b * y - c * x + d * w,
-        )
-        size = math.sqrt(w * w + x * x + y * y + z * z)
-        w, x, y, z = w / size, x / size, y / size, z / size
-        found.append((w, x, y, z))
-    return np.array(found)
-
-
-def _times(p: FloatArray, q: FloatArray) -> FloatArray:
-    """Product of quaternions, scalar first: first ``q``, then ``p``."""
-    a, b, c, d = np.moveaxis(p, -1, 0)
-    w, x, y, z = np.moveaxis(q, -1, 0)
-    parts = [a * w - b * x - c * y - d * z, a * x + b * w + c * z - d * y]
-    return np.stack([*parts, a * y - b * z + c * w + d * x, a * z + b * y - c * x + d * w], axis=-1)
-
-
-def _conjugate(q: FloatArray) -> FloatArray:
-    return np.asarray(q * np.array([1.0, -1.0, -1.0, -1.0]))
-
-
-def _exponential(turn: FloatArray) -> FloatArray:
-    """Quaternions of rotation vectors [rad], shape (n, 3) to (n, 4)."""
-    half = np.linalg.norm(turn, axis=-1, keepdims=True) / 2
-    return np.concatenate([np.cos(half), np.sinc(half / np.pi) / 2 * turn], axis=-1)
-
-
-def _slerp(grid: FloatArray, q: FloatArray, times: FloatArray) -> FloatArray:
-    from scipy.spatial.transform import Rotation, Slerp
-
-    found: Any = Slerp(grid, Rotation.from_quat(np.roll(q, -1, axis=1)))(np.clip(times, grid[0], grid[-1]))
-    return np.asarray(np.roll(found.as_quat(), 1, axis=1))
+    steps = Rotation.from_rotvec(h / 2 * (early + late) + np.sqrt(3) / 12 * h**2 * np.cross(late, early))
+    turned = Rotation.concatenate([Rotation.identity(), steps])
+    reach = 1  # each has been turned by so many steps before it, in the end by all
+    while reach < len(turned):
+        turned = Rotation.concatenate([turned[:reach], turned[reach:] * turned[:-reach]])
+        reach *= 2
+    return turned[::_SUBSTEPS]
