@@ -134,6 +134,15 @@ class Drawing:
         across = 0.36 * np.array([-along[1], along[0]])
         self.path([tip, tip - _HEAD * (along + across), tip - _HEAD * (along - across)], f"{look}-head", closed=True)
 
+    def vector(
+        self, ends: npt.ArrayLike, look: str, name: str, by: float = 11.0, beside: tuple[float, float] = (0.0, 0.0)
+    ) -> None:
+        """A straight arrow between places, shape (2, 2), whose name stands ``by`` so many pixels past its tip."""
+        self.arrow(ends, look)
+        a, b = np.asarray(ends, dtype=np.float64)
+        letters = "letter" if look == "thin" else f"{look}-letter"
+        self.text(b + by * _unit(b - a) + [0.0, 4.5], name, letters, beside)
+
     def text(
         self, place: npt.ArrayLike, symbol: str, look: str = "letter", beside: tuple[float, float] = (0.0, 0.0)
     ) -> None:
@@ -154,12 +163,6 @@ class Drawing:
         left = x - width / 2
         self._bounds.append(np.array([[left, y - 1.5 * _LETTER], [left + width, y + 0.5 * _LETTER]]))
         self.marks.append(Lettering(round(x, 1), round(y, 1), parts, look))
-
-
-def beyond(ends: npt.ArrayLike, by: float = 11.0) -> FloatArray:
-    """The place past the tip of an arrow where its letter stands; ``ends`` of shape (2, 2)."""
-    a, b = np.asarray(ends, dtype=np.float64)
-    return np.asarray(b + by * _unit(b - a) + [0.0, 4.5])
 
 
 def turn(start: float, end: float) -> FloatArray:

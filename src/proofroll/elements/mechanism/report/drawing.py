@@ -7,7 +7,7 @@ import numpy as np
 from proofroll.core.arrays import FloatArray
 from proofroll.elements.mechanism.element import MechanismElement
 from proofroll.elements.mechanism.fastened import fastened
-from proofroll.report.pen import Drawing, View, beyond
+from proofroll.report.pen import Drawing, View
 
 _SIZE = 240.0  # of the mechanism in the picture [px]
 _JOINT, _MASS, _POINT = 4.0, 2.5, 3.0  # radii of what marks them [px]
@@ -109,6 +109,4 @@ def _gravity(picture: Drawing, at: View, element: MechanismElement) -> None:
     x, y, width, _ = picture.box
     along = at(gravity / np.linalg.norm(gravity)) / at.scale
     place = np.array([x + width + 14.0, y + 10.0])
-    ends = np.stack([place, place + _GRAVITY * along])
-    picture.arrow(ends, "force")
-    picture.text(beyond(ends), "g", "force-letter")
+    picture.vector(np.stack([place, place + _GRAVITY * along]), "force", "g")

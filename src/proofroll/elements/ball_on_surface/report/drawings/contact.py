@@ -6,7 +6,7 @@ import numpy as np
 
 from proofroll.core.arrays import FloatArray
 from proofroll.elements.ball_on_surface.model import RollingBall
-from proofroll.report.pen import Drawing, View, beyond, circle, turn
+from proofroll.report.pen import Drawing, View, circle, turn
 
 _BALL = 84.0  # radius of the ball [px]
 # How far rolling resistance shifts the normal force, in radii: millimetres would not be seen.
@@ -42,9 +42,7 @@ def _wall(drawn: Drawing, at: View) -> None:
 def _frame(drawn: Drawing, at: View) -> None:
     """Unit vectors at the centre, and the angular velocity that goes with each."""
     for index, axis in enumerate((E1, E2, E3)):
-        ends = at([0 * axis, 1.7 * axis])
-        drawn.arrow(ends, "frame")
-        drawn.text(beyond(ends), f"e_{index + 1}", "frame-letter")
+        drawn.vector(at([0 * axis, 1.7 * axis]), "frame", f"e_{index + 1}")
         one, other = np.roll(E1, index + 1), np.roll(E1, index + 2)
         drawn.arrow(at(circle(1.33 * axis, 0.17 * one, 0.17 * other, turn(-2.4, 2.4))), "motion")
         drawn.text(_aside(at, 1.33 * axis, axis, 27.0), f"ω_{index + 1}", "motion-letter")
@@ -76,9 +74,7 @@ def _forces(drawn: Drawing, at: View, body: RollingBall) -> None:
     """N against e1, F2 and F3 on the ball at the contact; with rolling resistance N is shifted forward."""
     drawn.disc(at(E1).tolist(), 2.6, "force-head")
     for axis, symbol in ((E2, "F_2"), (E3, "F_3")):
-        ends = at([E1, E1 + 1.05 * axis])
-        drawn.arrow(ends, "force")
-        drawn.text(beyond(ends, 13.0), symbol, "force-letter")
+        drawn.vector(at([E1, E1 + 1.05 * axis]), "force", symbol, by=13.0)
     f = body.contact.rolling_resistance
     shift = _SHIFT * _forward(body) if f else np.zeros(3)
     drawn.arrow(at([E1 + shift, shift + 0.35 * E1]), "force")

@@ -12,7 +12,7 @@ from proofroll.elements.ball_on_surface.report.drawings.contact import contact
 from proofroll.elements.ball_on_surface.report.drawings.surfaces import SIZE, direction, gravity, overview, right
 from proofroll.elements.ball_on_surface.surfaces import Declared
 from proofroll.report.labels import symbol
-from proofroll.report.pen import Drawing, View, beyond
+from proofroll.report.pen import Drawing, View
 
 _LINES, _FINE = 13, 61  # lines along each coordinate, and points of each
 
@@ -41,14 +41,10 @@ def net(wall: Declared, body: RollingBall) -> list[Drawing]:
     start, frame = body.p0 - centre, body.surface.frame(body.u0)
     foot = start + body.ball.radius * frame[:, 0]
     for name, along in zip(body.surface.coordinates, frame[:, 1:].T, strict=True):
-        way = at([foot, foot + 0.45 * size * along])
-        drawn.arrow(way, "thin")
-        drawn.text(beyond(way, 14.0), symbol(name))
+        drawn.vector(at([foot, foot + 0.45 * size * along]), "thin", symbol(name), by=14.0)
     speed = float(np.linalg.norm(body.v0))
     if speed:
-        ends = at([start, start + 0.4 * size * body.v0 / speed])
-        drawn.arrow(ends, "motion")
-        drawn.text(beyond(ends), "v", "motion-letter")
+        drawn.vector(at([start, start + 0.4 * size * body.v0 / speed]), "motion", "v")
     drawn.disc(at(start).tolist(), body.ball.radius * at.scale, "ball")
     gravity(drawn, at, body, at(-1.25 * size * right(at)))
     return [drawn, contact(body, (-0.6, -0.72, 0.36), (0, 0, 1) if abs(frame[2, 0]) < 0.9 else (-1, 0, 0))]

@@ -10,7 +10,7 @@ from proofroll.core.arrays import FloatArray
 from proofroll.elements.ball_on_surface.model import RollingBall
 from proofroll.elements.ball_on_surface.report.drawings.contact import contact
 from proofroll.elements.ball_on_surface.surfaces import Cylinder, Plane, Surface
-from proofroll.report.pen import Drawing, View, beyond, turn
+from proofroll.report.pen import Drawing, View, turn
 
 SIZE = 128.0  # half the width of what is drawn of a wall [px]
 _LEVEL = 0.02  # angles below this have no arc [rad]
@@ -38,9 +38,7 @@ def _cylinder(wall: Cylinder, body: RollingBall) -> list[Drawing]:
     centre, start, level = (surface.position(u) for u in (here, (0.0, 0.0), (here[0], 0.0)))
     axis = wall.position((0.0, 1.0)) - wall.position((0.0, 0.0))
     drawn.path(at([bottom * axis, top * axis]), "axis")
-    ends = at([top * axis, (top + 0.42 * b) * axis])
-    drawn.arrow(ends, "thin")
-    drawn.text(beyond(ends), "z", beside=(10.0, 8.0))
+    drawn.vector(at([top * axis, (top + 0.42 * b) * axis]), "thin", "z", beside=(10.0, 8.0))
     _radius(drawn, at, top * axis, wall.position((-0.9, top)), "b", (12.0, 2.0))
     _radius(drawn, at, np.zeros(3), start, "c = b − a", (0.0, 17.0))
     drawn.path(at([np.zeros(3), level]), "thin")
@@ -52,9 +50,8 @@ def _cylinder(wall: Cylinder, body: RollingBall) -> list[Drawing]:
     radius = body.ball.radius * at.scale
     drawn.disc(at(start).tolist(), radius, "ghost")
     drawn.disc(at(centre).tolist(), radius, "ball")
-    speed = at([start, start + 0.62 * b * surface.frame((0.0, 0.0))[:, 1]])
-    drawn.arrow(speed, "motion")
-    drawn.text(beyond(speed), "V_0", "motion-letter", beside=(2.0, 0.0))
+    ahead = surface.frame((0.0, 0.0))[:, 1]
+    drawn.vector(at([start, start + 0.62 * b * ahead]), "motion", "V_0", beside=(2.0, 0.0))
     leader = at(centre) + np.outer([0.0, radius, radius + 20.0], [0.9, 0.44])
     drawn.path(leader, "thin")
     drawn.text(leader[-1], "a", beside=(8.0, 5.0))
@@ -78,12 +75,9 @@ def _plane(wall: Plane, body: RollingBall) -> list[Drawing]:
         drawn.path(at([start, touching]), "hidden")
         drawn.disc(at(touching).tolist(), a * at.scale, "ghost")
     for index, symbol in ((1, "V_0"), (2, "V_3")):
-        way = at([foot, foot + 0.95 * size * frame[:, index]])
-        drawn.arrow(way, "thin")
-        drawn.text(beyond(way, 14.0), surface.coordinates[index - 1])
-        ends = at([start, start + 0.62 * size * frame[:, index]])
-        drawn.arrow(ends, "motion")
-        drawn.text(beyond(ends, 13.0), symbol, "motion-letter")
+        along = size * frame[:, index]
+        drawn.vector(at([foot, foot + 0.95 * along]), "thin", surface.coordinates[index - 1], by=14.0)
+        drawn.vector(at([start, start + 0.62 * along]), "motion", symbol, by=13.0)
     drawn.disc(at(start).tolist(), a * at.scale, "ball")
     rim = at(start) + np.outer([0.0, a * at.scale, a * at.scale + 14.0], [-0.7, -0.7])
     drawn.path(rim, "thin")
@@ -157,9 +151,7 @@ def gravity(drawn: Drawing, at: View, body: RollingBall, place: FloatArray) -> N
         return
     a, b = at([np.zeros(3), body.gravity / size])
     along = (b - a) / (np.linalg.norm(b - a) or 1.0)
-    ends = np.stack([place, place + 44.0 * along])
-    drawn.arrow(ends, "force")
-    drawn.text(beyond(ends), "g", "force-letter")
+    drawn.vector(np.stack([place, place + 44.0 * along]), "force", "g")
 
 
 def direction(azimuth: float, elevation: float) -> tuple[float, float, float]:
