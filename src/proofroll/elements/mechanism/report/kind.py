@@ -5,6 +5,9 @@ from __future__ import annotations
 from collections.abc import Sequence
 from typing import TYPE_CHECKING, ClassVar
 
+import numpy as np
+
+from proofroll.core.observable import Observable, Role
 from proofroll.core.scene import Scene
 from proofroll.elements.mechanism.element import MechanismElement
 from proofroll.report.kinds import ReportKind
@@ -12,9 +15,13 @@ from proofroll.report.kinds import ReportKind
 if TYPE_CHECKING:
     import xarray as xr
 
-    from proofroll.core.observable import Observable
     from proofroll.report.pen import Picture
     from proofroll.report.replay_records import ReplayKind
+
+# Curves of forces, and of torques, of one case.
+_MOST = 8
+# What changes by less than this part of the widest range is a straight line in its figure.
+_STILL = 1e-6
 
 
 class MechanismReport(ReportKind):
@@ -44,11 +51,9 @@ class MechanismReport(ReportKind):
     @staticmethod
     def curves(scene: Scene, truth: xr.Dataset) -> Sequence[Observable]:
         """Forces and torques of joints and loops; their arrays are judged as a whole."""
-        from proofroll.elements.mechanism.report.reactions import reactions
-
         element = scene.elements[0]
         assert isinstance(element, MechanismElement)  # it covers no other
-        return reactions(element, truth)
+        return _reactions(element, truth)
 
     @staticmethod
     def replay() -> ReplayKind:
@@ -57,3 +62,24 @@ class MechanismReport(ReportKind):
         from proofroll.report.replay_records import ReplayKind
 
         return ReplayKind("mechanism", seen, drawn)
+
+
+def _reactions(element: MechanismElement, truth: xr.Dataset) -> list[Observable]:
+    """Determinate components of the wrenches on children that change most, in the order of joints and loops."""
+    names = [connection.name for connection in element.mechanism.connections]
+    found = []
+    for kind, unit in (("force", "N"), ("torque", "N m")):
+        components = [truth[f"{kind}.{name}.{axis}"] for name in names for axis in "xyz"]
+        # At time 0 a reaction belongs to the certificate.
+        ranges = {
+            str(item.name): float(np.ptp(item.to_numpy()[1:])) for item in components if not item.attrs.get("absent")
+        }
+        widest = max(ranges.values(), default=0.0)
+        moving = [name for name, width in ranges.items() if width > _STILL * widest]
+        largest = sorted(moving, key=lambda name: -ranges[name])[:_MOST]
+        found += [
+            Observable(name, unit, str(truth[name].attrs["long_name"]), Role.REACTION, floor=_STILL * widest)
+            for name in moving
+            if name in largest
+        ]
+    return found
