@@ -9,8 +9,7 @@ from unittest import SkipTest
 
 import numpy as np
 
-from proofroll.conformance.explaining import UnlikeSceneError
-from proofroll.conformance.subject import Subject, bits, lacking, require, scenes
+from proofroll.conformance.subject import Subject, UnlikeSceneError, bits, lacking, require, scenes
 from proofroll.core.certificate import certify, first_difference
 from proofroll.core.element_abilities import HasOptionalCapabilities
 from proofroll.core.engine import Sample

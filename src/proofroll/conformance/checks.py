@@ -7,14 +7,12 @@ from collections.abc import Callable, Iterator, Mapping
 from contextlib import suppress
 from dataclasses import dataclass
 from fnmatch import fnmatchcase
-from functools import cached_property
+from functools import cache, partial
 from typing import Any
 from unittest import SkipTest
 
 from proofroll.conformance import building, declarations, motion, response
-from proofroll.conformance.explaining import UnlikeSceneError, explained
-from proofroll.conformance.subject import Subject, lacking, scenes
-from proofroll.core.scene import Scene
+from proofroll.conformance.subject import Subject, UnlikeSceneError, explained, lacking, scenes
 
 # One per engine.
 _OF_ENGINES: tuple[Callable[[Any], None], ...] = (
@@ -137,45 +135,33 @@ def run_check(engine: Any, name: str) -> None:
 
 def _runs(engine: Any) -> Iterator[tuple[str, Callable[[], None]]]:
     for check in _OF_ENGINES:
-        yield check.__name__, _bound(check, engine)
+        yield check.__name__, partial(check, engine)
     for formulation, presets in engine.presets.items():
         for preset, settings in presets.items():
             # What hangs on the adapter alone comes first: it is the cause where the motion is wrong too.
-            first = _First(engine, settings)
-            for check_preset in _OF_PRESETS:
-                yield f"{check_preset.__name__}[{formulation}-{preset}]", first.checked(check_preset)
+            first = cache(partial(_first, engine, settings))
+            for check in _OF_PRESETS:
+                yield f"{check.__name__}[{formulation}-{preset}]", partial(_on_first, first, check)
             for found, of_found in ((scenes(), _OF_SCENES), (response.truth_scenes(), _OF_TRUTHS)):
-                for (name, scene), check_scene in itertools.product(found.items(), of_found):
+                for (name, scene), check in itertools.product(found.items(), of_found):
                     if lacking(engine, formulation, scene):
                         continue  # refused before it is built; that something is left `provides_for_some_scene` holds
                     subject = Subject(engine, settings, scene)
-                    yield f"{check_scene.__name__}[{formulation}-{preset}-{name}]", _bound(check_scene, subject)
+                    yield f"{check.__name__}[{formulation}-{preset}-{name}]", partial(check, subject)
 
 
-def _bound(check: Callable[[Any], None], what: Any) -> Callable[[], None]:
-    return lambda: check(what)
+def _first(engine: Any, settings: Any) -> Subject | None:
+    """The engine on the most demanding scene that it builds with these settings."""
+    for scene in scenes().values():
+        subject = Subject(engine, settings, scene)
+        with suppress(SkipTest):
+            subject.build()
+            return subject
+    return None
 
 
-class _First:
-    """The most demanding scene that the engine builds with these settings, looked for once."""
-
-    def __init__(self, engine: Any, settings: Any) -> None:
-        self._engine, self._settings = engine, settings
-
-    def checked(self, check: Callable[[Subject], None]) -> Callable[[], None]:
-        """The check on that scene."""
-
-        def run() -> None:
-            if self._scene is None:
-                raise SkipTest("every scene is refused")
-            check(Subject(self._engine, self._settings, self._scene))
-
-        return run
-
-    @cached_property
-    def _scene(self) -> Scene | None:
-        for scene in scenes().values():
-            with suppress(SkipTest):
-                Subject(self._engine, self._settings, scene).build()
-                return scene
-        return None
+def _on_first(first: Callable[[], Subject | None], check: Callable[[Subject], None]) -> None:
+    subject = first()
+    if subject is None:
+        raise SkipTest("every scene is refused")
+    check(subject)

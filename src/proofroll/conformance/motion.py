@@ -3,8 +3,10 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Callable
 from contextlib import suppress
 from dataclasses import replace
+from functools import cache, partial
 from itertools import pairwise
 from unittest import SkipTest
 
@@ -126,11 +128,11 @@ def order_is_as_declared(subject: Subject) -> None:
     declared = declared_order(subject.engine, subject.settings, subject.scene)
     if declared is None:
         raise SkipTest("no order is declared")
-    ends, factor, seen = _Ends(subject), _FIRST, dict[float, str]()
+    end, factor, seen = cache(partial(_end, subject)), _FIRST, dict[float, str]()
     # The step may be so small that only round-off is left, or so large that the order is not yet seen; which, is
     # decided without a look at what was declared.
     while _FINEST <= factor <= _COARSEST and factor not in seen:
-        first, second = ends.orders(factor)
+        first, second = _orders(subject, end, factor)
         dt = subject.settings.dt * factor
         seen[factor] = f"{first:.2f}, {second:.2f} at dt = {dt:g}"
         if math.isnan(second):
@@ -148,41 +150,33 @@ def order_is_as_declared(subject: Subject) -> None:
     raise AssertionError(f"the declared order is {declared}, but none is observed: {'; '.join(seen.values())}")
 
 
-class _Ends:
-    """Where runs of one motion with several steps end, each made once."""
+def _orders(subject: Subject, end: Callable[[float, float], FloatArray | None], factor: float) -> tuple[float, float]:
+    """Orders from the steps 2h, h, h/2 and h, h/2, h/4, h being ``factor`` preset's steps; NaN below round-off."""
+    coarsest = 2 * factor * subject.settings.dt
+    t = math.ceil(_ORDER_SPAN / coarsest) * coarsest
+    states = []
+    for part in (2.0, 1.0, 0.5, 0.25):
+        state = end(part * factor, t)
+        if state is None:
+            return math.inf, 0.0  # too coarse
+        states.append(state)
+    changes = [float(np.max(np.abs(coarse - fine))) for coarse, fine in pairwise(states)]
+    if changes[-1] < _ROUND_OFF:
+        return math.nan, math.nan
+    return math.log2(changes[0] / changes[1]), math.log2(changes[1] / changes[2])
 
-    def __init__(self, subject: Subject) -> None:
-        self._subject = subject
-        self._known: dict[tuple[float, float], FloatArray | None] = {}
 
-    def orders(self, factor: float) -> tuple[float, float]:
-        """Orders from the steps 2h, h, h/2 and h, h/2, h/4, h being ``factor`` preset's steps; NaN below round-off."""
-        coarsest = 2 * factor * self._subject.settings.dt
-        t = math.ceil(_ORDER_SPAN / coarsest) * coarsest
-        states = []
-        for part in (2.0, 1.0, 0.5, 0.25):
-            state = self._end(part * factor, t)
-            if state is None:
-                return math.inf, 0.0  # too coarse
-            states.append(state)
-        changes = [float(np.max(np.abs(coarse - fine))) for coarse, fine in pairwise(states)]
-        if changes[-1] < _ROUND_OFF:
-            return math.nan, math.nan
-        return math.log2(changes[0] / changes[1]), math.log2(changes[1] / changes[2])
-
-    def _end(self, factor: float, t: float) -> FloatArray | None:
-        """The state at time ``t`` [s]; none where it is not finite, or the engine takes no step so coarse."""
-        if (factor, t) not in self._known:
-            try:
-                state = self._subject.scaled(self._subject.finer(factor).at(t).sample())
-                self._known[factor, t] = state if np.all(np.isfinite(state)) else None
-            except Diverged:
-                self._known[factor, t] = None
-            except (InputError, SkipTest):  # its settings refuse the step, or it refuses to build with it
-                if factor <= 1:
-                    raise
-                self._known[factor, t] = None
-        return self._known[factor, t]
+def _end(subject: Subject, factor: float, t: float) -> FloatArray | None:
+    """The state at time ``t`` [s]; none where it is not finite, or the engine takes no step so coarse."""
+    try:
+        state = subject.scaled(subject.finer(factor).at(t).sample())
+    except Diverged:
+        return None
+    except (InputError, SkipTest):  # its settings refuse the step, or it refuses to build with it
+        if factor <= 1:
+            raise
+        return None
+    return state if np.all(np.isfinite(state)) else None
 
 
 def tolerance_has_an_effect(subject: Subject) -> None:

@@ -10,8 +10,7 @@ from unittest import SkipTest
 
 import numpy as np
 
-from proofroll.conformance.explaining import UnlikeSceneError
-from proofroll.conformance.subject import Subject
+from proofroll.conformance.subject import Subject, UnlikeSceneError
 from proofroll.core.arrays import FloatArray
 from proofroll.core.certificate import first_difference
 from proofroll.core.dataset import columns_of, scales
