@@ -2,8 +2,9 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable, Mapping
-from typing import ClassVar, Literal, Protocol
+from typing import Any, ClassVar, Literal, Protocol
 
 import numpy as np
 
@@ -26,6 +27,43 @@ def classical_step(rates: Rates, x: FloatArray, h: float) -> FloatArray:
     k3 = rates(x + h / 2 * k2)
     k4 = rates(x + h * k3)
     return np.asarray(x + h / 6 * (k1 + 2 * (k2 + k3) + k4))
+
+
+def controlled_step(solver: Any, accept: Accept, until: float, longest: float = math.inf) -> None:
+    """One step of a solver of scipy, at most of a length [s] and at most to the time ``until`` [s].
+
+    The step size that the error control wants survives a step that was shortened to end there.
+
+    Raises:
+        Diverged: no step is small enough.
+    """
+    solver.t_bound, solver.status, solver.max_step = until, "running", longest
+    wanted = solver.h_abs
+    if solver.step() is not None:
+        raise Diverged(f"the step size fell to nothing at t = {solver.t:.6g} s")
+    if solver.t == until:
+        solver.h_abs = max(wanted, solver.h_abs)
+    accepted = accept(float(solver.t), solver.y)
+    if accepted is not solver.y:
+        # The rate that opens the next step must belong to the changed state, or the error control collapses.
+        solver.y, solver.f = accepted, solver.fun(solver.t, accepted)
+
+
+def inside_last_step(solver: Any, t: float) -> FloatArray:
+    """The state at a time [s] within the last step of a DOP853 solver, integrated from where that step began.
+
+    Raises:
+        Diverged: no step is small enough.
+    """
+    if t <= solver.t_old:
+        return np.asarray(solver.y_old)
+    from scipy.integrate import DOP853
+
+    h, options = t - solver.t_old, {"rtol": solver.rtol, "atol": solver.atol}
+    part = DOP853(solver.fun, solver.t_old, solver.y_old, t, first_step=h, **options)
+    while part.status == "running":
+        controlled_step(part, lambda _, y: y, t)
+    return np.asarray(part.y)
 
 
 class Integrator(Protocol):
@@ -89,8 +127,8 @@ class RungeKutta4:
 class DormandPrince853:
     """Dormand and Prince's method of order 8 with error control, from scipy.
 
-    One solver lives through the whole run. Its bound moves from sample to sample, so that a step ends at each (scipy's
-    interpolant is of order 7 only), and the step size that the error control wants survives the shortened last step.
+    One solver lives through the whole run. Its bound moves from sample to sample, so that a step ends at each: scipy's
+    interpolant is of order 7 only.
     """
 
     resolution: ClassVar[Literal["dt", "rtol"]] = "rtol"
@@ -108,19 +146,8 @@ class DormandPrince853:
         solver = self._solver
         if t <= self.t:
             return
-        solver.t_bound, solver.status = t, "running"
-        while solver.status == "running":
-            wanted = solver.h_abs
-            message = solver.step()
-            if message is not None:
-                raise Diverged(f"the step size fell to nothing at t = {solver.t:.6g} s")
-            if solver.t == t:
-                solver.h_abs = max(wanted, solver.h_abs)
-            accepted = self._accept(float(solver.t), solver.y)
-            if accepted is not solver.y:
-                # The rate that opens the next step must belong to the changed state, or the error control collapses.
-                solver.y = accepted
-                solver.f = solver.fun(solver.t, accepted)
+        while solver.t < t:
+            controlled_step(solver, self._accept, t)
         self.t, self.x = t, solver.y
 
 

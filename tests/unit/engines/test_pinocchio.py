@@ -133,7 +133,7 @@ def test_declared_order(formulation: str, integrator: str, orientation: bool, dt
     for step in (dt, dt / 2):
         run = simulate(scene, "pinocchio", until=until, every=until / 2, dt=step, **options)
         errors.append(float(np.abs(run.p_WB - true.p_WB).max()))
-    declared = build(scene, "pinocchio", dt=dt, **options)._run.motion._settings.order
+    declared = build(scene, "pinocchio", dt=dt, **options).motion._settings.order
     assert np.log2(errors[0] / errors[1]) == pytest.approx(declared, abs=0.35)
 
 
@@ -150,7 +150,7 @@ def test_projection_takes_away_drift() -> None:
 
 def test_projection_is_mass_orthogonal() -> None:
     """What the projection takes from the velocities is an impulse of the rows: orthogonal to every rolling motion."""
-    mechanism = build(cylinder(), "pinocchio", formulation="free_flyer")._run.mechanism
+    mechanism = build(cylinder(), "pinocchio", formulation="free_flyer").mechanism
     data = mechanism.model.createData()
     v = mechanism.v0 + np.array([1e-3, 2e-3, -1e-3, 0.3, 0.1, -0.2])
     q, corrected = mechanism.project(data, mechanism.q0, v)
@@ -162,7 +162,7 @@ def test_projection_is_mass_orthogonal() -> None:
 
 def test_joint_transmits_what_the_multipliers_say() -> None:
     """In composite the spherical joint's wrench has no couple, and its friction is that of the multipliers."""
-    mechanism = build(cylinder(axial_speed=0.3, radial_spin=5), "pinocchio")._run.mechanism
+    mechanism = build(cylinder(axial_speed=0.3, radial_spin=5), "pinocchio").mechanism
     data = mechanism.model.createData()
     _, force = mechanism.reaction(data, mechanism.q0, mechanism.v0)
     wrench = data.oMi[mechanism.ball].act(data.f[mechanism.ball])

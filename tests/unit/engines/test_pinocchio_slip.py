@@ -200,7 +200,7 @@ def test_unbounded_friction_knows_nothing_of_slip() -> None:
     for formulation in ("composite", "free_flyer"):
         engine = build(load_scene("sphere_in_cylinder"), "pinocchio", formulation=formulation)
         assert engine.sample().sticking is None
-        assert engine._run.motion.mu_static is None
+        assert engine.motion.mu_static is None
     assert "sticking" not in run("pinocchio", 0.1)
     plain, bounded = run(TUNED, 0.5), run(TUNED, 0.5, mu_static=10.0)
     np.testing.assert_allclose(bounded.p_WB, plain.p_WB, rtol=0, atol=1e-13)
@@ -241,8 +241,8 @@ def test_coefficients_are_read_back(formulation: str) -> None:
     engine = build(scene, "pinocchio", formulation=formulation)
     assert (engine.built().mu_static, engine.built().mu_kinetic) == (0.35, 0.25)
     if formulation != "contact":
-        engine._run.mechanism._mu_kinetic = 0.2
-        engine._run.motion.mu_static = 0.3
+        engine.mechanism._mu_kinetic = 0.2
+        engine.motion.mu_static = 0.3
         assert [line.quantity for line in certify(engine, scene) if not line.holds] == [
             "static friction",
             "kinetic friction",

@@ -83,7 +83,7 @@ def test_the_orientation_in_the_rotating_frame_is_a_quadrature() -> None:
 def test_pinocchio(formulation: str, joints: int, freedoms: int) -> None:
     """No joint and no mass but those needed, no torque without f, an orientation that stays unless asked for."""
     engine = build(scene(), "pinocchio", formulation=formulation)
-    mechanism, motion = engine._run.mechanism, engine._run.motion
+    mechanism, motion = engine.mechanism, engine.motion
     assert (mechanism.model.njoints, mechanism.model.nv) == (joints, freedoms)
     assert [float(inertia.mass) for inertia in mechanism.model.inertias if inertia.mass > 0] == [0.517]
     assert mechanism.resistance(mechanism.model.createData(), mechanism.q0, mechanism.v0) is None
@@ -92,7 +92,7 @@ def test_pinocchio(formulation: str, joints: int, freedoms: int) -> None:
     np.testing.assert_array_equal(motion.q[-4:], mechanism.q0[-4:])
     asked = build(scene("orientation"), "pinocchio", formulation=formulation)
     asked.advance(0.01)
-    assert np.max(np.abs(asked._run.motion.q[-4:] - asked._run.mechanism.q0[-4:])) > 0.1
+    assert np.max(np.abs(asked.motion.q[-4:] - asked.mechanism.q0[-4:])) > 0.1
 
 
 def test_pinocchio_is_told_to_leave_out_what_is_asked() -> None:

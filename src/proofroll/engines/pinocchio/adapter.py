@@ -4,23 +4,21 @@ from __future__ import annotations
 
 import dataclasses
 from collections.abc import Mapping, Sequence
-from typing import Any, ClassVar, Self
+from typing import Any, ClassVar
 
 import pinocchio as pin
 
-from proofroll.core.engine import Built, Sample
 from proofroll.core.engine_abilities import Level, Term
 from proofroll.core.errors import Refused
-from proofroll.core.events import Event
 from proofroll.core.plugins import release
 from proofroll.core.scene import Scene
 from proofroll.elements.ball_on_surface.element import rolling_ball
 from proofroll.elements.ball_on_surface.model import ALL_OF_A_BALL, BallCapability
-from proofroll.elements.mechanism.sampling import MechanismBuilt
-from proofroll.engines.pinocchio.constraint_dynamics import ConstraintDynamics
+from proofroll.elements.mechanism.capabilities import require
+from proofroll.elements.mechanism.sampling import mechanism_of
+from proofroll.engines.pinocchio import constraint_dynamics, joint_tree
 from proofroll.engines.pinocchio.contact_run import ContactRun
 from proofroll.engines.pinocchio.mechanism_run import MechanismRun
-from proofroll.engines.pinocchio.null_space import NullSpace
 from proofroll.engines.pinocchio.rows_run import RowsRun
 from proofroll.engines.pinocchio.settings import OF_MECHANISMS, PRESETS, PinocchioSettings, lowered
 
@@ -37,15 +35,15 @@ class Pinocchio:
         "composite": ALL_OF_A_BALL,
         "free_flyer": ALL_OF_A_BALL | {BallCapability.MOVING_WALL},
         "contact": ALL_OF_A_BALL | {BallCapability.MOVING_WALL, BallCapability.IMPACTS},
-        "null_space": NullSpace.provides,
-        "constraint_dynamics": ConstraintDynamics.provides,
+        "null_space": joint_tree.PROVIDES,
+        "constraint_dynamics": constraint_dynamics.PROVIDES,
     }
     lacking: ClassVar[Mapping[str, Mapping[str, str]]] = {
         "composite": {BallCapability.IMPACTS: "its rows hold the ball on the wall; use contact"},
         "free_flyer": {BallCapability.IMPACTS: "its rows hold the ball on the wall; use contact"},
         "contact": {BallCapability.TANGENTIAL_RESTITUTION: "Pinocchio's solver has no restitution to be asked for"},
-        "null_space": NullSpace.lacking,
-        "constraint_dynamics": ConstraintDynamics.lacking,
+        "null_space": joint_tree.LACKING,
+        "constraint_dynamics": constraint_dynamics.LACKING,
     }
     settings: ClassVar[type[Any]] = PinocchioSettings
     lowered = staticmethod(lowered)
@@ -84,10 +82,6 @@ class Pinocchio:
         "contact": {BallCapability.ORIENTATION: "the spherical joint's configuration is the ball's orientation"}
     }
 
-    def __init__(self, run: ContactRun | RowsRun | MechanismRun) -> None:
-        self._run = run
-        self._t = 0.0
-
     @staticmethod
     def caveat(settings: PinocchioSettings) -> str:
         """See :class:`proofroll.core.engine_abilities.TellsCaveats`: Pinocchio computes terms, and has no steps."""
@@ -108,14 +102,14 @@ class Pinocchio:
         return found | {"gravity": pin.Model().gravity.linear.tolist()}
 
     @classmethod
-    def build(cls, scene: Scene, settings: PinocchioSettings) -> Self:
-        """See :class:`proofroll.core.engine.Engine`."""
+    def build(cls, scene: Scene, settings: PinocchioSettings) -> ContactRun | RowsRun | MechanismRun:
+        """See :class:`proofroll.core.engine.Engine`; what it builds is a run of a formulation."""
         if settings.formulation in _OF_PINOCCHIO_4 and release(cls.version()) < (4,):
             raise Refused(f"{settings.formulation} needs the constraints of pinocchio 4.0, and this is {cls.version()}")
         if settings.formulation in OF_MECHANISMS:
-            return cls(MechanismRun(scene, settings))
+            return _of_mechanism(scene, settings)
         settings = _decided(scene, settings)
-        return cls((ContactRun if settings.formulation == "contact" else RowsRun)(rolling_ball(scene), settings))
+        return (ContactRun if settings.formulation == "contact" else RowsRun)(rolling_ball(scene), settings)
 
     @classmethod
     def reproducer(cls, scene: Scene, settings: PinocchioSettings) -> str:
@@ -123,25 +117,14 @@ class Pinocchio:
         from proofroll.engines.pinocchio.reproducer import mechanism, source
 
         if settings.formulation in OF_MECHANISMS:
-            return mechanism.source(MechanismRun(scene, settings), settings)
+            return mechanism.source(_of_mechanism(scene, settings), settings)
         return source(rolling_ball(scene), _decided(scene, settings))
 
-    def advance(self, t: float) -> None:
-        """See :class:`proofroll.core.engine.Engine`."""
-        self._run.advance(self._t, t)
-        self._t = t
 
-    def sample(self) -> Sample:
-        """See :class:`proofroll.core.engine.Engine`."""
-        return self._run.sample()
-
-    def events(self) -> Sequence[Event]:
-        """See :class:`proofroll.core.engine_abilities.LocatesEvents`."""
-        return self._run.events()
-
-    def built(self) -> Built | MechanismBuilt:
-        """See :class:`proofroll.core.engine.Engine`."""
-        return self._run.built()
+def _of_mechanism(scene: Scene, settings: PinocchioSettings) -> MechanismRun:
+    mechanism, formulation = mechanism_of(scene), settings.formulation
+    require(mechanism, Pinocchio.provides[formulation], Pinocchio.lacking[formulation])
+    return MechanismRun(mechanism, settings)
 
 
 def _decided(scene: Scene, settings: PinocchioSettings) -> PinocchioSettings:

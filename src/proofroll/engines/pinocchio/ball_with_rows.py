@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+import sys
 from abc import ABC, abstractmethod
 from dataclasses import dataclass
 from typing import Any
@@ -18,6 +19,8 @@ from proofroll.engines.pinocchio.rows import BallTerms, resistance
 # A pull of the wall smaller than this part of the ball's weight, and of the force that turns its path by a radius, is
 # round-off.
 _FAINT = 1e-9
+# Friction relative to the normal force, and excess of it, that is round-off.
+NOISE = 1e-13
 
 
 @dataclass(frozen=True, slots=True)
@@ -39,6 +42,12 @@ class SlidingContact:
     slip_rate: FloatArray
     friction: FloatArray
     e1: FloatArray
+
+
+def unit(vector: FloatArray) -> FloatArray:
+    """The vector made a unit vector; zero stays zero."""
+    length = math.sqrt(vector @ vector)
+    return vector / length if length > 0 else vector
 
 
 def left_the_wall(when: str) -> Diverged:
@@ -95,10 +104,23 @@ class BallWithRows(ABC):
     def normal_force(self, data: Any) -> float:
         """N [N] that the last :meth:`accelerate` left in ``data``."""
 
-    def friction_force(self, data: Any) -> float:
-        """Size of the friction [N] that the last :meth:`accelerate` left in ``data``."""
+    def excess(self, data: Any, q: FloatArray, v: FloatArray, mu_static: float) -> tuple[float, float]:
+        """(needed - available) / (needed + available) friction while sticking [-], and N [N].
+
+        Slip begins where the first is positive.
+        """
+        self.accelerate(data, q, v)
+        return self.last_excess(data, mu_static)
+
+    def last_excess(self, data: Any, mu_static: float) -> tuple[float, float]:
+        """The same at the state of the last :meth:`accelerate`."""
         *_, F2, F3 = data.lambda_c.tolist()
-        return math.hypot(F2, F3)
+        needed, normal_force = math.hypot(F2, F3), self.normal_force(data)
+        available = mu_static * normal_force
+        # A friction of round-off is needed even where none is: it must not count as more than none (mu_static = 0).
+        noise = NOISE * abs(normal_force)
+        size = max(needed + abs(available) + noise, sys.float_info.min)
+        return (needed - available - noise) / size, normal_force
 
     @abstractmethod
     def reaction(self, data: Any, q: FloatArray, v: FloatArray) -> tuple[FloatArray, FloatArray]:

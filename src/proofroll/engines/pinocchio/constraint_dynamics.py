@@ -7,7 +7,7 @@ It holds points or whole frames together, which leaves out the loops between: a 
 from __future__ import annotations
 
 from collections.abc import Mapping
-from typing import Any, ClassVar
+from typing import Any
 
 import numpy as np
 import pinocchio as pin
@@ -16,10 +16,13 @@ from proofroll.elements.mechanism import WORLD, Loop
 from proofroll.elements.mechanism.capabilities import ALL_LOOPS, MechanismCapability
 from proofroll.elements.mechanism.loop_points import held_points
 from proofroll.elements.mechanism.rotations import Array
-from proofroll.engines.pinocchio.joint_tree import LACKING, PROVIDES, JointTree
+from proofroll.engines.pinocchio import joint_tree
+from proofroll.engines.pinocchio.joint_tree import JointTree
 
 _POINTS = {MechanismCapability.SPHERICAL_LOOP, MechanismCapability.REVOLUTE_LOOP}
 _NO_ROWS = "Pinocchio's rigid constraints hold points or whole frames together, and no single angle or direction"
+PROVIDES = joint_tree.PROVIDES - ALL_LOOPS | _POINTS
+LACKING: Mapping[str, str] = {**joint_tree.LACKING, **dict.fromkeys(ALL_LOOPS - _POINTS, _NO_ROWS)}
 _ITERATIONS = 50
 _ACCURACY = 1e-14
 
@@ -31,9 +34,6 @@ class ConstraintDynamics:
         constraints: Pinocchio's.
         proximal: accuracy, μ and most iterations of its method.
     """
-
-    provides: ClassVar[frozenset[str]] = frozenset(PROVIDES - ALL_LOOPS | _POINTS)
-    lacking: ClassVar[Mapping[str, str]] = {**LACKING, **dict.fromkeys(ALL_LOOPS - _POINTS, _NO_ROWS)}
 
     def __init__(self, tree: JointTree, proximal: float) -> None:
         """With the term μ of the proximal method."""

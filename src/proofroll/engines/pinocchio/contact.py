@@ -113,13 +113,13 @@ class ContactSteps:
         """Duration of the next kick [s]."""
         return self.dt if self.started or not self.leapfrog else 0.5 * self.dt
 
-    def advance(self, start: float, end: float) -> None:
-        """From ``start`` to ``end`` [s].
+    def advance(self, end: float) -> None:
+        """To ``end`` [s].
 
         Raises:
             Diverged: Pinocchio's solver did not find the impulse.
         """
-        model, dt = self.contact.model, self.dt
+        model, dt, start = self.contact.model, self.dt, self._time
         for number in range(whole_steps(start, end, dt)):
             self._time = start + number * dt
             v, impulse, self._normal_force, status = self.kick()

@@ -33,9 +33,9 @@ class ContactRun:
         self._looked_at = self.steps.contact.model.createData()  # for sampling, which leaves the running data alone
         self._unbounded = UNBOUNDED_FRICTION[self.steps.solver]
 
-    def advance(self, start: float, end: float) -> None:
-        """From ``start`` to ``end`` [s]."""
-        self.steps.advance(start, end)
+    def advance(self, t: float) -> None:
+        """See :class:`proofroll.core.engine.Engine`."""
+        self.steps.advance(t)
 
     def sample(self) -> Sample:
         """See :class:`proofroll.core.engine.Engine`; the force is that of the step beginning or centred here."""

@@ -8,6 +8,7 @@ from typing import Any
 import numpy as np
 
 from proofroll.core.arrays import FloatArray
+from proofroll.core.integrators import inside_last_step
 
 # Between the ends of an interval the function is looked at so many times, enough for one crest.
 _LOOKS = 4
@@ -66,7 +67,7 @@ def located(
     if time is None:
         return None
     # The dense output is of lower order than the steps: Newton's method on states that were integrated there.
-    y, width = _integrated(solver, time), 0.0
+    y, width = inside_last_step(solver, time), 0.0
     for _ in range(3):
         rates = solver.fun(time, y)
         slope = (g(y + span * rates) - g(y - span * rates)) / (2 * span)
@@ -76,19 +77,5 @@ def located(
         width = abs(better - time)
         if width <= 2 * np.spacing(time):
             break
-        time, y = better, _integrated(solver, better)
+        time, y = better, inside_last_step(solver, better)
     return time, width, y
-
-
-def _integrated(solver: Any, time: float) -> FloatArray:
-    """The state at ``time``, integrated from the start of the last step."""
-    if time <= solver.t_old:
-        return np.asarray(solver.y_old)
-    from scipy.integrate import DOP853
-
-    part = DOP853(
-        solver.fun, solver.t_old, solver.y_old, time, rtol=solver.rtol, atol=solver.atol, first_step=time - solver.t_old
-    )
-    while part.status == "running":
-        part.step()
-    return np.asarray(part.y)

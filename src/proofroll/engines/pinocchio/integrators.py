@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import math
+from abc import ABC, abstractmethod
 from typing import Any
 
 import numpy as np
@@ -11,6 +13,7 @@ from proofroll.core.arrays import FloatArray
 from proofroll.core.engine import whole_steps
 from proofroll.core.errors import Diverged, Refused
 from proofroll.core.events import Event
+from proofroll.core.integrators import controlled_step
 from proofroll.engines.pinocchio.ball_with_rows import BallWithRows, left_the_wall
 from proofroll.engines.pinocchio.settings import PinocchioSettings
 
@@ -21,11 +24,11 @@ def require_tangent_map() -> None:
         raise Refused(f"the rates of quaternions need tangentMap of pinocchio 4.0, and this is {pin.__version__}")
 
 
-class TangentIntegrator:
+class TangentIntegrator(ABC):
     """Moves the state of a mechanism.
 
     Attributes:
-        q, v: joint configuration and velocity now.
+        t, q, v: time [s], joint configuration and velocity now.
         turns: whether the orientation of the ball is integrated.
         events: so far; of a ball that cannot slip, that it left the wall.
         mu_static: largest |F|/N while sticking [-]; None: the rows of rolling hold always.
@@ -40,15 +43,24 @@ class TangentIntegrator:
         self._model, self._data = mechanism.model, mechanism.model.createData()
         self.turns = bool(settings.orientation)
         self.events: list[Event] = []
-        self.q, self.v = mechanism.q0.copy(), mechanism.v0.copy()
+        self.t, self.q, self.v = 0.0, mechanism.q0.copy(), mechanism.v0.copy()
 
-    def advance(self, start: float, end: float) -> None:
-        """From ``start`` to ``end`` [s].
+    def advance(self, end: float) -> None:
+        """To ``end`` [s].
 
         Raises:
             Diverged: no step is small enough, the rows have become dependent, or the wall would have to pull.
         """
-        raise NotImplementedError
+        start = self.t
+        try:
+            self._advance(start, end)
+        except np.linalg.LinAlgError as error:
+            raise Diverged(f"the equations became singular between {start:g} s and {end:g} s ({error})") from None
+        self.t = end
+
+    @abstractmethod
+    def _advance(self, start: float, end: float) -> None:
+        """From ``start`` to ``end`` [s]."""
 
     def reaction(self, data: Any) -> tuple[FloatArray, FloatArray]:
         """Joint acceleration, and force of the wall on the ball in the world [N], now."""
@@ -68,13 +80,9 @@ class FixedStep(TangentIntegrator):
         self._dt = float(settings.dt or 0.0)
         self._start: FloatArray | None = None
 
-    def advance(self, start: float, end: float) -> None:
-        """See :class:`TangentIntegrator`."""
-        try:
-            for number in range(whole_steps(start, end, self._dt)):
-                self._advance_one(start + number * self._dt)
-        except np.linalg.LinAlgError as error:
-            raise Diverged(f"the equations became singular between {start:g} s and {end:g} s ({error})") from None
+    def _advance(self, start: float, end: float) -> None:
+        for number in range(whole_steps(start, end, self._dt)):
+            self._advance_one(start + number * self._dt)
 
     def _advance_one(self, time: float) -> None:
         self._step(self._pressed(time) if self._start is None else self._start)
@@ -93,9 +101,9 @@ class FixedStep(TangentIntegrator):
     def _acceleration(self, q: FloatArray, v: FloatArray) -> FloatArray:
         return np.array(self._mechanism.accelerate(self._data, q, v))
 
+    @abstractmethod
     def _step(self, acceleration: FloatArray) -> None:
         """One step; the acceleration is that at its start."""
-        raise NotImplementedError
 
 
 class SemiImplicitEuler(FixedStep):
@@ -199,44 +207,32 @@ class Adaptive(TangentIntegrator):
 
         return DOP853(rates, start, y, np.inf, rtol=self._rtol, atol=self._atol)
 
-    def advance(self, start: float, end: float) -> None:
-        """See :class:`TangentIntegrator`."""
+    def _advance(self, start: float, end: float) -> None:
         if end <= start:
             return
         self._short_steps = 0
-        try:
-            if self._solver is None:
-                self._solver = self._solver_from(self._rates, start, self._joined(self.q, self.v))
-            solver = self._solver
-            solver.t_bound, solver.status = end, "running"
-            while solver.status == "running":
-                self._make_step(solver)
-                if self._settings.projection:
-                    self._put_back(solver)
-                # The rates that were found last are those at the end of the step, with projection or without.
-                if self._mechanism.normal_force(self._data) < -self._mechanism.faint:
-                    self.events.append(Event("lift_off", 0.5 * (solver.t_old + solver.t), solver.t_old, solver.t))
-                    raise left_the_wall(f"before {solver.t:.6g} s")
-        except np.linalg.LinAlgError as error:
-            raise Diverged(f"the equations became singular between {start:g} s and {end:g} s ({error})") from None
+        if self._solver is None:
+            self._solver = self._solver_from(self._rates, start, self._joined(self.q, self.v))
+        solver = self._solver
+        while solver.t < end:
+            self._make_step(solver, end)
+            # The rates that were found last are those at the end of the step, with projection or without.
+            if self._mechanism.normal_force(self._data) < -self._mechanism.faint:
+                self.events.append(Event("lift_off", 0.5 * (solver.t_old + solver.t), solver.t_old, solver.t))
+                raise left_the_wall(f"before {solver.t:.6g} s")
         self._keep(solver.y)
 
     def _keep(self, y: FloatArray) -> None:
         q, v = self._split(y)
         self.q, self.v = q.copy(), v.copy()
 
-    def _make_step(self, solver: Any) -> None:
-        """One step.
+    def _make_step(self, solver: Any, end: float, most: float = math.inf) -> None:
+        """One step, at most to the time ``end`` [s] and of the length ``most`` [s].
 
         Raises:
             Diverged: none is small enough, or too many in a row are too short.
         """
-        wanted = solver.h_abs
-        message = solver.step()
-        if message is not None:
-            raise Diverged(f"the motion could not be integrated past {solver.t:g} s: {message}")
-        if solver.t == solver.t_bound:  # the step may have been shortened to end there; the next must not inherit that
-            solver.h_abs = max(wanted, solver.h_abs)
+        controlled_step(solver, self._accepted, end, most)
         longest = SHORT * self._turning_time
         is_short = solver.step_size < longest
         if is_short:
@@ -249,6 +245,8 @@ class Adaptive(TangentIntegrator):
                 "does when the ball comes to rest"
             )
 
-    def _put_back(self, solver: Any) -> None:
-        solver.y = self._joined(*self._mechanism.project(self._data, *self._split(solver.y)))
-        solver.f = self._rates(solver.t, solver.y)  # the next step starts with the rates at its first point
+    def _accepted(self, _: float, y: FloatArray) -> FloatArray:
+        """The state after a step put back on the constraints, if that is wanted."""
+        if not self._settings.projection:
+            return y
+        return self._joined(*self._mechanism.project(self._data, *self._split(y)))

@@ -17,7 +17,9 @@ from proofroll.elements.mechanism import WORLD, Joint, Loop, Mechanism, Spring
 from proofroll.elements.mechanism.capabilities import ALL_JOINTS, ALL_LOOPS, FORCES, MechanismCapability
 from proofroll.elements.mechanism.rotations import Array
 
-PROVIDES = ALL_JOINTS | ALL_LOOPS | FORCES | {MechanismCapability.REDUNDANT, MechanismCapability.ARMATURE}
+PROVIDES: frozenset[str] = (
+    ALL_JOINTS | ALL_LOOPS | FORCES | {MechanismCapability.REDUNDANT, MechanismCapability.ARMATURE}
+)
 LACKING: Mapping[str, str] = {
     MechanismCapability.JOINT_FRICTION: "these equations have no law that switches; Pinocchio's solver of dry friction "
     "in joints belongs to its contacts"

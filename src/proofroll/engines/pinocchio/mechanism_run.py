@@ -10,9 +10,9 @@ import pinocchio as pin
 from proofroll.core.engine import Sample
 from proofroll.core.errors import Diverged
 from proofroll.core.integrators import INTEGRATORS
-from proofroll.elements.mechanism.capabilities import require
+from proofroll.elements.mechanism import Mechanism
 from proofroll.elements.mechanism.rotations import Array
-from proofroll.elements.mechanism.sampling import MechanismBuilt, independent, mechanism_of, unsaid
+from proofroll.elements.mechanism.sampling import MechanismBuilt, independent, unsaid
 from proofroll.engines.pinocchio.constraint_dynamics import ConstraintDynamics
 from proofroll.engines.pinocchio.integrators import require_tangent_map
 from proofroll.engines.pinocchio.joint_tree import AXIS_COLUMN, JointTree
@@ -24,19 +24,14 @@ from proofroll.engines.pinocchio.settings import PinocchioSettings
 class MechanismRun:
     """See :class:`proofroll.core.engine.Engine` for the methods."""
 
-    def __init__(self, scene: Any, settings: PinocchioSettings) -> None:
-        self._mechanism = mechanism = mechanism_of(scene)
-        kind = NullSpace if settings.proximal is None else ConstraintDynamics  # the one that has a proximal term
-        require(mechanism, kind.provides, kind.lacking)
+    def __init__(self, mechanism: Mechanism, settings: PinocchioSettings) -> None:
+        self._mechanism = mechanism
         self.tree = JointTree(mechanism)
         self._model, self._data = self.tree.model, self.tree.model.createData()
         self._nq = self._model.nq
         rows = LoopRows(self.tree)
-        self.dynamics: NullSpace | ConstraintDynamics
-        if settings.proximal is None:
-            self.dynamics = NullSpace(self.tree, rows)
-        else:
-            self.dynamics = ConstraintDynamics(self.tree, settings.proximal)
+        mu = settings.proximal  # which constraint_dynamics has, and nothing else
+        self.dynamics = NullSpace(self.tree, rows) if mu is None else ConstraintDynamics(self.tree, mu)
         self._rows, self.rank = rows, rows.rank
         self._turns = self._nq != self._model.nv  # configurations hold quaternions
         if self._turns:
@@ -67,16 +62,13 @@ class MechanismRun:
             q, v = self._rows.eliminated(self._data, q, v)
         return np.concatenate([q, v])
 
-    def advance(self, start: float, end: float) -> None:
-        """From ``start`` to ``end`` [s]."""
+    def advance(self, t: float) -> None:
+        """See :class:`proofroll.core.engine.Engine`."""
+        start = self.motion.t
         try:
-            self.motion.advance(end)
+            self.motion.advance(t)
         except np.linalg.LinAlgError as error:
-            raise Diverged(f"the equations became singular between {start:g} s and {end:g} s ({error})") from None
-
-    def events(self) -> tuple[()]:
-        """None: nothing here switches."""
-        return ()
+            raise Diverged(f"the equations became singular between {start:g} s and {t:g} s ({error})") from None
 
     def _evaluated(self) -> tuple[Any, Array, Array, Array, Any, Array]:
         """Data of the present state, q, v, and what the reactions are."""

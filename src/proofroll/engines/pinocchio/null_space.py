@@ -2,22 +2,18 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
-from typing import Any, ClassVar
+from typing import Any
 
 import numpy as np
 import pinocchio as pin
 
 from proofroll.elements.mechanism.rotations import Array
-from proofroll.engines.pinocchio.joint_tree import LACKING, PROVIDES, JointTree
+from proofroll.engines.pinocchio.joint_tree import JointTree
 from proofroll.engines.pinocchio.loop_rows import LoopRows, RowsAtState
 
 
 class NullSpace:
     """Accelerations and reactions of a tree with loops."""
-
-    provides: ClassVar[frozenset[str]] = frozenset(PROVIDES)
-    lacking: ClassVar[Mapping[str, str]] = LACKING
 
     def __init__(self, tree: JointTree, rows: LoopRows) -> None:
         self._tree, self._model, self._rows = tree, tree.model, rows

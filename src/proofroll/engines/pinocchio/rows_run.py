@@ -44,9 +44,9 @@ class RowsRun:
             self.motion = rolling(self.mechanism, settings)
         self._looked_at = self.mechanism.model.createData()  # for sampling, which leaves the running data alone
 
-    def advance(self, start: float, end: float) -> None:
-        """From ``start`` to ``end`` [s]."""
-        self.motion.advance(start, end)
+    def advance(self, t: float) -> None:
+        """See :class:`proofroll.core.engine.Engine`."""
+        self.motion.advance(t)
 
     def sample(self) -> Sample:
         """See :class:`proofroll.core.engine.Engine`; no orientation where it is not integrated."""

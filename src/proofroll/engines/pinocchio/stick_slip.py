@@ -16,15 +16,13 @@ from typing import Any
 import numpy as np
 
 from proofroll.core.arrays import FloatArray
-from proofroll.core.errors import Diverged
 from proofroll.core.events import Event
 from proofroll.elements.ball_on_surface.events import EventKind
 from proofroll.elements.ball_on_surface.model import Contact
-from proofroll.engines.pinocchio.ball_with_rows import BallWithRows, SlidingContact, left_the_wall
+from proofroll.engines.pinocchio.ball_with_rows import NOISE, BallWithRows, SlidingContact, left_the_wall, unit
 from proofroll.engines.pinocchio.crossing import located
 from proofroll.engines.pinocchio.integrators import Adaptive
 from proofroll.engines.pinocchio.settings import PinocchioSettings
-from proofroll.engines.pinocchio.slip_excess import NOISE, excess, last_excess, unit
 
 # |u| at which creeping ends, relative to |b|/ω_b: what is left out of the direction goes with its square.
 _HANDOVER = 1e-4
@@ -89,13 +87,9 @@ class AdaptiveStickSlip(Adaptive):
         direction = self._direction(data, self._joined(self.q, self.v))
         return self._mechanism.sliding_reaction(data, self.q, self.v, direction)
 
-    def advance(self, start: float, end: float) -> None:
-        """See :class:`~proofroll.engines.pinocchio.integrators.TangentIntegrator`."""
-        try:
-            while start < end:
-                start = self._leg(start, end)
-        except np.linalg.LinAlgError as error:
-            raise Diverged(f"the equations became singular before {end:g} s ({error})") from None
+    def _advance(self, start: float, end: float) -> None:
+        while start < end:
+            start = self._leg(start, end)
 
     # -- the laws ---------------------------------------------------------------------------------------------------
 
@@ -103,7 +97,7 @@ class AdaptiveStickSlip(Adaptive):
         return self._mechanism.slide(data, *self._split(y), direction)
 
     def _excess(self, y: FloatArray) -> float:
-        return excess(self._mechanism, self._data, *self._split(y), self.mu_static)[0]
+        return self._mechanism.excess(self._data, *self._split(y), self.mu_static)[0]
 
     def _turning(self, data: Any, y: FloatArray) -> tuple[SlidingContact, FloatArray]:
         """The ball without friction, and the rate at which the direction of its slip_rate turns [1/s], shape (3,)."""
@@ -149,8 +143,8 @@ class AdaptiveStickSlip(Adaptive):
             self._solver, self._short_steps = self._solver_from(law, start, y), 0
             self._monitored = self._monitor(y)
         solver, monitor = self._solver, self._monitored
-        solver.t_bound, solver.status = end, "running"
-        while solver.status == "running":
+        while solver.t < end:
+            longest = math.inf
             if self._mode is FrictionLaw.SLIDING:
                 left = monitor[0] / -monitor[1] if monitor[1] < 0 else math.inf
                 if monitor[0] <= self._floor and left < math.inf:
@@ -158,9 +152,9 @@ class AdaptiveStickSlip(Adaptive):
                     if stop > end:
                         return self._rest_of_slip(solver, end)
                     return self._switch(stop, left, solver.y + left * solver.f)
-                solver.max_step = max(_APPROACH * left, 1e-300)
-            self._make_step(solver)
-            before, monitor = monitor, self._after_step(solver)
+                longest = max(_APPROACH * left, 1e-300)
+            self._make_step(solver, end, longest)
+            before, monitor = monitor, self._after_step(solver.y)
             stop = self._stop(solver, before, monitor)
             if monitor[2] < -self._mechanism.faint:
                 self._leave(solver, before[2], monitor[2], stop)
@@ -176,31 +170,26 @@ class AdaptiveStickSlip(Adaptive):
         self._solver = None
         return end
 
-    def _after_step(self, solver: Any) -> tuple[float, float, float]:
-        """Puts the state back on the constraints, if that is wanted; what :meth:`_monitor` says then."""
-        if self._settings.projection:
-            self._put_back(solver)
+    def _after_step(self, y: FloatArray) -> tuple[float, float, float]:
+        """What :meth:`_monitor` says after a step."""
         if self._mode is not FrictionLaw.STICKING:
-            return self._speed(solver.y)
+            return self._speed(y)
         # The rates that were found last are those at the end of the step, with projection or without.
-        beyond, normal_force = last_excess(self._mechanism, self._data, self.mu_static)
+        beyond, normal_force = self._mechanism.last_excess(self._data, self.mu_static)
         return beyond, 0.0, normal_force
 
-    def _put_back(self, solver: Any) -> None:
-        if self._mode is FrictionLaw.STICKING:
-            super()._put_back(solver)
-            return
-        q, v = self._split(solver.y)
+    def _accepted(self, t: float, y: FloatArray) -> FloatArray:
+        if self._mode is FrictionLaw.STICKING or not self._settings.projection:
+            return super()._accepted(t, y)
+        q, v = self._split(y)
         back = self._mechanism.project_sliding(self._data, q, v)
-        if back[1] is not v:
-            solver.y = self._joined(*back)
-            solver.f = self._law(solver.t, solver.y)
+        return y if back[1] is v else self._joined(*back)
 
     def _monitor(self, y: FloatArray) -> tuple[float, float, float]:
         """What may end the mode, the excess of needed friction when sticking, else |u| and its rate; and N [N]."""
         if self._mode is not FrictionLaw.STICKING:
             return self._speed(y)
-        beyond, normal_force = excess(self._mechanism, self._data, *self._split(y), self.mu_static)
+        beyond, normal_force = self._mechanism.excess(self._data, *self._split(y), self.mu_static)
         return beyond, 0.0, normal_force
 
     def _stop(

@@ -10,10 +10,9 @@ import numpy as np
 from proofroll.core.arrays import FloatArray
 from proofroll.core.events import Event
 from proofroll.elements.ball_on_surface.model import Contact
-from proofroll.engines.pinocchio.ball_with_rows import BallWithRows, SlidingContact, left_the_wall
+from proofroll.engines.pinocchio.ball_with_rows import BallWithRows, SlidingContact, left_the_wall, unit
 from proofroll.engines.pinocchio.integrators import FixedStep, SemiImplicitEuler, TangentRungeKutta4
 from proofroll.engines.pinocchio.settings import PinocchioSettings
-from proofroll.engines.pinocchio.slip_excess import excess, unit
 
 
 class FixedStickSlip(FixedStep):
@@ -28,7 +27,7 @@ class FixedStickSlip(FixedStep):
     def __init__(self, mechanism: BallWithRows, settings: PinocchioSettings, contact: Contact) -> None:
         super().__init__(mechanism, settings)
         self.mu_static = contact.mu_static
-        self._excess, self._normal_force = excess(mechanism, self._data, self.q, self.v, self.mu_static)
+        self._excess, self._normal_force = mechanism.excess(self._data, self.q, self.v, self.mu_static)
         self.sticking = self._excess <= 0 and not mechanism.slips0
         self._free = self._without_friction()
         if not self.sticking:
@@ -50,7 +49,7 @@ class FixedStickSlip(FixedStep):
             self.q, self.v = put_back(self._data, self.q, self.v)
         if self.sticking:
             before = self._excess
-            self._excess, normal_force = excess(self._mechanism, self._data, self.q, self.v, self.mu_static)
+            self._excess, normal_force = self._mechanism.excess(self._data, self.q, self.v, self.mu_static)
             if self._excess <= 0:
                 self._must_press(time + self._dt, normal_force)
                 return
@@ -87,7 +86,7 @@ class FixedStickSlip(FixedStep):
         if math.sqrt(ahead @ ahead) > self._dt * math.sqrt(taken @ taken):
             return
         q, v = self._mechanism.project(self._data, self.q, self.v)
-        needed, self._normal_force = excess(self._mechanism, self._data, q, v, self.mu_static)
+        needed, self._normal_force = self._mechanism.excess(self._data, q, v, self.mu_static)
         if needed > 0:
             return
         slowing = math.sqrt((free.slip_rate - taken) @ (free.slip_rate - taken))

@@ -7,7 +7,8 @@ The five velocities are s = [u̇1 u̇2 r1 r2 r3]; here r gives the angular veloc
 from __future__ import annotations
 
 import math
-from typing import TYPE_CHECKING, ClassVar, Protocol
+from abc import ABC, abstractmethod
+from typing import TYPE_CHECKING, ClassVar
 
 import numpy as np
 
@@ -29,20 +30,22 @@ _SMALLEST_SINE = 0.01
 _LARGEST_SINE = 0.5
 
 
-class Orientation(Protocol):
-    """Angles (none, or three, or a quaternion) and the three velocities that describe the rotation.
+class Orientation(ABC):
+    """What describes the rotation: angles (none, or three, or a quaternion) and three velocities r.
 
     Attributes:
         size: number of angles.
         periodic: which of them say the same after a whole turn.
     """
 
-    size: ClassVar[int]
-    periodic: ClassVar[tuple[bool, ...]]
+    size: ClassVar[int] = 0
+    periodic: ClassVar[tuple[bool, ...]] = ()
 
+    @abstractmethod
     def start(self, frame: FloatArray, w: FloatArray) -> tuple[FloatArray, FloatArray]:
         """Angles [rad], shape (size,), and velocities r, shape (3,), of the angular velocity ω' [rad/s] at time 0."""
 
+    @abstractmethod
     def kinematics(
         self, angles: FloatArray, r: FloatArray, frame: FloatArray, turning: FloatArray
     ) -> tuple[FloatArray, FloatArray]:
@@ -52,24 +55,27 @@ class Orientation(Protocol):
             ArithmeticError: the angles are not finite.
         """
 
+    @abstractmethod
     def rates(self, u: FloatArray, angles: FloatArray, r: FloatArray) -> FloatArray:
         """Rates of the angles [1/s], shape (size,), where the ball is at ``u``."""
 
-    def check(self, t: float, angles: FloatArray, r: FloatArray, step: float) -> None:
+    def check(self, t: float, angles: FloatArray, r: FloatArray, step: float) -> None:  # noqa: B027 -- most never fail
         """Raises Diverged if the description fails at time ``t`` [s]; ``step`` [s] is a fixed step's size, else 0."""
 
-    def renewed(self, t: float, angles: FloatArray, r: FloatArray) -> tuple[FloatArray, FloatArray] | None:
+    def renewed(self, t: float, angles: FloatArray, r: FloatArray) -> tuple[FloatArray, FloatArray] | None:  # noqa: ARG002 -- most never fail
         """Other angles and velocities for the same rotation at time ``t`` [s], where these are about to fail; or None.
 
         Called once, in order of time, with each state from which the motion goes on; never with one that is only
         looked at.
         """
+        return None
 
-    def quaternion(self, angles: FloatArray) -> FloatArray | None:
+    def quaternion(self, angles: FloatArray) -> FloatArray | None:  # noqa: ARG002 -- there may be none
         """Orientation in the world, scalar first, shape (4,), identity at time 0; None if it is not followed."""
+        return None
 
 
-class EulerAngles:
+class EulerAngles(Orientation):
     """Euler angles z-x-z [φ θ ψ]: rotation, nutation, precession (Blajer 2006), about the axes of the world.
 
     Near the singularity at θ = 0 and π the body's axes, whose orientation the angles give, are chosen anew with
@@ -185,14 +191,11 @@ def _body_axes(angles: FloatArray) -> Rotation:
     return Rotation.from_euler("ZXZ", [psi, theta, phi])
 
 
-class RotatingFrame:
+class RotatingFrame(Orientation):
     """The angular velocity along the local axes itself, r = ω' (quasi-velocities): no angle, hence no singularity.
 
     A ball's inertia does not depend on its orientation, so nothing in the equations asks for it.
     """
-
-    size: ClassVar[int] = 0
-    periodic: ClassVar[tuple[bool, ...]] = ()
 
     def start(self, frame: FloatArray, w: FloatArray) -> tuple[FloatArray, FloatArray]:  # noqa: ARG002 -- no angles
         """See :class:`Orientation`."""
@@ -212,16 +215,6 @@ class RotatingFrame:
         """See :class:`Orientation`."""
         return angles
 
-    def check(self, t: float, angles: FloatArray, r: FloatArray, step: float) -> None:
-        """See :class:`Orientation`. Nothing to fail."""
-
-    def renewed(self, t: float, angles: FloatArray, r: FloatArray) -> None:
-        """See :class:`Orientation`. Nothing to renew."""
-
-    def quaternion(self, angles: FloatArray) -> FloatArray | None:  # noqa: ARG002 -- there are none
-        """See :class:`Orientation`. The orientation is not followed: nothing needs it."""
-        return None
-
 
 class FollowedFrame(RotatingFrame):
     """The same, and besides the orientation: a quaternion in the world, a quadrature on which nothing depends."""
@@ -232,7 +225,7 @@ class FollowedFrame(RotatingFrame):
     def __init__(self, geometry: Geometry) -> None:
         self._geometry = geometry
 
-    def start(self, frame: FloatArray, w: FloatArray) -> tuple[FloatArray, FloatArray]:  # noqa: ARG002 -- as above
+    def start(self, frame: FloatArray, w: FloatArray) -> tuple[FloatArray, FloatArray]:  # noqa: ARG002 -- it starts at the identity
         """See :class:`Orientation`."""
         return np.array([1.0, 0.0, 0.0, 0.0]), w
 

@@ -7,21 +7,22 @@ from interpolation, so that a located event is as accurate as the steps are.
 from __future__ import annotations
 
 import math
+from abc import ABC, abstractmethod
 from collections.abc import Mapping
-from typing import Any, ClassVar, Protocol
+from typing import ClassVar
 
 import numpy as np
 
 from proofroll.core.arrays import FloatArray
 from proofroll.core.engine import whole_steps
 from proofroll.core.errors import Diverged
-from proofroll.core.integrators import Accept, Rates, classical_step
+from proofroll.core.integrators import Accept, Rates, classical_step, controlled_step, inside_last_step
 
 # Part of a fixed step that is not worth a step of its own.
 _SLIVER = 1e-9
 
 
-class Stepper(Protocol):
+class Stepper(ABC):
     """Moves a state by single steps.
 
     Attributes:
@@ -33,15 +34,12 @@ class Stepper(Protocol):
 
     stability: ClassVar[float]
     reach: ClassVar[float]
-    t: float
-    y: FloatArray
-    t_before: float
-    y_before: FloatArray
 
     def __init__(self, resolution: float) -> None:
         """Stands at time 0; ``resolution`` is the step's size [s] or its relative tolerance."""
+        self._resolution = resolution
 
-    def begin(self, t: float, y: FloatArray, rates: Rates, accept: Accept, scales: FloatArray) -> None:
+    def begin(self, t: float, y: FloatArray, rates: Rates, accept: Accept, scales: FloatArray) -> None:  # noqa: ARG002 -- a fixed step needs no measure of error
         """Goes on with another state or other equations.
 
         Args:
@@ -51,14 +49,17 @@ class Stepper(Protocol):
             accept: called after each step, see :data:`proofroll.core.integrators.Accept`.
             scales: natural size of each component of y.
         """
+        self.t, self.y, self.t_before, self.y_before = t, y, t, y
+        self._rates, self._accept = rates, accept
 
-    def aim(self, t: float) -> None:
+    def aim(self, t: float) -> None:  # noqa: B027 -- the steps of most methods end anywhere
         """Says that steps will have to end at the time t [s].
 
         Raises:
             InputError: the method's own steps do not end there.
         """
 
+    @abstractmethod
     def step(self, until: float, longest: float) -> None:
         """One step, at most of this length [s] and at most to the time ``until`` [s].
 
@@ -66,35 +67,30 @@ class Stepper(Protocol):
             Diverged: it gave up.
         """
 
+    @abstractmethod
     def inside(self, t: float) -> FloatArray:
         """The state at a time [s] within the last step."""
 
     def bracket(self, low: float, high: float) -> tuple[float, float]:
-        """What this method can honestly say of an event found between two times [s]."""
+        """What this method can honestly say of an event found between two times [s]: as tight as it was located."""
+        return low, high
 
 
-class FixedSteps:
+class FixedSteps(Stepper):
     """The classical Runge-Kutta method on a grid of times; after an event it goes to the next point of the grid."""
 
-    stability: ClassVar[float] = 2.78
-    reach: ClassVar[float] = 0.25  # nothing else keeps the error of such a step small
-
-    def __init__(self, resolution: float) -> None:
-        self._dt = resolution
-
-    def begin(self, t: float, y: FloatArray, rates: Rates, accept: Accept, scales: FloatArray) -> None:  # noqa: ARG002 -- a fixed step needs no measure of error
-        """See :class:`Stepper`."""
-        self.t, self.y, self.t_before, self.y_before = t, y, t, y
-        self._rates, self._accept = rates, accept
+    stability = 2.78
+    reach = 0.25  # nothing else keeps the error of such a step small
 
     def aim(self, t: float) -> None:
         """See :class:`Stepper`."""
-        whole_steps(self.t, t, self._dt)
+        whole_steps(self.t, t, self._resolution)
 
     def step(self, until: float, longest: float) -> None:
         """See :class:`Stepper`."""
-        end = (math.floor(self.t / self._dt + _SLIVER) + 1) * self._dt
-        if end > until - _SLIVER * self._dt:
+        dt = self._resolution
+        end = (math.floor(self.t / dt + _SLIVER) + 1) * dt
+        if end > until - _SLIVER * dt:
             end = until
         if end - self.t > longest:
             end = self.t + longest
@@ -111,64 +107,35 @@ class FixedSteps:
 
     def bracket(self, low: float, high: float) -> tuple[float, float]:
         """See :class:`Stepper`. The step of the grid: more could be told only by trusting the step's own error."""
-        start = math.floor(low / self._dt + _SLIVER) * self._dt
-        return min(start, low), max(start + self._dt, high)
+        start = math.floor(low / self._resolution + _SLIVER) * self._resolution
+        return min(start, low), max(start + self._resolution, high)
 
 
-class ControlledSteps:
+class ControlledSteps(Stepper):
     """Dormand and Prince's method of order 8 with error control, from scipy."""
 
-    stability: ClassVar[float] = 6.3  # its step multiplies exp(-λ t) by less than 1 up to 6.39
-    reach: ClassVar[float] = 0.6
-
-    def __init__(self, resolution: float) -> None:
-        self._rtol = resolution
+    stability = 6.3  # its step multiplies exp(-λ t) by less than 1 up to 6.39
+    reach = 0.6
 
     def begin(self, t: float, y: FloatArray, rates: Rates, accept: Accept, scales: FloatArray) -> None:
         """See :class:`Stepper`."""
-        self.t, self.y, self.t_before, self.y_before = t, y, t, y
-        self._rates, self._accept, self._atol = rates, accept, self._rtol * scales
-        self._solver = self._solver_from(t, y, math.inf, None)
+        from scipy.integrate import DOP853
 
-    def aim(self, t: float) -> None:
-        """See :class:`Stepper`. Its steps end anywhere."""
+        super().begin(t, y, rates, accept, scales)
+        rtol = self._resolution
+        self._solver = DOP853(lambda _, x: rates(x), t, np.array(y), math.inf, rtol=rtol, atol=rtol * scales)
 
     def step(self, until: float, longest: float) -> None:
         """See :class:`Stepper`."""
-        solver = self._solver
-        solver.t_bound, solver.status, solver.max_step = until, "running", longest
-        wanted = solver.h_abs
         self.t_before, self.y_before = self.t, self.y
-        if solver.step() is not None:
-            raise Diverged(f"the step size fell to nothing at t = {solver.t:.6g} s")
-        if solver.t == until:
-            solver.h_abs = max(wanted, solver.h_abs)
-        self.t, self.y = float(solver.t), self._accept(float(solver.t), solver.y)
-        if self.y is not solver.y:
-            # The rate that opens the next step must belong to the changed state, or the error control collapses.
-            solver.y, solver.f = self.y, solver.fun(solver.t, self.y)
+        controlled_step(self._solver, self._accept, until, longest)
+        self.t, self.y = float(self._solver.t), self._solver.y
 
     def inside(self, t: float) -> FloatArray:
         """See :class:`Stepper`."""
         if t == self.t_before:
             return self.y_before
-        if t == self.t:
-            return self.y
-        solver = self._solver_from(self.t_before, self.y_before, t, t - self.t_before)
-        while solver.status == "running":
-            if solver.step() is not None:
-                raise Diverged(f"the step size fell to nothing at t = {solver.t:.6g} s")
-        return self._accept(t, solver.y)
-
-    def bracket(self, low: float, high: float) -> tuple[float, float]:
-        """See :class:`Stepper`. As tight as it was located."""
-        return low, high
-
-    def _solver_from(self, t: float, y: FloatArray, bound: float, first: float | None) -> Any:
-        from scipy.integrate import DOP853
-
-        rates = self._rates
-        return DOP853(lambda _, x: rates(x), t, np.array(y), bound, rtol=self._rtol, atol=self._atol, first_step=first)
+        return self.y if t == self.t else self._accept(t, inside_last_step(self._solver, t))
 
 
 STEPPERS: Mapping[str, type[Stepper]] = {"rk4": FixedSteps, "dop853": ControlledSteps}
