@@ -6,7 +6,7 @@ import math
 import sys
 from abc import ABC, abstractmethod
 from dataclasses import dataclass
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 import pinocchio as pin
@@ -14,13 +14,29 @@ import pinocchio as pin
 from proofroll.core.arrays import FloatArray
 from proofroll.core.errors import Diverged
 from proofroll.elements.ball_on_surface.model import RollingBall
-from proofroll.engines.pinocchio.rows import BallTerms, resistance
 
 # A pull of the wall smaller than this part of the ball's weight, and of the force that turns its path by a radius, is
 # round-off.
 _FAINT = 1e-9
 # Friction relative to the normal force, and excess of it, that is round-off.
 NOISE = 1e-13
+
+
+class RowsAtState(NamedTuple):
+    """What the rows are at a state; mass matrix and bias forces are in the ``data`` then.
+
+    Attributes:
+        frame: e1, e2, e3 as columns, in the world, shape (3, 3).
+        rows: on the joint velocities, shape (n, nv); the last two are those of rolling, the slip along e2 and e3.
+        drift: their rate at zero joint acceleration, shape (n,).
+        resistance: rolling resistance per unit of normal force, on the joints [m], shape (nv,): of the moment
+            f e1 × v/V about the centre (Blajer 2006, section 2.4), which at V = 0 has no direction and is zero.
+    """
+
+    frame: FloatArray
+    rows: FloatArray
+    drift: FloatArray
+    resistance: FloatArray
 
 
 @dataclass(frozen=True, slots=True)
@@ -92,9 +108,19 @@ class BallWithRows(ABC):
         self.model.appendBodyToJoint(self.ball, inertia, pin.SE3.Identity())
         self._rest = np.zeros(self.model.nv)
 
+    def _own_bias(self, data: Any, q: FloatArray, v: FloatArray) -> FloatArray:
+        """Acceleration of centre and spin while joint accelerations are zero, in the joint's axes, shape (6,).
+
+        Leaves kinematics, mass matrix and bias forces in ``data``.
+        """
+        pin.forwardKinematics(self.model, data, q, v, self._rest)
+        pin.crba(self.model, data, q)
+        pin.nonLinearEffects(self.model, data, q, v)
+        return pin.getClassicalAcceleration(self.model, data, self.ball, pin.LOCAL).vector  # type: ignore[no-any-return]  # it is an array
+
     @abstractmethod
-    def _rows(self, data: Any, q: FloatArray, v: FloatArray) -> tuple[BallTerms, FloatArray, FloatArray, FloatArray]:
-        """Terms of the ball, local frame, rows and drift; the last two rows are those of rolling."""
+    def _rows(self, data: Any, q: FloatArray, v: FloatArray) -> RowsAtState:
+        """The rows at a state."""
 
     @abstractmethod
     def accelerate(self, data: Any, q: FloatArray, v: FloatArray) -> FloatArray:
@@ -165,20 +191,12 @@ class BallWithRows(ABC):
 
     def _only_rows(self, data: Any, q: FloatArray, v: FloatArray) -> FloatArray:
         """The rows, and the mass matrix in ``data``."""
-        return self._rows(data, q, v)[2]
+        return self._rows(data, q, v).rows
 
     def rolling_row(self, data: Any, q: FloatArray, v: FloatArray) -> FloatArray:
         """Row of slip along e2, shape (nv,)."""
-        return np.asarray(self._rows(data, q, v)[2][-2])
+        return np.asarray(self._rows(data, q, v).rows[-2])
 
     def resistance(self, data: Any, q: FloatArray, v: FloatArray) -> FloatArray | None:
         """Rolling resistance on the joints per unit of normal force [m], shape (nv,); None if none was built."""
-        if not self._f:
-            return None
-        terms, frame = self._rows(data, q, v)[:2]
-        return resistance(terms, self._f, frame[:, 0])
-
-    def along(self, data: Any, q: FloatArray) -> FloatArray:
-        """Joint velocity at which the centre moves along e2 at 1 m/s and the ball does not turn, shape (nv,)."""
-        terms, frame = self._rows(data, q, self._rest)[:2]
-        return np.asarray(np.linalg.lstsq(terms.jacobian, np.concatenate([frame[:, 1], np.zeros(3)]), rcond=None)[0])
+        return self._rows(data, q, v).resistance if self._f else None

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Sequence
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -12,17 +13,7 @@ from proofroll.core.arrays import FloatArray
 from proofroll.core.errors import Refused
 from proofroll.elements.ball_on_surface.model import RollingBall
 from proofroll.elements.ball_on_surface.surfaces import Generator
-from proofroll.engines.pinocchio.ball_with_rows import BallWithRows, SlidingContact
-from proofroll.engines.pinocchio.rows import (
-    BallTerms,
-    ball_terms,
-    cross,
-    own_bias,
-    own_jacobian,
-    resistance,
-    rolling_directions,
-    rolling_rows,
-)
+from proofroll.engines.pinocchio.ball_with_rows import BallWithRows, RowsAtState, SlidingContact
 
 # Two places on the surface, at which its geometry along the local axes is compared.
 _SHIFTS = np.zeros(6), np.array([0.7, -0.4, 0.0, 0.0, 0.0, 0.0])
@@ -82,39 +73,60 @@ class Composite(BallWithRows):
         if orientation:  # q_WB is the identity at time 0
             pin.forwardKinematics(self.model, data, self.q0)
             self.q0[2:] = pin.Quaternion(data.oMi[self.ball].rotation.T.copy()).coeffs()
-        jacobian = ball_terms(self.model, data, self.ball, self.q0, self._rest, self._rest).jacobian
+        pin.computeJointJacobians(self.model, data, self.q0)
+        jacobian = pin.getJointJacobian(self.model, data, self.ball, pin.LOCAL_WORLD_ALIGNED)
         self._own = None if orientation else self._along_axes()
         self.v0 = np.linalg.lstsq(jacobian, np.concatenate([body.v0, body.w0]), rcond=None)[0]
         metres = np.asarray(body.surface.length_scales)
         self.q_scale = np.concatenate([self._radius / metres, np.ones(4)])
         self.v_scale = np.concatenate([self._speed / metres, np.full(3, self._speed / self._radius)])
 
-    def _rows(self, data: Any, q: FloatArray, v: FloatArray) -> tuple[BallTerms, FloatArray, FloatArray, FloatArray]:
-        """Terms of the ball, local frame, rows and drift of rolling."""
-        terms = ball_terms(self.model, data, self.ball, q, v, self._rest)
+    def _rows(self, data: Any, q: FloatArray, v: FloatArray) -> RowsAtState:
+        """See :class:`~proofroll.engines.pinocchio.ball_with_rows.BallWithRows`; those of rolling."""
+        model, ball, a, axes = self.model, self.ball, self._radius, pin.LOCAL_WORLD_ALIGNED
+        # computeAllTerms does not touch data.a, so the bias needs forwardKinematics with a joint acceleration of zero
+        pin.forwardKinematics(model, data, q, v, self._rest)
+        pin.computeAllTerms(model, data, q, v)
+        jacobian, velocity = pin.getJointJacobian(model, data, ball, axes), pin.getVelocity(model, data, ball, axes)
         frame = data.oMi[self._carriage].rotation.dot(self._frame0)
-        turning = pin.getVelocity(self.model, data, self._carriage, pin.LOCAL_WORLD_ALIGNED).angular
-        e1_rate = cross(turning.tolist(), frame[:, 0].tolist())
-        return terms, frame, *rolling_rows(terms, self._radius, frame.T.ravel().tolist(), e1_rate)
+        e1, (x2, y2, z2), (x3, y3, z3) = frame.T.tolist()
+        directions = _slip_directions(a, frame)
+        # ω × ė1 by plain floats: numpy's overhead on three numbers is that of all that Pinocchio computes here
+        turning = pin.getVelocity(model, data, self._carriage, axes).angular
+        x, y, z = _cross(velocity.angular.tolist(), _cross(turning.tolist(), e1))
+        drift = directions.dot(pin.getClassicalAcceleration(model, data, ball, axes).vector)
+        drift[0] += a * (x2 * x + y2 * y + z2 * z)
+        drift[1] += a * (x3 * x + y3 * y + z3 * z)
+        resistance = self._rest
+        if self._f:
+            along = velocity.linear.tolist()
+            speed = math.hypot(*along)
+            moment = np.array(_cross(e1, along)) * (self._f / speed if speed else 0.0)
+            resistance = jacobian[3:].T.dot(moment)
+        return RowsAtState(frame, directions.dot(jacobian), drift, resistance)
 
     def _along_axes(self) -> _AlongAxes | None:
         """What is constant along the ball's axes; None if it changes from place to place."""
-        here, there = (own_jacobian(self.model, self.ball, self.q0 + shift) for shift in _SHIFTS)
+        here, there = (self._own_jacobian(self.q0 + shift) for shift in _SHIFTS)
         if not np.allclose(here, there, rtol=1e-12, atol=1e-12):
             return None
-        directions = rolling_directions(self._radius, np.eye(3).ravel().tolist())
+        directions = _slip_directions(self._radius, np.eye(3))
         (_, _), (t2u, t2v), (t3u, t3v), *turns = here[:, :2].tolist()
         return _AlongAxes(directions, directions @ here, here[3:].T.copy(), ((t2u, t2v), (t3u, t3v)), tuple(turns))
 
+    def _own_jacobian(self, q: FloatArray) -> FloatArray:
+        """Of (v, ω) of the ball with respect to the joint velocities, in the axes of its joint; shape (6, 5)."""
+        return np.array(pin.computeJointJacobian(self.model, self.model.createData(), q, self.ball))
+
     def _only_rows(self, data: Any, q: FloatArray, v: FloatArray) -> FloatArray:
         if self._own is None:
-            return self._rows(data, q, v)[2]
+            return super()._only_rows(data, q, v)
         pin.crba(self.model, data, q)
         return self._own.rows
 
     def _accelerate_along(self, own: _AlongAxes, data: Any, q: FloatArray, v: FloatArray) -> FloatArray:
         """As :meth:`accelerate`, from what is constant along the ball's axes."""
-        drift = own.directions.dot(own_bias(self.model, data, self.ball, q, v, self._rest))
+        drift = own.directions.dot(self._own_bias(data, q, v))
         # a ω × ė1 with ė1 = Ω × e1 and Ω of the carriage.
         first, second, spin, _, _ = v.tolist()
         (x1, y1), (x2, y2), (x3, y3) = own.turns
@@ -139,11 +151,10 @@ class Composite(BallWithRows):
         """See :class:`~proofroll.engines.pinocchio.ball_with_rows.BallWithRows`; the multipliers are F2, F3."""
         if self._own is not None:
             return self._accelerate_along(self._own, data, q, v)
-        terms, frame, rows, drift = self._rows(data, q, v)
-        torque = self._rest
+        frame, rows, drift, torque = self._rows(data, q, v)
         if self._f:
             # The joints cannot accelerate the ball along e1, so N follows from the bias pass alone.
-            torque = resistance(terms, self._f, frame[:, 0]) * self._transmitted(data, frame[:, 0])
+            torque = torque * self._transmitted(data, frame[:, 0])
         return pin.forwardDynamics(self.model, data, torque, rows, drift)  # type: ignore[no-any-return]  # it is an array
 
     def normal_force(self, data: Any) -> float:
@@ -164,14 +175,14 @@ class Composite(BallWithRows):
 
     def slide(self, data: Any, q: FloatArray, v: FloatArray, direction: FloatArray) -> SlidingContact:
         """See :class:`~proofroll.engines.pinocchio.ball_with_rows.BallWithRows`; the friction is put to the joints."""
-        terms, frame, rows, drift = self._rows(data, q, v)
+        frame, rows, drift, resistance = self._rows(data, q, v)
         e1, along = frame[:, 0], frame[:, 1:]
         # Friction along the wall cannot change N, no more than the joints can.
         normal_force = self._transmitted(data, e1)
         friction = self.friction(normal_force, along.T @ direction)
         torque = rows.T @ friction
         if self._f:
-            torque += normal_force * resistance(terms, self._f, e1)
+            torque += normal_force * resistance
         acceleration = np.array(pin.aba(self.model, data, q, v, torque))
         slip_rate = along @ (rows @ acceleration + drift)
         return SlidingContact(acceleration, normal_force, along @ (rows @ v), slip_rate, along @ friction, e1)
@@ -195,3 +206,17 @@ def _joint(generator: Generator) -> Any:
     if generator.kind == "rotation":
         return pin.JointModelRevoluteUnaligned(axis)
     return pin.JointModelPrismaticUnaligned(axis)
+
+
+def _slip_directions(a: float, frame: FloatArray) -> FloatArray:
+    """Slip velocity along e2 and e3 from (v, ω) of a ball of radius a [m], shape (2, 6).
+
+    Slip is v + a ω × e1, so its components are e2·v + a e3·ω and e3·v - a e2·ω.
+    """
+    _, (x2, y2, z2), (x3, y3, z3) = frame.T.tolist()
+    return np.array([[x2, y2, z2, a * x3, a * y3, a * z3], [x3, y3, z3, -a * x2, -a * y2, -a * z2]])
+
+
+def _cross(x: Sequence[float], y: Sequence[float]) -> tuple[float, float, float]:
+    (x0, x1, x2), (y0, y1, y2) = x, y
+    return x1 * y2 - x2 * y1, x2 * y0 - x0 * y2, x0 * y1 - x1 * y0

@@ -11,8 +11,7 @@ import pinocchio as pin
 
 from proofroll.core.arrays import FloatArray, cross
 from proofroll.elements.ball_on_surface.model import RollingBall
-from proofroll.engines.pinocchio.ball_with_rows import BallWithRows, SlidingContact
-from proofroll.engines.pinocchio.rows import BallTerms, ball_terms, own_bias, resistance, rolling_rows
+from proofroll.engines.pinocchio.ball_with_rows import BallWithRows, RowsAtState, SlidingContact
 
 
 class FreeFlyer(BallWithRows):
@@ -36,23 +35,6 @@ class FreeFlyer(BallWithRows):
         self.v0 = np.concatenate([body.v0, body.w0])
         self.q_scale = np.concatenate([np.full(3, self._radius), np.ones(4)])
         self.v_scale = np.concatenate([np.full(3, self._speed), np.full(3, self._speed / self._radius)])
-
-    def _rows(self, data: Any, q: FloatArray, v: FloatArray) -> tuple[BallTerms, FloatArray, FloatArray, FloatArray]:
-        """Terms of the ball, local frame, rows and drift: first the surface, then the two of rolling."""
-        terms = ball_terms(self.model, data, self.ball, q, v, self._rest)
-        p, v_WB = q[:3].tolist(), terms.v.tolist()
-        _, *moving = self._surface.moving_triad(*p, *v_WB)
-        triad, e1_rate = moving[:9], moving[9:]
-        frame = np.array(triad).reshape(3, 3).T
-        e1 = frame[:, 0]
-        slip_rows, slip_drift = rolling_rows(terms, self._radius, triad, e1_rate)
-        rows, drift = np.empty((3, 6)), np.empty(3)
-        rows[0], rows[1:] = e1.dot(terms.jacobian[:3]), slip_rows
-        bend = e1_rate[0] * v_WB[0] + e1_rate[1] * v_WB[1] + e1_rate[2] * v_WB[2]
-        drift[0], drift[1:] = e1.dot(terms.bias[:3]) + bend, slip_drift
-        if self._wall_rate is not None:
-            drift[1:] -= frame.T[1:] @ self._carrying(self._wall_rate, v_WB, e1_rate)
-        return terms, frame, rows, drift
 
     def _carrying(self, W: FloatArray, v: Sequence[float], e1_rate: Sequence[float]) -> FloatArray:
         """Rate of the wall's velocity W × (p + a e1) at the contact, which goes along with the ball [m/s²]."""
@@ -83,18 +65,27 @@ class FreeFlyer(BallWithRows):
             entries[index] = factor * moving[source]
         return self._directions
 
-    def _own_rows(self, data: Any, q: FloatArray, v: FloatArray) -> tuple[FloatArray, FloatArray, FloatArray]:
-        """Rows, drift, and the rolling resistance per unit of N on the joint, where its axes are the world's.
+    def _at(
+        self, data: Any, q: FloatArray, v: FloatArray
+    ) -> tuple[Sequence[float], FloatArray, FloatArray, FloatArray]:
+        """Triad with its distance before it and ė1 behind, rows, drift, and the resistance; see :class:`RowsAtState`.
 
-        The joint's velocities are then those of the ball in the world, with no Jacobian between. Components as plain
-        floats: to add to one in an array takes numpy three times as long.
+        First the row of the surface, then the two of rolling. Components as plain floats: to add to one in an array
+        takes numpy three times as long.
         """
+        bias = self._own_bias(data, q, v)
+        turned = data.oMi[self.ball].rotation if self._orientation else None  # else the joint's axes are the world's
         px, py, pz = q[:3].tolist()
-        vx, vy, vz, wx, wy, wz = v.tolist()
+        if turned is None:
+            vx, vy, vz, wx, wy, wz = v.tolist()
+        else:
+            (vx, vy, vz), (wx, wy, wz) = turned.dot(v[:3]).tolist(), turned.dot(v[3:]).tolist()
         moving = self._surface.moving_triad(px, py, pz, vx, vy, vz)
         _, x1, y1, z1, x2, y2, z2, x3, y3, z3, x, y, z = moving
-        directions = self._aimed(moving)
-        drift = directions.dot(own_bias(self.model, data, self.ball, q, v, self._rest))
+        rows = self._aimed(moving)
+        if turned is not None:
+            rows = rows.reshape(6, 3).dot(turned).reshape(3, 6)  # both halves of each
+        drift = rows.dot(bias)
         along1, along2, along3 = drift.tolist()
         a = self._radius
         tx, ty, tz = a * (wy * z - wz * y), a * (wz * x - wx * z), a * (wx * y - wy * x)  # a ω × ė1
@@ -105,22 +96,27 @@ class FreeFlyer(BallWithRows):
             gain = self._carrying(self._wall_rate, (vx, vy, vz), (x, y, z))
             drift[1] -= gain @ (x2, y2, z2)
             drift[2] -= gain @ (x3, y3, z3)
-        lever = self._rest
+        resistance = self._rest
         if self._f:
             speed = math.sqrt(vx * vx + vy * vy + vz * vz)
             f = self._f / speed if speed else 0.0
-            moment = (f * (y1 * vz - z1 * vy), f * (z1 * vx - x1 * vz), f * (x1 * vy - y1 * vx))
-            lever = np.array((0.0, 0.0, 0.0, *moment))
-        return directions, drift, lever
+            moment = np.array((f * (y1 * vz - z1 * vy), f * (z1 * vx - x1 * vz), f * (x1 * vy - y1 * vx)))
+            resistance = np.zeros(6)
+            resistance[3:] = moment if turned is None else moment.dot(turned)
+        return moving, rows, drift, resistance
+
+    def _rows(self, data: Any, q: FloatArray, v: FloatArray) -> RowsAtState:
+        moving, *found = self._at(data, q, v)
+        return RowsAtState(np.array(moving[1:10]).reshape(3, 3).T, *found)
 
     def _only_rows(self, data: Any, q: FloatArray, v: FloatArray) -> FloatArray:
         if self._orientation:
-            return self._rows(data, q, v)[2]
+            return super()._only_rows(data, q, v)
         pin.crba(self.model, data, q)
         x, y, z = q[:3].tolist()
         return self._aimed(self._surface.moving_triad(x, y, z, 0.0, 0.0, 0.0))
 
-    def _solve(self, data: Any, rows: FloatArray, drift: FloatArray, lever: FloatArray) -> FloatArray:
+    def _solve(self, data: Any, rows: FloatArray, drift: FloatArray, resistance: FloatArray) -> FloatArray:
         """Joint acceleration; the multipliers (-N, F2, F3) [N] are left in ``data``.
 
         Rolling resistance is proportional to N, an unknown here: it makes the columns differ from the rows, which
@@ -130,7 +126,7 @@ class FreeFlyer(BallWithRows):
             return pin.forwardDynamics(self.model, data, self._rest, rows, drift)  # type: ignore[no-any-return]  # it is an array
         matrix = self._matrix
         matrix[:6, :6], matrix[6:, :6], matrix[:6, 6:] = data.M, rows, -rows.T
-        matrix[:6, 6] += lever
+        matrix[:6, 6] += resistance
         solution = np.linalg.solve(matrix, np.concatenate([-data.nle, -drift]))
         data.lambda_c = solution[6:]  # where forwardDynamics leaves them
         return solution[:6]
@@ -141,10 +137,10 @@ class FreeFlyer(BallWithRows):
         Without orientation the acceleration is that of world components: the joint accelerates in the ball's axes,
         which turn with ω, and axes that are held fixed do not.
         """
+        _, *rows = self._at(data, q, v)
+        acceleration = self._solve(data, *rows)
         if self._orientation:
-            terms, frame, rows, drift = self._rows(data, q, v)
-            return self._solve(data, rows, drift, resistance(terms, self._f, frame[:, 0]) if self._f else self._rest)
-        acceleration = self._solve(data, *self._own_rows(data, q, v))
+            return acceleration
         vx, vy, vz, wx, wy, wz = v.tolist()
         ax, ay, az, *_ = acceleration.tolist()
         acceleration[0] = ax + (wy * vz - wz * vy)
@@ -158,9 +154,8 @@ class FreeFlyer(BallWithRows):
 
     def reaction(self, data: Any, q: FloatArray, v: FloatArray) -> tuple[FloatArray, FloatArray]:
         """Joint acceleration, and the wall's force from the multipliers."""
-        terms, frame, rows, drift = self._rows(data, q, v)
-        lever = resistance(terms, self._f, frame[:, 0]) if self._f else self._rest
-        return np.array(self._solve(data, rows, drift, lever)), frame @ data.lambda_c
+        frame, *rows = self._rows(data, q, v)
+        return np.array(self._solve(data, *rows)), frame @ data.lambda_c
 
     def on_surface(self, q: FloatArray) -> FloatArray:
         """The configuration with the centre moved onto the surface along its normal."""
@@ -177,15 +172,12 @@ class FreeFlyer(BallWithRows):
 
     def _slide(self, data: Any, q: FloatArray, v: FloatArray, direction: FloatArray) -> SlidingContact:
         """One row, that of the surface; friction and rolling resistance are columns, for both follow N."""
-        terms, frame, rows, drift = self._rows(data, q, v)
+        frame, rows, drift, resistance = self._rows(data, q, v)
         e1, along = frame[:, 0], frame[:, 1:]
         against = self.friction(1.0, along.T @ direction)  # per unit of N
-        column = rows[0] - against @ rows[1:]
-        if self._f:
-            column = column - resistance(terms, self._f, e1)
         matrix = np.zeros((7, 7))
         matrix[:6, :6] = data.M
-        matrix[:6, 6] = -column
+        matrix[:6, 6] = against @ rows[1:] + resistance - rows[0]
         matrix[6, :6] = rows[0]
         solution = np.linalg.solve(matrix, np.concatenate([-data.nle, -drift[:1]]))
         acceleration, normal_force = solution[:6], -float(solution[6])
@@ -210,8 +202,7 @@ class FreeFlyer(BallWithRows):
     def project_sliding(self, data: Any, q: FloatArray, v: FloatArray) -> tuple[FloatArray, FloatArray]:
         """See :class:`~proofroll.engines.pinocchio.ball_with_rows.BallWithRows`."""
         q = self.on_surface(q)
-        rows = self._rows(data, q, v)[2]
-        return q, np.array(pin.impulseDynamics(self.model, data, v, rows[:1]))
+        return q, np.array(pin.impulseDynamics(self.model, data, v, self._rows(data, q, v).rows[:1]))
 
 
 def _sources(radius: float) -> list[tuple[int, int, float]]:

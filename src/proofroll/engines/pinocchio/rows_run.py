@@ -73,9 +73,9 @@ class RowsRun:
         model, data, ball = mechanism.model, mechanism.model.createData(), mechanism.ball
         inertia = model.inertias[ball]
         # In both formulations the spin is last, in orthonormal axes: the row of slip has the length a there, and
-        # rolling resistance the length f. At rest that has no direction, so it is looked at in motion.
-        radius = float(np.linalg.norm(mechanism.rolling_row(data, q, v)[-3:]))
-        torque = mechanism.resistance(data, q, mechanism.along(data, q))
+        # rolling resistance the length f. At rest that has no direction, so it is looked at in a motion along that row.
+        row = mechanism.rolling_row(data, q, v)
+        torque = mechanism.resistance(data, q, row)
         mu_kinetic = None  # without a bound nothing stands for it
         if self.motion.mu_static is not None:
             mu_kinetic = float(np.linalg.norm(mechanism.friction(1.0, np.array([1.0, 0.0]))))
@@ -86,7 +86,7 @@ class RowsRun:
             mass=float(inertia.mass),
             inertia=np.linalg.eigvalsh(inertia.inertia),
             gravity=model.gravity.linear.copy(),
-            ball_radius=radius,
+            ball_radius=float(np.linalg.norm(row[-3:])),
             rolling_resistance=0.0 if torque is None else float(np.linalg.norm(torque[-3:])),
             mu_static=self.motion.mu_static,
             mu_kinetic=mu_kinetic,
