@@ -147,7 +147,7 @@ def test_run_json(proofroll: Proofroll) -> None:
     assert found["final"]["gamma"] == pytest.approx(2.5)
     assert found["final"]["N"] == pytest.approx(0.517 * 25 / 0.2)
     assert set(found["units"]) == set(found["final"])
-    assert found["smallest_N"] == pytest.approx(0.517 * 25 / 0.2)
+    assert found["smallest"]["N"] == pytest.approx(0.517 * 25 / 0.2)
 
 
 def test_run_of_the_truth(proofroll: Proofroll) -> None:
@@ -165,7 +165,7 @@ def test_run_for_a_person(proofroll: Proofroll) -> None:
     code, out, err = proofroll(*with_option("--until", "0"))
     assert (code, err) == (0, "")
     assert ["gamma", "0", "rad"] in [line.split() for line in out.splitlines()]
-    assert "smallest normal force: " in out
+    assert "smallest N on the way: " in out
     assert max(map(len, out.splitlines())) <= 100
 
 

@@ -109,7 +109,7 @@ def test_fields(
     if arguments == ["engines"]:  # those that cannot be asked say so instead
         items = [item for item in items if item["status"] == "installed"]
     assert items
-    without = {"absent", "smallest_N", "error_bars", "trajectory", "plot"} if arguments[0] == "run" else set()
+    without = {"absent", "smallest", "error_bars", "trajectory", "plot"} if arguments[0] == "run" else set()
     for item in items:
         assert set(item) - without == fields(title)
 

@@ -47,7 +47,7 @@ def invented_study(*points: MeasuredPoint, **more: Any) -> TradeoffStudy:
     """What is kept of an invented trade-off."""
     values: dict[str, Any] = {
         "scene": "sphere_in_cylinder", "parameters": {}, "until": 2.0, "every": 0.05, "quantity": "z",
-        "quantities": {"z": MeasuredQuantity("m", 0.1, 1e-13)}, "absent": {}, "budgets": [], "pareto": {},
+        "quantities": {"z": MeasuredQuantity("m", 0.1, 1e-13, "z", column=True)}, "absent": {}, "budgets": [], "pareto": {},
         "pareto_engines": {}, "truth": TruthCost(route=""), "over": {}, "findings": [], "brief": False,
         "measured": study_identity.measured(),
     }  # fmt: skip
@@ -78,7 +78,10 @@ def tradeoff_study() -> TradeoffStudy:
         measured_point(id=0, engine="rough", error={"z": 3e-3, "N": 3e-2}, **timed(1e-3)),
         measured_point(id=1, engine="good", error={"z": 1e-9, "N": 1e-8}, **once),
         measured_point(id=2, engine="own", error={"z": 1e-12, "N": 1e-11}, level="reduced equations", **timed(0.01)),
-        quantities={"z": MeasuredQuantity("m", 0.1, 1e-13), "N": MeasuredQuantity("N", 40.0, 1e-12)},
+        quantities={
+            "z": MeasuredQuantity("m", 0.1, 1e-13, "z", column=True),
+            "N": MeasuredQuantity("N", 40.0, 1e-12, "N", column=True),
+        },
         absent={"lost": "lost is not installed here"},
         budgets=[invented_budget()],
         pareto={"z": [0, 2]},

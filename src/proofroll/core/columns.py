@@ -12,6 +12,9 @@ import numpy.typing as npt
 if TYPE_CHECKING:
     import xarray as xr
 
+# Beginning of an attribute of all: the least value of the variable named after it, where that tells something.
+SMALLEST = "smallest_"
+
 
 class Variable(NamedTuple):
     """One variable, in the order in which xarray takes one.

@@ -13,6 +13,10 @@ from proofroll.core.columns import Columns, Variable
 if TYPE_CHECKING:
     import xarray as xr
 
+# Name of an observable that any kind of element may declare whose runs have events: how many of these are of another
+# kind than the truth's, missing or too many.
+EVENT_ORDER = "event_order"
+
 
 @dataclass(frozen=True)
 class Event:

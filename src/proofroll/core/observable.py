@@ -30,6 +30,8 @@ class Observable:
         headline: whether summaries show it: the motion, and the forces that a person asks for first.
         decides: whether a trade-off, a stability map and a recommendation go by it where nobody says by what.
         asked_for: whether a person may ask for a recommendation by it.
+        column: whether a trade-off shows it beside what decides, where nobody says which quantities it shows.
+        audit: whether it holds the reactions that an engine reports against the motion that it made.
         hangs_on_events: whether it is a matter of luck where the time of an event is ill-posed.
         absent: why no run of the scene has it, and what to change; empty: runs have it.
     """
@@ -43,6 +45,8 @@ class Observable:
     headline: bool = False
     decides: bool = False
     asked_for: bool = True
+    column: bool = False
+    audit: bool = False
     hangs_on_events: bool = True
     absent: str = ""
 

@@ -42,7 +42,7 @@ def outcome_content(outcome: Outcome) -> ReportedComparison:
         question=comparison.question,
         scene=comparison.scene,
         observables={
-            name: ShownObservable(item.unit, item.shown, item.role, item.headline)
+            name: ShownObservable(item.unit, item.shown, item.role, item.headline, item.audit)
             for name, item in load_scene(comparison.scene).observables.items()
         },
         until=comparison.until,

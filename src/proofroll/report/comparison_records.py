@@ -156,6 +156,7 @@ class ShownObservable:
     symbol: str
     role: str
     headline: bool
+    audit: bool
 
 
 @dataclass(frozen=True)

@@ -6,6 +6,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
 
+from proofroll.core.events import EVENT_ORDER
 from proofroll.report.labels import names, number, off_by, unjudged, with_caveat
 from proofroll.report.scores import EVERYDAY, RowAdvice, Score, cheapest, closest, furthest_off, recommendation, scores
 
@@ -121,12 +122,12 @@ def _obvious(content: ReportedComparison, found: list[Score]) -> str:
 
 
 def _order(content: ReportedComparison) -> list[str]:
-    """Who slips and sticks in another order than the truth; nothing where no order was judged."""
+    """Who has other events than the truth, or in another order; nothing where no order was judged."""
     judged = [
         (run, judgement)
         for run in content.runs
         for judgement in run.judgements
-        if judgement.observable == "event_order" and judgement.verdict != "ill-posed"
+        if judgement.observable.partition(".")[0] == EVENT_ORDER and judgement.verdict != "ill-posed"
     ]
     if not judged:
         return []
@@ -135,7 +136,7 @@ def _order(content: ReportedComparison) -> list[str]:
         if judgement.verdict not in {"agrees", "unconfirmed"}:
             wrong[run.row] = wrong.get(run.row, 0) + 1
     if not wrong:
-        return ["Every setting slips and sticks in the truth's order, wherever that is well posed."]
+        return ["Every setting has the truth's events in the truth's order, wherever that is well posed."]
     shown = names(content.rows)
     cases = {row: sum(run.row == row for run, _ in judged) for row in wrong}
     said = _joined([f"{shown[row]} ({count} of {cases[row]} cases)" for row, count in wrong.items()])

@@ -27,12 +27,12 @@ if TYPE_CHECKING:
 
 Curves = dict[str, FloatArray]
 
-# Drawn besides the surface's coordinates. A reaction at time 0 belongs to the certificate, not to the curve.
 # More points than this are not seen in a figure 500 pixels wide.
 MOST_POINTS = 400
 # Digits of a curve, and of its difference from the truth: enough for a figure, and small in the file.
 CURVE_DIGITS, DIFFERENCE_DIGITS = 6, 3
 
+# A reaction at time 0 belongs to the certificate, not to the curve.
 _DRAWN = (Role.MOTION, Role.REACTION)
 
 
@@ -58,10 +58,11 @@ class EngineCurve:
 
 @dataclass(frozen=True)
 class Mark:
-    """An event of a row (-1: of the truth) on a curve; its time is None where it has none."""
+    """An event of a row (-1: of the truth) on a curve, as a person calls it; its time is None where it has none."""
 
     row: int
     time: float | None
+    name: str
 
 
 @dataclass(frozen=True)

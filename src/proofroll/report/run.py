@@ -6,6 +6,7 @@ from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import Any
 
+from proofroll.core.columns import SMALLEST
 from proofroll.core.diagnosis.of_scene import Diagnosis, diagnosed
 from proofroll.core.events import Event, events_of
 from proofroll.files.json_data import OPTIONAL
@@ -25,7 +26,7 @@ class RunContent:
         final: variable -> value at the last sample; empty if there is none.
         units: of these.
         absent: variable without a value -> why.
-        smallest_N: of balls [N].
+        smallest: variable -> least value on the way, of those whose least value tells something, as of a normal force.
         error_bars: of the truth, by variable.
         trajectory, plot: files that were written.
     """
@@ -45,7 +46,7 @@ class RunContent:
     units: dict[str, str] = field(default_factory=dict)
     absent: dict[str, str] = field(default_factory=dict)
     events: list[Event] = field(default_factory=list)
-    smallest_N: float | None = field(default=None, metadata=OPTIONAL)
+    smallest: dict[str, float] | None = field(default=None, metadata=OPTIONAL)
     error_bars: dict[str, float] | None = field(default=None, metadata=OPTIONAL)
     trajectory: str | None = field(default=None, metadata=OPTIONAL)
     plot: str | None = field(default=None, metadata=OPTIONAL)
@@ -73,16 +74,20 @@ def run_content(case: Case, result: Result, trajectory: Path) -> RunContent:
         return content
     columns = read_columns(trajectory)
     curves = {key: item for key, item in columns.variables.items() if item.dims == ("time",) and key != "time"}
-    smallest = columns.attrs.get("smallest_N")
+    smallest = {name: float(value) for key, value in columns.attrs.items() if (name := _after(SMALLEST, key))}
     return replace(
         content,
         final={"time": float(columns["time"].values[-1])} | {name: float(c.values[-1]) for name, c in curves.items()},
         units={"time": "s"} | {name: curve.attrs["units"] for name, curve in curves.items()},
         absent={name: str(curve.attrs["absent"]) for name, curve in curves.items() if "absent" in curve.attrs},
         events=events_of(columns),
-        smallest_N=None if smallest is None else float(smallest),
+        smallest=smallest or None,
         error_bars={name: float(c.attrs["error_bar"]) for name, c in curves.items() if "error_bar" in c.attrs} or None,
     )
+
+
+def _after(head: str, key: str) -> str:
+    return key.removeprefix(head) if key.startswith(head) else ""
 
 
 def _told(event: Event) -> str:
@@ -116,8 +121,8 @@ def run_lines(content: RunContent) -> list[Any]:
     for reason in dict.fromkeys(content.absent.values()):
         without = [name for name, why in content.absent.items() if why == reason]
         lines.append(Text(f"{reason}: {', '.join(without)}"))
-    if content.smallest_N is not None:
-        lines.append(Text(f"smallest normal force: {content.smallest_N:.6g} N"))
+    for name, value in (content.smallest or {}).items():
+        lines.append(Text(f"smallest {name} on the way: {value:.6g} {content.units.get(name, '')}".rstrip()))
     if content.events:
         said = ", ".join(_told(event) for event in content.events[:_EVENTS])
         more = len(content.events) - _EVENTS

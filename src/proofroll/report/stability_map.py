@@ -4,12 +4,14 @@ from __future__ import annotations
 
 import itertools
 import math
+import string
 import textwrap
 from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING, Any
 
 from proofroll.report.figure import panels, svg_text
 from proofroll.report.labels import name_of, number, step
+from proofroll.studies.failure import CRASHED, DIVERGED, GAVE_UP, LOST_PHASE, REFUSED, TOO_SLOW
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
@@ -17,20 +19,8 @@ if TYPE_CHECKING:
     from proofroll.studies.axes import Axis
     from proofroll.studies.stability_records import BoundaryPoint, StabilityStudy
 
-# Letters for what is beyond the boundary; with "!" where the engine was silent.
-LETTERS = {
-    "diverged": "d",
-    "energy gain": "e",
-    "left the surface": "l",
-    "sank in": "s",
-    "creep": "c",
-    "reversed": "v",
-    "lost phase": "p",
-    "solver gave up": "g",
-    "crashed": "x",
-    "too slow": "t",
-    "refused": "r",
-}
+# Letters for what is beyond the boundary of any scene; with "!" where the engine was silent.
+_LETTERS = {DIVERGED: "d", LOST_PHASE: "p", GAVE_UP: "g", CRASHED: "x", TOO_SLOW: "t", REFUSED: "r"}
 # Steps per natural time at which a colour is darkest and lightest; tolerances are put between by their decades.
 _FEWEST, _MOST = 8.0, 1e5
 _TOLERANCE_DECADES = 13
@@ -47,9 +37,21 @@ def svg(study: StabilityStudy) -> str:
     return svg_text({"svg.fonttype": "none", "font.size": 8.0}, lambda: _drawn(study))
 
 
+def letters(study: StabilityStudy) -> dict[str, str]:
+    """The letter of each kind of failure; of those that a kind of element names, the first of theirs that is left."""
+    found = dict(_LETTERS)
+    for kind in study.meanings:
+        if kind not in found:
+            left = (
+                letter for letter in kind + string.ascii_letters if letter.isalpha() and letter not in found.values()
+            )
+            found[kind] = next(left, kind)
+    return found
+
+
 def legend(study: StabilityStudy) -> list[str]:
     """What the cells say, as sentences."""
-    kinds = ", ".join(f"{letter} {kind}" for kind, letter in LETTERS.items())
+    kinds = ", ".join(f"{letter} {kind}" for kind, letter in letters(study).items())
     return [
         f"{study.scene}: {len(study.points)} points, {study.boundaries} boundaries, {study.silent} silent.",
         "Steps per natural time (or tolerance) that 1 % of the range needs; – no affordable one does; ? no truth.",
@@ -78,7 +80,7 @@ def _panel(panel: Any, study: StabilityStudy, axis: Axis, curves: list[str], col
     names = {point.curve: name_of(point) for point in study.points}
     for point in points:
         x, y = values.index(point.value), curves.index(point.curve)
-        text, shade = cell(point)
+        text, shade = cell(study, point)
         face = "#ffffff" if shade is None else colours(shade)
         hatch = "////" if text.startswith("–") else None
         panel.add_patch(_rectangle(x, y, face, hatch))
@@ -106,10 +108,10 @@ def _rectangle(x: int, y: int, face: Any, hatch: str | None) -> Any:
     return Rectangle((x - 0.5, y - 0.5), 1, 1, facecolor=face, hatch=hatch, edgecolor="0.8", lw=0.5)
 
 
-def cell(point: BoundaryPoint) -> tuple[str, float | None]:
+def cell(study: StabilityStudy, point: BoundaryPoint) -> tuple[str, float | None]:
     """Text of a cell and its place between the lightest (0, cheap) and the darkest colour; None: no colour."""
     largest, failure = point.largest_accurate, point.failure
-    beyond = (LETTERS.get(failure, failure) + ("!" if point.silent else "")) if failure else ""
+    beyond = (letters(study).get(failure, failure) + ("!" if point.silent else "")) if failure else ""
     if point.problem:
         return f"? {beyond}".strip(), None
     if largest is None:
@@ -151,7 +153,7 @@ def heat_map(study: StabilityStudy) -> HeatMap:
         name = name_of(point).removeprefix(point.engine).strip() or curve
         groups.setdefault(point.engine, []).append((name, [numbers.get((curve, *column)) for column in columns]))
     seen = {point.failure for point in study.points}
-    return HeatMap(axes, groups, {letter: kind for kind, letter in LETTERS.items() if kind in seen})
+    return HeatMap(axes, groups, {letter: kind for kind, letter in letters(study).items() if kind in seen})
 
 
 def told(point: BoundaryPoint) -> str:

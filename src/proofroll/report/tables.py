@@ -124,8 +124,9 @@ class Belief:
 
 
 def belief(content: ReportedComparison) -> list[Belief]:
-    """Why to believe it: for each row its certificates and its force audit, the worst over all points."""
+    """Why to believe it: for each row its certificates and its audit of reactions, the worst over all points."""
     lines = []
+    audits = [name for name, item in content.observables.items() if item.audit]
     for index, (name, row) in enumerate(zip(names(content.rows), content.rows, strict=True)):
         lines_of_all = [line for run in content.runs_of(index) for line in run.certificate]
         certificate = [line for line in lines_of_all if line["standing"] != Standing.NOT_REPORTED]
@@ -138,7 +139,7 @@ def belief(content: ReportedComparison) -> list[Belief]:
                 max(filter(math.isfinite, exact), default=None),
                 list(dict.fromkeys(line["quantity"] for line in certificate if line["because"])),
                 list(dict.fromkeys(not_reported(lines_of_all))),
-                row.observables.get("force_audit"),
+                next((row.observables[item] for item in audits if item in row.observables), None),
             )
         )
     return lines

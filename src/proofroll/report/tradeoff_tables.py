@@ -21,11 +21,13 @@ if TYPE_CHECKING:
     from proofroll.studies.study_identity import Measured
     from proofroll.studies.tradeoff_records import Corner, CurveBudget, MeasuredPoint, TradeoffStudy
 
+_MOST_COLUMNS = 4  # of quantities, where nobody names them
+
 
 def default_quantities(study: TradeoffStudy) -> list[str]:
-    """Path, reaction, onset and energy, as far as the scene has them."""
-    wanted = [study.quantity, "N", "F3", "first_slip", "energy_balance"]
-    return [name for name in dict.fromkeys(wanted) if name in study.quantities][:4]
+    """What decides, and what the elements of the scene say is shown beside it; no more than a terminal has room for."""
+    beside = (name for name, item in study.quantities.items() if item.column)
+    return list(dict.fromkeys([study.quantity, *beside]))[:_MOST_COLUMNS]
 
 
 def cost_of(point: MeasuredPoint) -> str:
@@ -119,7 +121,7 @@ def point_table(
     caption = Text("cost: wall seconds per simulated second through this adapter")
     if ties:
         caption += Text("; ≈ a tie: the cost cannot be told from that of the next line, which is more accurate")
-    errors = numeric(*(f"{_SHORT.get(name, name)} [{study.quantities[name].unit}]" for name in quantities))
+    errors = numeric(*(f"{study.quantities[name].symbol} [{study.quantities[name].unit}]" for name in quantities))
     table = plain_table(*unbroken("engine formulation setting", "step", "cost s/s"), *errors, title=title)
     table.caption = caption
     for point in points:
@@ -197,7 +199,6 @@ def budget_table(study: TradeoffStudy, quantity: str) -> Table:
 
 
 # Names that fit a column.
-_SHORT = {"energy_balance": "energy", "needed_friction": "needed", "force_audit": "audit"}
 _DOMINANT = {
     "time step": "step",
     "model form": "model",

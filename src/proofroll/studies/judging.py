@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, fields
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -182,7 +182,7 @@ def _completed(run: xr.Dataset, scene: Scene, times: FloatArray) -> xr.Dataset:
     """With all that follows from the state, if that is given; a scene of several elements is judged by variables."""
     if not all(name in run for name in _STATE) or len(scene.elements) > 1 or times[0] > 0:
         return run
-    names = [name for name in (*_STATE, "q_WB", "force", "joint_force", "joint_torque") if name in run]
+    names = [field.name for field in fields(Sample) if field.name in run and "FloatArray" in str(field.type)]
     arrays = {name: np.asarray(run[name].to_numpy(), dtype=np.float64) for name in names}
     samples = [Sample(**{name: values[index] for name, values in arrays.items()}) for index in range(len(times))]
     try:

@@ -15,7 +15,7 @@ from proofroll.core.arrays import FloatArray
 from proofroll.core.common_span import common_span
 from proofroll.core.dataset import observe, part, scales
 from proofroll.core.element_abilities import KnowsAnotherScene
-from proofroll.core.events import Event, events_of
+from proofroll.core.events import EVENT_ORDER, Event, events_of
 from proofroll.core.observable import Role
 from proofroll.core.scene import Scene
 from proofroll.core.verdict import Doubt
@@ -131,10 +131,6 @@ class Reference:
     def events(self) -> list[Event]:
         """Of all elements."""
         return [event for item in self.scene.elements for event in events_of(part(self.scene, item, self.dataset))]
-
-
-# Observable of every element that has events: how many of them are of another kind, missing or too many.
-EVENT_ORDER = "event_order"
 
 
 def event_order(dataset: xr.Dataset, truth: xr.Dataset) -> FloatArray:

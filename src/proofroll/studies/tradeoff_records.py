@@ -116,11 +116,16 @@ class MeasuredPoint(MeasuredCost):
 
 @dataclass(frozen=True)
 class MeasuredQuantity:
-    """An observable: its unit, what a percentage of it refers to, and the truth's error bar; None: there is none."""
+    """An observable: its unit, what a percentage of it refers to, and the truth's error bar; None: there is none.
+
+    ``symbol`` is what heads its columns, and ``column`` says whether tables show it where nobody says which quantities they show.
+    """
 
     unit: str
     scale: float | None
     truth_error_bar: float | None
+    symbol: str
+    column: bool
 
 
 @dataclass(frozen=True)

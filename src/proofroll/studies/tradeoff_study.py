@@ -91,7 +91,13 @@ def tradeoff_study(found: Tradeoff) -> TradeoffStudy:
         every=question.every,
         quantity=question.quantity,
         quantities={
-            name: MeasuredQuantity(known[name].unit, reference.scale(name), reference.true(name, curve)[1])
+            name: MeasuredQuantity(
+                known[name].unit,
+                reference.scale(name),
+                reference.true(name, curve)[1],
+                known[name].shown,
+                known[name].column,
+            )
             for name, curve in reference.curves.items()
         },
         points=[point for curve in found.curves for point in _points(curve, list(reference.curves), numbers)],

@@ -120,7 +120,7 @@ def test_a_percentage_is_of_the_scale() -> None:
 
 def test_a_percentage_of_what_has_no_size() -> None:
     """Where a quantity has no size, as the first slip of a ball that does not slip, a percentage of it is refused."""
-    sizeless = {"z": MeasuredQuantity("m", None, 1e-13)}
+    sizeless = {"z": MeasuredQuantity("m", None, 1e-13, "z", column=True)}
     with pytest.raises(InputError, match="z has no size here; give it in m"):
         recommend(study(FAST, MIDDLE, quantities=sizeless), wish(0.01, relative=True))
     assert recommend(study(FAST, MIDDLE, quantities=sizeless), wish(1e-3))["choice"]["engine"] == "middle"

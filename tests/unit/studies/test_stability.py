@@ -19,7 +19,7 @@ from invented import stability_study as invented_map
 from proofroll.core.errors import InputError
 from proofroll.files.json_data import plain, record
 from proofroll.files.scene_file import load_scene
-from proofroll.report.stability_map import LETTERS, legend, svg
+from proofroll.report.stability_map import legend, letters, svg
 from proofroll.report.stability_tables import boundary_table, headline, silent_lines
 from proofroll.running.case import Status
 from proofroll.running.runner import Runner
@@ -152,8 +152,9 @@ def test_reports_of_a_map(small: Any) -> None:
     picture = svg(study)
     assert picture.startswith("<?xml")
     assert "projection rotating_frame default" in picture, "texts stay texts"
-    assert all(f"{letter} {kind}" in " ".join(legend(study)) for kind, letter in LETTERS.items())
-    assert set(LETTERS) == set(meanings(load_scene("sphere_in_cylinder")))
+    assert all(f"{letter} {kind}" in " ".join(legend(study)) for kind, letter in letters(study).items())
+    assert set(letters(study)) == set(meanings(load_scene("sphere_in_cylinder")))
+    assert len(set(letters(study).values())) == len(letters(study))
 
 
 @pytest.mark.parametrize(

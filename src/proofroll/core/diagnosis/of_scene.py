@@ -96,10 +96,10 @@ def what_is_right(scene: Scene, judgements: Iterable[Judgement]) -> str:
 
     Empty unless some are right and some are not.
     """
-    right, wrong = [], []
+    right, wrong = [], []  # what holds at every instant, a balance or an audit, follows from the rest
     for item in judgements:
         known = scene.observables.get(item.observable)
-        if known is None or (known.role == Role.RESIDUAL and known.name != "slip"):
+        if known is None or (known.role == Role.RESIDUAL and not known.hangs_on_events):
             continue
         if item.verdict in {Verdict.AGREES, Verdict.UNCONFIRMED}:
             right.append(known)

@@ -7,7 +7,7 @@ from collections.abc import Mapping, Sequence
 import numpy as np
 
 from proofroll.core.arrays import FloatArray
-from proofroll.core.columns import Columns, Variable, axes
+from proofroll.core.columns import SMALLEST, Columns, Variable, axes
 from proofroll.core.engine import Sample
 from proofroll.elements.ball_on_surface.mechanics import energy, slip_velocity, wall_velocity
 from proofroll.elements.ball_on_surface.model import RollingBall
@@ -114,7 +114,7 @@ def columns(
 def _smallest(variables: Mapping[str, Variable]) -> dict[str, float]:
     """``smallest_N``, the least normal force at the samples [N], without time 0 (where several engines know none)."""
     found = variables["N"][1] if "N" in variables else np.zeros(0)
-    return {"smallest_N": float(np.min(found[1:] if len(found) > 1 else found))} if len(found) else {}
+    return {f"{SMALLEST}N": float(np.min(found[1:] if len(found) > 1 else found))} if len(found) else {}
 
 
 def _coordinate_rates(surface: Surface, p_WB: FloatArray, v_WB: FloatArray) -> FloatArray:

@@ -7,7 +7,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterable
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
@@ -56,18 +56,17 @@ def table(body: RollingBall) -> tuple[Observable, ...]:
     bounded = np.isfinite(body.contact.mu_static)
     never = "" if bounded else "without bounded friction the ball never slips; --set mu_static=…"
 
-    def residual(name: str, unit: str, meaning: str, floor: float, *, asked_for: bool = True) -> Observable:
-        kind = Role.RESIDUAL
-        return Observable(name, unit, meaning, kind, floor=floor, asked_for=asked_for, hangs_on_events=False)
+    def residual(name: str, unit: str, meaning: str, floor: float, **more: Any) -> Observable:
+        return Observable(name, unit, meaning, Role.RESIDUAL, floor=floor, hangs_on_events=False, **more)
 
     return (
         *coordinates,
-        Observable("N", "N", "normal force", Role.REACTION, floor=force, headline=True),
+        Observable("N", "N", "normal force", Role.REACTION, floor=force, headline=True, column=True),
         Observable("F2", "N", "friction on the ball along e2", Role.REACTION, floor=force, headline=True),
-        Observable("F3", "N", "friction on the ball along e3", Role.REACTION, floor=force, headline=True),
+        Observable("F3", "N", "friction on the ball along e3", Role.REACTION, floor=force, headline=True, column=True),
         Observable("needed_friction", "1", "friction needed, |F|/N", Role.REACTION, "|F|/N", floor=_LEAST),
-        residual("energy_balance", "J", "energy that is not accounted for", energy),
-        residual("force_audit", "N", "reported minus recomputed contact force", force, asked_for=False),
+        residual("energy_balance", "J", "energy that is not accounted for", energy, symbol="ΔE", column=not bounded),
+        residual("force_audit", "N", "reported minus recomputed contact force", force, asked_for=False, audit=True),
         residual("rate_audit", "m/s", "velocities minus the rates of position and attitude", speed, asked_for=False),
         # A ball that flies is followed in its distance, too, which decides.
         Observable("gap", "m", "distance of the ball from the wall", Role.MOTION, floor=a, headline=True, decides=True)
@@ -82,7 +81,7 @@ def table(body: RollingBall) -> tuple[Observable, ...]:
             floor=speed,
         ),
         residual("creep", "m", "way slipped while sticking", a),
-        Observable("first_slip", "s", "time of the first slip", Role.EVENT, absent=never),
+        Observable("first_slip", "s", "time of the first slip", Role.EVENT, column=True, absent=never),
         Observable("event_times", "s", "times of all events", Role.EVENT, asked_for=False),
         Observable("event_order", "events", "events of another kind than the truth's", Role.EVENT, asked_for=False),
     )

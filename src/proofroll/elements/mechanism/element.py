@@ -166,14 +166,16 @@ class MechanismElement:
         found.append(Observable("attitudes", "1", "quaternions of the bodies", Role.MOTION, floor=1.0, asked_for=False))
         if np.any(self.analysis.determinate[:, :3]):
             meaning = "determinate components of the forces on children"
-            found.append(Observable("forces", "N", meaning, Role.REACTION, floor=force, headline=True))
+            found.append(Observable("forces", "N", meaning, Role.REACTION, floor=force, headline=True, column=True))
         if np.any(self.analysis.determinate[:, 3:]):
             meaning = "determinate components of the moments on children at their joints"
             found.append(Observable("torques", "N m", meaning, Role.REACTION, floor=force * self.length))
         if self.conservative:
             meaning = "energy now minus energy at the start"
             floor = force * self.length
-            found.append(Observable("energy_error", "J", meaning, Role.RESIDUAL, floor=floor, hangs_on_events=False))
+            found.append(
+                Observable("energy_error", "J", meaning, Role.RESIDUAL, "ΔE", floor, column=True, hangs_on_events=False)
+            )
         meaning = "how far joints and loops are open"
         found.append(Observable("drift", "m", meaning, Role.RESIDUAL, floor=a, asked_for=False, hangs_on_events=False))
         return tuple(found)

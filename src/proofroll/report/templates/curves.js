@@ -33,7 +33,7 @@ const picture = (() => {
       type: "scatter", mode: "lines", x: time, y: observable.truth, meta: -1, line: { color: paint("--truth"), width: 6 },
       hovertemplate: label("truth", literal(observable.symbol) + " ="),
     };
-    const all = [truth, ...above, ...below, ...tolerances(figure), ...limits(figure), ...onsets(figure)];
+    const all = [truth, ...above, ...below, ...tolerances(figure), ...limits(figure), ...marks(figure)];
     return all.map((trace) => ({ ...trace, visible: visible(trace.meta, off) }));
   }
 
@@ -68,14 +68,14 @@ const picture = (() => {
     });
   }
 
-  // First slips, on the line that the needed friction must reach.
-  function onsets({ rows, observable, paint }) {
-    return (observable.marks ?? []).map(({ row, time }) => ({
-      type: "scatter", mode: "markers", x: [time], y: [observable.bounds[0].value], meta: row, name: "first slip",
+  // Events that a kind of element marks, on the bound that the curve must reach for one.
+  function marks({ rows, observable, paint }) {
+    return (observable.marks ?? []).map(({ row, time, name: event }) => ({
+      type: "scatter", mode: "markers", x: [time], y: [observable.bounds[0].value], meta: row, name: event,
       marker: row < 0
         ? { symbol: "diamond", size: 12, color: paint("--truth") }
         : { symbol: "circle-open", size: 9, color: paint(`--e${rows[row].colour}`), line: { width: rows[row].width } },
-      hovertemplate: `<b>${literal(row < 0 ? "truth" : rows[row].name)}</b><br>first slip at %{x:.7g} s<extra></extra>`,
+      hovertemplate: `<b>${literal(row < 0 ? "truth" : rows[row].name)}</b><br>${event} at %{x:.7g} s<extra></extra>`,
     }));
   }
 

@@ -106,7 +106,7 @@ def mark(content: ReportedComparison, curves: Sequence[PointCurves]) -> list[Poi
 def _marked(content: ReportedComparison, curves: PointCurves, truth: TrueSlips) -> PointCurves:
     runs = [(-1, truth), *((run.row, run.own) for run in content.runs if run.point == curves.point)]
     firsts = [(row, first_slip(slips.events)) for row, slips in runs]
-    marks = [Mark(row, first.time) for row, first in firsts if first is not None]
+    marks = [Mark(row, first.time, "first slip") for row, first in firsts if first is not None]
     named = {"static": truth.mu_static, "kinetic": truth.mu_kinetic if truth.mu_kinetic != truth.mu_static else None}
     bounds = [Bound(f"μ {name}", value) for name, value in named.items() if value is not None]
     observables = [
