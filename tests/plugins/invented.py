@@ -47,7 +47,8 @@ def invented_study(*points: MeasuredPoint, **more: Any) -> TradeoffStudy:
     """What is kept of an invented trade-off."""
     values: dict[str, Any] = {
         "scene": "sphere_in_cylinder", "parameters": {}, "until": 2.0, "every": 0.05, "quantity": "z",
-        "quantities": {"z": MeasuredQuantity("m", 0.1, 1e-13, "z", column=True)}, "absent": {}, "budgets": [], "pareto": {},
+        "quantities": {"z": MeasuredQuantity("m", 0.1, 1e-13, "z", column=True)}, "absent": {}, "budgets": [],
+        "pareto": {},
         "pareto_engines": {}, "truth": TruthCost(route=""), "over": {}, "findings": [], "brief": False,
         "measured": study_identity.measured(),
     }  # fmt: skip

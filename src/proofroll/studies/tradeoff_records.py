@@ -118,7 +118,8 @@ class MeasuredPoint(MeasuredCost):
 class MeasuredQuantity:
     """An observable: its unit, what a percentage of it refers to, and the truth's error bar; None: there is none.
 
-    ``symbol`` is what heads its columns, and ``column`` says whether tables show it where nobody says which quantities they show.
+    ``symbol`` is what heads its columns, and ``column`` says whether tables show it where nobody
+    says which quantities they show.
     """
 
     unit: str
