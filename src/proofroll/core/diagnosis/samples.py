@@ -15,7 +15,6 @@ from proofroll.core.arrays import FloatArray
 from proofroll.core.diagnosis import Cause, Evidence, above_round_off, apart, hypothesis
 from proofroll.core.diagnosis.clocks import late, said_delay, stretched
 from proofroll.core.diagnosis.lines import single_precision
-from proofroll.core.diagnosis.quaternions import quaternions, rounded
 from proofroll.core.diagnosis.vectors import Reported
 
 if TYPE_CHECKING:
@@ -24,6 +23,8 @@ if TYPE_CHECKING:
 TWIST = ("p_WB", "v_WB", "w_WB")
 # Fewer samples tell no frame and no time.
 _FEWEST = 3
+# Quaternions at time 0 that are this near to each other are the same.
+_START = 1e-6
 
 
 def both(evidence: Evidence) -> tuple[xr.Dataset, xr.Dataset] | None:
@@ -36,10 +37,16 @@ def both(evidence: Evidence) -> tuple[xr.Dataset, xr.Dataset] | None:
 
 @hypothesis("float32", "every number of the run, or each built one that differs, is exactly a float32")
 def single_precision_run(evidence: Evidence) -> Iterator[Cause]:
-    """Numbers of 24 bits."""
+    """Numbers of 24 bits: of random doubles one in 5e8 is such a one."""
     yield from single_precision(evidence.lines)
-    if evidence.run is not None and evidence.truth is not None:
-        yield from rounded(evidence.run, evidence.truth, TWIST)
+    run, truth = evidence.run, evidence.truth
+    if run is None or truth is None:
+        return
+    told = [run[name].to_numpy() for name in TWIST]
+    if all(np.any(said % 1) and np.array_equal(said, said.astype(np.float32)) for said in told):
+        true, says = truth[TWIST[0]].to_numpy(), "every number of the run is a single-precision one (float32)"
+        before = apart(told[0], true) if told[0].shape == true.shape else np.inf
+        yield Cause("float32", says, TWIST[0], "m", before, 0.0, "compute and report in double precision")
 
 
 @dataclass(frozen=True)
@@ -115,7 +122,7 @@ class ReportedVectors:
         time, frames = truth["time"].to_numpy(), self.frames(evidence)
         for name, (what, unit) in self.units.items():
             said, true, least = run[name].to_numpy(), truth[name].to_numpy(), self.least(evidence.element, name)
-            told = Reported.after_start(name, what, unit, said, true, time, frames, least)
+            told = Reported(name, what, unit, said, true, time, frames, least).after_start()
             yield from told.causes(evidence.step)
             yield from self.besides(told, evidence)
 
@@ -135,5 +142,26 @@ class Attitudes:
     def test(self, evidence: Evidence) -> Iterator[Cause]:
         """See :class:`proofroll.core.diagnosis.Hypothesis`."""
         found = both(evidence)
-        if found is not None and "q_WB" in found[0]:
-            yield from quaternions(found[0]["q_WB"].to_numpy(), self.true(evidence))
+        if found is None or "q_WB" not in found[0]:
+            return
+        said, true = found[0]["q_WB"].to_numpy(), self.true(evidence)
+        if said.shape != true.shape:
+            return
+        if len(said) > 1 and apart(np.abs(said[0]), np.abs(true[0])) < _START:
+            said, true = said[1:], true[1:]  # an engine may give at time 0 what it was given
+        lengths, before = np.linalg.norm(said, axis=-1, keepdims=True), _turned(said, true)
+        if not above_round_off(before, 1.0) or not np.all(lengths > 0):
+            return
+        for says, after in (
+            ("q_WB has its scalar last", _turned(said, true[..., [1, 2, 3, 0]])),
+            ("q_WB is that of the inverse rotation, of the world in the body", _turned(said, true * [1, -1, -1, -1])),
+            ("q_WB is not of unit length: it was not normalised", _turned(said / lengths, true)),
+        ):
+            remedy = "give a unit quaternion of the body, scalar first"
+            yield Cause("quaternion", says, "q_WB", "1", before, after, remedy)
+
+
+def _turned(said: FloatArray, other: FloatArray) -> float:
+    """How far quaternions are apart, up to their signs."""
+    signs = np.where(np.sum(said * other, axis=-1, keepdims=True) < 0, -1.0, 1.0)
+    return apart(said * signs, other)

@@ -13,7 +13,7 @@ from dataclasses import dataclass, field, replace
 import numpy as np
 
 from proofroll.core.arrays import FloatArray
-from proofroll.core.diagnosis import Cause, above_round_off, apart
+from proofroll.core.diagnosis import CLOSES, Cause, above_round_off, apart
 from proofroll.core.diagnosis.clocks import late, said_delay
 from proofroll.core.diagnosis.fitting import known_factor, said_factor
 
@@ -56,37 +56,26 @@ class Reported:
     frames: Mapping[str, FloatArray] = field(default_factory=dict)
     least: float = 0.0
 
-    @classmethod
-    def after_start(
-        cls,
-        name: str,
-        what: str,
-        unit: str,
-        said: FloatArray,
-        true: FloatArray,
-        time: FloatArray,
-        frames: Mapping[str, FloatArray],
-        least: float = 0.0,
-    ) -> Reported:
+    def after_start(self) -> Reported:
         """Without time 0 where that is right: an engine may give there what it was given."""
-        if (
-            len(said) > 1
-            and said.shape == true.shape
-            and not above_round_off(apart(said[0], true[0]), max(float(np.max(np.abs(true))), least))
-        ):
-            said, true, time = said[1:], true[1:], time[1:]
-            frames = {key: frame[1:] for key, frame in frames.items()}
-        return cls(name, what, unit, said, true, time, frames, least)
+        said, true = self.said, self.true
+        size = max(float(np.max(np.abs(true), initial=0.0)), self.least)
+        if len(said) < 2 or said.shape != true.shape or above_round_off(apart(said[0], true[0]), size):
+            return self
+        frames = {key: frame[1:] for key, frame in self.frames.items()}
+        return replace(self, said=said[1:], true=true[1:], time=self.time[1:], frames=frames)
 
     @property
     def before(self) -> float:
         """Largest difference."""
         return apart(self.said, self.true)
 
-    def cause(self, kind: str, says: str, explained: FloatArray, remedy: str, number: int = 0) -> Cause:
+    def cause(
+        self, kind: str, says: str, explained: FloatArray, remedy: str, number: int = 0, closes: float = CLOSES
+    ) -> Cause:
         """That the engine said ``explained`` instead of the truth."""
-        after = apart(self.said, explained)
-        return Cause(f"{kind}.{self.name}", says, self.name, self.unit, self.before, after, remedy, number)
+        proof = self.name, self.unit, self.before, apart(self.said, explained)
+        return Cause(f"{kind}.{self.name}", says, *proof, remedy, number, closes=closes)
 
     def causes(self, step: float | None) -> Iterator[Cause]:
         """All of this module, as far as there is a difference."""
@@ -141,24 +130,22 @@ class Reported:
             return  # some factor takes any number to any other
         times = "times the step, as an impulse" if impulse else said_factor(factor)
         says = f"{self.name} is {self.what} {times}"
-        cause = self.cause("scaled", says, factor * self.true, f"look at the unit of {self.name}", 1)
-        yield cause if known else replace(cause, closes=_EXACT)
+        closes = CLOSES if known else _EXACT
+        yield self.cause("scaled", says, factor * self.true, f"look at the unit of {self.name}", 1, closes)
 
     def _clamped(self) -> Iterator[Cause]:
         """A limit is held exactly, as a unit is."""
-        for cause in self._limits():
-            yield replace(cause, closes=_EXACT)
-
-    def _limits(self) -> Iterator[Cause]:
         limit = float(np.max(np.abs(self.said)))
-        remedy = f"find what limits {self.name} to {limit:.6g} {self.unit}"
-        says = f"{self.name} is clamped at {limit:.6g} {self.unit}"
-        yield self.cause("clamped", f"each component of {says}", np.clip(self.true, -limit, limit), remedy, 1)
         sizes = np.linalg.norm(self.true, axis=-1, keepdims=True)
         longest = float(np.max(np.linalg.norm(self.said, axis=-1)))
         shorter = self.true * np.minimum(1.0, longest / np.where(sizes > 0, sizes, 1.0))
-        says = f"{self.name} is clamped at a length of {longest:.6g} {self.unit}"
-        yield self.cause("clamped", says, shorter, f"find what limits {self.name} to {longest:.6g} {self.unit}", 1)
+        for what, at, largest, explained in (
+            (f"each component of {self.name}", "", limit, np.clip(self.true, -limit, limit)),
+            (self.name, "a length of ", longest, shorter),
+        ):
+            remedy = f"find what limits {self.name} to {largest:.6g} {self.unit}"
+            says = f"{what} is clamped at {at}{largest:.6g} {self.unit}"
+            yield self.cause("clamped", says, explained, remedy, 1, _EXACT)
 
     def _late(self, step: float | None) -> Iterator[Cause]:
         differs = np.max(np.abs(self.said - self.true).reshape(len(self.time), -1), axis=-1) > _FEW * self.before

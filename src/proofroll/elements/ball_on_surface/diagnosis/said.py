@@ -56,7 +56,7 @@ def reported_force(evidence: Evidence) -> Iterator[Cause]:
     said, true = forces(body, run), forces(body, truth)
     known = np.all(np.isfinite(said) & np.isfinite(true), axis=-1)
     own = {name: frame[known] for name, frame in axes.items()}
-    told = Reported.after_start("force", _FORCE, "N", said[known], true[known], time[known], own)
+    told = Reported("force", _FORCE, "N", said[known], true[known], time[known], own).after_start()
     yield _friction_reversed(told, own[SURFACE][-len(told.true) :, :, 0])
     yield from told.causes(evidence.step)
 
