@@ -2,21 +2,24 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Hashable, Mapping, Sequence
 from types import MappingProxyType
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, TypeVar
 
 import numpy as np
 
 from proofroll.core.arrays import FloatArray
 from proofroll.core.columns import Columns, Variable
 from proofroll.core.element import Element
-from proofroll.core.events import Event, event_columns
+from proofroll.core.element_abilities import WatchesRuns
+from proofroll.core.events import Event, event_columns, events_of
 from proofroll.core.scene import Scene
 from proofroll.core.several import AnySample, sample_of
 
 if TYPE_CHECKING:
     import xarray as xr
+
+Key = TypeVar("Key", bound=Hashable)
 
 # Dimensions that the variables of all elements share; every other is an element's own.
 _SHARED = frozenset({"time", "xyz", "wxyz"})
@@ -33,13 +36,9 @@ def columns_of(
     samples: Sequence[AnySample],
     between: Mapping[float, AnySample] = MappingProxyType({}),
 ) -> Columns:
-    """The trajectory of a run.
+    """The trajectory of a run, of one sample per time [s], shape (time,), or fewer if the run ended early.
 
-    Args:
-        scene: the scene that was run.
-        times: of the samples [s], shape (time,).
-        samples: one per time; fewer if the run ended early.
-        between: samples off the grid, by time [s].
+    ``between`` has samples off that grid, by time [s].
     """
     reached = np.asarray(times[: len(samples)], dtype=np.float64)
     parts = {
@@ -117,3 +116,42 @@ def scales(scene: Scene, truth: xr.Dataset) -> dict[str, float]:
     }
     floors = {name: item.floor or 0.0 for name, item in scene.observables.items()}
     return {name: max(size, floors[name]) if np.isfinite(size) else floors[name] for name, size in sizes.items()}
+
+
+def common_span(
+    scene: Scene, truth: xr.Dataset, runs: Mapping[Key, xr.Dataset]
+) -> tuple[xr.Dataset, dict[Key, xr.Dataset]]:
+    """The truth and runs of it as far as they are comparable for every element (:class:`WatchesRuns`).
+
+    A run ends for all elements where one of them ends it, with an event of its own after the last sample; of the others
+    what happens later is then not compared.
+    """
+    spans = {}
+    for element in scene.elements:
+        if isinstance(element, WatchesRuns):
+            own = part(scene, element, truth)
+            true, shorter = element.common_span(own, {key: part(scene, element, run) for key, run in runs.items()})
+            if true is not own:
+                spans[element.name] = true, shorter
+    if not spans:
+        return truth, dict(runs)
+    count = min(true.sizes["time"] for true, _ in spans.values())
+    end = float(truth["time"][count - 1])
+    ending = {
+        name
+        for name, (true, shorter) in spans.items()
+        if true.sizes["time"] == count and any(event.time > end for run in shorter.values() for event in events_of(run))
+    }
+
+    def cut(dataset: xr.Dataset, parts: Mapping[str, xr.Dataset]) -> xr.Dataset:
+        found = dataset.isel(time=slice(count))
+        for element in scene.elements:
+            own = parts.get(element.name, part(scene, element, dataset)).isel(time=slice(count))
+            if len(scene.elements) > 1 and element.name not in ending and "event_time" in own:
+                own = own.isel(event=own["event_time"].to_numpy() <= end)
+            found = with_part(scene, element, found, own)
+        return found
+
+    own_truths = {name: true for name, (true, _) in spans.items()}
+    own_runs = {key: {name: shorter[key] for name, (_, shorter) in spans.items()} for key in runs}
+    return cut(truth, own_truths), {key: cut(run, own_runs[key]) for key, run in runs.items()}

@@ -43,12 +43,7 @@ class FailedRun:
     note: str
 
     def lines(self, what: str, head: str) -> list[str]:
-        """The first words of the program: what fails where, and what it needs.
-
-        Args:
-            what: happens, in a few words.
-            head: the program's lines of imports.
-        """
+        """The first words of a program with these lines of imports: ``what`` fails where, and what it needs."""
         numbers = ", ".join(f"{name} = {value:g}" for name, value in self.parameters.items()) or "default parameters"
         settings = ", ".join(f"{key}={value}" for key, value in self.settings.items())
         needs = " and ".join(imported(head))

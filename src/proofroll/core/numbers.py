@@ -24,11 +24,7 @@ class Numbers:
     def filled(self, content: Any, where: str, units: Mapping[str, str], unit: str = "") -> Any:
         """The content of a table with each ``$name`` replaced by its number, which must have the unit of its place.
 
-        Args:
-            content: of a table.
-            where: it stands, for messages.
-            units: unit of each number by its key.
-            unit: of the content itself, if it is a number.
+        ``units`` are those of numbers by their keys, ``unit`` is that of the content itself, if it is a number.
 
         Raises:
             InputError: no such parameter, another unit, or a truth value instead of a number.

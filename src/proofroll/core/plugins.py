@@ -166,12 +166,9 @@ def parse_engine(text: str) -> EngineSpec:
 
 
 def resolve_settings(engine: Any, options: Mapping[str, Any], requires: Collection[str] = ()) -> Any:
-    """Complete settings: the preset of the formulation, with the given options put over it.
+    """Complete settings of an engine's class: the preset of the formulation, with the given options put over it.
 
-    Args:
-        engine: its class.
-        options: what is given.
-        requires: by the scene; where no formulation is given, it is the first that provides this.
+    Where no formulation is given it is the first that provides what the scene ``requires``.
 
     Raises:
         InputError: unknown or ill-typed option.

@@ -42,12 +42,7 @@ class Parameter:
 
 
 def check_parameters(parameters: Mapping[str, Parameter], units: Iterable[str], path: Path) -> None:
-    """All that can be said of parameters without their values.
-
-    Args:
-        parameters: of a scene, by name.
-        units: that are known.
-        path: of the file, for messages.
+    """All that can be said of a scene's parameters without their values.
 
     Raises:
         InputError: an unknown unit, or what a value or a bound refers to is not there.

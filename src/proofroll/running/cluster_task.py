@@ -83,10 +83,7 @@ def installed() -> dict[str, str]:
 def run_case(asked: Asked, content: dict[str, Any], files: Mapping[str, bytes]) -> tuple[dict[str, Any], bytes | None]:
     """Runs a case; its result as a dictionary, with the machine's name, and the file of its trajectory, if any.
 
-    Args:
-        asked: what the command wants of this place.
-        content: of the case.
-        files: of the scene's folder, by name, or the file that is the scene, where it does not come with proofroll.
+    Where the scene does not come with proofroll, ``files`` has those of its folder by name, or the one that is it.
 
     Raises:
         Unfit: results here are not those of the command's own machine.

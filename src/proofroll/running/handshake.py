@@ -19,11 +19,7 @@ PROTOCOL = 1
 
 
 def hello(place: str) -> dict[str, Any]:
-    """Who this worker is. From now on it is the one for engines ``NAME@place``, and for no other.
-
-    Args:
-        place: as a person wrote it after ``@``.
-    """
+    """Who this worker is. From now on it is the one for engines ``NAME@place``, and for no other."""
     from proofroll.running import loading
 
     loading.settle(place)
@@ -56,9 +52,7 @@ def mismatch(answer: Mapping[str, Any]) -> str:
 def libraries(engine: str) -> dict[str, str]:
     """What besides an engine and its adapter decides the last digits of its results.
 
-    Args:
-        engine: with its place; in another interpreter all its packages count, for engines bring libraries of their
-            own, and of a program the program itself.
+    In another interpreter all its packages count, for engines bring libraries of their own; of a program it itself.
     """
     program = path_of(engine)
     if program is not None:

@@ -14,12 +14,9 @@ Found = TypeVar("Found")
 
 
 def in_processes(function: Callable[[Item], Found], items: Sequence[Item], workers: int) -> Iterator[Found]:
-    """What a function gives for each item, in order; Ctrl-C ends the processes that compute.
+    """What a function gives for each item, in order, in so many processes; 1 computes in this one.
 
-    Args:
-        function: can be pickled, and its results too.
-        items: its arguments.
-        workers: processes at once; 1 computes in this one.
+    The function and its results can be pickled. Ctrl-C ends the processes that compute.
     """
     if workers == 1:
         yield from map(function, items)

@@ -34,11 +34,7 @@ OLDEST = (3, 11)
 
 
 def start(engine: str, memory: float | None = None) -> Worker:
-    """A worker for an engine, in the interpreter that its name says.
-
-    Args:
-        engine: ``NAME``, which runs in this interpreter, or ``NAME@PLACE``.
-        memory: see :class:`Worker`.
+    """A worker for an engine, ``NAME``, which runs in this interpreter, or ``NAME@PLACE``.
 
     Raises:
         InputError: there is no such place.

@@ -18,7 +18,6 @@ from typing import Any, Self
 from proofroll.core.errors import InputError, Missing, ProofrollError
 from proofroll.running.case import Status
 from proofroll.running.memory import VARIABLE, descendants, memory_limit, resident_gb
-from proofroll.running.starving import starved
 
 # One thread per worker, set before anything is imported there: workers run side by side.
 _ONE_THREAD = dict.fromkeys(
@@ -157,14 +156,14 @@ class Worker:
 
     def _line(self, time_limit: float) -> bytes:
         """The next line of the answers."""
-        starved_before = starved(self._process.pid)
+        starved_before = _starved(self._process.pid)
         deadline = time.monotonic() + time_limit
         look = time.monotonic() + _TICK
         while b"\n" not in self._pending:
             now = time.monotonic()
             if now >= deadline:
                 # What it waited for others is granted once more, until it had the time for itself.
-                starved_now = starved(self._process.pid)
+                starved_now = _starved(self._process.pid)
                 if starved_now - starved_before > _TICK:
                     deadline, starved_before = now + starved_now - starved_before, starved_now
                     continue
@@ -259,6 +258,21 @@ class Worker:
 
     def __exit__(self, *_: object) -> None:
         self.close()
+
+
+def _starved(process: int) -> float:
+    """How long [s] the process or a descendant, whichever waited longest, was ready while others had the processor.
+
+    On a machine with other work a wall clock says more about that work than about an engine. The kernel counts how long
+    every thread waited in the queue of a processor (``schedstat``, second number); a process that hangs asleep waits in
+    none, so that a limit of wall seconds less these still ends it. 0 where the system does not count it.
+    """
+    longest = 0
+    for one in (process, *descendants(process)):
+        with contextlib.suppress(OSError, ValueError, IndexError):  # it has just ended, or there is no such file
+            for task in Path(f"/proc/{one}/task").iterdir():
+                longest = max(longest, int((task / "schedstat").read_text(encoding="ascii").split()[1]))
+    return longest * 1e-9
 
 
 def _how(code: int) -> str:

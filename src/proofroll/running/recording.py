@@ -35,11 +35,7 @@ _FEW = 17
 def off_grid(times: FloatArray, step: float | None) -> FloatArray:
     """A few times [s] between those of the grid, none at the same part of its interval, each a whole number of steps.
 
-    An error that repeats with the grid is zero on it, and seen here.
-
-    Args:
-        times: the grid.
-        step: the engine's [s], or None if it has no fixed one.
+    An error that repeats with the grid is zero on it, and seen here. ``step``: the engine's [s]; None: it has none.
     """
     found: list[float] = []
     if len(times) <= _FEW:
@@ -89,13 +85,9 @@ class Recording:
 
 
 def record(engine: Any, scene: Scene, times: FloatArray, probes: Iterable[float] = ()) -> Recording:
-    """Advances a freshly built engine over ``times`` and samples it at each, and at a few times off that grid.
+    """Advances an engine freshly built of a scene over ``times`` [s] and samples it at each, and at ``probes`` [s].
 
-    Args:
-        engine: at time 0.
-        scene: what it was built from.
-        times: of the samples [s], shape (time,).
-        probes: times off the grid at which it is sampled besides [s], from :func:`off_grid`.
+    Probes are a few times off that grid, from :func:`off_grid`.
     """
     began, processor = time.perf_counter(), -time.process_time()
     inside = 0.0

@@ -15,13 +15,12 @@ from proofroll.core.plugins import plain_name
 from proofroll.running.case import Case, Result, Status
 from proofroll.running.manifest import manifest
 from proofroll.running.manifest import versions as made_with
-from proofroll.running.time_accounts import TimeAccounts
 from proofroll.running.time_case import clean_runs
 
 
 def run(case: dict[str, Any], out: str) -> dict[str, Any]:
     """Runs a case and writes its trajectory to ``out``; everything the case says comes back as a result."""
-    spent = TimeAccounts()
+    spent = _TimeAccounts()
     gc.freeze()  # what there is by now are modules: to look at each of them after the case costs as much as a short one
     try:
         answer = dataclasses.asdict(_run(Case.from_dict(case), Path(out), spent)) | {"interpreter": sys.executable}
@@ -32,7 +31,7 @@ def run(case: dict[str, Any], out: str) -> dict[str, Any]:
     return answer | {"spent": spent.seconds, "processor": spent.processor}
 
 
-def _run(case: Case, out: Path, spent: TimeAccounts) -> Result:
+def _run(case: Case, out: Path, spent: _TimeAccounts) -> Result:
     from proofroll.core.certificate import first_difference
     from proofroll.core.engine import fixed_step
     from proofroll.core.first_steps import certificate
@@ -114,3 +113,33 @@ def _run_truth(scene: Any, times: Any, out: Path, versions: dict[str, str]) -> R
     said = {"status": "done", "message": message, "wall_seconds": wall}
     write(dataset.assign_attrs(said | manifest("truth", {}, scene, versions)), out)
     return Result(Status.DONE, message, wall_seconds=wall, versions=versions, trajectory=out.name)
+
+
+class _TimeAccounts:
+    """Where the time of a case goes.
+
+    Attributes:
+        seconds: wall seconds by cause [s].
+        processor: seconds of this process by cause [s], whoever else computes on the machine.
+    """
+
+    _counted = 0.0  # of the processor, in the cases before: what has passed since was the start, and other requests
+
+    def __init__(self) -> None:
+        self.seconds: dict[str, float] = {}
+        now = time.process_time()
+        self.processor: dict[str, float] = {"process start": now - _TimeAccounts._counted}
+        self._since = time.perf_counter(), now
+
+    def on(self, cause: str, **parts: tuple[float, float]) -> None:
+        """What has passed since the last call went to ``cause``, but for ``parts`` of it that had another.
+
+        Each part is a pair of wall and processor seconds [s].
+        """
+        now = time.perf_counter(), time.process_time()
+        for index, account in enumerate((self.seconds, self.processor)):
+            found = {key.replace("_", " "): part[index] for key, part in parts.items()}
+            found[cause] = now[index] - self._since[index] - sum(found.values())
+            for key, value in found.items():
+                account[key] = account.get(key, 0.0) + value
+        self._since, _TimeAccounts._counted = now, now[1]

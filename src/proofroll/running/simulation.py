@@ -40,7 +40,7 @@ def build(scene: Scene, engine: Any, **settings: Any) -> Any:
         Refused: the engine cannot represent the scene.
     """
     kind, resolved = _resolved(scene, engine, settings)
-    return _build(scene, kind, resolved)
+    return several.build(kind, scene, resolved)
 
 
 def _resolved(scene: Scene, engine: Any, settings: dict[str, Any]) -> tuple[Any, Any]:
@@ -57,10 +57,6 @@ def _resolved(scene: Scene, engine: Any, settings: dict[str, Any]) -> tuple[Any,
             raise InputError(f"{spec.name}: {key}", value, f"{spec.options[key]} is in the brackets; give it once")
     kind = load_engine(spec.name)
     return kind, resolve_settings(kind, {**spec.options, **settings}, scene.requires)
-
-
-def _build(scene: Scene, kind: Any, settings: Any) -> Any:
-    return several.build(kind, scene, settings)
 
 
 def simulate(
@@ -105,7 +101,7 @@ def simulate(
         return found.assign_attrs(manifest("truth", {}, scene, versions("truth", truth_version())))
     kind, resolved = _resolved(scene, engine, settings)
     times = time_grid(until, sampling_interval(fixed_step(resolved)) if every is None else every)
-    built = _build(scene, kind, resolved)
+    built = several.build(kind, scene, resolved)
     lines = certificate(kind, built, scene, resolved)
     difference = first_difference(lines)
     if difference is not None:

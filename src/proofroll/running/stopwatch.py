@@ -18,8 +18,7 @@ _LIMIT = 60.0
 class Stopwatch:
     """Keeps one worker per engine, which stays warm between the rounds of :func:`proofroll.running.timing.interleaved`.
 
-    Args:
-        workers: where they come from and go back to.
+    They come from ``workers`` and go back there.
     """
 
     def __init__(self, workers: Workers | None = None) -> None:

@@ -45,11 +45,7 @@ class Axis:
     scale_free: bool = False
 
     def at(self, scene: Scene, value: float) -> dict[str, float]:
-        """The parameters at a value of the axis.
-
-        Args:
-            scene: with its default parameters.
-            value: of the axis.
+        """The parameters of a scene, whose own are its defaults, at a value of the axis.
 
         Raises:
             InputError: the axis names a parameter that the scene does not have.

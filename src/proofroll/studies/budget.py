@@ -55,15 +55,10 @@ class Order(NamedTuple):
 
 
 def budget(curve: Curve, quantity: str, every: float, true: FloatArray, unit: str) -> CurveBudget:
-    """The budget of one quantity along a curve.
+    """The budget of one quantity, with its true values and unit, along a curve.
 
-    Args:
-        curve: swept.
-        quantity: an observable.
-        every: sampling interval of the runs from which order and limit come [s]. One with a longer step has fewer
-            samples, and only the coarsest of them counts, as the coarse end.
-        true: the true values.
-        unit: of the quantity.
+    Order and limit come from runs that are sampled at ``every`` [s]. One with a longer step has fewer samples, and only
+    the coarsest of them counts, as the coarse end.
     """
     used = [p for p in curve.points if p.case.every == every and np.isfinite(p.errors.get(quantity, np.inf))]
     bar = _bar(used, quantity)
@@ -126,11 +121,7 @@ def _contradicted(order: Order, declared: int | None) -> bool:
 def order_of(steps: Sequence[float], differences: Sequence[float]) -> Order:
     """Order and its confidence interval from the longest stretch of runs that follow one power law.
 
-    The difference of neighbouring runs is C |h1^p - h2^p|; C and p are fitted in logarithms.
-
-    Args:
-        steps: falling.
-        differences: between runs with neighbouring steps, one fewer.
+    Steps fall; the difference of neighbouring runs is C |h1^p - h2^p|, and C and p are fitted in logarithms.
     """
     from scipy.optimize import curve_fit
     from scipy.stats import t

@@ -12,16 +12,9 @@ from proofroll.running.case import Case, EngineFacts
 def case_of(
     name: str, scene: Scene, given: Iterable[str], engine: EngineFacts, until: float, every: float, **others: Any
 ) -> Case:
-    """A case of any study.
+    """A case of any study, on a scene that was loaded with what it is asked and with the parameters ``given``.
 
-    Args:
-        name: of the scene, or its path.
-        scene: loaded with these parameters and questions.
-        given: names of its parameters that are not left at their defaults.
-        engine: with complete settings.
-        until: last time [s].
-        every: sampling interval [s].
-        **others: fields of :class:`proofroll.running.case.Case` that have defaults, but what the scene says itself.
+    Times are those of :class:`proofroll.running.case.Case` [s], ``others`` its fields that have defaults.
     """
     parameters = {parameter: scene.parameters[parameter] for parameter in given}
     return Case(name, parameters, scene.digest, engine, until, every, asks=scene.asks, **others)

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterable
 from dataclasses import replace
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
@@ -37,22 +37,22 @@ def evaluate(planned: Plan, results: dict[str, Result], runner: Runner) -> Outco
         if isinstance(run.facts, ProofrollError):
             judged.append(_absent(run))
             continue
-        main = run.ladder[1.0]
-        result = results[main.key]
+        result = results[run.ladder[1.0].key]
         if result.trajectory is None or result.status != Status.DONE:
-            judged.append(_failed(run, run.facts, result))
+            judged.append(_failed(run, result))
             continue
         name = point_name(run.parameters)
         truth = results[planned.truths[name].key]
         if truth.status != Status.DONE:
-            judged.append(_without_truth(run, run.facts, result, truth))
+            judged.append(_without_truth(run, result, truth))
             continue
         if name not in references:
             scene = load_scene(comparison.scene, **run.parameters)
             references[name] = Reference.read(scene, runner.store.trajectory(planned.truths[name]))
-        other = references[name].another_scene(result.certificate)
+        reference = references[name]
+        other = reference.another_scene(result.certificate)
         if other is not None:
-            judged.append(_of_another_scene(run, run.facts, result, other))
+            judged.append(_of_another_scene(run, result, other))
             continue
         trajectories = {
             factor: read(runner.store.trajectory(case))
@@ -60,20 +60,19 @@ def evaluate(planned: Plan, results: dict[str, Result], runner: Runner) -> Outco
             if results[case.key].status == Status.DONE
         }
         band = comparison.bands[run.row.tolerance]
-        judgements = _judgements(run, band, references[name], trajectories, _lost(run, results))
+        judgements = _judgements(run, band, reference, trajectories, _lost(run, results))
         missing = sorted({*band.bounds, *run.row.bound} - {judgement.observable for judgement in judgements})
-        contradictions = contradictions_of(comparison, run, judgements, missing)
-        shared = references[name].shared(run.facts.shares)
-        found = Run(run.row, run.parameters, run.facts, result, judgements, contradictions, main, missing, shared)
+        found = _run(
+            run,
+            result,
+            judgements=judgements,
+            contradictions=contradictions_of(comparison, run, judgements, missing),
+            missing=missing,
+            shared=reference.shared(run.facts.shares),
+        )
         if found.verdict == Verdict.DIFFERS:
-            causes = diagnosed(
-                references[name].scene,
-                result.certificate,
-                trajectories[1.0],
-                references[name].dataset,
-                run.facts.step,
-                judgements,
-            )
+            true, main = reference.dataset, trajectories[1.0]
+            causes = diagnosed(reference.scene, result.certificate, main, true, run.facts.step, judgements)
             found = replace(found, diagnosis=causes)
         judged.append(found)
     return Outcome(comparison, judged, planned.truths)
@@ -90,42 +89,44 @@ def compare(
     return evaluate(planned, runner.run(planned.cases, progress), runner)
 
 
+def _run(planned: Planned, result: Result, **found: Any) -> Run:
+    """A run of a plan with its result and what was found of it."""
+    facts = planned.facts if isinstance(planned.facts, EngineFacts) else None
+    return Run(planned.row, planned.parameters, facts, result, case=planned.ladder.get(1.0), **found)
+
+
 def _absent(run: Planned) -> Run:
     """A row whose engine could not even be asked."""
-    assert isinstance(run.facts, ProofrollError)  # the caller looked
     status = Status.CRASHED
     if isinstance(run.facts, Missing):
         status = Status.MISSING
     elif isinstance(run.facts, WorkerDied):
         status = run.facts.status
-    return Run(run.row, run.parameters, None, Result(status, str(run.facts)))
+    return _run(run, Result(status, str(run.facts)))
 
 
-def _failed(run: Planned, facts: EngineFacts, result: Result) -> Run:
+def _failed(run: Planned, result: Result) -> Run:
     expected = Verdict.FAILED in run.row.expected(run.parameters)
     sentence = f"{run.row.engine}{at_point(run.parameters)} {result.status}: {result.message}"
-    scene = load_scene(run.ladder[1.0].scene, **run.parameters)
-    causes = diagnosed(scene, result.certificate, step=facts.step)
-    said = [] if expected else [sentence]
-    return Run(run.row, run.parameters, facts, result, [], said, run.ladder[1.0], diagnosis=causes)
+    case = run.ladder[1.0]
+    causes = diagnosed(load_scene(case.scene, **run.parameters), result.certificate, step=case.engine.step)
+    return _run(run, result, contradictions=[] if expected else [sentence], diagnosis=causes)
 
 
-def _without_truth(run: Planned, facts: EngineFacts, result: Result, truth: Result) -> Run:
+def _without_truth(run: Planned, result: Result, truth: Result) -> Run:
     """A row at a point where the truth refuses, which says nothing about the engine; or where it was lost."""
     refused = truth.status in LASTING
     status = Status.NO_TRUTH if refused else truth.status
     result = replace(result, status=status, message=f"there is no truth here: {truth.message}")
-    if not refused:
-        return _failed(run, facts, result)
-    return Run(run.row, run.parameters, facts, result, case=run.ladder[1.0])
+    return _run(run, result) if refused else _failed(run, result)
 
 
-def _of_another_scene(run: Planned, facts: EngineFacts, result: Result, sentence: str) -> Run:
+def _of_another_scene(run: Planned, result: Result, sentence: str) -> Run:
     """A row whose engine ran another scene: shown with its trajectory, and not judged."""
     result = replace(result, status=Status.ANOTHER_SCENE, message=sentence)
     expected = {Verdict.ANOTHER_SCENE, Verdict.DIFFERS, Verdict.FAILED} & set(run.row.expected(run.parameters))
     said = [] if expected else [f"{run.row.engine}{at_point(run.parameters)}: {sentence}"]
-    return Run(run.row, run.parameters, facts, result, [], said, run.ladder[1.0])
+    return _run(run, result, contradictions=said)
 
 
 def _judgements(
@@ -140,15 +141,15 @@ def _judgements(
         if tolerance is None:
             continue
         true, bar = reference.true(name, curve)
-        item = reference.scene.observables[name]
+        scale = reference.sizes.get(name, 1.0)
         judgement = judge(
             name,
-            item.unit,
+            reference.scene.observables[name].unit,
             curve,
             true,
             truth_error_bar=bar,
-            tolerance=tolerance.absolute(reference.sizes.get(name, 1.0)),
-            scale=reference.sizes.get(name, 1.0),
+            tolerance=tolerance.absolute(scale),
+            scale=scale,
             limit=_limit(run, name, curves),
             ladder=_has_ladder(run, curve),
             lost=lost,

@@ -146,10 +146,7 @@ class Curve:
 def judged(points: Sequence[CurvePoint], references: Mapping[float, Reference], runner: Runner) -> CurvePoint:
     """The point with its observables and their errors, if it has a trajectory that reached the end.
 
-    Args:
-        points: the run, and the one over few samples if there is one.
-        references: the truth by sampling interval.
-        runner: where the trajectories are.
+    ``points`` are the run, and the one over few samples if there is one; the truth is known by sampling interval.
     """
     point, *others = (_measured(point, references[point.case.every], runner) for point in points)
     if not others:

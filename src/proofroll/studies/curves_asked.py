@@ -17,10 +17,8 @@ def curves_of(
 ) -> tuple[list[Curve], dict[str, str]]:
     """A curve without points for every formulation and preset of the engines, and why some engine has none.
 
-    Args:
-        engines: names, or ``name[key=value,…]`` for one formulation or setting; all that are installed if empty.
-        workers: processes in which they are asked.
-        requires: by the scene; formulations that provide nothing of it are for other kinds of scenes, and left out.
+    An engine is a name, or ``name[key=value,…]`` for one formulation or setting; none means all that are installed.
+    Formulations that provide nothing of what the scene requires are for other kinds of scenes, and left out.
     """
     wanted: list[tuple[str, str | None]] = []
     absent: dict[str, str] = {}

@@ -99,13 +99,7 @@ class Yardstick:
 
 
 def judge(result: Result, dataset: xr.Dataset | None, yardstick: Yardstick) -> RunOutcome:
-    """What a run gave, held against the yardstick.
-
-    Args:
-        result: how it ended.
-        dataset: its trajectory as far as it went, if there is one.
-        yardstick: of its place.
-    """
+    """What a run gave: how it ended, and its trajectory as far as it went, held against the yardstick of its place."""
     early = {Status.CRASHED: CRASHED, Status.TIMEOUT: TOO_SLOW, Status.REFUSED: REFUSED}
     if result.status in early or dataset is None:
         return _failed(early.get(result.status, GAVE_UP), result, None, None)

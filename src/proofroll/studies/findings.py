@@ -121,12 +121,7 @@ def read_finding(path: Path) -> EngineFinding:
 
 
 def shown(findings: Sequence[EngineFinding], python: str = "", time_limit: float = 300.0) -> Iterator[Shown]:
-    """Runs each program in a process of its own.
-
-    Args:
-        findings: from :func:`load_findings`.
-        python: interpreter that has the engines; this one if empty.
-        time_limit: for each program [s].
+    """Runs each program in a process of its own, of another Python if one is given, for so long at most [s].
 
     Raises:
         Missing: there is no such interpreter.

@@ -27,10 +27,6 @@ _PARTS = (0.1, 1.0, 10.0)
 def compared(name: str, parameters: Mapping[str, Any]) -> Comparison:
     """Every formulation of every installed engine that can, held against the truth of a scene, with nothing claimed.
 
-    Args:
-        name: of the scene.
-        parameters: that the user sets.
-
     Raises:
         InputError: there is no such scene, a parameter makes no sense, or no installed engine can represent it.
     """

@@ -111,14 +111,7 @@ def _written(options: Mapping[str, Any]) -> str:
 def switches(
     ladder: Sequence[Rung], engines: Mapping[str, EngineDescription | ProofrollError], scene: Scene, truth: xr.Dataset
 ) -> list[Switch]:
-    """Every optional term: the scene's in one model of each engine and level, the engine's in each model that has it.
-
-    Args:
-        ladder: from :func:`rungs`.
-        engines: from :func:`described`.
-        scene: as it was given.
-        truth: of the scene.
-    """
+    """Every optional term: the scene's in one model of each engine and level, the engine's in each that has it."""
     found: list[Switch] = []
     models = [(rung.level, rung.model) for rung in ladder if rung.model is not None and not rung.variant]
     seen: set[tuple[str, Level]] = set()

@@ -54,13 +54,7 @@ class Plan:
 
 
 def plan(comparison: Comparison, engines: Iterable[str] = (), workers: Workers | None = None) -> Plan:
-    """The cases of a comparison.
-
-    Args:
-        comparison: from :func:`proofroll.files.comparison_file.load_comparison`.
-        engines: names of engines to which it is restricted; all if empty. ``mujoco@3.8.1`` runs the rows of
-            mujoco there.
-        workers: processes in which they are asked.
+    """The cases of a comparison, or of its rows of some engines alone; ``mujoco@3.8.1`` runs those of mujoco there.
 
     Raises:
         InputError: an engine or setting that does not exist.
@@ -106,13 +100,7 @@ def _moved(row: Row, name: str) -> Row | None:
 def row_facts(
     comparison: Comparison, rows: Sequence[tuple[int, Row]], requires: Collection[str], workers: Workers | None = None
 ) -> tuple[list[EngineFacts | ProofrollError], EngineFacts]:
-    """The complete settings of rows, or why there are none, and those of the truth.
-
-    Args:
-        comparison: for messages.
-        rows: with their place in it.
-        requires: by the scene.
-        workers: processes in which engines are asked.
+    """The complete settings of rows, each with its place in the file, or why there are none, and those of the truth.
 
     Raises:
         InputError: an engine or setting that does not exist.

@@ -166,10 +166,7 @@ def recommend(study: TradeoffStudy, wish: Wish) -> Recommendation:
 def holding(study: TradeoffStudy, wish: Wish, *, here: bool = False) -> list[MeasuredPoint]:
     """Every point among those asked for that holds the tolerance with margin, the cheapest first, untimed ones last.
 
-    Args:
-        study: measured.
-        wish: what is asked for.
-        here: whether the scene's own parameters are enough, whatever happens at the corners of the range.
+    With ``here`` the scene's own parameters are enough, whatever happens at the corners of the range.
     """
     absolute = absolute_tolerance(study, wish)
     within = replace(study, over={}) if here else study

@@ -4,16 +4,15 @@ from __future__ import annotations
 
 import itertools
 import re
-from collections.abc import Collection, Hashable, Mapping, Sequence
+from collections.abc import Collection, Mapping, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, Self, TypeVar
+from typing import TYPE_CHECKING, Any, Self
 
 import numpy as np
 
 from proofroll.core.arrays import FloatArray
-from proofroll.core.common_span import common_span
-from proofroll.core.dataset import observe, part, scales
+from proofroll.core.dataset import Key, common_span, observe, part, scales
 from proofroll.core.element_abilities import KnowsAnotherScene
 from proofroll.core.events import EVENT_ORDER, Event, events_of
 from proofroll.core.observable import Role
@@ -23,8 +22,6 @@ from proofroll.files.trajectory_file import read
 
 if TYPE_CHECKING:
     import xarray as xr
-
-Key = TypeVar("Key", bound=Hashable)
 
 
 @dataclass(frozen=True)

@@ -184,11 +184,7 @@ class StabilityStudy:
 def dependence(points: Sequence[BoundaryPoint], name: str) -> str:
     """How a boundary, in parts of the natural time, changes along an axis, if it does; else nothing.
 
-    Where the search was cut for its many steps, a boundary that is missing says nothing.
-
-    Args:
-        points: of one curve along one axis.
-        name: of the boundary.
+    The points are those of one curve. Where the search was cut for its many steps, a missing boundary says nothing.
     """
     fixed_step = any(point.resolution == "dt" for point in points)
     sizes = [

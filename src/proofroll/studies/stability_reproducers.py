@@ -26,13 +26,7 @@ _NOTHING_TO_SHOW = {
 def with_programs(
     found: StabilityMap, study: StabilityStudy, folder: Path, workers: Workers | None = None
 ) -> StabilityStudy:
-    """Writes a program for each point that shows a failure.
-
-    Args:
-        found: the map.
-        study: what is kept of it.
-        folder: where the programs go.
-        workers: idle ones that may be asked.
+    """Writes a program into the folder for each point that shows a failure.
 
     Returns:
         the study, whose points name their programs or say why they have none.

@@ -202,14 +202,7 @@ def pareto_entries(curves: Iterable[Curve], quantity: str) -> list[tuple[CurvePo
 
 
 def stored(folder: Path, question: Question, engines: Sequence[str] = (), *, brief: bool = False) -> Path:
-    """Where the study of a question is stored under the folder of results.
-
-    Args:
-        folder: of all results.
-        question: what was swept.
-        engines: those to which it was restricted; such a study has a file of its own.
-        brief: likewise.
-    """
+    """Where the study of a question is stored below the folder of results; a brief or restricted one by itself."""
     scene = question.loaded()
     parts = [[scene.digest, question.until], *([sorted(engines)] if engines else [])]
     digests = (hashlib.sha256(json.dumps(part).encode()).hexdigest()[:10] for part in parts)

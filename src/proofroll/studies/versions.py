@@ -115,14 +115,9 @@ def compared(
     rounds: int = ROUNDS,
     progress: Progress | None = None,
 ) -> VersionsStudy:
-    """The same cases in two versions of an engine, and what changed.
+    """The same cases in two versions of an engine, the old and the new ``NAME`` or ``NAME@PLACE``, and what changed.
 
-    Args:
-        sides: the engine twice, ``NAME`` or ``NAME@PLACE``: the old version and the new one.
-        comparisons: from :func:`proofroll.studies.version_subjects.comparisons_about`.
-        runner: where the cases are run.
-        rounds: of timing; 0 times nothing.
-        progress: called with what has just been done.
+    Speeds are measured in so many rounds; with 0 they are not. ``progress`` is called with what has just been done.
 
     Raises:
         InputError, Missing, WorkerDied: one of them cannot be asked at all.

@@ -7,8 +7,7 @@ from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
 
-from proofroll.core.common_span import common_span
-from proofroll.core.dataset import part
+from proofroll.core.dataset import common_span, part
 from proofroll.core.diagnosis import Cause, Evidence, diagnose, hypotheses_of
 from proofroll.core.observable import Role
 from proofroll.core.scene import Scene
