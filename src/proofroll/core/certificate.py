@@ -104,11 +104,8 @@ def require_shapes(built: Any, shapes: Mapping[str, tuple[tuple[int, ...], ...]]
         if not any(
             len(shape) == len(one) and all(n in {m, -1} for n, m in zip(one, shape, strict=True)) for one in allowed
         ):
-            raise Diverged(f"the engine's built() gave {name} with shape {shape} instead of {_shape(allowed[0])}")
-
-
-def _shape(shape: tuple[int, ...]) -> str:
-    return str(shape).replace("-1", "n")
+            wanted = str(allowed[0]).replace("-1", "n")
+            raise Diverged(f"the engine's built() gave {name} with shape {shape} instead of {wanted}")
 
 
 def first_difference(lines: list[Line]) -> str | None:

@@ -91,7 +91,7 @@ def _read(name: str, given: Mapping[str, object]) -> tuple[SceneFile, dict[str, 
     other = source_of(name)
     if other is None:
         path = scene_folder(name) / "scene.toml"
-        file = _parse(path)
+        file = _checked(read_toml(path), path)
         return file, values_of(file.parameters, given), path
     source, path = other
     file = _checked({"gravity": {}, **source.content(path)}, path)
@@ -151,11 +151,7 @@ def load_scene(name: str, /, *, asks: Any = (), **parameters: float) -> Scene:
 
 
 def _elements(tables: Mapping[str, Any], gravity: Gravity, numbers: Numbers, where: str) -> tuple[Element, ...]:
-    """What the tables of a file hold, each read by the kind of element that it belongs to.
-
-    Raises:
-        InputError: a table that no kind reads.
-    """
+    """What the tables of a file hold, each read by the kind of element that it belongs to."""
     kinds = load_element_kinds()
     known = [name for kind in kinds for name in kind.tables]
     for name in tables:
@@ -178,10 +174,6 @@ def _names(asks: object) -> list[str]:
     if not isinstance(asks, Sequence):
         raise InputError("asks", asks, "give a list of names")
     return [str(name) for name in asks]
-
-
-def _parse(path: Path) -> SceneFile:
-    return _checked(read_toml(path), path)
 
 
 def _checked(content: Mapping[str, Any], path: Path) -> SceneFile:

@@ -70,11 +70,7 @@ def check_parameters(parameters: Mapping[str, Parameter], units: Iterable[str], 
 
 
 def _check_end(parameters: Mapping[str, Parameter], name: str, where: str) -> None:
-    """The defaults that follow one another end at a number.
-
-    Raises:
-        InputError: they go round in a circle.
-    """
+    """The defaults that follow one another end at a number."""
     passed = [name]
     while isinstance(following := parameters[passed[-1]].value, str) and following in parameters:
         if following in passed:

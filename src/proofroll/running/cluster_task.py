@@ -23,10 +23,10 @@ from proofroll.core.plugins import GROUP
 from proofroll.files.scene_file import load_scene
 from proofroll.files.trajectory_file import STORED
 from proofroll.running.asking import resolve
-from proofroll.running.case import Case, EngineFacts
+from proofroll.running.case import Case, EngineFacts, Status
 from proofroll.running.identity import digest
 from proofroll.running.process import WorkerDied
-from proofroll.running.runner import refusal, run_one
+from proofroll.running.runner import ended, run_one
 from proofroll.running.worker_pool import Workers
 
 # Processes are kept between the cases of a command, in each Dask worker for so many engines and commands.
@@ -104,7 +104,7 @@ def run_case(asked: Asked, content: dict[str, Any], files: Mapping[str, bytes]) 
         try:
             result = run_one(case, out, workers)
         except InputError as error:
-            result = refusal(case, error)
+            result = ended(case, Status.REFUSED, error)
         said = dataclasses.asdict(dataclasses.replace(result, host=socket.gethostname()))
         return said, out.read_bytes() if result.trajectory is not None else None
 
@@ -142,11 +142,7 @@ def end(command: str) -> None:
 
 
 def _workers_of(asked: Asked) -> Workers:
-    """The processes of a command; of commands that have not been heard of for longest, idle ones are ended.
-
-    Raises:
-        Unfit: other versions are installed here.
-    """
+    """The processes of a command; of commands that have not been heard of for longest, idle ones are ended."""
     with _lock:
         known = asked.command in _workers
     if not known:
@@ -164,11 +160,7 @@ def _workers_of(asked: Asked) -> Workers:
 
 
 def _check(asked: Asked, case: Case, workers: Workers) -> None:
-    """Whether the case is the same here: its engine with all that decides its results, and its scene.
-
-    Raises:
-        Unfit: it is not.
-    """
+    """Whether the case is the same here: its engine with all that decides its results, and its scene."""
     engine = case.engine
     known = asked.command, engine.name, engine.code
     if known not in _same:

@@ -106,11 +106,7 @@ def package_of(engine: str) -> str:
 
 
 def _require_supported(name: str, requirements: Sequence[str]) -> None:
-    """Asks the engine that is installed here, if any, from which version on its adapter supports it.
-
-    Raises:
-        InputError: the version that is pinned of its package is older.
-    """
+    """Asks the engine that is installed here, if any, from which version on its adapter supports it."""
     package = package_of(name) or name
     pinned = [found for text in requirements if (found := _PINNED.fullmatch(text)) and found[1] == package]
     oldest = ""
@@ -173,11 +169,7 @@ def _install_by_uv(uv: str, venv: Path, base: Path, wanted: Sequence[str], tell:
 
 
 def _interpreter(python: str) -> Path:
-    """The Python from which an environment is made.
-
-    Raises:
-        InputError: it is none, or too old.
-    """
+    """The Python from which an environment is made."""
     if not python:
         return Path(sys.executable)
     found = shutil.which(str(Path(python).expanduser()))
@@ -213,9 +205,6 @@ def _wheel(item: metadata.Distribution, folder: Path) -> Path:
     """An installed package as a wheel again, from the list of its files (PEP 376, PEP 427).
 
     Of one that was installed to be edited these are the path of its source, which is then shared.
-
-    Raises:
-        ProofrollError: the package has no such list.
     """
     files = [file for file in item.files or () if ".." not in file.parts and "__pycache__" not in file.parts]
     info = next((file.parts[0] for file in files if file.parts[0].endswith(".dist-info")), None)
@@ -237,11 +226,7 @@ def _wheel(item: metadata.Distribution, folder: Path) -> Path:
 
 
 def _call(command: Sequence[str | Path]) -> str:
-    """What a program prints; it ends, with all that it started, when this process is interrupted.
-
-    Raises:
-        ProofrollError: it failed; the last lines that it wrote are said.
-    """
+    """What a program prints; it ends, with all that it started, when this process is interrupted."""
     try:
         process = subprocess.Popen(
             command,

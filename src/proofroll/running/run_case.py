@@ -86,11 +86,7 @@ def _run(case: Case, out: Path, spent: _TimeAccounts) -> Result:
 
 
 def _answer(error: Refused | Diverged, versions: dict[str, str]) -> Result:
-    """What an engine answers, unless the machine made it say so: then there is no answer.
-
-    Raises:
-        ProofrollError: memory, a file or time was lacking.
-    """
+    """What an engine answers, unless the machine made it say so: then there is no answer."""
     if lack := lack_behind(error):
         raise ProofrollError(f"{error} ({type(lack).__name__})")
     status = Status.REFUSED if isinstance(error, Refused) else Status.DIVERGED

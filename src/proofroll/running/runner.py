@@ -167,7 +167,7 @@ class Runner:
                         worker = self.workers.take(engine)
                     except (InputError, Missing, WorkerDied) as error:  # another interpreter, gone since it was asked
                         status = error.status if isinstance(error, WorkerDied) else Status.MISSING
-                        arrived.put((case, _lost(case, WorkerDied(status, str(error)))))
+                        arrived.put((case, ended(case, status, error)))
                         continue
                     self._busy.add(worker)
                     if self._stopping.is_set():  # whoever stops us may not have seen this worker
@@ -197,9 +197,9 @@ class Runner:
         except WorkerDied as error:
             if self._stopping.is_set():
                 return False
-            result, lives = _lost(case, error), False
+            result, lives = ended(case, error.status, error), False
         except ProofrollError as error:  # a full disk, say, which costs this case alone
-            result, lives = _lost(case, WorkerDied(Status.CRASHED, str(error))), True
+            result, lives = ended(case, Status.CRASHED, error), True
         arrived.put((case, result))
         return lives
 
@@ -209,7 +209,7 @@ class Runner:
             try:
                 result = make(written)
             except InputError as error:  # a step that does not divide the grid, say: this case's own affair
-                result = refusal(case, error)
+                result = ended(case, Status.REFUSED, error)
             except WorkerDied as error:  # where the disk is full the name for a while means nothing to a person
                 said = str(error).replace(str(written.absolute()), str(self.store.trajectory(case)))
                 raise WorkerDied(error.status, said) from None
@@ -234,13 +234,9 @@ def _ask(worker: Worker, case: Case, out: Path) -> Result:
         return Result(Status.MISSING, str(error))
 
 
-def refusal(case: Case, error: InputError) -> Result:
-    """What comes of a case whose own settings make no sense."""
-    return Result(Status.REFUSED, str(error), versions={plain_name(case.engine.name): case.engine.version})
-
-
-def _lost(case: Case, error: WorkerDied) -> Result:
-    return Result(error.status, str(error), versions={plain_name(case.engine.name): case.engine.version})
+def ended(case: Case, status: Status, error: ProofrollError) -> Result:
+    """What comes of a case that has none of the worker's own results."""
+    return Result(status, str(error), versions={plain_name(case.engine.name): case.engine.version})
 
 
 def run_one(case: Case, out: Path, workers: Workers | None = None) -> Result:
@@ -249,4 +245,4 @@ def run_one(case: Case, out: Path, workers: Workers | None = None) -> Result:
         with lent_workers(workers) as lent, lent.lend(case.engine.name) as worker:
             return _ask(worker, case, out)
     except WorkerDied as error:
-        return _lost(case, error)
+        return ended(case, error.status, error)

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Generator
 from dataclasses import dataclass, field
+from operator import attrgetter
 from typing import Generic, Protocol, TypeVar
 
 
@@ -73,7 +74,7 @@ def search(size: int, stride: int) -> Generator[int, V | None, SearchResult[V]]:
             if following == rung:
                 break
         rung = following
-    for passes in (_stable, _accurate):
+    for passes in (attrgetter("stable"), attrgetter("accurate")):
         while (wanted := _next(found, passes)) is not None:
             verdict = yield wanted
             if verdict is None:
@@ -81,14 +82,6 @@ def search(size: int, stride: int) -> Generator[int, V | None, SearchResult[V]]:
             else:
                 seen[wanted] = verdict
     return found
-
-
-def _stable(verdict: RungVerdict) -> bool:
-    return verdict.stable
-
-
-def _accurate(verdict: RungVerdict) -> bool:
-    return verdict.accurate
 
 
 def _next(found: SearchResult[V], passes: Callable[[V], bool]) -> int | None:

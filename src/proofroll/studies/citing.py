@@ -8,7 +8,7 @@ from __future__ import annotations
 import dataclasses
 import json
 import re
-from collections.abc import Iterable
+from collections.abc import Iterable, Iterator
 from importlib.machinery import PathFinder
 from importlib.util import find_spec
 from pathlib import Path
@@ -54,23 +54,8 @@ class Cited:
         return f"{self.name}{known}" if self.kind == "suite" else f"{self.kind} {self.name}{known}"
 
 
-class _Met:
-    """What was met in results, in the order in which it was."""
-
-    def __init__(self) -> None:
-        self.engines: dict[str, list[str]] = {}
-        self.scenes: dict[str, None] = {}
-        self.count = 0
-
-    def scene(self, name: str) -> None:
-        self.scenes[name] = None
-        self.count += 1
-
-    def engine(self, name: str, version: object = None) -> None:
-        self.count += 1
-        known = self.engines.setdefault(plain_name(name), [])
-        if version and str(version) not in known:
-            known.append(str(version))
+# What a result names: ``scene`` or ``engine``, its name, and the version as far as it says it.
+_Named = tuple[str, str, str]
 
 
 def cited(subjects: Iterable[str]) -> list[Cited]:
@@ -83,45 +68,46 @@ def cited(subjects: Iterable[str]) -> list[Cited]:
     Raises:
         InputError: something is none of these.
     """
-    met = _Met()
-    for subject in subjects:
-        _meet(subject, met)
+    engines: dict[str, list[str]] = {}
+    scenes: dict[str, None] = {}
+    for kind, name, version in (found for subject in subjects for found in _named(subject)):
+        if kind == "scene":
+            scenes[name] = None
+            continue
+        versions = engines.setdefault(plain_name(name), [])
+        if version and version not in versions:
+            versions.append(version)
     told = [
         Cited("suite", "proofroll", [proofroll.__version__], references=entries(Path(proofroll.__file__).parent)),
         Cited("truth", "by two routes", references=_beside(TRUTHS)),
     ]
     told += [
         Cited("engine", name, versions, references=_beside(GROUP, name))
-        for name, versions in met.engines.items()
+        for name, versions in engines.items()
         if name != "truth"
     ]
-    return told + [_scene(name) for name in met.scenes]
+    return told + [_scene(name) for name in scenes]
 
 
-def _meet(subject: str, met: _Met) -> None:
+def _named(subject: str) -> list[_Named]:
+    """The scenes and engines that a subject is about."""
     path = Path(subject)
     if path.suffix in {".json", ".nc", STORED} and path.is_file():
-        before = met.count
-        _walk(_document(path), met)
-        if met.count == before:
+        found = list(_walk(_document(path)))
+        if not found:
             raise InputError("result", path.name, "it names neither an engine nor a scene; name a file of proofroll's")
-    elif named_file(subject) is None and is_scene(subject):
-        met.scene(subject)
-    elif subject in engine_names():
-        met.engine(subject)
-    else:
-        comparison = load_comparison(subject)
-        met.scene(comparison.scene)
-        for row in comparison.rows:
-            met.engine(parse_engine(row.engine).name)
+        return found
+    if named_file(subject) is None and is_scene(subject):
+        return [("scene", subject, "")]
+    if subject in engine_names():
+        return [("engine", subject, "")]
+    comparison = load_comparison(subject)
+    engines = (parse_engine(row.engine).name for row in comparison.rows)
+    return [("scene", comparison.scene, ""), *(("engine", name, "") for name in engines)]
 
 
 def _document(path: Path) -> object:
-    """What a file of results says of itself.
-
-    Raises:
-        InputError: it cannot be read as its ending says.
-    """
+    """What a file of results says of itself."""
     try:
         if path.suffix == ".json":
             return json.loads(path.read_text(encoding="utf-8"))
@@ -131,27 +117,27 @@ def _document(path: Path) -> object:
         raise InputError("result", path.name, f"this cannot be read ({error})") from None
 
 
-def _walk(content: object, met: _Met) -> None:
+def _walk(content: object) -> Iterator[_Named]:
     """Every engine and scene that a document of ours names, wherever it does."""
     if isinstance(content, list):
         for item in content:
-            _walk(item, met)
+            yield from _walk(item)
     if not isinstance(content, dict):
         return
     versions = content.get("versions")
     names = {*engine_names(), "truth"}
     for name, version in (versions if isinstance(versions, dict) else {}).items():
         if plain_name(name) in names:
-            met.engine(name, version)
+            yield "engine", name, str(version or "")
     for key in ("engine", "name"):
-        name = content.get(key)
-        if isinstance(name, str) and plain_name(name.partition("[")[0]) in names:
-            met.engine(name.partition("[")[0], content.get("version"))
+        name = str(content.get(key)).partition("[")[0]
+        if isinstance(content.get(key), str) and plain_name(name) in names:
+            yield "engine", name, str(content.get("version") or "")
     scene = content.get("scene")
     if isinstance(scene, str) and is_scene(scene):
-        met.scene(scene)
+        yield "scene", scene, ""
     for item in content.values():
-        _walk(item, met)
+        yield from _walk(item)
 
 
 def _scene(name: str) -> Cited:

@@ -6,6 +6,7 @@ import dataclasses
 import math
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
+from functools import partial
 from typing import TYPE_CHECKING, Any
 
 from proofroll.core.arrays import FloatArray, largest_difference
@@ -181,7 +182,7 @@ class Ladder:
         timed = {key: answer.case for key, answer in self.answers.items() if answer.values is not None}
         with Stopwatch(self._runner.workers) as stopwatch:
             timings = interleaved(
-                {key: _task(stopwatch, case) for key, case in timed.items() if case is not None},
+                {key: partial(stopwatch, case) for key, case in timed.items() if case is not None},
                 self._rounds,
                 lambda _: progress("timing"),
             )
@@ -192,10 +193,6 @@ class Ladder:
 def key_of(model: LadderModel) -> str:
     """Distinguishes models."""
     return repr((model.engine, sorted(model.options.items()), sorted(model.parameters.items()), model.asks))
-
-
-def _task(stopwatch: Stopwatch, case: Case) -> Callable[[], float | None]:
-    return lambda: stopwatch(case)
 
 
 def absence(error: ProofrollError) -> Result:

@@ -86,26 +86,20 @@ def rungs(engines: Mapping[str, EngineDescription | ProofrollError], requires: f
             for formulation, presets in told.presets.items():
                 if told.levels.get(formulation) != level or not requires & set(told.provides[formulation]):
                     continue
-                model = LadderModel(told.name, {"formulation": formulation, "preset": _preset(presets)})
+                preset = "matched" if "matched" in presets else next(iter(presets))
+                model = LadderModel(told.name, {"formulation": formulation, "preset": preset})
                 ladder.append(Rung(level, model))
                 for term in told.terms:
                     if term.rung and formulation in term.formulations:
-                        ladder.append(Rung(level, _with(model, term.on), _written(term.on)))
+                        variant = ",".join(f"{key}={value}" for key, value in term.on.items())
+                        ladder.append(Rung(level, _with(model, term.on), variant))
         if len(ladder) == before:
             ladder.append(Rung(level, None, message="no engine that was asked has a model of this level"))
     return ladder
 
 
-def _preset(presets: Mapping[str, Any]) -> str:
-    return "matched" if "matched" in presets else next(iter(presets))
-
-
 def _with(model: LadderModel, options: Mapping[str, Any]) -> LadderModel:
     return LadderModel(model.engine, {**model.options, **options}, model.parameters, model.asks)
-
-
-def _written(options: Mapping[str, Any]) -> str:
-    return ",".join(f"{key}={value}" for key, value in options.items())
 
 
 def switches(

@@ -176,7 +176,8 @@ def _search(name: str, points: Sequence[MapPoint], effort: Effort, runner: Runne
     def ended(point: MapPoint) -> None:
         nonlocal finished
         finished += 1
-        tell(f"{_label(point)}: {finished} of {len(points)} points", 1)
+        where = f"{point.curve.facts.name}, {point.place.axis.name} = {point.place.value:g}"
+        tell(f"{where}: {finished} of {len(points)} points", 1)
 
     def ask(point: MapPoint, searching: Searching, rung: int | None) -> list[Case]:
         """Goes on with a search until it needs a case that has not been run; that case, unless another asked for it."""
@@ -223,10 +224,6 @@ def _send(point: MapPoint, searching: Searching, outcome: RunOutcome | None) -> 
     except StopIteration as stop:
         point.found = stop.value
         return None
-
-
-def _label(point: MapPoint) -> str:
-    return f"{point.curve.facts.name}, {point.place.axis.name} = {point.place.value:g}"
 
 
 def failure_beyond(point: MapPoint, rung: int | None) -> RunOutcome | None:

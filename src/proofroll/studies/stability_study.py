@@ -3,14 +3,15 @@
 from __future__ import annotations
 
 from collections import Counter
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Sequence
 from dataclasses import asdict, replace
+from operator import attrgetter
 from pathlib import Path
 
 from proofroll.files.scene_file import load_scene
 from proofroll.running.runner import Runner
 from proofroll.studies.axes import Axis
-from proofroll.studies.failure import ACCURATE, REFUSED, RunOutcome, meanings
+from proofroll.studies.failure import ACCURATE, REFUSED, meanings
 from proofroll.studies.hosts import hosts
 from proofroll.studies.stability import MapPoint, Progress, StabilityMap, failure_beyond, stability, stability_path
 from proofroll.studies.stability_claims import StabilityFile
@@ -29,11 +30,6 @@ from proofroll.studies.stability_reproducers import with_programs
 from proofroll.studies.step_numbers import explanation, step_numbers, values
 from proofroll.studies.study_identity import measured
 from proofroll.studies.study_store import keep
-
-_PASSES: Mapping[str, Callable[[RunOutcome], bool]] = {
-    "stable": lambda outcome: outcome.stable,
-    "accurate": lambda outcome: outcome.accurate,
-}
 
 
 def make_stability(
@@ -134,7 +130,7 @@ def _point(point: MapPoint) -> BoundaryPoint:
 
 def _side(point: MapPoint, name: str) -> Boundary:
     """One boundary: the largest step or tolerance that holds, and what is beyond."""
-    holding, failing = point.found.boundary(_PASSES[name])
+    holding, failing = point.found.boundary(attrgetter(name))
     beyond = failure_beyond(point, failing)
     scene, yardstick = point.place.scene, point.place.yardstick
     assert scene is not None  # points have both

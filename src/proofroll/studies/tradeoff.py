@@ -12,6 +12,7 @@ import itertools
 import json
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass, field
+from functools import partial
 from pathlib import Path
 
 import numpy as np
@@ -130,7 +131,7 @@ def _time(found: Tradeoff, truth: Case, workers: Workers, rounds: int, tell: Pro
     seconds = BRIEF_SECONDS if found.brief else None
     with Stopwatch(workers) as stopwatch:
         timings = interleaved(
-            {key: lambda case=case: stopwatch(case, seconds) for key, case in cases.items()},  # type: ignore[misc]
+            {key: partial(stopwatch, case, seconds) for key, case in cases.items()},
             min(rounds, BRIEF_ROUNDS) if found.brief else rounds,
             once_above=BRIEF_ONCE if found.brief else np.inf,
             progress=lambda key: tell(f"timing {cases[key].engine.name}"),

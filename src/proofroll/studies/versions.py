@@ -6,6 +6,7 @@ import dataclasses
 from collections import Counter
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field
+from functools import partial
 from typing import Any
 
 from proofroll.core.comparison import Comparison
@@ -202,8 +203,7 @@ def _speeds(
         for key, (before, after) in chosen.items():
             assert before.case is not None  # both ran
             assert after.case is not None
-            old, new = before.case, after.case
-            timings = interleaved({"old": lambda c=old: watch(c), "new": lambda c=new: watch(c)}, rounds)  # type: ignore[misc]  # bound now
+            timings = interleaved({"old": partial(watch, before.case), "new": partial(watch, after.case)}, rounds)
             progress(f"timing {key[1]}")
             if timings.keys() == {"old", "new"} and len(timings["old"].values) == len(timings["new"].values):
                 speeds[key] = ratio(timings["new"], timings["old"])
